@@ -169,3 +169,36 @@ def mechanisms(tape: Tape, places: list[Array]) -> list[Any]:
                 bars += [(p, joint), (q, joint)]
         found.append(planar.pinned(at, bars, fixed, 0, velocity=OMEGA, acceleration=ALPHA))
     return found
+
+
+def linkages(tape: Tape, places: Array) -> Any:
+    """The same from arrays at once; places (joints, 2) of all linkages one after the other."""
+    import planar
+
+    counts = np.diff(tape.first)
+    many, longest = len(counts), int(counts.max())
+    owner = np.repeat(np.arange(many), counts)
+    joint = np.arange(len(owner)) - tape.first[owner]
+    at = np.full((many, longest, 2), np.nan)
+    at[owner, joint] = places
+    fixed = tape.kind == FRAME
+    # the crank's bar, or the two of a dyad
+    bar_counts = np.where(fixed, 0, np.where(tape.kind == CRANK, 1, 2))
+    of = np.repeat(np.arange(len(owner)), bar_counts)
+    second = np.concatenate([[False], of[1:] == of[:-1]])
+    bars = np.stack([np.where(second, tape.of[of, 1], tape.of[of, 0]), joint[of]], axis=1)
+    return planar.pinned_linkages(
+        at,
+        _padded(bars, owner[of], many),
+        _padded(joint[fixed], owner[fixed], many),
+        velocity=OMEGA,
+        acceleration=ALPHA,
+    )
+
+
+def _padded(values: Array, owner: Array, many: int) -> Array:
+    """Rows of several owners, one owner after the other, with an entry for each owner; -1 where one has fewer."""
+    counts = np.bincount(owner, minlength=many)
+    found = np.full((many, counts.max(), *values.shape[1:]), -1)
+    found[owner, np.arange(len(owner)) - (np.cumsum(counts) - counts)[owner]] = values
+    return found

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -87,31 +88,29 @@ class Mixed:
         return found
 
     def _planar(self, places: list[Array]) -> list[_Entry]:
-        """`planar.sweep_each` on mechanisms that are there, and from the places of their joints."""
-        if not (hasattr(planar, "sweep_each") and hasattr(planar, "pinned")):
+        """`planar.sweep_each` on linkages as arrays and as mechanisms, made from the places of their joints and ready."""
+        if not (hasattr(planar, "sweep_each") and hasattr(planar, "pinned_linkages")):
             return []
-        tape, ready = self.tape, dyadic.mechanisms(self.tape, places)
+        tape, flat = self.tape, np.concatenate(places)
+        ways: dict[str, Callable[[], Any]] = {
+            "planar.sweep_each": lambda: dyadic.linkages(tape, flat),
+            "planar.sweep_each, of mechanisms": lambda: dyadic.mechanisms(tape, places),
+        }
 
         def read(rates: bool) -> Callable[[Any, int], Array]:
             return lambda told, k: _read(told[k], places[k], rates)
 
         found = []
         for rates in (False, True):
-            found += [
-                _Entry(
-                    "planar.sweep_each",
-                    rates,
-                    lambda rates=rates: planar.sweep_each(ready, self.steps, rates=rates),
-                    read(rates),
-                ),
-                _Entry(
-                    "planar.sweep_each, with building",
-                    rates,
-                    lambda rates=rates: planar.sweep_each(dyadic.mechanisms(tape, places), self.steps, rates=rates),
-                    read(rates),
-                ),
-            ]
+            for name, build in ways.items():
+                ready = build()
+                for system, made in ((name, lambda ready=ready: ready), (f"{name}, with building", build)):
+                    call = partial(self._swept, made, rates)
+                    found.append(_Entry(system, rates, call, read(rates)))
         return found
+
+    def _swept(self, made: Callable[[], Any], rates: bool) -> Any:
+        return planar.sweep_each(made(), self.steps, rates=rates)
 
     def result(self, entry: _Entry, seconds: float, first: float) -> Result:
         """What an entry found beside the closed form."""

@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from planar.assemblies.modes import Mode, Modes, modes
     from planar.batch.mechanisms.results import Each, Swept
     from planar.batch.prepared import PreparedRun, PreparedSweep, prepared
+    from planar.batch.reductions.reduced_sweep import ReducedSweep
     from planar.batch.results import Sweep
     from planar.batch.sweep import sweep
     from planar.batch.sweep_mechanisms import sweep_each
@@ -68,6 +69,7 @@ if TYPE_CHECKING:
     from planar.model.pairs.slot import SlotPair
     from planar.model.pairs.turning import TurningPair
     from planar.model.pin_linkage import pinned
+    from planar.model.pin_linkages import PinnedLinkages, pinned_linkages
     from planar.pages.view import view
     from planar.reports.files.xarray_dataset import dataset
     from planar.results.motion import Motion, State
@@ -131,6 +133,7 @@ _ROOMS = {
     "NoAnswer": "foundation.errors",
     "Outcome": "foundation.errors",
     "Pair": "model.pairs.base",
+    "PinnedLinkages": "model.pin_linkages",
     "PlanarError": "foundation.errors",
     "Point": "model.mechanism",
     "PointMotion": "results.records",
@@ -141,6 +144,7 @@ _ROOMS = {
     "PreparedSweep": "batch.prepared",
     "RackPair": "model.pairs.rack",
     "Reaction": "dynamics.reactions",
+    "ReducedSweep": "batch.reductions.reduced_sweep",
     "RelativeState": "results.records",
     "Simulation": "dynamics.simulation",
     "SlidingPair": "model.pairs.sliding",
@@ -187,6 +191,7 @@ _ROOMS = {
     "modes": "assemblies.modes",
     "problem_variants": "analysis.classroom.variants",
     "pinned": "model.pin_linkage",
+    "pinned_linkages": "model.pin_linkages",
     "plot": "plot",
     "prepared": "batch.prepared",
     "schema": "document.schema",
@@ -258,6 +263,7 @@ __all__ = [
     "NoAnswer",
     "Outcome",
     "Pair",
+    "PinnedLinkages",
     "PlanarError",
     "Point",
     "PointMotion",
@@ -268,6 +274,7 @@ __all__ = [
     "PreparedSweep",
     "RackPair",
     "Reaction",
+    "ReducedSweep",
     "RelativeState",
     "Simulation",
     "SlidingPair",
@@ -313,6 +320,7 @@ __all__ = [
     "mobility",
     "modes",
     "pinned",
+    "pinned_linkages",
     "plot",
     "prepared",
     "problem_variants",

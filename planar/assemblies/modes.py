@@ -108,6 +108,11 @@ class Modes(Displayable, Sequence["Mode"]):
         """The mechanism at the inputs of these assemblies."""
         return self._solver.mechanism
 
+    @property
+    def scale(self) -> Array:
+        """The units of all coordinates (coordinates,), m or rad, in which the unknowns of modes are."""
+        return self._solver.scale
+
     def __iter__(self) -> Iterator[Mode]:
         number = 0
         while self._list_up_to(number + 1):

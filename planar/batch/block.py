@@ -12,14 +12,15 @@ from planar.batch.closed_form.own_ranges import run_between_limits
 from planar.batch.dead_point_tracking import DEAD_POINT_MARGIN, FollowedDesigns, follow_to_dead_points
 from planar.batch.design_arrays import values_of_design, with_design_values
 from planar.batch.general_path import OUTCOMES, DesignQuestion, solve_design
-from planar.batch.initial_assembly import find_assemblies
+from planar.batch.initial_assembly import find_assemblies, given_assemblies
 from planar.batch.march.backend import DesignBatch, DesignRunner, UnsupportedStructure, erase_from_steps
 from planar.batch.march.choice import find_runner
 from planar.batch.march.numpy_backend import NumpyRunner
 from planar.batch.reference_design import ReferenceDesign, reference_design
 from planar.codegen.aligned_arrays import allocate_aligned
 from planar.foundation.errors import Outcome
-from planar.model.link_shapes import LinkShape
+from planar.foundation.turns import take_turn
+from planar.model.link_shapes import LinkShape, PointMember, PointName, place_in_link
 from planar.model.mechanism import LARGEST_INPUT_POSITION, Mechanism
 
 Array = np.ndarray
@@ -32,17 +33,23 @@ FULL_TURN = 2.0 * np.pi
 
 
 class DesignBlock(NamedTuple):
-    """A block that is to be solved. `designs`: names with an array (designs,) each; `start`, `stop`: see `sweep`."""
+    """A block that is to be solved. `designs`: names with an array (designs,) each; `start`, `stop`: see `sweep`.
+
+    `assemblies`: unknowns (unknowns, designs) at the designs' own inputs, where it is not the sketch that chooses; not
+    numbers of a design that has no assembly. `dtype`: of the results, which are rounded to it when they are written.
+    """
 
     mechanism: Mechanism
     designs: Mapping[str, Array]
     steps: int
-    points: tuple[str, ...]
+    points: tuple[PointName, ...]
     rates: bool
     start: float | None
     stop: float | None
     pair: str | None
     backend: str
+    assemblies: Array | None = None
+    dtype: str = "float64"
 
 
 class SolvedDesigns(NamedTuple):
@@ -65,7 +72,8 @@ class SolvedDesigns(NamedTuple):
 def solve_design_block(block: DesignBlock, out: Array | None = None) -> SolvedDesigns:
     """Solve a block, in `out` (steps + 1, rows, designs) if that is given. Raises BadInput only for what holds for all
     designs."""
-    return _DesignBlockSolver(block, out).solve()
+    with take_turn():
+        return _DesignBlockSolver(block, out).solve()
 
 
 def status_code(outcome: Outcome) -> int:
@@ -146,6 +154,8 @@ class _DesignBlockSolver:
         """A design, and the range that it is to run."""
         block = self.block
         mechanism = with_design_values(self.reference.mechanism, values_of_design(block.designs, index))
+        if block.assemblies is not None:
+            mechanism = self.reference.with_sketch_of(mechanism, block.assemblies[:, index], self.u[:, index])
         grid = None if self.has_own_range else inputs if inputs.ndim == 1 else inputs[index]
         ends = (block.start, block.stop) if grid is None else (float(grid[0]), float(grid[-1]))
         return DesignQuestion(mechanism, self.reference.pair, grid, block.steps, ends)
@@ -173,10 +183,13 @@ class _DesignBlockSolver:
         """
         block, base_, runner = self.block, self.reference, find_runner(self.block.backend)
         shapes = base_.shapes(self.all_designs)
-        p = base_.pair_numbers(shapes, self.design_count)
+        p = base_.pair_numbers(shapes, self.design_count, self.all_designs)
         told = {name: base_.point_member(name) for name in block.points}
         moving = {name: each for name, each in told.items() if each[0] != base_.mechanism.frame}
-        start = find_assemblies(base_, shapes, p, self.u, runner, block.backend)
+        if block.assemblies is None:
+            start = find_assemblies(base_, shapes, p, self.u, runner, block.backend)
+        else:
+            start = given_assemblies(block.assemblies)
         self.failed_block = start.failed_block
         fit = start.is_sure & base_.is_fit(block.designs, shapes, p)
         fit &= (np.abs(self.u).max(axis=0) <= LARGEST_INPUT_POSITION) & (np.abs(self.start) <= LARGEST_INPUT_POSITION)
@@ -224,15 +237,14 @@ class _DesignBlockSolver:
         out = self._output_array()
         if march.output_row_count == out.shape[1]:
             return out
-        return allocate_aligned(len(out), march.output_row_count, self.design_count)
+        return allocate_aligned(len(out), march.output_row_count, self.design_count, out.dtype)
 
     def _output_array(self) -> Array:
         """Where the results stand."""
         block = self.block
         if self.out is None:
-            self.out = allocate_aligned(
-                block.steps + 1, 2 * len(block.points) * (3 if block.rates else 1), self.design_count
-            )
+            rows = 2 * len(block.points) * (3 if block.rates else 1)
+            self.out = allocate_aligned(block.steps + 1, rows, self.design_count, block.dtype)
         return self.out
 
     def _run_fit_designs(self, runner: DesignRunner, march: DesignBatch, fit: Array) -> tuple[Array, Array]:
@@ -244,7 +256,7 @@ class _DesignBlockSolver:
         out[:] = np.nan
         some, good = np.flatnonzero(fit), np.zeros(self.design_count, dtype=int)
         if some.size:
-            own = allocate_aligned(len(out), march.output_row_count, some.size)
+            own = allocate_aligned(len(out), march.output_row_count, some.size, out.dtype)
             good[some] = runner.run(march.select(some), own)
             out[:, :, some] = own
         return out, good
@@ -305,7 +317,7 @@ class _DesignBlockSolver:
         return march._replace(z0=z), fit & passed
 
     def _with_frame_points(
-        self, out: Array, told: Mapping[str, tuple[str, str]], shapes: Mapping[str, LinkShape]
+        self, out: Array, told: Mapping[PointName, PointMember], shapes: Mapping[str, LinkShape]
     ) -> Array:
         """The rows of all points, those on the frame filled in."""
         frame = self.reference.mechanism.frame
@@ -317,7 +329,7 @@ class _DesignBlockSolver:
         moving = [k for k, (link, _) in enumerate(told.values()) if link != frame]
         for k, (link, point) in enumerate(told.values()):
             if link == frame:
-                whole[:, 2 * k], whole[:, 2 * k + 1] = shapes[link].position(point)
+                whole[:, 2 * k], whole[:, 2 * k + 1] = place_in_link(shapes[link], point)
         for order in range(orders):
             for place, k in enumerate(moving):
                 old, new = 2 * (order * len(moving) + place), 2 * (order * len(told) + k)

@@ -12,8 +12,6 @@ from planar.document.dimensions import (
     Dimension,
     change_dimension,
     file_dimensions,
-    input_numbers,
-    link_lengths,
 )
 from planar.foundation.errors import BadInput
 from planar.model.mechanism import LARGEST_COUNTED_ANGLE, Mechanism
@@ -22,11 +20,10 @@ Array = np.ndarray
 
 
 def design_variables(mechanism: Mechanism) -> dict[str, Dimension]:
-    """Everything that designs may differ in, by name: lengths of links, then inputs (see `document.dimensions`)."""
+    """Everything that designs may differ in, by name: all numbers of the file (see `document.dimensions`)."""
     found: dict[str, Dimension] | None = mechanism.__dict__.get("_design_variables")  # kept: asked often
     if found is None:
-        lengths = link_lengths(mechanism, (link.name for link in mechanism.links))
-        found = {each.name: each for each in (*lengths, *input_numbers(mechanism))}
+        found = file_dimensions(mechanism)
         object.__setattr__(mechanism, "_design_variables", found)
     return found
 
@@ -36,7 +33,7 @@ def read_designs(mechanism: Mechanism, designs: Mapping[str, Any]) -> dict[str, 
     if not isinstance(designs, Mapping) or not designs:
         raise BadInput("designs", "name what the designs differ in, with an array each, as {'BC.length': lengths}")
     known = design_variables(mechanism)
-    values = {name: _read_values(name, given, known, mechanism) for name, given in designs.items()}
+    values = {name: _read_values(name, given, known) for name, given in designs.items()}
     many = {name: len(array) for name, array in values.items() if array.ndim}
     if not many:
         many = {next(iter(values)): 1}
@@ -49,11 +46,8 @@ def read_designs(mechanism: Mechanism, designs: Mapping[str, Any]) -> dict[str, 
     return {name: np.broadcast_to(array, (count,)) for name, array in values.items()}
 
 
-def _read_values(name: str, given: Any, known: Mapping[str, Dimension], mechanism: Mechanism) -> Array:
+def _read_values(name: str, given: Any, known: Mapping[str, Dimension]) -> Array:
     if name not in known:
-        other = file_dimensions(mechanism).get(name)
-        if other is not None:
-            raise BadInput(name, f"designs differ in lengths of links and in inputs, and this is a {other.kind}")
         meant = suggest_spelling(str(name), known, cutoff=0.5) or f"; there are {', '.join(list(known)[:12])}"
         raise BadInput(str(name), f"the mechanism has no such dimension or input{meant}")
     try:
@@ -64,7 +58,13 @@ def _read_values(name: str, given: Any, known: Mapping[str, Dimension], mechanis
         raise BadInput(name, f"one row of numbers is wanted, not an array of {array.ndim} axes; ravel a grid of them")
     if not np.all(np.isfinite(array)):
         raise BadInput(name, "a number here is not finite")
-    if known[name].path[-1] == "position" and np.any(np.abs(array) > LARGEST_COUNTED_ANGLE):
+    if known[name].kind == "count" and np.any(array != np.round(array)):
+        raise BadInput(name, "whole numbers are wanted here")
+    if (
+        known[name].path[0] == "inputs"
+        and known[name].path[-1] == "position"
+        and np.any(np.abs(array) > LARGEST_COUNTED_ANGLE)
+    ):
         raise BadInput(name, f"an input moves to {LARGEST_COUNTED_ANGLE:g} rad or m at most")
     return array
 

@@ -1,10 +1,12 @@
-"""Tasks given to an executor, which may lose them: retried, then done here."""
+"""Tasks side by side: in threads of this process, or given to an executor, which may lose them."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, ThreadPoolExecutor, wait
+from contextlib import suppress
+from numbers import Integral
 from typing import TypeVar
 
 from planar.foundation.errors import BadInput
@@ -15,7 +17,26 @@ Result = TypeVar("Result")
 MAX_EXECUTOR_TRIES = 2
 """How often a task is given to an executor before it is done here."""
 TASKS_PER_WORKER = 2
-"""Tasks in the hands of an executor for each of its workers."""
+"""Tasks in the hands of an executor, or of threads, for each of its workers."""
+
+
+def usable_cores() -> int:
+    """How many cores this process may use."""
+    try:
+        return max(1, len(os.sched_getaffinity(0)))
+    except AttributeError:  # not every system tells
+        return max(1, os.cpu_count() or 1)
+
+
+def thread_count(workers: int | None, executor: Executor | None) -> int:
+    """How many threads solve: as many as there are cores where `workers` is None. Raises BadInput."""
+    if workers is None:
+        return 1 if executor is not None else usable_cores()
+    if isinstance(workers, bool) or not isinstance(workers, Integral) or workers < 1:
+        raise BadInput("workers", f"a whole number of threads is wanted, not {workers!r:.40}")
+    if executor is not None:
+        raise BadInput("workers", "an executor has workers of its own; name the one or the other")
+    return int(workers)
 
 
 def worker_count(executor: Executor) -> int:
@@ -23,40 +44,82 @@ def worker_count(executor: Executor) -> int:
     return max(1, getattr(executor, "_max_workers", None) or os.cpu_count() or 1)
 
 
-def run_tasks(
-    executor: Executor | None,
-    function: Callable[[Task], Result],
-    tasks: Mapping[int, Task],
-    run_here: Callable[[int], Result],
+def run_in_threads(
+    threads: int, tasks: Iterable[tuple[int, Task]], function: Callable[[int, Task], Result]
 ) -> Iterator[tuple[int, Result]]:
-    """The results as they come, each by its number: `function` of a task by the executor, else `run_here` of a number.
+    """The results of numbered tasks as they come, each by its number; tasks are taken when a thread is free for them.
+
+    Whatever a task raises is raised here.
+    """
+    if threads == 1:
+        for k, task in tasks:
+            yield k, function(k, task)
+        return
+    waiting = iter(tasks)
+    running: dict[Future[Result], int] = {}
+    with ThreadPoolExecutor(threads, thread_name_prefix="planar") as pool:
+        try:
+            while True:
+                with suppress(StopIteration):
+                    while len(running) < TASKS_PER_WORKER * threads:
+                        k, task = next(waiting)
+                        running[pool.submit(function, k, task)] = k
+                if not running:
+                    return
+                for future in wait(running, return_when=FIRST_COMPLETED).done:
+                    yield running.pop(future), future.result()
+        finally:
+            for future in running:
+                future.cancel()
+
+
+def run_tasks(
+    threads: int,
+    executor: Executor | None,
+    run_there: Callable[[Task], Result],
+    tasks: Iterable[tuple[int, Task]],
+    run_here: Callable[[int, Task], Result],
+) -> Iterator[tuple[int, Result]]:
+    """The results of numbered tasks as they come: by an executor if there is one, else in threads."""
+    if executor is None:
+        return run_in_threads(threads, tasks, run_here)
+    return run_in_executor(executor, run_there, tasks, run_here)
+
+
+def run_in_executor(
+    executor: Executor,
+    function: Callable[[Task], Result],
+    tasks: Iterable[tuple[int, Task]],
+    run_here: Callable[[int, Task], Result],
+) -> Iterator[tuple[int, Result]]:
+    """The same by an executor: `function` of a task there, `run_here` of its number and itself where that is lost.
 
     Whatever an executor raises, its tasks can be done here; a BadInput of the task itself is raised once.
     """
-    if executor is None:
-        for k in tasks:
-            yield k, run_here(k)
-        return
-    waiting, tries = list(tasks)[::-1], dict.fromkeys(tasks, 0)
-    running: dict[Future[Result], int] = {}
+    waiting, lost = iter(tasks), list[tuple[int, Task, int]]()
+    running: dict[Future[Result], tuple[int, Task, int]] = {}
     most = TASKS_PER_WORKER * worker_count(executor)
     try:
-        while waiting or running:
-            while waiting and len(running) < most:
-                k = waiting.pop()
-                future = _submit(executor, function, tasks[k]) if tries[k] < MAX_EXECUTOR_TRIES else None
-                tries[k] += 1
+        while True:
+            while len(running) < most:
+                following = lost.pop() if lost else next(((k, task, 0) for k, task in waiting), None)
+                if following is None:
+                    break
+                k, task, tries = following
+                future = _submit(executor, function, task) if tries < MAX_EXECUTOR_TRIES else None
                 if future is None:
-                    yield k, run_here(k)
+                    yield k, run_here(k, task)
                 else:
-                    running[future] = k
-            for future in wait(running, return_when=FIRST_COMPLETED).done if running else ():
-                k = running.pop(future)
+                    running[future] = k, task, tries + 1
+            if not running:
+                return
+            for future in wait(running, return_when=FIRST_COMPLETED).done:
+                k, task, tries = running.pop(future)
                 problem = future.exception() if not future.cancelled() else None
                 if isinstance(problem, BadInput):
                     raise problem
                 if future.cancelled() or problem is not None:
-                    waiting.append(k)
+                    lost.append((k, task, tries))
                 else:
                     yield k, future.result()
     finally:

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 
 from planar.foundation.errors import BadInput, NoAnswer, Outcome
-from planar.model.link_shapes import PointPlacementError
+from planar.foundation.jets import value_and_rates
+from planar.model.link_shapes import PointName, PointPlacementError
 from planar.model.mechanism import Mechanism
 from planar.results.motion import Motion
+from planar.results.records import PointMotion, stack_vectors, vector_and_rates
 from planar.solving.cycle import cycle
 
 Array = np.ndarray
@@ -52,30 +55,58 @@ def solve_design(
     grid: Array | None,
     steps: int,
     range_: tuple[float | None, float | None],
-    points: tuple[str, ...],
+    points: tuple[PointName, ...],
     rates: bool,
 ) -> SolvedDesign:
     """A design over a grid of positions (rows,) of its running input, or, without one, over a range of its own.
 
     `range_` is the start and the stop that the cycle is asked for. Never raises NoAnswer: the status says it.
     """
+
+    def run() -> tuple[Motion, Array]:
+        motion = cycle(mechanism, steps, *range_, pair)
+        return motion, motion.inputs[pair].position
+
+    return _solve(run, grid, steps, points, rates)
+
+
+def solve_timed_design(
+    mechanism: Mechanism, duration: float, steps: int, points: tuple[PointName, ...], rates: bool
+) -> SolvedDesign:
+    """A design in time, all its inputs at once by their laws or rates: as `solve_design`, `input` the times (s)."""
+
+    def run() -> tuple[Motion, Array]:
+        motion = cycle(mechanism, steps, duration=duration)
+        assert motion.time is not None
+        return motion, motion.time
+
+    return _solve(run, np.linspace(0.0, duration, steps + 1), steps, points, rates)
+
+
+def _solve(
+    run: Callable[[], tuple[Motion, Array]],
+    grid: Array | None,
+    steps: int,
+    points: tuple[PointName, ...],
+    rates: bool,
+) -> SolvedDesign:
+    """The rows of a motion on a grid (rows,), or on its own; `run` gives the motion, and where its rows are."""
     wide = 2 * len(points) * (3 if rates else 1)
     out, status = np.full((steps + 1, wide), np.nan), np.zeros(steps + 1, dtype=np.int8)
     input_ = np.full(steps + 1, np.nan) if grid is None else grid
     try:
-        motion = cycle(mechanism, steps, *range_, pair)
+        motion, position = run()
     except NoAnswer as problem:
         status[:] = OUTCOMES.index(problem.outcome)
         return SolvedDesign(input_, out, status, str(problem))
     except (BadInput, PointPlacementError) as problem:
         status[:] = OUTCOMES.index(Outcome.CANNOT_BE_ASSEMBLED)
         return SolvedDesign(input_, out, status, str(problem))
-    position = motion.inputs[pair].position
+    both = min(len(position), steps + 1)
     if grid is None:
         input_[: len(position)] = position[: steps + 1]
-        many = min(len(position), steps + 1)
+        many = both
     else:
-        both = min(len(position), steps + 1)
         off = np.abs(position[:both] - grid[:both]) > GRID_TOLERANCE * max(1.0, float(np.max(np.abs(grid))))
         many = int(np.argmax(off)) if off.any() else both
     out[:many] = _point_rows(motion, points, rates)[:many]
@@ -87,9 +118,21 @@ def solve_design(
     return SolvedDesign(input_, out, status, reason, told, dead_point)
 
 
-def _point_rows(motion: Motion, points: tuple[str, ...], rates: bool) -> Array:
-    found = [motion.point(name) for name in points]
+def link_angles(motion: Motion, links: tuple[str, ...]) -> Array:
+    """The angles of links (links, rows) over a motion, with all turns as they are followed."""
+    return np.array([np.broadcast_to(value_and_rates(motion.frames[link].angle)[0], len(motion)) for link in links])
+
+
+def _point_rows(motion: Motion, points: tuple[PointName, ...], rates: bool) -> Array:
+    found = [_point_motion(motion, name) for name in points]
     orders = ("position", "velocity", "acceleration") if rates else ("position",)
     if not found:
         return np.zeros((len(motion), 0))
     return np.hstack([getattr(point, order) for order in orders for point in found])
+
+
+def _point_motion(motion: Motion, name: PointName) -> PointMotion:
+    if isinstance(name, str):
+        return motion.point(name)
+    orders = vector_and_rates(motion.frames[name.link].to_world(name.at))[:3]
+    return PointMotion(*(np.broadcast_to(stack_vectors(*each), (len(motion), 2)) for each in orders))

@@ -50,6 +50,11 @@ MAX_SEARCHED_UNKNOWNS = 6
 find the nearest where that lies far from the sketch."""
 
 
+def given_assemblies(z: Array) -> DesignAssemblies:
+    """Assemblies that are told: unknowns (unknowns, designs), not numbers where there is none."""
+    return DesignAssemblies(z, np.isfinite(z).all(axis=0), np.full(z.shape[1], -1))
+
+
 def find_assemblies(
     reference: ReferenceDesign,
     shapes: Mapping[str, LinkShape],

@@ -3,24 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import cached_property, lru_cache
 from itertools import combinations
 
 import numpy as np
 
-from planar.batch.design_arrays import design_variables
+from planar.batch.design_arrays import design_variables, values_of_design, with_design_values
 from planar.batch.march.backend import DesignBatch
 from planar.document.cursor import suggest_spelling
-from planar.equations.mechanism_numbers import scaled_pair_numbers
+from planar.equations.coordinates import frames_from_coordinates
+from planar.equations.mechanism_numbers import scaled_pair_numbers, shapes_of_links
 from planar.foundation.errors import BadInput
 from planar.foundation.geometry import Vector
 from planar.foundation.jets import Scalar
-from planar.model.link_shapes import LinkShape, link_shape
+from planar.model.link_shapes import LinkPlace, LinkShape, PointMember, PointName, link_shape, place_in_link
 from planar.model.mechanism import (
     Drive,
     Mechanism,
     NamedPoint,
+    links_counting_turns,
     named_points,
+    relative_motions,
     replace_inputs,
     running_input_index,
 )
@@ -37,19 +41,22 @@ MAX_ROOTS = 16
 
 
 class ReferenceDesign:
-    """A mechanism one of whose inputs runs while the others stand still, before its designs change it."""
+    """A mechanism one of whose inputs runs while the others stand still, before its designs change it; in time all
+    run."""
 
-    def __init__(self, mechanism: Mechanism, pair: str | None):
+    def __init__(self, mechanism: Mechanism, pair: str | None, is_timed: bool = False):
         names = [given.pair for given in mechanism.inputs]
-        self.running_index = running_input_index(mechanism, pair)
+        self.running_index = 0 if is_timed else running_input_index(mechanism, pair)
         self.pair = names[self.running_index]
-        still = tuple(Drive(name, None, 0.0, 0.0) for name in names if name != self.pair)
+        still = () if is_timed else tuple(Drive(name, None, 0.0, 0.0) for name in names if name != self.pair)
         self.mechanism = replace_inputs(mechanism, still)
         self.solver = PositionSolver(self.mechanism)
         self.unit, self.functions = self.solver.unit, self.solver.functions
         self.is_sliding = self.solver.is_sliding(self.pair)
         self.input_scale = np.array([self.unit if self.solver.is_sliding(name) else 1.0 for name in names])
         self.points = {each.name: each for each in named_points(mechanism)}
+        self.motions = relative_motions(mechanism)
+        self.counted_links = links_counting_turns(mechanism)
 
     @cached_property
     def candidates(self) -> BlockAssemblies:
@@ -81,8 +88,26 @@ class ReferenceDesign:
                 raise BadInput("points", f"there is no point {each!r:.60}{meant}")
         return tuple(dict.fromkeys(known[each] for each in given))
 
-    def point_member(self, name: str) -> tuple[str, str]:
+    def result_name(self, point: str) -> PointName:
+        """The result name of a point. Raises BadInput."""
+        return self.select_points(point)[0]
+
+    def with_sketch_of(self, design: Mechanism, z: Array, u: Array) -> Mechanism:
+        """A design whose sketch is the assembly of these unknowns, with every named point; as it is where these are not
+        numbers."""
+        if not np.isfinite(z).all():
+            return design
+        shapes = shapes_of_links(design)
+        w = self.functions.coordinates(z, u, self.pair_numbers(shapes, 1, design)[:, 0]) * self.solver.scale
+        frames = frames_from_coordinates(w.tolist(), self.solver.column, shapes, {})[0]
+        points = [(name, *each.members[0]) for name, each in self.points.items()]
+        places = [(name, frames[link].to_world(shapes[link].position(point))) for name, link, point in points]
+        return replace(design, sketch=tuple((name, float(at.x), float(at.y)) for name, at in places))
+
+    def point_member(self, name: PointName) -> PointMember:
         """The (link, point) by which a point is told: on the frame where it lies there."""
+        if isinstance(name, LinkPlace):
+            return name.link, name.at
         members = self.points[name].members
         return next((each for each in members if each[0] == self.mechanism.frame), members[0])
 
@@ -95,10 +120,10 @@ class ReferenceDesign:
                 for link in designs.links
             }
 
-    def pair_numbers(self, shapes: Mapping[str, LinkShape], many: int) -> Array:
-        """p (numbers, designs), lengths in units of the base's size."""
+    def pair_numbers(self, shapes: Mapping[str, LinkShape], many: int, designs: Mechanism) -> Array:
+        """p (numbers, designs), lengths in units of the base's size, of links of these shapes in the designs' pairs."""
         rows: list[Scalar] = []
-        for pair in self.mechanism.pairs:
+        for pair in designs.pairs:
             rows += scaled_pair_numbers(pair, shapes, self.unit)
         return stack_rows(rows, many)
 
@@ -124,7 +149,7 @@ class ReferenceDesign:
         shapes: Mapping[str, LinkShape],
         p: Array,
         inputs: tuple[Array, Array, Array],
-        members: Iterable[tuple[str, str]],
+        members: Iterable[PointMember],
         rates: bool = False,
     ) -> DesignBatch:
         """Designs of these shapes and numbers, at their inputs (position, first and second rate), with points to tell.
@@ -133,20 +158,23 @@ class ReferenceDesign:
         """
         u, u1, u2 = inputs
         members, many = tuple(members), p.shape[1]
-        q = stack_rows([part for link, point in members for part in shapes[link].position(point)], many) / self.unit
+        q = (
+            stack_rows([part for link, point in members for part in place_in_link(shapes[link], point)], many)
+            / self.unit
+        )
         links, z0 = tuple(link for link, _ in members), np.zeros((len(self.functions.equations.unknowns), many))
         offsets, tolerance, zeros = np.zeros((1, len(u))), self.tolerance(p), self._zeros(p, q, members)
         return DesignBatch(
             self.functions, self.mechanism, p, q, z0, offsets, u, u1, u2, links, rates, tolerance, self.unit, zeros
         )
 
-    def _zeros(self, p: Array, q: Array, members: Sequence[tuple[str, str]]) -> frozenset[tuple[str, int]]:
+    def _zeros(self, p: Array, q: Array, members: Sequence[PointMember]) -> frozenset[tuple[str, int]]:
         """Rows of p and q that are nothing in all designs: those that are it in the base, or none.
 
         So all designs of a mechanism share their code, but for those that give such a number a value.
         """
         shapes = self.solver.shapes
-        base_q = [part for link, point in members for part in shapes[link].position(point)]
+        base_q = [part for link, point in members for part in place_in_link(shapes[link], point)]
         rows = [("p", k) for k in np.flatnonzero(self._base_numbers == 0.0).tolist()]
         rows += [("q", k) for k, part in enumerate(base_q) if part == 0.0]
         given = {"p": p, "q": q}
@@ -155,7 +183,7 @@ class ReferenceDesign:
     @cached_property
     def _base_numbers(self) -> Array:
         """p of the base (numbers,)."""
-        return self.pair_numbers(self.solver.shapes, 1)[:, 0]
+        return self.pair_numbers(self.solver.shapes, 1, self.mechanism)[:, 0]
 
     def is_fit(self, values: Mapping[str, Array], shapes: Mapping[str, LinkShape], p: Array) -> Array:
         """The designs that a backend may run (designs,): see `is_unfit` and `has_short_arm`."""
@@ -163,7 +191,8 @@ class ReferenceDesign:
         return fit & ~self.is_unfit(values, shapes) if values else fit
 
     def is_unfit(self, values: Mapping[str, Array], shapes: Mapping[str, LinkShape]) -> Array:
-        """The designs that the pairs may refuse before anything moves (designs,): they are looked at one by one."""
+        """The designs that are looked at one by one (designs,): pairs may refuse them before anything moves, or they
+        have a sketch of their own."""
         many = len(next(iter(values.values())))
         found = np.zeros(many, dtype=bool)
         for shape_ in shapes.values():
@@ -171,10 +200,15 @@ class ReferenceDesign:
                 found |= ~np.isfinite(np.asarray(at.x + at.y))
         choosy = [pair for pair in self.mechanism.pairs if type(pair).find_misfit is not Pair.find_misfit]
         known = design_variables(self.mechanism)
-        if choosy and any(known[name].link for name in values):
+        for name, value in values.items():
+            if known[name].path[0] == "sketch":
+                found |= value != known[name].value
+        of_pairs = {name: value for name, value in values.items() if known[name].path[0] == "pairs"}
+        if choosy and (of_pairs or any(known[name].link for name in values)):
             for index in range(many):
                 own = {name: shape_of_design(each, index) for name, each in shapes.items()}
-                found[index] |= any(pair.find_misfit(self.mechanism.pairs, own, str) for pair in choosy)
+                pairs = with_design_values(self.mechanism, values_of_design(of_pairs, index)).pairs
+                found[index] |= any(pair.find_misfit(pairs, own, str) for pair in pairs)
         return found
 
     def has_short_arm(self, shapes: Mapping[str, LinkShape], many: int) -> Array:
@@ -239,9 +273,9 @@ class ReferenceDesign:
 
 
 @lru_cache(maxsize=16)
-def reference_design(mechanism: Mechanism, pair: str | None) -> ReferenceDesign:
+def reference_design(mechanism: Mechanism, pair: str | None, is_timed: bool = False) -> ReferenceDesign:
     """The base of a mechanism's designs; kept, since a worker solves many blocks of one sweep."""
-    return ReferenceDesign(mechanism, pair)
+    return ReferenceDesign(mechanism, pair, is_timed)
 
 
 def stack_rows(rows: Sequence[Array | float], design_count: int) -> Array:

@@ -60,6 +60,19 @@ class Sweep:
     positions of the input that runs, (steps + 1,), or (designs, steps + 1) where they differ. `general`: how many
     positions the general path solved, one design after the other. `dead_point` (designs,): where the input is at the
     dead point at which a design's motion ends (rad or m), NaN where none does.
+
+    What was asked for beside points stands by the names of links, pairs and inputs in arrays (designs, steps + 1), and
+    is empty where nothing was: `angle`, `angular_velocity` and `angular_acceleration` of links (rad, s) as
+    `Motion.link` has them; `value` of pairs, the relative angle (rad) or how far a slide is (m), with `value_rate` and
+    `value_second_rate` (per s, per s^2), as `Motion.pair` has them; `transmission_angle` of outputs (rad), as of
+    `planar.transmission`; `effort` of inputs (N m or N), `reaction` of pairs, the force on the second link by the first
+    (designs, steps + 1, 2) (N), and `reaction_couple` (N m), as of `planar.forces` with inertia. NaN as of points;
+    forces also where equilibrium does not tell them. `limit` of the running input: the dead point (rad or m) at which a
+    design's run ends, the same at every step, NaN where it comes to its end.
+
+    Where all assemblies were asked for each stands as a design of its own: `design` is the number (from 0) of the one
+    that was given, and `assembly` that of the assembly in the list of `planar.modes` (from 1; 0 of a design that has
+    none), each (designs,).
     """
 
     points: tuple[str, ...]
@@ -73,6 +86,19 @@ class Sweep:
     dead_point: Any
     notes: SweepNotes = field(repr=False)
     outcomes: tuple[Outcome, ...] = tuple(Outcome)
+    angle: Mapping[str, Any] = field(default_factory=dict, repr=False)
+    angular_velocity: Mapping[str, Any] = field(default_factory=dict, repr=False)
+    angular_acceleration: Mapping[str, Any] = field(default_factory=dict, repr=False)
+    value: Mapping[str, Any] = field(default_factory=dict, repr=False)
+    value_rate: Mapping[str, Any] = field(default_factory=dict, repr=False)
+    value_second_rate: Mapping[str, Any] = field(default_factory=dict, repr=False)
+    transmission_angle: Mapping[str, Any] = field(default_factory=dict, repr=False)
+    effort: Mapping[str, Any] = field(default_factory=dict, repr=False)
+    reaction: Mapping[str, Any] = field(default_factory=dict, repr=False)
+    reaction_couple: Mapping[str, Any] = field(default_factory=dict, repr=False)
+    limit: Mapping[str, Any] = field(default_factory=dict, repr=False)
+    design: Array | None = field(default=None, repr=False)
+    assembly: Array | None = field(default=None, repr=False)
 
     __repr__ = short_repr
 

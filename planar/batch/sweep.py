@@ -2,32 +2,117 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import replace
+from functools import partial
 from math import ceil
 from numbers import Integral
 from pathlib import Path
-from typing import Any
+from typing import Any, overload
 
-from planar.batch.block import DesignBlock, solve_design_block
+import numpy as np
+from numpy.typing import DTypeLike
+
+from planar.batch.assembly_lists import list_assemblies
+from planar.batch.block import DesignBlock
 from planar.batch.design_arrays import read_designs, split_into_blocks
-from planar.batch.executor import TASKS_PER_WORKER, run_tasks, worker_count
+from planar.batch.executor import TASKS_PER_WORKER, run_tasks, thread_count, worker_count
 from planar.batch.march.choice import available_backends
-from planar.batch.reference_design import reference_design
+from planar.batch.named_results.result_block import ResultBlock, solve_result_block
+from planar.batch.named_results.result_rows import RequestedResults, select_names
+from planar.batch.named_results.transmission_angles import output_link
+from planar.batch.reductions.reduced_sweep import (
+    ReducedSweep,
+    Reduction,
+    Reductions,
+    ReductionStore,
+    read_reductions,
+    reduce_block,
+    result_type,
+)
+from planar.batch.reference_design import ReferenceDesign, reference_design
 from planar.batch.results import Sweep
-from planar.batch.stores.store import SweepPlan, open_store
+from planar.batch.stores.store import BlockStore, SweepPlan, open_store
 from planar.document.first_argument import takes_mechanism
+from planar.dynamics.load_validation import check_loads
 from planar.foundation.errors import BadInput
+from planar.model.link_shapes import PointName
 from planar.model.mechanism import LARGEST_COUNTED_ANGLE, Mechanism
 from planar.model.run_arguments import check_number, check_steps
+from planar.solving.cycle import MAX_DURATION
 
-MAX_BLOCK_BYTES = 128 * 2**20
-"""Bytes of a block's results."""
+MIN_BLOCK_POSITIONS, MAX_BLOCK_POSITIONS = 2**19, 2**22
+"""Positions of a block at least, where there are as many: so many that solving them is more than beginning it."""
+USUAL_BLOCKS = 12
+"""Blocks into which designs are divided between these: as many for two, three, four or six cores."""
+MAX_BLOCK_BYTES = {"memory": 256 * 2**20, "store": 64 * 2**20, "reduced": 16 * 2**20}
+"""Bytes of a block's results: solved where they stay; kept until they are written; only reduced, where no page of
+memory is new."""
+MAX_EXECUTOR_BLOCK_BYTES = 128 * 2**20
+"""Bytes of the results of a block that is solved elsewhere."""
 BLOCK_MULTIPLE = 16
 """Blocks are multiples of so many designs, where there are enough."""
 
 
+@overload
+@takes_mechanism
+def sweep(  # many: the public signature
+    mechanism: Mechanism,
+    designs: Mapping[str, Any],
+    steps: int = 200,
+    points: Sequence[str] | str | None = None,
+    *,
+    links: Sequence[str] | str = (),
+    pairs: Sequence[str] | str = (),
+    outputs: Sequence[str] | str = (),
+    efforts: Sequence[str] | str = (),
+    reactions: Sequence[str] | str = (),
+    limits: bool = False,
+    assemblies: str = "nearest",
+    rates: bool = True,
+    start: float | None = None,
+    stop: float | None = None,
+    pair: str | None = None,
+    duration: float | None = None,
+    backend: str = "auto",
+    workers: int | None = None,
+    executor: Executor | None = None,
+    block: int | None = None,
+    store: str | Path | None = None,
+    dtype: DTypeLike = "float64",
+    reduce: None = None,
+    progress: Callable[[int, int], object] | None = None,
+) -> Sweep: ...
+@overload
+@takes_mechanism
+def sweep(  # many: the public signature
+    mechanism: Mechanism,
+    designs: Mapping[str, Any],
+    steps: int = 200,
+    points: Sequence[str] | str | None = None,
+    *,
+    links: Sequence[str] | str = (),
+    pairs: Sequence[str] | str = (),
+    outputs: Sequence[str] | str = (),
+    efforts: Sequence[str] | str = (),
+    reactions: Sequence[str] | str = (),
+    limits: bool = False,
+    assemblies: str = "nearest",
+    rates: bool = True,
+    start: float | None = None,
+    stop: float | None = None,
+    pair: str | None = None,
+    duration: float | None = None,
+    backend: str = "auto",
+    workers: int | None = None,
+    executor: Executor | None = None,
+    block: int | None = None,
+    store: None = None,
+    dtype: DTypeLike = "float64",
+    reduce: Mapping[str, str | Reduction[Sweep]],
+    progress: Callable[[int, int], object] | None = None,
+) -> ReducedSweep: ...
 @takes_mechanism
 def sweep(  # many: the public signature; # long: its docstring
     mechanism: Mechanism,
@@ -35,70 +120,138 @@ def sweep(  # many: the public signature; # long: its docstring
     steps: int = 200,
     points: Sequence[str] | str | None = None,
     *,
+    links: Sequence[str] | str = (),
+    pairs: Sequence[str] | str = (),
+    outputs: Sequence[str] | str = (),
+    efforts: Sequence[str] | str = (),
+    reactions: Sequence[str] | str = (),
+    limits: bool = False,
+    assemblies: str = "nearest",
     rates: bool = True,
     start: float | None = None,
     stop: float | None = None,
     pair: str | None = None,
+    duration: float | None = None,
     backend: str = "auto",
+    workers: int | None = None,
     executor: Executor | None = None,
     block: int | None = None,
     store: str | Path | None = None,
+    dtype: DTypeLike = "float64",
+    reduce: Mapping[str, str | Reduction[Sweep]] | None = None,
     progress: Callable[[int, int], object] | None = None,
-) -> Sweep:
-    """The motions of many designs of one mechanism, which differ in dimensions of links or in their inputs.
+) -> Sweep | ReducedSweep:
+    """The motions of many designs of one mechanism, which differ in any numbers of its file.
 
-    `designs` maps names to arrays, all of one length, or single numbers (m, rad, per s): `BC.length`, `A.position`,
-    `BC.E.distance`; the names are those of `planar.dimensions`, of lengths of links and of inputs. Each design is
+    `designs` maps names to arrays, all of one length, or single numbers (SI: m, rad, per s): `BC.length`, `A.position`,
+    `BC.E.angle`, `wheels.ratio`, `stroke.line.angle`; the names are those of `planar.dimensions`. Each design is
     solved as `planar.cycle` would solve the mechanism so changed: from the assembly nearest to the sketch, at `steps`
     + 1 positions of one input from `start` to `stop` (rad or m), the others standing still. An angle runs from its
     own position a turn on where they are left out; a slide without a `stop` runs between its limits, each design
     between its own.
 
+    With a `duration` (s), or where an input has a law and no range is given, each design runs in time instead, as
+    `planar.cycle` does: all its inputs at once, by their laws or at their rates, over the duration or the longest law.
+
     `points` are those whose positions are wanted, and with `rates` velocities and accelerations; all that move, if left
-    out. A design that comes to a dead point has NaN from there on, and `status` says why.
+    out and nothing else is asked for. `links` and `pairs` are those whose angles and relative motions are wanted, with
+    `rates` their rates too; `outputs` links or pairs at the frame whose transmission angles are; `efforts` inputs and
+    `reactions` pairs whose forces are, under loads, weights, springs and inertia; with `limits` the dead points at
+    which runs end: see `Sweep`. A design that comes to a dead point has NaN from there on, and `status` says why.
+
+    `assemblies` "nearest" takes of each design that nearest to the sketch; "all" takes every assembly that it has at
+    its own inputs, each as a design of its own: see `Sweep.assembly`.
 
     `backend` "native" runs compiled machine code, "numpy" is always there, "auto" takes the faster that is there. What
     a backend cannot do, or its gate does not let pass, the general path does, which is counted and said.
 
-    `executor`, any of `concurrent.futures`' kind, solves the blocks elsewhere; a block that is lost there is tried
-    again, then solved here. `block` is how many designs are solved together. `store`, a path ending in .zarr or
-    .parquet, takes the results block by block, with checksums, into a folder of its own; the same sweep into the same
-    store goes on with the blocks that are missing or damaged. `progress` is called with how many designs are done, and
-    how many there are.
+    Blocks of designs are solved in as many threads as there are cores for this process, or in so many `workers`; that
+    changes no digit of the results. `executor`, any of `concurrent.futures`' kind, solves them elsewhere instead; a
+    block that is lost there is tried again, then solved here. `block` is how many designs are solved together. `store`,
+    a path ending in .zarr or .parquet, takes the results block by block, with checksums, into a folder of its own; the
+    same sweep into the same store goes on with the blocks that are missing or damaged. `progress` is called with how
+    many designs are done, and how many there are.
+
+    `dtype` "float32" halves the memory: each number is computed in double precision and rounded when it is written.
+    With `reduce` no positions are kept, only what is made of every block as it comes, by the names given. Measures have
+    names as `C.path_length`: of points x_extremes, y_extremes, bounding_box (least x and y, greatest x and y),
+    speed_extremes and acceleration_extremes over the positions that are solved, path_length of designs solved at every
+    step, enclosed_area and fourier_descriptors of those whose path is closed; of links, pairs and inputs the extremes
+    of any other result, as `BC.angle_extremes` or `A.effort_extremes`. Or they are functions that take a `Sweep` of a
+    block's designs and give an array with an entry for each. Only what measures need is then solved, and the result is
+    a `ReducedSweep`; not a number stands where a measure has nothing to go by.
 
     Raises BadInput for a name that is not there, a range or a store that cannot be; WriteFailure, which is one, where a
     store finds no more room.
     """
-    values = read_designs(mechanism, designs)
     if block is not None and (isinstance(block, bool) or not isinstance(block, Integral) or block < 1):
         raise BadInput("block", f"a whole number of designs is wanted, not {block!r:.40}")
-    mechanism = check_range(mechanism, steps, start, stop, pair)
-    common = reference_design(mechanism, pair)
-    names = common.select_points(points)
+    duration = run_duration(mechanism, duration, (start, stop, pair))
+    mechanism = check_range(mechanism, steps, start, stop, pair) if duration is None else mechanism
+    values = read_designs(mechanism, designs)
+    threads, number_type = thread_count(workers, executor), result_type(dtype)
+    common = reference_design(mechanism, pair, duration is not None)
+    if reduce is not None and store is not None:
+        raise BadInput("store", "a store keeps all results, and reductions are kept in memory; leave out one of them")
+    reductions = None if reduce is None else read_reductions(reduce, common.result_name, steps)
+    asked = {"links": links, "pairs": pairs, "outputs": outputs, "efforts": efforts, "reactions": reactions}
+    wanted = asked if reductions is None else reductions.with_results(asked)
+    results = _select_results(common, wanted, duration is not None)
+    if limits and duration is not None:
+        raise BadInput("limits", "they are of one input that runs over a range, and here all run in time")
+    results = results._replace(limits=(common.pair,) if limits else ())
+    names: tuple[PointName, ...] = () if points is None and any(results) else common.select_points(points)
+    if reductions is not None:
+        own, rates = reductions.with_points(names, rates)
+        names = own or ()
     available_backends(backend)
+    if assemblies not in ("nearest", "all"):
+        raise BadInput("assemblies", f"choose from nearest, all; there is no {assemblies!r:.40}")
+    listed = list_assemblies(common, values) if assemblies == "all" else None
+    if listed is not None:
+        values = {name: array[listed.design] for name, array in values.items()}
+    z = listed and listed.z
+    whole = DesignBlock(mechanism, values, int(steps), names, rates, start, stop, pair, backend, z, number_type)
     many = len(next(iter(values.values())))
-    size = int(block) if block is not None else _block_size(many, steps, len(names), rates, executor)
-    whole = DesignBlock(mechanism, values, int(steps), names, rates, start, stop, pair, backend)
-    into = open_store(store, SweepPlan(whole, size))
-    size = into.block_size
+    kept = "reduced" if reduce is not None else "store" if store is not None or any(results) else "memory"
+    width = len(names) + 2 * len(mechanism.links) * any(results)
+    size = int(block) if block is not None else _block_size(whole, width, many, executor, kept)
+    plan = SweepPlan(whole, size, results, listed, duration)
+    into = open_store(store, plan) if reductions is None else ReductionStore(plan)
+    for done in _solve_blocks(into, threads, executor, reductions):
+        if progress is not None:
+            progress(done, many)
+    found: Sweep | ReducedSweep = into.result()
+    return found
 
-    def task(part: slice) -> DesignBlock:
-        return whole._replace(designs={name: array[part] for name, array in values.items()})
 
-    parts = dict(enumerate(split_into_blocks(many, size)))
-    ready = sum(part.stop - part.start for k, part in parts.items() if k in into.finished)
-    if progress is not None and ready:
-        progress(ready, many)
-    todo = {k: part for k, part in parts.items() if k not in into.finished}
-    tasks = {k: task(part) for k, part in todo.items()}
-    for k, done in run_tasks(
-        executor, solve_design_block, tasks, lambda k: solve_design_block(tasks[k], into.output_array(parts[k]))
-    ):
+def _solve_blocks(
+    into: BlockStore, threads: int, executor: Executor | None, reductions: Reductions | None
+) -> Iterator[int]:
+    """Solve the blocks that are not there yet, and write them; how many designs are done after each."""
+    plan = into.plan
+    parts = list(split_into_blocks(plan.design_count, into.block_size))
+    whole = plan.all_designs
+    ready = sum(part.stop - part.start for k, part in enumerate(parts) if k in into.finished)
+    if ready:
+        yield ready
+
+    def task(part: slice) -> ResultBlock:
+        z = None if whole.assemblies is None else whole.assemblies[:, part]
+        own = {name: array[part] for name, array in whole.designs.items()}
+        return ResultBlock(whole._replace(designs=own, assemblies=z), plan.results, plan.duration)
+
+    def solve_here(number: int, block: ResultBlock) -> Any:
+        if reductions is not None:
+            return reduce_block(block, reductions.functions)
+        return solve_result_block(block, into.output_array(parts[number]))
+
+    tasks = ((k, task(part)) for k, part in enumerate(parts) if k not in into.finished)
+    solve = solve_result_block if reductions is None else partial(reduce_block, reductions=reductions.functions)
+    for k, done in run_tasks(min(threads, len(parts)), executor, solve, tasks, solve_here):
         into.write_block(k, parts[k], done)
         ready += parts[k].stop - parts[k].start
-        if progress is not None:
-            progress(ready, many)
-    return into.result()
+        yield ready
 
 
 def check_range(mechanism: Mechanism, steps: object, start: object, stop: object, pair: str | None) -> Mechanism:
@@ -108,15 +261,56 @@ def check_range(mechanism: Mechanism, steps: object, start: object, stop: object
     check_number("stop", stop, LARGEST_COUNTED_ANGLE)
     lawful = [given.pair for given in mechanism.inputs if given.law is not None]
     if lawful and start is None and stop is None and pair is None:
-        told = f"the input at {lawful[0]!r} has a law of time, which a sweep does not run; give it a start and a stop"
+        told = f"the input at {lawful[0]!r} has a law of time, which is not run here; give it a start and a stop"
         raise BadInput("designs", told)
     return replace(mechanism, inputs=tuple(given._replace(law=None) for given in mechanism.inputs))
 
 
-def _block_size(many: int, steps: int, points: int, rates: bool, executor: Executor | None) -> int:
-    """How many designs make a block."""
-    each = (steps + 1) * 2 * max(points, 1) * (3 if rates else 1) * 8
-    size = max(1, MAX_BLOCK_BYTES // each)
+def run_duration(mechanism: Mechanism, duration: float | None, range_: tuple[object, object, object]) -> float | None:
+    """How long (s) a run in time takes, as of `cycle`; None where one input runs over a range. Raises BadInput."""
+    check_number("duration", duration, MAX_DURATION, "s")
+    laws = [given.law.duration for given in mechanism.inputs if given.law is not None]
+    ranged = any(each is not None for each in range_)
+    if duration is None:
+        return max(laws) if laws and not ranged else None
+    if not duration > 0.0:
+        raise BadInput("duration", f"a time from zero on is wanted, not {duration!r:.40}")
+    if ranged:
+        raise BadInput("duration", "a run in time has no range of one input; give the one or the other")
+    return float(duration)
+
+
+def _select_results(
+    common: ReferenceDesign, asked: Mapping[str, Sequence[str] | str], is_timed: bool
+) -> RequestedResults:
+    """The results that are wanted beside those of points, by names. Raises BadInput."""
+    mechanism = common.mechanism
+    known = {
+        "links": [link.name for link in mechanism.links if link.name != mechanism.frame],
+        "pairs": list(common.motions),
+        "outputs": [link.name for link in mechanism.links] + list(common.motions),
+        "efforts": [given.pair for given in mechanism.inputs],
+        "reactions": [pair.name for pair in mechanism.pairs],
+    }
+    results = RequestedResults(**{word: select_names(word, names, known[word]) for word, names in asked.items()})
+    for output in results.outputs:
+        output_link(mechanism, output)
+    if results.has_forces:
+        check_loads(mechanism)
+        if not is_timed and any(load.varies is not None and load.varies.input is None for load in mechanism.loads):
+            raise BadInput("loads", "a load varies with time, which this sweep has not; give it a duration")
+    return results
+
+
+def _block_size(whole: DesignBlock, width: int, many: int, executor: Executor | None, kept: str) -> int:
+    """How many designs make a block of so many points, `kept` as in MAX_BLOCK_BYTES; in threads that hangs on the work
+    alone, so that results do."""
+    itemsize = 8 if kept == "reduced" else np.dtype(whole.dtype).itemsize
+    each = (whole.steps + 1) * 2 * max(width, 1) * (3 if whole.rates else 1) * itemsize
     if executor is not None:
-        size = min(size, ceil(many / (TASKS_PER_WORKER * worker_count(executor))))
-    return min(many, ceil(size / BLOCK_MULTIPLE) * BLOCK_MULTIPLE)
+        size = min(MAX_EXECUTOR_BLOCK_BYTES // each, ceil(many / (TASKS_PER_WORKER * worker_count(executor))))
+    else:
+        least, most = (positions // (whole.steps + 1) for positions in (MIN_BLOCK_POSITIONS, MAX_BLOCK_POSITIONS))
+        size = max(1, min(max(ceil(many / USUAL_BLOCKS), least), most, MAX_BLOCK_BYTES[kept] // each))
+        size = ceil(many / ceil(many / size))
+    return min(many, ceil(max(1, size) / BLOCK_MULTIPLE) * BLOCK_MULTIPLE)

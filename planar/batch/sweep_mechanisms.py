@@ -2,41 +2,50 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import replace
 from functools import partial
-from math import ceil
-from os import PathLike
-from typing import NamedTuple
+from typing import NamedTuple, overload
 
 import numpy as np
+from numpy.typing import DTypeLike
 
-from planar.batch.executor import in_order, run_tasks
+from planar.batch.executor import in_order, run_tasks, thread_count
 from planar.batch.general_path import OUTCOMES, solve_design
 from planar.batch.march.choice import available_backends
 from planar.batch.mechanisms.block_runner import BlockRunner, find_block_runner
 from planar.batch.mechanisms.initial_assembly import StartAssemblies, find_start_assemblies
-from planar.batch.mechanisms.linkage_groups import LinkageGroup, SweepRequest, linkage_groups, wanted_points
+from planar.batch.mechanisms.linkage_groups import LinkageGroup, SweepRequest, linkage_group, wanted_points
 from planar.batch.mechanisms.march import run_linkages
-from planar.batch.mechanisms.results import Each, PointMapping, Swept
-from planar.document.files import as_mechanism
+from planar.batch.mechanisms.parts import (
+    PART_SIZE,
+    PartRuns,
+    check_inputs,
+    find_endings,
+    part_messages,
+    read_mechanisms,
+)
+from planar.batch.mechanisms.results import Each, PointMapping, Swept, SweptList, SweptPart
+from planar.batch.pinned.march import FULL_TURN, REFINEMENT, make_values, step_division
+from planar.batch.pinned.results import PinnedPart, join_parts
+from planar.batch.pinned.solve import solve_pinned
+from planar.batch.pinned.told_pins import ToldPins, find_told_pins, pin_number
+from planar.batch.reductions.reduced_mechanisms import sweep_reduced
+from planar.batch.reductions.reduced_sweep import ReducedSweep, Reduction, result_type
 from planar.document.first_argument import MechanismSource
 from planar.foundation.errors import BadInput, Outcome
+from planar.foundation.turns import take_turn
 from planar.model.mechanism import Mechanism, named_points, relative_motions, running_input_index
 from planar.model.pairs import MeasureKind as Measure
 from planar.model.pin_linkage import PinnedMechanism
+from planar.model.pin_linkages import PinnedLinkages
 from planar.model.run_arguments import check_steps
-from planar.model.wording import count_phrase
 
 Array = np.ndarray
 
-FULL_TURN = 2.0 * np.pi
-LONGEST_INPUT_STEP, REFINEMENT = 0.07, 8
-"""rad: steps that are longer are divided, so that a position is never far from the one before; those that are not sure
-once more, into so many."""
-PART_SIZE = 512
-"""Mechanisms that are assembled together, and handed to an executor."""
+LINKAGES_PART_SIZE = PART_SIZE
+"""Linkages that are arrays already, and are handed on together."""
 MAX_STATE_BYTES = 16 * 2**20
 """Bytes of the links' places that are worked on at once."""
 
@@ -59,20 +68,54 @@ _ATTEMPTS = (
 that can give extremes."""
 
 
+@overload
 def sweep_each(  # many: the public signature
-    mechanisms: Iterable[MechanismSource],
+    mechanisms: Iterable[MechanismSource | PinnedLinkages],
     steps: int = 200,
     points: Sequence[str] | str | None = None,
     *,
     rates: bool = True,
     pair: str | None = None,
     backend: str = "auto",
+    workers: int | None = None,
     executor: Executor | None = None,
+    dtype: DTypeLike = "float64",
+    reduce: None = None,
     progress: Callable[[int, int], object] | None = None,
-) -> Each:
+) -> Each: ...
+@overload
+def sweep_each(  # many: the public signature
+    mechanisms: Iterable[MechanismSource | PinnedLinkages],
+    steps: int = 200,
+    points: Sequence[str] | str | None = None,
+    *,
+    rates: bool = True,
+    pair: str | None = None,
+    backend: str = "auto",
+    workers: int | None = None,
+    executor: Executor | None = None,
+    dtype: DTypeLike = "float64",
+    reduce: Mapping[str, str | Reduction[Each]],
+    progress: Callable[[int, int], object] | None = None,
+) -> ReducedSweep: ...
+def sweep_each(  # many: the public signature
+    mechanisms: Iterable[MechanismSource | PinnedLinkages],
+    steps: int = 200,
+    points: Sequence[str] | str | None = None,
+    *,
+    rates: bool = True,
+    pair: str | None = None,
+    backend: str = "auto",
+    workers: int | None = None,
+    executor: Executor | None = None,
+    dtype: DTypeLike = "float64",
+    reduce: Mapping[str, str | Reduction[Each]] | None = None,
+    progress: Callable[[int, int], object] | None = None,
+) -> Each | ReducedSweep:
     """The motions of mechanisms of any structure, each as `planar.sweep` would have it as a single design.
 
-    `mechanisms` are mechanisms, files or names of models.
+    `mechanisms` are mechanisms, files or names of models, or `planar.pinned_linkages`, of which none becomes an object
+    of its own.
 
     Each runs from the assembly nearest to its sketch, at `steps` + 1 positions of its input (the only one, else the one
     at `pair`; the others stand still), a turn on from its own position; a slide runs between its limits. `points` are
@@ -86,84 +129,148 @@ def sweep_each(  # many: the public signature
     input that runs, and those that come so near to where two assemblies meet that steps eight times finer do not show
     on which side they pass. A linkage that comes to a dead point has NaN from there on, and says so.
 
-    `backend` "native" runs compiled machine code, "numpy" numpy, "auto" the faster that is there. `executor`, any of
-    `concurrent.futures`' kind, solves parts of the whole elsewhere. `progress` is called with how many mechanisms are
-    done, and how many there are.
+    `backend` "native" runs compiled machine code, "numpy" numpy, "auto" the faster that is there. Parts of the whole
+    are solved in as many threads as there are cores for this process, or in so many `workers`; that changes no digit of
+    the results. `executor`, any of `concurrent.futures`' kind, solves them elsewhere instead. `progress` is called with
+    how many mechanisms are done, and how many there are, as far as that is known.
+
+    `dtype` "float32" halves the memory: each number is computed in double precision and rounded once. With `reduce` no
+    positions are kept, only what is made of them part by part, by the names given: measures of points as
+    `P7.path_length` (see `planar.sweep`), not a number where a mechanism has no such point, or functions that take an
+    `Each` of some mechanisms and give an array with an entry for each. `mechanisms` may then be any iterable, of which
+    only so many are taken at a time as are being solved, and may hold `planar.pinned_linkages` among the others; the
+    result is a `ReducedSweep`.
 
     Raises BadInput for what is no mechanism, a point that none has, an input that is not there, impossible steps.
     """
-    whole = _read_mechanisms(mechanisms)
-    step_count = check_steps(steps)
-    for k, mechanism in enumerate(whole):
-        if pair is not None or not isinstance(mechanism, PinnedMechanism) or mechanism.layout is None:
-            running_input_index(mechanism, pair, f"mechanisms[{k}]")
+    step_count, threads, number_type = check_steps(steps), thread_count(workers, executor), result_type(dtype)
     names = (points,) if isinstance(points, str) else None if points is None else tuple(dict.fromkeys(points))
     available_backends(backend)
     wanted = SweepRequest(step_count, names, rates, pair, backend)
-    parts = {k: whole[first : first + PART_SIZE] for k, first in enumerate(range(0, len(whole), PART_SIZE))}
-    solve_part = partial(solve_mechanisms, request=wanted)
-    found: list[Swept] = []
-    for done in in_order(run_tasks(executor, solve_part, parts, lambda k: solve_part(parts[k]))):
-        found += done
-        if progress is not None:
-            progress(len(found), len(whole))
-    for name in names or ():
-        if found and not any(name in each.position for each in found):
+    runs = PartRuns(threads, executor, number_type, progress)
+    if reduce is not None:
+        return sweep_reduced(mechanisms, wanted, runs, reduce, _solve_rounded)
+    parts: list[SweptPart] = []
+    if isinstance(mechanisms, PinnedLinkages) and pair is None:
+        parts += _sweep_linkages(mechanisms, wanted, runs)
+    else:
+        parts += _sweep_list(read_mechanisms(mechanisms), wanted, runs)
+    general = [each for part in parts for each in part.others if each.general]
+    said = part_messages([find_endings(part) for part in parts], sum(map(len, parts)), len(general))
+    return Each(tuple(parts), sum(int(np.sum(each.status == 0)) for each in general), len(general), said)
+
+
+def _sweep_linkages(linkages: PinnedLinkages, request: SweepRequest, runs: PartRuns) -> Iterator[SweptPart]:
+    """Linkages of pinned bars, many at a time: all their points in one array, or those of each part where an executor
+    has solved it."""
+    many = len(linkages)
+    told = find_told_pins(linkages, request.points)
+    for name in request.points or ():
+        number = pin_number(name)
+        if many and (number is None or number >= np.diff(linkages.first_pin).max()):
             raise BadInput("points", f"no mechanism has a point {name!r:.60}")
-    general = [each for each in found if each.general]
-    return Each(tuple(found), sum(int(np.sum(each.status == 0)) for each in general), len(general), _messages(found))
+    bounds = [(k, min(k + LINKAGES_PART_SIZE, many)) for k in range(0, many, LINKAGES_PART_SIZE)]
+    tasks = ((k, linkages[a:b] if b - a < many else linkages) for k, (a, b) in enumerate(bounds))
+    is_here = runs.executor is None
+    values = make_values(len(told.pins), request.steps, request.rates, runs.dtype) if is_here else None
+
+    def solve_here(k: int, part: PinnedLinkages) -> PinnedPart:
+        a, b = bounds[k]
+        own = told.select(linkages, a, b) if b - a < many else told
+        room = None if values is None else values[told.first[a] : told.first[b]]
+        return _solve_pinned_rounded(part, request, runs.dtype, own, room)
+
+    solve_there = partial(_solve_pinned_rounded, request=request, dtype=runs.dtype)
+    found: list[PinnedPart] = []
+    for done in in_order(run_tasks(runs.threads, runs.executor, solve_there, tasks, solve_here)):
+        found.append(done)
+        runs.tell(sum(map(len, found)), many)
+    if values is None:
+        yield from found
+    elif found:
+        yield join_parts(found, values)
 
 
-def _read_mechanisms(sources: Iterable[MechanismSource]) -> list[Mechanism]:
-    """The mechanisms, each file or model read once. Raises BadInput."""
-    if isinstance(sources, str | PathLike | Mechanism) or not isinstance(sources, Iterable):
-        raise BadInput("mechanisms", f"a list of mechanisms is wanted, not {type(sources).__name__} {sources!r:.40}")
-    read: dict[str | PathLike[str], Mechanism] = {}
-    mechanisms = []
-    for source in sources:
-        if isinstance(source, Mechanism):
-            mechanisms.append(source)
-        elif isinstance(source, str | PathLike):
-            if source not in read:
-                read[source] = as_mechanism(source)
-            mechanisms.append(read[source])
-        else:
-            raise BadInput(f"mechanisms[{len(mechanisms)}]", f"a mechanism is wanted, not {source!r:.40}")
-    return mechanisms
+def _sweep_list(mechanisms: list[Mechanism], request: SweepRequest, runs: PartRuns) -> Iterator[SweptPart]:
+    """Mechanisms of any kind, some at a time."""
+    check_inputs(mechanisms, request.pair)
+    solve_part = partial(_solve_rounded, request=request, dtype=runs.dtype)
+    tasks = ((k, mechanisms[first : first + PART_SIZE]) for k, first in enumerate(range(0, len(mechanisms), PART_SIZE)))
+    found = 0
+    missing = set(request.points or ())
+    for done in in_order(run_tasks(runs.threads, runs.executor, solve_part, tasks, lambda _, part: solve_part(part))):
+        found += len(done)
+        if missing:
+            missing -= {name for k in range(len(done)) for name in done.swept(k).position}
+        runs.tell(found, len(mechanisms))
+        yield done
+    for name in request.points or ():
+        if name in missing and mechanisms:
+            raise BadInput("points", f"no mechanism has a point {name!r:.60}")
 
 
-def _messages(found: Sequence[Swept]) -> tuple[str, ...]:
-    """What there is to say: how many the general path solved, and how many ended before their time, with a reason."""
-    told = []
-    sent = sum(each.general for each in found)
-    if sent:
-        told.append(f"the general path solved {sent} of {count_phrase(len(found), 'mechanism')}, one after the other")
-    ended: dict[int, list[Swept]] = {}
-    for each in found:
-        if each.status.any():
-            ended.setdefault(int(each.status[-1]), []).append(each)
-    told += [
-        f"{count_phrase(len(own), 'mechanism')}: {OUTCOMES[code].value}; {own[0].reason}" for code, own in ended.items()
-    ]
-    few = [each for each in found if each.reason and not each.status.any()]
-    if few:
-        phrase = count_phrase(len(few), "mechanism")
-        told.append(f"{phrase}: rates are missing or have few digits; {few[0].reason}")
-    return tuple(told)
+def _solve_rounded(part: list[Mechanism] | PinnedLinkages, request: SweepRequest, dtype: str) -> SweptPart:
+    """Some mechanisms, their numbers rounded to a type."""
+    if isinstance(part, PinnedLinkages):
+        return _solve_pinned_rounded(part, request, dtype)
+    solved = solve_mechanisms(part, request)
+    return solved if dtype == "float64" else solved.astype(dtype)
 
 
-def solve_mechanisms(mechanisms: Sequence[Mechanism], request: SweepRequest) -> list[Swept]:
+def _solve_pinned_rounded(
+    linkages: PinnedLinkages, request: SweepRequest, dtype: str, told: ToldPins | None = None, room: Array | None = None
+) -> PinnedPart:
+    """The same of linkages of pinned bars, written where there is `room`."""
+    if dtype == "float64":
+        return _solve_linkages(linkages, request, told, room)
+    return _solve_linkages(linkages, request, told).astype(dtype, room)
+
+
+def _solve_linkages(
+    linkages: PinnedLinkages, request: SweepRequest, told: ToldPins | None = None, values: Array | None = None
+) -> PinnedPart:
+    solve_blocks, solve_general = (
+        partial(each, request=request) for each in (solve_by_blocks, _solve_with_general_path)
+    )
+    with take_turn():
+        return solve_pinned(linkages, request, solve_blocks, solve_general, told, values)
+
+
+def solve_mechanisms(mechanisms: Sequence[Mechanism], request: SweepRequest) -> SweptPart:
     """Some mechanisms, in their order."""
+    with take_turn():
+        return _solve_some(mechanisms, request)
+
+
+def _solve_some(mechanisms: Sequence[Mechanism], request: SweepRequest) -> SweptPart:
+    layouts = {
+        k: each.layout
+        for k, each in enumerate(mechanisms)
+        if request.pair is None and isinstance(each, PinnedMechanism) and each.layout is not None
+    }
+    if not layouts:
+        return SweptList(tuple(solve_by_blocks(mechanisms, request)))
+    pinned = _solve_linkages(PinnedLinkages.from_layouts(list(layouts.values())), request)
+    if len(layouts) == len(mechanisms):
+        return pinned
+    found = {number: pinned.swept(k) for k, number in enumerate(layouts)}
+    others = [k for k in range(len(mechanisms)) if k not in found]
+    found |= zip(others, solve_by_blocks([mechanisms[k] for k in others], request), strict=True)
+    return SweptList(tuple(found[k] for k in range(len(mechanisms))))
+
+
+def solve_by_blocks(mechanisms: Sequence[Mechanism], request: SweepRequest) -> list[Swept]:
+    """Some mechanisms, in their order, parted into blocks of links; those that cannot be by the general path."""
     found: dict[int, Swept] = {}
     runner = find_block_runner(request.backend)
     attempts = [each for each in _ATTEMPTS if runner.can_give_extremes or not each.verdict_only]
-    for ready in linkage_groups(mechanisms, request):
+    ready = linkage_group(mechanisms, request)
+    if ready is not None:
         start = find_start_assemblies(ready.arrays, runner)
         left = np.flatnonzero(start.is_sure)
         for each in attempts:
-            for some in _cache_sized_chunks(
-                ready.arrays.link_counts, left, request, _step_division(request.steps) * each.refinement
-            ):
+            refinement = step_division(request.steps) * each.refinement
+            for some in _cache_sized_chunks(ready.arrays.link_counts, left, request, refinement):
                 found |= _run_attempt(ready, some, start, request, each, runner)
             left = np.array([k for k in left if ready.numbers[k] not in found], dtype=int)
             if not left.size:
@@ -188,11 +295,6 @@ def _cache_sized_chunks(
         first = last
 
 
-def _step_division(steps: int) -> int:
-    """Into how many a step is divided."""
-    return ceil(FULL_TURN / steps / LONGEST_INPUT_STEP)
-
-
 def _run_attempt(
     group: LinkageGroup,
     some: Array,
@@ -202,7 +304,7 @@ def _run_attempt(
     runner: BlockRunner,
 ) -> dict[int, Swept]:
     """Those that came to their end, or to a dead point, by their numbers."""
-    steps, finer = request.steps, _step_division(request.steps) * attempt.refinement
+    steps, finer = request.steps, step_division(request.steps) * attempt.refinement
     gone = np.linspace(0.0, FULL_TURN, steps * finer + 1)
     lot = group.arrays.select(some)
     told = run_linkages(

@@ -198,7 +198,16 @@ def _time_sweeps(mechanism: Mechanism, input_range: InputRange, seconds: float) 
     def run(backend: str, rates: bool, designs: int) -> Sweep:
         drawn = _draw_designs(mechanism, designs, within)
         return sweep(
-            mechanism, drawn, SWEEP_STEPS, points, rates=rates, start=start, stop=stop, pair=pair, backend=backend
+            mechanism,
+            drawn,
+            SWEEP_STEPS,
+            points,
+            rates=rates,
+            start=start,
+            stop=stop,
+            pair=pair,
+            backend=backend,
+            workers=1,
         )
 
     for k, (backend, rates) in enumerate(todo):
@@ -235,7 +244,7 @@ def _time_sweeps(mechanism: Mechanism, input_range: InputRange, seconds: float) 
 def _draw_designs(mechanism: Mechanism, count: int, within: float) -> dict[str, np.ndarray]:
     """Every length within a part of itself, evenly drawn; the input's rate where there is no length."""
     known = design_variables(mechanism)
-    lengths = {name: each.value for name, each in known.items() if each.link and each.value}
+    lengths = {name: each.value for name, each in known.items() if each.link and each.kind == "length" and each.value}
     if not lengths:
         given = mechanism.inputs[0]
         lengths = {f"{given.pair}.velocity": given.velocity}

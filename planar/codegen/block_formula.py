@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -37,6 +38,32 @@ class BlockFormula:
     @cached_property
     def _numpy_function(self) -> NumpyFunction:
         return compile_numpy(self.instructions, self.outputs, tuple(self.inputs))
+
+
+def share_reciprocals(formula: BlockFormula) -> BlockFormula:
+    """The same formula with one division for all that is divided by the same, and none by what does not vary."""
+    source, made = formula.instructions, InstructionList[FormulaInput]()
+    numbers: dict[int, int] = {}
+    still: set[int] = set()
+    below = Counter(
+        source.instructions[k].operands[1] for k in formula.order if source.instructions[k].operation == "div"
+    )
+    for k in formula.order:
+        value = source.instructions[k]
+        of = [numbers[each] for each in value.operands]
+        if (
+            value.operation == "const"
+            or (value.key is not None and value.key.source == "p")
+            or (value.operands and still.issuperset(value.operands))
+        ):
+            still.add(k)
+        by = value.operands[1] if value.operation == "div" else None
+        if by is not None and k not in still and (by in still or below[by] > 1):
+            numbers[k] = made.add("mul", of[0], made.add("div", made.add_constant(1.0), of[1]))
+        else:
+            numbers[k] = made.add_again(value, of)
+    inputs = {numbers[k]: leaf for k, leaf in formula.inputs.items()}
+    return BlockFormula(made, tuple(numbers[k] for k in formula.outputs), inputs)
 
 
 class KernelLayout(NamedTuple):

@@ -11,7 +11,10 @@ from planar.codegen.block_formula import BlockFormula, KernelLayout
 from planar.codegen.llvm_compile import compile_function
 from planar.codegen.llvm_ir import IRWriter
 from planar.foundation.arrays import Array
+from planar.foundation.turns import leave_turn
 
+LONG_CALL_NUMBERS = 2**14
+"""Positions of instances from which on other threads go on while they are computed."""
 LANES = 8
 """Numbers that are worked on at once; rows of memory are multiples of so many."""
 
@@ -183,7 +186,9 @@ def run_kernel(formula: BlockFormula, layout: KernelLayout, state: Array, index:
         return outside
     places = np.ascontiguousarray(index, dtype=np.int64) * (state.shape[1] * steps)
     addresses = (each.ctypes.data for each in (places, p, state, outside))
-    _compiled_kernel(formula, layout)(many, steps // LANES, steps, *addresses)
+    walk = _compiled_kernel(formula, layout)
+    with leave_turn(many * steps >= LONG_CALL_NUMBERS):
+        walk(many, steps // LANES, steps, *addresses)
     if layout.extremes_only:
         least = outside[:, 1].min(axis=1)
         return np.stack([outside[:, 0].max(axis=1), least, *(outside[:, k].max(axis=1) for k in (2, 3))])

@@ -77,7 +77,15 @@ class IRWriter:
 
     def store_streaming(self, value: str, pointer: str) -> None:
         """Store what is not read again soon, past the caches; where whole vectors begin."""
-        self.write_line(f"store {self.vector} {value}, ptr {pointer}, align 64, !nontemporal !0")
+        self._store_streaming(self.vector, value, pointer)
+
+    def store_streaming_rounded(self, value: str, pointer: str) -> None:
+        """The same, each number rounded once to single precision."""
+        single = f"<{self.lanes} x float>"
+        self._store_streaming(single, self.add_instruction(f"fptrunc {self.vector} {value} to {single}"), pointer)
+
+    def _store_streaming(self, vector: str, value: str, pointer: str) -> None:
+        self.write_line(f"store {vector} {value}, ptr {pointer}, align 64, !nontemporal !0")
 
     def close_loop(self, counter: str, last: str, again: str, after: str) -> None:
         """Count on, and go round again up to the last."""
@@ -172,6 +180,10 @@ class IRWriter:
     def double_pointer(self, base: str, index: str) -> str:
         """A pointer to the double at an index."""
         return self.add_instruction(f"getelementptr double, ptr {base}, i64 {index}")
+
+    def single_pointer(self, base: str, index: str) -> str:
+        """A pointer to the number of single precision at an index."""
+        return self.add_instruction(f"getelementptr float, ptr {base}, i64 {index}")
 
     def broadcast(self, scalar: str) -> str:
         """A number in every lane."""

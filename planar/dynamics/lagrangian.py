@@ -10,7 +10,7 @@ inputs, whose drives are D q',
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from functools import cached_property, lru_cache
 
 import casadi as ca
@@ -23,7 +23,7 @@ from planar.equations.mechanism_numbers import mechanism_size, shapes_of_links
 from planar.equations.residuals import input_positions, pair_residuals, scalars
 from planar.foundation.arrays import Array
 from planar.foundation.geometry import Vector
-from planar.foundation.jets import value_and_rates
+from planar.foundation.jets import Scalar, value_and_rates
 from planar.model.loads import COINCIDENCE_TOLERANCE, Load, Mass, Spring
 from planar.model.mechanism import Mechanism, relative_motions
 from planar.results.kinematic_result import KinematicResult
@@ -66,19 +66,20 @@ class LagrangianFunctions:
             for pair in (*mechanism.pairs, *self.relative_motions.values())
         }
 
-    def initial_spring_turns(self, q: Array) -> Array:
-        """The whole turns (rad) by which links stand apart whose torsional springs do not count them (springs,).
+    def initial_spring_turns(self, q: Array, springs: Sequence[Spring] | None = None) -> Array:
+        """The whole turns (rad) by which links stand apart whose torsional springs do not count them (springs, ...).
 
         Nothing says in a file how often links have turned: where they stand at coordinates q the spring is wound up the
-        least, but for a free angle beyond half a turn, which is off the angle between -pi and pi.
+        least, but for a free angle beyond half a turn, which is off the angle between -pi and pi. Coordinates may be
+        arrays (coordinates, n), and the numbers of `springs` then too.
         """
-        found = np.zeros(len(self.mechanism.springs))
-        for number, spring in enumerate(self.mechanism.springs):
+        found = np.zeros((len(self.mechanism.springs), *np.shape(q)[1:]))
+        for number, spring in enumerate(self.mechanism.springs if springs is None else springs):
             if spring.is_torsional:
                 first, second = (
                     q[self.link_columns[link] + 2] if link in self.link_columns else 0.0 for link in spring.ends
                 )
-                near = spring.free if abs(spring.free) <= np.pi else 0.0
+                near = np.where(np.abs(spring.free) <= np.pi, spring.free, 0.0)
                 found[number] = 2.0 * np.pi * np.round((second - first - near) / (2.0 * np.pi))
         return found
 
@@ -155,7 +156,9 @@ class LagrangianFunctions:
         q, q1 = self.q, self.q1
         loads = []
         for k, load in enumerate(self.mechanism.loads):
-            effort = self.unit_effort_on_links(load.pair) * (load.effort or 0.0) if load.pair is not None else 0.0
+            effort: ca.SX | float = 0.0
+            if load.pair is not None and load.effort is not None:
+                effort = self.unit_effort_on_links(load.pair) * load.effort
             loads.append((self._load_forces(load)[0] + effort) * self.factors[k])
         weights = [-ca.gradient(self._weight_potential(mass), q) for mass in self.mechanism.masses]
         energies = [
@@ -203,9 +206,11 @@ class LagrangianFunctions:
         away = ca.sqrt(square)
         met = square <= (COINCIDENCE_TOLERANCE * self.size) ** 2
         known = ca.if_else(met, np.nan, 1.0)  # as a factor, so that Jacobians have it too
-        stored = 0.5 * spring.stiffness * ((away - spring.free) ** 2 * known if spring.free else square)
+        stored = (
+            0.5 * spring.stiffness * ((away - spring.free) ** 2 * known if _may_be_nonzero(spring.free) else square)
+        )
         taken = ca.SX(0.0)
-        if spring.damping:
+        if _may_be_nonzero(spring.damping):
             taken = 0.5 * spring.damping * (ca.dot(apart, self._time_derivative(apart)) / away) ** 2 * known
         return stored, taken
 
@@ -231,6 +236,11 @@ class LagrangianFunctions:
 
     def _time_derivative(self, value: ca.SX) -> ca.SX:
         return ca.jtimes(value, self.q, self.q1)
+
+
+def _may_be_nonzero(number: Scalar) -> bool:
+    """Whether a number is not zero, or a symbol."""
+    return isinstance(number, ca.SX) or bool(number)
 
 
 @lru_cache(maxsize=32)

@@ -14,7 +14,6 @@ import numpy as np
 
 from planar.dynamics.external_actions import KinematicArrays
 from planar.dynamics.virtual_work import BalanceFunction, VirtualWorkBalance
-from planar.equations.mechanism_numbers import mechanism_size
 from planar.foundation.arrays import Array, BoolArray
 from planar.foundation.geometry import Vector
 from planar.foundation.short_repr import short_repr
@@ -69,10 +68,10 @@ class ReactionSolver:
 
     def __init__(self, balancing: BalanceFunction, balance: VirtualWorkBalance, field: KinematicArrays):
         self.work, self.pair_rows, self.balance = balancing.work, balancing.pair_rows, balance
-        self.pairs = {pair.name: pair for pair in self.work.mechanism.pairs}
+        self.pairs = {pair.name: pair for pair in field.mechanism.pairs}
         self.position_count = len(balance.loads)
         self.frames = field.frames
-        self.arm = mechanism_size(self.work.mechanism, self.work.shapes)
+        self.shapes, self.arm = field.shapes, self.work.size
         self.coordinate_scale = np.tile([1.0, 1.0, 1.0 / self.arm], len(self.work.links))
         rows = balance.constraints.copy()
         for name, contact in self.contacts.items():
@@ -84,8 +83,8 @@ class ReactionSolver:
     @cached_property
     def contacts(self) -> dict[str, ToothContact]:
         """Where teeth touch, for the pairs of which that is known."""
-        beside = self.work.mechanism.pairs
-        found = {name: pair.tooth_contact(self.frames, self.work.shapes, beside) for name, pair in self.pairs.items()}
+        beside = tuple(self.pairs.values())
+        found = {name: pair.tooth_contact(self.frames, self.shapes, beside) for name, pair in self.pairs.items()}
         return {name: contact for name, contact in found.items() if contact is not None}
 
     @cached_property

@@ -28,9 +28,12 @@ class VirtualWorkBalance(NamedTuple):
 
 
 class BalanceFunction:
-    """The function of one mechanism that fills a balance in."""
+    """The function of one mechanism that fills a balance in.
 
-    def __init__(self, work: LagrangianFunctions):
+    `dimensions` are the symbols that stand in the mechanism for numbers of its file.
+    """
+
+    def __init__(self, work: LagrangianFunctions, dimensions: ca.SX | None = None):
         self.work, self.link_coordinate_count = work, work.link_coordinate_count
         self.pair_rows: dict[str, slice] = {}
         "of every pair: its rows of the constraints"
@@ -44,13 +47,24 @@ class BalanceFunction:
             ca.SX(0, work.q.numel()), *(work.unit_effort_on_links(given.pair).T for given in work.mechanism.inputs)
         )
         outputs = [ca.jacobian(work.residuals, work.q), drives, ca.sum2(work.actions_on_links), work.inertia]
-        given = [work.q, work.q1, work.q2, work.factors, work.spring_turns]
+        given = [
+            work.q,
+            work.q1,
+            work.q2,
+            work.factors,
+            work.spring_turns,
+            ca.SX(0, 1) if dimensions is None else dimensions,
+        ]
         self._called = BufferedFunction(ca.Function("balance", given, [ca.densify(each) for each in outputs]))
 
-    def evaluate(self, q: Array, q1: Array, q2: Array, factors: Array, wound: Array) -> VirtualWorkBalance:
-        """Everything at coordinates with their rates (n, coordinates), each alike; factors of the loads (n, loads), and
-        `wound` as `LagrangianFunctions.initial_spring_turns` gives it."""
-        parts = self._called.evaluate_batch(len(q), q, q1, q2, factors, wound)
+    def evaluate(
+        self, q: Array, q1: Array, q2: Array, factors: Array, wound: Array, dimensions: Array | None = None
+    ) -> VirtualWorkBalance:
+        """Everything at coordinates with their rates (n, coordinates), each alike; factors of the loads (n, loads),
+        `wound` as `LagrangianFunctions.initial_spring_turns` gives it, (springs,) or (n, springs), and `dimensions`
+        (n, dimensions), where there are any."""
+        numbers = np.zeros(0) if dimensions is None else dimensions
+        parts = self._called.evaluate_batch(len(q), q, q1, q2, factors, wound, numbers)
         slopes, drives = (each.transpose(0, 2, 1) for each in parts[:2])
         loads, inertia = (each[:, 0] for each in parts[2:])
         constraints = np.zeros((len(q), self.row_count, self.link_coordinate_count))

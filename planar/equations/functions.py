@@ -102,6 +102,23 @@ class ClosedFormAssemblies:
             found.append(whole[self._unknowns])
         return found, float(left), bend
 
+    def of_designs(self, z: Array, u: Array, p: Array) -> tuple[Array, Array, Array]:
+        """The same of designs z (designs, unknowns), u and p alike: both (2, designs, unknowns of the block), the
+        greatest residuals and how near they are to where they meet (designs,)."""
+        many, found = len(z), []
+        left: Array = np.zeros(many)
+        bend: Array = np.zeros(many)
+        for sign in (1.0, -1.0):
+            whole = z.copy()
+            own, bends = self._form.evaluate_batch(many, z, u, p, np.array([sign]))
+            bend, whole[:, self._unknowns] = bends[:, 0, 0], own[:, 0]
+            for _ in range(POLISHING_STEPS):
+                whole[:, self._unknowns] = self._polished.evaluate_batch(many, whole, u, p)[0][:, 0]
+            gap = self._polished.evaluate_batch(many, whole, u, p)[1][:, 0, 0]
+            left = np.maximum(left, np.where(np.isfinite(whole[:, self._unknowns]).all(axis=1), gap, np.nan))
+            found.append(whole[:, self._unknowns])
+        return np.array(found), left, bend
+
 
 def kept_function(make: Callable[[Any], ca.Function]) -> cached_property[ca.Function]:
     """A property of `EquationFunctions`: a function that is made once, in this process or in one before."""

@@ -90,6 +90,19 @@ class Link:
         return (self.ends or ()) + tuple(point.name for point in self.points)
 
 
+class LinkPlace(NamedTuple):
+    """A place of a link that has no name, by coordinates (m) in the link's own axes."""
+
+    link: str
+    at: Vector
+
+
+PointName = str | LinkPlace
+"""A point by the name that results give it, or a place of a link."""
+PointMember = tuple[str, str | Vector]
+"""A link, and a point of it by name or by coordinates (m) in the link's own axes."""
+
+
 class PointPlacementError(Exception):
     """A point cannot be placed; `point` names it (None: the axis), the text says why."""
 
@@ -112,6 +125,11 @@ class LinkShape:
         if isinstance(point, str):
             return self.points[point]
         return (Vector(*point) - self.origin).rotate(Vector(self.axis.x, -self.axis.y))
+
+
+def place_in_link(shape: LinkShape, point: str | Vector) -> Vector:
+    """Where a point of a link lies in its axes (m)."""
+    return point if isinstance(point, Vector) else shape.position(point)
 
 
 def link_shape(link: Link) -> LinkShape:

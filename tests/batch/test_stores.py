@@ -16,8 +16,11 @@ from tests.closed_forms import ROCKER, TRIPLE, TURN
 
 
 def swept(store, **more):
+    """By one worker, so that blocks come in their order."""
     mechanism = four_bar(*TRIPLE, 1.2)
-    return planar.sweep(mechanism, designs_around(mechanism, 0.05, 9), 20, ["E", "C"], block=4, store=store, **more)
+    return planar.sweep(
+        mechanism, designs_around(mechanism, 0.05, 9), 20, ["E", "C"], block=4, workers=1, store=store, **more
+    )
 
 
 @pytest.fixture(params=["zarr", "parquet"])
@@ -60,7 +63,7 @@ LITTLE = four_bar(*TRIPLE, 1.2)
 def little(store, **more):
     """A sweep of three blocks, in few files, whose designs come to dead points."""
     lengths, there = {"BC.length": [0.7, 0.72, 0.73, 0.74, 0.76]}, {"start": 1.2, "stop": 1.5}
-    return planar.sweep(LITTLE, lengths, 6, "E", rates=False, block=2, store=store, **there, **more)
+    return planar.sweep(LITTLE, lengths, 6, "E", rates=False, block=2, workers=1, store=store, **there, **more)
 
 
 def equal(found, wanted, again=None):

@@ -32,7 +32,7 @@ FUNCTIONS = {
 }
 DRAWINGS = {name: getattr(planar.plot, name) for name in planar.plot.__all__}
 CLASSES = {name: each for name in planar.__all__ if inspect.isclass(each := getattr(planar, name))}
-FREE = {"schema", "build", "pinned", "centre_of", "from_dict", "load", "loads", "sweep_each", "save"}
+FREE = {"schema", "build", "pinned", "pinned_linkages", "centre_of", "from_dict", "load", "loads", "sweep_each", "save"}
 """Functions whose first argument is neither a mechanism nor a result."""
 COMMANDS = {
     name: command
@@ -73,6 +73,7 @@ def results():
     yield from (
         planar.simulate("physical-pendulum", 0.05, steps=4),
         planar.sweep(bars, {"BC.length": [0.066]}, steps=6),
+        planar.sweep(bars, {"BC.length": [0.066]}, steps=6, reduce={"path": "C.path_length"}),
     )
     yield from (swept, swept[0], prepared, prepared())
     yield from (planar.BadInput("here", "wrong"), planar.Unknown("no such point"), planar.Outcome.SOLVED)

@@ -11,10 +11,10 @@ from planar.analysis.motion.output import Extreme
 from planar.analysis.motion.zeros import SERIES_TOLERANCE, bracket_maxima, find_maximum
 from planar.document.first_argument import takes_result
 from planar.foundation.arrays import Array, BoolArray
-from planar.foundation.errors import BadInput, NoAnswer, Unknown
+from planar.foundation.errors import BadInput, NoAnswer
 from planar.foundation.jets import Jet
 from planar.foundation.short_repr import short_repr
-from planar.model.mechanism import relative_motions
+from planar.model.output_pair import find_output_pair
 from planar.model.pairs import MeasureKind, Pair
 from planar.model.wording import join_all_names
 from planar.results.kinematic_result import KinematicResult
@@ -112,7 +112,7 @@ class _DrivenOutput:
 
     def __init__(self, moving: KinematicResult, output: str):
         mechanism = moving.mechanism
-        self.link, self.pair = _find_output_pair(moving, output)
+        self.link, self.pair = find_output_pair(moving.mechanism, output)
         if not mechanism.inputs:
             raise BadInput("inputs", "the mechanism has no input, and nothing is transmitted")
         self.prepared = PreparedMechanism(mechanism)
@@ -280,30 +280,6 @@ class _DrivenOutput:
         gaps = np.broadcast_to(self.constraints.residuals(flat), (len(self.constraints.pair_of_row), flat.shape[1]))
         rows = np.concatenate([gaps, self.constraints.relative_positions(self.inputs, flat)])
         return (np.imag(rows) / COMPLEX_STEP).reshape(len(rows), many, w.shape[0]).transpose(1, 0, 2)
-
-
-def _find_output_pair(moving: KinematicResult, output: str) -> tuple[str, Pair]:
-    """The output link, and the pair at which it turns or slides on the frame. Raises Unknown, BadInput."""
-    frame, named = moving.mechanism.frame, relative_motions(moving.mechanism)
-    if output in named:
-        candidates = [named[output]]
-    elif output in moving.frames:
-        candidates = [pair for pair in named.values() if output in pair.links]
-    else:
-        told = f"pairs are {', '.join(named)}, links {', '.join(moving.frames)}"
-        raise Unknown(f"there is no pair and no link {output!r}; {told}")
-    for pair in candidates:
-        others = [link for link in pair.links if link != frame]
-        pinned = pair.input_kind is MeasureKind.ANGLE and bool(pair.coincident_points())
-        if (
-            len(others) == 1
-            and pair.is_lower_pair
-            and pair.prevented_motion_count() == 2
-            and (pinned or pair.point_on_line() is not None)
-        ):
-            return others[0], pair
-    told = "is told of a link that turns about a fixed pin or slides on the frame"
-    raise BadInput(output, f"a transmission angle {told}, and {output!r} is no such link or pair")
 
 
 def _value(value: object) -> Array:

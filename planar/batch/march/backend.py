@@ -86,6 +86,8 @@ class DesignRunner(Protocol):
         """Fill out (steps + 1, rows, designs): x and y of each point, then their first, then second rates (m, s); what
         is no number from the first step on that did not pass.
 
+        Where `out` is in single precision, each number is rounded when it is written.
+
         Returns how many of the first steps passed residual and branch check (designs,).
         """
 
@@ -138,7 +140,7 @@ class RunnerLadder:
                     good = runner.run(batch, out)
                 else:
                     steps, rows, _ = out.shape
-                    own = allocate_aligned(steps, rows, left.size)
+                    own = allocate_aligned(steps, rows, left.size, out.dtype)
                     good[left] = runner.run(batch.select(left), own)
                     out[:, :, left] = own
             except UnsupportedStructure:

@@ -48,21 +48,24 @@ def write_designs_kernel(
     rates: bool,
     lanes: int,
     point_blocks: tuple[int, ...] | None = None,
+    *,
     streams: bool = True,
+    is_single: bool = False,
 ) -> DesignsKernelLayout:
     """The function for points on these links, none of which is the frame. Raises UnsupportedOperation.
 
     A step gives x and y of every point, then with `rates` all first and all second rates: no numbers from the first
-    that does not pass the checks. With `levels`, of the block
-    that places each point, it gives more: x and y of every point in the other assembly of its block (infinite where
-    that is not in closed form), the state, and how regular the least regular of the blocks is that Newton's method
-    solves. What it gives goes past the caches where it `streams`: it is not read again soon.
+    that does not pass the checks. With `point_blocks`, of the block that places each point, it gives more: x and y of
+    every point in the other assembly of its block (infinite where that is not in closed form), the state, and how
+    regular the least regular of the blocks is that Newton's method solves. What it gives goes past the caches where it
+    `streams`: it is not read again soon; where `is_single`, it is rounded to single precision when it is written.
     """
     carried: frozenset[Operand] = frozenset()
     while True:
         try:
             writer = _DesignsKernelWriter(equations, tuple(links), rates, lanes, point_blocks, carried)
             writer.streams = streams
+            writer.is_single = is_single
             return writer.write()
         except BareAngle as angle:
             if angle.operand in carried:  # its value is wanted before its own block is solved
@@ -73,6 +76,8 @@ def write_designs_kernel(
 class _DesignsKernelWriter(KernelWriter):
     streams = True
     "whether results are written past the caches"
+    is_single = False
+    "whether what a step gives is written in single precision"
 
     def __init__(
         self,
@@ -387,6 +392,9 @@ class _DesignsKernelWriter(KernelWriter):
             place = t.add_instruction(
                 f"add i64 {t.add_instruction('mul i64 %k, %time')}, {t.add_instruction(f'mul i64 %row, {k}')}"
             )
-            store = t.store_streaming if self.streams else t.store
-            store(each, t.double_pointer("%out", t.add_instruction(f"add i64 {place}, {self.lane}")))
+            place = t.add_instruction(f"add i64 {place}, {self.lane}")
+            if self.is_single:
+                t.store_streaming_rounded(each, t.single_pointer("%out", place))
+            else:
+                (t.store_streaming if self.streams else t.store)(each, t.double_pointer("%out", place))
         t.store(t.binary("add", t.load(self.good_count_slot), t.load(self.passed_slot)), self.good_count_slot)

@@ -27,18 +27,25 @@ from planar.batch.march.prediction import (
 from planar.codegen.aligned_arrays import allocate_aligned, is_aligned
 from planar.codegen.instructions import UnsupportedOperation
 from planar.codegen.llvm_compile import compile_function
+from planar.foundation.turns import leave_turn
 
 Array = np.ndarray
 
+LONG_CALL_POSITIONS = 2**13
+"""Positions from which on other threads go on while they are solved."""
 LANES = 16
 """Designs at once: two vectors of the widest machines, so that one waits while the other works."""
 
 
 def designs_kernel(
-    equations: KernelEquations, links: tuple[str, ...], rates: bool, point_blocks: tuple[int, ...] | None = None
+    equations: KernelEquations,
+    links: tuple[str, ...],
+    rates: bool,
+    point_blocks: tuple[int, ...] | None = None,
+    is_single: bool = False,
 ) -> DesignsKernelLayout:
     """The function for points on links of a structure, see `march`. Raises UnsupportedOperation."""
-    found = _designs_kernel_or_reason(equations, links, rates, point_blocks)
+    found = _designs_kernel_or_reason(equations, links, rates, point_blocks, is_single)
     if isinstance(found, str):
         raise UnsupportedOperation(found)
     return found
@@ -46,11 +53,15 @@ def designs_kernel(
 
 @lru_cache(maxsize=256)
 def _designs_kernel_or_reason(
-    equations: KernelEquations, links: tuple[str, ...], rates: bool, point_blocks: tuple[int, ...] | None
+    equations: KernelEquations,
+    links: tuple[str, ...],
+    rates: bool,
+    point_blocks: tuple[int, ...] | None,
+    is_single: bool,
 ) -> DesignsKernelLayout | str:
     """The same, or why there is none: every block of a sweep would find that out again."""
     try:
-        return write_designs_kernel(equations, links, rates, LANES, point_blocks)
+        return write_designs_kernel(equations, links, rates, LANES, point_blocks, is_single=is_single)
     except UnsupportedOperation as why:
         return str(why)
 
@@ -59,10 +70,12 @@ def run_designs_kernel(batch: DesignBatch, extra_corrections: int = 0, out: Arra
     """The points of a batch over its steps, and how many of its first steps every design did well (designs,).
 
     `extra_corrections` are made at every step for designs that are less well predicted. The points are out (steps + 1,
-    rows, designs), as for `DesignRunner`. Raises UnsupportedOperation where the structure is not for machine code.
+    rows, designs), as for `DesignRunner`, in single precision where `out` is. Raises UnsupportedOperation where the
+    structure is not for machine code.
     """
     longest = _longest_step(batch)
-    kernel = designs_kernel(batch_equations(batch), tuple(batch.links), batch.rates)
+    is_single = out is not None and out.dtype == np.float32
+    kernel = designs_kernel(batch_equations(batch), tuple(batch.links), batch.rates, None, is_single)
     table, counts = step_table(batch.input_offsets)
     tolerances = batch.tolerance, correction_limit(longest), batch.unit
     out, good = _run_kernel(kernel, batch, batch.rates, (table, counts + extra_corrections), tolerances, out)
@@ -129,8 +142,9 @@ def _run_kernel(
         np.concatenate([batch.u1, batch.u2]) if rates else np.zeros((0, many)),
     )
     given = out
+    dtype = np.dtype(np.float64) if out is None else out.dtype
     if out is None or not is_aligned(out):
-        out = allocate_aligned(steps, kernel.output_row_count, many)
+        out = allocate_aligned(steps, kernel.output_row_count, many, dtype)
     good = np.empty(-(-many // lanes) * lanes)
     whole = many // lanes * lanes
     if whole:
@@ -138,7 +152,7 @@ def _run_kernel(
     if whole < many:
         # those that do not fill the lanes, with copies of the last beside them
         which = np.minimum(np.arange(whole, whole + lanes), many - 1)
-        last = allocate_aligned(steps, kernel.output_row_count, lanes)
+        last = allocate_aligned(steps, kernel.output_row_count, lanes, dtype)
         _call_function(function, kernel, [row[:, which] for row in rows], lanes, tables, tolerances, last, good[whole:])
         out[:, :, whole:] = last[:, :, : many - whole]
     if given is not None and given is not out:
@@ -159,16 +173,17 @@ def _call_function(
     arrays = [np.ascontiguousarray(row) for row in (*rows, *tables)]
     width = rows[0].shape[1]
     strides = (out.strides[1] // out.itemsize, out.strides[0] // out.itemsize)
-    function(
-        design_count // kernel.lanes,
-        len(tables[0]),
-        width,
-        *strides,
-        *(each.ctypes.data for each in arrays),
-        *tolerances,
-        out.ctypes.data,
-        good.ctypes.data,
-    )
+    with leave_turn(design_count * len(tables[0]) >= LONG_CALL_POSITIONS):
+        function(
+            design_count // kernel.lanes,
+            len(tables[0]),
+            width,
+            *strides,
+            *(each.ctypes.data for each in arrays),
+            *tolerances,
+            out.ctypes.data,
+            good.ctypes.data,
+        )
 
 
 def operand_rows(operands: Sequence[tuple[str, int]], values: Array) -> Array:

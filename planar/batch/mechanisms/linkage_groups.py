@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from planar.batch.mechanisms.bar_linkages import MAX_BARS, bar_linkage_arrays
 from planar.batch.mechanisms.linkage_arrays import LinkageArrays, PartitionedLinkage, make_linkage_arrays
 from planar.batch.mechanisms.partition import NotPartitionable, Partition, partition_mechanism
 from planar.foundation.errors import BadInput
 from planar.model.link_shapes import PointPlacementError
 from planar.model.mechanism import Mechanism, named_points, running_input_index
 from planar.model.pairs import MeasureKind as Measure
-from planar.model.pin_linkage import PinnedMechanism
 
 Array = np.ndarray
 
@@ -40,31 +38,14 @@ class LinkageGroup(NamedTuple):
     links_of_block: Callable[[int], str]
 
 
-def linkage_groups(mechanisms: Sequence[Mechanism], request: SweepRequest) -> Iterator[LinkageGroup]:
-    """Those of the mechanisms that are not for the general path."""
-    taken: set[int] = set()
-    pins = _pin_numbers(request.points) if request.pair is None else ()
-    laid = {
-        k: each.layout
-        for k, each in enumerate(mechanisms)
-        if isinstance(each, PinnedMechanism) and each.layout is not None
-    }
-    laid = {k: each for k, each in laid.items() if len(each.bars) <= MAX_BARS}
-    if laid and pins != ():
-        own = bar_linkage_arrays(list(laid.values()), pins)
-        if own is not None:
-            which = np.array(list(laid))[own.which]
-            taken = set(which.tolist())
-            called = [f"P{k}" for k in range(max(len(each.pin_positions) for each in laid.values()))]
-            yield LinkageGroup(
-                which, own.arrays, [[called[pin] for pin in each] for each in own.pins], own.start, own.links_of_block
-            )
+def linkage_group(mechanisms: Sequence[Mechanism], request: SweepRequest) -> LinkageGroup | None:
+    """Those of the mechanisms that are not for the general path; None where there are none."""
     ones: list[PartitionedLinkage] = []
     numbers: list[int] = []
     names: list[list[str]] = []
     starts: list[float] = []
     for k, mechanism in enumerate(mechanisms):
-        made = None if k in taken else _partition_linkage(mechanism, request)
+        made = _partition_linkage(mechanism, request)
         if made is not None:
             one, own_names, start = made
             ones.append(one)
@@ -72,7 +53,7 @@ def linkage_groups(mechanisms: Sequence[Mechanism], request: SweepRequest) -> It
             names.append(own_names)
             starts.append(start)
     if not ones:
-        return
+        return None
 
     def block_links(number: int) -> str:
         for one in ones:
@@ -82,16 +63,7 @@ def linkage_groups(mechanisms: Sequence[Mechanism], request: SweepRequest) -> It
             number -= len(one.partition.blocks)
         return ""
 
-    yield LinkageGroup(np.array(numbers), make_linkage_arrays(ones), names, np.array(starts), block_links)
-
-
-def _pin_numbers(points: tuple[str, ...] | None) -> list[int] | tuple[()] | None:
-    """The numbers of pins by their names: None for all that move, nothing where a name is not one of a pin."""
-    if points is None:
-        return None
-    if all(name[:1] == "P" and name[1:].isdecimal() for name in points):
-        return [int(name[1:]) for name in points]
-    return ()
+    return LinkageGroup(np.array(numbers), make_linkage_arrays(ones), names, np.array(starts), block_links)
 
 
 def _partition_linkage(

@@ -21,6 +21,7 @@ from planar.codegen import block_kernel
 from planar.codegen.block_formula import BlockFormula, FormulaInput, KernelLayout
 from planar.codegen.llvm_compile import compile_function
 from planar.codegen.llvm_ir import IRWriter
+from planar.foundation.turns import leave_turn
 
 Array = np.ndarray
 
@@ -46,7 +47,9 @@ class LLVMBlockRunner:
             np.stack([cos_or_length(block_type, start), sin_or_zero(block_type, start)], axis=2)
         )
         arrays = places, np.ascontiguousarray(p), both, table, counts, state, outside
-        _compile_newton_kernel(block_type, rates)(many, steps, steps, *(each.ctypes.data for each in arrays))
+        follow = _compile_newton_kernel(block_type, rates)
+        with leave_turn():
+            follow(many, steps, steps, *(each.ctypes.data for each in arrays))
         return NewtonRun(outside[:, 0], outside[:, 1], outside[:, 2])
 
 

@@ -69,8 +69,8 @@ class NewtonRun:
             raise UnsupportedOperation("the sketch does not show every group")
         pieces = _Pieces(len(u))
         kernels = (
-            write_designs_kernel(design.equations("at"), shown, False, LANES, blocks, False),
-            write_designs_kernel(equations, links, rates, LANES, (-1,) * len(links), False),
+            write_designs_kernel(design.equations("at"), shown, False, LANES, blocks, streams=False),
+            write_designs_kernel(equations, links, rates, LANES, (-1,) * len(links), streams=False),
         )
         starts, lanes = _assembly_lanes(reference, equations)
         layout = write_newton_run(equations, design, kernels, len(links), rates, lanes)

@@ -22,8 +22,8 @@ from planar.batch.stores.store import (
     damaged_block_error,
     foreign_store_error,
     is_folder_begun,
-    point_views,
     reporting_write_errors,
+    result_views,
 )
 from planar.document.files import read_limited
 from planar.foundation.errors import BadInput, Outcome
@@ -100,15 +100,17 @@ class ParquetStore(BlockStore):
         columns: dict[str, Array] = {
             "design": np.repeat(np.arange(part.start, part.stop), steps),
             "step": np.tile(np.arange(steps, dtype=np.int32), designs),
-            **{name: np.repeat(values[part], steps) for name, values in self.plan.all_designs.designs.items()},
+            **{name: np.repeat(values[part], steps) for name, values in self.plan.design_columns.items()},
             "input": np.broadcast_to(done.input, done.status.shape).ravel(),
             "status": done.status.ravel(),
             "dead_point": np.repeat(done.dead_point, steps),
         }
-        for order, points in point_views(done.out, self.plan).items():
-            for name, values in points.items():
-                for axis, own in zip(_column_names(order, name), np.moveaxis(values, 2, 0), strict=True):
-                    columns[axis] = np.ascontiguousarray(own).ravel()
+        named = column_names(self.plan)
+        for quantity, results in result_views(done.out, self.plan).items():
+            for name, values in results.items():
+                axes = np.moveaxis(values, 2, 0) if values.ndim == 3 else values[None]
+                for column, own in zip(named[quantity][name], axes, strict=True):
+                    columns[column] = np.ascontiguousarray(own).ravel()
         said = [(code, count, str(sentence)) for code, count, sentence in done.endings]
         about = {
             "fingerprint": self.fingerprint,
@@ -145,29 +147,38 @@ class ParquetStore(BlockStore):
             raise damaged_block_error(self.path, number, part) from None
 
     def result(self) -> Sweep:
-        found = {order: _ParquetPoints(self, order) for order in self.plan.quantities}
+        found = {quantity: _ParquetResults(self, names) for quantity, names in column_names(self.plan).items()}
         status, inputs, dead_points = self.read_columns(("status", "input", "dead_point"))
         return self.make_sweep(found, status, inputs[0] if np.all(inputs == inputs[0]) else inputs, dead_points[:, 0])
 
 
-class _ParquetPoints(Mapping[str, Any]):
-    """One quantity of all points, read from Parquet files when it is asked for."""
+class _ParquetResults(Mapping[str, Any]):
+    """One quantity of all that have it, by name, read from Parquet files when it is asked for."""
 
-    def __init__(self, store: ParquetStore, order: str):
-        self.store, self.order = store, order
+    def __init__(self, store: ParquetStore, columns: Mapping[str, tuple[str, ...]]):
+        self.store, self.columns = store, columns
 
     def __getitem__(self, name: str) -> Array:
-        if name not in self.store.plan.all_designs.points:
-            raise KeyError(name)
-        return np.stack(self.store.read_columns(_column_names(self.order, name)), axis=2)
+        found = self.store.read_columns(self.columns[name])
+        return np.stack(found, axis=2) if len(found) > 1 else found[0]
 
     def __iter__(self) -> Iterator[str]:
-        return iter(self.store.plan.all_designs.points)
+        return iter(self.columns)
 
     def __len__(self) -> int:
-        return len(self.store.plan.all_designs.points)
+        return len(self.columns)
 
 
-def _column_names(order: str, point: str) -> tuple[str, str]:
+def column_names(plan: SweepPlan) -> dict[str, dict[str, tuple[str, ...]]]:
+    """The columns of every result by quantity and name."""
+    found = {order: {name: _point_columns(order, name) for name in plan.point_names} for order in plan.quantities}
+    for row in plan.result_rows:
+        said = f"{row.name} {row.quantity.replace('_', ' ')}"
+        columns = [f"{said} [{row.unit}]"] if row.width == 1 else [f"{said} {axis} [{row.unit}]" for axis in "xy"]
+        found.setdefault(row.quantity, {})[row.name] = tuple(columns)
+    return found
+
+
+def _point_columns(order: str, point: str) -> tuple[str, ...]:
     letter, unit = COLUMN_SYMBOLS[order]
     return f"{point} {letter}x [{unit}]", f"{point} {letter}y [{unit}]"

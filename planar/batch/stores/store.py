@@ -13,7 +13,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from planar.batch.assembly_lists import ListedAssemblies
 from planar.batch.block import DesignBlock, SolvedDesigns
+from planar.batch.named_results.result_rows import RequestedResults, ResultRow
 from planar.batch.results import Sweep, SweepNotes
 from planar.codegen.aligned_arrays import allocate_aligned
 from planar.document.files import to_dict
@@ -36,6 +38,9 @@ class SweepPlan(NamedTuple):
 
     all_designs: DesignBlock
     block_size: int
+    results: RequestedResults = RequestedResults()
+    assemblies: ListedAssemblies | None = None
+    duration: float | None = None
 
     @property
     def design_count(self) -> int:
@@ -43,20 +48,43 @@ class SweepPlan(NamedTuple):
         return len(next(iter(self.all_designs.designs.values())))
 
     @property
+    def design_columns(self) -> dict[str, Array]:
+        """What is known of every design: its numbers, and which assembly it is of which of the given designs."""
+        listed = self.assemblies
+        rows = {} if listed is None else {"of design": listed.design, "assembly": listed.number}
+        return {**self.all_designs.designs, **rows}
+
+    @property
     def block_count(self) -> int:
         """How many blocks there are."""
         return -(-self.design_count // self.block_size)
+
+    @property
+    def point_names(self) -> tuple[str, ...]:
+        """The names of the points."""
+        return tuple(str(name) for name in self.all_designs.points)
 
     @property
     def quantities(self) -> tuple[str, ...]:
         """What is told of every point."""
         return POINT_QUANTITIES if self.all_designs.rates else POINT_QUANTITIES[:1]
 
+    @property
+    def result_rows(self) -> tuple[ResultRow, ...]:
+        """What is told beside points."""
+        return self.results.rows(self.all_designs.mechanism, self.all_designs.rates)
+
+    @property
+    def row_count(self) -> int:
+        """How many numbers are told at a step."""
+        return 2 * len(self.all_designs.points) * len(self.quantities) + sum(row.width for row in self.result_rows)
+
     def fingerprint(self) -> str:
         """The same for two sweeps that have the same results."""
         whole, made = self.all_designs, hashlib.sha256()
-        grid = [whole.steps, whole.points, whole.rates, whole.start, whole.stop, whole.pair]
-        made.update(json.dumps([STORE_VERSION, to_dict(whole.mechanism), grid], sort_keys=True, default=float).encode())
+        grid = [whole.steps, whole.points, whole.rates, whole.start, whole.stop, whole.pair, whole.dtype]
+        told = [STORE_VERSION, to_dict(whole.mechanism), grid, self.results, self.assemblies is not None, self.duration]
+        made.update(json.dumps(told, sort_keys=True, default=float).encode())
         for name, values in sorted(whole.designs.items()):
             made.update(name.encode() + b"\0" + np.ascontiguousarray(values).tobytes())
         return made.hexdigest()
@@ -82,8 +110,8 @@ class BlockStore(ABC):
         """A solved block, of these designs."""
 
     @abstractmethod
-    def result(self) -> Sweep:
-        """The sweep, once all blocks are there."""
+    def result(self) -> Any:
+        """The sweep, or what is kept of it, once all blocks are there."""
 
     def notes(self) -> SweepNotes:
         """What there is to say, in the order of the designs, whichever block was solved first."""
@@ -103,12 +131,15 @@ class BlockStore(ABC):
         return sum(each[0] for each in self.block_notes.values())
 
     def make_sweep(self, found: Mapping[str, Mapping[str, Any]], status: Any, input_: Array, dead_point: Any) -> Sweep:
-        """The result out of arrays by order and point."""
+        """The result out of arrays by quantity and name."""
         plan = self.plan
         position, velocity, acceleration = (found.get(order) for order in POINT_QUANTITIES)
         assert position is not None
+        listed = plan.assemblies
+        rows: dict[str, Any] = {} if listed is None else {"design": listed.design, "assembly": listed.number}
+        more: dict[str, Any] = rows | {name: found[name] for name in found if name not in POINT_QUANTITIES}
         return Sweep(
-            plan.all_designs.points,
+            plan.point_names,
             plan.all_designs.designs,
             position,
             velocity,
@@ -118,13 +149,14 @@ class BlockStore(ABC):
             self.general_positions,
             dead_point,
             self.notes(),
+            **more,
         )
 
 
 def open_store(store: str | Path | None, plan: SweepPlan) -> BlockStore:
     """Where a sweep's results go. Raises BadInput."""
     if store is None:
-        return _MemoryStore(plan)
+        return MemoryStore(plan)
     path = Path(store)
     modules = {
         ".zarr": ("zarr_store", "ZarrStore", "zarr", "sweep"),
@@ -173,15 +205,17 @@ def damaged_block_error(path: Path, number: int, part: slice) -> BadInput:
     return BadInput("store", f"{told}; the same sweep into this store solves it again")
 
 
-class _MemoryStore(BlockStore):
+class MemoryStore(BlockStore):
+    """Arrays of all designs in memory, into which blocks are solved."""
+
     def __init__(self, plan: SweepPlan):
         super().__init__(plan)
-        self.row_count = 2 * len(plan.all_designs.points) * len(plan.quantities)
-        self.shape = plan.all_designs.steps + 1, self.row_count, plan.design_count
-        if np.prod(self.shape, dtype=float) * 8.0 > MAX_BYTES_IN_MEMORY:
-            told = f"results of {np.prod(self.shape, dtype=float) * 8e-9:.0f} GB are too much for memory"
+        self.shape = plan.all_designs.steps + 1, plan.row_count, plan.design_count
+        whole = np.prod(self.shape, dtype=float) * np.dtype(plan.all_designs.dtype).itemsize
+        if whole > MAX_BYTES_IN_MEMORY:
+            told = f"results of {whole * 1e-9:.0f} GB are too much for memory"
             raise BadInput("store", f"{told}; name a store, as 'sweep.zarr'")
-        self.out = allocate_aligned(*self.shape)
+        self.out = allocate_aligned(*self.shape, plan.all_designs.dtype)
         self.status = np.zeros((plan.design_count, plan.all_designs.steps + 1), dtype=np.int8)
         self.inputs: Array | None = None
         self.dead_point = np.full(plan.design_count, np.nan)
@@ -199,20 +233,27 @@ class _MemoryStore(BlockStore):
 
     def result(self) -> Sweep:
         assert self.inputs is not None
-        return self.make_sweep(point_views(self.out, self.plan), self.status, self.inputs, self.dead_point)
+        return self.make_sweep(result_views(self.out, self.plan), self.status, self.inputs, self.dead_point)
 
 
-def point_views(out: Array, plan: SweepPlan) -> dict[str, dict[str, Array]]:
-    """out (steps + 1, rows, designs) as arrays (designs, steps + 1, 2) by order and point, without a copy."""
+def result_views(out: Array, plan: SweepPlan) -> dict[str, dict[str, Array]]:
+    """out (steps + 1, rows, designs) by quantity and name, without a copy: arrays (designs, steps + 1), or of vectors
+    (designs, steps + 1, 2)."""
     turned = out.transpose(2, 0, 1)
     many = len(plan.all_designs.points)
-    return {
+    found = {
         order: {
             name: turned[:, :, 2 * (k * many + place) : 2 * (k * many + place) + 2]
-            for place, name in enumerate(plan.all_designs.points)
+            for place, name in enumerate(plan.point_names)
         }
         for k, order in enumerate(plan.quantities)
     }
+    at = 2 * many * len(plan.quantities)
+    for row in plan.result_rows:
+        values = turned[:, :, at] if row.width == 1 else turned[:, :, at : at + row.width]
+        found.setdefault(row.quantity, {})[row.name] = values
+        at += row.width
+    return found
 
 
 def _join_inputs(whole: Array | None, own: Array, part: slice, plan: SweepPlan) -> Array:

@@ -20,8 +20,8 @@ from planar.batch.stores.store import (
     damaged_block_error,
     foreign_store_error,
     is_folder_begun,
-    point_views,
     reporting_write_errors,
+    result_views,
 )
 from planar.document.files import to_dict
 from planar.foundation.errors import Outcome
@@ -58,7 +58,7 @@ class ZarrStore(BlockStore):
             about = {
                 "fingerprint": mark,
                 "mechanism": to_dict(plan.all_designs.mechanism),
-                "points": list(plan.all_designs.points),
+                "points": list(plan.point_names),
                 "block": self.block_size,
                 "outcomes": [each.value for each in Outcome],
             }
@@ -78,16 +78,21 @@ class ZarrStore(BlockStore):
         row = {"shape": (plan.design_count, steps), "chunks": (rows, steps), "dimension_names": ("design", "step")}
         point: dict[str, Any] = {"shape": (plan.design_count, steps, 2), "chunks": (rows, steps, 2)}
         point["dimension_names"] = ("design", "step", "axis")
+        dtype = plan.all_designs.dtype
         for order in plan.quantities:
-            for name in plan.all_designs.points:
-                yield self._open_array(f"{order}/{_path_name(name)}", dtype="float64", fill_value=np.nan, **point)
+            for name in plan.point_names:
+                yield self._open_array(f"{order}/{_path_name(name)}", dtype=dtype, fill_value=np.nan, **point)
+        for result in plan.result_rows:
+            shape = point if result.width == 2 else row
+            path = f"{result.quantity}/{_path_name(result.name)}"
+            yield self._open_array(path, dtype=dtype, fill_value=np.nan, **shape)
         yield self._open_array("status", dtype="int8", fill_value=MISSING_STATUS, **row)
         yield self._open_array("input", dtype="float64", fill_value=np.nan, **row)
         of_designs = {"shape": (plan.design_count,), "chunks": (rows,), "dimension_names": ("design",)}
         yield self._open_array("dead_point", dtype="float64", fill_value=np.nan, **of_designs)
         records = {"shape": (plan.block_count, RECORD_BYTES), "chunks": (1, RECORD_BYTES)}
         yield self._open_array("blocks", dtype="uint8", fill_value=0, **records)
-        for name, values in plan.all_designs.designs.items():
+        for name, values in plan.design_columns.items():
             of_all = {"shape": values.shape, "chunks": values.shape, "dimension_names": ("design",)}
             key, array = self._open_array(
                 f"designs/{_path_name(name)}", dtype=str(values.dtype), fill_value=values.dtype.type(0), **of_all
@@ -152,7 +157,7 @@ class ZarrStore(BlockStore):
 
     def write_block(self, number: int, part: slice, done: SolvedDesigns) -> None:
         with reporting_write_errors(self.path):
-            for order, points in point_views(done.out, self.plan).items():
+            for order, points in result_views(done.out, self.plan).items():
                 for name, values in points.items():
                     self.arrays[f"{order}/{_path_name(name)}"][part] = np.ascontiguousarray(values)
             self.arrays["status"][part], self.arrays["dead_point"][part] = done.status, done.dead_point
@@ -164,9 +169,12 @@ class ZarrStore(BlockStore):
 
     def result(self) -> Sweep:
         found = {
-            order: {name: StoredArray(self, f"{order}/{_path_name(name)}") for name in self.plan.all_designs.points}
+            order: {name: StoredArray(self, f"{order}/{_path_name(name)}") for name in self.plan.point_names}
             for order in self.plan.quantities
         }
+        for row in self.plan.result_rows:
+            stored = StoredArray(self, f"{row.quantity}/{_path_name(row.name)}")
+            found.setdefault(row.quantity, {})[row.name] = stored
         return self.make_sweep(
             found, StoredArray(self, "status"), self._input_positions(), StoredArray(self, "dead_point")
         )

@@ -1,0 +1,1 @@
+"""Results of a sweep beside those of points: of links, pairs, inputs."""

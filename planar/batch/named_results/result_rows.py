@@ -1,0 +1,73 @@
+"""Which results a sweep tells beside the points', and the rows in which they stand."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+from planar.document.cursor import suggest_spelling
+from planar.foundation.errors import BadInput
+from planar.model.mechanism import Mechanism, relative_motions
+from planar.model.pairs import MeasureKind
+
+LINK_QUANTITIES = ("angle", "angular_velocity", "angular_acceleration")
+PAIR_QUANTITIES = ("value", "value_rate", "value_second_rate")
+RATE_UNITS = ("", "/s", "/s^2")
+
+
+class ResultRow(NamedTuple):
+    """A result of a sweep: the quantity, which is the attribute that has it; of what; how many numbers; their unit."""
+
+    quantity: str
+    name: str
+    width: int
+    unit: str
+
+
+class RequestedResults(NamedTuple):
+    """The results that are asked for beside those of points: of these links, pairs, outputs, inputs and pairs,
+    and where runs of the input end."""
+
+    links: tuple[str, ...] = ()
+    pairs: tuple[str, ...] = ()
+    outputs: tuple[str, ...] = ()
+    efforts: tuple[str, ...] = ()
+    reactions: tuple[str, ...] = ()
+    limits: tuple[str, ...] = ()
+
+    @property
+    def has_forces(self) -> bool:
+        """Whether loads, springs and inertia count."""
+        return bool(self.efforts or self.reactions)
+
+    def rows(self, mechanism: Mechanism, rates: bool) -> tuple[ResultRow, ...]:
+        """The rows in their order, of links and pairs with `rates` also first and second rates."""
+        return tuple(self._rows(mechanism, 3 if rates else 1))
+
+    def _rows(self, mechanism: Mechanism, orders: int) -> Iterator[ResultRow]:
+        slides = {name: pair.input_kind is MeasureKind.LENGTH for name, pair in relative_motions(mechanism).items()}
+        for order in range(orders):
+            for link in self.links:
+                yield ResultRow(LINK_QUANTITIES[order], link, 1, f"rad{RATE_UNITS[order]}")
+            for pair in self.pairs:
+                yield ResultRow(PAIR_QUANTITIES[order], pair, 1, f"{'m' if slides[pair] else 'rad'}{RATE_UNITS[order]}")
+        for name in self.outputs:
+            yield ResultRow("transmission_angle", name, 1, "rad")
+        for name in self.efforts:
+            yield ResultRow("effort", name, 1, "N" if slides[name] else "N m")
+        for name in self.limits:
+            yield ResultRow("limit", name, 1, "m" if slides[name] else "rad")
+        for name in self.reactions:
+            yield ResultRow("reaction", name, 2, "N")
+        for name in self.reactions:
+            yield ResultRow("reaction_couple", name, 1, "N m")
+
+
+def select_names(place: str, given: Sequence[str] | str, known: Sequence[str]) -> tuple[str, ...]:
+    """Names that are asked for, each once. Raises BadInput for one that is not known."""
+    asked = [given] if isinstance(given, str) else list(given)
+    for each in asked:
+        if each not in known:
+            meant = suggest_spelling(str(each), known, cutoff=0.5) or f"; there are {', '.join(list(known)[:12])}"
+            raise BadInput(place, f"there is nothing of the name {each!r:.60} here{meant}")
+    return tuple(dict.fromkeys(asked))

@@ -1,0 +1,219 @@
+"""A sweep of which only reductions are kept: what is asked for, what a block gives, and what all blocks give."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any, NamedTuple, TypeVar
+
+import numpy as np
+from numpy.typing import DTypeLike
+
+from planar.batch.block import SolvedDesigns
+from planar.batch.named_results.result_block import ResultBlock, solve_result_block
+from planar.batch.reductions.point_reductions import (
+    EXTREMES_ENDING,
+    HARMONICS,
+    MEASURES,
+    RESULTS,
+    PointReduction,
+    ResultReduction,
+)
+from planar.batch.results import Sweep, SweepNotes
+from planar.batch.stores.store import BlockStore, MemoryStore, SweepPlan
+from planar.document.cursor import suggest_spelling
+from planar.foundation.errors import BadInput, Outcome
+from planar.foundation.short_repr import short_repr
+
+Array = np.ndarray
+Swept_ = TypeVar("Swept_")
+Reduction = Callable[[Swept_], Any]
+"""What is made of some of the whole, a `Sweep` or an `Each`: an array with an entry first for each of its designs."""
+RESULT_TYPES = ("float64", "float32")
+"""Types of the numbers of results."""
+
+
+@dataclass(frozen=True)
+class ReducedSweep(Mapping[str, Array]):
+    """Reductions of every design by their names, arrays with an entry for each design first.
+
+    `designs`: what they differ in; nothing of mechanisms. `status` (designs,): how each ended, 0 is solved at every
+    step, any other number k is `outcomes[k]`. `general`: how many positions the general path solved.
+    `design` and `assembly` as of `Sweep`, where all assemblies were asked for.
+    """
+
+    designs: Mapping[str, Array]
+    reduced: Mapping[str, Array]
+    status: Array
+    general: int
+    notes: SweepNotes | tuple[str, ...] = field(repr=False)
+    outcomes: tuple[Outcome, ...] = tuple(Outcome)
+    design: Array | None = field(default=None, repr=False)
+    assembly: Array | None = field(default=None, repr=False)
+
+    __repr__ = short_repr
+
+    @cached_property
+    def said(self) -> tuple[str, ...]:
+        """What there is to say; made when it is first read."""
+        return self.notes.sentences() if isinstance(self.notes, SweepNotes) else self.notes
+
+    def __getitem__(self, name: str) -> Array:
+        """A reduction of all designs."""
+        return self.reduced[name]
+
+    def __iter__(self) -> Iterator[str]:
+        """The names."""
+        return iter(self.reduced)
+
+    def __len__(self) -> int:
+        """How many reductions there are."""
+        return len(self.reduced)
+
+    @property
+    def whole(self) -> Array:
+        """The designs (designs,) that were solved at every step."""
+        found: Array = self.status == 0
+        return found
+
+
+class ReducedBlock(NamedTuple):
+    """What is kept of a block: its reductions (designs, ...), how each design ended (designs,), and of `SolvedDesigns`
+    the rest."""
+
+    reduced: dict[str, Array]
+    status: Array
+    general_positions: int
+    general_designs: int
+    endings: tuple[tuple[int, int, Any], ...]
+
+
+class Reductions(NamedTuple):
+    """What is to be kept, by its names."""
+
+    functions: dict[str, Reduction[Any]]
+
+    @property
+    def measures(self) -> list[PointReduction | ResultReduction]:
+        """Those that are asked for by name."""
+        return [each for each in self.functions.values() if isinstance(each, PointReduction | ResultReduction)]
+
+    def with_results(self, asked: Mapping[str, Sequence[str] | str]) -> dict[str, tuple[str, ...]]:
+        """The names of links, pairs and so on that are asked for, with those of measures."""
+        found = {word: (names,) if isinstance(names, str) else tuple(names) for word, names in asked.items()}
+        for each in self.measures:
+            if isinstance(each, ResultReduction):
+                word = RESULTS[each.quantity].asked_by
+                found[word] = (*found[word], each.name)
+        return found
+
+    def with_points(self, points: Sequence[Any] | None, rates: bool) -> tuple[tuple[Any, ...] | None, bool]:
+        """The points that have to be solved, and whether with rates, of what is asked for: no more than is needed where
+        only measures are. Raises BadInput."""
+        own = tuple(dict.fromkeys(each.point for each in self.measures if isinstance(each, PointReduction)))
+        wants_rates = any(each.wants_rates for each in self.measures)
+        if len(self.measures) == len(self.functions):
+            return own, wants_rates
+        if wants_rates and not rates:
+            raise BadInput("rates", "speeds and accelerations are wanted, which are rates")
+        return None if points is None else tuple(dict.fromkeys((*points, *own))), rates
+
+
+def read_reductions(reduce: Mapping[str, Any], result_name: Callable[[str], Any], steps: int) -> Reductions:
+    """The reductions by their names; `result_name` gives that of a point, and raises BadInput. Raises BadInput."""
+    if not isinstance(reduce, Mapping) or not reduce:
+        raise BadInput("reduce", "name what is to be kept, as {'reach': 'C.bounding_box'}")
+    return Reductions({name: _read_reduction(name, each, result_name, steps) for name, each in reduce.items()})
+
+
+def _read_reduction(name: str, given: Any, result_name: Callable[[str], Any], steps: int) -> Reduction[Any]:
+    if isinstance(given, str):
+        point, _, measure = given.rpartition(".")
+        if measure.removesuffix(EXTREMES_ENDING) in RESULTS and measure not in MEASURES:
+            told: Reduction[Any] = ResultReduction(point, measure.removesuffix(EXTREMES_ENDING))
+            return told
+        if measure not in MEASURES:
+            known = [*MEASURES, *(f"{result}{EXTREMES_ENDING}" for result in RESULTS)]
+            meant = suggest_spelling(measure, known, cutoff=0.5) or f"; there are {', '.join(known)}"
+            raise BadInput(f"reduce.{name}", f"there is no measure {given!r:.60}{meant}")
+        if measure == "fourier_descriptors" and steps <= 2 * HARMONICS:
+            raise BadInput(f"reduce.{name}", f"{HARMONICS} harmonics want more than {2 * HARMONICS} steps")
+        measured: Reduction[Any] = PointReduction(result_name(point), measure)
+        return measured
+    if not callable(given):
+        wanted = "a measure, as 'C.bounding_box', or a function of a sweep"
+        raise BadInput(f"reduce.{name}", f"{wanted} is wanted, not {given!r:.40}")
+    function: Reduction[Any] = given
+    return function
+
+
+def result_type(dtype: DTypeLike) -> str:
+    """The name of the type that results have. Raises BadInput."""
+    try:
+        name = np.dtype(dtype).name
+    except TypeError:
+        name = ""
+    if name not in RESULT_TYPES:
+        raise BadInput("dtype", f"results are {' or '.join(RESULT_TYPES)}, not {dtype!r:.40}")
+    return name
+
+
+def reduce_block(block: ResultBlock, reductions: Mapping[str, Reduction[Sweep]]) -> ReducedBlock:
+    """Solve a block and keep its reductions, made of numbers in double precision and rounded to the block's."""
+    designs = block.designs._replace(dtype="float64")
+    store = MemoryStore(
+        SweepPlan(designs, len(next(iter(designs.designs.values()))), block.results, duration=block.duration)
+    )
+    every = slice(0, store.plan.design_count)
+    done = solve_result_block(block._replace(designs=designs), store.output_array(every))
+    store.write_block(0, every, done)
+    sweep = store.result()
+    reduced = reduce_all(sweep, reductions, block.designs.dtype)
+    ended = np.array(done.status[:, -1])
+    return ReducedBlock(reduced, ended, done.general_positions, done.general_designs, done.endings)
+
+
+def reduce_all(found: Swept_, reductions: Mapping[str, Reduction[Swept_]], dtype: str) -> dict[str, Array]:
+    """The reductions of some of the whole, rounded. Raises BadInput where one has no entry for each design."""
+    return {name: _reduce(name, function, found, dtype) for name, function in reductions.items()}
+
+
+def _reduce(name: str, function: Reduction[Any], some: Any, dtype: str) -> Array:
+    found = np.asarray(function(some))
+    if found.dtype == object or found.shape[:1] != (len(some),):
+        told = f"a reduction gives an array with an entry for each of {len(some)} designs, not one {found.shape}"
+        raise BadInput(f"reduce.{name}", told)
+    if dtype != "float64" and found.dtype.kind in "fc":
+        return found.astype("complex64" if found.dtype.kind == "c" else dtype)
+    return found
+
+
+class ReductionStore(BlockStore):
+    """Takes the reductions of blocks, in memory."""
+
+    def __init__(self, plan: SweepPlan):
+        super().__init__(plan)
+        self.reduced: dict[str, Array] = {}
+        self.status = np.zeros(plan.design_count, dtype=np.int8)
+
+    def write_block(self, number: int, part: slice, done: SolvedDesigns | ReducedBlock) -> None:
+        assert isinstance(done, ReducedBlock)
+        for name, values in done.reduced.items():
+            whole, own = self.reduced.get(name), values.shape[1:]
+            if whole is None:
+                whole = np.empty((self.plan.design_count, *own), values.dtype)
+            if whole.shape[1:] != own:
+                told = f"designs {part.start} to {part.stop - 1} have an array {own} each, others {whole.shape[1:]}"
+                raise BadInput(f"reduce.{name}", told)
+            whole = self.reduced[name] = whole.astype(np.result_type(whole, values), copy=False)
+            whole[part] = values
+        self.status[part] = done.status
+        self.block_notes[number] = done.general_positions, done.general_designs, done.endings
+
+    def result(self) -> ReducedSweep:
+        found = ReducedSweep(
+            self.plan.all_designs.designs, self.reduced, self.status, self.general_positions, self.notes()
+        )
+        listed = self.plan.assemblies
+        return found if listed is None else replace(found, design=listed.design, assembly=listed.number)
