@@ -22,8 +22,9 @@ class Sweep:
     are None where no rates were asked for. NaN where a position is refused; rates also on a dead point itself, where
     none is determined. Written to a store they are read when they are indexed, which raises BadInput where a block of
     it is missing or damaged. `status` (designs, steps + 1): 0 is solved, any other number k is `outcomes[k]`. `input`:
-    positions of the input that runs, (steps + 1,), or (designs, steps + 1) where they differ. `general`: how many
-    positions the general path solved, one design after the other. `said`: what there is to say.
+    positions of the input that runs, (steps + 1,), or (designs, steps + 1) where they differ; of a run in time the
+    times (s). `general`: how many positions the general path solved, one design after the other. `said`: what there is
+    to say.
 
     What was asked for beside points stands by the names of links, pairs and inputs in arrays (designs, steps + 1), and
     is empty where nothing was: `angle`, `angular_velocity` and `angular_acceleration` of links (rad, s) as
