@@ -57,9 +57,9 @@ class Sweep:
     are None where no rates were asked for. NaN where a position is refused; rates also on a dead point itself, where
     none is determined. Written to a store they are read when they are indexed, which raises BadInput where a block of
     it is missing or damaged. `status` (designs, steps + 1): 0 is solved, any other number k is `outcomes[k]`. `input`:
-    positions of the input that runs, (steps + 1,), or (designs, steps + 1) where they differ. `general`: how many
-    positions the general path solved, one design after the other. `dead_point` (designs,): where the input is at the
-    dead point at which a design's motion ends (rad or m), NaN where none does.
+    positions of the input that runs, (steps + 1,), or (designs, steps + 1) where they differ; of a run in time the
+    times (s). `general`: how many positions the general path solved, one design after the other. `dead_point`
+    (designs,): where the input is at the dead point at which a design's motion ends (rad or m), NaN where none does.
 
     What was asked for beside points stands by the names of links, pairs and inputs in arrays (designs, steps + 1), and
     is empty where nothing was: `angle`, `angular_velocity` and `angular_acceleration` of links (rad, s) as

@@ -151,7 +151,8 @@ def sweep(  # many: the public signature; # long: its docstring
     between its own.
 
     With a `duration` (s), or where an input has a law and no range is given, each design runs in time instead, as
-    `planar.cycle` does: all its inputs at once, by their laws or at their rates, over the duration or the longest law.
+    `planar.cycle` does: all its inputs at once, by their laws or at their rates, over the duration or the mechanism's
+    longest law.
 
     `points` are those whose positions are wanted, and with `rates` velocities and accelerations; all that move, if left
     out and nothing else is asked for. `links` and `pairs` are those whose angles and relative motions are wanted, with
@@ -186,6 +187,7 @@ def sweep(  # many: the public signature; # long: its docstring
     """
     if block is not None and (isinstance(block, bool) or not isinstance(block, Integral) or block < 1):
         raise BadInput("block", f"a whole number of designs is wanted, not {block!r:.40}")
+    check_steps(steps)
     duration = run_duration(mechanism, duration, (start, stop, pair))
     mechanism = check_range(mechanism, steps, start, stop, pair) if duration is None else mechanism
     values = read_designs(mechanism, designs)
@@ -275,6 +277,8 @@ def run_duration(mechanism: Mechanism, duration: float | None, range_: tuple[obj
         return max(laws) if laws and not ranged else None
     if not duration > 0.0:
         raise BadInput("duration", f"a time from zero on is wanted, not {duration!r:.40}")
+    if not mechanism.inputs:
+        raise BadInput("inputs", "the mechanism has no input that could run")
     if ranged:
         raise BadInput("duration", "a run in time has no range of one input; give the one or the other")
     return float(duration)
