@@ -11,7 +11,7 @@ import casadi as ca
 from planar.batch.mechanisms.block_formulas import FormulaBuilder, SymbolicAssembly
 from planar.batch.mechanisms.block_type import FRAME_BODY, BlockPair, BlockSignature
 from planar.batch.mechanisms.solved_block_type import BlockType, find_block_type
-from planar.codegen.block_formula import BlockFormula, FormulaInput, share_reciprocals
+from planar.codegen.block_formula import BlockFormula, FormulaInput, simplify_formula
 from planar.codegen.instructions import CosSin, InstructionList, required_values
 from planar.codegen.tape import TapeFormula
 from planar.equations.linear import solve_by_determinants
@@ -47,10 +47,10 @@ def pin_formulas(rates: bool, polished: bool) -> tuple[TapeFormula, ...]:
     """The formulas of all steps. `polished`: closed forms are followed by a step of Newton's method."""
     made = [TapeFormula(_crank_formula(rates), ROWS[rates])]
     for step in (PinStep.DYAD, PinStep.DYAD_ON_FRAME):
-        made.append(TapeFormula(_dyad_formula(step, rates, polished), ROWS[rates], 4))
+        made.append(TapeFormula(_dyad_formula(step, rates, polished), ROWS[rates], 2))
     for step in (PinStep.CARRIED, PinStep.CARRIED_ON_FRAME):
         made.append(TapeFormula(_carried_formula(step, rates), ROWS[rates]))
-    return tuple(each._replace(formula=share_reciprocals(each.formula)) for each in made)
+    return tuple(each._replace(formula=simplify_formula(each.formula)) for each in made)
 
 
 @lru_cache

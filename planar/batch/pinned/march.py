@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from math import ceil
+from math import ceil, cos
 from typing import NamedTuple
 from weakref import WeakKeyDictionary
 
@@ -25,6 +25,10 @@ LONGEST_INPUT_STEP, REFINEMENT = 0.07, 8
 once more, into so many."""
 MAX_STATE_BYTES = 16 * 2**20
 """Bytes of pins' places that are worked on at once beside those that are told."""
+
+
+LEAST_COSINE = cos(MAX_TURN_PER_STEP)
+"""Of the angle by which a bar turns in a step."""
 
 
 class _Attempt(NamedTuple):
@@ -181,10 +185,10 @@ def _run_attempt(  # many: one attempt with all that it takes and fills
             from planar.codegen.tape_kernel import run_tape
 
             result = run_tape(
-                formulas, MAX_TURN_PER_STEP, count, arrays._replace(slots=state.ctypes.data + slots * state.strides[0])
+                formulas, LEAST_COSINE, count, arrays._replace(slots=state.ctypes.data + slots * state.strides[0])
             )
         else:
-            result = run_tape_numpy(formulas, MAX_TURN_PER_STEP, count, arrays, state)
+            result = run_tape_numpy(formulas, LEAST_COSINE, count, arrays, state)
         placed = tape.placed[point[tape.placed] >= 0]
         values[point[placed], :, : steps + 1] = state[slot[placed], :, :count:finer]
     _note(tape, result, finer, far, run)
@@ -204,7 +208,7 @@ def _run_native(
     slots = _tape_rows(tape, addresses, table.ctypes.data)
     return run_tape(
         formulas,
-        MAX_TURN_PER_STEP,
+        LEAST_COSINE,
         count,
         Tape(tape.first, tape.kinds, slots, tape.p, tape.level, tape.tolerance, tape.clearance),
     )
