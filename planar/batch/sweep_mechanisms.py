@@ -120,7 +120,8 @@ def _sweep_linkages(
         number = pin_number(name)
         if many and (number is None or number >= np.diff(linkages.first_pin).max()):
             raise BadInput("points", f"no mechanism has a point {name!r:.60}")
-    bounds = {k: (k, min(k + LINKAGES_PART_SIZE, many)) for k in range(0, many, LINKAGES_PART_SIZE)}
+    size = LINKAGES_PART_SIZE
+    bounds = {k: (begin, min(begin + size, many)) for k, begin in enumerate(range(0, many, size))}
     parts = {k: linkages[a:b] if b - a < many else linkages for k, (a, b) in bounds.items()}
     values = make_values(len(told.pins), request.steps, request.rates) if executor is None else None
 
@@ -145,9 +146,8 @@ def _sweep_linkages(
 def _solve_linkages(
     linkages: PinnedLinkages, request: SweepRequest, told: ToldPins | None = None, values: Array | None = None
 ) -> PinnedPart:
-    solve_blocks, solve_general = (
-        partial(each, request=request) for each in (solve_by_blocks, _solve_with_general_path)
-    )
+    solve_blocks = partial(solve_by_blocks, request=request)
+    solve_general = partial(_solve_with_general_path, request=request)
     return solve_pinned(linkages, request, solve_blocks, solve_general, told, values)
 
 

@@ -7,7 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from planar.codegen.block_formula import BlockFormula
-from planar.foundation.arrays import Array
+
+Array = np.ndarray
 
 LANES = 8
 """Steps that machine code works on at once; rows of numbers are multiples of so many."""

@@ -10,7 +10,8 @@ import numpy as np
 from planar.codegen.llvm_compile import compile_function
 from planar.codegen.llvm_ir import IRWriter
 from planar.codegen.tape import DEAD_POINT, LANES, UNDECIDED, Tape, TapeFormula, TapeResult, padded_steps
-from planar.foundation.arrays import Array
+
+Array = np.ndarray
 
 SHIFT = LANES.bit_length() - 1
 """By how many bits a number of steps is one of vectors."""

@@ -9,10 +9,11 @@ from typing import Any, overload
 
 import numpy as np
 
-from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput
 from planar.model.mechanism import LARGEST_INPUT_POSITION
 from planar.model.pin_linkage import PinLayout, PinnedMechanism
+
+Array = np.ndarray
 
 ABSENT = -1
 """In arrays of pin numbers: no pin."""
@@ -111,7 +112,7 @@ class PinnedLinkages(Sequence[PinnedMechanism]):
         entries = self.first_entry[self.first_bar[:-1] + self.crank]
         first, second = (self.positions[self.first_pin[:-1] + self.bar_pins[entries + k]] for k in (0, 1))
         way = second - first
-        return np.arctan2(way[:, 1], way[:, 0])
+        return np.asarray(np.arctan2(way[:, 1], way[:, 0]))
 
     def __repr__(self) -> str:
         return f"PinnedLinkages(<{len(self)} linkages>)"

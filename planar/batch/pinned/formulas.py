@@ -90,8 +90,9 @@ class _PinFormulaBuilder(FormulaBuilder):
         """x and y of a point of the first inner link, then of its rates."""
         e, (u1, u2) = self.equations, self.symbols[2:]
         frames, _ = self._inner_frames()
-        point = ca.vertcat(*frames[self.block_equations.inner_links[0]].to_world(Vector(*local)))
-        wanted = [point]
+        x, y, *_ = frames[self.block_equations.inner_links[0]].to_world(Vector(*local))
+        point = ca.vertcat(ca.SX(x), ca.SX(y))
+        wanted: list[ca.SX] = [point]
         if rates:
             z1, z2 = UnknownRates(e, solve_by_determinants).first_and_second(u1, u2)
             wanted += first_and_second_rates(point, e.y, ca.vertcat(z1, u1), ca.vertcat(z2, u2))
@@ -160,6 +161,5 @@ def _carried_formula(step: PinStep, rates: bool) -> BlockFormula:
         else:
             two = [listing.add_input(FormulaInput("p", place + k)) for k in range(2)]
         wanted += listing.inline_function(function, [one, two, parts])[0]
-    order = required_values(listing, wanted)
-    leaves = {k: key for k in order if (key := listing.instructions[k].key) is not None}
+    leaves = {k: key for k in required_values(listing, wanted) if (key := listing.instructions[k].key) is not None}
     return BlockFormula(listing, tuple(wanted), leaves)

@@ -14,7 +14,16 @@ from planar.batch.march.prediction import MAX_TURN_PER_STEP
 from planar.batch.pinned.formulas import ROWS, TABLE_ROWS, PinStep, pin_formulas
 from planar.batch.pinned.tape import PinTape, make_tape
 from planar.batch.pinned.told_pins import ToldPins, frame_pins
-from planar.codegen.tape import DEAD_POINT, LANES, UNDECIDED, Tape, TapeResult, padded_steps, run_tape_numpy
+from planar.codegen.tape import (
+    DEAD_POINT,
+    LANES,
+    UNDECIDED,
+    Tape,
+    TapeFormula,
+    TapeResult,
+    padded_steps,
+    run_tape_numpy,
+)
 from planar.model.pin_linkages import PinnedLinkages
 
 Array = np.ndarray
@@ -63,7 +72,7 @@ def run_pinned_linkages(
     """
     many = len(linkages)
     decided, solved = np.zeros((2, many), dtype=bool), np.zeros(many, dtype=np.int64)
-    run = PinRun(*decided, solved, np.zeros((many, 2)), np.zeros((many, 2), np.int64))
+    run = PinRun(decided[0], decided[1], solved, np.zeros((many, 2)), np.zeros((many, 2), np.int64))
     whole = _tape(linkages)
     run.is_dyadic[whole.which] = True
     frame = _FramePins(linkages, told)
@@ -194,8 +203,14 @@ def _run_attempt(  # many: one attempt with all that it takes and fills
     _note(tape, result, finer, far, run)
 
 
-def _run_native(
-    linkages: PinnedLinkages, tape: PinTape, point: Array, values: Array, formulas: tuple, count: int, table: Array
+def _run_native(  # many: what is run, and where it is told
+    linkages: PinnedLinkages,
+    tape: PinTape,
+    point: Array,
+    values: Array,
+    formulas: tuple[TapeFormula, ...],
+    count: int,
+    table: Array,
 ) -> TapeResult:
     """Write what is told where it is told, and what else is needed into room that linkages share."""
     from planar.codegen.tape_kernel import run_tape

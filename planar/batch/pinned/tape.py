@@ -48,8 +48,18 @@ class PinTape(NamedTuple):
         counts = np.diff(self.first)[some]
         first = np.concatenate([[0], np.cumsum(counts)])
         own = np.repeat(self.first[some] - first[:-1], counts) + np.arange(first[-1])
-        parts = (each[own] for each in (self.kinds, self.given, self.placed, self.p, self.bars, self.level))
-        return PinTape(self.which[some], first, *parts, self.tolerance[some], self.clearance[some])
+        return PinTape(
+            self.which[some],
+            first,
+            self.kinds[own],
+            self.given[own],
+            self.placed[own],
+            self.p[own],
+            self.bars[own],
+            self.level[own],
+            self.tolerance[some],
+            self.clearance[some],
+        )
 
 
 class _Steps(NamedTuple):
@@ -94,8 +104,8 @@ def make_tape(linkages: PinnedLinkages) -> PinTape:
     tolerance = residual_tolerance(bar_counts + 1, reach / unit)[which]
     shortest = np.minimum.reduceat(arm[order], first[:-1]) if len(which) else np.ones(0)
     clearance = EPS / (NEGLIGIBLE_ERROR * np.minimum(shortest, 1.0))
-    ordered = (each[order] for each in (steps.placed, p))
-    return PinTape(which, first, steps.kinds[order], given, *ordered, bars, steps.level[order], tolerance, clearance)
+    kinds, placed, level = steps.kinds[order], steps.placed[order], steps.level[order]
+    return PinTape(which, first, kinds, given, placed, p[order], bars, level, tolerance, clearance)
 
 
 def _find_steps(linkages: PinnedLinkages, entry_bar: Array, entry_pin: Array, is_fixed: Array) -> tuple[_Steps, Array]:
