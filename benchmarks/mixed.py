@@ -88,7 +88,7 @@ class Mixed:
         return found
 
     def _planar(self, places: list[Array]) -> list[_Entry]:
-        """`planar.sweep_each` on linkages as arrays and as mechanisms, made from the places of their joints and ready."""
+        """`planar.sweep_each` on linkages as arrays and as mechanisms, ready and made of the places of their joints."""
         if not (hasattr(planar, "sweep_each") and hasattr(planar, "pinned_linkages")):
             return []
         tape, flat = self.tape, np.concatenate(places)

@@ -229,9 +229,8 @@ def _solve_pinned_rounded(
 def _solve_linkages(
     linkages: PinnedLinkages, request: SweepRequest, told: ToldPins | None = None, values: Array | None = None
 ) -> PinnedPart:
-    solve_blocks, solve_general = (
-        partial(each, request=request) for each in (solve_by_blocks, _solve_with_general_path)
-    )
+    solve_blocks = partial(solve_by_blocks, request=request)
+    solve_general = partial(_solve_with_general_path, request=request)
     with take_turn():
         return solve_pinned(linkages, request, solve_blocks, solve_general, told, values)
 

@@ -7,7 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from planar.codegen.block_formula import BlockFormula
-from planar.foundation.arrays import Array
+
+Array = np.ndarray
 
 LANES = 8
 """Steps that machine code works on at once; rows of numbers are multiples of so many."""
@@ -16,8 +17,8 @@ GOOD, DEAD_POINT, UNDECIDED = range(3)
 
 
 class TapeFormula(NamedTuple):
-    """A formula of a tape: what it gives are so many rows of a point, then, where it is checked, so many cosines and
-    sines that may not change fast, what is left open, and how clear of a dead point it is."""
+    """A formula of a tape: what it gives are so many rows of a point, then, where it is checked, the cosines and
+    sines of so many links, which may not turn fast, what is left open, and how clear of a dead point it is."""
 
     formula: BlockFormula
     row_count: int
@@ -30,8 +31,8 @@ class TapeFormula(NamedTuple):
 
 
 def padded_steps(steps: int) -> int:
-    """How many numbers a row of so many steps has: whole vectors, and what is looked at beyond the last step."""
-    return LANES * ((steps + 6) // LANES + 1)
+    """How many numbers a row of so many steps has: whole vectors."""
+    return LANES * -(-steps // LANES)
 
 
 class Tape(NamedTuple):
@@ -60,11 +61,11 @@ class TapeResult(NamedTuple):
 
 
 def run_tape_numpy(
-    formulas: tuple[TapeFormula, ...], greatest_change: float, steps: int, tape: Tape, state: Array
+    formulas: tuple[TapeFormula, ...], least_cosine: float, steps: int, tape: Tape, state: Array
 ) -> TapeResult:
     """Work off a tape level by level: state (slots, rows, numbers) is filled by all blocks.
 
-    `greatest_change` is that of a cosine or sine from one step to the next.
+    `least_cosine` is that of the angle by which a link turns in a step.
     """
     many, owner = len(tape.tolerance), np.repeat(np.arange(len(tape.tolerance)), np.diff(tape.first))
     result = TapeResult(np.full(many, steps), np.zeros(many, dtype=np.int64), np.zeros(many, dtype=np.int64))
@@ -82,30 +83,29 @@ def run_tape_numpy(
             state[slots[:, -1], row] = found[row]
         if own.is_checked:
             told = [each[:, :steps] for each in found[own.row_count :]]
-            _judge(result, tape, greatest_change, owner[blocks], blocks, told)
+            _judge(result, tape, least_cosine, owner[blocks], blocks, told)
     return result
 
 
-def _judge(
-    result: TapeResult, tape: Tape, greatest_change: float, owner: Array, blocks: Array, told: list[Array]
-) -> None:
+def _judge(result: TapeResult, tape: Tape, least_cosine: float, owner: Array, blocks: Array, told: list[Array]) -> None:
     """Put into the result where blocks end that end before the others of their sequences did."""
     *directions, left, clear = told
     with np.errstate(invalid="ignore"):
-        closed = left <= tape.tolerance[owner, None]
-        clear = np.where(closed | (clear < 0.0), clear, np.nan)
-        bends = np.zeros_like(clear)
-        bends[:, 1:-1] = np.nan_to_num(np.abs(clear[:, 2:] - 2.0 * clear[:, 1:-1] + clear[:, :-2]))
-        needed = np.maximum(np.maximum(bends[:, 1:], bends[:, :-1]), tape.clearance[owner, None])
-        fastest = np.fmax.reduce([np.abs(np.diff(each, axis=1)) for each in directions])
-        slow = ~(fastest > greatest_change)
-        fine = (clear[:, 1:] > needed) & (clear[:, :-1] > needed) & slow
-    whole = fine.all(axis=1)
-    come = np.where(whole, clear.shape[1], np.argmin(fine, axis=1) + 1)
+        good = left <= tape.tolerance[owner, None]
+        for c, s in zip(directions[::2], directions[1::2], strict=True):
+            # where a step is no position nothing turns
+            good[:, 1:] &= ~(c[:, 1:] * c[:, :-1] + s[:, 1:] * s[:, :-1] < least_cosine)
+        clear = np.where(good | (clear < 0.0), clear, np.nan)
+        least, needed = np.full_like(clear, np.inf), np.zeros_like(clear)
+        least[:, 1:] = np.fmin(clear[:, :-1], np.hstack([least[:, :1], clear[:, :-2]]))
+        needed[:, 2:] = np.nan_to_num(np.abs(clear[:, 2:] - 2.0 * clear[:, 1:-1] + clear[:, :-2]))
+        needed = np.maximum(needed, tape.clearance[owner, None])
+        fine = np.minimum(least, clear) > needed
+    come = np.where(fine.all(axis=1), clear.shape[1], np.argmin(fine, axis=1))
     earlier = np.flatnonzero(come < result.good[owner])
     end, k = come[earlier], owner[earlier]
     with np.errstate(invalid="ignore"):
-        dead = slow[earlier, end - 1] & (clear[earlier, end] < 0.0)
+        dead = (clear[earlier, end] < 0.0) & (least[earlier, end] > needed[earlier, end]) & (end > 0)
     # of several blocks of a sequence on one level the first one that ends
     order = np.lexsort((end, k))
     chosen = order[np.concatenate([[True], k[order][1:] != k[order][:-1]])] if len(order) else order

@@ -3,48 +3,42 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
 from planar.codegen.llvm_compile import compile_function
 from planar.codegen.llvm_ir import IRWriter
-from planar.codegen.tape import LANES, Tape, TapeFormula, TapeResult, padded_steps
+from planar.codegen.tape import DEAD_POINT, LANES, UNDECIDED, Tape, TapeFormula, TapeResult, padded_steps
 from planar.foundation.arrays import Array
 from planar.foundation.turns import leave_turn
 
-MARGIN = LANES
-"""Numbers before and after a row of what is looked at between steps."""
+SHIFT = LANES.bit_length() - 1
+"""By how many bits a number of steps is one of vectors."""
+_NAN = f"splat (double 0x{0x7FF8000000000000:X})"
 
 
 @lru_cache(maxsize=16)
-def compile_tape(formulas: tuple[TapeFormula, ...], greatest_change: float) -> Any:
-    """walk(begin, end, steps, stride, slots, numbers, first, kinds, rows, p, tolerance, clearance, scratch, good,
+def compile_tape(formulas: tuple[TapeFormula, ...], least_cosine: float) -> Any:
+    """walk(begin, end, steps, stride, slots, numbers, first, kinds, rows, p, tolerance, clearance, flags, good,
     outcome, at).
 
     For every sequence from `begin` to `end`: `first` (sequences + 1,) are where its blocks begin; kinds (blocks,) which
     formula each is of; rows (blocks, slots) the addresses of the rows that it takes, and last of those that it gives,
     `stride` numbers apart; p (blocks, numbers); tolerance (sequences,) of what is left open, clearance (sequences,)
-    that steps have at least. A cosine or sine may change by `greatest_change` from one step to the next. Told are
-    `good` (sequences,), how many of its steps are good in all blocks, the `outcome` after these, and `at` which block
-    that is: see `TapeResult`. `scratch`: see `scratch_size`.
+    that steps have at least. `least_cosine` is that of the angle by which a link turns in a step. Told are `good`
+    (sequences,), how many of its steps are good in all blocks, the `outcome` after these, and `at` which block
+    that is: see `TapeResult`. `flags`: two bytes for every vector of steps.
     """
-    text = _TapeWriter(formulas, greatest_change).write()
+    text = _TapeWriter(formulas, least_cosine).write()
     return compile_function(text, "walk", *("int",) * 6, *("array",) * 10)
-
-
-def scratch_size(formulas: tuple[TapeFormula, ...], stride: int) -> int:
-    """Numbers of room for what is looked at between steps."""
-    rows = 1 + max(each.direction_count for each in formulas)
-    return rows * (stride + 2 * MARGIN) + 2 * (stride // LANES)
 
 
 class _TapeWriter:
     """Writes the function of `compile_tape`."""
 
-    def __init__(self, formulas: tuple[TapeFormula, ...], greatest_change: float):
-        self.ir, self.formulas, self.greatest_change = IRWriter(LANES), formulas, greatest_change
+    def __init__(self, formulas: tuple[TapeFormula, ...], least_cosine: float):
+        self.ir, self.formulas, self.least_cosine = IRWriter(LANES), formulas, least_cosine
         self.tolerance = self.clearance = ""
 
     def write(self) -> str:
@@ -52,14 +46,11 @@ class _TapeWriter:
         t = self.ir
         integers = ", ".join(f"i64 %{name}" for name in ("begin", "end", "steps", "stride", "slots", "numbers"))
         given = ", ".join(f"ptr readonly %{name}" for name in ("first", "kinds", "rows", "p", "tolerance", "clearance"))
-        told = ", ".join(f"ptr %{name}" for name in ("scratch", "good", "outcome", "at"))
+        told = ", ".join(f"ptr %{name}" for name in ("flags", "good", "outcome", "at"))
         t.write_line(f"define void @walk({integers}, {given}, {told}) {{")
         t.write_label("entry")
-        t.write_line(f"%row = add i64 %stride, {2 * MARGIN}")
-        rows = 1 + max(each.direction_count for each in self.formulas)
-        t.write_line(f"%flagsat = mul i64 %row, {rows}")
-        t.write_line("%fineflags = getelementptr double, ptr %scratch, i64 %flagsat")
-        t.write_line("%slowflags = getelementptr i8, ptr %fineflags, i64 %stride")
+        t.write_line(f"%bytes = lshr i64 %stride, {SHIFT}")
+        t.write_line("%deadflags = getelementptr i8, ptr %flags, i64 %bytes")
         t.write_line("%any = icmp slt i64 %begin, %end")
         t.write_line("br i1 %any, label %sequence, label %done")
         t.write_label("sequence")
@@ -96,10 +87,8 @@ class _TapeWriter:
         t.write_line("%limit = phi i64 [%steps, %sequence], [%limitnext, %blockend]")
         t.write_line("%outcomenow = phi i64 [0, %sequence], [%outcomenext, %blockend]")
         t.write_line("%atnow = phi i64 [0, %sequence], [%atnext, %blockend]")
-        # flags are of so many vectors of the intervals between steps; values of one more
-        t.write_line("%rounded = add i64 %limit, 6")
-        t.write_line(f"%spans = lshr i64 %rounded, {LANES.bit_length() - 1}")
-        t.write_line("%vectors = add i64 %spans, 1")
+        t.write_line(f"%rounded = add i64 %limit, {LANES - 1}")
+        t.write_line(f"%vectors = lshr i64 %rounded, {SHIFT}")
         t.write_line(f"%kind = load i64, ptr {self.integer_pointer('%kinds', '%j')}")
         t.write_line("%pfrom = mul i64 %j, %numbers")
         t.write_line("%rowsfrom = mul i64 %j, %slots")
@@ -110,7 +99,7 @@ class _TapeWriter:
             self.write_formula(k)
             ends.append(f"kind{k}good")
             if self.formulas[k].is_checked:
-                self.write_check(k)
+                self.write_search(k)
                 ends += [f"kind{k}stopped"]
         t.write_label("blockend")
         for name, now, stop in (("limit", "limit", "come"), ("outcome", "outcomenow", "verdict"), ("at", "atnow", "")):
@@ -123,12 +112,6 @@ class _TapeWriter:
         t.write_line("%jnext = add i64 %j, 1")
         t.write_line("%jmore = icmp slt i64 %jnext, %jend")
         t.write_line("br i1 %jmore, label %block, label %sequenceend")
-
-    def scratch_row(self, k: int) -> str:
-        """A pointer to the first step of a row of what is looked at between steps."""
-        t = self.ir
-        begin = t.add_instruction(f"mul i64 %row, {k}")
-        return t.double_pointer("%scratch", t.add_instruction(f"add i64 {begin}, {MARGIN}"))
 
     def write_formula(self, kind: int) -> None:
         """All steps of a block, by its formula."""
@@ -154,110 +137,96 @@ class _TapeWriter:
                 pointers[number] = t.double_pointer(slots[leaf.place], begin)
         into = slot_pointer(t.add_instruction("sub i64 %slots, 1"))
         given = [t.double_pointer(into, t.add_instruction(f"mul i64 %stride, {row}")) for row in range(own.row_count)]
-        given += [self.scratch_row(1 + k) for k in range(own.direction_count)]
-        clear_row = self.scratch_row(0)
         t.write_line(f"br label %kind{kind}step")
         t.write_label(f"kind{kind}step")
         v = f"vector{kind}"
         t.write_line(f"%{v} = phi i64 [0, %kind{kind}], [%{v}next, %kind{kind}step]")
+        watched = [f"%watched{kind}.{k}" for k in range(2 * own.direction_count + 1 if own.is_checked else 0)]
+        for each in watched:
+            t.write_line(f"{each} = phi {t.vector} [{_NAN}, %kind{kind}], [{each}next, %kind{kind}step]")
+        if own.is_checked:
+            t.write_line(f"%all{kind} = phi i{LANES} [-1, %kind{kind}], [%allnext{kind}, %kind{kind}step]")
         t.write_line(f"%off{kind} = mul i64 %{v}, {LANES}")
         for number, pointer in pointers.items():
             names[number] = t.load(t.double_pointer(pointer, f"%off{kind}"))
         known: dict[int, str] = {}
         t.write_values(own.formula.instructions, own.formula.order, known, names)
         found = [known[number] for number in own.formula.outputs]
-        if own.is_checked:
-            found[-2:] = [self.write_merged(found[-2], found[-1])]
-            given.append(clear_row)
-        for value, pointer in zip(found, given, strict=True):
+        for value, pointer in zip(found, given, strict=not own.is_checked):
             t.store(value, t.double_pointer(pointer, f"%off{kind}"))
-        t.close_loop(v, "vectors", f"kind{kind}step", f"kind{kind}{'check' if own.is_checked else 'good'}")
+        if own.is_checked:
+            self.write_check(kind, watched, found[own.row_count :])
+        t.close_loop(v, "vectors", f"kind{kind}step", f"kind{kind}{'told' if own.is_checked else 'good'}")
         if not own.is_checked:
             t.write_label(f"kind{kind}good")
             t.write_line("br label %blockend")
 
-    def write_merged(self, left: str, clear: str) -> str:
-        """How clear a step is where it is closed; else what tells that it is not good, but not below zero without a
-        dead point."""
-        t, flags = self.ir, f"<{LANES} x i1>"
-        beyond = t.compare("olt", clear, t.constant(0.0))
-        nan = t.constant(float("nan"))
-        other = t.add_instruction(f"select {flags} {beyond}, {t.vector} {clear}, {t.vector} {nan}")
-        closed = t.compare("ole", left, self.tolerance)
-        return t.add_instruction(f"select {flags} {closed}, {t.vector} {clear}, {t.vector} {other}")
+    def write_check(self, kind: int, watched: list[str], found: list[str]) -> None:
+        """Look at a vector of steps: directions, what is left open and how clear it is, as before in `watched`."""
+        t, flags, byte = self.ir, f"<{LANES} x i1>", f"i{LANES}"
+        *directions, left, clear = found
+        cosines = []
+        for k in range(0, len(directions), 2):
+            now = directions[k : k + 2]
+            then = [self.earlier(value, before, 1) for value, before in zip(now, watched[k:], strict=False)]
+            cosines.append(t.add_all([t.binary("mul", a, b) for a, b in zip(now, then, strict=True)]))
+        clear = self.write_merged(left, clear, cosines)
+        for value, before in zip((*directions, clear), watched, strict=True):
+            # a value of its own name, for the next vector
+            t.write_line(f"{before}next = select i1 true, {t.vector} {value}, {t.vector} {value}")
+        fine, dead = self.write_flags(clear, watched[-1])
+        bits = [t.add_instruction(f"bitcast {flags} {each} to {byte}") for each in (fine, dead)]
+        for pointer, value in zip(("%flags", "%deadflags"), bits, strict=True):
+            place = t.add_instruction(f"getelementptr i8, ptr {pointer}, i64 %vector{kind}")
+            t.write_line(f"store {byte} {value}, ptr {place}")
+        t.write_line(f"%allnext{kind} = and {byte} %all{kind}, {bits[0]}")
 
-    def write_check(self, kind: int) -> None:
-        """Whether all is good between steps; if not, where that ends."""
-        t, own, flags = self.ir, self.formulas[kind], f"<{LANES} x i1>"
-        name, byte = f"kind{kind}", f"i{LANES}"
-        t.write_label(f"{name}check")
-        clear_row = self.scratch_row(0)
-        ends = [t.add_instruction(f"mul i64 %vectors, {LANES}")]
-        ends += [t.add_instruction(f"add i64 {ends[0]}, {k}") for k in (1, -1, -2)]
-        self.write_extrapolated(clear_row, "-1", "0", "1")
-        self.write_extrapolated(clear_row, ends[0], ends[2], ends[3])
-        self.write_extrapolated(clear_row, ends[1], ends[0], ends[2])
-        rows = [self.scratch_row(1 + k) for k in range(own.direction_count)]
-        t.write_line(f"br label %{name}span")
-        t.write_label(f"{name}span")
-        w = f"interval{kind}"
-        t.write_line(f"%{w} = phi i64 [0, %{name}check], [%{w}next, %{name}span]")
-        t.write_line(f"%all{kind} = phi {byte} [-1, %{name}check], [%allnext{kind}, %{name}span]")
-        fine, slow = self.write_flags(f"%{w}", clear_row, rows)
-        for pointer, value in (("%fineflags", fine), ("%slowflags", slow)):
-            value_bits = t.add_instruction(f"bitcast {flags} {value} to {byte}")
-            place = t.add_instruction(f"getelementptr i8, ptr {pointer}, i64 %{w}")
-            t.write_line(f"store {byte} {value_bits}, ptr {place}")
-            if value is fine:
-                t.write_line(f"%allnext{kind} = and {byte} %all{kind}, {value_bits}")
-        t.close_loop(w, "spans", f"{name}span", f"{name}told")
-        t.write_label(f"{name}told")
-        t.write_line(f"%whole{kind} = icmp eq {byte} %allnext{kind}, -1")
-        t.write_line(f"br i1 %whole{kind}, label %{name}good, label %{name}find")
-        t.write_label(f"{name}good")
-        t.write_line("br label %blockend")
-        self.write_search(kind, clear_row)
+    def earlier(self, value: str, before: str, by: int) -> str:
+        """The values so many steps before those of a vector; `before` is the vector before it."""
+        v, lanes = self.ir.vector, ", ".join(f"i32 {LANES + k - by}" for k in range(LANES))
+        return self.ir.add_instruction(f"shufflevector {v} {before}, {v} {value}, <{LANES} x i32> <{lanes}>")
 
-    def write_extrapolated(self, row: str, to: str, near: str, far: str) -> None:
-        """A number beyond the end of a row, as if it went on straight."""
+    def pick(self, how: str, a: str, b: str) -> str:
+        """One value where it compares so with another, else the other."""
         t = self.ir
-        one, two = (t.add_instruction(f"load double, ptr {t.double_pointer(row, k)}") for k in (near, far))
-        twice = t.add_instruction(f"fadd double {one}, {one}")
-        t.write_line(
-            f"store double {t.add_instruction(f'fsub double {twice}, {two}')}, ptr {t.double_pointer(row, to)}"
-        )
+        flag = t.compare(how, a, b)
+        return t.add_instruction(f"select <{LANES} x i1> {flag}, {t.vector} {a}, {t.vector} {b}")
 
-    def write_flags(self, counter: str, clear_row: str, direction_rows: list[str]) -> tuple[str, str]:
-        """Of the intervals from a vector of steps to the next ones: whether all is good, and whether nothing turns
-        too fast. Between two steps what is clear bends by less than its second differences say."""
-        t, flags = self.ir, f"<{LANES} x i1>"
-        begin = t.add_instruction(f"mul i64 {counter}, {LANES}")
-        here = {k: t.add_instruction(f"add i64 {begin}, {k}") for k in (-1, 1, 2)} | {0: begin}
-        values = [t.load(t.double_pointer(clear_row, here[k])) for k in (-1, 0, 1, 2)]
-        moves = [t.binary("sub", b, a) for a, b in pairwise(values)]
-        bends = [t.call_intrinsic("fabs", t.binary("sub", b, a)) for a, b in pairwise(moves)]
+    def write_merged(self, left: str, clear: str, cosines: list[str]) -> str:
+        """How clear a step is where it is closed, and nothing has turned too fast; else no number, but for what is
+        below zero."""
+        t = self.ir
+        good = t.compare("ole", left, self.tolerance)
+        for cosine in cosines:
+            # where a step is no position nothing turns
+            good = t.and_flags(good, t.compare("uge", cosine, t.constant(self.least_cosine)))
+        told = t.or_flags(good, t.compare("olt", clear, t.constant(0.0)))
+        return t.add_instruction(f"select <{LANES} x i1> {told}, {t.vector} {clear}, {t.vector} {_NAN}")
 
-        def pick(how: str, a: str, b: str) -> str:
-            return t.add_instruction(f"select {flags} {t.compare(how, a, b)}, {t.vector} {a}, {t.vector} {b}")
+    def write_flags(self, clear: str, before: str) -> tuple[str, str]:
+        """Whether all is good up to each step of a vector, and whether there is a dead point just before it. Between
+        steps what is clear bends by less than its second differences say."""
+        t = self.ir
+        one, two = (self.earlier(clear, before, by) for by in (1, 2))
+        bend = t.call_intrinsic("fabs", t.binary("sub", t.binary("sub", clear, one), t.binary("sub", one, two)))
+        # at the first steps some of these are no numbers, which is passed over
+        needed = self.pick("ogt", bend, self.clearance)
+        least = self.pick("olt", two, one)
+        fine = t.compare("ogt", self.pick("olt", least, clear), needed)
+        dead = t.and_flags(t.compare("olt", clear, t.constant(0.0)), t.compare("ogt", least, needed))
+        return fine, dead
 
-        # what is no number bends by nothing, and is not good itself
-        known = t.compare("ord", bends[0], bends[0])
-        first = t.select_or_zero(known, bends[0])
-        needed = pick("ogt", pick("ogt", bends[1], first), self.clearance)
-        fine = t.and_flags(t.compare("ogt", values[1], needed), t.compare("ogt", values[2], needed))
-        fastest = t.constant(0.0)
-        for row in direction_rows:
-            change = t.binary("sub", t.load(t.double_pointer(row, here[1])), t.load(t.double_pointer(row, begin)))
-            fastest = pick("ogt", t.call_intrinsic("fabs", change), fastest)
-        slow = t.compare("ole", fastest, t.constant(self.greatest_change))
-        return t.and_flags(fine, slow), slow
-
-    def write_search(self, kind: int, clear_row: str) -> None:
+    def write_search(self, kind: int) -> None:
         """The first interval that is not good, and why."""
         t, name, byte, w = self.ir, f"kind{kind}", f"i{LANES}", f"searched{kind}"
+        t.write_label(f"{name}told")
+        t.write_line(f"%good{kind} = icmp eq {byte} %allnext{kind}, -1")
+        t.write_line(f"br i1 %good{kind}, label %{name}good, label %{name}find")
+        t.write_label(f"{name}good")
+        t.write_line("br label %blockend")
         t.write_label(f"{name}find")
         t.write_line(f"%{w} = phi i64 [0, %{name}told], [%{w}next, %{name}find]")
-        place = t.add_instruction(f"getelementptr i8, ptr %fineflags, i64 %{w}")
+        place = t.add_instruction(f"getelementptr i8, ptr %flags, i64 %{w}")
         t.write_line(f"%bits{kind} = load {byte}, ptr {place}")
         t.write_line(f"%{w}next = add i64 %{w}, 1")
         t.write_line(f"%{w}more = icmp eq {byte} %bits{kind}, -1")
@@ -266,33 +235,28 @@ class _TapeWriter:
         bad = t.add_instruction(f"xor {byte} %bits{kind}, -1")
         lane = t.add_instruction(f"call {byte} @llvm.cttz.{byte}({byte} {bad}, i1 true)")
         wide = t.add_instruction(f"zext {byte} {lane} to i64")
-        begin = t.add_instruction(f"mul i64 %{w}, {LANES}")
-        before = t.add_instruction(f"add i64 {begin}, {wide}")
-        t.write_line(f"%come{kind} = add i64 {before}, 1")
-        place = t.add_instruction(f"getelementptr i8, ptr %slowflags, i64 %{w}")
-        slow = t.add_instruction(f"load {byte}, ptr {place}")
-        slow = t.add_instruction(f"trunc {byte} {t.add_instruction(f'lshr {byte} {slow}, {lane}')} to i1")
-        clear = t.add_instruction(f"load double, ptr {t.double_pointer(clear_row, f'%come{kind}')}")
-        beyond = t.add_instruction(f"fcmp olt double {clear}, 0.0")
-        dead = t.add_instruction(f"and i1 {slow}, {beyond}")
-        t.write_line(f"%verdict{kind} = select i1 {dead}, i64 1, i64 2")
+        after = t.add_instruction(f"add i64 {t.add_instruction(f'mul i64 %{w}, {LANES}')}, {wide}")
+        t.write_line(f"%come{kind} = add i64 {after}, 0")
+        place = t.add_instruction(f"getelementptr i8, ptr %deadflags, i64 %{w}")
+        dead = t.add_instruction(f"lshr {byte} {t.add_instruction(f'load {byte}, ptr {place}')}, {lane}")
+        dead = t.add_instruction(f"trunc {byte} {dead} to i1")
+        t.write_line(f"%verdict{kind} = select i1 {dead}, i64 {DEAD_POINT}, i64 {UNDECIDED}")
         t.write_line(f"%ends{kind} = icmp slt i64 %come{kind}, %limit")
         t.write_line(f"br i1 %ends{kind}, label %{name}stopped, label %{name}good")
         t.write_label(f"{name}stopped")
         t.write_line("br label %blockend")
 
 
-def run_tape(formulas: tuple[TapeFormula, ...], greatest_change: float, steps: int, tape: Tape) -> TapeResult:
+def run_tape(formulas: tuple[TapeFormula, ...], least_cosine: float, steps: int, tape: Tape) -> TapeResult:
     """Walk over a whole tape, whose slots are addresses; see `compile_tape`."""
     stride, many = padded_steps(steps), len(tape.tolerance)
     result = TapeResult(*np.empty((3, many), dtype=np.int64))
-    scratch = np.empty(scratch_size(formulas, stride) + LANES)
+    flags = np.empty(2 * stride // LANES, dtype=np.int8)
     slots, p = tape.slots, tape.p
     given = (tape.first, tape.kinds, slots, p, tape.tolerance, tape.clearance)
-    arrays = [*(np.ascontiguousarray(each) for each in given), scratch, *result]
+    arrays = [*(np.ascontiguousarray(each) for each in given), flags, *result]
     addresses = [each.ctypes.data for each in arrays]
-    addresses[6] += -addresses[6] % 64
-    walk = compile_tape(formulas, greatest_change)
+    walk = compile_tape(formulas, least_cosine)
     with leave_turn():
         walk(0, many, steps, stride, slots.shape[1], p.shape[1], *addresses)
     return result

@@ -9,10 +9,11 @@ from typing import Any, overload
 
 import numpy as np
 
-from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput
 from planar.model.mechanism import LARGEST_INPUT_POSITION
 from planar.model.pin_linkage import PinLayout, PinnedMechanism
+
+Array = np.ndarray
 
 ABSENT = -1
 """In arrays of pin numbers: no pin."""
@@ -43,41 +44,29 @@ def pinned_linkages(
     fixed = _read_numbers(frame, "frame", 2, many)
     _check_pins(held, "bars", pin_counts)
     _check_pins(fixed, "frame", pin_counts)
-    bar_sizes = np.sum(held >= 0, axis=2)
+    bar_sizes, frame_counts = _count_present(held), _count_present(fixed)
     bar_counts = np.sum(bar_sizes > 0, axis=1)
-    driven = np.broadcast_to(_read_numbers(crank, "crank", np.ndim(crank), many), many)
+    driven = np.broadcast_to(_read_numbers(crank, "crank", np.ndim(crank), many), many).astype(np.int64)
     rates = [_read_rates(each, name, many) for each, name in ((velocity, "velocity"), (acceleration, "acceleration"))]
-    _refuse(np.arange(held.shape[1]) >= bar_counts[:, None], bar_sizes > 0, "bars", "a bar stands behind none")
-    _refuse(bar_sizes > 0, bar_sizes < 2, "bars", "two pins or more are wanted, each once")
-    _check_twice(held, "bars", "two pins or more are wanted, each once")
-    _check_twice(fixed, "frame", "each pin is wanted once")
-    every = np.arange(many)
-    first, second = (at[every[:, None], held[:, :, k]] for k in (0, 1))
-    flat = (bar_sizes > 0) & np.all(first == second, axis=2)
-    _refuse(flat, flat, "bars", "its first two pins are at one place, so the bar has no length")
-    _refuse(bar_counts == 0, bar_counts == 0, "bars", "a linkage without a bar is none")
-    _refuse(fixed[:, 0] < 0, fixed[:, 0] < 0, "frame", "no pin is on the frame")
-    _refuse((driven < 0) | (driven >= bar_counts), np.ones(many, dtype=bool), "crank", "the number of a bar is wanted")
-    on_frame, on_bar = (np.zeros((many, at.shape[1] + 1), dtype=bool) for _ in range(2))
-    on_frame[every[:, None], fixed] = True
-    on_bar[every[:, None], held.reshape(many, -1)] = True
-    alone = ~(on_frame | on_bar)[:, :-1] & (np.arange(at.shape[1]) < pin_counts[:, None])
-    _refuse(alone, alone, "places", "the pin is on no bar, and not on the frame")
-    own = held[every, driven]
-    times = np.sum(on_frame[every[:, None], own] & (own >= 0), axis=1)
-    _refuse(times == 0, times == 0, "crank", "the bar is not pinned to the frame")
-    _refuse(times > 1, times > 1, "crank", "the bar is pinned to the frame twice, so it cannot turn")
-    return PinnedLinkages(
+    _refuse((bar_sizes == 0) & (np.arange(held.shape[1]) < bar_counts[:, None]), "bars", "a bar without a pin is none")
+    _refuse((bar_sizes == 1) | _has_twice(held), "bars", "two pins or more are wanted, each once")
+    _refuse(_has_twice(fixed), "frame", "each pin is wanted once")
+    _refuse(bar_counts == 0, "bars", "a linkage without a bar is none")
+    _refuse(frame_counts == 0, "frame", "no pin is on the frame")
+    _refuse((driven < 0) | (driven >= bar_counts), "crank", "the number of a bar is wanted")
+    made = PinnedLinkages(
         at[np.arange(at.shape[1]) < pin_counts[:, None]],
         _offsets(pin_counts),
         held[held >= 0],
         _offsets(bar_sizes[bar_sizes > 0]),
         _offsets(bar_counts),
         fixed[fixed >= 0],
-        _offsets(np.sum(fixed >= 0, axis=1)),
-        driven.astype(np.int64),
+        _offsets(frame_counts),
+        driven,
         *rates,
     )
+    _check_joined(made)
+    return made
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -123,7 +112,7 @@ class PinnedLinkages(Sequence[PinnedMechanism]):
         entries = self.first_entry[self.first_bar[:-1] + self.crank]
         first, second = (self.positions[self.first_pin[:-1] + self.bar_pins[entries + k]] for k in (0, 1))
         way = second - first
-        return np.arctan2(way[:, 1], way[:, 0])
+        return np.asarray(np.arctan2(way[:, 1], way[:, 0]))
 
     def __repr__(self) -> str:
         return f"PinnedLinkages(<{len(self)} linkages>)"
@@ -192,13 +181,14 @@ def _read_positions(places: Any) -> tuple[Array, Array]:
         raise BadInput("places", "an array (linkages, pins, 2) of numbers (m) is wanted") from None
     if at.ndim != 3 or at.shape[2] != 2 or at.shape[1] < 2:
         raise BadInput("places", "an array (linkages, pins, 2) is wanted, of two pins at least")
-    present = ~np.all(np.isnan(at), axis=2)
+    present = ~(np.isnan(at[:, :, 0]) & np.isnan(at[:, :, 1]))
     counts = np.sum(present, axis=1)
     expected = np.arange(at.shape[1]) < counts[:, None]
     with np.errstate(invalid="ignore"):
-        wrong = (present != expected) | (expected & ~np.all(np.abs(at) <= LARGEST_INPUT_POSITION, axis=2))
-    _refuse(wrong, wrong, "places", f"numbers up to {LARGEST_INPUT_POSITION:g} m are wanted, NaN at the end alone")
-    _refuse(counts < 2, counts < 2, "places", "two pins at least are wanted")
+        within = np.abs(at) <= LARGEST_INPUT_POSITION
+        wrong = (present != expected) | (expected & ~(within[:, :, 0] & within[:, :, 1]))
+    _refuse(wrong, "places", f"numbers up to {LARGEST_INPUT_POSITION:g} m are wanted, NaN at the end alone")
+    _refuse(counts < 2, "places", "two pins at least are wanted")
     return at, counts
 
 
@@ -220,7 +210,7 @@ def _read_rates(values: Any, name: str, many: int) -> Array:
         whole = np.broadcast_to(found, many).copy()
     except (TypeError, ValueError):
         raise BadInput(name, "a finite number is wanted, or an array (linkages,) of these") from None
-    _refuse(~np.isfinite(whole), ~np.isfinite(whole), name, "a finite number is wanted")
+    _refuse(~np.isfinite(whole), name, "a finite number is wanted")
     return whole
 
 
@@ -228,19 +218,53 @@ def _check_pins(numbers: Array, name: str, pin_counts: Array) -> None:
     """Refuse numbers of pins that are not there, and those that stand behind none."""
     wrong = (numbers < ABSENT) | (numbers >= pin_counts.reshape(-1, *[1] * (numbers.ndim - 1)))
     wrong[..., 1:] |= (numbers[..., 1:] >= 0) & (numbers[..., :-1] < 0)
-    _refuse(wrong, wrong, name, "the number of a pin of the linkage is wanted, -1 at the end alone")
+    _refuse(wrong, name, "the number of a pin of the linkage is wanted, -1 at the end alone")
 
 
-def _check_twice(numbers: Array, name: str, told: str) -> None:
-    """Refuse the same pin twice in a row."""
+def _count_present(numbers: Array) -> Array:
+    """How many are there in each row."""
+    found = np.zeros(numbers.shape[:-1], dtype=np.int64)
+    for k in range(numbers.shape[-1]):
+        found += numbers[..., k] >= 0
+    return found
+
+
+def _has_twice(numbers: Array) -> Array:
+    """Whether a row has a pin twice."""
+    if numbers.shape[-1] == 2:
+        return np.asarray((numbers[..., 0] == numbers[..., 1]) & (numbers[..., 0] >= 0))
     ordered = np.sort(numbers, axis=-1)
-    twice = np.any((ordered[..., 1:] == ordered[..., :-1]) & (ordered[..., 1:] >= 0), axis=-1)
-    _refuse(twice, twice, name, told)
+    return np.asarray(np.any((ordered[..., 1:] == ordered[..., :-1]) & (ordered[..., 1:] >= 0), axis=-1))
 
 
-def _refuse(suspected: Array, wrong: Array, name: str, told: str) -> None:
-    """Raises BadInput at the first place where both are true."""
-    both = suspected & wrong
-    if both.any():
-        place = np.unravel_index(int(np.argmax(both)), both.shape)
+def _check_joined(made: PinnedLinkages) -> None:
+    """Refuse bars of no length, pins on nothing, and cranks that are not pinned to the frame at one point."""
+    x, y = made.positions.T
+    bar_owner = np.repeat(np.arange(len(made)), np.diff(made.first_bar))
+    sizes = np.diff(made.first_entry)
+    entries = made.bar_pins + np.repeat(made.first_pin[bar_owner], sizes)
+    first, second = entries[made.first_entry[:-1]], entries[made.first_entry[:-1] + 1]
+    flat = np.flatnonzero((x[first] == x[second]) & (y[first] == y[second]))
+    if len(flat):
+        owner = bar_owner[flat[0]]
+        place = f"bars[{owner}][{flat[0] - made.first_bar[owner]}]"
+        raise BadInput(place, "its first two pins are at one place, so the bar has no length")
+    frame_owner = np.repeat(np.arange(len(made)), np.diff(made.first_frame_pin))
+    on_frame, on_bar = np.zeros((2, len(x)), dtype=bool)
+    on_frame[made.frame_pins + made.first_pin[frame_owner]] = True
+    on_bar[entries] = True
+    alone = np.flatnonzero(~(on_frame | on_bar))
+    if len(alone):
+        owner = int(np.searchsorted(made.first_pin, alone[0], side="right")) - 1
+        place = f"places[{owner}][{alone[0] - made.first_pin[owner]}]"
+        raise BadInput(place, "the pin is on no bar, and not on the frame")
+    times = np.add.reduceat(on_frame[entries].astype(np.int64), made.first_entry[:-1])[made.first_bar[:-1] + made.crank]
+    _refuse(times == 0, "crank", "the bar is not pinned to the frame")
+    _refuse(times > 1, "crank", "the bar is pinned to the frame twice, so it cannot turn")
+
+
+def _refuse(wrong: Array, name: str, told: str) -> None:
+    """Raises BadInput at the first place where something is wrong."""
+    if wrong.any():
+        place = np.unravel_index(int(np.argmax(wrong)), wrong.shape)
         raise BadInput(f"{name}{''.join(f'[{int(k)}]' for k in place)}", told)

@@ -130,6 +130,66 @@ def test_many_random_dyads_end_where_their_cycles_end():
         as_cycle(mechanism, found, 40, result.outcomes, 1e-8)
 
 
+def as_arrays(mechanisms):
+    """Places, bars and pins on the frame of pinned mechanisms, as `planar.pinned_linkages` takes them."""
+    laid = [each.layout for each in mechanisms]
+    places = np.full((len(laid), max(len(each.pin_positions) for each in laid), 2), np.nan)
+    widest = max(len(bar) for each in laid for bar in each.bars)
+    bars = np.full((len(laid), max(len(each.bars) for each in laid), widest), -1)
+    frame = np.full((len(laid), max(len(each.frame_pins) for each in laid)), -1)
+    for k, each in enumerate(laid):
+        places[k, : len(each.pin_positions)] = each.pin_positions
+        frame[k, : len(each.frame_pins)] = each.frame_pins
+        for number, bar in enumerate(each.bars):
+            bars[k, number, : len(bar)] = bar
+    rates = ([getattr(each, name) for each in laid] for name in ("velocity", "acceleration"))
+    return (places, bars, frame, [each.crank for each in laid]), dict(
+        zip(("velocity", "acceleration"), rates, strict=True)
+    )
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_linkages_as_arrays_are_the_mechanisms_one_by_one(backend):
+    """Ones that go round and ones that stop, with bars of three pins, and one that is no crank and dyads."""
+    places = [(0.0, 0.0), (0.3, 0.2), (1.0, 0.0), (0.9, 0.7), (0.6, 1.1), (2.0, 0.0), (2.1, 0.8)]
+    bell = planar.pinned(places, [(0, 1), (1, 3), (2, 3, 4), (4, 6), (5, 6)], [0, 2, 5], velocity=-3.0)
+    mechanisms = [*(dyads(seed, 4 + seed % 5) for seed in range(12)), bell, triads(1)]
+    given, rates = as_arrays(mechanisms)
+    linkages = planar.pinned_linkages(*given, **rates)
+    assert list(linkages) == mechanisms
+    arrays = planar.sweep_each(linkages, 60, backend=backend)
+    each = planar.sweep_each([replace(one) for one in mechanisms], 60, backend=backend)
+    np.testing.assert_array_equal(arrays.whole, each.whole)
+    assert not arrays.whole.all()
+    rows = arrays.rows()
+    for k, (one, other) in enumerate(zip(arrays, each, strict=True)):
+        np.testing.assert_array_equal(one.status, other.status)
+        for order in ORDERS:
+            assert list(getattr(one, order)) == list(getattr(other, order))
+            own = getattr(rows, order)[rows.first[k] : rows.first[k + 1]]
+            for values, (name, wanted) in zip(own, getattr(other, order).items(), strict=True):
+                np.testing.assert_array_equal(values, getattr(one, order)[name])
+                np.testing.assert_allclose(values, wanted, rtol=1e-8, atol=1e-8)
+
+
+def test_linkages_as_arrays_in_parts_and_with_points_of_some(monkeypatch):
+    from planar.batch import sweep_mechanisms
+
+    given, rates = as_arrays([dyads(seed, 4 + seed % 4) for seed in range(7)])
+    linkages = planar.pinned_linkages(*given, **rates)
+    whole = planar.sweep_each(linkages, 100, ["P5", "P0"])
+    monkeypatch.setattr(sweep_mechanisms, "LINKAGES_PART_SIZE", 3)
+    with ThreadPoolExecutor(2) as pool:
+        found = [planar.sweep_each(linkages, 100, ["P5", "P0"], executor=each) for each in (None, pool)]
+    for result in found:
+        np.testing.assert_array_equal(result.rows().position, whole.rows().position)
+        np.testing.assert_array_equal(result.rows().first, np.cumsum([0, *(len(one.position) for one in whole)]))
+    assert [list(one.position) for one in whole][:3] == [["P0"], ["P0"], ["P5", "P0"]]
+    np.testing.assert_array_equal(whole[2].position["P0"][0], linkages[2].layout.pin_positions[0])
+    with pytest.raises(BadInput, match="no mechanism has a point 'C'"):
+        planar.sweep_each(linkages, 6, ["C"])
+
+
 @pytest.mark.parametrize("backend", BACKENDS)
 def test_pins_read_as_arrays_and_links_read_one_by_one_are_the_same(backend):
     laid = [dyads(seed, 9) for seed in range(6)]

@@ -122,3 +122,44 @@ def test_places_and_bars_as_arrays_are_not_held():
     mechanism = planar.pinned(places, bars, np.array([0, 1]))
     places[3] = 7.0
     np.testing.assert_allclose(planar.solve(mechanism).point("P3").position, PLACES[3], atol=1e-14)
+
+
+ARRAYS = {
+    "places": np.array([[*PLACES[:5], [np.nan, np.nan]], PLACES]),
+    "bars": np.array([[[0, 2, -1], [2, 3, 4], [1, 3, -1], [-1] * 3], [[0, 2, -1], [2, 3, 4], [1, 3, -1], [3, 5, -1]]]),
+    "frame": np.array([[0, 1], [1, 0]]),
+}
+
+
+def test_linkages_from_arrays_are_those_that_are_made_one_by_one():
+    linkages = planar.pinned_linkages(**ARRAYS, velocity=[1.0, 2.0])
+    assert linkages[0] == planar.pinned(PLACES[:5], BARS[:3], [0, 1])
+    assert linkages[-1] == planar.pinned(PLACES, BARS, [1, 0], velocity=2.0)
+    assert pickle.loads(pickle.dumps(linkages))[1:][0] == linkages[1]
+    assert len(linkages[:1]) == 1
+    np.testing.assert_allclose(linkages.crank_angles, [each.inputs[0].position for each in linkages], atol=1e-15)
+
+
+WRONG_ARRAYS = {
+    "a place that is none": ("places", (1, 2, 0), np.inf, r"places\[1\]\[2\]"),
+    "a pin between others": ("places", (0, 2), np.nan, r"places\[0\]\[2\]"),
+    "a pin that is not there": ("bars", (0, 1, 2), 5, r"bars\[0\]\[1\]\[2\]"),
+    "a pin twice": ("bars", (1, 1, 2), 2, r"bars\[1\]\[1\]"),
+    "a bar of one pin": ("bars", (1, 3, 1), -1, r"bars\[1\]\[3\]"),
+    "no length": ("places", (1, 2), PLACES[0], r"bars\[1\]\[0\].*no length"),
+    "nothing on the frame": ("frame", (1,), -1, r"frame\[1\].*no pin"),
+    "a crank that is not on it": ("frame", (0, 0), 3, r"crank\[0\].*not pinned"),
+    "a crank that is on it twice": ("frame", (1, 0), 2, r"crank\[1\].*twice"),
+    "a pin on nothing": ("bars", (0, 1, 2), -1, r"places\[0\]\[4\].*on no bar"),
+}
+
+
+@pytest.mark.parametrize("name", WRONG_ARRAYS)
+def test_arrays_that_are_no_linkages_are_refused_at_their_place(name):
+    key, place, value, told = WRONG_ARRAYS[name]
+    given = {each: values.copy() for each, values in ARRAYS.items()}
+    given[key][place] = value
+    if name == "a crank that is on it twice":
+        given["frame"][1] = [0, 2]
+    with pytest.raises(BadInput, match=told):
+        planar.pinned_linkages(**given)

@@ -85,7 +85,8 @@ class PointRows(NamedTuple):
     velocity: Array | None
     acceleration: Array | None
 
-    __repr__ = short_repr
+    def __repr__(self) -> str:
+        return short_repr(self)
 
 
 class SweptPart(Protocol):
@@ -234,8 +235,11 @@ class Each(Sequence[Swept]):
             return parts[0]
         counts = np.concatenate([np.zeros(0, dtype=np.int64), *(np.diff(part.first) for part in parts)])
         kept = [part for part in parts if len(part.position)] or parts[:1]
-        orders = [[part[1 + k] for part in kept] for k in range(3)]
-        whole = [None if not of or of[0] is None else np.concatenate(of) for of in orders]
-        return PointRows(
-            np.concatenate([[0], np.cumsum(counts)]), np.zeros((0, 0, 2)) if whole[0] is None else whole[0], *whole[1:]
-        )
+        whole = [
+            np.concatenate([each for part in kept if (each := part[1 + order]) is not None])
+            if kept and kept[0][1 + order] is not None
+            else None
+            for order in range(3)
+        ]
+        position = np.zeros((0, 0, 2)) if whole[0] is None else whole[0]
+        return PointRows(np.concatenate([[0], np.cumsum(counts)]), position, whole[1], whole[2])

@@ -11,7 +11,7 @@ import casadi as ca
 from planar.batch.mechanisms.block_formulas import FormulaBuilder, SymbolicAssembly
 from planar.batch.mechanisms.block_type import FRAME_BODY, BlockPair, BlockSignature
 from planar.batch.mechanisms.solved_block_type import BlockType, find_block_type
-from planar.codegen.block_formula import BlockFormula, FormulaInput, share_reciprocals
+from planar.codegen.block_formula import BlockFormula, FormulaInput, simplify_formula
 from planar.codegen.instructions import CosSin, InstructionList, required_values
 from planar.codegen.tape import TapeFormula
 from planar.equations.linear import solve_by_determinants
@@ -47,10 +47,10 @@ def pin_formulas(rates: bool, polished: bool) -> tuple[TapeFormula, ...]:
     """The formulas of all steps. `polished`: closed forms are followed by a step of Newton's method."""
     made = [TapeFormula(_crank_formula(rates), ROWS[rates])]
     for step in (PinStep.DYAD, PinStep.DYAD_ON_FRAME):
-        made.append(TapeFormula(_dyad_formula(step, rates, polished), ROWS[rates], 4))
+        made.append(TapeFormula(_dyad_formula(step, rates, polished), ROWS[rates], 2))
     for step in (PinStep.CARRIED, PinStep.CARRIED_ON_FRAME):
         made.append(TapeFormula(_carried_formula(step, rates), ROWS[rates]))
-    return tuple(each._replace(formula=share_reciprocals(each.formula)) for each in made)
+    return tuple(each._replace(formula=simplify_formula(each.formula)) for each in made)
 
 
 @lru_cache
@@ -90,8 +90,9 @@ class _PinFormulaBuilder(FormulaBuilder):
         """x and y of a point of the first inner link, then of its rates."""
         e, (u1, u2) = self.equations, self.symbols[2:]
         frames, _ = self._inner_frames()
-        point = ca.vertcat(*frames[self.block_equations.inner_links[0]].to_world(Vector(*local)))
-        wanted = [point]
+        x, y, *_ = frames[self.block_equations.inner_links[0]].to_world(Vector(*local))
+        point = ca.vertcat(ca.SX(x), ca.SX(y))
+        wanted: list[ca.SX] = [point]
         if rates:
             z1, z2 = UnknownRates(e, solve_by_determinants).first_and_second(u1, u2)
             wanted += first_and_second_rates(point, e.y, ca.vertcat(z1, u1), ca.vertcat(z2, u2))
@@ -160,6 +161,5 @@ def _carried_formula(step: PinStep, rates: bool) -> BlockFormula:
         else:
             two = [listing.add_input(FormulaInput("p", place + k)) for k in range(2)]
         wanted += listing.inline_function(function, [one, two, parts])[0]
-    order = required_values(listing, wanted)
-    leaves = {k: key for k in order if (key := listing.instructions[k].key) is not None}
+    leaves = {k: key for k in required_values(listing, wanted) if (key := listing.instructions[k].key) is not None}
     return BlockFormula(listing, tuple(wanted), leaves)

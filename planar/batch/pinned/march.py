@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from math import ceil
+from math import ceil, cos
 from typing import NamedTuple
 from weakref import WeakKeyDictionary
 
@@ -14,7 +14,16 @@ from planar.batch.march.prediction import MAX_TURN_PER_STEP
 from planar.batch.pinned.formulas import ROWS, TABLE_ROWS, PinStep, pin_formulas
 from planar.batch.pinned.tape import PinTape, make_tape
 from planar.batch.pinned.told_pins import ToldPins, frame_pins
-from planar.codegen.tape import DEAD_POINT, LANES, UNDECIDED, Tape, TapeResult, padded_steps, run_tape_numpy
+from planar.codegen.tape import (
+    DEAD_POINT,
+    LANES,
+    UNDECIDED,
+    Tape,
+    TapeFormula,
+    TapeResult,
+    padded_steps,
+    run_tape_numpy,
+)
 from planar.model.pin_linkages import PinnedLinkages
 
 Array = np.ndarray
@@ -25,6 +34,10 @@ LONGEST_INPUT_STEP, REFINEMENT = 0.07, 8
 once more, into so many."""
 MAX_STATE_BYTES = 16 * 2**20
 """Bytes of pins' places that are worked on at once beside those that are told."""
+
+
+LEAST_COSINE = cos(MAX_TURN_PER_STEP)
+"""Of the angle by which a bar turns in a step."""
 
 
 class _Attempt(NamedTuple):
@@ -59,7 +72,7 @@ def run_pinned_linkages(
     """
     many = len(linkages)
     decided, solved = np.zeros((2, many), dtype=bool), np.zeros(many, dtype=np.int64)
-    run = PinRun(*decided, solved, np.zeros((many, 2)), np.zeros((many, 2), np.int64))
+    run = PinRun(decided[0], decided[1], solved, np.zeros((many, 2)), np.zeros((many, 2), np.int64))
     whole = _tape(linkages)
     run.is_dyadic[whole.which] = True
     frame = _FramePins(linkages, told)
@@ -181,17 +194,23 @@ def _run_attempt(  # many: one attempt with all that it takes and fills
             from planar.codegen.tape_kernel import run_tape
 
             result = run_tape(
-                formulas, MAX_TURN_PER_STEP, count, arrays._replace(slots=state.ctypes.data + slots * state.strides[0])
+                formulas, LEAST_COSINE, count, arrays._replace(slots=state.ctypes.data + slots * state.strides[0])
             )
         else:
-            result = run_tape_numpy(formulas, MAX_TURN_PER_STEP, count, arrays, state)
+            result = run_tape_numpy(formulas, LEAST_COSINE, count, arrays, state)
         placed = tape.placed[point[tape.placed] >= 0]
         values[point[placed], :, : steps + 1] = state[slot[placed], :, :count:finer]
     _note(tape, result, finer, far, run)
 
 
-def _run_native(
-    linkages: PinnedLinkages, tape: PinTape, point: Array, values: Array, formulas: tuple, count: int, table: Array
+def _run_native(  # many: what is run, and where it is told
+    linkages: PinnedLinkages,
+    tape: PinTape,
+    point: Array,
+    values: Array,
+    formulas: tuple[TapeFormula, ...],
+    count: int,
+    table: Array,
 ) -> TapeResult:
     """Write what is told where it is told, and what else is needed into room that linkages share."""
     from planar.codegen.tape_kernel import run_tape
@@ -204,7 +223,7 @@ def _run_native(
     slots = _tape_rows(tape, addresses, table.ctypes.data)
     return run_tape(
         formulas,
-        MAX_TURN_PER_STEP,
+        LEAST_COSINE,
         count,
         Tape(tape.first, tape.kinds, slots, tape.p, tape.level, tape.tolerance, tape.clearance),
     )

@@ -107,8 +107,8 @@ def join_parts(parts: Sequence[PinnedPart], values: Array) -> PinnedPart:
     points = np.concatenate([[0], np.cumsum([part.first[-1] for part in parts])])
     first = np.concatenate([*(part.first[:-1] + at for part, at in zip(parts, points, strict=False)), points[-1:]])
     names = ("pins", "start", "solved", "near", "bars")
-    pins, *rest = (np.concatenate([getattr(part, name) for part in parts]) for name in names)
+    pins, start, solved, near, bars = (np.concatenate([getattr(part, name) for part in parts]) for name in names)
     found = {
         k + int(at): each for part, at in zip(parts, sizes, strict=False) for k, each in part.found_elsewhere.items()
     }
-    return PinnedPart(values, parts[0].steps, first, pins, *rest, found)
+    return PinnedPart(values, parts[0].steps, first, pins, start, solved, near, bars, found)

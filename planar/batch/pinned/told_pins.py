@@ -35,8 +35,8 @@ def find_told_pins(linkages: PinnedLinkages, names: Sequence[str] | None) -> Tol
         return ToldPins(pins, np.searchsorted(pins, linkages.first_pin))
     numbers = np.array([number for name in names if (number := pin_number(name)) is not None], dtype=np.int64)
     there = numbers < np.diff(linkages.first_pin)[:, None]
-    pins = (numbers + linkages.first_pin[:-1, None])[there]
-    return ToldPins(pins, np.concatenate([[0], np.cumsum(there.sum(axis=1))]))
+    named = (numbers + linkages.first_pin[:-1, None])[there]
+    return ToldPins(named, np.concatenate([[0], np.cumsum(there.sum(axis=1))]))
 
 
 def frame_pins(linkages: PinnedLinkages) -> Array:
