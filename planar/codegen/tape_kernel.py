@@ -10,7 +10,7 @@ import numpy as np
 from planar.codegen.llvm_compile import compile_function
 from planar.codegen.llvm_ir import IRWriter
 from planar.codegen.tape import DEAD_POINT, LANES, UNDECIDED, Tape, TapeFormula, TapeResult, padded_steps
-from planar.foundation.arrays import Array
+from planar.foundation.arrays import IntArray
 from planar.foundation.turns import leave_turn
 
 SHIFT = LANES.bit_length() - 1
@@ -262,7 +262,7 @@ def run_tape(formulas: tuple[TapeFormula, ...], least_cosine: float, steps: int,
     return result
 
 
-def clear_rows(addresses: Array, first: Array, count: int) -> None:
+def clear_rows(addresses: IntArray, first: IntArray, count: int) -> None:
     """Rows of so many numbers, a multiple of LANES, at addresses (rows,): NaN from the number first (rows,) on."""
     if len(addresses):
         held = [np.ascontiguousarray(each, dtype=np.int64) for each in (addresses, first)]

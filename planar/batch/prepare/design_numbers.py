@@ -8,12 +8,13 @@ from functools import reduce
 import casadi as ca
 import numpy as np
 
-from planar.batch.design_arrays import design_variables, with_design_values
+from planar.batch.design_arrays import with_design_values
 from planar.batch.march.kernel import KernelEquations, Operand, kernel_equations
 from planar.batch.reference_design import ReferenceDesign
+from planar.document.dimensions import Dimension, input_numbers, link_lengths
 from planar.equations.mechanism_numbers import equation_structure, scaled_pair_numbers
-from planar.model.link_shapes import Distances, Link, LinkShape
-from planar.model.mechanism import LARGEST_INPUT_POSITION, Input
+from planar.model.link_shapes import Distances, Link, LinkShape, PointMember
+from planar.model.mechanism import LARGEST_INPUT_POSITION, Input, Mechanism
 from planar.model.pairs import MeasureKind
 from planar.solving.checks.residual_check import SHORT_ARM, residual_tolerance
 
@@ -23,6 +24,12 @@ LARGEST_REACH = 1e3
 """Sizes of the file's design of a pair's length: where one is greater, rounding may take digits of what is small."""
 OPEN_TRIANGLE = 1e-8
 """Of the square of the longest side's square: so far from closing rounding does not bring a triangle."""
+
+
+def compiled_variables(mechanism: Mechanism) -> dict[str, Dimension]:
+    """What a compiled run takes of all that designs may differ in: lengths of links, and the inputs' own numbers."""
+    lengths = link_lengths(mechanism, (link.name for link in mechanism.links))
+    return {each.name: each for each in (*lengths, *input_numbers(mechanism))}
 
 
 class DesignNumbers:
@@ -47,13 +54,13 @@ class DesignNumbers:
     def __init__(
         self,
         reference: ReferenceDesign,
-        members: Sequence[tuple[str, str]],
+        members: Sequence[PointMember],
         may_shift: Container[int],
         zeros: Container[str] = (),
     ):
         """`may_shift`: the inputs (by number) that may stand, or start, elsewhere than the file's own; `zeros`: names
         of lengths that are nothing in all designs."""
-        mechanism, variables = reference.mechanism, design_variables(reference.mechanism)
+        mechanism, variables = reference.mechanism, compiled_variables(reference.mechanism)
         still = {name: 0.0 for name in variables if name in zeros}
         variables = {name: each for name, each in variables.items() if name not in still}
         candidates = reference.candidates
@@ -107,7 +114,7 @@ class DesignNumbers:
     def _add(self, kind: str, values: Sequence[ca.SX | float]) -> None:
         self.numbers |= {(kind, k): ca.SX(value) for k, value in enumerate(values)}
 
-    def _local_coordinates(self, members: Sequence[tuple[str, str]]) -> list[ca.SX]:
+    def _local_coordinates(self, members: Sequence[PointMember]) -> list[ca.SX]:
         """x and y of points, each of a link, in its axes."""
         return [part / self.unit for link, point in members for part in self.shapes[link].position(point)]
 

@@ -10,8 +10,8 @@ from typing import NamedTuple
 import numpy as np
 
 from planar.batch.block import LEAD_IN_STEP
-from planar.batch.design_arrays import design_variables, read_designs, with_design_values
-from planar.batch.prepare.design_numbers import DesignNumbers
+from planar.batch.design_arrays import read_designs, with_design_values
+from planar.batch.prepare.design_numbers import DesignNumbers, compiled_variables
 from planar.batch.prepare.run_endings import DEAD_POINT, UNSURE
 from planar.batch.prepare.value_binder import MAX_BOUND_NAMES
 from planar.batch.reference_design import ReferenceDesign
@@ -98,7 +98,7 @@ class _RunsByZeros:
     designs that give such a length a value there is one for each choice of them, made when it is first wanted."""
 
     def __init__(self, compile_run: Callable[[frozenset[str]], NativeRun], reference: ReferenceDesign):
-        known = design_variables(reference.mechanism)
+        known = compiled_variables(reference.mechanism)
         self._zeros = frozenset(name for name, each in known.items() if each.link and each.value == 0.0)
         self._names = frozenset(known)
         self._compile = compile_run

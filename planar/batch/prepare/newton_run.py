@@ -33,9 +33,10 @@ from planar.batch.prepare.llvm_newton import (
 )
 from planar.batch.prepare.value_binder import ValueBinder, address_of
 from planar.batch.reference_design import ReferenceDesign
-from planar.codegen.aligned_arrays import WIDEST_VECTOR
+from planar.codegen.aligned_arrays import WIDEST_VECTOR_BYTES
 from planar.codegen.instructions import UnsupportedOperation
 from planar.codegen.llvm_compile import compile_function
+from planar.model.link_shapes import PointMember
 
 Array = np.ndarray
 
@@ -58,7 +59,7 @@ class NewtonRun:
         self,
         reference: ReferenceDesign,
         design: DesignNumbers,
-        members: Sequence[tuple[str, str]],
+        members: Sequence[PointMember],
         rates: bool,
         u: Array,
     ):
@@ -94,7 +95,9 @@ class NewtonRun:
         self._function: Any = compile_function(layout.ir, FUNCTION_NAME, *ARGUMENT_TYPES)
         self._shape, self._positions = (layout.told, pieces.width), len(u)
         marched = (pieces.steps + 1) * kernels[1].output_row_count * LANES
-        self._scratch = layout.scratch + len(kernels[1].state) * pieces.width + LANES + marched + WIDEST_VECTOR
+        self._scratch = (
+            layout.scratch + len(kernels[1].state) * pieces.width + LANES + marched + WIDEST_VECTOR_BYTES // 8
+        )
         self._size = HEADER + layout.told * pieces.width
         binder = ValueBinder(design.index)
         self._bind, self._bound = binder.bind, binder.bound
@@ -106,7 +109,7 @@ class NewtonRun:
         out, scratch = np.empty(self._size), np.empty(self._scratch)
         first = address_of(scratch)
         # where whole vectors begin
-        first += -first % (8 * WIDEST_VECTOR)
+        first += -first % (WIDEST_VECTOR_BYTES)
         self._function(self._context_pointer, places, pack(*values.values()), first, address_of(out))
         rows = out[HEADER:].reshape(self._shape)[:, : self._positions]
         return rows, out.item(0), 0
@@ -134,13 +137,13 @@ class _Pieces:
         return ((which - self.firsts[lane]) * stride + lane).astype(np.int64)
 
 
-def _own_unknowns(reference: ReferenceDesign, u: Array, members: Sequence[tuple[str, str]], at: Array) -> Array:
+def _own_unknowns(reference: ReferenceDesign, u: Array, members: Sequence[PointMember], at: Array) -> Array:
     """The unknowns (unknowns, lanes) of the file's own design at positions (lanes,) of its run.
 
     Raises UnsupportedOperation where its assembly is not sure, or does not come to the end.
     """
     shapes = reference.shapes(reference.mechanism)
-    p, inputs = reference.pair_numbers(shapes, 1), reference.inputs(reference.mechanism, 1)
+    p, inputs = reference.pair_numbers(shapes, 1, reference.mechanism), reference.inputs(reference.mechanism, 1)
     start = find_assemblies(reference, shapes, p, inputs[0], find_runner("native"))
     batch = reference.design_batch(shapes, p, inputs, members)._replace(z0=start.z, input_offsets=u - u[0])
     _, good = run_designs_kernel(batch, EXTRA_CORRECTIONS)
