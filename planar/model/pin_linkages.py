@@ -89,6 +89,10 @@ class PinnedLinkages(Sequence[PinnedMechanism]):
     velocity: Array
     acceleration: Array
 
+    def __post_init__(self) -> None:
+        for each in fields(self):
+            getattr(self, each.name).setflags(write=False)
+
     @classmethod
     def from_layouts(cls, layouts: Sequence[PinLayout]) -> PinnedLinkages:
         """Linkages that have been checked."""

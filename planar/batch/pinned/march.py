@@ -75,19 +75,20 @@ def run_pinned_linkages(
     run = PinRun(decided[0], decided[1], solved, np.zeros((many, 2)), np.zeros((many, 2), np.int64))
     whole = _tape(linkages)
     run.is_dyadic[whole.which] = True
+    is_native = available_backends(backend)[0] == "native"
     frame = _FramePins(linkages, told)
     left = np.arange(len(whole.which))
     for attempt in _ATTEMPTS:
         finer = step_division(steps) * attempt.refinement
-        for some in _chunks(linkages, whole.which[left], steps * finer + 1, rates, finer > 1 or backend == "numpy"):
+        for some in _chunks(linkages, whole.which[left], steps * finer + 1, rates, finer > 1 or not is_native):
             tape = whole.select(left[some])
-            _run_attempt(linkages, tape, told, values, steps, rates, attempt, backend, run)
+            _run_attempt(linkages, tape, told, values, steps, rates, attempt, is_native, run)
         left = left[~run.is_decided[whole.which[left]]]
         if not left.size:
             break
     frame.fill(values)
     stopped = np.flatnonzero(run.is_decided & (run.solved <= steps))
-    clear_points(values, told, stopped, run.solved[stopped])
+    clear_points(values, told, stopped, run.solved[stopped], is_native)
     return run
 
 
@@ -116,13 +117,13 @@ def make_values(points: int, steps: int, rates: bool, dtype: str = "float64") ->
     return made[first : first + size].reshape(shape)
 
 
-def clear_points(values: Array, told: ToldPins, which: Array, first: Array) -> None:
+def clear_points(values: Array, told: ToldPins, which: Array, first: Array, is_native: bool) -> None:
     """The points of some linkages are NaN from a step of each on."""
     counts = np.diff(told.first)[which]
     begin = np.cumsum(counts) - counts
     points = np.repeat(told.first[which] - begin, counts) + np.arange(counts.sum())
     steps = np.repeat(first, counts)
-    if available_backends("auto")[0] == "native":
+    if is_native:
         from planar.codegen.tape_kernel import clear_rows
 
         rows = values.ctypes.data + points[:, None] * values.strides[0] + np.arange(values.shape[1]) * values.strides[1]
@@ -173,7 +174,7 @@ def _run_attempt(  # many: one attempt with all that it takes and fills
     steps: int,
     rates: bool,
     attempt: _Attempt,
-    backend: str,
+    is_native: bool,
     run: PinRun,
 ) -> None:
     """Run some linkages, and note those that are decided."""
@@ -184,13 +185,13 @@ def _run_attempt(  # many: one attempt with all that it takes and fills
     table = np.stack([np.cos(far), np.sin(far)])
     point = np.full(len(linkages.positions), -1)
     point[told.pins] = np.arange(len(told.pins))
-    if finer == 1 and available_backends(backend)[0] == "native":
+    if finer == 1 and is_native:
         result = _run_native(linkages, tape, point, values, formulas, count, table)
     else:
         state, slot = _make_state(linkages, tape, far, rates, table)
         slots = _tape_rows(tape, slot, len(state) - 1)
         arrays = Tape(tape.first, tape.kinds, slots, tape.p, tape.level, tape.tolerance, tape.clearance)
-        if available_backends(backend)[0] == "native":
+        if is_native:
             from planar.codegen.tape_kernel import run_tape
 
             result = run_tape(
