@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
-from typing import Any
 
 import numpy as np
 
@@ -53,7 +52,7 @@ def drawn(kind: str, seed: int) -> Case | None:
     """The case of a kind and seed, always the same; None where what is drawn is no mechanism that runs."""
     rng = np.random.default_rng([seed, *kind.encode()])
     try:
-        mechanism = KINDS[kind](rng, seed)
+        mechanism = KINDS[kind](seed)
     except planar.BadInput:
         return None
     if not mechanism.inputs or not design_variables(mechanism):
@@ -90,27 +89,23 @@ def model_names() -> tuple[str, ...]:
     return tuple(str(file) for file in model_files())
 
 
-def _model(rng: np.random.Generator, seed: int) -> Mechanism:
+def _model(seed: int) -> Mechanism:
     names = model_names()
     return planar.load(names[seed % len(names)])
 
 
-def _linkage(rng: np.random.Generator, seed: int) -> Mechanism:
+def _linkage(seed: int) -> Mechanism:
     return planar.from_dict(random_linkage(seed, 1 + seed % MOST_LINKS, 0.01, HIGHER * (seed % 3 == 2)).value)
 
 
-def _six_bars(rng: np.random.Generator, seed: int) -> Mechanism:
-    return _document(SWEPT[1 + seed % (len(SWEPT) - 1)].document())
+def _six_bars(seed: int) -> Mechanism:
+    return planar.from_dict(SWEPT[1 + seed % (len(SWEPT) - 1)].document())
 
 
-def _document(value: dict[str, Any]) -> Mechanism:
-    return planar.from_dict(value)
-
-
-KINDS: dict[str, Callable[[np.random.Generator, int], Mechanism]] = {
+KINDS: dict[str, Callable[[int], Mechanism]] = {
     "models": _model,
     "linkages": _linkage,
-    "four-bars": lambda rng, seed: refusals.base(),
-    "slider-cranks": lambda rng, seed: _document(SliderCrank().document()),
+    "four-bars": lambda _: refusals.base(),
+    "slider-cranks": lambda _: planar.from_dict(SliderCrank().document()),
     "six-bars": _six_bars,
 }

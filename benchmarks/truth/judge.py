@@ -112,6 +112,14 @@ class Truth:
             **{f"sweep_each, {backend}": lambda backend=backend: self._each(backend) for backend in backends},
         }
 
+    def order(self, column: int) -> str:
+        """What a column of the numbers is."""
+        return ("position", "velocity", "acceleration")[column // (2 * len(self.points))]
+
+    def point(self, column: int) -> str:
+        """Of which point a column of the numbers is."""
+        return self.points[column % (2 * len(self.points)) // 2]
+
     def _sweep(self, backend: str) -> list[Told]:
         case = self.case
         found = planar.sweep(
@@ -208,41 +216,35 @@ def _difference(truth: Truth, true: Told, told: Told, reach: Array | None) -> tu
         is_, should = OUTCOMES[told.status[row]].value, OUTCOMES[true.status[row]].value
         return f"status {is_!r} for {should!r}", f"from row {row} of {len(true.status) - 1}"
     gone, must = np.isnan(told.out), np.isnan(true.out)
-    wide = 2 * len(truth.points)
     if not np.array_equal(gone, must):
         row, column = map(int, np.argwhere(gone != must)[0])
         what = "missing" if gone[row, column] else "told though not determined"
-        return f"{_order(column, wide)} {what}", f"row {row}, point {_point(truth, column)}"
-    off = np.where(must, 0.0, np.abs(told.out - true.out))
+        return f"{truth.order(column)} {what}", f"row {row}, point {truth.point(column)}"
+    return _distance(truth, np.where(must, 0.0, true.out), np.where(must, 0.0, told.out), reach)
+
+
+def _distance(truth: Truth, true: Array, told: Array, reach: Array | None) -> tuple[str, str]:
+    """The greatest difference of numbers that both have."""
+    off, wide = np.abs(told - true), 2 * len(truth.points)
     if off.size == 0:
         return SAME, ""
     scale = np.empty_like(off)
     for first in range(0, off.shape[1], wide):
         part = slice(first, first + wide)
-        size = truth.reference.unit if first == 0 else float(np.nanmax(np.abs(true.out[:, part]), initial=0.0))
-        scale[:, part] = size or 1.0
-    allowed = ROUND_OFF * scale * (1.0 if reach is None else 10.0)
+        scale[:, part] = truth.reference.unit if first == 0 else float(np.max(np.abs(true[:, part]))) or 1.0
+    allowed = ROUND_OFF * scale
     if reach is not None:
         allowed = allowed + np.nan_to_num(reach)
     worst = np.unravel_index(int(np.argmax(off / allowed)), off.shape)
     if off[worst] <= allowed[worst]:
         return SAME, ""
     row, column = map(int, worst)
-    where = f"row {row}, point {_point(truth, column)}: {told.out[worst]:.17g} for {true.out[worst]:.17g}"
+    where = f"row {row}, point {truth.point(column)}: {told[worst]:.17g} for {true[worst]:.17g}"
     far = np.any(off[:, :wide] > FAR * truth.reference.unit, axis=1)
-    if far[0]:
-        return "another assembly at the start", where
     if far.any():
-        return "branch switched", f"from row {int(np.argmax(far))}; {where}"
-    return f"{_order(column, wide)} off", f"{off[worst] / scale[worst]:.1e} of its order; {where}"
-
-
-def _order(column: int, wide: int) -> str:
-    return ("position", "velocity", "acceleration")[column // wide]
-
-
-def _point(truth: Truth, column: int) -> str:
-    return truth.points[column % (2 * len(truth.points)) // 2]
+        first = int(np.argmax(far))
+        return ("branch switched" if first else "another assembly"), f"from row {first}; {where}"
+    return f"{truth.order(column)} off", f"{off[worst] / scale[worst]:.1e} of its order; {where}"
 
 
 @contextmanager
