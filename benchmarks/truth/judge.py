@@ -1,0 +1,266 @@
+"""One case solved in every way and compared, position by position, with the general path."""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from functools import cached_property
+from importlib.util import find_spec
+from typing import Any, NamedTuple
+
+import numpy as np
+
+import planar
+from benchmarks.truth.draws import Case
+from planar.batch.design_arrays import design_variables, values_of_design, with_design_values
+from planar.batch.general_path import OUTCOMES, solve_design
+from planar.batch.reference_design import ReferenceDesign
+
+Array = np.ndarray
+
+PERTURBED, TRIES = 1e-9, 6
+"""By what part of itself every dimension is changed to see whether a design is decided, and how often."""
+ALLOWED = 1e-11
+"""A number may be off by what a change of all dimensions by this part of them does to it, as far as that shows."""
+ROUND_OFF = 1e-11
+"""Or by this part of the greatest number of its order."""
+FAR = 1e-4
+"""Positions that differ by this part of the size are another assembly, or another branch."""
+SECONDS = 30
+"""A way that takes longer over one case is given up, which is counted."""
+TRUE = "general path"
+"""The way that the others are compared with; its verdicts say how designs end."""
+SAME, UNDECIDED = "the same", "undecided"
+
+
+class Told(NamedTuple):
+    """Of one design: numbers (steps + 1, x and y of points, then rates; m, s), and status (steps + 1,)."""
+
+    out: Array
+    status: Array
+
+
+class Verdict(NamedTuple):
+    """What a way told of one design of a case, in words, with what there is to say of it."""
+
+    kind: str
+    seed: int
+    design: int
+    way: str
+    what: str
+    detail: str = ""
+
+
+class Truth:
+    """A case by the general path, design by design, as `planar.sweep` asks it."""
+
+    def __init__(self, case: Case):
+        self.case = case
+        given = tuple(each._replace(law=None) for each in case.mechanism.inputs)
+        self.mechanism = replace(case.mechanism, inputs=given)
+        self.reference = ReferenceDesign(self.mechanism, case.pair)
+        self.points = self.reference.select_points(None)
+        self.known: dict[int, Told] = {}
+        self.near: dict[int, list[Told]] = {}
+
+    def told(self, design: int) -> Told:
+        """The design as it is."""
+        if design not in self.known:
+            self.known[design] = self._solved(values_of_design(self.case.designs, design))
+        return self.known[design]
+
+    def perturbed(self, design: int) -> list[Told]:
+        """The design with all of its dimensions a little changed, in different ways."""
+        if design not in self.near:
+            own = {
+                name: each.value
+                for name, each in design_variables(self.reference.mechanism).items()
+                if each.kind == "length" or name.endswith(".position")
+            } | values_of_design(self.case.designs, design)
+            rng, self.near[design] = np.random.default_rng(design), []
+            size = max(map(abs, own.values()))
+            for _ in range(TRIES):
+                # in coordinates that vanish as well
+                changed = {
+                    name: value + PERTURBED * (value or size) * float(rng.choice([-1.0, 1.0]))
+                    for name, value in own.items()
+                    if not name.endswith(".position")
+                }
+                self.near[design].append(self._solved(own | changed))
+        return self.near[design]
+
+    def _solved(self, values: dict[str, float]) -> Told:
+        case, reference = self.case, self.reference
+        mechanism = with_design_values(reference.mechanism, values)
+        start = float(mechanism.inputs[reference.running_index].position)
+        grid, ends = None, (None, None)
+        if not reference.is_sliding:
+            grid = start + 2.0 * np.pi * np.linspace(0.0, 1.0, case.steps + 1)
+            ends = float(grid[0]), float(grid[-1])
+        found = solve_design(mechanism, reference.pair, grid, case.steps, ends, self.points, case.rates)
+        return Told(found.out, found.status)
+
+    @cached_property
+    def ways(self) -> dict[str, Callable[[], list[Told]]]:
+        """Every other way to solve the case."""
+        backends = ["native", "numpy"] if find_spec("llvmlite") else ["numpy"]
+        return {
+            **{f"sweep, {backend}": lambda backend=backend: self._sweep(backend) for backend in backends},
+            "prepared": self._prepared,
+            **{f"sweep_each, {backend}": lambda backend=backend: self._each(backend) for backend in backends},
+        }
+
+    def order(self, column: int) -> str:
+        """What a column of the numbers is."""
+        return ("position", "velocity", "acceleration")[column // (2 * len(self.points))]
+
+    def point(self, column: int) -> str:
+        """Of which point a column of the numbers is."""
+        return self.points[column % (2 * len(self.points)) // 2]
+
+    def _sweep(self, backend: str) -> list[Told]:
+        case = self.case
+        found = planar.sweep(
+            self.mechanism, case.designs, case.steps, rates=case.rates, pair=case.pair, backend=backend
+        )
+        return [self._told(found, np.asarray(found.status)[k], k) for k in range(len(case))]
+
+    def _prepared(self) -> list[Told]:
+        case = self.case
+        ready = planar.prepared(self.mechanism, case.steps, rates=case.rates, pair=case.pair)
+        found = [ready(values_of_design(case.designs, k)) for k in range(len(case))]
+        return [self._told(each, each.status, None) for each in found]
+
+    def _each(self, backend: str) -> list[Told]:
+        case = self.case
+        mechanisms = [with_design_values(self.mechanism, values_of_design(case.designs, k)) for k in range(len(case))]
+        found = planar.sweep_each(mechanisms, case.steps, rates=case.rates, pair=case.pair, backend=backend)
+        return [self._told(each, each.status, None) for each in found]
+
+    def _told(self, found: Any, status: Array, design: int | None) -> Told:
+        orders = (found.position, found.velocity, found.acceleration)[: 3 if self.case.rates else 1]
+        rows = [order[name] if design is None else order[name][design] for order in orders for name in self.points]
+        out = np.hstack(rows) if rows else np.zeros((len(status), 0))
+        return Told(np.array(out), np.array(status))
+
+
+def agrees(verdict: Verdict) -> bool:
+    """Whether nothing is wrong with what was told."""
+    return verdict.way == TRUE or verdict.what in (SAME, UNDECIDED)
+
+
+def verdicts(case: Case) -> list[Verdict]:
+    """What every way told of every design."""
+    try:
+        truth = Truth(case)
+        with limited(SECONDS):
+            for design in range(len(case)):
+                truth.told(design)
+    except planar.BadInput:
+        return []
+    except TimeoutError:
+        return [Verdict(case.kind, case.seed, 0, f"{TRUE}, too long", "given up", f"after {SECONDS} s")]
+    found = [
+        Verdict(case.kind, case.seed, design, TRUE, OUTCOMES[truth.told(design).status[-1]].value)
+        for design in range(len(case))
+    ]
+    for way, solve in truth.ways.items():
+        try:
+            with limited(SECONDS):
+                told = solve()
+        except TimeoutError:
+            found.append(Verdict(case.kind, case.seed, 0, way, "given up", f"after {SECONDS} s"))
+            continue
+        except Exception as problem:
+            what = f"raises {type(problem).__name__}"
+            found.append(Verdict(case.kind, case.seed, 0, way, what, str(problem)[:200]))
+            continue
+        for design, each in enumerate(told):
+            what, detail = judged(truth, design, each)
+            found.append(Verdict(case.kind, case.seed, design, way, what, detail))
+    return found
+
+
+def judged(truth: Truth, design: int, told: Told) -> tuple[str, str]:
+    """What there is to say of what was told of a design, and where."""
+    true = truth.told(design)
+    what, detail = _difference(truth, true, told, None)
+    if what == SAME:
+        return what, detail
+    near = truth.perturbed(design)
+    if any(_flips(truth, true, each) for each in near):
+        return UNDECIDED, f"{what}: {detail}"
+    reach = np.max([np.abs(each.out - true.out) for each in near], axis=0)
+    return _difference(truth, true, told, reach * (ALLOWED / PERTURBED))
+
+
+def _flips(truth: Truth, true: Told, other: Told) -> bool:
+    """Whether a status, a missing number or an assembly is another one."""
+    if not np.array_equal(true.status, other.status):
+        return True
+    if not np.array_equal(np.isnan(true.out), np.isnan(other.out)):
+        return True
+    wide = 2 * len(truth.points)
+    off = np.abs(true.out[:, :wide] - other.out[:, :wide])
+    return bool(np.any(off > FAR * truth.reference.unit))
+
+
+def _difference(truth: Truth, true: Told, told: Told, reach: Array | None) -> tuple[str, str]:
+    """The greatest difference in words; numbers may be off by round-off, and by `reach`."""
+    if told.out.shape != true.out.shape:
+        return "other shapes", f"{told.out.shape} for {true.out.shape}"
+    if not np.array_equal(told.status, true.status):
+        row = int(np.argmax(told.status != true.status))
+        is_, should = OUTCOMES[told.status[row]].value, OUTCOMES[true.status[row]].value
+        return f"status {is_!r} for {should!r}", f"from row {row} of {len(true.status) - 1}"
+    gone, must = np.isnan(told.out), np.isnan(true.out)
+    if not np.array_equal(gone, must):
+        row, column = map(int, np.argwhere(gone != must)[0])
+        what = "missing" if gone[row, column] else "told though not determined"
+        return f"{truth.order(column)} {what}", f"row {row}, point {truth.point(column)}"
+    return _distance(truth, np.where(must, 0.0, true.out), np.where(must, 0.0, told.out), reach)
+
+
+def _distance(truth: Truth, true: Array, told: Array, reach: Array | None) -> tuple[str, str]:
+    """The greatest difference of numbers that both have."""
+    off, wide = np.abs(told - true), 2 * len(truth.points)
+    if off.size == 0:
+        return SAME, ""
+    scale = np.empty_like(off)
+    for first in range(0, off.shape[1], wide):
+        part = slice(first, first + wide)
+        scale[:, part] = truth.reference.unit if first == 0 else float(np.max(np.abs(true[:, part]))) or 1.0
+    allowed = ROUND_OFF * scale
+    if reach is not None:
+        allowed = allowed + np.nan_to_num(reach)
+    worst = np.unravel_index(int(np.argmax(off / allowed)), off.shape)
+    if off[worst] <= allowed[worst]:
+        return SAME, ""
+    row, column = map(int, worst)
+    where = f"row {row}, point {truth.point(column)}: {told[worst]:.17g} for {true[worst]:.17g}"
+    far = np.any(off[:, :wide] > FAR * truth.reference.unit, axis=1)
+    if far.any():
+        first = int(np.argmax(far))
+        return ("branch switched" if first else "another assembly"), f"from row {first}; {where}"
+    return f"{truth.order(column)} off", f"{off[worst] / scale[worst]:.1e} of its order; {where}"
+
+
+@contextmanager
+def limited(seconds: int) -> Iterator[None]:
+    """TimeoutError after so many seconds, where the system can interrupt."""
+    if not hasattr(signal, "SIGALRM"):
+        yield
+        return
+
+    def stop(*_: object) -> None:
+        raise TimeoutError
+
+    before = signal.signal(signal.SIGALRM, stop)
+    signal.alarm(seconds)
+    try:
+        yield
+    finally:
+        signal.alarm(0)
+        signal.signal(signal.SIGALRM, before)
