@@ -14,7 +14,7 @@ from typing import Any, overload
 import numpy as np
 from numpy.typing import DTypeLike
 
-from planar.batch.assembly_lists import list_assemblies
+from planar.batch.assembly.assembly_lists import list_assemblies
 from planar.batch.block import DesignBlock
 from planar.batch.design_arrays import read_designs, split_into_blocks
 from planar.batch.executor import TASKS_PER_WORKER, run_tasks, thread_count, worker_count

@@ -34,7 +34,7 @@ def drawn(mechanism, spread, many):
     }
     designs = with_design_values(common.mechanism, values)
     shapes = common.shapes(designs)
-    return values, common, shapes, common.pair_numbers(shapes, many), common.inputs(designs, many)[0]
+    return values, common, shapes, common.pair_numbers(shapes, many, designs), common.inputs(designs, many)[0]
 
 
 @pytest.mark.parametrize("case", CASES.values(), ids=CASES)

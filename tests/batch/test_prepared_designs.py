@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 import planar
-from planar.batch.design_arrays import design_variables, with_design_values
+from planar.batch.design_arrays import with_design_values
 from planar.batch.general_path import solve_design
+from planar.batch.prepare.design_numbers import compiled_variables
 from planar.batch.prepare.run_endings import UNSURE
 from planar.foundation.errors import BadInput
 from tests.builders import open_four_bar
@@ -22,7 +23,7 @@ FULL_TURN = 2.0 * np.pi
 
 def lengths_around(mechanism, rng, spread, zeros=0.0):
     """Lengths of links, each times a factor; those that are nothing up to so many metres."""
-    known = design_variables(mechanism)
+    known = compiled_variables(mechanism)
     return {
         name: float(each.value * np.exp(spread * rng.normal()) + (0.0 if each.value else zeros * rng.normal()))
         for name, each in known.items()

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.batch.assembly_scores import CLEARLY_OPEN, DesignAssemblies, is_surely_farther
+from planar.batch.assembly.assembly_scores import CLEARLY_OPEN, DesignAssemblies, is_surely_farther
 from planar.batch.closed_form.choice import find_joiner
 from planar.batch.closed_form.joined_blocks import BlockJoiner, JoinedBlocks, unknowns_from_state
 from planar.batch.march.backend import DesignBatch

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.batch.assembly_scores import is_at_sketch, is_clearly_regular, is_surely_farther
+from planar.batch.assembly.assembly_scores import is_at_sketch, is_clearly_regular, is_surely_farther
 from planar.batch.mechanisms.block_runner import BlockRunner
 from planar.batch.mechanisms.block_type import COS, POSE_ROWS, SIN, SKETCH_SUMS, X, Y
 from planar.batch.mechanisms.linkage_arrays import BlockBatch, LinkageArrays, PointArrays

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.batch.assembly_scores import is_surely_farther
+from planar.batch.assembly.assembly_scores import is_surely_farther
 from planar.batch.pinned.formulas import NUMBERS, PinStep
 from planar.batch.pinned.told_pins import frame_pins
 from planar.model.pin_linkages import PinnedLinkages

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from math import inf
 from typing import NamedTuple
 
-from planar.batch.assembly_scores import MAX_BLOCK_UNKNOWNS, NEAR_SKETCH
+from planar.batch.assembly.assembly_scores import MAX_BLOCK_UNKNOWNS, NEAR_SKETCH
 from planar.batch.march.kernel import KernelEquations, Operand
 from planar.batch.march.llvm_designs import DesignsKernelLayout
 from planar.batch.march.llvm_kernel import write_angle_sum

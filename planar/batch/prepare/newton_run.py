@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from planar.batch.assembly.nearest_assemblies import CORRECTIONS
 from planar.batch.initial_assembly import find_assemblies
 from planar.batch.march.choice import find_runner
 from planar.batch.march.kernel import KernelEquations
@@ -21,7 +22,6 @@ from planar.batch.march.prediction import (
     correction_limit,
     longest_step,
 )
-from planar.batch.nearest_assemblies import CORRECTIONS
 from planar.batch.prepare.design_numbers import DesignNumbers
 from planar.batch.prepare.llvm_newton import (
     ARGUMENT_TYPES,

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from planar.batch.assembly_lists import ListedAssemblies
+from planar.batch.assembly.assembly_lists import ListedAssemblies
 from planar.batch.block import DesignBlock, SolvedDesigns
 from planar.batch.named_results.result_rows import RequestedResults, ResultRow
 from planar.batch.results import Sweep, SweepNotes

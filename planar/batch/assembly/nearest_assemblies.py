@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.batch.assembly_scores import (
+from planar.batch.assembly.assembly_scores import (
     MAX_BLOCK_UNKNOWNS,
     NEAR_SKETCH,
     is_at_sketch,

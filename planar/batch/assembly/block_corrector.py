@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.batch.assembly_scores import CLEARLY_OPEN
+from planar.batch.assembly.assembly_scores import CLEARLY_OPEN
 from planar.batch.march.checks import column_volume
 from planar.equations.functions import EquationFunctions
 from planar.equations.linear import solve_vectors

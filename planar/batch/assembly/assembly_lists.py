@@ -12,7 +12,7 @@ from planar.assemblies.modes import modes
 from planar.assemblies.search_tree import is_linear
 from planar.batch.design_arrays import values_of_design, with_design_values
 from planar.batch.reference_design import ReferenceDesign
-from planar.equations.functions import POLISHING_STEPS, ClosedFormAssemblies
+from planar.equations.casadi_call import POLISHING_STEPS, ClosedFormAssemblies
 from planar.equations.linear import solve_vectors
 from planar.equations.symbolic_equations import Block, slice_length
 from planar.foundation.errors import BadInput, NoAnswer

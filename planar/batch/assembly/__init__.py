@@ -1,0 +1,1 @@
+"""Where designs start: their assemblies nearest to the sketch."""

@@ -1,0 +1,356 @@
+"""The search for the assemblies of many designs, block after block, all ways to add one side by side."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import reduce
+
+import numpy as np
+
+from planar.batch.assembly.assembly_scores import (
+    MAX_BLOCK_UNKNOWNS,
+    NEAR_SKETCH,
+    DesignAssemblies,
+    is_at_sketch,
+    is_clearly_regular,
+)
+from planar.batch.assembly.block_corrector import SPREAD_STARTS, BlockCorrector
+from planar.batch.assembly.partial_assemblies import PartialAssemblies
+from planar.batch.reference_design import ReferenceDesign, shape_of_designs
+from planar.equations.coordinates import frames_from_coordinates
+from planar.equations.symbolic_equations import Block, slice_length
+from planar.foundation.angles import distances
+from planar.foundation.geometry import Vector
+from planar.model.link_shapes import LinkShape
+from planar.solving.assembly.block_assemblies import CLEAR_SKETCH_DISTANCE, SAME_ASSEMBLY_TOLERANCE
+from planar.solving.assembly.nearest_assembly import EQUAL_DISTANCE_TOLERANCE
+from planar.solving.newton import damped_newton
+
+Array = np.ndarray
+
+NEWTON_STEPS, SPREAD_NEWTON_STEPS = 8, 40
+"""Newton's steps from the assemblies of the base, and from starts all over the circles."""
+DAMPED_STARTS = 6
+"""Starts of the damped method, by which a design is refused."""
+REFUSAL_TOLERANCE = 1e-6
+"""Lengths of the size by which a block stays open that is not sure to be refused."""
+LARGEST_NUMBER = 1e12
+"""Sizes, or rad, of a number of a pair: farther off nothing is refused by the damped method."""
+MAX_PARTIAL_ASSEMBLIES = 8
+"""Partial assemblies of a design that are carried on, those nearest to the sketch."""
+MAX_SEARCHED_UNKNOWNS = 6
+"""Unknowns of a block of which the search one by one finds every assembly from its starts; of a larger one it may not
+find the nearest where that lies far from the sketch."""
+
+
+class AssemblySearch:
+    def __init__(self, base: ReferenceDesign, shapes: Mapping[str, LinkShape], p: Array, u: Array):
+        self.reference, self.shapes, self.p, self.u = base, shapes, p, u
+        self.equations, self.functions = base.functions.equations, base.functions
+        self.design_count = p.shape[1]
+        self.candidates = base.candidates
+        unit = base.unit
+        self.local_points = {
+            name: {point: Vector(at.x / unit, at.y / unit) for point, at in shape.points.items()}
+            for name, shape in shapes.items()
+        }
+        ends = np.cumsum([len(pair.number_kinds) for pair in base.mechanism.pairs])
+        self.numbers = dict(zip(self.candidates.pairs, np.split(p, ends[:-1]), strict=True))
+        self.is_sure = np.ones(self.design_count, dtype=bool)
+        self.failed_block = np.full(self.design_count, -1)
+        self.is_listed = np.ones(self.design_count, dtype=bool)
+        "of which all assemblies of every larger block are known"
+        self.clear_ways: list[tuple[Block, Array]] = []
+        "of larger blocks what lies where it is meant, not a number where nothing does (unknowns, designs)"
+        self.dropped_distance = np.full(self.design_count, np.inf)
+        "the nearest partial assembly that was not carried on"
+        self.corrector = BlockCorrector(self.functions, p, u, self.candidates.counts_turns)
+
+    def search(self) -> DesignAssemblies:
+        """See `find_assemblies`."""
+        here, hasty = self._join_blocks(True)
+        found = self._choose(here)
+        # a block that lies where it is meant may leave the later ones no place near the sketch
+        cost = np.where(here.exists, here.distance, np.inf).min(axis=1)
+        again = np.flatnonzero(hasty & ~is_at_sketch(cost, self._sketched_point_count()))
+        if again.size:
+            own = {name: shape_of_designs(shape, again) for name, shape in self.shapes.items()}
+            slow = AssemblySearch(self.reference, own, self.p[:, again], self.u[:, again])
+            found.z[:, again], found.is_sure[again], found.failed_block[again] = slow._choose(
+                slow._join_blocks(False)[0]
+            )[:3]
+        return found
+
+    def _join_blocks(self, quick: bool) -> tuple[PartialAssemblies, Array]:
+        """All blocks joined, and which designs had one that was clear by itself; without `quick` none is."""
+        hasty = np.zeros(self.design_count, dtype=bool)
+        unknowns = len(self.equations.unknowns)
+        zero = np.zeros((self.design_count, 1))
+        here = PartialAssemblies(np.zeros((unknowns, self.design_count, 1)), zero == 0.0, zero)
+        for block, (roots, most) in zip(self.equations.blocks, self.reference.block_assemblies(), strict=True):
+            if slice_length(block.rows):
+                on, rest = self._extend_clearly(block, here, roots) if quick else (here, np.arange(self.design_count))
+                clear = np.setdiff1d(np.arange(self.design_count), rest)
+                hasty[clear], self.is_listed[clear] = True, False
+                if rest.size:
+                    others, sure, listed = self._extend(
+                        self.corrector.select(rest), block, here.select(rest), roots, most
+                    )
+                    on = self._merge_extensions(here, on, rest, others)
+                    self.is_sure[rest] &= sure
+                    self.is_listed[rest] &= listed
+                    none = np.flatnonzero(here.exists.any(axis=1) & ~on.exists.any(axis=1))
+                    if none.size and self.corrector.has_closed_form(block):
+                        self.failed_block[none[self.is_sure[none]]] = block.block_index
+                        none = none[~self.is_sure[none]]
+                    if none.size:
+                        self._refuse_designs(block, none, here, roots)
+                    before, on = on.distance, self._score(block, on)
+                    self._keep_clear_ways(block, on, on.distance - before)
+                here = self._keep_nearest(on)
+        return here, hasty
+
+    def _keep_clear_ways(self, block: Block, on: PartialAssemblies, cost: Array) -> None:
+        """Keep which way of a larger block lies where it is meant: the search one by one may not look for others then,
+        though later blocks can be joined to one of those alone."""
+        sketched = len(self.candidates.sketched_by_level.get(block.block_index, ()))
+        if sketched and slice_length(block.unknowns) > 2:
+            own = np.where(on.exists & is_at_sketch(cost, sketched), cost, np.inf)
+            nearest = np.take_along_axis(on.z[block.unknowns], np.argmin(own, axis=1)[None, :, None], axis=2)[..., 0]
+            self.clear_ways.append((block, np.where(np.isfinite(own).any(axis=1), nearest, np.nan)))
+
+    def _sketched_point_count(self) -> int:
+        """How many points the sketch shows."""
+        return sum(map(len, self.candidates.sketched_by_level.values()))
+
+    def _refuse_designs(self, block: Block, designs: Array, here: PartialAssemblies, roots: Array) -> None:
+        """Of designs that no start has led to an assembly, those that have none: where the damped method says so too.
+
+        That of blocks of two unknowns, whose least squares it cannot miss from starts on all sides; of larger ones
+        where the complete list says so.
+        """
+        unknowns = slice_length(block.unknowns)
+        # of numbers that are none, or whose squares are none, nothing is known here
+        designs = designs[np.abs(self.p[:, designs]).max(axis=0, initial=0.0) < LARGEST_NUMBER]
+        if unknowns > 2:
+            all_known = self.is_listed[designs] & self.is_sure[designs] & np.isinf(self.dropped_distance[designs])
+            self.failed_block[designs[all_known]] = block.block_index
+        if unknowns > 2 or not designs.size:
+            return
+        ways = [(design, way) for design in designs for way in np.flatnonzero(here.exists[design])]
+        starts = np.repeat(
+            self.corrector.spread_starts(block, roots)[:: SPREAD_STARTS // DAMPED_STARTS], len(ways), axis=0
+        )
+        each = np.tile(np.arange(len(ways)), len(starts) // len(ways))
+        design, way = np.array(ways).T
+        whole = here.z[:, design, way]
+        function = self.functions.block_call(block)
+
+        def closing(tried: Array) -> tuple[Array, Array]:
+            # the last entry tells the columns apart: nothing depends on it, so no step moves it
+            which = np.rint(tried[:, -1]).astype(int)
+            z = whole[:, which].T
+            z[:, block.unknowns] = tried[:, :-1]
+            left, slope = function.evaluate_batch(len(which), z, self.u.T[design[which]], self.p.T[design[which]])
+            slope = np.concatenate([slope.transpose(0, 2, 1), np.zeros((len(which), left.shape[2], 1))], axis=2)
+            return left[:, 0], slope
+
+        ended = damped_newton(closing, np.hstack([starts, each[:, None]]))
+        # nearly closed is neither the one nor the other
+        near = np.zeros(self.design_count, dtype=bool)
+        near[design[each[ended.residual < REFUSAL_TOLERANCE]]] = True
+        self.failed_block[designs[~near[designs]]] = block.block_index
+
+    def _extend_clearly(self, block: Block, here: PartialAssemblies, roots: Array) -> tuple[PartialAssemblies, Array]:
+        """Every design with one way to add a block, and the designs for which that is not clearly the one meant.
+
+        It is where it lies at the sketch, and the Jacobian is so regular that no other is near: see `BlockAssemblies`.
+        """
+        every = np.arange(self.design_count)
+        sketched = len(self.candidates.sketched_by_level.get(block.block_index, ()))
+        # of a block of two both assemblies may be near the sketch, where its links are short
+        if not sketched or here.exists.shape[1] > 1 or slice_length(block.unknowns) <= 2:
+            return here, every
+        z, closed, regularity = self.corrector.correct(block, here.z, here.exists, roots[:1], NEWTON_STEPS)
+        on = self._score(block, here._replace(z=z[:, :, :, 0], exists=closed[:, :, 0]))
+        near = is_at_sketch(on.distance - here.distance, sketched)
+        clear = on.exists[:, 0] & near[:, 0] & is_clearly_regular(regularity[:, 0, 0])
+        return on, every[~clear]
+
+    def _merge_extensions(
+        self, here: PartialAssemblies, clear: PartialAssemblies, rest: Array, others: PartialAssemblies
+    ) -> PartialAssemblies:
+        """The ways of all designs: one of those that are clear, and those of the rest; not measured yet."""
+        width = others.exists.shape[1]
+
+        def widened(own: Array, of_rest: Array) -> Array:
+            whole = np.repeat(own[..., :1], width, axis=-1)
+            whole[..., rest, :] = of_rest
+            return whole
+
+        there = np.zeros((self.design_count, width), dtype=bool)
+        there[:, 0] = clear.exists[:, 0]
+        there[rest] = others.exists
+        lying = tuple(widened(*both) for both in zip(here.tie_keys, others.tie_keys, strict=True))
+        return PartialAssemblies(widened(clear.z, others.z), there, widened(here.distance, others.distance), lying)
+
+    def _extend(
+        self, corrector: BlockCorrector, block: Block, here: PartialAssemblies, roots: Array, most: int
+    ) -> tuple[PartialAssemblies, Array, Array]:
+        """Every partial assembly with the ways in which a block may be added, for which designs these are sure, and for
+        which they are all there are."""
+        count, listing, is_large = len(here.exists), None, slice_length(block.unknowns) > 2
+        if is_large:
+            from planar.batch.block_solutions.complete_lists import block_listing  # only where it is needed
+
+            listing = block_listing(self.reference, block.block_index)
+        if listing is None:
+            on, sure = self._extend_from_starts(corrector, block, here, roots, most)
+            return on, sure, np.full(count, not is_large)
+        listed = listing.extend(here.z, here.exists, corrector.p, corrector.u)
+        width = listed.exists.shape[1] // here.exists.shape[1]
+        on = PartialAssemblies(
+            listed.unknowns,
+            listed.exists,
+            np.repeat(here.distance, width, axis=1),
+            tuple(np.repeat(each, width, axis=1) for each in here.tie_keys),
+        )
+        rest, sure = np.flatnonzero(~listed.is_complete), np.ones(count, dtype=bool)
+        if rest.size:
+            others, sure[rest] = self._extend_from_starts(corrector.select(rest), block, here.select(rest), roots, most)
+            on = on.replace(rest, others)
+        return on, sure, listed.is_complete
+
+    def _extend_from_starts(
+        self, corrector: BlockCorrector, block: Block, here: PartialAssemblies, roots: Array, most: int
+    ) -> tuple[PartialAssemblies, Array]:
+        """The same by Newton's method from the base's assemblies, and from starts all over the circles."""
+        sure = np.ones(len(here.exists), dtype=bool)
+        if corrector.has_closed_form(block):
+            found, there, sure = corrector.join(block, here.z, here.exists)
+            return self._spread_ways(here, found, there), sure
+        found, there, _ = corrector.correct(block, here.z, here.exists, roots, NEWTON_STEPS)
+        there &= corrector.is_distinct(block, found, there)
+        few = here.exists & (there.sum(axis=2) < most)
+        if few.any():
+            # where some starts led astray or to one end, others are tried as well
+            designs, ways = np.nonzero(few)
+            part = corrector.select(designs)
+            more, closed, _ = part.correct(
+                block,
+                here.z[:, designs, ways][:, :, None],
+                here.exists[designs, ways][:, None],
+                part.spread_starts(block, roots),
+                SPREAD_NEWTON_STEPS,
+            )
+            old = found[:, designs, ways][:, :, None], there[designs, ways][:, None]
+            more, closed = np.concatenate([old[0], more], axis=3), np.concatenate([old[1], closed], axis=2)
+            closed &= part.is_distinct(block, more, closed)
+            order = np.argsort(~closed[:, 0], axis=1, kind="stable")[:, : len(roots)]
+            kept = np.take_along_axis(closed[:, 0], order, axis=1)
+            # more than the base has, or some but fewer: the search one by one may see it otherwise
+            count = closed[:, 0].sum(axis=1)
+            sure[designs[(count > 0) & (count != most)]] = False
+            found[:, designs, ways] = np.take_along_axis(more[:, :, 0], order[None], axis=2)
+            there[designs, ways] = kept
+        return self._spread_ways(here, found, there), sure
+
+    @staticmethod
+    def _spread_ways(here: PartialAssemblies, found: Array, there: Array) -> PartialAssemblies:
+        """Ways to add a block to each partial assembly, z (unknowns, designs, ways, assemblies), side by side."""
+        designs, ways, each = there.shape
+        spread = np.repeat(here.distance, each, axis=1)
+        lying = tuple(np.repeat(key, each, axis=1) for key in here.tie_keys)
+        z, exists = found.reshape(len(found), designs, ways * each), there.reshape(designs, ways * each)
+        return PartialAssemblies(z, exists, spread, lying)
+
+    def _score(self, block: Block, here: PartialAssemblies) -> PartialAssemblies:
+        """The partial assemblies with what a block adds to how they are told apart."""
+        candidates, width = self.candidates, here.exists.shape[1]
+        u, p = (np.repeat(part.T, width, axis=0) for part in (self.u, self.p))
+        found = self.functions.coordinates(here.z.reshape(len(here.z), -1).T, u, p)
+        w = np.ascontiguousarray(found.T).reshape(-1, self.design_count, width)
+        sketched = {
+            name: candidates.first_link[name] for name in candidates.sketched_by_level.get(block.block_index, ())
+        }
+        pairs = {name: candidates.pairs[name] for name in block.pairs}
+        links = {*block.links, *(link for pair in pairs.values() for link in pair.bodies)}
+        links |= {link for _, link, _ in sketched.values()}
+        frames, own = frames_from_coordinates(w, candidates.column, links, pairs)
+
+        def carried(link: str, point: str) -> Vector:
+            return frames[link].to_world(
+                Vector(*(np.reshape(part, (-1, 1)) for part in self.local_points[link][point]))
+            )
+
+        distance = here.distance.copy()
+        for name, (_, link, point) in sketched.items():
+            gap = carried(link, point) - candidates.sketch[name]
+            distance += gap.dot(gap)
+        if sketched:
+            return here._replace(distance=distance)
+        # no sketch tells them apart: slides ahead of where they start first, then what lies higher, then farther
+        behind, far = np.zeros(here.exists.shape), np.zeros(here.exists.shape)
+        for name, pair in pairs.items():
+            if pair.coordinate_kinds:
+                numbers = [number[:, None] for number in self.numbers[name]]
+                drive = np.asarray(pair.input_position([frames[link] for link in pair.bodies], numbers, own[name]))
+                behind += ~np.vectorize(pair.is_intended_assembly, otypes=[bool])(drive)
+                far = far + drive
+        heights = [carried(link, point).y for link in block.links for point in self.local_points[link]]
+        height = np.mean(np.broadcast_arrays(*heights, far), axis=0) if heights else far * 0.0
+        return here._replace(distance=distance, tie_keys=(*here.tie_keys, behind, -height, -far))
+
+    def _keep_nearest(self, here: PartialAssemblies) -> PartialAssemblies:
+        """The partial assemblies nearest to the sketch, so many as are carried on."""
+        if here.exists.shape[1] <= MAX_PARTIAL_ASSEMBLIES:
+            return here
+        cost = np.where(here.exists, here.distance, np.inf)
+        order = np.argsort(cost, axis=1, kind="stable")
+        self.dropped_distance = np.minimum(
+            self.dropped_distance, np.take_along_axis(cost, order, axis=1)[:, MAX_PARTIAL_ASSEMBLIES]
+        )
+        order = order[:, :MAX_PARTIAL_ASSEMBLIES]
+        lying = tuple(np.take_along_axis(each, order, axis=1) for each in here.tie_keys)
+        return PartialAssemblies(
+            np.take_along_axis(here.z, order[None], axis=2),
+            np.take_along_axis(here.exists, order, axis=1),
+            np.take_along_axis(here.distance, order, axis=1),
+            lying,
+        )
+
+    def _choose(self, here: PartialAssemblies) -> DesignAssemblies:
+        cost = np.where(here.exists, here.distance, np.inf)
+        least = cost.min(axis=1)
+        best = np.argmin(cost, axis=1)
+        alike = here.exists & (cost <= least[:, None] + EQUAL_DISTANCE_TOLERANCE)
+        tied = np.flatnonzero(alike.sum(axis=1) > 1)
+        if tied.size:
+            keys = [each[tied] for each in here.tie_keys]
+            # behind counts over all blocks, the rest block after block
+            keys = [reduce(np.add, keys[::3]), *(key for k, key in enumerate(keys) if k % 3)] if keys else []
+            left = alike[tied]
+            for key in keys:
+                value = np.where(left, key, np.inf)
+                left &= value <= value.min(axis=1, keepdims=True) + EQUAL_DISTANCE_TOLERANCE
+            best[tied] = np.argmax(left, axis=1)
+            self.is_sure[tied[left.sum(axis=1) > 1]] = False
+        z = np.take_along_axis(here.z, best[None, :, None], axis=2)[..., 0]
+        shown = self._sketched_point_count()
+        clear = is_at_sketch(least, shown) & (shown > 0) & ~np.isin(np.arange(self.design_count), tied)
+        sure = (self.is_sure | clear) & np.isfinite(least) & (least < self.dropped_distance - EQUAL_DISTANCE_TOLERANCE)
+        largest = max((slice_length(block.unknowns) for block in self.equations.blocks), default=0)
+        if largest > 2:
+            # it may have assemblies that no start has led to: none of these is nearer than what is near
+            reach = np.where(
+                self.is_listed,
+                np.inf if largest <= MAX_SEARCHED_UNKNOWNS else NEAR_SKETCH,
+                NEAR_SKETCH if largest <= MAX_BLOCK_UNKNOWNS else CLEAR_SKETCH_DISTANCE,
+            )
+            sure &= is_at_sketch(least, shown, reach)
+            # of two that lie where they are meant the search one by one may see one alone
+            sure &= np.count_nonzero(here.exists & is_at_sketch(cost, shown), axis=1) <= 1
+            for block, clear_way in self.clear_ways:
+                angles = self.equations.unknown_is_angle[block.unknowns]
+                sure &= ~np.any(distances(angles, z[block.unknowns].T, clear_way.T) > SAME_ASSEMBLY_TOLERANCE, axis=1)
+        return DesignAssemblies(z, sure, self.failed_block)
