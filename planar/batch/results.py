@@ -67,8 +67,7 @@ class Sweep:
     `value_second_rate` (per s, per s^2), as `Motion.pair` has them; `transmission_angle` of outputs (rad), as of
     `planar.transmission`; `effort` of inputs (N m or N), `reaction` of pairs, the force on the second link by the first
     (designs, steps + 1, 2) (N), and `reaction_couple` (N m), as of `planar.forces` with inertia. NaN as of points;
-    forces also where equilibrium does not tell them. `limit` of the running input: the dead point (rad or m) at which a
-    design's run ends, the same at every step, NaN where it comes to its end.
+    forces also where equilibrium does not tell them.
 
     Where all assemblies were asked for each stands as a design of its own: `design` is the number (from 0) of the one
     that was given, and `assembly` that of the assembly in the list of `planar.modes` (from 1; 0 of a design that has
@@ -96,7 +95,6 @@ class Sweep:
     effort: Mapping[str, Any] = field(default_factory=dict, repr=False)
     reaction: Mapping[str, Any] = field(default_factory=dict, repr=False)
     reaction_couple: Mapping[str, Any] = field(default_factory=dict, repr=False)
-    limit: Mapping[str, Any] = field(default_factory=dict, repr=False)
     design: Array | None = field(default=None, repr=False)
     assembly: Array | None = field(default=None, repr=False)
 

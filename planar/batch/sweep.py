@@ -68,7 +68,6 @@ def sweep(  # many: the public signature
     outputs: Sequence[str] | str = (),
     efforts: Sequence[str] | str = (),
     reactions: Sequence[str] | str = (),
-    limits: bool = False,
     assemblies: str = "nearest",
     rates: bool = True,
     start: float | None = None,
@@ -97,7 +96,6 @@ def sweep(  # many: the public signature
     outputs: Sequence[str] | str = (),
     efforts: Sequence[str] | str = (),
     reactions: Sequence[str] | str = (),
-    limits: bool = False,
     assemblies: str = "nearest",
     rates: bool = True,
     start: float | None = None,
@@ -125,7 +123,6 @@ def sweep(  # many: the public signature; # long: its docstring
     outputs: Sequence[str] | str = (),
     efforts: Sequence[str] | str = (),
     reactions: Sequence[str] | str = (),
-    limits: bool = False,
     assemblies: str = "nearest",
     rates: bool = True,
     start: float | None = None,
@@ -157,8 +154,8 @@ def sweep(  # many: the public signature; # long: its docstring
     `points` are those whose positions are wanted, and with `rates` velocities and accelerations; all that move, if left
     out and nothing else is asked for. `links` and `pairs` are those whose angles and relative motions are wanted, with
     `rates` their rates too; `outputs` links or pairs at the frame whose transmission angles are; `efforts` inputs and
-    `reactions` pairs whose forces are, under loads, weights, springs and inertia; with `limits` the dead points at
-    which runs end: see `Sweep`. A design that comes to a dead point has NaN from there on, and `status` says why.
+    `reactions` pairs whose forces are, under loads, weights, springs and inertia: see `Sweep`. A design that comes to a
+    dead point has NaN from there on, `status` says why, and `Sweep.dead_point` where.
 
     `assemblies` "nearest" takes of each design that nearest to the sketch; "all" takes every assembly that it has at
     its own inputs, each as a design of its own: see `Sweep.assembly`.
@@ -199,9 +196,6 @@ def sweep(  # many: the public signature; # long: its docstring
     asked = {"links": links, "pairs": pairs, "outputs": outputs, "efforts": efforts, "reactions": reactions}
     wanted = asked if reductions is None else reductions.with_results(asked)
     results = _select_results(common, wanted, duration is not None)
-    if limits and duration is not None:
-        raise BadInput("limits", "they are of one input that runs over a range, and here all run in time")
-    results = results._replace(limits=(common.pair,) if limits else ())
     names: tuple[PointName, ...] = () if points is None and any(results) else common.select_points(points)
     if reductions is not None:
         own, rates = reductions.with_points(names, rates)

@@ -244,10 +244,10 @@ def test_several_inputs_run_in_time_as_in_a_cycle(name):
             planar.sweep(mechanism, designs, 12, **wrong)
 
 
-def test_limits_are_the_dead_points_of_triangles():
+def test_dead_points_are_those_of_triangles():
     a, b, c = np.array([0.9, 0.7, 0.3]), 0.8, np.array([0.5, 0.85, 0.9])
     designs = {"AB.length": a, "BC.length": b, "DC.length": c, "AD.D.x": 1.0}
-    result = planar.sweep(four_bar(0.9, b, 0.5, 1.0, 0.8), designs, 60, limits=True, backend="numpy")
+    result = planar.sweep(four_bar(0.9, b, 0.5, 1.0, 0.8), designs, 60, backend="numpy")
     # coupler and follower in one line, so long as that goes together with the crank and the base
     wanted = np.arccos((a**2 + 1.0 - (b + c) ** 2) / (2.0 * a), where=a + 1.0 > b + c, out=np.full(3, np.nan))
-    np.testing.assert_allclose(result.limit["A"], np.tile(wanted[:, None], 61), atol=1e-9)
+    np.testing.assert_allclose(result.dead_point, wanted, atol=1e-9)

@@ -180,9 +180,12 @@ def test_a_link_and_a_pair_of_one_name():
     assert mechanism.with_values({"pairs.stroke.line.x": 0.25}) != mechanism
 
 
-def test_a_sweep_says_which_numbers_it_cannot_vary():
-    with pytest.raises(BadInput, match=r"BC\.E\.angle: designs differ in lengths of links and in inputs"):
-        planar.sweep("four-bar", {"BC.E.angle": [0.1, 0.2]}, steps=4)
+def test_a_sweep_varies_any_number_and_offers_the_name_that_is_meant():
+    found = planar.sweep("four-bar", {"BC.E.angle": [0.1, 0.2]}, 4, ["E"], start=1.0, stop=1.2)
+    one = planar.cycle(planar.load("four-bar").with_values({"BC.E.angle": 0.2}), 4, 1.0, 1.2)
+    np.testing.assert_allclose(found.position["E"][1], one.point("E").position, atol=1e-12)
+    with pytest.raises(BadInput, match=r"BC\.E\.angel: .*'BC\.E\.angle'"):
+        planar.sweep("four-bar", {"BC.E.angel": [0.1, 0.2]}, steps=4)
 
 
 def test_a_law_starts_where_its_input_does():

@@ -9,7 +9,7 @@ import numpy as np
 
 from planar.batch.block import FULL_TURN, DesignBlock, SolvedDesigns, solve_design_block
 from planar.batch.design_arrays import split_into_blocks, values_of_design, with_design_values
-from planar.batch.general_path import OUTCOMES, link_angles
+from planar.batch.general_path import link_angles
 from planar.batch.march.prediction import LONGEST_STEP
 from planar.batch.named_results.design_frames import DesignFrames
 from planar.batch.named_results.force_results import find_forces
@@ -18,7 +18,6 @@ from planar.batch.named_results.timed_block import input_motions, solve_timed_bl
 from planar.batch.named_results.transmission_angles import output_link
 from planar.batch.reference_design import ReferenceDesign, reference_design
 from planar.codegen.aligned_arrays import allocate_aligned
-from planar.foundation.errors import Outcome
 from planar.foundation.geometry import Vector
 from planar.foundation.turns import take_turn
 from planar.model.link_shapes import LinkPlace
@@ -169,16 +168,6 @@ class _ResultBlockSolver:
         grid = part.input if part.input.ndim == 1 else part.input[index]
         return cycle(mechanism, steps, float(grid[0]), float(grid[-1]), self.reference.pair)
 
-    def _limits(self, part: _DesignPart) -> Array:
-        """Where the running input (rad or m) comes to the dead point at which a run ends (designs,); NaN elsewhere."""
-        found = np.full(len(part.status), np.nan)
-        stopped = (part.status[:, 0] == 0) & (part.status[:, -1] == OUTCOMES.index(Outcome.DEAD_POINT))
-        for index in np.flatnonzero(stopped):
-            motion = self._motion(part, int(index), self.block.steps)
-            if motion.outcome is Outcome.DEAD_POINT:
-                found[index] = motion.inputs[self.reference.pair].position[-1]
-        return found
-
     def _write_results(self, frames: DesignFrames, part: _DesignPart, out: Array, refined: int) -> None:
         """Write the results into rows of out (steps + 1, rows, designs)."""
         found: dict[tuple[str, str], Array] = {}
@@ -196,8 +185,6 @@ class _ResultBlockSolver:
         for name in self.results.outputs:
             angles = output_link(self.mechanism, name).angles(frames, part.designs, is_solved)
             found["transmission_angle", name] = angles[None]
-        if self.results.limits:
-            found |= {("limit", name): self._limits(part)[None, None] for name in self.results.limits}
         at = 0
         for row in self.rows:
             whole = np.broadcast_to(found[row.quantity, row.name], (row.width, *frames.design_shape))

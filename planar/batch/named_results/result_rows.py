@@ -25,15 +25,13 @@ class ResultRow(NamedTuple):
 
 
 class RequestedResults(NamedTuple):
-    """The results that are asked for beside those of points: of these links, pairs, outputs, inputs and pairs,
-    and where runs of the input end."""
+    """The results that are asked for beside those of points: of these links, pairs, outputs, inputs and pairs."""
 
     links: tuple[str, ...] = ()
     pairs: tuple[str, ...] = ()
     outputs: tuple[str, ...] = ()
     efforts: tuple[str, ...] = ()
     reactions: tuple[str, ...] = ()
-    limits: tuple[str, ...] = ()
 
     @property
     def has_forces(self) -> bool:
@@ -55,8 +53,6 @@ class RequestedResults(NamedTuple):
             yield ResultRow("transmission_angle", name, 1, "rad")
         for name in self.efforts:
             yield ResultRow("effort", name, 1, "N" if slides[name] else "N m")
-        for name in self.limits:
-            yield ResultRow("limit", name, 1, "m" if slides[name] else "rad")
         for name in self.reactions:
             yield ResultRow("reaction", name, 2, "N")
         for name in self.reactions:

@@ -72,7 +72,8 @@ class PinnedPart:
         """See `SweptPart`; where there is `room` for the values, there."""
         found = {k: each.astype(dtype) for k, each in self.found_elsewhere.items()}
         room = np.empty(self.values.shape, dtype) if room is None else room
-        room[...] = self.values
+        with np.errstate(over="ignore", invalid="ignore"):  # rows that were solved elsewhere hold anything
+            room[...] = self.values
         return replace(self, values=room, found_elsewhere=found)
 
     def swept(self, k: int) -> Swept:
