@@ -129,7 +129,7 @@ def _swept(mechanism: Mechanism, swept: Swept, d: Array, steps: int, backend: st
         rates,
         np.arange(d.shape[1]),
         np.arange(steps + 1),
-        lambda: planar.sweep(mechanism, named, steps=steps, points=points, rates=rates, backend=backend),
+        lambda: planar.sweep(mechanism, named, steps=steps, points=points, rates=rates, backend=backend, workers=1),
         read,
     )
 

@@ -17,7 +17,7 @@ from benchmarks.timing import best
 
 LIMIT = "C by hand"
 DESIGNS, STEPS, TURN = 10_000, 200, 360
-MIXED, WIDE, NEW = 2_000, 20_000, 200
+MIXED, WIDE, NEW = 2_000, 50_000, 200
 SAMPLE = 40
 """Errors are taken over so many designs, evenly chosen."""
 ROUNDS = 5

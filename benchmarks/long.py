@@ -190,7 +190,7 @@ def long_of(name: str) -> Long:
             mechanism = planar.pinned(linkage.places, linkage.bars, linkage.frame, 0)
             last = f"P{len(linkage.places) - 1}"
             start = perf_counter()
-            found = planar.sweep_each([mechanism], STEPS, rates=False)[0]
+            found = planar.sweep_each([mechanism], STEPS, rates=False, workers=1)[0]
             took = perf_counter() - start
             errors.append(_error(linkage, found.position, turned))
             # the next is ten times as long; by the general path that may take a thousand times as long

@@ -110,7 +110,7 @@ class Mixed:
         return found
 
     def _swept(self, made: Callable[[], Any], rates: bool) -> Any:
-        return planar.sweep_each(made(), self.steps, rates=rates)
+        return planar.sweep_each(made(), self.steps, rates=rates, workers=1)
 
     def result(self, entry: _Entry, seconds: float, first: float) -> Result:
         """What an entry found beside the closed form."""

@@ -47,7 +47,7 @@ def main(many: int = 10_000, steps: int = 200) -> int:
     a, b, c, d = np.random.default_rng(0).uniform(0.2, 1.5, (4, many))
     designs = {"AB.length": a, "BC.length": b, "DC.length": c, "AD.D.x": d}
     start = time.perf_counter()
-    result = planar.sweep(base(), designs, steps, "C", rates=False)
+    result = planar.sweep(base(), designs, steps, "C", rates=False, workers=1)
     took = time.perf_counter() - start
     wanted = closes(a, b, c, d, FIRST + np.linspace(0, 2 * np.pi, steps + 1))
     differing = int(np.sum(np.any((np.asarray(result.status) == 0) != wanted, axis=1)))

@@ -18,7 +18,7 @@ from planar.batch.march.choice import find_runner
 from planar.batch.march.numpy_backend import NumpyRunner
 from planar.batch.reference_design import ReferenceDesign, reference_design
 from planar.codegen.aligned_arrays import allocate_aligned
-from planar.foundation.errors import Outcome
+from planar.foundation.errors import NoAnswer, Outcome
 from planar.foundation.turns import take_turn
 from planar.model.link_shapes import LinkShape, PointMember, PointName, place_in_link
 from planar.model.mechanism import LARGEST_INPUT_POSITION, Mechanism
@@ -65,7 +65,7 @@ class SolvedDesigns(NamedTuple):
     input: Array
     general_positions: int
     general_designs: int
-    endings: tuple[tuple[int, int, str | DesignQuestion], ...]
+    endings: tuple[tuple[int, int, str | DesignQuestion | NoAnswer], ...]
     dead_point: Array
 
 
@@ -97,7 +97,7 @@ class _DesignBlockSolver:
         self.solved_steps = np.full(self.design_count, -1)
         "how many steps are solved of a design that was followed to its end, or to a dead point"
         self.general_positions, self.followed_designs = 0, 0
-        self.endings: dict[int, tuple[int, str | DesignQuestion]] = {}
+        self.endings: dict[int, tuple[int, str | DesignQuestion | NoAnswer]] = {}
         self.dead_point = np.full(self.design_count, np.nan)
         self.limits = np.full((2, self.design_count), np.nan)
         "between which inputs run that have a range of their own, rad or sizes"
@@ -170,7 +170,7 @@ class _DesignBlockSolver:
         self._count_sentence(int(told.status[-1]), told.message)
         self._count_sentence(status_code(Outcome.SOLVED), told.rate_remark)
 
-    def _count_sentence(self, code: int, sentence: str) -> None:
+    def _count_sentence(self, code: int, sentence: str | NoAnswer) -> None:
         """One design more of which this is said by a code; the first one's sentence is kept."""
         if sentence:
             many, first = self.endings.get(code, (0, sentence))

@@ -25,13 +25,13 @@ GRID_TOLERANCE = 1e-9
 
 class SolvedDesign(NamedTuple):
     """One design: positions of the running input (rows,), the points (rows, 2 a point and order; m, s), the status of
-    every row, what there is to say of its end, and of rates that are missing or of few digits; where the input is at
-    the dead point that ends it (rad, m), not a number where none does."""
+    every row, what there is to say of its end (which as text is the sentence), and of rates that are missing or of few
+    digits; where the input is at the dead point that ends it (rad, m), not a number where none does."""
 
     input: Array
     out: Array
     status: Array
-    message: str
+    message: str | NoAnswer
     rate_remark: str = ""
     dead_point: float = np.nan
 
@@ -46,7 +46,7 @@ class DesignQuestion(NamedTuple):
     range: tuple[float | None, float | None]
 
     def __str__(self) -> str:
-        return solve_design(*self, (), False).message
+        return str(solve_design(*self, (), False).message)
 
 
 def solve_design(
@@ -98,7 +98,7 @@ def _solve(
         motion, position = run()
     except NoAnswer as problem:
         status[:] = OUTCOMES.index(problem.outcome)
-        return SolvedDesign(input_, out, status, str(problem))
+        return SolvedDesign(input_, out, status, problem.with_traceback(None))  # its sentence takes long to find
     except (BadInput, PointPlacementError) as problem:
         status[:] = OUTCOMES.index(Outcome.CANNOT_BE_ASSEMBLED)
         return SolvedDesign(input_, out, status, str(problem))

@@ -42,7 +42,7 @@ from planar.model.mechanism import LARGEST_COUNTED_ANGLE, Mechanism
 from planar.model.run_arguments import check_number, check_steps
 from planar.solving.cycle import MAX_DURATION
 
-MIN_BLOCK_POSITIONS, MAX_BLOCK_POSITIONS = 2**19, 2**22
+MIN_BLOCK_POSITIONS, MAX_BLOCK_POSITIONS = 2**20, 2**22
 """Positions of a block at least, where there are as many: so many that solving them is more than beginning it."""
 USUAL_BLOCKS = 12
 """Blocks into which designs are divided between these: as many for two, three, four or six cores."""

@@ -368,4 +368,4 @@ def _solve_with_general_path(mechanism: Mechanism, request: SweepRequest) -> Swe
     out = told.out.reshape(request.steps + 1, 3 if request.rates else 1, len(names), 2)
     parts = [{name: out[:, k, i] for i, name in enumerate(names)} for k in range(out.shape[1])]
     position, velocity, acceleration = parts if request.rates else (parts[0], None, None)
-    return Swept(position, velocity, acceleration, told.input, told.status, told.message or told.rate_remark, True)
+    return Swept(position, velocity, acceleration, told.input, told.status, str(told.message or told.rate_remark), True)

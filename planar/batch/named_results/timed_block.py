@@ -12,7 +12,7 @@ from planar.batch.march.backend import UnsupportedStructure
 from planar.batch.march.choice import find_runner
 from planar.batch.reference_design import ReferenceDesign, reference_design
 from planar.codegen.aligned_arrays import allocate_aligned
-from planar.foundation.errors import Outcome
+from planar.foundation.errors import NoAnswer, Outcome
 from planar.foundation.turns import take_turn
 from planar.model.link_shapes import place_in_link
 from planar.model.mechanism import LARGEST_INPUT_POSITION, Mechanism
@@ -61,7 +61,7 @@ class _TimedBlockSolver:
         out = allocate_aligned(steps + 1, self.row_count, many, self.block.dtype)
         status = np.zeros((many, steps + 1), dtype=np.int8)
         good = self._run_with_backend(out)
-        general, said = 0, dict[int, tuple[int, str]]()
+        general, said = 0, dict[int, tuple[int, str | NoAnswer]]()
         rest = np.flatnonzero(good <= steps)
         for index in rest:
             told = solve_timed_design(
