@@ -14,6 +14,7 @@ from benchmarks import dyadic, peers
 from benchmarks.contests import LIMIT, Result
 from benchmarks.dyadic import DYAD, MOST, closed, moving, sketch
 from benchmarks.limit import compiled
+from benchmarks.peers import by_link
 from benchmarks.swept import RATES
 from benchmarks.timing import best
 
@@ -85,6 +86,8 @@ class Mixed:
             from benchmarks.peers.by_pylinkage import mixed
 
             found += [_Entry(*each) for each in mixed(tape, places, self.steps)]
+        if by_link.is_there():
+            found.append(_Entry(*by_link.entry(tape, places, self.turned)))
         return found
 
     def _planar(self, places: list[Array]) -> list[_Entry]:
