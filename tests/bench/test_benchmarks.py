@@ -81,7 +81,7 @@ def test_a_sweep_is_read_as_its_contract_has_it(monkeypatch):
     swept, asked = SweptFourBar(), {}
     d, exact = swept.designs(7), swept.motion(swept.designs(7), angles(20))
 
-    def sweep(mechanism, named, *, steps, points, rates, backend):
+    def sweep(mechanism, named, *, steps, points, rates, backend, workers):
         asked.update(named)
         orders = [{points[0]: np.moveaxis(exact[k : k + 2], (0, 2), (2, 0))} for k in (0, 2, 4)]
         status = np.zeros((7, steps + 1), dtype=int)
