@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from functools import cached_property, lru_cache
+from functools import cached_property, lru_cache, reduce
 from itertools import combinations
 
 import numpy as np
@@ -129,11 +129,16 @@ class ReferenceDesign:
 
     def tolerance(self, p: Array) -> float:
         """What the residual check lets pass for these designs: as `ResidualCheck.tolerance`, of the longest of any."""
-        kinds = [kind for pair in self.mechanism.pairs for kind in pair.number_kinds]
-        lengths = np.array([kind is MeasureKind.LENGTH for kind in kinds], dtype=bool)
-        reach = float(np.max(np.abs(p[lengths]), initial=0.0))
-        reach = reach if np.isfinite(reach) else float(np.nanmax(np.abs(p[lengths]), initial=0.0))
+        rows = self._length_rows
+        reach = max((max(float(p[k].max()), -float(p[k].min())) for k in rows), default=0.0) if p.shape[1] else 0.0
+        reach = max(reach, 0.0) if np.isfinite(reach) else float(np.nanmax(np.abs(p[rows]), initial=0.0))
         return float(residual_tolerance(len(self.mechanism.links), reach))
+
+    @cached_property
+    def _length_rows(self) -> list[int]:
+        """The rows of p that are lengths."""
+        kinds = [kind for pair in self.mechanism.pairs for kind in pair.number_kinds]
+        return [k for k, kind in enumerate(kinds) if kind is MeasureKind.LENGTH]
 
     def inputs(self, designs: Mechanism, many: int) -> tuple[Array, Array, Array]:
         """Positions and rates of all inputs, each (inputs, designs), lengths in units of the size."""
@@ -217,18 +222,25 @@ class ReferenceDesign:
         Beside the size of the base, or the farthest point of a link of the design itself where that is greater.
         """
         found = np.zeros(many, dtype=bool)
-        size = np.full(many, self.unit)
-        for at in shapes.values():
-            for point in at.points.values():
-                size = np.fmax(size, np.hypot(point.x, point.y))
-        for link, first, second in self.arms():
-            one, other = shapes[link].points[first], shapes[link].points[second]
-            arm = np.hypot(other.x - one.x, other.y - one.y)
+        if not many:
+            return found
+        sizes = [np.hypot(point.x, point.y) for at in shapes.values() for point in at.points.values()]
+        ends = [(shapes[link].points[first], shapes[link].points[second]) for link, first, second in self.arms]
+        arms = [np.hypot(other.x - one.x, other.y - one.y) for one, other in ends]
+        greatest = max((float(np.max(each)) for each in sizes), default=0.0)
+        if all(float(np.min(arm)) >= SHORT_ARM * max(greatest, self.unit) for arm in arms):
+            return found  # as mostly; a number that is none compares as false
+        size = reduce(np.fmax, sizes, np.full(many, self.unit))
+        for arm in arms:
             found |= (arm > 0.0) & (arm < SHORT_ARM * size)
         return found
 
-    def arms(self) -> Iterator[tuple[str, str, str]]:
+    @cached_property
+    def arms(self) -> tuple[tuple[str, str, str], ...]:
         """Two points of a link each, by which pairs hold it that the blocks before it, or its own, make use of."""
+        return tuple(self._find_arms())
+
+    def _find_arms(self) -> Iterator[tuple[str, str, str]]:
         column, known_from = self.solver.column, self.functions.equations.known_after_block
         names = [link.name for link in self.mechanism.links]
         known = {link: known_from[column[link, "angle"]] if (link, "angle") in column else -1 for link in names}

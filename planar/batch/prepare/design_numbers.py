@@ -159,7 +159,7 @@ class DesignNumbers:
         for shape in self.shapes.values():
             for at in shape.points.values():
                 size = ca.fmax(size, at.dot(at))
-        for link, first, second in reference.arms():
+        for link, first, second in reference.arms:
             way = self.shapes[link].points[second] - self.shapes[link].points[first]
             arm = way.dot(way)
             yield ca.fmax(arm - SHORT_ARM**2 * size, -arm)
