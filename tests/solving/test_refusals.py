@@ -567,3 +567,22 @@ def test_what_would_mend_it_is_looked_for_once_and_only_where_somebody_asks(monk
         planar.solve(apart)
     assert "it would go together with" in told.value.reason == again.value.reason
     assert len(looked) == 1
+
+
+def test_a_range_whose_start_is_out_of_contact_is_refused_as_the_position_is():
+    wheel = planar.load("rolling-wheel").with_values(
+        {
+            "frame.O.x": 0.01344,
+            "frame.O.y": 0.02811,
+            "wheel.length": 0.41017,
+            "rod.length": 1.24066,
+            "block B.B.x": -0.12831,
+            "block B.B.y": 0.00416,
+            "axle box.line.x": -0.02814,
+            "axle box.line.y": 0.03025,
+            "rail.radius": 0.09711,
+            "axle box.position": 0.33437,
+        }
+    )
+    with pytest.raises(planar.NoAnswer, match="from touching"):
+        planar.cycle(wheel, 24)

@@ -174,6 +174,8 @@ class RangeRun(RunningInput):
         inner = grid[1:-1]
         down, up = self._follow_from_file(inner[inner < here][::-1]), self._follow_from_file(inner[inner >= here])
         for part in (down, up):
+            if part.stopped is not None and len(part.z) < 2:
+                raise self._stop_reason(part, part.stopped)
             if part.stopped is not None:
                 return self._with_stop_row(drop_first(part), self.input_rates(inner[: len(part.z)]))
         found = splice_runs(down, up)
