@@ -43,6 +43,11 @@ def area(motion: Motion, point: str) -> Area:
     (L. N. Trefethen, J. A. C. Weideman, The exponentially convergent trapezoidal rule, SIAM Review 56, 2014).
 
     Raises Unknown for another name, BadInput where the curve is not closed.
+
+    >>> import planar
+    >>> motion = planar.cycle(planar.load("slider-crank"), 12)
+    >>> round(planar.area(motion, "A").value, 6)
+    0.723823
     """
     motion.point(point)  # refuses what there is not
     steady = InterpolatedRun(motion)
