@@ -82,7 +82,12 @@ def sweep(  # many: the public signature
     dtype: DTypeLike = "float64",
     reduce: None = None,
     progress: Callable[[int, int], object] | None = None,
-) -> Sweep: ...
+
+    >>> import planar
+    >>> swept = planar.sweep(planar.load("four-bar"), {"BC.length": [0.066, 0.07]}, 12, "C")
+    >>> swept.position["C"].shape
+    (2, 13, 2)
+    """) -> Sweep: ...
 @overload
 @takes_mechanism
 def sweep(  # many: the public signature

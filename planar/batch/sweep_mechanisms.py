@@ -82,7 +82,11 @@ def sweep_each(  # many: the public signature
     dtype: DTypeLike = "float64",
     reduce: None = None,
     progress: Callable[[int, int], object] | None = None,
-) -> Each: ...
+
+    >>> import planar
+    >>> planar.sweep_each(["four-bar", "slider-crank"], 12).general
+    0
+    """) -> Each: ...
 @overload
 def sweep_each(  # many: the public signature
     mechanisms: Iterable[MechanismSource | PinnedLinkages],

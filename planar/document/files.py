@@ -44,7 +44,12 @@ def from_dict(value: Any) -> Mechanism:
 
 
 def to_dict(mechanism: Mechanism | str | os.PathLike[str]) -> dict[str, Any]:
-    """The JSON value of a mechanism; `from_dict` gives the same mechanism back, to the last bit."""
+    """The JSON value of a mechanism; `from_dict` gives the same mechanism back, to the last bit.
+
+    >>> import planar
+    >>> list(planar.to_dict("four-bar"))[:3]
+    ['planar', 'name', 'about']
+    """
     from planar.document.writer import write_mechanism
 
     return write_mechanism(as_mechanism(mechanism))

@@ -94,7 +94,7 @@ class Curvature:
         """The curvature of the path of a point of the link, by name or by its coordinates (m) in the link's axes.
 
         Euler-Savary: with r from the pole to the point and e the part of the inflection circle's diameter along r,
-        the radius is r^2 / |r - e|, and the centre lies at r^2 / (r - e) from the point towards the pole. Raises
+        the radius is r^2 / abs(r - e), and the centre lies at r^2 / (r - e) from the point towards the pole. Raises
         Unknown for a point that the link does not carry.
         """
         at = self.motion.points_in_other(self._local_point(point))
