@@ -98,6 +98,11 @@ def swing(motion: Motion, name: str) -> Swing | None:
     Angles are those of the motion, so that the swing may be more than a turn. None where it turns right round, where it
     does not turn, where it is most at an end of the input's range and does not turn back there, and of a slide. Raises
     Unknown for another name.
+
+    >>> import planar
+    >>> motion = planar.cycle(planar.load("crank-rocker"), 12)
+    >>> planar.swing(motion, "crank") is None
+    True
     """
     if name in relative_motions(motion.mechanism) and motion.has_length_motion(name):
         return None
