@@ -98,6 +98,10 @@ def conflict(mechanism: Mechanism, drives: Mapping[str, float] | Sequence[Drive]
 
     None too where those in conflict join more than MOST moving links: they are too many to be told apart.
     `drives` change inputs, as {pair: position} (rad or m). Raises NoAnswer where the inputs leave links free.
+
+    >>> import planar
+    >>> planar.conflict(planar.load("four-bar")) is None
+    True
     """
     if isinstance(drives, Mapping):
         drives = [Drive(pair, position) for pair, position in drives.items()]

@@ -66,6 +66,10 @@ def prepared(
     See `planar.sweep` for what is taken, and raised: this is a sweep of one design at a time, without its preparations.
     With llvmlite a run takes some microseconds, of whatever design, also of one that cannot be assembled or comes to a
     dead point; what the compiled code is not sure of goes through `planar.sweep`.
+
+    >>> import planar
+    >>> planar.prepared(planar.load("four-bar"), 12, "C")
+    <PreparedSweep of 'Four-bar chain': 13 positions of C>
     """
     return PreparedSweep(mechanism, steps, points, rates, start, stop, pair)
 

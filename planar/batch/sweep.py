@@ -181,6 +181,11 @@ def sweep(  # many: the public signature; # long: its docstring
 
     Raises BadInput for a name that is not there, a range or a store that cannot be; WriteFailure, which is one, where a
     store finds no more room.
+
+    >>> import planar
+    >>> swept = planar.sweep(planar.load("four-bar"), {"BC.length": [0.066, 0.07]}, 12, "C")
+    >>> swept.position["C"].shape
+    (2, 13, 2)
     """
     if block is not None and (isinstance(block, bool) or not isinstance(block, Integral) or block < 1):
         raise BadInput("block", f"a whole number of designs is wanted, not {block!r:.40}")

@@ -142,6 +142,10 @@ def sweep_each(  # many: the public signature
     result is a `ReducedSweep`.
 
     Raises BadInput for what is no mechanism, a point that none has, an input that is not there, impossible steps.
+
+    >>> import planar
+    >>> planar.sweep_each(["four-bar", "slider-crank"], 12).general
+    0
     """
     step_count, threads, number_type = check_steps(steps), thread_count(workers, executor), result_type(dtype)
     names = (points,) if isinstance(points, str) else None if points is None else tuple(dict.fromkeys(points))

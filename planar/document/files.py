@@ -24,24 +24,44 @@ MAX_FILE_BYTES = 8 * 1024 * 1024
 
 
 def loads(text: str | bytes, place: str = "$") -> Mechanism:
-    """The mechanism in a JSON text. Raises BadInput."""
+    """The mechanism in a JSON text. Raises BadInput.
+
+    >>> import planar
+    >>> planar.loads(planar.dumps("four-bar"))
+    <Mechanism 'Four-bar chain': 4 links, 4 pairs, driven at A>
+    """
     return read_mechanism(_parse_json(text, place))
 
 
 def from_dict(value: Any) -> Mechanism:
-    """The mechanism in a JSON value (dicts, lists, texts, numbers). Raises BadInput."""
+    """The mechanism in a JSON value (dicts, lists, texts, numbers). Raises BadInput.
+
+    >>> import planar
+    >>> planar.from_dict(planar.to_dict("four-bar"))
+    <Mechanism 'Four-bar chain': 4 links, 4 pairs, driven at A>
+    """
     return read_mechanism(value)
 
 
 def to_dict(mechanism: Mechanism | str | os.PathLike[str]) -> dict[str, Any]:
-    """The JSON value of a mechanism; `from_dict` gives the same mechanism back, to the last bit."""
+    """The JSON value of a mechanism; `from_dict` gives the same mechanism back, to the last bit.
+
+    >>> import planar
+    >>> list(planar.to_dict("four-bar"))[:3]
+    ['planar', 'name', 'about']
+    """
     from planar.document.writer import write_mechanism
 
     return write_mechanism(as_mechanism(mechanism))
 
 
 def dumps(mechanism: Mechanism | str | os.PathLike[str]) -> str:
-    """The JSON text of a mechanism."""
+    """The JSON text of a mechanism.
+
+    >>> import planar
+    >>> planar.loads(planar.dumps("four-bar"))
+    <Mechanism 'Four-bar chain': 4 links, 4 pairs, driven at A>
+    """
     return json.dumps(to_dict(mechanism), indent=2, ensure_ascii=False) + "\n"
 
 

@@ -237,7 +237,12 @@ FILE_SCHEMA: Schema = {
 
 
 def schema() -> dict[str, Any]:
-    """The JSON Schema (draft 2020-12) of a mechanism file."""
+    """The JSON Schema (draft 2020-12) of a mechanism file.
+
+    >>> import planar
+    >>> planar.schema()["type"]
+    'object'
+    """
     from planar.model.input_laws import SEGMENT_TYPES  # which few files have
 
     return {

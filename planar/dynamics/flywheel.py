@@ -52,6 +52,11 @@ def flywheel(forces: Forces, of: str | None = None, fluctuation: float = DEFAULT
     own inertia is in the torque already, at the speed without fluctuation (J. E. Shigley, Mechanical Engineering
     Design, chapter on flywheels; R. L. Norton, Design of Machinery, section on flywheels). Raises BadInput for an input
     that is not there or is no angle, forces that are not over a whole cycle, and a fluctuation that is none.
+
+    >>> import planar
+    >>> motion = planar.cycle(planar.load("two-stroke-engine"), 72)
+    >>> round(planar.flywheel(planar.forces(motion)).speed, 2)
+    314.16
     """
     motion = forces.moving
     if not 0.0 < fluctuation < 2.0:

@@ -39,6 +39,11 @@ def pinned(
 
     Raises BadInput, with the place among the arguments, for pins that are not there or stand alone, bars of no length,
     a crank that is not pinned to the frame at one point.
+
+    >>> import planar
+    >>> places = [(0, 0), (0, 1), (3, 2), (4, 0)]
+    >>> planar.pinned(places, [(0, 1), (1, 2), (2, 3)], [0, 3], name="Bars")
+    <Mechanism 'Bars': 4 links, 4 pairs, driven at P0>
     """
     at, lists = _read_positions(places), _read_bars(bars)
     numbers = at.tolist()

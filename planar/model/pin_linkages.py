@@ -37,6 +37,11 @@ def pinned_linkages(
 
     Nothing is made for each linkage by itself, until one is asked for by its number. Raises BadInput, with the place
     among the arguments, as `pinned` does, and for a pin that is on the frame twice.
+
+    >>> import planar
+    >>> places = [[(0, 0), (0, 1), (3, 2), (4, 0)]] * 2
+    >>> len(planar.pinned_linkages(places, [[(0, 1), (1, 2), (2, 3)]] * 2, [[0, 3]] * 2))
+    2
     """
     at, pin_counts = _read_positions(places)
     many = len(at)

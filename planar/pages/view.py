@@ -32,6 +32,11 @@ def view(shown: Mechanism | State | Motion, path: str | Path | None = None) -> P
 
     Without a path it is written to a folder of its own and opened in the browser. Gives the file's path. Raises
     NoAnswer where the mechanism has no position to start from, BadInput where the file cannot be written.
+
+    >>> import planar
+    >>> from tempfile import mkdtemp
+    >>> planar.view(planar.load("four-bar"), mkdtemp() + "/page.html").name
+    'page.html'
     """
     if not isinstance(shown, Mechanism | State | Motion):
         raise BadInput("view", f"a Mechanism, a State or a Motion is wanted, not {type(shown).__name__}")

@@ -141,6 +141,11 @@ def centrodes(motion: Motion, link: str, other: str | None = None) -> Centrodes:
     The input's speed does not matter; where it is zero in the file, a unit rate takes its place. At the limits of a
     range, where rates are not determined, the pole is that of the motion that the constraints leave. Raises Unknown
     for a link that is not there.
+
+    >>> import planar
+    >>> motion = planar.cycle(planar.load("slider-crank"), 12)
+    >>> planar.centrodes(motion, "rod").fixed.homogeneous.shape
+    (13, 3)
     """
     frame = motion.mechanism.frame
     other = frame if other is None else other

@@ -94,7 +94,7 @@ class Curvature:
         """The curvature of the path of a point of the link, by name or by its coordinates (m) in the link's axes.
 
         Euler-Savary: with r from the pole to the point and e the part of the inflection circle's diameter along r,
-        the radius is r^2 / |r - e|, and the centre lies at r^2 / (r - e) from the point towards the pole. Raises
+        the radius is r^2 / abs(r - e), and the centre lies at r^2 / (r - e) from the point towards the pole. Raises
         Unknown for a point that the link does not carry.
         """
         at = self.motion.points_in_other(self._local_point(point))
@@ -143,6 +143,11 @@ def curvature(state: State, link: str, other: str | None = None) -> Curvature:
     Where the only input is at rest, rates are per unit of it (1 rad/s or 1 m/s, no acceleration). Raises Unknown
     for a link that is not there, BadInput where several inputs are all at rest, so that no ratio of their rates is
     given.
+
+    >>> import planar
+    >>> state = planar.solve(planar.load("four-bar"))
+    >>> [round(float(each), 3) for each in planar.curvature(state, "BC").pole]
+    [0.076, 0.132]
     """
     other = state.mechanism.frame if other is None else other
     relative_motion(state.frames, link, other)  # refuses what there is not

@@ -50,6 +50,10 @@ def centre_of(
     Case 1: the perpendiculars to both velocities meet in it. Case 2, parallel velocities square to AB: the line
     through the arrows' heads meets AB in it; equal velocities put it at infinity. Raises BadInput where A and B are
     one point, or no rigid link can have such velocities, or a direction is not enough.
+
+    >>> import planar
+    >>> planar.centre_of((0, 0), (0, 1), (1, 0), (0, 2)).angular_velocity
+    1.0
     """
     at_a, at_b, va = (np.array(each, dtype=float) for each in (a, b, velocity_a))
     if not all(each.shape == (2,) and np.isfinite(each).all() for each in (at_a, at_b, va)):

@@ -83,7 +83,12 @@ class Inspection:
 
 @takes_mechanism
 def inspect(mechanism: Mechanism) -> Inspection:
-    """Everything that can be said of a mechanism before its motion is asked for."""
+    """Everything that can be said of a mechanism before its motion is asked for.
+
+    >>> import planar
+    >>> planar.inspect(planar.load("four-bar")).names
+    ('four-bar chain', 'triple-rocker')
+    """
     try:
         found, trouble = mobility(mechanism), ""
     except NoAnswer as problem:

@@ -37,7 +37,12 @@ class Mobility:
 
 @takes_mechanism
 def mobility(mechanism: Mechanism) -> Mobility:
-    """The mobility of a mechanism in the position of its file. Raises NoAnswer where it cannot be assembled."""
+    """The mobility of a mechanism in the position of its file. Raises NoAnswer where it cannot be assembled.
+
+    >>> import planar
+    >>> planar.mobility(planar.load("four-bar")).finite
+    1
+    """
     setup = PositionSolver(mechanism)
     constraints = FullConstraints(setup)
     return mobility_at(constraints, closed_position(setup, constraints))

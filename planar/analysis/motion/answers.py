@@ -55,6 +55,11 @@ def answers(motion: Motion, name: str) -> tuple[Answers, ...]:
     """What there is to tell of a name over a motion: of the pair, the link and the point that bear it.
 
     Raises Unknown where there is nothing of that name.
+
+    >>> import planar
+    >>> motion = planar.cycle(planar.load("slider-crank"), 12)
+    >>> len(planar.answers(motion, "A"))
+    2
     """
     steady, found = InterpolatedRun(motion), []
     if name in relative_motions(motion.mechanism):

@@ -37,12 +37,17 @@ def area(motion: Motion, point: str) -> Area:
     Positive where the point goes round anticlockwise; parts that are gone round several times, or the other way, count
     so often, or against the others. A path there and back along one line has none.
 
-    With x + iy = sum of c_n exp(i n theta) over the range it is pi times the sum of n |c_n|^2, which is half the
+    With x + iy = sum of c_n exp(i n theta) over the range it is pi times the sum of n abs(c_n)^2, which is half the
     integral of x dy - y dx. From exact positions equally spaced, as many as those of the motion, and twice as many
     until the sum does not change by more than 1e-10 of itself: of smooth curves it converges like a geometric series
     (L. N. Trefethen, J. A. C. Weideman, The exponentially convergent trapezoidal rule, SIAM Review 56, 2014).
 
     Raises Unknown for another name, BadInput where the curve is not closed.
+
+    >>> import planar
+    >>> motion = planar.cycle(planar.load("slider-crank"), 12)
+    >>> round(planar.area(motion, "A").value, 6)
+    0.723823
     """
     motion.point(point)  # refuses what there is not
     steady = InterpolatedRun(motion)

@@ -49,6 +49,11 @@ def dwells(
     velocity, or 1 rad/s or 1 m/s where that is zero. What moves slowly without ever standing still does not dwell.
 
     Raises Unknown, BadInput where there is nothing of that name, or for a `within` or `least` that is none.
+
+    >>> import planar
+    >>> motion = planar.cycle(planar.load("slider-crank"), 12)
+    >>> len(planar.dwells(motion, "stroke"))
+    0
     """
     for name, value in (("within", within), ("least", least)):
         if value is None:

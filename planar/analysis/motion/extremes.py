@@ -71,6 +71,11 @@ def stroke(motion: Motion, pair: str) -> Stroke | None:
     far, the end of greater displacement. Of ends that are reached more than once the first in the range is told. None
     where the displacement is greatest or least at an end of the input's range and does not turn back there, where the
     slide does not move, or where the relative motion at the pair is no length. Raises Unknown for another name.
+
+    >>> import planar
+    >>> motion = planar.cycle(planar.load("slider-crank"), 12)
+    >>> planar.stroke(motion, "stroke").pair
+    'stroke'
     """
     motion.pair(pair)  # refuses what there is not
     return find_stroke(InterpolatedRun(motion), pair) if motion.has_length_motion(pair) else None
@@ -93,6 +98,11 @@ def swing(motion: Motion, name: str) -> Swing | None:
     Angles are those of the motion, so that the swing may be more than a turn. None where it turns right round, where it
     does not turn, where it is most at an end of the input's range and does not turn back there, and of a slide. Raises
     Unknown for another name.
+
+    >>> import planar
+    >>> motion = planar.cycle(planar.load("crank-rocker"), 12)
+    >>> planar.swing(motion, "crank") is None
+    True
     """
     if name in relative_motions(motion.mechanism) and motion.has_length_motion(name):
         return None
@@ -106,6 +116,11 @@ def extremes(motion: Motion, point: str, axis: Axis = "x") -> Extremes:
 
     Over a range that is not closed they may be at its ends. Of places that are alike the first in the range is told.
     Raises Unknown for another name, BadInput for another axis.
+
+    >>> import planar
+    >>> motion = planar.cycle(planar.load("slider-crank"), 12)
+    >>> round(planar.extremes(motion, "A").greatest.value, 6)
+    0.48
     """
     return find_extremes(Output(InterpolatedRun(motion), point, axis), axis)
 
@@ -138,6 +153,11 @@ def greatest(motion: Motion, of: str | StateMeasure, what: str = "velocity") -> 
     Over a range that is not closed the greatest may be at an end; where it grows beyond all bounds towards a limit of
     the range it is inf, there; where no rates are determined anywhere it is NaN. Raises Unknown where there is
     nothing of that name, BadInput for another `what`.
+
+    >>> import planar
+    >>> motion = planar.cycle(planar.load("slider-crank"), 12)
+    >>> planar.greatest(motion, "stroke").value > 0
+    True
     """
     return find_greatest(InterpolatedRun(motion), of, what)
 

@@ -125,6 +125,10 @@ def harmonics(mechanism: Mechanism, of: str, axis: str | None = None, pair: str 
 
     Raises BadInput where there is nothing of that name, the input is a slide, or the motion does not repeat with every
     turn of it (wheels may need several); NoAnswer where the input makes no full turn.
+
+    >>> import planar
+    >>> planar.harmonics(planar.load("slider-crank"), "stroke").of
+    'stroke'
     """
     steady, running = _at_steady_rate(mechanism, pair)
     samples, motion = MIN_SAMPLES, _run_full_turn(steady, MIN_SAMPLES, running)

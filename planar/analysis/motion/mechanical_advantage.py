@@ -52,6 +52,11 @@ def advantage(state: State, output: str, input: str | None = None) -> Advantage:
 
     With the input alone moving at unit rate; `input` may be left out where there is one. Raises Unknown where there
     is no such output or input, BadInput where an input has to be named, NoAnswer where none can move alone.
+
+    >>> import planar
+    >>> state = planar.solve(planar.load("slider-crank"))
+    >>> planar.advantage(state, "stroke").measure
+    '1/m'
     """
     return _AdvantagesOverInput(state, _choose_input(state, input)).advantage_of(output)
 

@@ -47,6 +47,11 @@ def advantage_over(motion: Motion, output: str) -> AdvantageOver:
 
     Over the input that runs; `planar.advantage` tells that of one position by two ways. Raises Unknown for another
     name.
+
+    >>> import planar
+    >>> motion = planar.cycle(planar.load("slider-crank"), 12)
+    >>> planar.advantage_over(motion, "stroke").values.shape
+    (13,)
     """
     return advantage_over_run(InterpolatedRun(motion), output)
 

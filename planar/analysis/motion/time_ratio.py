@@ -41,6 +41,11 @@ def time_ratio(motion: Motion, of: str, axis: Axis | None = None) -> TimeRatio |
     velocity, in its sense; at 1 rad/s where that is zero. The position of the input at an end is told in the range of
     the motion. None where the output has no such ends, or the motion does not come back to where it started, so that
     there is no return. Raises Unknown, BadInput where there is nothing of that name.
+
+    >>> import planar
+    >>> motion = planar.cycle(planar.load("slider-crank"), 12)
+    >>> round(planar.time_ratio(motion, "stroke").ratio, 3)
+    1.0
     """
     return find_time_ratio(Output(InterpolatedRun(motion), of, axis))
 

@@ -67,6 +67,11 @@ def transmission(moving: State | Motion, output: str) -> Transmission:
     Raises Unknown for another name; BadInput where the link is not so joined to the frame, nothing but the input
     itself drives it, a turning link is driven at several places or by a couple, so that no one line of force acts on a
     pin, or where constraints hold twice, so that the forces are not determined.
+
+    >>> import planar
+    >>> state = planar.solve(planar.load("four-bar"))
+    >>> round(planar.transmission(state, "D").angle, 3)
+    1.57
     """
     driven = _DrivenOutput(moving, output)
     through, angle = driven.angles(moving)

@@ -36,6 +36,10 @@ def circuits(mechanism: Mechanism, pair: str | None = None) -> Circuits:
     J. Mech. Des. 115, 1993). `pair` names the input that runs, where there are several.
 
     Raises BadInput where there is no such input, NoAnswer where the inputs leave links free whatever the dimensions.
+
+    >>> import planar
+    >>> planar.circuits(planar.load("four-bar"))
+    <1 circuits of 'Four-bar chain' over A, numerically complete>
     """
     return Circuits(mechanism, mechanism.inputs[running_input_index(mechanism, pair)].pair)
 

@@ -35,6 +35,11 @@ def dataset(motion: Motion) -> xr.Dataset:
 
     `dataset(motion).link_angle.sel(link="DC").plot(x="input_A_position")` draws a diagram. Attributes are `mechanism`,
     `outcome` and `reason`. Raises BadInput where xarray is not installed.
+
+    >>> import planar
+    >>> motion = planar.cycle(planar.load("slider-crank"), 12)
+    >>> planar.dataset(motion).sizes["row"]
+    13
     """
     try:
         import xarray as xr
