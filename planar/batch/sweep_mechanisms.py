@@ -98,7 +98,7 @@ def sweep_each(  # many: the public signature
     reduce: Mapping[str, str | Reduction[Each]],
     progress: Callable[[int, int], object] | None = None,
 ) -> ReducedSweep: ...
-def sweep_each(  # many: the public signature
+def sweep_each(  # many: the public signature; # long: its docstring
     mechanisms: Iterable[MechanismSource | PinnedLinkages],
     steps: int = 200,
     points: Sequence[str] | str | None = None,
