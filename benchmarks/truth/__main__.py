@@ -7,7 +7,7 @@ import os
 import sys
 from collections import Counter
 from concurrent.futures import ProcessPoolExecutor
-from itertools import cycle, islice
+from itertools import cycle, islice, repeat
 from time import perf_counter
 
 from rich.console import Console
@@ -20,9 +20,9 @@ SHOWN = 40
 """Differing designs of each way and kind of difference that are printed."""
 
 
-def tried(kind: str, seed: int) -> list[Verdict]:
+def tried(kind: str, seed: int, designs: int = DESIGNS) -> list[Verdict]:
     """What every way told of the case of a kind and seed; nothing where there is no such case."""
-    case = drawn(kind, seed)
+    case = drawn(kind, seed, designs)
     return [] if case is None else verdicts(case)
 
 
@@ -30,6 +30,7 @@ def main() -> None:
     """Draw, compare, print."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.truth", description=__doc__)
     parser.add_argument("--count", type=int, default=1000, help="designs")
+    parser.add_argument("--designs", type=int, default=DESIGNS, help="of a case, which is one mechanism")
     parser.add_argument("--first", type=int, default=0, help="the first seed")
     parser.add_argument("--kinds", nargs="+", choices=list(KINDS), default=list(KINDS), help="of mechanisms")
     parser.add_argument("--workers", type=int, default=os.cpu_count(), help="processes")
@@ -39,17 +40,19 @@ def main() -> None:
     start = perf_counter()
     if wanted.case:
         kind, seed = wanted.case[0], int(wanted.case[1])
-        case = drawn(kind, seed)
+        case = drawn(kind, seed, wanted.designs)
         console.print(case)
-        told = tried(kind, seed)
+        told = tried(kind, seed, wanted.designs)
         for each in told:
             console.print(f"design {each.design}, {each.way}: {each.what}. {each.detail}", highlight=False)
     else:
-        cases = -(-wanted.count // DESIGNS)
+        cases = -(-wanted.count // wanted.designs)
         seeds = (wanted.first + n // len(wanted.kinds) for n in range(cases))
         told = []
         with ProcessPoolExecutor(wanted.workers) as pool:
-            for found in pool.map(tried, islice(cycle(wanted.kinds), cases), seeds, chunksize=4):
+            for found in pool.map(
+                tried, islice(cycle(wanted.kinds), cases), seeds, repeat(wanted.designs), chunksize=4
+            ):
                 told += found
         _print(console, told, perf_counter() - start)
     sys.exit(any(not agrees(each) for each in told))

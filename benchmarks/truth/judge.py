@@ -28,8 +28,8 @@ ROUND_OFF = 1e-11
 """Or by this part of the greatest number of its order."""
 FAR = 1e-4
 """Positions that differ by this part of the size are another assembly, or another branch."""
-SECONDS = 30
-"""A way that takes longer over one case is given up, which is counted."""
+SECONDS = 4
+"""Of processor time: a way that takes longer over a design, on average of its case, is given up, which is counted."""
 TRUE = "general path"
 """The way that the others are compared with; its verdicts say how designs end."""
 SAME, UNDECIDED = "the same", "undecided"
@@ -153,25 +153,26 @@ def agrees(verdict: Verdict) -> bool:
 
 def verdicts(case: Case) -> list[Verdict]:
     """What every way told of every design."""
+    seconds = SECONDS * len(case)
     try:
         truth = Truth(case)
-        with limited(SECONDS):
+        with limited(seconds):
             for design in range(len(case)):
                 truth.told(design)
     except planar.BadInput:
         return []
     except TimeoutError:
-        return [Verdict(case.kind, case.seed, 0, f"{TRUE}, too long", "given up", f"after {SECONDS} s")]
+        return [Verdict(case.kind, case.seed, 0, f"{TRUE}, too long", "given up", f"after {seconds} s")]
     found = [
         Verdict(case.kind, case.seed, design, TRUE, OUTCOMES[truth.told(design).status[-1]].value)
         for design in range(len(case))
     ]
     for way, solve in truth.ways.items():
         try:
-            with limited(SECONDS):
+            with limited(seconds):
                 told = solve()
         except TimeoutError:
-            found.append(Verdict(case.kind, case.seed, 0, way, "given up", f"after {SECONDS} s"))
+            found.append(Verdict(case.kind, case.seed, 0, way, "given up", f"after {seconds} s"))
             continue
         except Exception as problem:
             what = f"raises {type(problem).__name__}"
@@ -249,18 +250,18 @@ def _distance(truth: Truth, true: Array, told: Array, reach: Array | None) -> tu
 
 @contextmanager
 def limited(seconds: int) -> Iterator[None]:
-    """TimeoutError after so many seconds, where the system can interrupt."""
-    if not hasattr(signal, "SIGALRM"):
+    """TimeoutError after so many seconds of processor time, where the system can interrupt."""
+    if not hasattr(signal, "SIGPROF"):
         yield
         return
 
     def stop(*_: object) -> None:
         raise TimeoutError
 
-    before = signal.signal(signal.SIGALRM, stop)
-    signal.alarm(seconds)
+    before = signal.signal(signal.SIGPROF, stop)
+    signal.setitimer(signal.ITIMER_PROF, seconds)
     try:
         yield
     finally:
-        signal.alarm(0)
-        signal.signal(signal.SIGALRM, before)
+        signal.setitimer(signal.ITIMER_PROF, 0)
+        signal.signal(signal.SIGPROF, before)
