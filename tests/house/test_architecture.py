@@ -81,17 +81,24 @@ def parse(path: Path) -> ast.Module:
 
 
 @cache
+def nodes(path: Path) -> tuple[ast.AST, ...]:
+    """What a file imports, names, calls, says as text and defines; it is walked through once."""
+    kinds = (ast.Import, ast.ImportFrom, ast.Constant, ast.Name, ast.Call, ast.FunctionDef, ast.AsyncFunctionDef)
+    return tuple(node for node in ast.walk(parse(path)) if isinstance(node, kinds))
+
+
+@cache
 def imports(path: Path) -> set[str]:
     """Every module that a file imports, lazily, or by a text with its name: files of planar, or other packages."""
     modules = set()
-    for node in ast.walk(parse(path)):
+    for node in nodes(path):
         if isinstance(node, ast.Import):
             modules |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom):
             assert node.level == 0, f"{path}: relative import"
             modules |= {f"{node.module}.{alias.name}" for alias in node.names}
         elif isinstance(node, ast.Constant) and isinstance(node.value, str):
-            modules |= {node.value} & set(NAMES)
+            modules |= {node.value} & NAMES.keys()
     return {module_of(name) for name in modules}
 
 
@@ -103,11 +110,12 @@ def module_of(name: str) -> str:
     return name
 
 
-def arrows() -> list[tuple[str, str]]:
+@cache
+def arrows() -> tuple[tuple[str, str], ...]:
     """Who imports whom within planar, as modules; the list of public names in `planar/__init__.py` left out."""
     top = f"{planar.__name__}.__init__"
     whole = [(name, module) for name, path in NAMES.items() if name != top for module in imports(path)]
-    return [(name, module) for name, module in whole if module in NAMES and module not in (name, top)]
+    return tuple((name, module) for name, module in whole if module in NAMES and module not in (name, top))
 
 
 def circles(pairs: Iterable[tuple[str, str]]) -> list[list[str]]:
@@ -157,17 +165,14 @@ def test_libraries_stay_in_their_rooms():
 
 
 def test_no_pair_type_is_named_outside_the_pairs():
+    names, keywords = {kind.__name__ for kind in pair_types().values()}, set(pair_types())
     for path in FILES:
         if path.parent == ROOT / "model" / "pairs":
             continue
-        tree = parse(path)
-        names = {kind.__name__ for kind in pair_types().values()}
-        said = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name)}
-        texts = {
-            node.value for node in ast.walk(tree) if isinstance(node, ast.Constant) and isinstance(node.value, str)
-        }
+        said = {node.id for node in nodes(path) if isinstance(node, ast.Name)}
+        texts = {node.value for node in nodes(path) if isinstance(node, ast.Constant) and isinstance(node.value, str)}
         assert not said & names
-        assert not texts & set(pair_types())
+        assert not texts & keywords
 
 
 def test_only_two_files_open_files():
@@ -176,7 +181,7 @@ def test_only_two_files_open_files():
     for path in FILES:
         called = {
             node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")
-            for node in ast.walk(parse(path))
+            for node in nodes(path)
             if isinstance(node, ast.Call)
         }
         if called & opening:
@@ -196,7 +201,7 @@ def test_functions_are_short_and_take_few_arguments():
     """What is longer, or takes more, says why in a comment beside its first line: `# long: ...` or `# many: ...`."""
     for path in FILES:
         lines = path.read_text().splitlines()
-        for node in ast.walk(parse(path)):
+        for node in nodes(path):
             if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
                 said = " ".join(lines[node.lineno - 2 : node.body[0].lineno])
                 given = node.args
@@ -214,7 +219,7 @@ def test_no_test_file_imports_another():
     found = [
         f"{name} imports {module}"
         for name, path in tests.items()
-        for node in ast.walk(parse(path))
+        for node in nodes(path)
         if isinstance(node, ast.ImportFrom)
         for module in (node.module, *(f"{node.module}.{alias.name}" for alias in node.names))
         if module in tests
