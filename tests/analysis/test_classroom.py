@@ -9,7 +9,7 @@ from planar.analysis.classroom.marking import mark_answers
 from planar.analysis.classroom.questions import problem_questions, question_text, solve_question
 from planar.document.dimensions import file_dimensions
 from planar.foundation.errors import BadInput
-from planar.foundation.units import unit_of_kind
+from planar.model.file_units import unit_of_kind
 from tests import command
 
 PROBLEMS = ("four-bar", "slider-crank", "whitworth", "toggle-press", "watt-six-bar")

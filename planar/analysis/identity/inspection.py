@@ -17,7 +17,8 @@ from planar.equations.mechanism_numbers import mechanism_size, shapes_of_links
 from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput, NoAnswer, Outcome, PlanarError
 from planar.foundation.short_repr import short_repr
-from planar.foundation.units import SI_UNITS, display_unit
+from planar.foundation.units import SI_UNITS
+from planar.model.file_units import display_unit
 from planar.model.link_graph import link_numbers, pair_labels_by_type, unconnected_links
 from planar.model.mechanism import Input, Mechanism, pair_entries
 from planar.model.pairs import MeasureKind

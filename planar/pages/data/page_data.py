@@ -14,7 +14,7 @@ from planar.codegen.javascript import write_javascript
 from planar.document.dimensions import Dimension, change_dimension
 from planar.equations.mechanism_numbers import scale_lengths, shapes_of_links
 from planar.equations.symbolic_equations import slice_length
-from planar.foundation.units import display_unit
+from planar.model.file_units import display_unit
 from planar.model.link_graph import link_numbers
 from planar.model.link_shapes import PointPlacementError
 from planar.model.mechanism import Mechanism, links_counting_turns, named_points, pair_misfits

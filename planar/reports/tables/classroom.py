@@ -12,8 +12,8 @@ from planar.analysis.classroom.marking import RIGHT, MarkedValue, StudentMarks
 from planar.analysis.classroom.questions import problem_questions, question_text, solve_question
 from planar.analysis.classroom.variants import Variant
 from planar.document.dimensions import file_dimensions
-from planar.foundation.units import display_unit
-from planar.model.mechanism import PUBLISHED_QUANTITIES, FileUnits
+from planar.model.file_units import FileUnits, display_unit
+from planar.model.mechanism import PUBLISHED_QUANTITIES
 from planar.reports.fitted_table import plain_table
 from planar.reports.number_format import DIGITS
 from planar.results.motion import State

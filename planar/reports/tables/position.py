@@ -9,8 +9,9 @@ from rich.console import Group, RenderableType
 from rich.text import Text
 
 from planar.analysis.worked.published import Comparison
-from planar.foundation.units import display_unit, parse_unit
-from planar.model.mechanism import PUBLISHED_QUANTITIES, FileUnits, relative_motions
+from planar.foundation.units import parse_unit
+from planar.model.file_units import FileUnits, display_unit
+from planar.model.mechanism import PUBLISHED_QUANTITIES, relative_motions
 from planar.model.pairs import Pair
 from planar.model.wording import amount, join_all_names
 from planar.reports.fitted_table import FittedTable, plain_table
