@@ -506,11 +506,11 @@ def test_the_pump_jack_lifts_its_rods_by_the_arc_of_its_horsehead():
 
 def test_the_engine_in_inches_has_its_mean_piston_speed_and_inertia_in_pounds():
     """3000 rpm with a stroke of 4 in are 2000 ft/min; at TDC the piston's acceleration is r w^2 (1 + r/l)."""
-    motion = planar.cycle("shop-engine", 360)
+    motion = planar.cycle("engine-in-inches", 360)
     angle, speed = motion.inputs["O"].position, np.abs(motion.pair("stroke")["velocity"])
     mean = np.trapezoid(speed, angle) / (2 * np.pi)
     assert mean == pytest.approx(parse_quantity("2000 ft/min", "velocity"), rel=1e-4)
-    top = planar.solve("shop-engine", {"O": np.pi / 2})
+    top = planar.solve("engine-in-inches", {"O": np.pi / 2})
     acceleration = 2 * (3000 * np.pi / 30) ** 2 * (1 + 2 / 8)
     assert -top.pair("stroke")["acceleration"] / 0.0254 == pytest.approx(acceleration, rel=1e-12)
     inertia = next(each for each in planar.forces(top).acting if each.name == "inertia of block B")

@@ -21,7 +21,7 @@ from planar.drawing.diagrams.motion_curves import (
 from planar.drawing.labels.fonts import DRAWING_FAMILY, font_families
 from planar.drawing.labels.text_metrics import clip_text, format_tick, text_size
 from planar.drawing.paper.pens import MM_PER_POINT, require_matplotlib
-from planar.drawing.paper.scales import DECIMAL_STEPS, DEGREE_STEPS, round_scale, round_step
+from planar.drawing.paper.scales import DECIMAL_STEPS, DEGREE_STEPS, round_scale, round_step, tick_spacing
 from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput
 from planar.foundation.units import SI_UNITS, format_unit, parse_unit
@@ -107,7 +107,7 @@ def _draw_figure(sheet: DiagramSheet) -> Figure:
 
 
 def _fit_ordinate(sheet: DiagramSheet, index: int) -> Ordinate:
-    """The scale of one diagram, round, and its ends: whole half-centimetres with some air."""
+    """The scale of one diagram, round, and its ends: halves of what ticks are apart, with some air."""
     angle, timed = sheet.subject.is_angle, sheet.run.has_speed
     kinds = ("angle", "angular velocity", "angular acceleration") if angle else ("length", "velocity", "acceleration")
     kind = kinds[index]
@@ -119,10 +119,11 @@ def _fit_ordinate(sheet: DiagramSheet, index: int) -> Ordinate:
     name = _ordinate_unit(kind, index, sheet)
     scale = round_scale(kind, name, high - low, high - low, (MAX_CURVE_HEIGHT, MAX_CURVE_HEIGHT))
     nothing = 1e-9 * max(high, -low)  # what rounding leaves of zero asks for no room
-    top = 5.0 * max(ceil((scale.on_paper(high) + 2.0) / 5.0 - 1e-9), 0) if high > nothing else 0.0
-    foot = 5.0 * min(floor((scale.on_paper(low) - 2.0) / 5.0 + 1e-9), 0) if low < -nothing else 0.0
-    if top - foot < 10.0:
-        top, foot = max(top, 5.0), min(foot, -5.0)
+    half = tick_spacing(name) / 2.0
+    top = half * max(ceil((scale.on_paper(high) + 2.0) / half - 1e-9), 0) if high > nothing else 0.0
+    foot = half * min(floor((scale.on_paper(low) - 2.0) / half + 1e-9), 0) if low < -nothing else 0.0
+    if top - foot < 2.0 * half:
+        top, foot = max(top, half), min(foot, -half)
     told, of = (name, parse_unit(name)) if index else coherent_unit(SI_UNITS["angle"] if angle else name)
     if not timed and index:
         length = rate_length(sheet.units)[0]
@@ -146,7 +147,8 @@ def _draw_diagram(axes: Axes, sheet: DiagramSheet, ordinate: Ordinate, index: in
     time = sheet.run.time
     axes.set_xlim(0.0, sheet.span)
     axes.set_ylim(ordinate.low * per_mm, ordinate.high * per_mm)
-    ticks = [10.0 * k for k in range(ceil(ordinate.low / 10.0), floor(ordinate.high / 10.0) + 1)]
+    step = tick_spacing(ordinate.scale.unit)
+    ticks = [step * k for k in range(ceil(ordinate.low / step), floor(ordinate.high / step) + 1)]
     axes.set_yticks(
         [tick * per_mm for tick in ticks],
         [format_tick(tick * per_mm) for tick in ticks],

@@ -17,9 +17,9 @@ from planar.drawing.paper.scales import (
     DEGREE_STEPS,
     Scale,
     format_force,
-    paper_unit,
     round_scale,
     round_step,
+    tick_spacing,
     unit_for_size,
 )
 from planar.dynamics.external_actions import KinematicArrays
@@ -169,9 +169,7 @@ def _empty_picture(load: _BearingLoad, values: Array) -> _Undrawn:
 def _axis_at_scale(low: float, high: float, scale: Scale, name: str, per: float) -> axes.Axis:
     """An axis of a force at a scale, a little longer than what is drawn, with ticks by the centimetre or half inch."""
     low, high = low - POLAR_MARGIN * scale.per_mm, high + POLAR_MARGIN * scale.per_mm
-    paper, length = paper_unit(scale.unit)
-    tick = length / 2.0 if paper == "in" else length
-    return axes.Axis(low, high, scale.on_paper(high - low), tick * scale.per_mm, name, per)
+    return axes.Axis(low, high, scale.on_paper(high - low), tick_spacing(scale.unit) * scale.per_mm, name, per)
 
 
 def _input_marks(drawn: ForceRun, force: Array, across: axes.Axis, up: axes.Axis) -> Iterator[Mark]:

@@ -73,6 +73,11 @@ def paper_unit(unit_name: str) -> tuple[str, float]:
     return ("in", INCH) if is_customary(unit_name) else ("cm", 10.0)
 
 
+def tick_spacing(unit_name: str) -> float:
+    """mm between the ticks of an axis at a scale that is said in this unit: a centimetre, or half an inch."""
+    return INCH / 2.0 if is_customary(unit_name) else 10.0
+
+
 def paper_length(length: float, units: FileUnits) -> str:
     """A length on paper (mm): 150 mm, beside inches 5.91 in."""
     return f"{length / INCH:.2f} in" if is_customary(units.length) else f"{length:g} mm"
