@@ -23,10 +23,10 @@ _MADE_OF: dict[str, tuple[tuple[str, ...], str, str]] = {
     **{kind: (("rate length",), behind, "") for kind, behind in _LENGTH_RATES.items()},
     **{kind: (("rate angle",), behind, "") for kind, behind in _ANGLE_RATES.items()},
     "area": (("length", "length"), "", ""),
-    "torque": (("force", "rate length"), "", ""),
-    "moment of inertia": (("mass", "rate length", "rate length"), "", ""),
-    "stiffness": (("force",), "/", "rate length"),
-    "damping": (("force",), " s/", "rate length"),
+    "torque": (("force", "arm"), "", ""),
+    "moment of inertia": (("mass", "arm", "arm"), "", ""),
+    "stiffness": (("force",), "/", "arm"),
+    "damping": (("force",), " s/", "arm"),
     "torsional stiffness": (("torque",), "/rad", ""),
     "torsional damping": (("torque",), " s/rad", ""),
     "power": (("torque",), "/s", ""),
@@ -121,11 +121,13 @@ def _factor(name: str, kind: str, units: FileUnits) -> tuple[str, Unit]:
     """A unit that another kind's is made of."""
     if name == "rate length":
         return rate_length(units, kind)
+    if name == "arm":
+        return _coherent_length(units)
     return _rate_angle(units) if name == "rate angle" else unit_of_kind(name, units)
 
 
 def rate_length(units: FileUnits, kind: str = "") -> tuple[str, Unit]:
-    """The unit of length that stands in rates, torques and stiffnesses, and in the formulas of worked solutions.
+    """The unit of length that stands in rates, and in the formulas of worked solutions.
 
     That of the rate of this kind, or of another one, where the file declares it as a length by the second, the metre
     where lengths are metric, and else the length's own unit.
@@ -134,8 +136,12 @@ def rate_length(units: FileUnits, kind: str = "") -> tuple[str, Unit]:
         name = _base_of_rate(units.declared(each), _LENGTH_RATES[each])
         if name:
             return name, parse_unit(name)
-    own = parse_unit(units.length)
-    return (SI_UNITS["length"], Unit("length", 1.0, 1.0)) if is_metric(own) else (units.length, own)
+    return _coherent_length(units)
+
+
+def _coherent_length(units: FileUnits) -> tuple[str, Unit]:
+    """The unit of length beside which forces and masses stand: the metre where lengths are metric, else their own."""
+    return coherent_unit(units.length)
 
 
 def rate_unit(kind: str, units: FileUnits) -> tuple[str, Unit]:

@@ -133,3 +133,7 @@ def test_the_commands_write_sheets_and_print_marks(tmp_path, handed_in):
     (marks,) = json.loads(command.run(tmp_path, "mark", "slider-crank", str(path), "--json").done())
     assert marks["right"] == 1
     assert "pdf" in command.run(tmp_path, *words, "-o", "sheet.txt").refused(2)
+
+
+def test_a_problem_is_set_of_a_mechanism_that_has_numbers_without_a_unit(tmp_path):
+    assert "variant" in command.run(tmp_path, "problem", "two-stroke-engine", "--vary", "1").done()

@@ -1,5 +1,5 @@
-"""A mechanism in inches and pounds on every face: tables, lists, drawings, pages and sheets have no metric unit in them,
-and say the same as those of the same mechanism in SI."""
+"""A mechanism in inches and pounds on every face: tables, lists, drawings, pages and sheets have no metric unit, and
+say the same as those of the same mechanism in SI."""
 
 from __future__ import annotations
 
@@ -156,7 +156,9 @@ def test_drawings_have_no_metric_unit(what: str) -> None:
 def test_a_scale_is_said_by_the_inch_of_paper() -> None:
     figure = planar.plot.scheme(planar.solve("pump-jack"), scale="1:50")
     assert any("1 in = 50 in" in text for text, _ in visible_texts(figure))
-    assert "1 cm = 20 cm" in " ".join(text for text, _ in visible_texts(planar.plot.scheme(planar.solve("four-bar"), "1 cm = 20 cm")))
+    assert "1 cm = 20 cm" in " ".join(
+        text for text, _ in visible_texts(planar.plot.scheme(planar.solve("four-bar"), "1 cm = 20 cm"))
+    )
 
 
 def test_problem_sheets_and_answers_have_no_metric_unit() -> None:

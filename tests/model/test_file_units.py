@@ -80,10 +80,10 @@ def test_forces_and_masses_beside_inches_are_in_pounds_and_the_rest_is_made_of_t
 def test_what_is_declared_is_shown_so_and_the_rest_follows() -> None:
     mixed = FileUnits("in", "deg", velocity="ft/s", force="ozf", mass="slug", angular_velocity="deg/s")
     kinds = ("velocity", "acceleration", "force", "torque", "mass", "moment of inertia", "angular acceleration")
-    assert names(mixed, *kinds) == ["ft/s", "ft/s²", "ozf", "ozf·ft", "slug", "slug·ft²", "deg/s²"]
+    assert names(mixed, *kinds) == ["ft/s", "ft/s²", "ozf", "ozf·in", "slug", "slug·in²", "deg/s²"]
     metric = FileUnits("mm", "deg", velocity="mm/s", force="kN", torque="N*mm", angular_velocity="rpm")
-    assert names(metric, *kinds) == ["mm/s", "mm/s²", "kN", "N·mm", "kg", "kg·mm²", "rad/s²"]
-    assert names(metric, "power", "energy", "stiffness") == ["W", "J", "kN/mm"]
+    assert names(metric, *kinds) == ["mm/s", "mm/s²", "kN", "N·mm", "kg", "kg·m²", "rad/s²"]
+    assert names(metric, "power", "energy", "stiffness") == ["W", "J", "kN/m"]
 
 
 def test_formulas_are_in_one_length_and_seconds() -> None:

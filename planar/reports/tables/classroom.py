@@ -22,8 +22,8 @@ from planar.results.motion import State
 def variants_tables(base: State, variants: Sequence[Variant], seed: int) -> RenderableType:
     """The numbers of all variants, then what is asked with the answers."""
     mechanism = base.mechanism
-    kinds = {name: display_unit(each.kind, mechanism.units) for name, each in file_dimensions(mechanism).items()}
-    names = list(variants[0].values)
+    names, known = list(variants[0].values), file_dimensions(mechanism)
+    kinds = {name: display_unit(known[name].kind, mechanism.units) for name in names}
     numbers = plain_table("Numbers", "variant", *(f"{name} ({kinds[name][0]})" for name in names), keys=1)
     for each in variants:
         shown = (f"{kinds[name][1].from_si(value):.{DIGITS}g}" for name, value in each.values.items())
