@@ -106,7 +106,7 @@ def unit_of_kind(kind: str, units: FileUnits) -> tuple[str, Unit]:
     """
     written = units.declared(kind)
     if written:
-        return spell_unit(written), parse_declared_unit(kind, written)
+        return written if kind in ("length", "angle") else spell_unit(written), parse_declared_unit(kind, written)
     if kind in _MADE_OF and not (kind in _OF_THEIR_OWN and is_metric(unit_of_kind("torque", units)[1])):
         factors, behind, divisor = _MADE_OF[kind]
         over = [_factor(each, kind, units) for each in factors]

@@ -43,6 +43,18 @@ INCHES: dict[str, Any] = {
     "gravity": [0, "-386.0886 in/s^2"],
 }
 """It declares inches alone, so that everything else follows."""
+FEET: dict[str, Any] = INCHES | {
+    "units": {
+        "length": "in",
+        "angle": "deg",
+        "velocity": "ft/s",
+        "angular_velocity": "rpm",
+        "angular_acceleration": "deg/s^2",
+    }
+    | {"force": "ozf", "torque": "ft*lbf", "mass": "slug", "moment_of_inertia": "lb ft^2", "stiffness": "lbf/ft"}
+    | {"damping": "lbf s/ft", "power": "hp", "energy": "ft lbf"}
+}
+"""It declares other units than those that follow, no two of a size."""
 
 
 def metric_words(text: str) -> list[str]:
@@ -74,14 +86,15 @@ TABLES = [
 
 
 @pytest.mark.parametrize("words", TABLES, ids=lambda words: words.split(" -")[0])
-def test_tables_say_in_inches_what_they_say_in_si(
-    words: str, inches: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+def test_tables_say_in_feet_and_inches_what_they_say_in_si(
+    words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     command, *options = words.split()
+    inches = written(tmp_path, FEET)
     seen: list[FittedTable] = []
     draw = FittedTable.__rich_console__
     monkeypatch.setattr(FittedTable, "__rich_console__", lambda self, *more: (seen.append(self), draw(self, *more))[1])
-    si = planar.to_dict(replace(planar.from_dict(INCHES), units=FileUnits("m", "deg")))
+    si = planar.to_dict(replace(planar.from_dict(FEET), units=FileUnits("m", "deg")))
     found = []
     for name in (inches, written(tmp_path, si, "si.json")):
         seen.clear()
@@ -99,15 +112,16 @@ def test_tables_say_in_inches_what_they_say_in_si(
 
 def quantities(table: FittedTable) -> Iterator[tuple[tuple[str, str, str], float]]:
     """Every number of a table that has a unit, in SI, with where it stands."""
+    written = [k for k, column in enumerate(table.columns) if column.name == "unit"]
     for row in table.rows:
-        by_head = {column.name: str(cell) for column, cell in zip(table.columns, row, strict=True)}
-        for column, cell in zip(table.columns, row, strict=True):
+        for k, (column, cell) in enumerate(zip(table.columns, row, strict=True)):
             number, _, unit = str(cell).replace("−", "-").partition(" ")
             try:
                 value = float(number)
             except ValueError:
                 continue
-            of = unit.split(",")[0].split(" at ")[0] or column.unit or by_head.get("unit", "")
+            beside = [at for at in written if at == k + 1] or [at for at in written if at < k][-1:] or written[:1]
+            of = unit.split(",")[0].split(" at ")[0] or column.unit or "".join(str(row[at]) for at in beside)
             yield ((table.title or "").split(",")[0], column.name, str(row[0])), value * size_of(of)
 
 
