@@ -46,6 +46,7 @@ if TYPE_CHECKING:
     from planar.dynamics.reactions import Reaction
     from planar.dynamics.simulation import Simulation, simulate
     from planar.foundation.errors import BadInput, NoAnswer, Outcome, PlanarError, Unknown
+    from planar.model.file_units import FileUnits
     from planar.model.input_laws.cam_rises import (
         CycloidalRise,
         HarmonicRise,
@@ -59,7 +60,7 @@ if TYPE_CHECKING:
     from planar.model.input_laws.spline_table import TableSegment
     from planar.model.link_shapes import Along, At, Distances, Link, Point
     from planar.model.loads import Course, Load, Mass, Spring
-    from planar.model.mechanism import Drive, FileUnits, Input, Mechanism
+    from planar.model.mechanism import Drive, Input, Mechanism
     from planar.model.pairs.base import Pair
     from planar.model.pairs.belt import BeltPair, ChainPair
     from planar.model.pairs.gear import GearPair
@@ -108,7 +109,7 @@ _ROOMS = {
     "Each": "batch.mechanisms.results",
     "Extreme": "analysis.motion.output",
     "Extremes": "analysis.motion.extremes",
-    "FileUnits": "model.mechanism",
+    "FileUnits": "model.file_units",
     "Flywheel": "dynamics.flywheel",
     "Forces": "dynamics.forces",
     "GearPair": "model.pairs.gear",

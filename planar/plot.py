@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from planar.document.first_argument import takes_result
 from planar.drawing.output.matplotlib_figure import draw_on_sheets, draw_pictures, encode_figure
-from planar.drawing.paper.scales import parse_scales
+from planar.drawing.paper.scales import Scale, parse_scales
 from planar.foundation.safe_files import save_file as write
 
 # what only some drawings need is imported where they are made: that takes longer than to draw
@@ -46,6 +46,11 @@ __all__ = [
 ]
 
 
+def _length_scale(scale: ScaleTexts, source: Any) -> Scale | None:
+    """The scale of lengths among those that a reader writes, beside the units of what is drawn."""
+    return parse_scales(scale, ["length"], getattr(source, "mechanism", source).units).get("length")
+
+
 @takes_result("State")
 def scheme(state: State, scale: ScaleTexts = None) -> Figure:
     """The kinematic scheme of a position: links numbered, points lettered, crowded parts once more and larger.
@@ -54,7 +59,7 @@ def scheme(state: State, scale: ScaleTexts = None) -> Figure:
     """
     from planar.drawing.scheme.details import scheme_with_details
 
-    return draw_pictures(scheme_with_details(state, parse_scales(scale, ["length"]).get("length")))
+    return draw_pictures(scheme_with_details(state, _length_scale(scale, state)))
 
 
 @takes_result("State")
@@ -92,9 +97,7 @@ def centres(
     found = all_centres(state)
     shown = choose_centres(found, links)
     pictures = [
-        centres_picture(
-            found, shown, parse_scales(scale, ["length"]).get("length"), DEFAULT_REACH if reach is None else reach
-        ),
+        centres_picture(found, shown, _length_scale(scale, state), DEFAULT_REACH if reach is None else reach),
         circle_picture(found, shown),
     ]
     return draw_pictures(pictures, state.mechanism.name)
@@ -107,7 +110,7 @@ def positions(
     """The mechanism in `count` + 1 positions, its joints lettered A0, A1, ...; TDC and BDC where a slider has them."""
     from planar.drawing.diagrams.positions import positions as picture
 
-    return draw_pictures([picture(motion, count, points, parse_scales(scale, ["length"]).get("length"))])
+    return draw_pictures([picture(motion, count, points, _length_scale(scale, motion))])
 
 
 @takes_result("Motion", "Mechanism")
@@ -115,7 +118,7 @@ def loci(motion: Motion | Mechanism, points: Sequence[str] | None = None, scale:
     """The paths of points (left out: of those that no link on the frame carries)."""
     from planar.drawing.diagrams.positions import loci as picture
 
-    return draw_pictures([picture(motion, points, parse_scales(scale, ["length"]).get("length"))])
+    return draw_pictures([picture(motion, points, _length_scale(scale, motion))])
 
 
 @takes_result("Motion", "Mechanism")
@@ -128,7 +131,7 @@ def centrodes(
     """
     from planar.drawing.centres.centrodes import centrodes_picture
 
-    return draw_pictures([centrodes_picture(motion, link, other, parse_scales(scale, ["length"]).get("length"))])
+    return draw_pictures([centrodes_picture(motion, link, other, _length_scale(scale, motion))])
 
 
 @takes_result("Modes", "Mechanism")
@@ -142,7 +145,7 @@ def modes(assemblies: Modes | Mechanism, scale: ScaleTexts = None) -> list[Figur
     from planar.drawing.scheme.assemblies import assembly_sheets
 
     found = assemblies if isinstance(assemblies, Modes) else all_modes(assemblies)
-    return [draw_pictures(*sheet) for sheet in assembly_sheets(found, parse_scales(scale, ["length"]).get("length"))]
+    return [draw_pictures(*sheet) for sheet in assembly_sheets(found, _length_scale(scale, found))]
 
 
 @takes_result("Circuits", "Mechanism")
@@ -228,7 +231,7 @@ def solution(state: State, scale: ScaleTexts = None) -> list[Figure]:
     """The worked solution of a position on pages of A4."""
     from planar.drawing.output.solution_pages import solution_pages
 
-    return solution_pages(state, scales=parse_scales(scale))
+    return solution_pages(state, scales=parse_scales(scale, units=state.mechanism.units))
 
 
 @takes_result("State")
@@ -240,7 +243,7 @@ def two_directions(state: State, link: str, points: Sequence[str] | None = None,
     """
     from planar.drawing.centres.two_directions import directions_picture
 
-    given = parse_scales(scale)
+    given = parse_scales(scale, units=state.mechanism.units)
     return draw_pictures([directions_picture(state, link, points, given.get("length"), given.get("velocity"))])
 
 

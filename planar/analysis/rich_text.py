@@ -75,10 +75,10 @@ Phrase = tuple[PhrasePiece, ...]
 
 
 class PaperScale(Protocol):
-    """A scale: how many millimetres a value takes on paper."""
+    """A scale: what length a value takes on paper."""
 
-    def on_paper(self, value: float) -> float:
-        """Millimetres for a value (SI)."""
+    def paper_text(self, value: float) -> str:
+        """The length of a value (SI) with its unit."""
 
 
 def format_number(value: float, digits: int = SIGNIFICANT_DIGITS) -> str:
@@ -122,7 +122,7 @@ def format_measured(value: MeasuredValue, paper: Mapping[str, PaperScale] | None
     """A number with its unit, and in brackets its length on paper where its kind has a scale."""
     told = f"{format_number(value.value * value.units_per_si)} {format_unit(value.unit)}".rstrip()
     scale = (paper or {}).get(value.kind)
-    return told if scale is None else f"{told} ({scale.on_paper(abs(value.value)):.1f} mm)"
+    return told if scale is None else f"{told} ({scale.paper_text(abs(value.value))})"
 
 
 def plain_text(phrase: Phrase, paper: Mapping[str, PaperScale] | None = None) -> str:

@@ -110,7 +110,7 @@ def explain(  # many: one for each option
         if output.suffix not in SUFFIXES:
             raise unknown_format_error(output.suffix, "a worked solution", (*SUFFIXES, *PAGES))
     state, comparisons = _solve_model(model, mode, at, as_json, output)
-    given = read(scales)
+    given = read(scales, units=state.mechanism.units)
     if output is not None and on_pages:
         from planar.drawing.output.solution_pages import encode_sheets, solution_pages
         from planar.foundation.safe_files import save_file

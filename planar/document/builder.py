@@ -7,9 +7,10 @@ from collections.abc import Mapping, Sequence
 from planar.document.reader import read_mechanism
 from planar.document.writer import write_mechanism
 from planar.foundation.errors import BadInput
+from planar.model.file_units import FileUnits
 from planar.model.link_shapes import Link
 from planar.model.loads import Load, Mass, Spring
-from planar.model.mechanism import FileUnits, Input, Mechanism, check_mechanism
+from planar.model.mechanism import Input, Mechanism, check_mechanism
 from planar.model.pairs import Pair, joining_entry
 
 

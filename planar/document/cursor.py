@@ -11,9 +11,10 @@ from typing import Any
 
 from planar.document.schema import FORBIDDEN_IN_NAMES
 from planar.foundation.errors import BadInput, first_unprintable, join_names
-from planar.foundation.units import UnitError, example_quantity, parse_quantity, parse_unit
+from planar.foundation.units import UnitError, example_quantity, parse_quantity
+from planar.model.file_units import FileUnits, takes_bare_number, unit_of_kind
 from planar.model.link_shapes import Link, link_shape
-from planar.model.mechanism import LARGEST_COUNTED_ANGLE, LARGEST_NUMBER, SMALLEST_NUMBER, FileUnits
+from planar.model.mechanism import LARGEST_COUNTED_ANGLE, LARGEST_NUMBER, SMALLEST_NUMBER
 
 # control characters, what turns the order of letters, halves of characters
 _UNPRINTABLE = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069\ud800-\udfff]")
@@ -201,18 +202,22 @@ class Cursor:
 
     def _number_in_file_units(self, number: float, kind: str) -> float:
         units = self.context.units
-        if kind == "length":
-            return parse_unit(units.length).to_si(number)
-        if kind == "angle":
-            return parse_unit(units.angle).to_si(number)
-        if kind.startswith("angular") and parse_unit(units.angle).to_si(1.0) != 1.0 and number != 0.0:
+        if units.declared(kind):
+            return unit_of_kind(kind, units)[1].to_si(number)
+        if number == 0.0 or takes_bare_number(kind, units):
+            return number
+        if kind.startswith("angular") and units.angle != "rad":
             rate = "rad/s, deg/s or rpm" if kind == "angular velocity" else "rad/s^2 or deg/s^2"
             raise self.error_at(
                 None,
                 f"a bare rate {self.value} is unclear where the angle unit is {units.angle}; write {rate}, "
                 f"such as {example_quantity(kind)!r}",
             )
-        return number
+        raise self.error_at(
+            None,
+            f"a bare {kind} {self.value} is unclear, as 'units' declares others but none of {kind}; write its unit, "
+            f"as '{self.value} {unit_of_kind(kind, units)[0]}', or declare it",
+        )
 
     def quantity(self, key: str, kind: str, default: float | None = None) -> float:
         if default is not None and not self.has(key):

@@ -26,14 +26,9 @@ from planar.document.loads import write_load, write_mass, write_spring
 from planar.document.reader import read_mechanism
 from planar.document.writer import write_input, write_link, write_mechanism
 from planar.foundation.errors import BadInput, join_names
+from planar.model.file_units import FileUnits
 from planar.model.input_laws import SEGMENT_TYPES
-from planar.model.mechanism import (
-    FileUnits,
-    Mechanism,
-    find_law_problem,
-    pair_entries,
-    relative_motions,
-)
+from planar.model.mechanism import Mechanism, find_law_problem, pair_entries, relative_motions
 from planar.model.pairs import Pair
 
 Address = tuple[str | int, ...]

@@ -6,7 +6,8 @@ from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 from planar.document.cursor import Cursor, suggest_spelling
-from planar.foundation.units import SI_UNITS, parse_unit
+from planar.foundation.units import SI_UNITS
+from planar.model.file_units import FileUnits, display_unit
 from planar.model.input_laws import SEGMENT_TYPES, InputLaw, LawSegment, SegmentKey, TableSegment
 from planar.model.loads import MAX_LAW_ITEMS
 from planar.model.mechanism import LARGEST_INPUT_POSITION, Input
@@ -38,7 +39,7 @@ def write_law(law: InputLaw, kinds: InputKinds, quantity: QuantityWriter) -> lis
     return [{"motion": piece.motion} | dict(_written_values(piece, kinds, quantity)) for piece in law.segments]
 
 
-def speed_jump_remarks(inputs: Iterable[Input], known: Mapping[str, Pair]) -> Iterator[str]:
+def speed_jump_remarks(inputs: Iterable[Input], known: Mapping[str, Pair], units: FileUnits) -> Iterator[str]:
     """What is to be said of each law whose pieces do not go on at the speed at which those before end."""
     for given in inputs:
         if given.law is None:
@@ -53,11 +54,10 @@ def speed_jump_remarks(inputs: Iterable[Input], known: Mapping[str, Pair]) -> It
         ]
         if found:
             (i, joint), *more = found
-            si = SI_UNITS[known[given.pair].input_quantity_kinds()[1]]
+            name, of = display_unit(known[given.pair].input_quantity_kinds()[1], units)
             before = f"piece {i} ends" if i else "the input's velocity is"
-            starts, ends = (
-                f"at {v:.6g} {si}" if v else "at rest" for v in (joint.velocity_after, joint.velocity_before)
-            )
+            speeds = (joint.velocity_after, joint.velocity_before)
+            starts, ends = (f"at {of.from_si(v):.6g} {name}" if v else "at rest" for v in speeds)
             others = f"; so it does at {len(more)} more of its joints" if more else ""
             told = f"{before} {ends if i else ends.removeprefix('at ')}"
             yield f"the law of input {given.pair!r} jumps in speed: piece {i + 1} starts {starts} where {told}{others}"
@@ -106,5 +106,5 @@ def _quantity_kind(key: SegmentKey, kinds: InputKinds) -> str:
 
 
 def _format_value(cursor: Cursor, value: float, kind: str) -> str:
-    units = cursor.context.units._asdict()
-    return f"{parse_unit(units[kind]).from_si(value):.9g} {units[kind]}"
+    name, of = display_unit(kind, cursor.context.units)
+    return f"{of.from_si(value):.9g} {name}"

@@ -22,12 +22,12 @@ from planar.document.schema import (
     SENSE_WORDS,
     UNITS_SCHEMA,
 )
-from planar.foundation.units import UnitError, parse_unit
+from planar.foundation.units import UnitError, example_quantity
+from planar.model.file_units import FileUnits, OtherKind, parse_declared_unit
 from planar.model.link_shapes import Along, At, Distances, Link, Point, PointDefinition, PointPlacementError, link_shape
 from planar.model.mechanism import (
     PUBLISHED_QUANTITIES,
     Drive,
-    FileUnits,
     Input,
     Mechanism,
     PublishedValue,
@@ -73,7 +73,7 @@ def read_mechanism(value: Any) -> Mechanism:
     if any(given.law is not None for given in inputs):
         from planar.document.input_laws import speed_jump_remarks
 
-        driven = replace(driven, remarks=(*bare.remarks, *speed_jump_remarks(inputs, relative_motions(bare))))
+        driven = replace(driven, remarks=(*bare.remarks, *speed_jump_remarks(inputs, relative_motions(bare), units)))
     points = point_aliases(driven)
     return replace(
         driven,
@@ -88,17 +88,15 @@ def _read_units(top: Cursor) -> FileUnits:
         return FileUnits()
     units = top.object_at("units")
     units.check_keys(*UNITS_SCHEMA)
-    found = FileUnits()._asdict()
-    for kind in found:
-        text = units[kind].as_text() if units.has(kind) else found[kind]
+    found = {key: units[key].as_text() for key in UNITS_SCHEMA if units.has(key)}
+    for key, text in found.items():
+        kind = key.replace("_", " ")
         try:
-            fits = parse_unit(text).kind == kind
-        except UnitError:
-            fits = False
-        if not fits:
-            such = {"length": "mm", "angle": "deg"}[kind]
-            raise units.error_at(kind, f"{text!r:.70} is not a unit of {kind}, such as {such!r}")
-        found[kind] = text
+            parse_declared_unit(kind, text)
+        except UnitError as problem:
+            such = example_quantity(kind).partition(" ")[2]
+            more = f"; {problem}" if isinstance(problem, OtherKind) else ""
+            raise units.error_at(key, f"{text!r:.70} is not a unit of {kind}, such as {such!r}{more}") from None
     return FileUnits(**found)
 
 

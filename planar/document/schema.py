@@ -57,6 +57,22 @@ def _vector_schema(kind: str) -> Schema:
 UNITS_SCHEMA: Schema = {
     "length": described(_TEXT, "the unit of bare lengths, as mm; left out: m"),
     "angle": described(_TEXT, "the unit of bare angles, deg or rad; left out: rad"),
+    "velocity": described(_TEXT, "of bare velocities, as in/s; left out, as those below: SI"),
+    "acceleration": described(_TEXT, "of bare accelerations and gravity, as in/s^2"),
+    "jerk": described(_TEXT, "in which jerks are shown, as in/s^3"),
+    "angular_velocity": described(_TEXT, "of bare angular velocities, as rpm or deg/s"),
+    "angular_acceleration": described(_TEXT, "of bare angular accelerations, as deg/s^2"),
+    "angular_jerk": described(_TEXT, "in which angular jerks are shown, as rad/s^3"),
+    "force": described(_TEXT, "of bare forces, as lbf or kN"),
+    "torque": described(_TEXT, "of bare torques and couples, as lbf in or N mm"),
+    "mass": described(_TEXT, "of bare masses, as lb, slug or g"),
+    "moment_of_inertia": described(_TEXT, "of bare moments of inertia, as lb in^2"),
+    "stiffness": described(_TEXT, "of bare stiffnesses of springs, as lbf/in or N/mm"),
+    "torsional_stiffness": described(_TEXT, "of bare stiffnesses of torsional springs, as lbf in/rad"),
+    "damping": described(_TEXT, "of bare dampings, as lbf s/in"),
+    "torsional_damping": described(_TEXT, "of bare dampings of torsional springs, as lbf in s/rad"),
+    "power": described(_TEXT, "in which powers are shown, as hp or kW"),
+    "energy": described(_TEXT, "in which energies are shown, as ft lbf or J"),
 }
 ALONG_SCHEMA: Schema = {
     "along": described(
@@ -124,13 +140,13 @@ PIN_POINT_NOTE: Schema = {
 """Of the name of a point where something acts."""
 FORCE_SCHEMA: Schema = {
     "point": _TEXT | PIN_POINT_NOTE,
-    "force": described(_vector_schema("quantity"), "its x and y parts, in N unless a unit is written"),
+    "force": described(_vector_schema("quantity"), "its x and y parts, in the declared unit or N"),
     "axes": described(_TEXT, "the link in whose axes the force is given, and turns; left out: the frame"),
     "varies": _VARIES,
 }
 TORQUE_SCHEMA: Schema = {
     "link": described(_TEXT, "the link on which the torque acts"),
-    "torque": described(schema_reference("quantity"), "the torque, anticlockwise, in N m unless a unit is written"),
+    "torque": described(schema_reference("quantity"), "the torque, anticlockwise, in the declared unit or N m"),
     "varies": _VARIES,
 }
 EFFORT_SCHEMA: Schema = {
@@ -141,25 +157,23 @@ EFFORT_SCHEMA: Schema = {
 }
 SPRING_SCHEMA: Schema = {
     "points": list_schema("text", 2, 2) | {"uniqueItems": True} | PIN_POINT_NOTE,
-    "stiffness": described(schema_reference("amount"), "force by length, in N/m unless a unit is written"),
+    "stiffness": described(schema_reference("amount"), "force by length, in the declared unit or N/m"),
     "free_length": described(schema_reference("amount"), "its length when nothing pulls; left out: 0"),
-    "damping": described(schema_reference("amount"), "force by speed of its length, in N s/m unless a unit is written"),
+    "damping": described(schema_reference("amount"), "force by speed of its length, in the declared unit or N s/m"),
 }
 TORSION_SPRING_SCHEMA: Schema = {
     "links": described(list_schema("name", 2, 2) | {"uniqueItems": True}, "the links between which it turns"),
-    "stiffness": described(schema_reference("amount"), "torque by angle, in N m/rad unless a unit is written"),
+    "stiffness": described(schema_reference("amount"), "torque by angle, in the declared unit or N m/rad"),
     "free_angle": described(
         schema_reference("angle"), "the angle of the second link against the first at rest; left out: 0"
     ),
-    "damping": described(schema_reference("amount"), "torque by angular speed, in N m s/rad unless a unit is written"),
+    "damping": described(schema_reference("amount"), "torque by angular speed, in the declared unit or N m s/rad"),
 }
 MASS_SCHEMA: Schema = {
     "link": described(_TEXT, "the link that it belongs to; several on a link add up"),
-    "mass": described(schema_reference("amount"), "the mass, in kg unless a unit is written"),
+    "mass": described(schema_reference("amount"), "the mass, in the declared unit or kg"),
     "at": described(schema_reference("spot"), "its centre: a point of the link, or [x, y] in the link's axes"),
-    "inertia": described(
-        schema_reference("amount"), "about that centre, in kg m^2 unless a unit is written; left out: 0"
-    ),
+    "inertia": described(schema_reference("amount"), "about that centre, in the declared unit or kg m^2; left out: 0"),
 }
 PUBLISHED_SCHEMA: Schema = {
     "symbol": described(_TEXT, "how the book writes it, as v_C"),
@@ -223,7 +237,9 @@ FILE_SCHEMA: Schema = {
     "masses": described(
         {"type": "array", "items": _object_schema(MASS_SCHEMA, "link", "mass", "at")}, "the masses of its links"
     ),
-    "gravity": described(_vector_schema("quantity"), "the acceleration of weights, as [0, -9.81], in m/s^2"),
+    "gravity": described(
+        _vector_schema("quantity"), "the acceleration of weights, as [0, -9.81], in the declared unit or m/s^2"
+    ),
     "sketch": described(
         {"type": "object", "additionalProperties": _vector_schema("length")},
         "roughly where some points are, in the frame's axes: the assembly nearest to them is taken",

@@ -9,6 +9,7 @@ from planar.document.input_laws import write_law
 from planar.document.loads import write_loads
 from planar.document.schema import DRIVE_SCHEMA, FORMAT_VERSION
 from planar.foundation.units import SI_UNITS, Unit, parse_unit, shortest_number
+from planar.model.file_units import FileUnits, is_metric, takes_bare_number, unit_of_kind
 from planar.model.link_shapes import Along, At, Link, PointDefinition
 from planar.model.mechanism import (
     PUBLISHED_QUANTITIES,
@@ -33,7 +34,7 @@ def write_mechanism(mechanism: Mechanism) -> dict[str, Any]:
         geometry=mechanism.geometry,
         notes=list(mechanism.notes),
     )
-    value["units"] = {"length": mechanism.units.length, "angle": mechanism.units.angle}
+    value["units"] = {key: unit for key, unit in mechanism.units._asdict().items() if unit}
     value["frame"] = mechanism.frame
     value["links"] = {link.name: write_link(link, quantity) for link in mechanism.links}
     value["pairs"] = [type(group[0]).write(group, quantity) for group in pair_entries(mechanism)]
@@ -47,19 +48,29 @@ def write_mechanism(mechanism: Mechanism) -> dict[str, Any]:
 
 
 def _quantity_writer(mechanism: Mechanism) -> QuantityWriter:
-    declared = {"length": parse_unit(mechanism.units.length), "angle": parse_unit(mechanism.units.angle)}
+    units = mechanism.units
 
     def quantity(value: float, kind: str) -> float | str:
         value = float(value)  # a number of numpy would write its type
         if kind == "count":
             return int(value)
-        if kind in declared:
-            return shortest_number(value, declared[kind])
-        if kind.startswith("angular") and value != 0.0:
-            return f"{value!r} {SI_UNITS[kind]}"  # a bare rate is refused where angles are in degrees
+        if units.declared(kind):
+            return shortest_number(value, unit_of_kind(kind, units)[1])
+        if value != 0.0 and (kind.startswith("angular") or not takes_bare_number(kind, units)):
+            return _quantity_text(value, kind, units)
         return shortest_number(value, Unit(kind, 1.0, 1.0))
 
     return quantity
+
+
+def _quantity_text(value: float, kind: str, units: FileUnits) -> str:
+    """A quantity (SI) as a text in SI, or where that is not metric in the unit in which it is shown."""
+    name, of = unit_of_kind(kind, units)
+    if not is_metric(of):
+        number = shortest_number(value, parse_unit(name))
+        if not isinstance(number, str):
+            return f"{number!r} {name}"
+    return f"{value!r} {SI_UNITS[kind]}"
 
 
 def _nonempty_fields(**fields: Any) -> dict[str, Any]:
@@ -121,7 +132,8 @@ def _write_drives(mechanism: Mechanism, drives: tuple[Drive, ...], quantity: Qua
 
 
 def _write_published(item: PublishedValue, mechanism: Mechanism, quantity: QuantityWriter) -> dict[str, Any]:
-    value = None if item.value is None else f"{float(item.value)!r} {SI_UNITS[PUBLISHED_QUANTITIES[item.quantity]]}"
+    kind = PUBLISHED_QUANTITIES[item.quantity]
+    value = None if item.value is None else _quantity_text(float(item.value), kind, mechanism.units)
     return {"symbol": item.symbol, "quantity": item.quantity, "of": item.of, "value": value} | _nonempty_fields(
         tolerance=item.tolerance,
         relative_to=item.relative_to,

@@ -8,6 +8,7 @@ from math import isfinite
 
 from planar.dynamics.load_attachment import attachments
 from planar.foundation.errors import BadInput
+from planar.foundation.units import SI_UNITS
 from planar.model.loads import Load, Mass, Spring
 from planar.model.mechanism import Mechanism, named_points, relative_motions
 
@@ -44,9 +45,12 @@ def _explain_loads(mechanism: Mechanism) -> str:
     load = {"point": moving[-1], "force": [-100, 0]} if moving else {"link": links[-1], "torque": 10} if links else {}
     mass = {"link": links[-1], "mass": 2, "at": [0, 0]} if links else {}
     example = json.dumps({"loads": [load], "masses": [mass]}, ensure_ascii=False)[1:-1] if links else '"loads": []'
+    newton, moment, mass_unit = (
+        mechanism.units.declared(kind) or SI_UNITS[kind] for kind in ("force", "torque", "mass")
+    )
     return (
-        "the mechanism has no loads, springs or masses; write forces (N) at points or torques (N m) on links, "
-        f"and masses (kg), as {example} in its file"
+        f"the mechanism has no loads, springs or masses; write forces ({newton}) at points or torques ({moment}) on "
+        f"links, and masses ({mass_unit}), as {example} in its file"
     )
 
 

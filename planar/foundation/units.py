@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from functools import cache
-from math import isfinite, log10, pi
+from math import isfinite, pi
 from typing import TYPE_CHECKING, Any, NamedTuple, overload
 
 if TYPE_CHECKING:
@@ -33,9 +33,14 @@ SI_UNITS = {
     "torsional stiffness": "N m/rad",
     "damping": "N s/m",
     "torsional damping": "N m s/rad",
+    "power": "W",
 }
-"""Every kind of quantity that a file holds, and its SI unit."""
+"""Every kind of quantity that units tell from others, and its SI unit."""
 
+POUND = 0.45359237
+"""kg of a pound, exactly."""
+POUND_FORCE = POUND * 9.80665
+"""N of the weight of a pound in standard gravity, exactly."""
 UNIT_TABLE: dict[str, tuple[str, float, float]] = {
     "m": ("length", 1.0, 1.0),
     "mm": ("length", 1.0, 1e3),
@@ -72,11 +77,33 @@ UNIT_TABLE: dict[str, tuple[str, float, float]] = {
     "N m/rad": ("torsional stiffness", 1.0, 1.0),
     "N s/m": ("damping", 1.0, 1.0),
     "N m s/rad": ("torsional damping", 1.0, 1.0),
+    "W": ("power", 1.0, 1.0),
+    "kW": ("power", 1e3, 1.0),
+    "lbf": ("force", POUND_FORCE, 1.0),
+    "lbf in": ("torque", POUND_FORCE * 0.0254, 1.0),
+    "lbf ft": ("torque", POUND_FORCE * 0.3048, 1.0),
+    "in lbf": ("torque", POUND_FORCE * 0.0254, 1.0),
+    "ft lbf": ("torque", POUND_FORCE * 0.3048, 1.0),
+    "lb": ("mass", POUND, 1.0),
+    "slug": ("mass", POUND_FORCE, 0.3048),
+    "lb in^2": ("moment of inertia", POUND * 0.0254**2, 1.0),
+    "lb ft^2": ("moment of inertia", POUND * 0.3048**2, 1.0),
+    "slug ft^2": ("moment of inertia", POUND_FORCE * 0.3048, 1.0),
+    "lbf in s^2": ("moment of inertia", POUND_FORCE * 0.0254, 1.0),
+    "lbf/in": ("stiffness", POUND_FORCE, 0.0254),
+    "lbf/ft": ("stiffness", POUND_FORCE, 0.3048),
+    "lbf in/rad": ("torsional stiffness", POUND_FORCE * 0.0254, 1.0),
+    "lbf ft/rad": ("torsional stiffness", POUND_FORCE * 0.3048, 1.0),
+    "lbf s/in": ("damping", POUND_FORCE, 0.0254),
+    "lbf s/ft": ("damping", POUND_FORCE, 0.3048),
+    "lbf in s/rad": ("torsional damping", POUND_FORCE * 0.0254, 1.0),
+    "lbf ft s/rad": ("torsional damping", POUND_FORCE * 0.3048, 1.0),
+    "lbf in/s": ("power", POUND_FORCE * 0.0254, 1.0),
+    "lbf ft/s": ("power", POUND_FORCE * 0.3048, 1.0),
+    "ft lbf/s": ("power", POUND_FORCE * 0.3048, 1.0),
+    "hp": ("power", 550.0 * POUND_FORCE * 0.3048, 1.0),
 }
 """unit: (kind, numerator, denominator) of its size in SI."""
-
-_LENGTH_RATE_SUFFIXES = {"velocity": "/s", "acceleration": "/s^2", "jerk": "/s^3"}
-"""Kinds of quantities that are lengths by time, and what stands behind the unit of length."""
 
 MAX_QUANTITY_LENGTH = 64
 """Characters of a quantity; the longest that `shortest_number` writes takes 33."""
@@ -99,6 +126,8 @@ _UNIT_WORDS = {
     "kgm": "kg m",
     "kgmm": "kg mm",
     "Ns": "N s",
+    "lbs": "lb",
+    "lbm": "lb",
 }
 """Words that people write for units, each as it is looked up."""
 _AMBIGUOUS_RATES = frozenset({"1/s", "/s", "s^-1", "1/sec", "/sec", "1/min", "/min", "min^-1"})
@@ -145,14 +174,7 @@ def parse_unit(text: str) -> Unit:
     """The unit that a text names. Raises UnitError."""
     if len(text) > MAX_QUANTITY_LENGTH:
         raise UnitError(f"a unit takes at most {MAX_QUANTITY_LENGTH} characters, not {len(text)}")
-    spelled = re.sub(r"\s+", " ", text.strip().translate(_SPELLINGS).replace("^-^", "^-").replace("**", "^"))
-    spelled = re.sub(r"(?<=[A-Za-z])\^-(?=\^?[0-9])", "^-", spelled)
-    if spelled in UNIT_TABLE:
-        return Unit(*UNIT_TABLE[spelled])
-    if spelled == "r/min":
-        spelled = "rpm"
-    spelled = re.sub(r"(?<=[A-Za-z])[.-](?=[A-Za-z])", " ", spelled).rstrip(".")
-    spelled = re.sub(r"[A-Za-z]+", lambda word: _UNIT_WORDS.get(word[0], word[0]), spelled)
+    spelled = spell_unit(text)
     if spelled in UNIT_TABLE:
         return Unit(*UNIT_TABLE[spelled])
     if not _UNIT_PATTERN.fullmatch(spelled):
@@ -164,6 +186,19 @@ def parse_unit(text: str) -> Unit:
         if meant is None:
             raise
         return meant
+
+
+def spell_unit(text: str) -> str:
+    """A unit as it is looked up: lbf*in, lbf·in and lbf-in as `lbf in`, m/s² as `m/s^2`."""
+    spelled = re.sub(r"\s+", " ", text.strip().translate(_SPELLINGS).replace("^-^", "^-").replace("**", "^"))
+    spelled = re.sub(r"(?<=[A-Za-z])\^-(?=\^?[0-9])", "^-", spelled)
+    if spelled in UNIT_TABLE:
+        return spelled
+    if spelled == "r/min":
+        return "rpm"
+    spelled = re.sub(r"(?<=[A-Za-z])[.-](?=[A-Za-z])", " ", spelled).rstrip(".")
+    spelled = re.sub(r"[A-Za-z]+", lambda word: _UNIT_WORDS.get(word[0], word[0]), spelled)
+    return re.sub(r"(?<=[A-Za-z0-9]) ?[*·] ?(?=[A-Za-z])", " ", spelled)
 
 
 def _unit_ignoring_case(spelled: str) -> Unit | None:
@@ -183,42 +218,6 @@ def _unit_ignoring_case(spelled: str) -> Unit | None:
 
 def _ambiguous_rate_error(spelled: str) -> UnitError:
     return UnitError(f"{spelled!r} leaves open whether turns or radians are meant; write rad/s, deg/s or rpm")
-
-
-def display_unit(kind: str, declared: tuple[str, str]) -> tuple[str, Unit]:
-    """The unit in which a kind of quantity is shown, and its name as it is printed (see `own`)."""
-    name, of = unit_of_kind(kind, declared)
-    return format_unit(name), of
-
-
-def unit_of_kind(kind: str, declared: tuple[str, str]) -> tuple[str, Unit]:
-    """The unit of a kind of quantity that goes with the length and the angle that a file declares, and its name.
-
-    Lengths and angles are in the file's own. Velocities, accelerations and jerks are in metres by seconds where
-    the length is metric, as textbooks have them beside millimetres, and else in the file's own length by seconds:
-    in/s beside in. Everything else is in SI.
-    """
-    length, angle = declared
-    theirs = {"length": length, "angle": angle}
-    if kind in theirs:
-        return theirs[kind], parse_unit(theirs[kind])
-    if kind in _LENGTH_RATE_SUFFIXES:
-        name, (_, numerator, denominator) = length_unit_of_rates(length)
-        return name + _LENGTH_RATE_SUFFIXES[kind], Unit(kind, numerator, denominator)
-    return SI_UNITS[kind], Unit(kind, 1.0, 1.0)
-
-
-def length_unit_of_rates(length: str) -> tuple[str, Unit]:
-    """The unit of length in which rates are shown: the metre where the declared one is metric, else that one."""
-    return coherent_unit(length)
-
-
-def coherent_unit(text: str) -> tuple[str, Unit]:
-    """The SI unit of what a unit measures where it is a tenth, a thousand, ... of that, else the unit itself."""
-    own = parse_unit(text)
-    power = log10(own.numerator / own.denominator)
-    metric = abs(power - round(power)) < 1e-9
-    return (SI_UNITS[own.kind], Unit(own.kind, 1.0, 1.0)) if metric else (text, own)
 
 
 def format_unit(name: str) -> str:
@@ -255,7 +254,8 @@ def parse_quantity(text: str, kind: str) -> float:
 
 def example_quantity(kind: str) -> str:
     """A text that is a quantity of this kind."""
-    return {"angular velocity": "10.5 rad/s", "length": "50 mm", "angle": "60 deg"}.get(kind, f"2.5 {SI_UNITS[kind]}")
+    known = {"angular velocity": "10.5 rad/s", "length": "50 mm", "angle": "60 deg", "energy": "2.5 J"}
+    return known.get(kind) or f"2.5 {SI_UNITS[kind]}"
 
 
 def _offered(written: str, kind: str) -> str:

@@ -13,6 +13,7 @@ from planar.foundation.errors import BadInput, first_unprintable, join_names
 from planar.foundation.notebook_display import Displayable
 from planar.foundation.revision import Revisable
 from planar.foundation.units import parse_unit
+from planar.model.file_units import FileUnits
 from planar.model.link_shapes import Along, At, Distances, Link, LinkShape, Point, PointDefinition
 from planar.model.loads import Course, Load, Mass, Spring
 from planar.model.pairs.base import Pair
@@ -27,7 +28,6 @@ __all__ = [
     "Course",
     "Distances",
     "Drive",
-    "FileUnits",
     "Input",
     "Link",
     "Load",
@@ -124,13 +124,6 @@ class PublishedValue(NamedTuple):
     slip: str | None = None
     inputs: tuple[Drive, ...] = ()
     start: tuple[Drive, ...] = ()
-
-
-class FileUnits(NamedTuple):
-    """The units in which a mechanism's file is written and its positions are printed."""
-
-    length: str = "m"
-    angle: str = "rad"
 
 
 @dataclass(frozen=True)

@@ -13,8 +13,9 @@ import numpy as np
 
 from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput
+from planar.model.file_units import FileUnits
 from planar.model.link_shapes import At, Link, Point
-from planar.model.mechanism import LARGEST_INPUT_POSITION, FileUnits, Input, Mechanism
+from planar.model.mechanism import LARGEST_INPUT_POSITION, Input, Mechanism
 from planar.model.pairs import MeasureKind, Pair, pair_types
 
 FRAME_NAME = "frame"

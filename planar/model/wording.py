@@ -7,8 +7,7 @@ from math import atan2, hypot, pi
 
 from planar.foundation.arrays import Array
 from planar.foundation.errors import join_names as several
-from planar.foundation.units import parse_unit
-from planar.model.mechanism import FileUnits
+from planar.model.file_units import FileUnits, display_unit
 
 REST_TOLERANCE = 1e-12
 """A rate below this part of the greatest of its kind is at rest: what rounding leaves of none."""
@@ -17,9 +16,9 @@ STEADY_TOLERANCE = 1e-9
 
 
 def amount(value: float, kind: str, units: FileUnits) -> str:
-    """A length or an angle in the units of a mechanism's file, with its unit."""
-    name = units.length if kind == "length" else units.angle
-    return f"{parse_unit(name).from_si(value):.6g} {name}"
+    """A quantity (SI) in the unit in which its kind is shown beside those of a mechanism's file, with that unit."""
+    name, of = display_unit(kind, units)
+    return f"{of.from_si(value):.6g} {name}"
 
 
 def turning_sense(rate: float, scale: float = 0.0) -> str:

@@ -6,14 +6,11 @@ from collections.abc import Iterable, Iterator, Mapping
 from typing import NamedTuple
 
 from planar.foundation.arrays import Array
-from planar.foundation.units import SI_UNITS, unit_of_kind
+from planar.model.file_units import unit_of_kind
 from planar.results.motion import Motion
 
 POINT_KINDS = {"position": "length", "velocity": "velocity", "acceleration": "acceleration", "jerk": "jerk"}
 """What is reported of a point, and the kind of quantity that each is; a jerk where the run has one."""
-
-UNITS_BY_KIND = SI_UNITS | {"power": "W", "energy": "J"}
-"""The unit of every kind of quantity that results have."""
 
 _VECTOR_LETTERS = {"position": "", "velocity": "v", "acceleration": "a", "jerk": "j", "force": "F"}
 
@@ -73,7 +70,7 @@ def reported_series(motion: Motion) -> Iterator[ReportedSeries]:
 def run_columns(motion: Motion, more: Iterable[ReportedSeries] = ()) -> Iterator[RunColumn]:
     """Time where there is one, all that is told of the run but the frame's rest, then more; under names that differ.
 
-    Units are those that go with the mechanism's file (see `planar.foundation.units.own`).
+    Units are those that go with the mechanism's file (see `planar.model.file_units.unit_of_kind`).
     """
     taken: set[str] = set()
     for name, kind, values in _named_values(motion, more):
@@ -82,11 +79,8 @@ def run_columns(motion: Motion, more: Iterable[ReportedSeries] = ()) -> Iterator
             again += 1
             different = f"{name} ({again})"
         taken.add(different)
-        if kind in SI_UNITS:
-            measure, (_, numerator, denominator) = unit_of_kind(kind, motion.mechanism.units)
-            yield RunColumn(different, measure, kind, values * denominator / numerator)
-        else:
-            yield RunColumn(different, UNITS_BY_KIND[kind], kind, values)
+        measure, of = unit_of_kind(kind, motion.mechanism.units)
+        yield RunColumn(different, measure, kind, of.from_si(values))
 
 
 def _named_values(motion: Motion, more: Iterable[ReportedSeries]) -> Iterator[tuple[str, str, Array]]:

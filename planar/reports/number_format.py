@@ -8,8 +8,8 @@ import numpy as np
 from rich.table import Table
 from rich.text import Text
 
-from planar.foundation.units import Unit, display_unit, parse_unit
-from planar.model.mechanism import FileUnits
+from planar.foundation.units import Unit, parse_unit
+from planar.model.file_units import FileUnits, display_unit
 
 DIGITS = 6
 """Significant digits printed; `--json` has all of them."""
@@ -67,6 +67,12 @@ def precision_text(value: float, reference: str = "") -> str:
 
 def format_number(value: float) -> str:
     return "0" if abs(value) < 1e-14 else f"{value:#.{DIGITS}g}".rstrip(".")
+
+
+def format_quantity(value: float | None, kind: str, units: FileUnits, beside: float = 0.0) -> str:
+    """A quantity (SI) as a number of the unit in which its kind is shown (see `format_or_zero`)."""
+    of = display_unit(kind, units)[1]
+    return format_or_zero(None if value is None else of.from_si(value), of.from_si(beside))
 
 
 def format_or_zero(value: float | None, beside: float = 0.0) -> str:

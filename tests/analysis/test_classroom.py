@@ -9,7 +9,7 @@ from planar.analysis.classroom.marking import mark_answers
 from planar.analysis.classroom.questions import problem_questions, question_text, solve_question
 from planar.document.dimensions import file_dimensions
 from planar.foundation.errors import BadInput
-from planar.foundation.units import unit_of_kind
+from planar.model.file_units import unit_of_kind
 from tests import command
 
 PROBLEMS = ("four-bar", "slider-crank", "whitworth", "toggle-press", "watt-six-bar")
@@ -133,3 +133,7 @@ def test_the_commands_write_sheets_and_print_marks(tmp_path, handed_in):
     (marks,) = json.loads(command.run(tmp_path, "mark", "slider-crank", str(path), "--json").done())
     assert marks["right"] == 1
     assert "pdf" in command.run(tmp_path, *words, "-o", "sheet.txt").refused(2)
+
+
+def test_a_problem_is_set_of_a_mechanism_that_has_numbers_without_a_unit(tmp_path):
+    assert "variant" in command.run(tmp_path, "problem", "two-stroke-engine", "--vary", "1").done()

@@ -16,9 +16,10 @@ import planar
 from planar.document.files import load_models
 from planar.foundation.errors import BadInput
 from planar.foundation.geometry import GROUND, frame_at
+from planar.model.file_units import FileUnits
 from planar.model.link_shapes import Along, At, Distances, Link, Point, link_shape
 from planar.model.loads import Course, Load, Mass, Spring
-from planar.model.mechanism import FileUnits, Input, Mechanism, PublishedValue, named_points, relative_motions
+from planar.model.mechanism import Input, Mechanism, PublishedValue, named_points, relative_motions
 from planar.model.pairs.guide_line import LinkLine
 from tests.documents import EXAMPLES, FOUR_BAR, LOADED, MISTAKES, SLIDER_CRANK, base, mistaken, put, read, refused
 from tests.draws import draws

@@ -14,8 +14,8 @@ import planar
 from planar.dynamics.load_attachment import attachment_remarks, attachments
 from planar.dynamics.load_variation import interpolate_factor
 from planar.foundation.errors import BadInput
+from planar.model.file_units import FileUnits
 from planar.model.loads import Course, Load, Mass, Spring
-from planar.model.mechanism import FileUnits
 from tests.command import run
 
 Value = dict[str, Any]

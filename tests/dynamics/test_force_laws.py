@@ -15,8 +15,9 @@ import planar
 from planar.dynamics.forces import Forces
 from planar.dynamics.virtual_velocities import has_length_motion
 from planar.foundation.errors import NoAnswer
+from planar.model.file_units import FileUnits
 from planar.model.loads import Load, Mass, Spring
-from planar.model.mechanism import FileUnits, Mechanism, named_points
+from planar.model.mechanism import Mechanism, named_points
 from planar.model.pairs import pair_types
 from planar.results.motion import State
 from planar.solving.position import PositionSolver, solve

@@ -18,12 +18,10 @@ from planar.foundation.units import (
     UNIT_TABLE,
     Unit,
     UnitError,
-    display_unit,
     example_quantity,
     parse_quantity,
     parse_unit,
     shortest_number,
-    unit_of_kind,
 )
 from tests.watchdog import watched
 
@@ -410,29 +408,3 @@ def test_shortest_writes_numbers_of_numpy_as_numbers() -> None:
 def test_from_si_undoes_to_si(spelled: str, value: float) -> None:
     of = parse_unit(spelled)
     assert of.from_si(of.to_si(value)) == pytest.approx(value, rel=ULPS)
-
-
-# the units in which results are shown
-
-
-@pytest.mark.parametrize(
-    ("length", "rates"),
-    [("m", "m"), ("mm", "m"), ("cm", "m"), ("km", "m"), ("dm", "m"), ("in", "in"), ("ft", "ft"), ("yd", "yd")],
-)
-def test_rates_are_in_metres_beside_metric_lengths_and_else_in_the_files_own(length: str, rates: str) -> None:
-    declared = (length, "deg")
-    size = 1.0 if rates == "m" else parse_quantity(f"1 {length}", "length")
-    for kind, behind in (("velocity", "/s"), ("acceleration", "/s^2"), ("jerk", "/s^3")):
-        name, of = unit_of_kind(kind, declared)
-        assert (name, of.kind) == (rates + behind, kind)
-        assert of.to_si(3.0) == pytest.approx(3.0 * size, rel=ULPS)
-        if kind != "jerk":
-            assert parse_unit(name).to_si(3.0) == pytest.approx(of.to_si(3.0), rel=ULPS)
-    assert display_unit("acceleration", declared)[0] == f"{rates}/s²"
-    assert unit_of_kind("length", declared) == (length, parse_unit(length))
-    assert unit_of_kind("angle", declared) == ("deg", parse_unit("deg"))
-    assert [unit_of_kind(kind, declared)[0] for kind in ("angular velocity", "force", "torque")] == [
-        "rad/s",
-        "N",
-        "N m",
-    ]

@@ -10,6 +10,7 @@ from scipy.optimize import brentq
 
 import planar
 from planar.foundation.errors import Outcome
+from planar.foundation.units import parse_quantity
 from planar.model.link_graph import link_pair_graph
 from tests.closed_forms import between, meeting, piston
 from tests.known import loop_sizes, state_turned_by
@@ -483,3 +484,34 @@ def test_watt_1_and_stephenson_1_fall_into_two_dyads(degrees):
     c = 0.090 * crank * np.exp(1j * np.radians(40))
     assert place(stephenson, "B") == pytest.approx(b, abs=1e-13)
     assert place(stephenson, "E") == pytest.approx(meeting(c, 0.240, d, 0.220), abs=1e-13)
+
+
+# In inches and pounds
+
+
+def test_the_pump_jack_lifts_its_rods_by_the_arc_of_its_horsehead():
+    """Its beam turns between where crank and pitman are in line; 54 in the unit's name is its stroke, roughly."""
+    post = np.hypot(64, 75)
+    far, near = (np.arccos((64**2 + post**2 - d**2) / (2 * 64 * post)) for d in (74.5 + 24, 74.5 - 24))
+    stroke = planar.stroke(planar.cycle("pump-jack", 72), "lift").length / 0.0254
+    assert stroke == pytest.approx(72 * (far - near), rel=1e-9)
+    assert stroke == pytest.approx(54, rel=0.03)
+    # the torque that 5000 lbf ask for is their lever, by power; the counterweight of 3000 lb hangs 43 in from the shaft
+    state = planar.solve("pump-jack")
+    lever = -5000 * state.pair("lift")["velocity"] / state.link("crank").angular_velocity / 0.0254
+    weight = 3000 * 43 * np.cos(np.radians(60))
+    torque = planar.forces(state).inputs["O"] / parse_quantity("1 lbf*in", "torque")
+    assert torque == pytest.approx(weight - lever, rel=1e-5)
+
+
+def test_the_engine_in_inches_has_its_mean_piston_speed_and_inertia_in_pounds():
+    """3000 rpm with a stroke of 4 in are 2000 ft/min; at TDC the piston's acceleration is r w^2 (1 + r/l)."""
+    motion = planar.cycle("engine-in-inches", 360)
+    angle, speed = motion.inputs["O"].position, np.abs(motion.pair("stroke")["velocity"])
+    mean = np.trapezoid(speed, angle) / (2 * np.pi)
+    assert mean == pytest.approx(parse_quantity("2000 ft/min", "velocity"), rel=1e-4)
+    top = planar.solve("engine-in-inches", {"O": np.pi / 2})
+    acceleration = 2 * (3000 * np.pi / 30) ** 2 * (1 + 2 / 8)
+    assert -top.pair("stroke")["acceleration"] / 0.0254 == pytest.approx(acceleration, rel=1e-12)
+    inertia = next(each for each in planar.forces(top).acting if each.name == "inertia of block B")
+    assert inertia.force[1] / parse_quantity("1 lbf", "force") == pytest.approx(2 * acceleration / 386.0886, rel=1e-6)

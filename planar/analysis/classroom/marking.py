@@ -11,7 +11,8 @@ from planar.analysis.classroom.variants import Variant, problem_variants
 from planar.document.answer_lists import AnswerList, HandedInValue, read_answers
 from planar.document.first_argument import takes_mechanism
 from planar.foundation.errors import BadInput
-from planar.foundation.units import SI_UNITS, UnitError, parse_unit
+from planar.foundation.units import UnitError, parse_unit
+from planar.model.file_units import unit_of_kind
 from planar.model.mechanism import PUBLISHED_QUANTITIES, Mechanism, PublishedValue
 from planar.solving.position import solve
 
@@ -53,10 +54,9 @@ def mark_answers(
     """The marks of all students, in the order in which they are first named.
 
     `answers` is a CSV file: `seed 7`, the seed of `problem_variants`, in its first line, then the columns student,
-    variant, quantity (as `velocity of C`), value and unit. A value is right within `tolerance` of the solved one's
-    size: of vectors the size, of angular rates anticlockwise above zero. A question that stands twice counts as it
-    stands last. Raises BadInput with the line of what cannot be
-    read.
+    variant, quantity (as `velocity of C`), value and unit; without one the value is in that of the sheet. It is right
+    within `tolerance` of the solved one's size: of vectors the size, of angular rates anticlockwise above zero. A
+    question that stands twice counts as it stands last. Raises BadInput with the line of what cannot be read.
     """
     if not isinstance(answers, AnswerList):
         answers = read_answers(Path(answers))
@@ -77,16 +77,17 @@ def mark_answers(
 def _mark_value(
     value: HandedInValue, variants: Mapping[int, Variant], questions: tuple[PublishedValue, ...], tolerance: float
 ) -> MarkedValue:
+    state = variants[value.variant].state
     try:
         question = read_question(value.quantity, questions)
     except BadInput as problem:
         raise BadInput(value.place, str(problem)) from None
-    solved = solve_question(variants[value.variant].state, question).solved
+    solved = solve_question(state, question).solved
     if value.number is None:
         return MarkedValue(question, None, solved, NO_NUMBER)
     kind = PUBLISHED_QUANTITIES[question.quantity]
     try:
-        unit = parse_unit(value.unit) if value.unit else parse_unit(SI_UNITS[kind])
+        unit = parse_unit(value.unit) if value.unit else unit_of_kind(kind, state.mechanism.units)[1]
     except UnitError as problem:
         raise BadInput(value.place, str(problem)) from None
     if unit.kind != kind:

@@ -12,8 +12,9 @@ import numpy as np
 from planar.document.dimensions import Dimension, file_dimensions, with_values
 from planar.document.first_argument import takes_mechanism
 from planar.foundation.errors import BadInput, NoAnswer
-from planar.foundation.units import parse_unit, unit_of_kind
-from planar.model.mechanism import FileUnits, Mechanism
+from planar.foundation.units import parse_unit
+from planar.model.file_units import FileUnits, unit_of_kind
+from planar.model.mechanism import Mechanism
 from planar.results.motion import State
 from planar.solving.position import solve
 

@@ -17,7 +17,8 @@ from planar.equations.mechanism_numbers import mechanism_size, shapes_of_links
 from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput, NoAnswer, Outcome, PlanarError
 from planar.foundation.short_repr import short_repr
-from planar.foundation.units import SI_UNITS, display_unit
+from planar.foundation.units import SI_UNITS
+from planar.model.file_units import RESULT_SI_UNITS, display_unit, is_customary
 from planar.model.link_graph import link_numbers, pair_labels_by_type, unconnected_links
 from planar.model.mechanism import Input, Mechanism, pair_entries
 from planar.model.pairs import MeasureKind
@@ -57,7 +58,8 @@ class Inspection:
 
     `pairs`: of every type the pairs by the numbers of their links, as ("turning", ("O-1", "1-2")); `lower` and `higher`
     how many; `is_mechanism` and `is_linkage` with the reasons. `actions` are its loads, springs and masses; `remarks`
-    say of which of them another link might have been meant. `dimensions` are all numbers of its file, by name.
+    say of which of them another link might have been meant. `dimensions` are all numbers of its file, by name, `units`
+    the unit in which each kind of quantity is shown, where the file asks for other than metres, newtons and the like.
     """
 
     name: str
@@ -77,6 +79,7 @@ class Inspection:
     actions: tuple[ActionDescription, ...]
     remarks: tuple[str, ...]
     dimensions: dict[str, NumberDescription]
+    units: dict[str, str]
 
     __repr__ = short_repr
 
@@ -125,7 +128,16 @@ def inspect(mechanism: Mechanism) -> Inspection:
         actions=describe_actions(mechanism),
         remarks=attachment_remarks(mechanism),
         dimensions={name: _describe_number(mechanism, each) for name, each in file_dimensions(mechanism).items()},
+        units=_shown_units(mechanism),
     )
+
+
+def _shown_units(mechanism: Mechanism) -> dict[str, str]:
+    """The unit of every kind of quantity, where the file asks for others than metric files have."""
+    units = mechanism.units
+    if not units.declares_more and not is_customary(units.length):
+        return {}
+    return {kind: display_unit(kind, units)[0] for kind in RESULT_SI_UNITS if kind != "time"}
 
 
 def _describe_number(mechanism: Mechanism, number: Dimension) -> NumberDescription:

@@ -30,7 +30,8 @@ def describe_actions(mechanism: Mechanism) -> tuple[ActionDescription, ...]:
     found += [_describe_mass(mechanism, mass) for mass in mechanism.masses]
     if any(mechanism.gravity):
         weighed = tuple(dict.fromkeys(mass.link for mass in mechanism.masses))
-        found.append(ActionDescription("gravity", "", weighed, _describe_vector(mechanism, mechanism.gravity, "m/s²")))
+        told = _describe_vector(mechanism, mechanism.gravity, "acceleration")
+        found.append(ActionDescription("gravity", "", weighed, told))
     return tuple(found)
 
 
@@ -39,28 +40,32 @@ def _describe_load(mechanism: Mechanism, load: Load) -> ActionDescription:
     if load.point is not None and load.force is not None:
         link = attachments(mechanism)[load.point].link
         turns = "" if load.axes is None else f" in the axes of {load.axes}"
-        kind, at, links, told = "force", load.point, (link,), f"{_describe_vector(mechanism, load.force, 'N')}{turns}"
+        kind, at, links, told = (
+            "force",
+            load.point,
+            (link,),
+            f"{_describe_vector(mechanism, load.force, 'force')}{turns}",
+        )
     elif load.link is not None and load.torque is not None:
-        kind, at, links, told = "torque", load.link, (load.link,), f"{load.torque:.6g} N·m"
+        kind, at, links, told = "torque", load.link, (load.link,), amount(load.torque, "torque", mechanism.units)
     else:
         pair = relative_motions(mechanism)[load.pair or ""]
         slides = pair.input_kind is MeasureKind.LENGTH
         kind, at, links = "force in a pair" if slides else "torque in a pair", pair.name, pair.links
-        told = f"{load.effort:.6g} {'N' if slides else 'N·m'}"
+        told = amount(float(load.effort or 0.0), "force" if slides else "torque", mechanism.units)
     if load.varies is not None:
         told += f", varies with {load.varies.input or 'time'}"
     return ActionDescription(kind, at, links, told)
 
 
 def _describe_spring(mechanism: Mechanism, spring: Spring) -> ActionDescription:
-    per, free = ("N·m", "angle") if spring.is_torsional else ("N", "length")
-    length = "rad" if spring.is_torsional else "m"
+    of, free = ("torsional ", "angle") if spring.is_torsional else ("", "length")
     told = []
     if spring.stiffness:
-        told.append(f"{spring.stiffness:.6g} {per}/{length}")
+        told.append(amount(spring.stiffness, f"{of}stiffness", mechanism.units))
         told.append(f"free {free} {amount(spring.free, free, mechanism.units)}")
     if spring.damping:
-        told.append(f"damping {spring.damping:.6g} {per}·s/{length}")
+        told.append(f"damping {amount(spring.damping, f'{of}damping', mechanism.units)}")
     kind = "spring" if spring.stiffness or not spring.damping else "damper"
     if spring.is_torsional:
         return ActionDescription(f"torsional {kind}", "", spring.ends, ", ".join(told))
@@ -71,10 +76,10 @@ def _describe_spring(mechanism: Mechanism, spring: Spring) -> ActionDescription:
 
 
 def _describe_mass(mechanism: Mechanism, mass: Mass) -> ActionDescription:
-    turning = f", moment of inertia {mass.inertia:.6g} kg·m²" if mass.inertia else ""
-    return ActionDescription(
-        "mass", _describe_mass_centre(mechanism, mass), (mass.link,), f"{mass.mass:.6g} kg{turning}"
-    )
+    told = amount(mass.mass, "mass", mechanism.units)
+    if mass.inertia:
+        told += f", moment of inertia {amount(mass.inertia, 'moment of inertia', mechanism.units)}"
+    return ActionDescription("mass", _describe_mass_centre(mechanism, mass), (mass.link,), told)
 
 
 def _describe_mass_centre(mechanism: Mechanism, mass: Mass) -> str:
@@ -85,6 +90,6 @@ def _describe_mass_centre(mechanism: Mechanism, mass: Mass) -> str:
     return f"({x}, {y}) {mechanism.units.length}"
 
 
-def _describe_vector(mechanism: Mechanism, vector: tuple[float, float], measure: str) -> str:
+def _describe_vector(mechanism: Mechanism, vector: tuple[float, float], kind: str) -> str:
     x, y = vector
-    return f"{hypot(x, y):.6g} {measure} at {amount(atan2(y, x), 'angle', mechanism.units)}"
+    return f"{amount(hypot(x, y), kind, mechanism.units)} at {amount(atan2(y, x), 'angle', mechanism.units)}"

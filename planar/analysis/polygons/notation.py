@@ -33,7 +33,7 @@ from planar.analysis.rich_text import (
     with_double_primes,
 )
 from planar.foundation.arrays import Array
-from planar.foundation.units import length_unit_of_rates, unit_of_kind
+from planar.model.file_units import rate_unit
 from planar.model.mechanism import named_points
 
 NEGLIGIBLE_RATIO = 1e-12
@@ -73,12 +73,12 @@ class Notation:
     @cached_property
     def unit(self) -> str:
         """The unit in which its vectors are told: m/s."""
-        return unit_of_kind(self.polygon.kind, self.polygon.state.mechanism.units)[0]
+        return rate_unit(self.polygon.kind, self.polygon.state.mechanism.units)[0]
 
     @cached_property
     def lengths_per_metre(self) -> float:
         """How many of the lengths in which rates are told are one metre."""
-        return length_unit_of_rates(self.polygon.state.mechanism.units.length)[1].from_si(1.0)
+        return rate_unit(self.polygon.kind, self.polygon.state.mechanism.units)[1].from_si(1.0)
 
     def format_number(self, value: float, kind: str) -> str:
         """A number (SI) of a kind of quantity, as it is told."""

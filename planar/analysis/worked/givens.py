@@ -9,9 +9,10 @@ import numpy as np
 
 from planar.analysis.rate_equations import SlideJoint, rate_equations
 from planar.analysis.rich_text import MeasuredValue, Phrase, list_phrases
-from planar.foundation.units import parse_unit, unit_of_kind
+from planar.foundation.units import SI_UNITS, parse_unit
+from planar.model.file_units import FileUnits, unit_of_kind
 from planar.model.link_shapes import Along, At, Distances, Link
-from planar.model.mechanism import FileUnits, Mechanism, pair_entries, relative_motions
+from planar.model.mechanism import Mechanism, pair_entries, relative_motions
 from planar.model.pairs import MeasureKind, Pair
 from planar.model.wording import amount, turning_sense
 from planar.results.motion import State
@@ -131,13 +132,16 @@ def _input_phrase(mechanism: Mechanism, pair: Pair, driven: InputState) -> Phras
     if not velocity and not acceleration:
         return (f"Input at {pair.name}: {at}; {moves} is held.",)
     uniformly = "uniformly " if velocity and not acceleration else ""
-    found: Phrase = (f"Input at {pair.name}: {at}; {moves} turns {uniformly}", *_turning_phrase(velocity))
+    found: Phrase = (
+        f"Input at {pair.name}: {at}; {moves} turns {uniformly}",
+        *_turning_phrase(velocity, mechanism.units),
+    )
     if acceleration:
         how = "speeds up" if velocity * acceleration > 0.0 else "slows down" if velocity else "begins to turn"
         found = (
             *found,
             f" and {how} at ",
-            MeasuredValue(abs(acceleration), "rad/s^2"),
+            *_angular_phrase(abs(acceleration), "angular acceleration", mechanism.units),
             "" if velocity else f" {turning_sense(acceleration)}",
         )
     return (*found, ".")
@@ -157,7 +161,13 @@ def _rate_value(value: float, kind: str, units: FileUnits) -> MeasuredValue:
     return MeasuredValue(value, name, units_per_si=of.from_si(1.0))
 
 
-def _turning_phrase(velocity: float) -> Phrase:
+def _turning_phrase(velocity: float, units: FileUnits) -> Phrase:
     if not velocity:
         return ("not yet",)
-    return (f"{turning_sense(velocity)} at ", MeasuredValue(abs(velocity), "rad/s"))
+    return (f"{turning_sense(velocity)} at ", *_angular_phrase(abs(velocity), "angular velocity", units))
+
+
+def _angular_phrase(value: float, kind: str, units: FileUnits) -> Phrase:
+    """An angular rate in the unit that the file declares, and in radians, in which formulas go on."""
+    told, plain = _rate_value(value, kind, units), MeasuredValue(value, SI_UNITS[kind])
+    return (told,) if told == plain else (told, " = ", plain)

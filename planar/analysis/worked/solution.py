@@ -14,7 +14,7 @@ from planar.analysis.rich_text import MeasuredValue, Phrase, Symbol, format_numb
 from planar.analysis.worked.givens import given_data
 from planar.analysis.worked.published import Comparison
 from planar.analysis.worked.sections import Section, sections
-from planar.foundation.units import unit_of_kind
+from planar.model.file_units import rate_unit
 from planar.model.mechanism import PUBLISHED_QUANTITIES, PublishedValue, relative_motions
 from planar.model.pairs import MeasureKind
 from planar.model.wording import REST_TOLERANCE, direction_sense, turning_sense
@@ -162,7 +162,7 @@ def _slide_results(state: State) -> Iterator[SlideResult]:
 
 def _rubbing_speeds(state: State) -> Iterator[Phrase]:
     """How fast pins rub: the difference of two angular velocities times the radius."""
-    measure, of = unit_of_kind("velocity", state.mechanism.units)
+    measure, of = rate_unit("velocity", state.mechanism.units)
     by = of.from_si(1.0)
     for name, pair in relative_motions(state.mechanism).items():
         speed = state.pair(name).get("rubbing_speed")

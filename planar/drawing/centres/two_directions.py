@@ -27,7 +27,7 @@ from planar.drawing.scheme.scene import plain_frames
 from planar.drawing.scheme.scheme import scheme, space_scale
 from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput
-from planar.foundation.units import length_unit_of_rates, unit_of_kind
+from planar.model.file_units import rate_length, unit_of_kind
 from planar.model.mechanism import named_points
 from planar.results.motion import State
 from planar.results.records import PointState
@@ -234,7 +234,7 @@ class _TwoDirectionsDrawing:
         yield self.found.method.format(C=self.letter)
         if self.found.position is None:
             return
-        length, of = length_unit_of_rates(self.units.length)
+        length, of = rate_length(self.units)
         for name, point in zip(self.names, self.points, strict=True):
             radius, speed = (float(np.hypot(*each)) for each in (point.position - self.found.position, point.velocity))
             if radius > 0.0 and speed > 0.0:

@@ -9,8 +9,9 @@ from typing import NamedTuple
 import numpy as np
 
 from planar.drawing.paper.picture import Label, Mark, PaperPoint, Pen, Polyline, paper_point
-from planar.drawing.paper.scales import DECIMAL_STEPS, DEGREE_STEPS, choose_prefix, round_step
+from planar.drawing.paper.scales import DECIMAL_STEPS, DEGREE_STEPS, round_step, unit_for_size
 from planar.foundation.arrays import Array
+from planar.model.file_units import FileUnits
 
 TICK_LENGTH, NUMBER_SIZE, NAME_SIZE = 1.2, 7.0, 8.0
 """mm that a tick is long; points of the numbers and of an axis's name."""
@@ -74,10 +75,11 @@ def fit_axis(
     return Axis(low, high, length, step, name)
 
 
-def force_axis(values: Array, length: float, symbol: str, measure: str) -> Axis:
-    """An upright axis of forces (N) or couples (N m), zero on it."""
-    prefix, per = choose_prefix(float(np.nanmax(np.abs(values), initial=0.0)))
-    return fit_axis(np.append(values, 0.0), length, f"{symbol} ({prefix}{measure})", 9.0)._replace(unit_factor=per)
+def force_axis(values: Array, length: float, symbol: str, kind: str, units: FileUnits) -> Axis:
+    """An upright axis of forces (N) or couples (N m), zero on it, in the unit in which these are said."""
+    name, per = unit_for_size(kind, float(np.nanmax(np.abs(values), initial=0.0)), units)
+    axis = fit_axis(np.append(values, 0.0) / per, length, f"{symbol} ({name})", 9.0)
+    return axis._replace(low=axis.low * per, high=axis.high * per, step=axis.step * per, unit_factor=per)
 
 
 def axes_frame(across: Axis, up: Axis) -> Iterator[Mark]:

@@ -10,10 +10,10 @@ import numpy as np
 from planar.drawing.diagrams.drawn_run import DrawnRun
 from planar.drawing.diagrams.motion_curves import ChordRates, DiagramSubject, MotionCurve, Peak, chord_rates, find_peak
 from planar.drawing.labels.text_metrics import text_size, wrap_text
-from planar.drawing.paper.scales import Scale
+from planar.drawing.paper.scales import Scale, format_calculating_scale, paper_length
 from planar.foundation.arrays import Array
-from planar.foundation.units import coherent_unit, display_unit, length_unit_of_rates, parse_unit
-from planar.model.mechanism import FileUnits
+from planar.foundation.units import format_unit, parse_unit
+from planar.model.file_units import FileUnits, coherent_unit, display_unit, rate_length
 from planar.model.wording import amount
 
 END_MARGIN = 0.1
@@ -68,10 +68,6 @@ def has_unbounded_end(sheet: DiagramSheet) -> bool:
     return any(np.isnan(curve.rate[[0, -1]]).any() for curve in sheet.subject.curves)
 
 
-def printed_unit(written: str) -> str:
-    return written.replace("^2", "²")
-
-
 def caption_lines(sheet: DiagramSheet, ordinates: list[Ordinate], points: float, room: float) -> list[tuple[str, bool]]:
     """The lines below the diagrams, at most `room` mm long; each with whether it is mathtext."""
     lines = [(line, False) for line in wrap_text(_start_sentence(sheet), points, room)]
@@ -121,7 +117,7 @@ def _start_sentence(sheet: DiagramSheet) -> str:
     if not run.has_speed:
         return (
             f"{told}The file gives no speed: rates are per "
-            f"{'metre' if run.is_sliding_input else 'radian'} of the input."
+            f"{_length_word(units) if run.is_sliding_input else 'radian'} of the input."
         )
     rates = ("velocity", "acceleration") if run.is_sliding_input else ("angular velocity", "angular acceleration")
     (speed, of), (second, of_second) = (display_unit(kind, units) for kind in rates)
@@ -131,20 +127,25 @@ def _start_sentence(sheet: DiagramSheet) -> str:
     return f"{told}."
 
 
+def _length_word(units: FileUnits) -> str:
+    """The length by which rates are told where no time is, in a word."""
+    name = rate_length(units)[0]
+    return "metre" if name == "m" else name
+
+
 def _scale_phrases(sheet: DiagramSheet, ordinates: list[Ordinate]) -> list[str]:
-    """The length of the axis and the calculating scales, in SI units to a millimetre."""
+    """The length of the axis and the calculating scales, in SI units to a millimetre, of inches in these to an inch."""
     run = sheet.run
-    parts = [f"Scales: OK = {sheet.width:g} mm"]
+    parts = [f"Scales: OK = {paper_length(sheet.width, sheet.units)}"]
     if run.has_speed:
-        parts.append(_calculating_scale("t", sheet.span / sheet.width, "s"))
+        parts.append(_calculating_scale("t", sheet.span / sheet.width, "s", sheet.units))
     if not run.is_time_run:
-        name, of = length_unit_of_rates(sheet.units.length) if run.is_sliding_input else coherent_unit("rad")
-        parts.append(
-            _calculating_scale(_travel_symbol(run), of.from_si(float(run.input_travel[-1])) / sheet.width, name)
-        )
+        name, of = rate_length(sheet.units) if run.is_sliding_input else coherent_unit("rad")
+        per_mm = of.from_si(float(run.input_travel[-1])) / sheet.width
+        parts.append(_calculating_scale(_travel_symbol(run), per_mm, name, sheet.units))
     symbols = _scale_subscripts(sheet)
     parts += [
-        _calculating_scale(name, each.scale.per_mm * each.si_factor, each.si_unit)
+        _calculating_scale(name, each.scale.per_mm * each.si_factor, each.si_unit, sheet.units)
         for name, each in zip(symbols, ordinates, strict=True)
     ]
     return [*(f"{part}," for part in parts[:-1]), f"{parts[-1]}."]
@@ -155,9 +156,8 @@ def _scale_subscripts(sheet: DiagramSheet) -> tuple[str, ...]:
     return ("φ", "ω", "ε") if sheet.subject.is_angle else ("s", "v", "a")
 
 
-def _calculating_scale(symbol: str, per_mm: float, si: str) -> str:
-    si = printed_unit(si)
-    return f"$\\mu_{{{symbol}}}$ = {per_mm:.4g} {f'({si})' if '/' in si else si}/mm"
+def _calculating_scale(symbol: str, per_mm: float, unit_name: str, units: FileUnits) -> str:
+    return format_calculating_scale(f"$\\mu_{{{symbol}}}$", per_mm, unit_name, units)
 
 
 def _peak_sentences(sheet: DiagramSheet, ordinate: Ordinate, index: int) -> list[str]:
@@ -170,7 +170,7 @@ def _peak_sentences(sheet: DiagramSheet, ordinate: Ordinate, index: int) -> list
             else None
         )
         name = f"${ordinate.symbol}_{curve.name}$" if curve.name else f"${ordinate.symbol}$"
-        written = printed_unit(ordinate.si_unit)
+        written = format_unit(ordinate.si_unit)
         if exact is not None and exact.value == 0.0:
             continue
         told = None
@@ -231,7 +231,7 @@ def _chord_scale_sentence(sheet: DiagramSheet, ordinates: list[Ordinate]) -> str
     symbols = _scale_subscripts(sheet)
     per_mm = ordinates[0].scale.per_mm / step
     base = f"$\\mu_{symbols[0]}/(\\mu_t\\cdot$OK$/{sheet.interval_count})$"
-    said = _calculating_scale(symbols[1], per_mm * ordinates[1].si_factor, ordinates[1].si_unit).replace(
+    said = _calculating_scale(symbols[1], per_mm * ordinates[1].si_factor, ordinates[1].si_unit, sheet.units).replace(
         " = ", f" = {base} = ", 1
     )
     return f"Rises of {ordinates[0].symbol} drawn as they are would be velocities to the scale {said}."

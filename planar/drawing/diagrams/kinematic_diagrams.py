@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from planar.drawing.diagrams.captions import DiagramSheet, Ordinate, bounded_values, caption_lines, printed_unit
+from planar.drawing.diagrams.captions import DiagramSheet, Ordinate, bounded_values, caption_lines
 from planar.drawing.diagrams.drawn_run import steady_run
 from planar.drawing.diagrams.motion_curves import (
     ChordRates,
@@ -21,10 +21,11 @@ from planar.drawing.diagrams.motion_curves import (
 from planar.drawing.labels.fonts import DRAWING_FAMILY, font_families
 from planar.drawing.labels.text_metrics import clip_text, format_tick, text_size
 from planar.drawing.paper.pens import MM_PER_POINT, require_matplotlib
-from planar.drawing.paper.scales import DECIMAL_STEPS, DEGREE_STEPS, round_scale, round_step
+from planar.drawing.paper.scales import DECIMAL_STEPS, DEGREE_STEPS, round_scale, round_step, tick_spacing
 from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput
-from planar.foundation.units import SI_UNITS, coherent_unit, length_unit_of_rates, parse_unit, unit_of_kind
+from planar.foundation.units import SI_UNITS, format_unit, parse_unit
+from planar.model.file_units import coherent_unit, rate_length, rate_unit, unit_of_kind
 from planar.model.mechanism import Mechanism, relative_motions
 from planar.model.wording import amount
 from planar.results.motion import Motion
@@ -106,7 +107,7 @@ def _draw_figure(sheet: DiagramSheet) -> Figure:
 
 
 def _fit_ordinate(sheet: DiagramSheet, index: int) -> Ordinate:
-    """The scale of one diagram, round, and its ends: whole half-centimetres with some air."""
+    """The scale of one diagram, round, and its ends: halves of what ticks are apart, with some air."""
     angle, timed = sheet.subject.is_angle, sheet.run.has_speed
     kinds = ("angle", "angular velocity", "angular acceleration") if angle else ("length", "velocity", "acceleration")
     kind = kinds[index]
@@ -115,28 +116,29 @@ def _fit_ordinate(sheet: DiagramSheet, index: int) -> Ordinate:
     )
     values = values[np.isfinite(values)]
     low, high = float(values.min(initial=0.0)), float(values.max(initial=0.0))
-    of_time = timed or not sheet.run.is_sliding_input or angle
-    name = unit_of_kind(kind, sheet.units)[0] if index == 0 or of_time else SI_UNITS[kind]
+    name = _ordinate_unit(kind, index, sheet)
     scale = round_scale(kind, name, high - low, high - low, (MAX_CURVE_HEIGHT, MAX_CURVE_HEIGHT))
     nothing = 1e-9 * max(high, -low)  # what rounding leaves of zero asks for no room
-    top = 5.0 * max(ceil((scale.on_paper(high) + 2.0) / 5.0 - 1e-9), 0) if high > nothing else 0.0
-    foot = 5.0 * min(floor((scale.on_paper(low) - 2.0) / 5.0 + 1e-9), 0) if low < -nothing else 0.0
-    if top - foot < 10.0:
-        top, foot = max(top, 5.0), min(foot, -5.0)
-    told, of = coherent_unit(SI_UNITS[kind] if angle else name)
+    half = tick_spacing(name) / 2.0
+    top = half * max(ceil((scale.on_paper(high) + 2.0) / half - 1e-9), 0) if high > nothing else 0.0
+    foot = half * min(floor((scale.on_paper(low) - 2.0) / half + 1e-9), 0) if low < -nothing else 0.0
+    if top - foot < 2.0 * half:
+        top, foot = max(top, half), min(foot, -half)
+    told, of = (name, parse_unit(name)) if index else coherent_unit(SI_UNITS["angle"] if angle else name)
     if not timed and index:
-        per = SI_UNITS["length"] if sheet.run.is_sliding_input else SI_UNITS["angle"]
-        base = (
-            SI_UNITS["angle"]
-            if angle
-            else length_unit_of_rates(sheet.units.length)[0]
-            if of_time
-            else SI_UNITS["length"]
-        )
+        length = rate_length(sheet.units)[0]
+        base, per = ("rad" if each else length for each in (angle, not sheet.run.is_sliding_input))
         told = f"{base}/{per}" + ("^2" if index == 2 else "")
     written = name if index == 0 else told
     title = ("displacement", "velocity", "acceleration")[index]
     return Ordinate(title, ORDINATE_SYMBOLS[angle][index], scale, written, told, foot, top, of.from_si(1.0))
+
+
+def _ordinate_unit(kind: str, index: int, sheet: DiagramSheet) -> str:
+    """The unit of a diagram: the one in which its kind is shown; that which goes with the input's where that rests."""
+    if index == 0 or sheet.run.has_speed:
+        return unit_of_kind(kind, sheet.units)[0]
+    return SI_UNITS[kind] if sheet.subject.is_angle else rate_unit(kind, sheet.units)[0]
 
 
 def _draw_diagram(axes: Axes, sheet: DiagramSheet, ordinate: Ordinate, index: int) -> None:
@@ -145,7 +147,8 @@ def _draw_diagram(axes: Axes, sheet: DiagramSheet, ordinate: Ordinate, index: in
     time = sheet.run.time
     axes.set_xlim(0.0, sheet.span)
     axes.set_ylim(ordinate.low * per_mm, ordinate.high * per_mm)
-    ticks = [10.0 * k for k in range(ceil(ordinate.low / 10.0), floor(ordinate.high / 10.0) + 1)]
+    step = tick_spacing(ordinate.scale.unit)
+    ticks = [step * k for k in range(ceil(ordinate.low / step), floor(ordinate.high / step) + 1)]
     axes.set_yticks(
         [tick * per_mm for tick in ticks],
         [format_tick(tick * per_mm) for tick in ticks],
@@ -153,7 +156,7 @@ def _draw_diagram(axes: Axes, sheet: DiagramSheet, ordinate: Ordinate, index: in
         fontsize=SMALL_TEXT,
     )
     axes.set_ylabel(
-        f"{ordinate.symbol} ({printed_unit(ordinate.unit_name)})",
+        f"{ordinate.symbol} ({format_unit(ordinate.unit_name)})",
         family=DRAWING_FAMILY,
         fontsize=NORMAL_TEXT,
         labelpad=3.0,

@@ -16,10 +16,11 @@ from planar.drawing.paper.scales import (
     DECIMAL_STEPS,
     DEGREE_STEPS,
     Scale,
-    choose_prefix,
     format_force,
     round_scale,
     round_step,
+    tick_spacing,
+    unit_for_size,
 )
 from planar.dynamics.external_actions import KinematicArrays
 from planar.dynamics.forces import Forces
@@ -136,10 +137,11 @@ def _polar_picture(drawn: ForceRun, force: Array, load: _BearingLoad) -> Picture
     seen = np.where(np.isfinite(axes.without_outliers(long))[:, None], force, np.nan)
     corners = np.concatenate([seen[np.isfinite(seen).all(axis=1)], np.zeros((1, 2))])
     low, high = corners.min(axis=0), corners.max(axis=0)
-    prefix, per = choose_prefix(float(np.abs(corners).max()))
+    units = drawn.motion.mechanism.units
+    name, per = unit_for_size("force", float(np.abs(corners).max()), units)
     width, height = map(float, high - low)
-    scale = round_scale("force", f"{prefix}N", width, height, POLAR_SIZE)
-    across, up = (_axis_at_scale(low[k], high[k], scale, f"{'xy'[k]} ({prefix}N)", per) for k in (0, 1))
+    scale = round_scale("force", name, width, height, POLAR_SIZE)
+    across, up = (_axis_at_scale(low[k], high[k], scale, f"{'xy'[k]} ({name})", per) for k in (0, 1))
     strokes: list[Mark] = [*axes.axes_frame(across, up)]
     middle = float(across.on_paper(0.0))
     strokes.append(Polyline(((middle, 0.0), (middle, up.length)), Pen.AXIS, "zero"))
@@ -147,7 +149,7 @@ def _polar_picture(drawn: ForceRun, force: Array, load: _BearingLoad) -> Picture
     strokes += _input_marks(drawn, seen, across, up)
     notes = [str(scale), *_load_notes(drawn, long, load)]
     row = int(np.nanargmax(long))
-    text = format_force(long[row], "N")
+    text = format_force(long[row], "force", units)
     if np.nanmin(long) < (1.0 - CONSTANT_TOLERANCE) * long[row]:
         text = f"{text} {drawn.place_text(row)}"
     if np.isfinite(seen[row]).all():
@@ -165,9 +167,9 @@ def _empty_picture(load: _BearingLoad, values: Array) -> _Undrawn:
 
 
 def _axis_at_scale(low: float, high: float, scale: Scale, name: str, per: float) -> axes.Axis:
-    """An axis of a force at a scale, a little longer than what is drawn, with a tick at every centimetre of it."""
+    """An axis of a force at a scale, a little longer than what is drawn, with ticks by the centimetre or half inch."""
     low, high = low - POLAR_MARGIN * scale.per_mm, high + POLAR_MARGIN * scale.per_mm
-    return axes.Axis(low, high, scale.on_paper(high - low), 10.0 * scale.per_mm, name, per)
+    return axes.Axis(low, high, scale.on_paper(high - low), tick_spacing(scale.unit) * scale.per_mm, name, per)
 
 
 def _input_marks(drawn: ForceRun, force: Array, across: axes.Axis, up: axes.Axis) -> Iterator[Mark]:
@@ -195,18 +197,19 @@ def _curve_picture(drawn: ForceRun, values: Array, load: _BearingLoad) -> Pictur
     """A force along a line's left, or a couple, over the input."""
     if not np.nanmax(np.abs(values), initial=0.0):
         return _empty_picture(load, values)
-    seen, measure = axes.without_outliers(values), "N·m" if load.about == "couple" else "N"
+    seen, kind = axes.without_outliers(values), "torque" if load.about == "couple" else "force"
+    units = drawn.motion.mechanism.units
     across = axes.fit_axis(
         drawn.abscissa, DIAGRAM_WIDTH, drawn.axis_name, end_at_ticks=False, degrees=drawn.unit == "deg"
     )
-    up = axes.force_axis(seen, DIAGRAM_HEIGHT, load.symbol.base, measure)
+    up = axes.force_axis(seen, DIAGRAM_HEIGHT, load.symbol.base, kind, units)
     strokes: list[Mark] = [
         *axes.axes_frame(across, up),
         *axes.curve_strokes(drawn.abscissa, seen, across, up, Pen.CURVE, load.about),
     ]
     notes = [*_load_notes(drawn, values, load)]
     row = int(np.nanargmax(np.abs(values)))
-    text = f"{format_force(values[row], measure)} {drawn.place_text(row)}"
+    text = f"{format_force(values[row], kind, units)} {drawn.place_text(row)}"
     if np.isfinite(seen[row]):
         at: PaperPoint = axes.point_on_paper(drawn.abscissa[row], values[row], across, up)
         strokes.append(Circle(at, MARK_RADIUS, Pen.CURVE, "greatest", Fill.PAPER))

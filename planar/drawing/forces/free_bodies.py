@@ -21,7 +21,7 @@ from planar.drawing.paper.picture import (
     extent,
     paper_point,
 )
-from planar.drawing.paper.scales import Scale, choose_prefix, format_force, parse_scales, round_scale
+from planar.drawing.paper.scales import Scale, format_force, parse_scales, round_scale, unit_for_size
 from planar.drawing.scheme import symbol_table, symbols
 from planar.drawing.scheme.clearance import Clearance
 from planar.drawing.scheme.link_bodies import link_bodies, unit_vector
@@ -35,6 +35,7 @@ from planar.dynamics.load_validation import require_loads
 from planar.equations.mechanism_numbers import mechanism_size
 from planar.foundation.errors import BadInput
 from planar.foundation.geometry import Vector, direction
+from planar.model.file_units import FileUnits
 from planar.model.link_graph import link_label, link_numbers
 from planar.model.mechanism import named_points
 from planar.model.pairs.symbols import BeltMark, PinMark, SliderMark, SlotMark, WheelMark
@@ -69,12 +70,12 @@ def free_bodies(forces: Forces, scale: str | Sequence[str] | None = None) -> tup
     if isinstance(forces.moving, Motion):
         raise BadInput("forces", "free bodies are drawn at one position; give the forces of a state")
     require_loads(forces.mechanism)
-    given = parse_scales(scale, ["length", "force"])
+    given = parse_scales(scale, ["length", "force"], forces.mechanism.units)
     state, mechanism = forces.moving, forces.mechanism
     felt = action_arrows(forces, mechanism_size(mechanism, state.shapes))
     frames, shown = plain_frames(state.frames), link_bodies(mechanism, state.shapes)
     scene = Scene(mechanism, shown, frames, state.shapes, given.get("length") or _length_scale(forces))
-    force = given.get("force") or _force_scale(list(felt.values()))
+    force = given.get("force") or _force_scale(list(felt.values()), mechanism.units)
     drawn = scheme(state, scene.scale)
     note = "F₃₂ is the force on link 3 by link 2, M₃₂ the couple"
     pictures = [drawn._replace(title="Space diagram", notes=(note, *attachment_remarks(mechanism)))]
@@ -188,7 +189,9 @@ class _FreeBody:
 
     def _action_label(self, push: ActionArrow, at: PaperPoint, about: str) -> Label:
         text, math = push.symbol.label
-        told = format_force(_magnitude(push), "N" if push.force is not None else "N·m")
+        told = format_force(
+            _magnitude(push), "force" if push.force is not None else "torque", self.scene.mechanism.units
+        )
         return Label(f"{text} = {told}", at, about, FORCE_LABEL_SIZE, 0.8, math=math)
 
     def _force_polygon(self, about: tuple[PaperPoint, PaperPoint]) -> Iterator[Mark]:
@@ -260,10 +263,12 @@ def _length_scale(forces: Forces) -> Scale:
     return round_scale("length", mechanism.units.length, most, most, (1.0, 1.0))
 
 
-def _force_scale(felt: Sequence[Sequence[ActionArrow]]) -> Scale:
+def _force_scale(felt: Sequence[Sequence[ActionArrow]], units: FileUnits) -> Scale:
     """The scale at which the greatest force has its room."""
     most = max((_magnitude(p) for each in felt for p in each if p.is_determined and p.force is not None), default=0.0)
-    return round_scale("force", choose_prefix(most)[0] + "N", most, most, (MAX_FORCE_LENGTH, MAX_FORCE_LENGTH))
+    return round_scale(
+        "force", unit_for_size("force", most, units)[0], most, most, (MAX_FORCE_LENGTH, MAX_FORCE_LENGTH)
+    )
 
 
 def _magnitude(push: ActionArrow) -> float:

@@ -15,6 +15,7 @@ from planar.dynamics.forces import Forces
 from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput
 from planar.foundation.units import parse_unit
+from planar.model.file_units import display_unit
 from planar.model.mechanism import Mechanism
 from planar.results.motion import Motion
 
@@ -47,7 +48,8 @@ def torque_picture(
     effort = np.where(
         np.abs(effort) <= drawn.round_off * (1.0 if found.is_force_input(name) else drawn.arm), 0.0, effort
     )
-    symbol, measure = ("F", "N") if found.is_force_input(name) else ("T", "N·m")
+    symbol, kind = ("F", "force") if found.is_force_input(name) else ("T", "torque")
+    units = found.mechanism.units
     why = explain_no_cycle(found, name)
     even = None if why else flywheel(found, name, fluctuation)
     mean = even.mean if even is not None else None
@@ -56,7 +58,7 @@ def torque_picture(
     across = axes.fit_axis(
         drawn.abscissa, DIAGRAM_WIDTH, drawn.axis_name, end_at_ticks=False, degrees=drawn.unit == "deg"
     )
-    up = axes.force_axis(np.concatenate([seen, *parts.values()]), DIAGRAM_HEIGHT, symbol, measure)
+    up = axes.force_axis(np.concatenate([seen, *parts.values()]), DIAGRAM_HEIGHT, symbol, kind, units)
     strokes: list[Mark] = [] if mean is None else [*_mean_areas(drawn.abscissa, effort, mean, across, up)]
     strokes += axes.axes_frame(across, up)
     for label, part in parts.items():
@@ -68,7 +70,7 @@ def torque_picture(
     if mean is not None:
         level = float(up.on_paper(mean))
         strokes.append(Polyline(((0.0, level), (DIAGRAM_WIDTH, level)), Pen.MEAN, "mean"))
-        text = f"${symbol}_m$ = {format_force(mean, measure)}"
+        text = f"${symbol}_m$ = {format_force(mean, kind, units)}"
         strokes.append(Label(text, (DIAGRAM_WIDTH, level), "mean", 8.0, 1.2, math=True, side=(1, 0)))
     strokes += axes.curve_strokes(drawn.abscissa, seen, across, up, Pen.CURVE, "effort")
     notes = [*drawn.notes]
@@ -77,33 +79,39 @@ def torque_picture(
         extremes = {}
         notes.append("the same at every position")
     for told, row in extremes.items():
-        text = f"{format_force(effort[row], measure)} {drawn.place_text(row)}"
+        text = f"{format_force(effort[row], kind, units)} {drawn.place_text(row)}"
         if np.isfinite(seen[row]):
             at = axes.point_on_paper(drawn.abscissa[row], effort[row], across, up)
             strokes.append(Circle(at, MARK_RADIUS, Pen.CURVE, told, Fill.PAPER))
             strokes.append(Label(text, at, told, 8.0, 1.0))
         else:
             notes.append(f"beyond the axis: {text}")
-    notes += _notes(even, why, measure, drawn)
-    what_of = "force" if found.is_force_input(name) else "torque"
-    return Picture(tuple(strokes), f"{found.mechanism.name}: {what_of} of the input {name}", tuple(notes))
+    notes += _notes(even, why, kind, drawn)
+    return Picture(tuple(strokes), f"{found.mechanism.name}: {kind} of the input {name}", tuple(notes))
 
 
-def _notes(even: Flywheel | None, why: str, measure: str, drawn: ForceRun) -> Iterator[str]:
+def _notes(even: Flywheel | None, why: str, kind: str, drawn: ForceRun) -> Iterator[str]:
     if even is None:
         yield f"no mean and no flywheel: {why}"
         return
-    yield f"mean {format_force(even.mean, measure)}; fluctuation of energy ΔE = {even.energy:.4g} J"
+    units = drawn.motion.mechanism.units
+
+    def told(value: float, kind: str) -> str:
+        name, of = display_unit(kind, units)
+        return f"{of.from_si(value):.4g} {name}"
+
+    yield f"mean {format_force(even.mean, kind, units)}; fluctuation of energy ΔE = {told(even.energy, 'energy')}"
     if not even.energy:
         return
     slow, fast = (np.mod(parse_unit(drawn.unit).from_si(each), drawn.period) for each in (even.slowest, even.fastest))
     yield f"fastest at {fast:.4g} {drawn.unit}, slowest at {slow:.4g} {drawn.unit}, driven by the mean torque"
-    if even.inertia is None:
+    if even.inertia is None or even.speed is None:
         yield "no flywheel: the input has no steady speed"
     else:
         yield (
-            f"flywheel for a coefficient of fluctuation {even.fluctuation:g} at {even.speed:.4g} rad/s: "
-            f"I = ΔE / (C ω²) = {even.inertia:.4g} kg·m²"
+            f"flywheel for a coefficient of fluctuation {even.fluctuation:g} at "
+            f"{told(even.speed, 'angular velocity')}: "
+            f"I = ΔE / (C ω²) = {told(even.inertia, 'moment of inertia')}"
         )
 
 

@@ -22,7 +22,7 @@ from planar.drawing.output.solution_pages import (
 )
 from planar.drawing.paper.pens import require_matplotlib
 from planar.drawing.scheme.scheme import scheme
-from planar.foundation.units import display_unit
+from planar.model.file_units import display_unit
 from planar.model.mechanism import PUBLISHED_QUANTITIES, PublishedValue
 from planar.results.motion import State
 

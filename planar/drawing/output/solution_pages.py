@@ -42,7 +42,8 @@ from planar.drawing.scheme.scene import plain_frames
 from planar.drawing.scheme.scheme import scheme, space_scale
 from planar.dynamics.load_attachment import attachment_remarks
 from planar.foundation.errors import BadInput
-from planar.foundation.units import display_unit, parse_unit, unit_of_kind
+from planar.foundation.units import format_unit, parse_unit
+from planar.model.file_units import display_unit, rate_unit, unit_of_kind
 from planar.model.mechanism import PUBLISHED_QUANTITIES
 from planar.results.motion import State
 
@@ -242,7 +243,7 @@ def _section_strips(section: Section, half: WorkedPolygon, scales: Mapping[str, 
         heads = (
             "S.N.",
             "Vector",
-            f"Magnitude ({display_unit(half.kind, half.polygon.state.mechanism.units)[0]})",
+            f"Magnitude ({format_unit(rate_unit(half.kind, half.polygon.state.mechanism.units)[0])})",
             "Direction",
             "Sense",
         )
@@ -278,19 +279,22 @@ def _result_strips(solution: WorkedSolution) -> Iterator[Strip]:
 
 def _link_strips(solution: WorkedSolution) -> Iterator[Strip]:
     if solution.links:
+        (w, velocity), (e, acceleration) = (
+            display_unit(kind, solution.state.mechanism.units) for kind in ("angular velocity", "angular acceleration")
+        )
         heads = [
             PageColumn("Link"),
-            PageColumn("ω (rad/s)", True),
+            PageColumn(f"ω ({w})", True),
             PageColumn(""),
-            PageColumn("α (rad/s²)", True),
+            PageColumn(f"α ({e})", True),
             PageColumn(""),
         ]
         cells: list[Sequence[Phrase]] = [
             (
                 (Name(link.link),),
-                (format_number(abs(link.velocity)),),
+                (format_number(velocity.from_si(abs(link.velocity))),),
                 (link.velocity_sense,),
-                (format_number(abs(link.acceleration)),),
+                (format_number(acceleration.from_si(abs(link.acceleration))),),
                 (link.acceleration_sense,),
             )
             for link in solution.links

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from math import floor, isfinite, log10
 
 from planar.foundation.errors import BadInput
-from planar.foundation.units import UnitError, coherent_unit, parse_quantity, parse_unit
+from planar.foundation.units import UnitError, format_unit, parse_quantity, parse_unit
+from planar.model.file_units import FileUnits, coherent_unit, display_unit, is_customary, is_si
 
 DRAWING_WIDTH, DRAWING_HEIGHT = 150.0, 110.0
 """mm on paper that one drawing takes at the most, unless its scale is given."""
@@ -26,11 +27,17 @@ PREFIX_THRESHOLD, MILLI_THRESHOLD = 10.0, 0.01
 """A force or a couple is said in the next larger unit from so many of these on, below so many in thousandths."""
 SCALE_SYMBOLS = {"length": "μₗ", "velocity": "μᵥ", "acceleration": "μₐ"}
 """Of the calculating scales of a space diagram and its polygons."""
+_NO_UNITS = FileUnits()
+INCH = 25.4
+"""mm."""
 
 
 @dataclass(frozen=True)
 class Scale:
-    """So much of a quantity (SI) to a millimetre on paper; `unit` is the one in which it is said, such as mm or m/s."""
+    """So much of a quantity (SI) to a millimetre on paper; `unit` is the one in which it is said, such as mm or m/s.
+
+    It is said by the centimetre of paper, of inches and the like by the inch.
+    """
 
     kind: str
     per_mm: float
@@ -42,18 +49,45 @@ class Scale:
 
     def __str__(self) -> str:
         """As chapters write it: 1 cm = 100 mm."""
-        value, written = parse_unit(self.unit).from_si(10.0 * self.per_mm), self.unit
+        paper, length = paper_unit(self.unit)
+        value, written = parse_unit(self.unit).from_si(length * self.per_mm), self.unit
         if written == "mm" and value >= 1000.0:
             value, written = value / 1000.0, "m"
-        told = f"1 cm = {value:.6g} {printed_unit(written)}"
+        told = f"1 {paper} = {value:.6g} {format_unit(written)}"
         return f"{told} (1:1)" if self.kind == "length" and self.per_mm == 1e-3 else told
 
     @property
     def calculating_scale(self) -> str:
-        """The calculating scale, in SI units to a millimetre, of inches in these: μₗ = 0.01 m/mm."""
+        """The calculating scale, in SI units to a millimetre, of inches in these to an inch: μₗ = 0.01 m/mm."""
         name, of = coherent_unit(self.unit)
-        name = printed_unit(name)
-        return f"{SCALE_SYMBOLS[self.kind]} = {of.from_si(self.per_mm):.4g} {f'({name})' if '/' in name else name}/mm"
+        return format_calculating_scale(SCALE_SYMBOLS[self.kind], of.from_si(self.per_mm), name, FileUnits(length=name))
+
+    def paper_text(self, value: float) -> str:
+        """The length on paper of a value (SI): 40.0 mm, beside inches 1.57 in."""
+        paper, length = paper_unit(self.unit)
+        return f"{self.on_paper(value):.1f} mm" if paper == "cm" else f"{self.on_paper(value) / length:.2f} {paper}"
+
+
+def paper_unit(unit_name: str) -> tuple[str, float]:
+    """The length by which a scale of this unit is said, and its millimetres: a centimetre, or an inch."""
+    return ("in", INCH) if is_customary(unit_name) else ("cm", 10.0)
+
+
+def tick_spacing(unit_name: str) -> float:
+    """mm between the ticks of an axis at a scale that is said in this unit: a centimetre, or half an inch."""
+    return INCH / 2.0 if is_customary(unit_name) else 10.0
+
+
+def paper_length(length: float, units: FileUnits) -> str:
+    """A length on paper (mm): 150 mm, beside inches 5.91 in."""
+    return f"{length / INCH:.2f} in" if is_customary(units.length) else f"{length:g} mm"
+
+
+def format_calculating_scale(symbol: str, per_mm: float, unit_name: str, units: FileUnits) -> str:
+    """A calculating scale, so much of a unit by the millimetre of paper, beside inches by the inch."""
+    by, per = (INCH, "in") if is_customary(units.length) else (1.0, "mm")
+    name = format_unit(unit_name)
+    return f"{symbol} = {per_mm * by:.4g} {f'({name})' if '/' in name else name}/{per}"
 
 
 def round_scale(
@@ -61,13 +95,13 @@ def round_scale(
 ) -> Scale:
     """The roundest largest scale at which `width` x `height` (SI) fits the room (mm); `written` is the unit said."""
     most = max(width / room[0], height / room[1])
-    size = parse_unit(unit_name)
-    per_cm = size.from_si(10.0 * most)
-    if not isfinite(per_cm) or per_cm <= 0.0:
-        return Scale(kind, size.to_si(1.0) / 10.0, unit_name)
-    power = 10.0 ** floor(log10(per_cm))
-    first = next(digit for digit in ROUND_DIGITS if digit * power >= per_cm * (1.0 - ROUND_SLACK))
-    return Scale(kind, size.to_si(first * power) / 10.0, unit_name)
+    size, (_, length) = parse_unit(unit_name), paper_unit(unit_name)
+    least = size.from_si(length * most)
+    if not isfinite(least) or least <= 0.0:
+        return Scale(kind, size.to_si(1.0) / length, unit_name)
+    power = 10.0 ** floor(log10(least))
+    first = next(digit for digit in ROUND_DIGITS if digit * power >= least * (1.0 - ROUND_SLACK))
+    return Scale(kind, size.to_si(first * power) / length, unit_name)
 
 
 def round_step(least: float, first_digits: Sequence[float] = DECIMAL_STEPS) -> float:
@@ -88,24 +122,31 @@ def choose_prefix(value: float) -> tuple[str, float]:
     return next((each for each in LARGE_PREFIXES if abs(value) >= PREFIX_THRESHOLD * each[1]), small)
 
 
-def format_force(value: float, measure: str) -> str:
+def unit_for_size(kind: str, greatest: float, units: FileUnits) -> tuple[str, float]:
+    """The unit in which so great a force (N) or couple (N m) is said, as it is printed, and how many SI units it has.
+
+    In SI with a prefix, unless the file declares another unit for it.
+    """
+    name, of = display_unit(kind, units)
+    if not is_si(kind, units):
+        return name, of.to_si(1.0)
+    prefix, per = choose_prefix(greatest)
+    return prefix + name, per
+
+
+def format_force(value: float, kind: str, units: FileUnits) -> str:
     """A force (N) or a couple (N m) with its unit: 46.65 kN."""
-    prefix, by = choose_prefix(value)
-    return f"{value / by:.4g} {prefix}{measure}".replace("-", "−")
+    name, per = unit_for_size(kind, value, units)
+    return f"{value / per:.4g} {name}".replace("-", "−")
 
 
-def printed_unit(unit_name: str) -> str:
-    """A unit as it is printed: m/s²."""
-    return unit_name.replace("^2", "²")
-
-
-def parse_scale(text: str) -> Scale:
+def parse_scale(text: str, units: FileUnits = _NO_UNITS) -> Scale:
     """A scale as a reader writes it: "1 cm = 0.1 m/s", of lengths also "1:5" or "2:1". Raises BadInput."""
     ratio = re.fullmatch(r"\s*([0-9.]+)\s*:\s*([0-9.]+)\s*", text)
     try:
         if ratio is not None:
             paper, real = (float(part) for part in ratio.groups())
-            kind, per_mm, written = "length", 1e-3 * real / paper, "mm"
+            kind, per_mm, written = "length", 1e-3 * real / paper, units.length if is_customary(units.length) else "mm"
         else:
             left, equals, right = text.partition("=")
             if not equals:
@@ -120,11 +161,15 @@ def parse_scale(text: str) -> Scale:
     return Scale(kind, per_mm, written)
 
 
-def parse_scales(texts: str | Sequence[str] | None, kinds: Sequence[str] = tuple(SCALE_SYMBOLS)) -> dict[str, Scale]:
+def parse_scales(
+    texts: str | Sequence[str] | None,
+    kinds: Sequence[str] = tuple(SCALE_SYMBOLS),
+    units: FileUnits = _NO_UNITS,
+) -> dict[str, Scale]:
     """Scales as a reader writes them, by the kind of quantity that each measures. Raises BadInput for other kinds."""
     found: dict[str, Scale] = {}
     for text in [texts] if isinstance(texts, str) else texts or ():
-        scale = parse_scale(text)
+        scale = parse_scale(text, units)
         if scale.kind not in kinds:
             raise BadInput("scale", f"this drawing has a scale of {' and of '.join(kinds)}, not of {scale.kind}")
         if scale.kind in found:

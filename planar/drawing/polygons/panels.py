@@ -13,7 +13,7 @@ from planar.drawing.polygons.polygon import polygon_picture
 from planar.drawing.scheme.scene import plain_frames
 from planar.drawing.scheme.scheme import scheme as scheme_picture
 from planar.drawing.scheme.scheme import space_scale
-from planar.foundation.units import unit_of_kind
+from planar.model.file_units import unit_of_kind
 from planar.results.motion import State
 
 ScaleTexts = str | Sequence[str] | None
@@ -24,7 +24,7 @@ PANEL_SIZE = (80.0, 80.0)
 
 def polygon_panels(state: State, scales: ScaleTexts, count: int) -> list[Picture]:
     """Space diagram, velocity polygon and acceleration polygon, the first of them, each small enough for a row."""
-    given = paper.parse_scales(scales, ("length", "velocity", "acceleration")[:count])
+    given = paper.parse_scales(scales, ("length", "velocity", "acceleration")[:count], state.mechanism.units)
     space = given.get("length")
     if space is None:
         whole = space_scale(state.mechanism, plain_frames(state.frames), state.shapes)

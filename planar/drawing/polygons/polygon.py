@@ -17,7 +17,7 @@ from planar.analysis.rate_equations import RateEquations, SlideJoint, rate_equat
 from planar.drawing.labels.text_line import LETTER_PATTERN
 from planar.drawing.paper.picture import Arrow, Circle, Label, Mark, Pen, Picture, Polyline, paper_point
 from planar.drawing.paper.scales import Scale, round_scale
-from planar.foundation.units import unit_of_kind
+from planar.model.file_units import unit_of_kind
 from planar.model.mechanism import named_points
 
 SAME_POINT_DISTANCE = 0.05

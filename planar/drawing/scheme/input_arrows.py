@@ -23,7 +23,7 @@ from planar.drawing.scheme.symbol_table import (
 )
 from planar.foundation import jets
 from planar.foundation.geometry import Vector, direction
-from planar.foundation.units import display_unit
+from planar.model.file_units import display_unit
 from planar.model.link_graph import link_numbers
 from planar.model.mechanism import Input, relative_motions
 from planar.model.pairs import MeasureKind, Pair

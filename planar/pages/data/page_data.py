@@ -12,9 +12,10 @@ from planar.assemblies.circuits.circuits import Circuits, circuits
 from planar.assemblies.modes import Mode, modes
 from planar.codegen.javascript import write_javascript
 from planar.document.dimensions import Dimension, change_dimension
+from planar.drawing.paper.scales import paper_unit
 from planar.equations.mechanism_numbers import scale_lengths, shapes_of_links
 from planar.equations.symbolic_equations import slice_length
-from planar.foundation.units import display_unit
+from planar.model.file_units import display_unit
 from planar.model.link_graph import link_numbers
 from planar.model.link_shapes import PointPlacementError
 from planar.model.mechanism import Mechanism, links_counting_turns, named_points, pair_misfits
@@ -39,7 +40,17 @@ MAX_ASSEMBLIES = 64
 """Assemblies that a page offers."""
 
 
-SHOWN_KINDS = ("length", "angle", "velocity", "acceleration", "angular velocity", "angular acceleration")
+SHOWN_KINDS = (
+    "length",
+    "angle",
+    "velocity",
+    "acceleration",
+    "angular velocity",
+    "angular acceleration",
+    "force",
+    "torque",
+    "power",
+)
 """Of quantities that a page shows."""
 
 
@@ -70,6 +81,7 @@ def page_data(mechanism: Mechanism, z: np.ndarray | None = None) -> tuple[dict[s
         "name": mechanism.name,
         "about": mechanism.about,
         "units": _unit_data(mechanism),
+        "paper": dict(zip(("name", "mm"), paper_unit(mechanism.units.length), strict=True)),
         "column": {
             link.name: [solver.column[link.name, part] for part in ("x", "y", "angle")]
             for link in mechanism.links

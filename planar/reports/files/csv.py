@@ -17,7 +17,7 @@ CSV_BLOCK_ROWS = 500
 
 
 def encode_csv(motion: Motion, more: Iterable[ReportedSeries]) -> bytes:
-    """A row a position; positions and angles in the units of the mechanism's file, rates in SI, as the heads say."""
+    """A row a position; in the units that go with the mechanism's file, as the heads say."""
     all_columns = tuple(run_columns(motion, more))
     text = io.BytesIO()
     text.write((",".join(_csv_cell(column.head) for column in all_columns) + "\n").encode())

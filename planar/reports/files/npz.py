@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from planar.reports.columns import UNITS_BY_KIND, ReportedSeries, reported_series, run_header
+from planar.model.file_units import RESULT_SI_UNITS
+from planar.reports.columns import ReportedSeries, reported_series, run_header
 from planar.results.motion import Motion
 
 
@@ -20,12 +21,12 @@ def encode_npz(motion: Motion, more: Iterable[ReportedSeries]) -> bytes:
     arrays: dict[str, Any] = {}
     units: dict[str, str] = {}
     if motion.time is not None:
-        arrays["time"], units["time"] = motion.time, UNITS_BY_KIND["time"]
+        arrays["time"], units["time"] = motion.time, RESULT_SI_UNITS["time"]
     for thing in (*reported_series(motion), *more):
         for what, values in thing.values.items():
             if values is not None:
                 name = "/".join(filter(None, (thing.group, thing.name, what)))
-                arrays[name], units[name] = values, UNITS_BY_KIND[thing.kinds[what]]
+                arrays[name], units[name] = values, RESULT_SI_UNITS[thing.kinds[what]]
     texts: dict[str, Any] = {what: np.array(text) for what, text in run_header(motion).items()}
     content = io.BytesIO()
     np.savez(content, **arrays, **texts, units=np.array(list(units.items())))

@@ -13,8 +13,9 @@ from rich.text import Text
 from planar.analysis.motion.analytical_route import AnalyticalRoute, RodPointComparison, TwoTermComparison
 from planar.analysis.motion.harmonics import Harmonics
 from planar.foundation.arrays import Array
-from planar.foundation.units import length_unit_of_rates, parse_unit
-from planar.model.mechanism import FileUnits, Mechanism
+from planar.foundation.units import parse_unit
+from planar.model.file_units import FileUnits, display_unit, unit_by_input
+from planar.model.mechanism import Mechanism
 from planar.model.wording import amount, count_phrase
 from planar.reports.fitted_table import plain_table
 from planar.reports.number_format import paragraphs
@@ -34,7 +35,7 @@ def analytical_tables(mechanism: Mechanism, routes: Sequence[AnalyticalRoute]) -
     first = routes[0]
     running = first.series[0].input
     at = f"{running} = {amount(first.position, 'angle', mechanism.units)}"
-    rate = f"at the steady rate of the file, {_format_number(first.rate)} rad/s"
+    rate = f"at the steady rate of the file, {_rate_text(first.rate, mechanism.units)}"
     rate = "rates per radian of it, as its velocity in the file is 0" if first.per_unit else rate
     parts: list[RenderableType] = [Text(mechanism.name, style="bold")]
     if mechanism.source:
@@ -47,21 +48,29 @@ def analytical_tables(mechanism: Mechanism, routes: Sequence[AnalyticalRoute]) -
     return Group(*parts)
 
 
+def _rate_text(rate: float, units: FileUnits) -> str:
+    name, of = display_unit("angular velocity", units)
+    return f"{_format_number(of.from_si(rate))} {name}"
+
+
 class _RateUnits(NamedTuple):
-    """The units of velocity and acceleration, by time or by the input's angle, and how many of the length are 1 m."""
+    """The units of velocity and acceleration, by time or by the input's angle, and how many of each are one in SI."""
 
     velocity: str
     acceleration: str
-    length_factor: float
+    per_si: tuple[float, float]
 
 
 def _route_tables(route: AnalyticalRoute, units: FileUnits) -> Iterator[RenderableType]:
     point = route.series[0].axis is not None
     yield Text(f"{'Point' if point else 'Slide'} {route.of}", style="bold")
-    name, length = length_unit_of_rates(units.length)
-    per = _RateUnits(
-        *((f"{name}/rad", f"{name}/rad²") if route.per_unit else (f"{name}/s", f"{name}/s²")), length.from_si(1)
-    )
+    if route.per_unit:
+        found = [unit_by_input(True, order, False, units) for order in (1, 2)]
+    else:
+        shown = [display_unit(kind, units) for kind in ("velocity", "acceleration")]
+        found = [(name, of.from_si(1.0)) for name, of in shown]
+    (velocity, first), (acceleration, second) = found
+    per = _RateUnits(velocity, acceleration, (first, second))
     yield paragraphs(_route_facts(route, units, per))
     yield _harmonics_table(route.series, units)
     if route.formula is not None:
@@ -80,13 +89,13 @@ def _route_facts(route: AnalyticalRoute, units: FileUnits, per: _RateUnits) -> I
         )
         yield "stroke", f"{_length_text(stroke.length, units)}: {'; '.join(ends)}"
     fastest = (
-        f"{_format_number(route.fastest.value * per.length_factor)} {per.velocity} at "
+        f"{_format_number(route.fastest.value * per.per_si[0])} {per.velocity} at "
         f"{_angle_text(route.fastest.input, units)}"
     )
     if route.formula is not None:
         by_two = route.formula.fastest
         fastest += (
-            f"; by two terms {_format_number(by_two.value * per.length_factor)} {per.velocity} at "
+            f"; by two terms {_format_number(by_two.value * per.per_si[0])} {per.velocity} at "
             f"{_angle_text(by_two.input, units)}"
         )
     yield "greatest speed", fastest
@@ -151,7 +160,7 @@ def _formula_table(formula: TwoTermComparison, units: FileUnits, per: _RateUnits
     )
     length = parse_unit(units.length)
     names = (("displacement", units.length), ("velocity", per.velocity), ("acceleration", per.acceleration))
-    scales = (length.from_si(1.0), per.length_factor, per.length_factor)
+    scales = (length.from_si(1.0), *per.per_si)
     for (name, measure), by, exact, two, off in zip(
         names, scales, formula.exact, formula.here, formula.deviations, strict=True
     ):
@@ -177,8 +186,8 @@ def _rod_table(rod: RodPointComparison, units: FileUnits, per: _RateUnits) -> Re
     length = parse_unit(units.length)
     names = (
         ("", units.length, length.from_si(1.0)),
-        ("velocity", per.velocity, per.length_factor),
-        ("acceleration", per.acceleration, per.length_factor),
+        ("velocity", per.velocity, per.per_si[0]),
+        ("acceleration", per.acceleration, per.per_si[1]),
     )
     for (name, measure, by), exact, two in zip(names, rod.exact, rod.here, strict=True):
         rows = [(f"{name} {axis}".strip(), float(exact[k]), float(two[k])) for k, axis in enumerate("xy")]

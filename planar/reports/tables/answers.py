@@ -12,12 +12,12 @@ from rich.text import Text
 
 from planar.analysis.motion.answers import Answers
 from planar.analysis.motion.output import Axis, Extreme
-from planar.foundation.units import length_unit_of_rates, parse_unit
-from planar.model.mechanism import FileUnits
+from planar.foundation.units import parse_unit
+from planar.model.file_units import FileUnits, display_unit, unit_by_input
 from planar.model.wording import amount
 from planar.reports.fitted_table import plain_table
 from planar.reports.number_format import DIGITS
-from planar.reports.tables.forces.mechanical_advantage import ADVANTAGE_UNITS
+from planar.reports.tables.forces.mechanical_advantage import advantage_unit
 from planar.results.motion import Motion
 
 AnswerRow = tuple[str, str, str, str]
@@ -81,14 +81,12 @@ def _range_rows(each: Answers, units: FileUnits, position: _PositionFormatter) -
 
 
 def _rate_rows(each: Answers, units: FileUnits, position: _PositionFormatter) -> Iterator[AnswerRow]:
-    name, length = length_unit_of_rates(units.length)
-    what, per = (name if each.length else "rad"), (name if position.kind == "length" else "rad")
-    by = length.from_si(1.0) if each.length else 1.0
-    measures = (f"{what}/{per}", f"{what}/{per}²") if each.per_unit else (f"{what}/s", f"{what}/s²")
-    scales = (by / length.from_si(1.0) ** order if each.per_unit and per == name else by for order in (1, 2))
-    for word, found, measure, scale in zip(
-        ("velocity", "acceleration"), (each.velocity, each.acceleration), measures, scales, strict=True
-    ):
+    for order, word, found in ((1, "velocity", each.velocity), (2, "acceleration", each.acceleration)):
+        if each.per_unit:
+            measure, scale = unit_by_input(each.length, order, position.kind == "length", units)
+        else:
+            measure, of = display_unit(word if each.length else f"angular {word}", units)
+            scale = of.from_si(1.0)
         if found is not None and np.isfinite(found.value):
             yield f"greatest {word}", f"{found.value * scale:.{DIGITS}g} {measure}", position(found.input), ""
         elif found is not None:
@@ -99,17 +97,17 @@ def _rate_rows(each: Answers, units: FileUnits, position: _PositionFormatter) ->
 def _use_rows(each: Answers, units: FileUnits, position: _PositionFormatter) -> Iterator[AnswerRow]:
     """Area, transmission angle, mechanical advantage."""
     if each.area is not None:
-        scale = parse_unit(units.length).from_si(1.0) ** 2
-        value = each.area.value * scale if abs(each.area.value) > each.area.error else 0.0
-        yield "area of its curve", f"{value:.{DIGITS}g} {units.length}²", "", "anticlockwise positive"
+        name, of = display_unit("area", units)
+        value = of.from_si(each.area.value) if abs(each.area.value) > each.area.error else 0.0
+        yield "area of its curve", f"{value:.{DIGITS}g} {name}", "", "anticlockwise positive"
     if each.transmission is not None and each.transmission.least is not None:
         least = each.transmission.least
         through = f"driven at {' and '.join(each.transmission.through)}"
         yield "least transmission angle", amount(least.value, "angle", units), position(least.input), through
     if each.advantage is not None:
         found = each.advantage
-        measure = ADVANTAGE_UNITS[found.measure]
-        told = f"{found.least.value:.{DIGITS}g}" + (f" {measure}" if measure else "")
+        measure, by = advantage_unit(found.measure, units)
+        told = f"{found.least.value * by:.{DIGITS}g}" + (f" {measure}" if measure else "")
         yield "least mechanical advantage", told, position(found.least.input), ""
         for place in found.infinite:
             yield "  beyond all bounds", "", position(place), ""

@@ -12,8 +12,8 @@ from planar.analysis.classroom.marking import RIGHT, MarkedValue, StudentMarks
 from planar.analysis.classroom.questions import problem_questions, question_text, solve_question
 from planar.analysis.classroom.variants import Variant
 from planar.document.dimensions import file_dimensions
-from planar.foundation.units import display_unit
-from planar.model.mechanism import PUBLISHED_QUANTITIES, FileUnits
+from planar.model.file_units import FileUnits, display_unit
+from planar.model.mechanism import PUBLISHED_QUANTITIES
 from planar.reports.fitted_table import plain_table
 from planar.reports.number_format import DIGITS
 from planar.results.motion import State
@@ -22,8 +22,8 @@ from planar.results.motion import State
 def variants_tables(base: State, variants: Sequence[Variant], seed: int) -> RenderableType:
     """The numbers of all variants, then what is asked with the answers."""
     mechanism = base.mechanism
-    kinds = {name: display_unit(each.kind, mechanism.units) for name, each in file_dimensions(mechanism).items()}
-    names = list(variants[0].values)
+    names, known = list(variants[0].values), file_dimensions(mechanism)
+    kinds = {name: display_unit(known[name].kind, mechanism.units) for name in names}
     numbers = plain_table("Numbers", "variant", *(f"{name} ({kinds[name][0]})" for name in names), keys=1)
     for each in variants:
         shown = (f"{kinds[name][1].from_si(value):.{DIGITS}g}" for name, value in each.values.items())

@@ -27,6 +27,7 @@ def inspection_tables(found: Inspection) -> RenderableType:
         ("pairs", f"{count_phrase(found.lower, 'lower pair')}, {count_phrase(found.higher, 'higher pair')}"),
         *((" ", f"{len(pairs)} {kind}: {', '.join(pairs)}") for kind, pairs in found.pairs),
         *_mobility_facts(found),
+        *([("units", ", ".join(f"{kind} {unit}" for kind, unit in found.units.items()))] if found.units else []),
     ]
     return Group(
         Text(found.name, style="bold"),

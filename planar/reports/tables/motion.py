@@ -8,7 +8,8 @@ import numpy as np
 from rich.console import Group, RenderableType
 from rich.text import Text
 
-from planar.foundation.units import display_unit, parse_unit
+from planar.foundation.units import parse_unit
+from planar.model.file_units import display_unit
 from planar.model.wording import amount, count_phrase, join_all_names
 from planar.reports.fitted_table import FittedTable, plain_table
 from planar.reports.number_format import (

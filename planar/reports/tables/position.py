@@ -9,8 +9,8 @@ from rich.console import Group, RenderableType
 from rich.text import Text
 
 from planar.analysis.worked.published import Comparison
-from planar.foundation.units import display_unit, parse_unit
-from planar.model.mechanism import PUBLISHED_QUANTITIES, FileUnits, relative_motions
+from planar.model.file_units import FileUnits, display_unit
+from planar.model.mechanism import PUBLISHED_QUANTITIES, relative_motions
 from planar.model.pairs import Pair
 from planar.model.wording import amount, join_all_names
 from planar.reports.fitted_table import FittedTable, plain_table
@@ -93,14 +93,13 @@ def _links_table(state: State) -> FittedTable:
         column_heading("ang. velocity", "angular velocity", units),
         (column_heading("ang. acceleration", "angular acceleration", units), "sense"),
     )
-    angle = parse_unit(units.angle)
     for name, link in state.links.items():
         if name != state.mechanism.frame:
             table.add_row(
                 name,
-                format_number(angle.from_si(link.angle)),
-                format_number(link.angular_velocity),
-                format_number(link.angular_acceleration),
+                _report_cell(link.angle, "angle", units),
+                _report_cell(link.angular_velocity, "angular velocity", units),
+                _report_cell(link.angular_acceleration, "angular acceleration", units),
                 link.sense,
             )
     return table

@@ -9,10 +9,11 @@ import numpy as np
 from rich.console import Group, RenderableType
 
 from planar.dynamics.simulation import Simulation
-from planar.foundation.units import display_unit, parse_unit
+from planar.foundation.units import parse_unit
+from planar.model.file_units import display_unit
 from planar.reports.columns import ReportedSeries
 from planar.reports.fitted_table import FittedTable, plain_table
-from planar.reports.number_format import format_number, format_or_zero, paragraphs
+from planar.reports.number_format import column_heading, format_number, format_quantity, paragraphs
 from planar.reports.tables.motion import motion_tables
 
 ENERGIES = ("kinetic", "potential", "work")
@@ -49,14 +50,18 @@ def _inputs_table(simulation: Simulation) -> FittedTable:
 
 
 def _energies_table(simulation: Simulation) -> FittedTable:
-    headings = ("of", "at the start, J", "at the end, J", "least, J", "greatest, J")
+    units = simulation.motion.mechanism.units
+    headings = (
+        "of",
+        *(column_heading(each, "energy", units) for each in ("at the start", "at the end", "least", "greatest")),
+    )
     table = plain_table("Energy", *headings)
     names = ("kinetic energy", "potential energy", "work put in")
     most = max(float(np.abs(getattr(simulation, what)).max()) for what in ENERGIES)
     for name, what in zip(names, ENERGIES, strict=True):
         values = getattr(simulation, what)
         ends = (values[0], values[-1], values.min(), values.max())
-        table.add_row(name, *(format_or_zero(float(each), most) for each in ends))
+        table.add_row(name, *(format_quantity(float(each), "energy", units, most) for each in ends))
     return table
 
 

@@ -13,7 +13,8 @@ from planar.analysis.rich_text import PaperScale, Phrase, format_number, plain_t
 from planar.analysis.worked.sections import Section
 from planar.analysis.worked.solution import LinkResult, PointResult, SlideResult, WorkedPolygon, WorkedSolution
 from planar.dynamics.load_attachment import attachment_remarks
-from planar.foundation.units import Unit, display_unit, parse_unit
+from planar.foundation.units import Unit, format_unit, parse_unit
+from planar.model.file_units import display_unit, rate_unit
 from planar.reports.fitted_table import plain_table
 from planar.reports.number_format import column_heading, paragraphs
 from planar.reports.tables.position import published_table
@@ -59,7 +60,7 @@ def _section_parts(section: Section, half: WorkedPolygon, scales: Scales) -> Ite
     if section.equation:
         yield paragraphs((" ", plain_text(line)) for line in section.equation)
     if section.rows:
-        yield _vector_table(section.rows, display_unit(half.kind, half.polygon.state.mechanism.units)[0])
+        yield _vector_table(section.rows, format_unit(rate_unit(half.kind, half.polygon.state.mechanism.units)[0]))
     steps = [(f"{count})", plain_text(step, scales)) for count, step in enumerate((*section.steps, *section.images), 1)]
     if section.simultaneous:
         yield paragraphs(steps[: len(section.steps)])
@@ -86,10 +87,15 @@ def _result_tables(solution: WorkedSolution) -> Iterator[RenderableType]:
     units = solution.state.mechanism.units
     rates = [display_unit(kind, units)[1] for kind in ("velocity", "acceleration")]
     links = plain_table(
-        "Links", "link", ("ang. velocity, rad/s", "sense"), ("ang. acceleration, rad/s²", "sense"), left=(0, 2, 4)
+        "Links",
+        "link",
+        (column_heading("ang. velocity", "angular velocity", units), "sense"),
+        (column_heading("ang. acceleration", "angular acceleration", units), "sense"),
+        left=(0, 2, 4),
     )
+    turns = [display_unit(kind, units)[1] for kind in ("angular velocity", "angular acceleration")]
     for link in solution.links:
-        links.add_row(*_link_cells(link))
+        links.add_row(*_link_cells(link, turns))
     points = plain_table(
         "Points",
         "point",
@@ -120,9 +126,10 @@ def _result_tables(solution: WorkedSolution) -> Iterator[RenderableType]:
         yield _phrase_paragraphs(solution.rubbing, {})
 
 
-def _link_cells(link: LinkResult) -> tuple[str, ...]:
+def _link_cells(link: LinkResult, turns: Sequence[Unit]) -> tuple[str, ...]:
     name, velocity, sense, acceleration, second = link
-    return name, format_number(abs(velocity)), sense, format_number(abs(acceleration)), second
+    first, after = (of.from_si(abs(each)) for of, each in zip(turns, (velocity, acceleration), strict=True))
+    return name, format_number(first), sense, format_number(after), second
 
 
 def _point_cells(point: PointResult, rates: Sequence[Unit]) -> tuple[str, ...]:

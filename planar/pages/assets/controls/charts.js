@@ -15,8 +15,8 @@ const DIAGRAMS = [
   { key: "angle", label: "angle", unit: "angle", kind: "link", of: (c, i) => c.angle[i] - c.turns },
   { key: "w", label: "angular velocity", unit: "angular velocity", kind: "link", of: (c, i) => c.w[i] },
   { key: "e", label: "angular acceleration", unit: "angular acceleration", kind: "link", of: (c, i) => c.e[i] },
-  { key: "torque", label: "input torque", unit: "N·m", kind: "input", of: (c, i) => c.effort[i] },
-  { key: "push", label: "input force", unit: "N", kind: "input", of: (c, i) => c.effort[i] },
+  { key: "torque", label: "input torque", unit: "torque", kind: "input", of: (c, i) => c.effort[i] },
+  { key: "push", label: "input force", unit: "force", kind: "input", of: (c, i) => c.effort[i] },
 ];
 
 class Charts {
@@ -74,7 +74,7 @@ class Charts {
   /** Of what a diagram has lines. */
   names({ kind, unit }) {
     const { page } = this;
-    if (kind === "input") return (page.forces?.inputs ?? []).filter((each) => each.slides === (unit === "N")).map((each) => each.pair);
+    if (kind === "input") return (page.forces?.inputs ?? []).filter((each) => each.slides === (unit === "force")).map((each) => each.pair);
     return kind === "point" ? page.chosen.points() : page.chosen.links();
   }
 

@@ -20,17 +20,18 @@ class ForceTables {
     this.told.hidden = this.told.textContent === "";
     if (!found.efforts) { this.rows("inputs", "", [], []); this.rows("pairs", "", [], []); return; }
     const [force, couple] = page.forces.least(found);
-    const number = (value, least) => [value, Math.abs(value) <= least ? "0" : Number.isFinite(value) ? figures(value) : ""];
+    const number = (value, least, by) => [value, Math.abs(value) <= least ? "0" : Number.isFinite(value) ? figures(value * by) : ""];
     const [degree, angle] = unitOf(page, "angle"), rates = page.inputRates();
-    this.rows("inputs", `What inputs supply at ${at}`, [["input"], ["torque or force"], ["unit"], ["power", "W"]], found.inputs.map((each, k) => {
-      const least = each.slides ? force : couple, rate = rates[k][0];
-      return [each.pair, number(each.effort, least), each.slides ? "N" : "N·m", number(each.effort * rate, least * Math.abs(rate))];
+    const [[byForce, forceUnit], [byTorque, torqueUnit], [byPower, powerUnit]] = ["force", "torque", "power"].map((kind) => unitOf(page, kind));
+    this.rows("inputs", `What inputs supply at ${at}`, [["input"], ["torque or force"], ["unit"], ["power", powerUnit]], found.inputs.map((each, k) => {
+      const rate = rates[k][0], [least, by, unit] = each.slides ? [force, byForce, forceUnit] : [couple, byTorque, torqueUnit];
+      return [each.pair, number(each.effort, least, by), unit, number(each.effort * rate, least * Math.abs(rate), byPower)];
     }));
-    const head = [["pair"], ["on"], ["by"], ["force", "N"], ["at", angle], ["along x", "N"], ["along y", "N"], ["couple", "N·m"]];
+    const head = [["pair"], ["on"], ["by"], ["force", forceUnit], ["at", angle], ["along x", forceUnit], ["along y", forceUnit], ["couple", torqueUnit]];
     this.rows("pairs", `Reactions in the pairs at ${at}`, head, pairForces(found, page.chosen.links()).filter((each) => Number.isFinite(each.couple)).map(({ pair, link, by, force: [x, y], couple: turned }) => {
       const size = Math.hypot(x, y), way = Math.atan2(y, x);
       const at = size > force ? [way, figures(way * degree)] : [NaN, ""];
-      return [pair, link, by ?? "", number(size, force), at, number(x, force), number(y, force), number(turned, couple)];
+      return [pair, link, by ?? "", number(size, force, byForce), at, number(x, force, byForce), number(y, force, byForce), number(turned, couple, byTorque)];
     }));
   }
 

@@ -104,11 +104,12 @@ const forceArrows = {
     const { page } = layers, { data } = page, found = page.forces.now(), chosen = page.chosen.links();
     if (!found.efforts) return `Forces: ${found.why}`;
     const most = greatestForce(found), usual = usualForce(page, most), [nothing, still] = page.forces.least(found);
+    const [byTorque, torqueUnit] = unitOf(page, "torque");
     const pushes = [
       ...pairForces(found, chosen).filter((each) => each.at !== null).map((each) => ({ ...each, kind: "reaction", name: each.pair, of: "reaction" })),
       ...[...found.acting, ...found.inputs].map((each) => ({ ...each, of: `load ${each.kind}` })),
     ];
-    const { px, told } = roundScale(most > BEYOND * usual ? most : usual, MAX_ARROW_LENGTH, [1, "N"]), turned = [];
+    const { px, told } = roundScale(page, most > BEYOND * usual ? most : usual, MAX_ARROW_LENGTH, unitOf(page, "force")), turned = [];
     for (const { at, force, couple, of, kind, name, link } of pushes) {
       const tail = layers.at(at), length = Math.hypot(...force), [symbol, turning] = data.forces.symbols[kind][name][link];
       const key = `${of} ${symbol} ${link}`;
@@ -122,7 +123,7 @@ const forceArrows = {
         const there = turned.filter((each) => Math.hypot(each[0] - tail[0], each[1] - tail[1]) < 1).length;
         turned.push(tail);
         const { at: place, away } = ink.turn(tail, there, Math.sign(couple), `arrow ${of}`);
-        ink.letter(place, [turning], `letter ${of}`, { away, key: `${key} turned`, told: ` = ${figures3(Math.abs(couple))} N·m` });
+        ink.letter(place, [turning], `letter ${of}`, { away, key: `${key} turned`, told: ` = ${figures3(Math.abs(couple) * byTorque)} ${torqueUnit}` });
       }
     }
     const on = chosen.length ? `of the pairs on ${chosen.join(", ")}` : "of every pair on its second link";

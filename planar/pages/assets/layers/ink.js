@@ -2,7 +2,7 @@
 /* What layers are drawn with: SVG elements, arrows, dots, letters that keep clear of one another, round scales. */
 
 const SVG = "http://www.w3.org/2000/svg";
-const CM = 96 / 2.54; // px of a screen's centimetre
+const MM = 96 / 25.4; // px of a screen's millimetre
 
 /** An element of SVG, or of HTML (`html`), with attributes, in a parent; a text is shown as text. */
 function svgPart(tag, attributes = {}, parent = null, text = null) {
@@ -27,10 +27,10 @@ function roundUp(least, values = STEP_VALUES) {
 }
 
 /** A scale at which `most` (SI) takes no more than `room` px, of a unit [by, name] (see `unitOf`): {px per SI unit,
-    told: "1 cm = 0.2 m/s"}. */
-function roundScale(most, room, [by, name]) {
-  const perCm = roundUp((most * by * CM) / room, SCALE_VALUES);
-  return { px: (CM / perCm) * by, told: `1 cm = ${short(perCm)} ${name}` };
+    told: "1 cm = 0.2 m/s"}, by the page's length on paper: a centimetre, or an inch. */
+function roundScale(page, most, room, [by, name]) {
+  const { paper } = page.data, length = paper.mm * MM, per = roundUp((most * by * length) / room, SCALE_VALUES);
+  return { px: (length / per) * by, told: `1 ${paper.name} = ${short(per)} ${name}` };
 }
 
 /** A number as people write it, six figures at the most. */

@@ -46,7 +46,7 @@ function arrows(rate) {
       if (now[0][rate] === null) return `${Word}: ${page.undetermined}`;
       const usual = greatest(page, names, parts), most = Math.max(...now.map((point) => Math.hypot(...point[rate])));
       if (!(usual > 0)) return `${Word}: none of these points has one at the inputs' rates`;
-      const { px, told } = roundScale(most > BEYOND * usual ? most : usual, MAX_ARROW_LENGTH, unitOf(page, unit));
+      const { px, told } = roundScale(page, most > BEYOND * usual ? most : usual, MAX_ARROW_LENGTH, unitOf(page, unit));
       now.forEach((point) => {
         const tail = layers.at(point.position), [x, y] = point[rate];
         ink.arrow(tail, [tail[0] + x * px, tail[1] - y * px], `arrow ${rate}`);

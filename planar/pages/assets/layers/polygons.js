@@ -108,7 +108,7 @@ function polygonFit(page, svg, rate, values, state) {
   const zoom = svg.getScreenCTM()?.a || 1;
   if (state.zoom !== zoom) Object.assign(state, { zoom, fit: null });
   const fitted = (box) => {
-    const { px: onScreen, told } = roundScale(room(box) / zoom, 1, unitOf(page, unit)), px = onScreen / zoom;
+    const { px: onScreen, told } = roundScale(page, room(box) / zoom, 1, unitOf(page, unit)), px = onScreen / zoom;
     return { px, told, pole: [width / 2 - ((box[0] + box[2]) / 2) * px, height / 2 + ((box[1] + box[3]) / 2) * px] };
   };
   const fits = ({ px, pole }) => values.every(([x, y]) => {

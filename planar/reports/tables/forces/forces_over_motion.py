@@ -14,10 +14,11 @@ from planar.dynamics.load_attachment import attachment_remarks
 from planar.dynamics.reactions import Reaction
 from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput
+from planar.model.file_units import display_unit
 from planar.model.wording import count_phrase, join_all_names
 from planar.reports.columns import ReportedSeries
 from planar.reports.fitted_table import FittedTable, plain_table
-from planar.reports.number_format import format_or_zero, paragraphs
+from planar.reports.number_format import column_heading, format_or_zero, format_quantity, paragraphs
 from planar.reports.tables.forces import loads
 from planar.reports.tables.forces import position_forces as at_one
 from planar.reports.tables.motion import motion_heading, position_cell, position_heading, running_pair
@@ -53,11 +54,12 @@ def _efforts_table(forces: Forces, motion: Motion) -> FittedTable:
         "Inputs, among these positions", "input", ("mean effort", "unit"), ("least", at), ("greatest", at), left=(0, 2)
     )
     for name, effort in forces.inputs.items():
-        _, unit = at_one.effort_name_and_unit(forces, name)
+        _, unit, of = at_one.effort_name_and_unit(forces, name)
         values = np.asarray(effort)
         least, greatest = (_greatest_with_place(motion, sense * values) for sense in (-1.0, 1.0))
         mean, low, high = (
-            format_or_zero(each, most[unit == "N"]) for each in (_mean(motion, values), -least[0], greatest[0])
+            format_or_zero(of.from_si(each), of.from_si(most[forces.is_force_input(name)]))
+            for each in (_mean(motion, values), -least[0], greatest[0])
         )
         table.add_row(name, mean, unit, low, least[1], high, greatest[1])
     return table
@@ -82,21 +84,21 @@ def _greatest_with_place(motion: Motion, values: Array) -> tuple[float, str]:
 
 
 def _reactions_table(forces: Forces, motion: Motion) -> FittedTable:
-    degree, at, (moment, greatest) = (
-        forces.mechanism.units.angle,
+    units, at, (moment, greatest) = (
+        forces.mechanism.units,
         position_heading(motion),
         at_one.greatest_moment_and_force(forces),
     )
-    force = ("greatest force, N", f"its direction, {degree}", at)
-    headings = ("pair", "on", "by", force, ("greatest couple, N·m", at))
+    force = (column_heading("greatest force", "force", units), column_heading("its direction", "angle", units), at)
+    headings = ("pair", "on", "by", force, (column_heading("greatest couple", "torque", units), at))
     table = plain_table("Reactions in the pairs, among these positions", *headings, left=(0, 1, 2), keys=3)
     for name, each in forces.reactions.items():
         first, second = each.links
         if each.at is not None:
             sizes = np.hypot(*each.force.T)
             most, where = _greatest_with_place(motion, sizes)
-            way = loads.polar_cells(each.force[int(np.nanargmax(sizes))], degree, greatest)[1] if where else ""
-            told = format_or_zero(most, greatest), way, where if way else ""
+            way = loads.polar_cells(each.force[int(np.nanargmax(sizes))], units, "force", greatest)[1] if where else ""
+            told = format_quantity(most, "force", units, greatest), way, where if way else ""
             table.add_row(name, second, first, *told, *_greatest_couple(motion, each.couple, moment))
         for link, couple in each.couples.items():
             table.add_row(name, link, "", "-", "", "", *_greatest_couple(motion, couple, moment))
@@ -106,7 +108,7 @@ def _reactions_table(forces: Forces, motion: Motion) -> FittedTable:
 def _greatest_couple(motion: Motion, couple: Array | float, beside: float) -> tuple[str, str]:
     """The greatest couple, whatever its sense, and where; nowhere if there is none."""
     most, where = _greatest_with_place(motion, np.abs(np.asarray(couple)))
-    told = format_or_zero(most, beside)
+    told = format_quantity(most, "torque", motion.mechanism.units, beside)
     return told, "" if told == "0" else where
 
 
@@ -116,9 +118,11 @@ def _shaking_facts(forces: Forces, motion: Motion) -> Iterator[tuple[str, str]]:
     force, moment = forces.shaking
     (name, measure), told = position_heading(motion).split(", "), []
     sizes, most_of_all = (np.hypot(*force.T), np.abs(np.asarray(moment))), at_one.greatest_moment_and_force(forces)
-    for values, unit, beside in zip(sizes, ("N", "N·m"), most_of_all[::-1], strict=True):
+    units = motion.mechanism.units
+    for values, kind, beside in zip(sizes, ("force", "torque"), most_of_all[::-1], strict=True):
         most, where = _greatest_with_place(motion, values)
-        told.append(f"up to {format_or_zero(most, beside)} {unit} ({name} = {where} {measure})")
+        unit = display_unit(kind, units)[0]
+        told.append(f"up to {format_quantity(most, kind, units, beside)} {unit} ({name} = {where} {measure})")
     yield "shaking", f"{told[0]}, and {told[1]} about the frame's origin"
 
 
@@ -145,7 +149,7 @@ def _undetermined_rows(each: Reaction) -> Array:
 def force_series(forces: Forces) -> Iterable[ReportedSeries]:
     """Efforts, reactions, shaking force and moment at every position, beside what a file of the motion has."""
     for name, effort in forces.inputs.items():
-        what, _ = at_one.effort_name_and_unit(forces, name)
+        what, _, _ = at_one.effort_name_and_unit(forces, name)
         yield ReportedSeries(
             "inputs",
             name,

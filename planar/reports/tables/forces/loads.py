@@ -10,10 +10,9 @@ import numpy as np
 from planar.dynamics.external_actions import ExternalAction, KinematicArrays
 from planar.dynamics.forces import Forces
 from planar.foundation.arrays import Array
-from planar.foundation.units import display_unit, parse_unit
-from planar.model.mechanism import FileUnits
+from planar.model.file_units import FileUnits
 from planar.reports.fitted_table import FittedTable, plain_table
-from planar.reports.number_format import ROUNDING_RATIO, column_heading, format_or_zero, vector_direction
+from planar.reports.number_format import ROUNDING_RATIO, column_heading, format_quantity, vector_direction
 
 
 class ActionMotion(NamedTuple):
@@ -47,15 +46,14 @@ def actions_table(title: str, rows: Iterable[ActionMotion], units: FileUnits, mo
         title,
         "what",
         "on",
-        ("force, N", at),
-        "torque, N·m",
+        (column_heading("force", "force", units), at),
+        column_heading("torque", "torque", units),
         (column_heading("velocity", "velocity", units), at),
         column_heading("ang. velocity", "angular velocity", units),
-        "power, W",
+        column_heading("power", "power", units),
         left=(0, 1),
         keys=2,
     )
-    measure = display_unit("velocity", units)[1]
     for each in rows:
         acting = each.acting
         turns = abs(float(acting.couple)) > ROUNDING_RATIO * moment
@@ -63,22 +61,22 @@ def actions_table(title: str, rows: Iterable[ActionMotion], units: FileUnits, mo
         table.add_row(
             acting.name,
             acting.link,
-            *polar_cells(acting.force if pushes else None, units.angle),
-            format_or_zero(float(acting.couple) if turns else None),
-            *polar_cells(measure.from_si(each.velocity) if pushes else None, units.angle),
-            format_or_zero(each.angular_velocity if turns else None),
-            format_or_zero(float(acting.power), each.max_power + moment * abs(each.angular_velocity)),
+            *polar_cells(acting.force if pushes else None, units, "force"),
+            format_quantity(float(acting.couple) if turns else None, "torque", units),
+            *polar_cells(each.velocity if pushes else None, units, "velocity"),
+            format_quantity(each.angular_velocity if turns else None, "angular velocity", units),
+            format_quantity(float(acting.power), "power", units, each.max_power + moment * abs(each.angular_velocity)),
         )
     return table
 
 
-def polar_cells(vector: Array | None, degree: str, beside: float = 0.0) -> tuple[str, str]:
-    """A vector's magnitude and direction, without one where it is nothing (see `counted`)."""
+def polar_cells(vector: Array | None, units: FileUnits, kind: str, beside: float = 0.0) -> tuple[str, str]:
+    """A vector's magnitude and direction, without one where it is nothing (see `format_or_zero`)."""
     if vector is None or not np.isfinite(vector).all():
         return "-", "-"
     size = float(np.hypot(*vector))
-    way = format_or_zero(parse_unit(degree).from_si(vector_direction(vector))) if size > ROUNDING_RATIO * beside else ""
-    return format_or_zero(size, beside), way
+    way = format_quantity(vector_direction(vector), "angle", units) if size > ROUNDING_RATIO * beside else ""
+    return format_quantity(size, kind, units, beside), way
 
 
 def record(rows: Iterable[ActionMotion]) -> list[dict[str, Any]]:

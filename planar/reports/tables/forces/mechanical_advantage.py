@@ -6,13 +6,22 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from planar.analysis.motion.mechanical_advantage import Advantage
+from planar.model.file_units import FileUnits, display_unit
 from planar.reports.fitted_table import FittedTable, plain_table
 from planar.reports.number_format import format_or_zero
 
 Advantages = Mapping[str, Mapping[str, Advantage]]
 """By output and input."""
-ADVANTAGE_UNITS = {"1/m": "N per N·m", "m": "N·m per N", "1": ""}
-"""How an advantage's unit is printed; one of like for like has none."""
+_ADVANTAGE_KINDS = {"1/m": ("force", "torque"), "m": ("torque", "force")}
+"""What is exerted for what; an advantage of like for like has no unit."""
+
+
+def advantage_unit(measure: str, units: FileUnits) -> tuple[str, float]:
+    """The unit of an advantage as it is printed, N per N·m, and how many of it are one in SI."""
+    if measure not in _ADVANTAGE_KINDS:
+        return "", 1.0
+    (over, of_over), (under, of_under) = (display_unit(kind, units) for kind in _ADVANTAGE_KINDS[measure])
+    return f"{over} per {under}", of_over.from_si(1.0) / of_under.from_si(1.0)
 
 
 def all_advantages(advantages: Advantages) -> list[Advantage]:
@@ -20,13 +29,14 @@ def all_advantages(advantages: Advantages) -> list[Advantage]:
     return [each for row in advantages.values() for each in row.values()]
 
 
-def advantages_table(ratios: Iterable[Advantage]) -> FittedTable:
+def advantages_table(ratios: Iterable[Advantage], units: FileUnits) -> FittedTable:
     """What an ideal mechanism exerts at each output for what an input supplies, by both routes."""
     headings = ("output", "for the input", ("by power", "by centres", "unit"), "through")
     table = plain_table("Mechanical advantage", *headings, left=(0, 1, 4, 5), keys=2)
     for each in ratios:
-        values = format_or_zero(each.by_power), format_or_zero(each.by_centres)
-        table.add_row(each.output, each.input, *values, ADVANTAGE_UNITS[each.measure], " ".join(each.through))
+        unit, by = advantage_unit(each.measure, units)
+        values = (format_or_zero(None if one is None else one * by) for one in (each.by_power, each.by_centres))
+        table.add_row(each.output, each.input, *values, unit, " ".join(each.through))
     return table
 
 

@@ -15,12 +15,13 @@ from planar.dynamics.load_attachment import attachment_remarks
 from planar.dynamics.reactions import Reaction
 from planar.equations.mechanism_numbers import mechanism_size
 from planar.foundation.errors import Outcome
-from planar.foundation.units import display_unit
+from planar.foundation.units import Unit
+from planar.model.file_units import display_unit
 from planar.model.link_graph import link_label, link_numbers
 from planar.model.mechanism import relative_motions
 from planar.model.wording import amount, join_all_names
 from planar.reports.fitted_table import FittedTable, plain_table
-from planar.reports.number_format import ROUNDING_RATIO, format_or_zero, paragraphs, precision_text
+from planar.reports.number_format import ROUNDING_RATIO, column_heading, format_quantity, paragraphs, precision_text
 from planar.reports.tables.forces import loads
 from planar.reports.tables.forces import mechanical_advantage as ratios
 from planar.reports.tables.position import published_table
@@ -44,7 +45,7 @@ def tables(forces: Forces, advantages: ratios.Advantages, comparisons: Sequence[
     parts += [_reactions_table(forces), paragraphs(_power_and_shaking(forces, most)), Text()]
     told = ratios.all_advantages(advantages)
     if told:
-        parts.append(ratios.advantages_table(told))
+        parts.append(ratios.advantages_table(told, units))
     if any(each.through for each in told):
         links = join_all_names([link_label(number, link) for link, number in link_numbers(forces.mechanism).items()])
         parts += [paragraphs([("links", links)]), Text()]
@@ -75,9 +76,10 @@ def has_inertia(forces: Forces) -> bool:
     return any(each.kind == "inertia" for each in forces.acting)
 
 
-def effort_name_and_unit(forces: Forces, name: str) -> tuple[str, str]:
-    """What an input's effort is called, and its kind of quantity as it is printed."""
-    return ("force", "N") if forces.is_force_input(name) else ("torque", "N·m")
+def effort_name_and_unit(forces: Forces, name: str) -> tuple[str, str, Unit]:
+    """What an input's effort is called, which is its kind of quantity, and its unit, with the name that is printed."""
+    kind = "force" if forces.is_force_input(name) else "torque"
+    return (kind, *display_unit(kind, forces.mechanism.units))
 
 
 def greatest_moment_and_force(forces: Forces) -> tuple[float, float]:
@@ -100,34 +102,42 @@ def _largest(values: np.ndarray | float) -> float:
 def _inputs_table(forces: Forces) -> FittedTable:
     mechanism, given = forces.mechanism, forces.moving.inputs
     named, most = relative_motions(mechanism), greatest_moment_and_force(forces)
-    table = plain_table("Inputs", "input", ("effort", "unit"), "position", "rate", "power, W", left=(0, 2))
+    units = mechanism.units
+    table = plain_table(
+        "Inputs", "input", ("effort", "unit"), "position", "rate", column_heading("power", "power", units), left=(0, 2)
+    )
     for name, effort in forces.inputs.items():
         kind, rate_kind, _ = named[name].input_quantity_kinds()
-        rate, of = display_unit(rate_kind, mechanism.units)
+        rate = display_unit(rate_kind, units)[0]
+        what, unit, _ = effort_name_and_unit(forces, name)
+        most_here = most[forces.is_force_input(name)]
         position, velocity = float(given[name].position), float(given[name].velocity)
         table.add_row(
             name,
-            format_or_zero(float(effort), most[forces.is_force_input(name)]),
-            effort_name_and_unit(forces, name)[1],
-            amount(position, kind, mechanism.units),
-            f"{format_or_zero(of.from_si(velocity))} {rate}",
-            format_or_zero(float(forces.powers[name]), most[forces.is_force_input(name)] * velocity),
+            format_quantity(float(effort), what, units, most_here),
+            unit,
+            amount(position, kind, units),
+            f"{format_quantity(velocity, rate_kind, units)} {rate}",
+            format_quantity(float(forces.powers[name]), "power", units, most_here * velocity),
         )
     return table
 
 
 def _reactions_table(forces: Forces) -> FittedTable:
-    degree, (moment, most) = forces.mechanism.units.angle, greatest_moment_and_force(forces)
-    headings = ("pair", "on", "by", ("force, N", f"at, {degree}"), ("x, N", "y, N"), "couple, N·m")
+    units, (moment, most) = forces.mechanism.units, greatest_moment_and_force(forces)
+    force, *axes = (column_heading(each, "force", units) for each in ("force", "x", "y"))
+    whole = (force, column_heading("at", "angle", units))
+    headings = ("pair", "on", "by", whole, tuple(axes), column_heading("couple", "torque", units))
     table = plain_table("Reactions in the pairs", *headings, left=(0, 1, 2), keys=3)
     for name, reaction in forces.reactions.items():
         first, second = reaction.links
         if reaction.at is not None:
-            parts = (format_or_zero(float(each), most) for each in reaction.force)
-            arrow = loads.polar_cells(reaction.force, degree, most)
-            table.add_row(name, second, first, *arrow, *parts, format_or_zero(float(reaction.couple), moment))
+            parts = (format_quantity(float(each), "force", units, most) for each in reaction.force)
+            arrow = loads.polar_cells(reaction.force, units, "force", most)
+            turned = format_quantity(float(reaction.couple), "torque", units, moment)
+            table.add_row(name, second, first, *arrow, *parts, turned)
         for link, couple in reaction.couples.items():
-            table.add_row(name, link, "", "-", "-", "-", "-", format_or_zero(float(couple), moment))
+            table.add_row(name, link, "", "-", "-", "-", "-", format_quantity(float(couple), "torque", units, moment))
     return table
 
 
@@ -135,16 +145,23 @@ def _power_and_shaking(forces: Forces, most: float) -> Iterator[tuple[str, str]]
     """Power, beside the most that all could have, and what the frame feels of the links' inertia."""
     yield "power", _power_text(forces, most)
     if has_inertia(forces):
-        degree = forces.mechanism.units.angle
+        units = forces.mechanism.units
         force, moment = forces.shaking
-        strength, way = loads.polar_cells(force, degree)
+        strength, way = loads.polar_cells(force, units, "force")
+        degree, unit, by = (display_unit(kind, units)[0] for kind in ("angle", "force", "torque"))
         turned = f" at {way} {degree}" if way else ""
-        moved = format_or_zero(float(moment), greatest_moment_and_force(forces)[0])
-        yield "shaking", f"{strength} N{turned} and {moved} N·m about the frame's origin, on the frame"
+        moved = format_quantity(float(moment), "torque", units, greatest_moment_and_force(forces)[0])
+        yield "shaking", f"{strength} {unit}{turned} and {moved} {by} about the frame's origin, on the frame"
 
 
 def _power_text(forces: Forces, most: float) -> str:
     supplied, taken = float(forces.power_in), float(forces.power_out)
+    units = forces.mechanism.units
+    watt = display_unit("power", units)[0]
+
+    def told(value: float) -> str:
+        return f"{format_quantity(value, 'power', units, most)} {watt}"
+
     stored = sum(float(each.power) for each in forces.acting if each.kind == "inertia")
     if not np.isfinite(supplied):
         return "not determined, as what the inputs supply is not"
@@ -152,14 +169,10 @@ def _power_text(forces: Forces, most: float) -> str:
         return "nothing that is loaded moves at the inputs' speeds, so that there is none"
     if has_inertia(forces):
         parts = ((supplied, "from the inputs"), (-taken, "from the loads"), (stored, "from the links' inertia"))
-        return ", ".join(f"{format_or_zero(value, most)} W {source}" for value, source in parts)
+        return ", ".join(f"{told(value)} {source}" for value, source in parts)
     if supplied < -ROUNDING_RATIO * most:
-        given, absorbed = format_or_zero(-taken, most), format_or_zero(-supplied, most)
-        return f"the loads drive: {given} W from the loads, {absorbed} W taken up by the inputs"
-    return (
-        f"in: {format_or_zero(supplied, most)} W from the inputs; out: {format_or_zero(taken, most)} W "
-        "against the loads"
-    )
+        return f"the loads drive: {told(-taken)} from the loads, {told(-supplied)} taken up by the inputs"
+    return f"in: {told(supplied)} from the inputs; out: {told(taken)} against the loads"
 
 
 def proof_facts(forces: Forces) -> list[tuple[str, str]]:
