@@ -15,7 +15,7 @@ from PIL import Image, ImageChops, ImageStat
 import planar
 from planar import plot
 from planar.foundation.errors import BadInput
-from planar.guide.keys_page import keys_page
+from planar.guide.keys_page import key_sections, keys_page, read_example
 from planar.guide.reference import reference_names
 from planar.guide.topics import FIRST_PAGE, find_topic, guide_topics, read_page
 from tests import command
@@ -95,6 +95,43 @@ def test_every_page_is_listed_once_and_begins_with_its_title():
 
 def test_the_page_of_keys_is_that_of_the_schema():
     assert PAGES["begin/keys"] == keys_page()
+
+
+def keys_of(value) -> set[str]:
+    """All keys of a JSON value, at any depth."""
+    parts = value.values() if isinstance(value, dict) else value if isinstance(value, list) else ()
+    return set(value if isinstance(value, dict) else ()).union(*map(keys_of, parts))
+
+
+NOT_DRAWN = {"A published value", "Units"}
+"""Sections of keys that no drawing has."""
+WORDS = {"ids", "about", "source", "geometry", "notes", "published"}
+"""Keys of the file that are words."""
+
+
+DRAWN_SECTIONS = [each for each in key_sections() if each.title not in NOT_DRAWN]
+
+
+@pytest.mark.parametrize("section", DRAWN_SECTIONS, ids=lambda each: each.title)
+def test_every_key_that_can_be_drawn_stands_in_an_example_with_its_picture(section):
+    """One in place of which another stands is drawn as that is: its description says so."""
+    names = [each.example for each in key_sections() if each.example]
+    of_parts = {"The file": names, "A point of a link": ["link"]}
+    drawn = set().union(*(keys_of(read_example(name)) for name in of_parts.get(section.title, [section.example])))
+    for kind in section.kinds:
+        for key, own in kind["properties"].items():
+            wanted = {key, *own.get("properties", {})} - WORDS
+            assert wanted <= drawn or "in place of" in own["description"], key
+    constants = {own["const"] for kind in section.kinds for own in kind["properties"].values() if "const" in own}
+    assert constants <= {1, *(piece["motion"] for piece in read_example("law")["inputs"][0]["law"])}
+
+
+@pytest.mark.parametrize("name", [each.example for each in key_sections() if each.example])
+def test_an_example_of_keys_is_a_mechanism_file_that_goes_together(name):
+    value = read_example(name)
+    Draft202012Validator(planar.schema()).validate(value)
+    assert planar.solve(planar.from_dict(value)).residual < 1e-12
+    assert f"![{value['name']}](../pictures/key-{name}.png)" in PAGES["begin/keys"]
 
 
 def test_a_topic_is_known_by_its_name_and_its_title_and_others_are_offered():
