@@ -125,7 +125,7 @@ PICTURES: dict[str, Callable[[], object]] = {
     "diagrams": lambda: plot.diagrams(planar.cycle("slider-crank")),
     "bodies": lambda: plot.forces(planar.forces(planar.solve("two-stroke-engine"))),
     "circuits": lambda: plot.circuits(planar.circuits("watt-six-bar")),
-    **{f"key-{each.example}": partial(example_figure, each.example) for each in key_sections() if each.example},
+    **{f"keys/{each.example}": partial(example_figure, each.example) for each in key_sections() if each.example},
 }
 COLOURS = 48
 """Of a picture's palette, which makes its file a third as large."""

@@ -123,7 +123,7 @@ def _section_lines(section: KeySection) -> Iterator[str]:
 def _example_lines(name: str) -> Iterator[str]:
     """The picture of an example, and what is shown of its file."""
     example = read_example(name)
-    yield f"\n![{example['name']}](../pictures/key-{name}.png)\n\n```json"
+    yield f"\n![{example['name']}](../pictures/keys/{name}.png)\n\n```json"
     for key in SHOWN_KEYS.get(name, ()):
         yield f'"{key}": {_json_lines(example[key], 110)}'
     if name not in SHOWN_KEYS:

@@ -114,14 +114,16 @@ DRAWN_SECTIONS = [each for each in key_sections() if each.title not in NOT_DRAWN
 
 @pytest.mark.parametrize("section", DRAWN_SECTIONS, ids=lambda each: each.title)
 def test_every_key_that_can_be_drawn_stands_in_an_example_with_its_picture(section):
-    """One in place of which another stands is drawn as that is: its description says so."""
+    """Of keys of which the schema takes one, as radii or teeth, one is drawn, as of those that are in place of another."""
     names = [each.example for each in key_sections() if each.example]
     of_parts = {"The file": names, "A point of a link": ["link"]}
     drawn = set().union(*(keys_of(read_example(name)) for name in of_parts.get(section.title, [section.example])))
     for kind in section.kinds:
+        choice = {key for each in kind.get("oneOf", ()) for key in each.get("required", ())}
+        drawn_here = drawn | (choice if choice & drawn else set())
         for key, own in kind["properties"].items():
             wanted = {key, *own.get("properties", {})} - WORDS
-            assert wanted <= drawn or "in place of" in own["description"], key
+            assert wanted <= drawn_here or "in place of" in own["description"], key
     constants = {own["const"] for kind in section.kinds for own in kind["properties"].values() if "const" in own}
     assert constants <= {1, *(piece["motion"] for piece in read_example("law")["inputs"][0]["law"])}
 
@@ -131,7 +133,7 @@ def test_an_example_of_keys_is_a_mechanism_file_that_goes_together(name):
     value = read_example(name)
     Draft202012Validator(planar.schema()).validate(value)
     assert planar.solve(planar.from_dict(value)).residual < 1e-12
-    assert f"![{value['name']}](../pictures/key-{name}.png)" in PAGES["begin/keys"]
+    assert f"![{value['name']}](../pictures/keys/{name}.png)" in PAGES["begin/keys"]
 
 
 def test_a_topic_is_known_by_its_name_and_its_title_and_others_are_offered():
@@ -169,7 +171,14 @@ def test_the_site_is_made_without_a_warning_and_holds_all(tmp_path):
 
 def test_every_picture_is_shown_and_one_is_what_the_tool_makes_now(tmp_path):
     shown = {target for page in PAGES.values() for target in re.findall(r"\]\((?:\.\./)*pictures/(\S+)\.png\)", page)}
-    assert shown == {*PICTURES, *TIMES} == {path.stem for path in (FOLDER / "pictures").iterdir()}
+    assert (
+        shown
+        == {*PICTURES, *TIMES}
+        == {
+            path.relative_to(FOLDER / "pictures").with_suffix("").as_posix()
+            for path in (FOLDER / "pictures").rglob("*.png")
+        }
+    )
     plot.save(PICTURES["sliding"](), tmp_path / "now.png")
     now, kept = (Image.open(path).convert("L") for path in (tmp_path / "now.png", FOLDER / "pictures" / "sliding.png"))
     apart = ImageChops.difference(now.resize(kept.size), kept)
