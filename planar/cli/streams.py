@@ -41,6 +41,7 @@ PLAIN_LETTERS = {
     "‴": "'''",
     "…": "...",
     "’": "'",
+    "\N{NO-BREAK SPACE}": " ",
 }
 """What stands for a letter that cannot be shown, of one character where that reads well."""
 

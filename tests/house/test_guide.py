@@ -114,7 +114,7 @@ DRAWN_SECTIONS = [each for each in key_sections() if each.title not in NOT_DRAWN
 
 @pytest.mark.parametrize("section", DRAWN_SECTIONS, ids=lambda each: each.title)
 def test_every_key_that_can_be_drawn_stands_in_an_example_with_its_picture(section):
-    """Of keys of which the schema takes one, as radii or teeth, one is drawn, as of those that are in place of another."""
+    """Of keys of which the schema takes one, as radii or teeth, one is drawn; so where one is in place of another."""
     names = [each.example for each in key_sections() if each.example]
     of_parts = {"The file": names, "A point of a link": ["link"]}
     drawn = set().union(*(keys_of(read_example(name)) for name in of_parts.get(section.title, [section.example])))
