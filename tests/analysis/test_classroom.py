@@ -127,6 +127,21 @@ def test_marks_tell_right_ones_wrong_senses_and_wrong_units(handed_in):
     assert mark_answers("four-bar", path, 0.01).students[0].right == 0
 
 
+def test_what_is_small_beside_the_largest_of_its_kind_may_be_as_far_off_as_a_drawing_is(handed_in):
+    variant = planar.problem_variants("toggle-press", 3, seed=7)[2]
+    small, large = (
+        solve_question(variant.state, item).solved
+        for item in problem_questions(planar.solve("toggle-press"))
+        if item.quantity == "acceleration" and item.of in "DB"
+    )
+    small, large = sorted((small, large))
+    assert small < 0.01 * large  # the ram is all but at its fastest
+    near, far = small + 0.009 * large, small + 0.02 * large
+    path = handed_in(f"Ann,3,acceleration of D,{near},m/s^2", f"Ben,3,acceleration of D,{far},")
+    ann, ben = mark_answers("toggle-press", path).students
+    assert (ann.values[0].verdict, ben.values[0].verdict) == ("right", "wrong")
+
+
 def test_lines_that_cannot_be_read_are_told_one_by_one_and_the_others_are_marked(handed_in, tmp_path):
     unread = {
         "Ann,1,velocity of Z,1,m/s": "'velocity of Z' is not asked; did you mean 'velocity of C'",

@@ -19,6 +19,8 @@ from planar.solving.position import solve
 
 READING_TOLERANCE = 0.05
 """The part of a value by which what is read off a drawing may be off, unless said."""
+PART_OF_LARGEST = 0.2
+"""What counts of the largest value of a kind: what is small beside it is read off the same drawing."""
 POWERS = tuple(10.0**k for k in (-3, -2, -1, 1, 2, 3))
 """Factors by which a value in a wrong unit is off."""
 LIKENESS_OF_NAMES, MAX_NAMES_COMPARED = 0.85, 40
@@ -70,7 +72,8 @@ def mark_answers(mechanism: Mechanism, answers: AnswerList | str | Path, toleran
 
     `answers` is a CSV file: `seed 7`, the seed of `problem_variants`, in its first line, then the columns student,
     variant, quantity (as `velocity of C`), value and unit. A value is right within `tolerance` of the solved one's
-    size: of vectors the size, of angular rates anticlockwise above zero. A question that stands twice counts as it
+    size, or within a fifth of that of the largest one of its kind, to whose scale a polygon is drawn: of vectors the
+    size counts, of angular rates anticlockwise is above zero. A question that stands twice counts as it
     stands last; capitals and blanks of names do not count. Lines that cannot be read are told in `unread`. Raises
     BadInput where the file is no such list.
 
@@ -127,7 +130,8 @@ def _mark_value(
 ) -> MarkedValue:
     """Raises BadInput where the question or the unit is none."""
     question = read_question(value.quantity, questions)
-    solved = solve_question(variants[value.variant].state, question).solved
+    state = variants[value.variant].state
+    solved = solve_question(state, question).solved
     if value.number is None:
         return MarkedValue(question, None, solved, NO_NUMBER)
     kind = PUBLISHED_QUANTITIES[question.quantity]
@@ -139,16 +143,18 @@ def _mark_value(
         told = f"{value.unit!r} is a unit of {unit.kind}, and that of {question_text(question)} is one of {kind}"
         raise BadInput("unit", told)
     number = unit.to_si(value.number)
-    return MarkedValue(question, number, solved, _verdict(number, solved, tolerance))
+    alike = (each for each in questions if PUBLISHED_QUANTITIES[each.quantity] == kind)
+    largest = max(abs(solve_question(state, each).solved) for each in alike)
+    return MarkedValue(question, number, solved, _verdict(number, solved, tolerance, largest))
 
 
-def _verdict(number: float, solved: float, tolerance: float) -> str:
-    def fits(value: float) -> bool:
-        return abs(value - solved) <= tolerance * abs(solved)
-
-    if fits(number):
+def _verdict(number: float, solved: float, tolerance: float, largest: float) -> str:
+    """What comes of a number beside the solved one and the `largest` of its kind."""
+    own = tolerance * abs(solved)
+    most_off = max(own, tolerance * PART_OF_LARGEST * largest)
+    if abs(number - solved) <= most_off:
         return RIGHT
-    if fits(-number):
+    if abs(-number - solved) <= most_off:
         return WRONG_SENSE
-    off_by_powers = any(fits(sign * number * power) for power in POWERS for sign in (1.0, -1.0))
-    return WRONG_UNIT if off_by_powers else WRONG
+    by_powers = (sign * number * power for power in POWERS for sign in (1.0, -1.0))
+    return WRONG_UNIT if any(abs(value - solved) <= own for value in by_powers) else WRONG
