@@ -1,5 +1,7 @@
 """The pictures of the guide, made by the tool: `python -m tests.guide_pictures` writes them anew."""
 
+import json
+import re
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -11,6 +13,7 @@ from PIL import Image
 import planar
 from planar import plot
 from planar.guide.keys_page import key_sections, read_example
+from planar.guide.topics import read_page
 
 FOLDER = Path(__file__).parents[1] / "planar" / "guide" / "pictures"
 PLATE = {
@@ -126,6 +129,30 @@ PICTURES: dict[str, Callable[[], object]] = {
     "bodies": lambda: plot.forces(planar.forces(planar.solve("two-stroke-engine"))),
     "circuits": lambda: plot.circuits(planar.circuits("watt-six-bar")),
     **{f"keys/{each.example}": partial(example_figure, each.example) for each in key_sections() if each.example},
+}
+RECIPES = read_page("look-up/recipes")
+
+
+def shown_file(name: str) -> dict[str, object]:
+    """A file that a recipe shows."""
+    found = re.search(rf"<!-- file: {re.escape(name)} -->\n```json\n(.*?)```", RECIPES, re.DOTALL)
+    value: dict[str, object] = json.loads(found[1]) if found else {}
+    return value
+
+
+def exam_page() -> object:
+    """The first page of an exam."""
+    from planar.drawing.output.problem_sheets import problem_pages
+
+    variants = planar.problem_variants("toggle-press", 1, seed=23)
+    return problem_pages(planar.solve("toggle-press"), variants, 23)[0]
+
+
+PICTURES |= {
+    "recipes/press": lambda: plot.positions(planar.cycle("toggle-press")),
+    "recipes/suspension": lambda: plot.centres(planar.solve(planar.from_dict(shown_file("wishbone.json")))),
+    "recipes/excavator": scheme_of("excavator-arm"),
+    "recipes/exam": exam_page,
 }
 COLOURS = 48
 """Of a picture's palette, which makes its file a third as large."""
