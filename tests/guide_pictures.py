@@ -144,8 +144,8 @@ def exam_page() -> object:
     """The first page of an exam."""
     from planar.drawing.output.problem_sheets import problem_pages
 
-    variants = planar.problem_variants("toggle-press", 1, seed=23)
-    return problem_pages(planar.solve("toggle-press"), variants, 23)[0]
+    variants = planar.problem_variants("whitworth", 1, seed=23)
+    return problem_pages(planar.solve("whitworth"), variants, 23)[0]
 
 
 PICTURES |= {

@@ -78,6 +78,8 @@ def test_the_snippets_of_a_page_run(page, folder):
     code = [sys.executable, "-c", "\n".join(blocks(page, "python"))]
     done = subprocess.run(code, cwd=folder, capture_output=True, text=True, env=environment, check=False)
     assert done.returncode == 0, done.stderr
+    printed = done.stdout.splitlines()
+    assert [line for text in blocks(page, "text") for line in text.splitlines() if line not in printed] == []
 
 
 @pytest.mark.parametrize("page", PAGES)
