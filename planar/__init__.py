@@ -13,8 +13,8 @@ if TYPE_CHECKING:
     from planar.analysis.centres.curvature import Curvature, curvature
     from planar.analysis.centres.two_directions import centre_of
     from planar.analysis.centres.velocities import velocity_by_centres
-    from planar.analysis.classroom.marking import mark_answers
-    from planar.analysis.classroom.variants import problem_variants
+    from planar.analysis.classroom.marking import MarkedValue, Marks, StudentMarks, mark_answers
+    from planar.analysis.classroom.variants import Variant, problem_variants
     from planar.analysis.identity.inspection import Inspection, inspect
     from planar.analysis.identity.mobility import Mobility, mobility
     from planar.analysis.motion.answers import Answers, answers
@@ -124,6 +124,8 @@ _ROOMS = {
     "LinkMotion": "results.records",
     "LinkState": "results.records",
     "Load": "model.mechanism",
+    "MarkedValue": "analysis.classroom.marking",
+    "Marks": "analysis.classroom.marking",
     "Mass": "model.mechanism",
     "Mechanism": "model.mechanism",
     "Mobility": "analysis.identity.mobility",
@@ -153,6 +155,7 @@ _ROOMS = {
     "Spring": "model.mechanism",
     "State": "results.motion",
     "Stroke": "analysis.motion.extremes",
+    "StudentMarks": "analysis.classroom.marking",
     "Sweep": "batch.results",
     "Swept": "batch.mechanisms.results",
     "Swing": "analysis.motion.extremes",
@@ -162,6 +165,7 @@ _ROOMS = {
     "TrapezoidalRise": "model.input_laws.cam_rises",
     "TurningPair": "model.pairs.turning",
     "Unknown": "foundation.errors",
+    "Variant": "analysis.classroom.variants",
     "advantage": "analysis.motion.mechanical_advantage",
     "advantage_over": "analysis.motion.mechanical_advantage_over_motion",
     "answers": "analysis.motion.answers",
@@ -254,6 +258,8 @@ __all__ = [
     "LinkMotion",
     "LinkState",
     "Load",
+    "MarkedValue",
+    "Marks",
     "Mass",
     "Mechanism",
     "Mobility",
@@ -283,6 +289,7 @@ __all__ = [
     "Spring",
     "State",
     "Stroke",
+    "StudentMarks",
     "Sweep",
     "Swept",
     "Swing",
@@ -292,6 +299,7 @@ __all__ = [
     "TrapezoidalRise",
     "TurningPair",
     "Unknown",
+    "Variant",
     "advantage",
     "advantage_over",
     "answers",

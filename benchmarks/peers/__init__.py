@@ -1,4 +1,4 @@
-"""Other solvers of linkages, those of them that are installed: `pip install 'planar-linkages[bench]'`.
+"""Other solvers of linkages, those of them that are installed: `pip install \"planar-linkages[bench]\"`.
 
 Each file is one of them and gives its `entries` for a swept linkage; none of their code is run unless it is timed.
 """

@@ -220,7 +220,7 @@ class Modes(Displayable, Sequence["Mode"]):
         if self._solver.structure.counts:
             told.append("of angles that count turns the least are taken")
         if self._lacks_certifier:
-            told.append("nothing is certified: that needs python-flint (pip install 'planar-linkages[modes]')")
+            told.append('nothing is certified: that needs python-flint (pip install "planar-linkages[modes]")')
         return tuple(told)
 
     @cached_property

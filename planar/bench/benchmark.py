@@ -115,7 +115,7 @@ def measure_speed(mechanism: Mechanism, rounds: int = 5, seconds: float = SWEEP_
             told.append(_describe_shares("A cycle, which is the general path too", parts))
         cycled /= rows
         if find_spec(BACKEND_LIBRARIES["native"]) is None:
-            told.append("Machine code is not installed; pip install 'planar-linkages[native]'")
+            told.append('Machine code is not installed; pip install "planar-linkages[native]"')
     unknowns, links = len(solver.equations.unknowns), len(mechanism.links)
     return Speed(mechanism.name, links, unknowns, equations, assembly, solved, cycled, swept, tuple(told))
 

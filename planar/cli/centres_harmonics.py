@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import click
@@ -20,6 +19,7 @@ from planar.cli.options import (
     refuse_overwriting,
     show_status,
 )
+from planar.cli.streams import print_json
 from planar.foundation.errors import BadInput
 
 
@@ -46,7 +46,7 @@ def harmonics(
     with show_status(mechanism.name):
         found = analytical_routes(mechanism, pairs, points, running)
     if as_json:
-        click.echo(json.dumps(record(mechanism, found), ensure_ascii=False, allow_nan=False))
+        print_json(record(mechanism, found))
         return
     print_or_write(analytical_tables(mechanism, found), None)
 
@@ -70,6 +70,6 @@ def centres(model: str, as_json: bool, at: tuple[str, ...], mode: int | None, ou
     with show_status(mechanism.name):
         found = all_centres(rest_position(mechanism, parse_drives(mechanism, at)))
     if as_json:
-        click.echo(json.dumps(record(found), ensure_ascii=False, indent=1, allow_nan=False))
+        print_json(record(found), indent=1)
         return
     print_or_write(table(found), output)

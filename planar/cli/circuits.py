@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import sys
 from pathlib import Path
 
@@ -22,6 +21,7 @@ from planar.cli.options import (
     refuse_overwriting,
     show_status,
 )
+from planar.cli.streams import print_json
 from planar.foundation.errors import BadInput
 
 
@@ -46,7 +46,7 @@ def circuits(model: str, as_json: bool, pair: str | None, at: tuple[str, ...], o
         found = all_circuits(here.mechanism, pair)
         told = record(found, here) if as_json else table(found, here)
     if as_json:
-        click.echo(json.dumps(told, ensure_ascii=False, indent=1, allow_nan=False))
+        print_json(told, indent=1)
     else:
         print_or_write(told, output)
     if not here:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import gc
-import json
 import re
 import sys
 import warnings
@@ -15,6 +14,7 @@ from typing import Any, NoReturn, TextIO
 
 import click
 
+from planar.cli.streams import allow_every_letter, print_json
 from planar.foundation.errors import BadInput, MissingGlyphs, NoAnswer, Unknown, WriteFailure, join_names
 
 NO_ANSWER, BAD_INPUT, NOT_WRITTEN, INTERRUPTED = 1, 2, 3, 130
@@ -110,9 +110,7 @@ class CommandGroup(click.Group):
             _exit_unwritable(problem)
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        for stream in (sys.stdout, sys.stderr):
-            if hasattr(stream, "reconfigure"):
-                stream.reconfigure(errors="backslashreplace")  # what the screen's alphabet lacks
+        allow_every_letter()
         with _exit_with_status() if args else nullcontext():  # without any words click shows the help
             return super().parse_args(ctx, args)
 
@@ -190,7 +188,7 @@ def _exit_refused(
 ) -> None:
     if "--json" in sys.argv:
         try:
-            click.echo(json.dumps({"outcome": outcome, "reason": reason, **more}, ensure_ascii=False))
+            print_json({"outcome": outcome, "reason": reason, **more}, allow_nan=True)
         except OSError as problem:
             _exit_unwritable(problem)
     _print_error(sentence)

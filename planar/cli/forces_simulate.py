@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -28,6 +27,7 @@ from planar.cli.options import (
     show_status,
     steps_option,
 )
+from planar.cli.streams import print_json
 from planar.foundation.errors import BadInput
 
 if TYPE_CHECKING:
@@ -101,7 +101,7 @@ def _forces_at_position(
             [] if moved else [each for each in compare_published(state) if each.published.quantity == "input torque"]
         )
     if as_json:
-        click.echo(json.dumps(record(found, ratios, printed), ensure_ascii=False, indent=1, allow_nan=False))
+        print_json(record(found, ratios, printed), indent=1)
         return
     print_or_write(tables(found, ratios, printed), output)
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-
 import click
 
 from planar.cli.options import (
@@ -15,6 +13,7 @@ from planar.cli.options import (
     refuse_settings,
     show_status,
 )
+from planar.cli.streams import print_json
 
 
 @main.command()
@@ -30,7 +29,7 @@ def inspect(model: str, as_json: bool) -> None:
     if as_json:
         from dataclasses import asdict
 
-        click.echo(json.dumps(asdict(found), ensure_ascii=False))
+        print_json(asdict(found))
         return
     from planar.reports.tables.inspection import inspection_tables
 
@@ -42,7 +41,7 @@ def schema() -> None:
     """The JSON schema of mechanism files, which editors can use."""
     from planar.document.schema import schema as published
 
-    click.echo(json.dumps(published(), ensure_ascii=False, indent=2))
+    print_json(published(), indent=2)
 
 
 @main.command()
@@ -53,7 +52,7 @@ def models(as_json: bool) -> None:
 
     rows = [(file.stem, [name for name in m.ids if name != file.stem], m.about or m.name) for file, m in known()]
     if as_json:
-        click.echo(json.dumps([{"model": n, "ids": ids, "about": about} for n, ids, about in rows], ensure_ascii=False))
+        print_json([{"model": n, "ids": ids, "about": about} for n, ids, about in rows])
         return
     from planar.reports.tables.inspection import models_table as table
 
@@ -82,7 +81,7 @@ def bench(model: str | None, seconds: float, as_json: bool) -> None:
         with show_status(mechanism.name):
             speeds.append(measure_speed(mechanism, seconds=seconds))
     if as_json:
-        click.echo(json.dumps([speed.record() for speed in speeds], ensure_ascii=False))
+        print_json([speed.record() for speed in speeds])
         return
     from planar.reports.tables.benchmark import table
 

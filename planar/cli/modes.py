@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -20,6 +19,7 @@ from planar.cli.options import (
     refuse_overwriting,
     show_status,
 )
+from planar.cli.streams import print_json
 from planar.foundation.errors import BadInput
 
 if TYPE_CHECKING:
@@ -74,7 +74,7 @@ def modes(  # many: options of a command
         on = circuits(found.mechanism, pair) if circled else None
         told = record(found, limit, on) if as_json else table(found, limit, points, on)
     if as_json:
-        click.echo(json.dumps(told, ensure_ascii=False, indent=1, allow_nan=False))
+        print_json(told, indent=1)
         return
     print_or_write(told, output)
 

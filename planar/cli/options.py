@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import errno
-import json
 import os
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -15,6 +14,7 @@ import click
 
 from planar import __version__
 from planar.cli.exit_status import NO_ANSWER, CommandGroup
+from planar.cli.streams import print_json
 from planar.foundation.errors import BadInput, Outcome
 
 if TYPE_CHECKING:
@@ -183,10 +183,10 @@ def output_option(help: str, required: bool = False) -> Callable[[Any], Any]:  #
     return click.option("-o", "output", type=kind, metavar="FILE", help=help, required=required)
 
 
-def refuse_overwriting(model: str, output: Path | None) -> None:
-    """Refuse to write over the mechanism's own file."""
+def refuse_overwriting(model: str, output: Path | None, what: str = "the mechanism's own file") -> None:
+    """Refuse to write over a file that is read."""
     if output is not None and output.exists() and Path(model).exists() and output.samefile(model):
-        raise BadInput("-o", "this is the mechanism's own file, which would be lost; name another")
+        raise BadInput("-o", f"this is {what}, which would be lost; name another")
 
 
 def show_status(description: str) -> AbstractContextManager[Any]:
@@ -285,7 +285,7 @@ def report_motion(
     from planar.reports.files.run_formats import encode_run, record
 
     if as_json:
-        click.echo(json.dumps(record(motion, more, facts or {}), ensure_ascii=False, allow_nan=False))
+        print_json(record(motion, more, facts or {}))
     else:
         if output is not None:
             from planar.foundation.safe_files import save_file

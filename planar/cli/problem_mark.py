@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import click
 
+from planar.cli.exit_status import BAD_INPUT
 from planar.cli.options import (
     json_option,
     main,
@@ -17,17 +17,18 @@ from planar.cli.options import (
     refuse_overwriting,
     show_progress,
 )
-from planar.foundation.errors import BadInput, unknown_format_error
+from planar.cli.streams import print_json
+from planar.document.answer_lists import MAX_VARIANT
+from planar.foundation.errors import BadInput, join_names, unknown_format_error
 
 PAGES = (".pdf",)
-MAX_VARIANTS = 1000
 
 
 @main.command()
 @model_argument()
 @json_option
 @click.option(
-    "--vary", "count", type=click.IntRange(1, MAX_VARIANTS), default=30, show_default=True, help="How many variants."
+    "--vary", "count", type=click.IntRange(1, MAX_VARIANT), default=30, show_default=True, help="How many variants."
 )
 @click.option(
     "--seed", type=click.IntRange(0), default=0, show_default=True, help="Which variants: a seed has always the same."
@@ -57,7 +58,7 @@ def problem(model: str, as_json: bool, count: int, seed: int, output: Path | Non
         from planar.reports.tables.classroom import variants_record, variants_tables
 
         if as_json:
-            click.echo(json.dumps(variants_record(base, variants, seed), ensure_ascii=False, allow_nan=False))
+            print_json(variants_record(base, variants, seed))
         else:
             print_or_write(variants_tables(base, variants, seed), None)
         return
@@ -82,16 +83,26 @@ def problem(model: str, as_json: bool, count: int, seed: int, output: Path | Non
     show_default=True,
     help="The part of a value by which what is read off a drawing may be off.",
 )
-@output_option("Write the marks to a .txt, .html or .csv file.")
+@output_option("Write the marks to a .csv, .txt, .html or .svg file.")
 def mark(model: str, answers: Path, as_json: bool, tolerance: float, output: Path | None) -> None:
     """Marks what students hand in: ANSWERS is a CSV file with `seed N` in its first line, then the columns student,
     variant, quantity, value, unit."""
     from planar.analysis.classroom.marking import mark_answers
-    from planar.reports.tables.classroom import marks_record, marks_tables
+    from planar.foundation.safe_files import save_file
+    from planar.reports.tables.classroom import marks_csv, marks_record, marks_tables
 
     mechanism = read_model(model)
+    refuse_overwriting(model, output)
+    refuse_overwriting(str(answers), output, "the list of answers")
     marks = mark_answers(mechanism, answers, tolerance)
     if as_json:
-        click.echo(json.dumps(marks_record(marks), ensure_ascii=False, allow_nan=False))
-        return
-    print_or_write(marks_tables(marks, mechanism.units), output)
+        print_json(marks_record(marks))
+    elif output is not None and output.suffix.lower() == ".csv":
+        save_file(output, marks_csv(marks))
+    else:
+        print_or_write(marks_tables(marks, mechanism.units), output)
+    if marks.unread:
+        lines = [str(each.line) for each in marks.unread]
+        told = f"line {lines[0]} is" if len(lines) == 1 else f"lines {join_names(lines)} are"
+        click.echo(f"planar: {answers}: {told} not read, and so not marked", err=True)
+        click.get_current_context().exit(BAD_INPUT)

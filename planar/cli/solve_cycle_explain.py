@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -27,6 +26,7 @@ from planar.cli.options import (
     show_progress,
     show_status,
 )
+from planar.cli.streams import print_json
 from planar.foundation.errors import BadInput, unknown_format_error
 
 if TYPE_CHECKING:
@@ -65,7 +65,7 @@ def solve(
     if as_json:
         from planar.reports.files.json_values import record
 
-        click.echo(json.dumps(record(state, comparisons, relatives), ensure_ascii=False, indent=1, allow_nan=False))
+        print_json(record(state, comparisons, relatives), indent=1)
         return
     from planar.reports.tables.position import solution_tables
 
@@ -124,7 +124,7 @@ def explain(  # many: one for each option
 
     solution = worked_solution(state, comparisons)
     if as_json:
-        click.echo(json.dumps(record(solution, given), ensure_ascii=False, indent=1, allow_nan=False))
+        print_json(record(solution, given), indent=1)
         return
     print_or_write(_with_parts(solution_text(solution, given), state, parts), output)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import re
-from io import StringIO
+from codecs import BOM_UTF8, BOM_UTF16_BE, BOM_UTF16_LE
 from math import isfinite
 from pathlib import Path
 from typing import NamedTuple
@@ -14,73 +14,133 @@ from planar.document.files import read_limited
 from planar.foundation.errors import BadInput, join_names
 
 COLUMNS = ("student", "variant", "quantity", "value", "unit")
-SEED_LINE = re.compile(r"\s*#?\s*seed\s*[:=,;]?\s*(\d{1,18})[\s,;]*", re.IGNORECASE)
+SEED_LINE = re.compile(r"#?\s*seed[\s:=,;]*(\d{1,18})", re.IGNORECASE)
+SEPARATOR_LINE = re.compile(r"sep=.\s*$", re.IGNORECASE)
+"""What some spreadsheets write in front."""
+NUMBER = re.compile(r"([+-]?[\d.,]*\d[\d.,]*(?:[eE][+-]?\d+)?)\s*(|[^\d\s.,].*)")
 
 
 class HandedInValue(NamedTuple):
     """A line of a list: who, of which variant, what, the number as it was written (None where it is none), its unit,
-    and the place of the line."""
+    and the number of the line in the file."""
 
     student: str
     variant: int
     quantity: str
     number: float | None
     unit: str
-    place: str
+    line: int
+
+
+class UnreadLine(NamedTuple):
+    """A line of a list that cannot be read, by its number in the file, and a sentence that says why."""
+
+    line: int
+    sentence: str
 
 
 class AnswerList(NamedTuple):
-    """A list: the seed of the problem's variants, and its lines."""
+    """A list: the seed of the problem's variants, its lines, and those that cannot be read."""
 
     seed: int
     values: tuple[HandedInValue, ...]
+    unread: tuple[UnreadLine, ...] = ()
 
 
-MAX_VARIANT = 10_000
+MAX_VARIANT = 1000
+"""As many variants as a problem has at most."""
+MAX_VARIANT_DIGITS, MAX_CELL_LENGTH = 9, 100
+"""Digits and characters that are looked at."""
 
 
 def read_answers(path: Path) -> AnswerList:
-    """The list in a file: `seed 7`, then a head, then lines of student, variant, quantity, value, unit; separated by
-    commas, semicolons or tabs. Raises BadInput with the line."""
-    try:
-        text = read_limited(path).decode("utf-8-sig")
-    except UnicodeDecodeError:
-        raise BadInput(str(path), "this is no text in UTF-8; save the table as CSV (UTF-8)") from None
-    first, _, rest = text.partition("\n")
-    seed = SEED_LINE.fullmatch(first)
+    """The list in a file as spreadsheets save it: `seed 7`, then a head, then lines of student, variant, quantity,
+    value, unit; separated by commas, semicolons or tabs. Raises BadInput where it is no such list."""
+    lines = _decode_text(read_limited(path)).splitlines()
+    told = [number for number, line in enumerate(lines) if _cells_text(line) and not SEPARATOR_LINE.match(line)]
+    first = told[0] if told else 0
+    seed = SEED_LINE.fullmatch(_cells_text(lines[first])) if lines else None
     if seed is None:
-        raise BadInput(f"{path}:1", f"the first line names the seed of the problem, as in 'seed 7', not {first[:40]!r}")
-    head = rest.partition("\n")[0]
-    separator = max(",;\t", key=head.count)
-    rows = csv.reader(StringIO(rest), delimiter=separator)
-    names = [cell.strip().lower() for cell in next(rows, [])]
+        shown = lines[first][:40] if lines else ""
+        raise BadInput(
+            f"{path}:{first + 1}", f"the first line names the seed of the problem, as in 'seed 7', not {shown!r}"
+        )
+    if len(told) == 1:
+        raise BadInput(str(path), f"after the seed come the columns {join_names(COLUMNS)}, and a line for each value")
+    head = told[1]
+    separator = max(",;\t", key=lines[head].count)
+    rows = csv.reader(lines[head:], delimiter=separator)
+    values, unread = [], []
+    try:
+        names = [cell.strip().lower() for cell in next(rows)]
+        columns = _find_columns(names, f"{path}:{head + 1}")
+        for row in rows:
+            cells = {name: row[index].strip() if index < len(row) else "" for name, index in columns.items()}
+            if not any(cells.values()):
+                continue
+            try:
+                if any(cell.strip() for cell in row[len(names) :]):
+                    quoted = "; a number with a decimal comma stands in quotes" if separator == "," else ""
+                    raise BadInput("line", f"the line has more cells than the head{quoted}")
+                values.append(_read_line(cells, head + rows.line_num))
+            except BadInput as problem:
+                unread.append(UnreadLine(head + rows.line_num, problem.sentence))
+    except csv.Error as problem:
+        raise BadInput(f"{path}:{head + rows.line_num}", f"this is no line of a table: {problem}") from None
+    return AnswerList(int(seed[1]), tuple(values), tuple(unread))
+
+
+def _decode_text(content: bytes) -> str:
+    """The text of a file as spreadsheets write it: in UTF-8 or UTF-16 with a mark in front, in UTF-8 without, or in the
+    alphabet of western Windows."""
+    for mark, name in ((BOM_UTF8, "utf-8-sig"), (BOM_UTF16_LE, "utf-16"), (BOM_UTF16_BE, "utf-16")):
+        if content.startswith(mark):
+            return content.decode(name, errors="replace")
+    try:
+        return content.decode("utf-8")
+    except UnicodeDecodeError:
+        return content.decode("cp1252", errors="replace")
+
+
+def _cells_text(line: str) -> str:
+    """A line without its quotes and empty cells."""
+    return line.replace('"', "").strip(" ,;\t\ufeff")
+
+
+def _find_columns(names: list[str], place: str) -> dict[str, int]:
     for column in COLUMNS[:-1]:
         if column not in names:
             meant = suggest_spelling(column, names, "is it the column {!r}?") or f"; its head has {join_names(names)}"
-            raise BadInput(f"{path}:2", f"there is no column {column!r}{meant}")
-    place = {name: names.index(name) for name in COLUMNS if name in names}
-    values = []
-    for number, row in enumerate(rows, 3):
-        cells = {name: row[index].strip() if index < len(row) else "" for name, index in place.items()}
-        if any(cells.values()):
-            values.append(_read_line(cells, f"{path}:{number}", separator))
-    return AnswerList(int(seed[1]), tuple(values))
+            raise BadInput(place, f"there is no column {column!r}{meant}")
+    return {name: names.index(name) for name in COLUMNS if name in names}
 
 
-def _read_line(cells: dict[str, str], place: str, separator: str) -> HandedInValue:
+def _read_line(cells: dict[str, str], line: int) -> HandedInValue:
+    place = f"line {line}"
     for column in ("student", "quantity"):
         if not cells[column]:
             raise BadInput(place, f"the line has no {column}")
-    if not (cells["variant"].isdecimal() and 1 <= int(cells["variant"]) <= MAX_VARIANT):
-        raise BadInput(place, f"the number of a variant is wanted, from 1 on, not {cells['variant']!r:.40}")
-    written = cells["value"].replace("−", "-")
-    if separator != ",":
-        written = written.replace(",", ".")  # where a comma does not separate it may be the decimal one
+    variant = cells["variant"].removesuffix(".0").removesuffix(",0")
+    if not (variant.isdecimal() and len(variant) <= MAX_VARIANT_DIGITS and 1 <= int(variant) <= MAX_VARIANT):
+        wanted = f"the number of a variant is wanted, from 1 to {MAX_VARIANT}"
+        raise BadInput(place, f"{wanted}, not {cells['variant']!r:.40}" if variant else f"{wanted}; there is none")
+    number, unit = _read_number(cells["value"])
+    student = " ".join(cells["student"].split())
+    return HandedInValue(student, int(variant), cells["quantity"], number, cells.get("unit", "") or unit, line)
+
+
+def _read_number(written: str) -> tuple[float | None, str]:
+    """The number of a cell, with a decimal point or comma, or None; and the unit that stands behind it."""
+    parts = NUMBER.fullmatch(written.replace("−", "-")) if len(written) <= MAX_CELL_LENGTH else None
+    if parts is None:
+        return None, ""
+    digits, unit = parts.groups()
+    marks = [each for each in digits if each in ".,"]
+    if len(set(marks)) > 1 or marks.count(",") > 1:  # the other one, or each of many, parts thousands
+        decimal = marks[-1] if marks.count(marks[-1]) == 1 else ""
+        digits = "".join(each for each in digits if each not in ".," or each == decimal)
     try:
-        value: float | None = float(written)
+        value = float(digits.replace(",", "."))
     except ValueError:
-        value = None
-    if value is not None and not isfinite(value):
-        value = None
-    unit = cells.get("unit", "")
-    return HandedInValue(cells["student"], int(cells["variant"]), cells["quantity"], value, unit, place)
+        return None, ""
+    return (value if isfinite(value) else None), unit.strip()

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator, Mapping
-from typing import Any
+from textwrap import indent
+from typing import Any, NamedTuple
 
+from planar.document.files import read_packaged_text
 from planar.document.schema import schema
 
 Schema = Mapping[str, Any]
@@ -39,26 +42,62 @@ HEAD = """# Every key of a file
 
 Made from the schema that `planar schema` prints. A *quantity* is a number in the declared unit, or a text with its own,
 such as `"210 rpm"`; [Writing a mechanism](writing.md) shows how the keys are used. Keys in **bold** are always there.
+Beneath a picture stands what it shows.
 """
+
+
+SHOWN_KEYS = {
+    "file": ("sketch",),
+    "link": ("links",),
+    "input": ("inputs",),
+    "law": ("inputs",),
+    "load": ("loads",),
+    "varies": ("loads",),
+    "spring": ("springs",),
+    "mass": ("masses", "gravity"),
+}
+"""What a page shows of the example of a section; of that of a pair the entry with its keyword."""
+
+
+class KeySection(NamedTuple):
+    """A part of the page: its title, the kinds of objects whose keys it tells, and the name of its example, or
+    nothing."""
+
+    title: str
+    kinds: tuple[Schema, ...]
+    example: str
+
+
+def key_sections() -> tuple[KeySection, ...]:
+    """The parts of the page, from the schema."""
+    whole = schema()
+    kinds, lists = whole["$defs"], {key: value.get("items", {}) for key, value in whole["properties"].items()}
+    places = tuple(each for each in kinds["place"]["anyOf"] if "properties" in each)
+    return (
+        KeySection("The file", (whole,), "file"),
+        KeySection("A link", (kinds["link"],), "link"),
+        KeySection("A point of a link", places, ""),
+        *(KeySection(_title(pair), (pair,), next(iter(pair["properties"]))) for pair in kinds["pair"]["oneOf"]),
+        KeySection("An input", (lists["inputs"],), "input"),
+        KeySection("A piece of an input's law", tuple(kinds["piece"]["oneOf"]), "law"),
+        KeySection("A load", tuple(lists["loads"]["anyOf"]), "load"),
+        KeySection("How a load varies", (kinds["varies"],), "varies"),
+        KeySection("A spring", tuple(lists["springs"]["anyOf"]), "spring"),
+        KeySection("A mass", (lists["masses"],), "mass"),
+        KeySection("Units", (whole["properties"]["units"],), ""),
+        KeySection("A published value", (lists["published"],), ""),
+    )
 
 
 def keys_page() -> str:
     """The whole page, in Markdown."""
-    whole = schema()
-    kinds = whole["$defs"]
-    parts = [HEAD, *_section("The file", whole)]
-    parts += _section("A link", kinds["link"])
-    parts += _section("A point of a link", *(each for each in kinds["place"]["anyOf"] if "properties" in each))
-    parts += [part for pair in kinds["pair"]["oneOf"] for part in _section(_title(pair), pair)]
-    parts += _section("An input", whole["properties"]["inputs"]["items"])
-    parts += _section("A piece of an input's law", *kinds["piece"]["oneOf"])
-    parts += _section("A load", *whole["properties"]["loads"]["items"]["anyOf"])
-    parts += _section("How a load varies", kinds["varies"])
-    parts += _section("A spring", *whole["properties"]["springs"]["items"]["anyOf"])
-    parts += _section("A mass", whole["properties"]["masses"]["items"])
-    parts += _section("Units", whole["properties"]["units"])
-    parts += _section("A published value", whole["properties"]["published"]["items"])
-    return "\n".join(parts)
+    return "\n".join([HEAD, *(line for each in key_sections() for line in _section_lines(each))])
+
+
+def read_example(name: str) -> dict[str, Any]:
+    """The mechanism file in which the keys of a section stand."""
+    found: dict[str, Any] = json.loads(read_packaged_text("guide", f"examples/{name}.json"))
+    return found
 
 
 def _title(pair: Schema) -> str:
@@ -67,16 +106,43 @@ def _title(pair: Schema) -> str:
     return f"`{keyword}`: {pair['properties'][keyword]['description'].partition(':')[0]}"
 
 
-def _section(title: str, *kinds: Schema) -> Iterator[str]:
-    """A heading, and a table of the keys of one kind of object, or of several, one after the other."""
-    yield f"\n## {title}"
-    for kind in kinds:
+def _section_lines(section: KeySection) -> Iterator[str]:
+    """A heading, the example with its picture, and a table of the keys of each kind of object."""
+    yield f"\n## {section.title}"
+    if section.example:
+        yield from _example_lines(section.example)
+    for kind in section.kinds:
         yield "\n| key | value | |\n|---|---|---|"
         for key, own in kind["properties"].items():
             name = f"**`{key}`**" if key in kind.get("required", ()) else f"`{key}`"
             yield f"| {name} | {_value_words(own)} | {own['description']} |"
             for inner, part in own.get("properties", {}).items() if key != "units" else ():
                 yield f"| `{key}.{inner}` | {_value_words(part)} | {part['description']} |"
+
+
+def _example_lines(name: str) -> Iterator[str]:
+    """The picture of an example, and what is shown of its file."""
+    example = read_example(name)
+    yield f"\n![{example['name']}](../pictures/keys/{name}.png)\n\n```json"
+    for key in SHOWN_KEYS.get(name, ()):
+        yield f'"{key}": {_json_lines(example[key], 110)}'
+    if name not in SHOWN_KEYS:
+        yield from (_json_lines(pair, 118) for pair in example["pairs"] if name in pair)
+    yield "```"
+
+
+def _json_lines(value: Any, width: int) -> str:
+    """A JSON value in one line, or its parts in lines of their own where that is too long."""
+    whole = json.dumps(value)
+    if len(whole) <= width or not value or not isinstance(value, dict | list):
+        return whole
+    inner = width - 2
+    if isinstance(value, dict):
+        lines = [f"{json.dumps(key)}: {_json_lines(part, inner)}" for key, part in value.items()]
+    else:
+        lines = [_json_lines(part, inner) for part in value]
+    start, end = "{}" if isinstance(value, dict) else "[]"
+    return "\n".join([start, indent(",\n".join(lines), "  "), end])
 
 
 def _value_words(value: Schema) -> str:  # noqa: PLR0911

@@ -47,7 +47,7 @@ def write_site(folder: Path) -> Path:
         import_module("myst_parser")
         import_module("furo")
     except ImportError:
-        raise BadInput("--html", "the site is made with Sphinx: pip install 'planar-linkages[guide]'") from None
+        raise BadInput("--html", 'the site is made with Sphinx: pip install "planar-linkages[guide]"') from None
     with TemporaryDirectory() as place:
         source, made = Path(place, "source"), Path(place, "site")
         _write_sources(source)

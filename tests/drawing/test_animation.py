@@ -182,7 +182,7 @@ def test_an_mp4_that_is_broken_off_leaves_nothing_behind():
 def test_an_mp4_without_ffmpeg_says_what_to_install(monkeypatch):
     monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
     with pytest.raises(
-        BadInput, match=re.escape("imageio-ffmpeg: MP4 files need ffmpeg: pip install 'planar-linkages[video]'")
+        BadInput, match=re.escape('imageio-ffmpeg: MP4 files need ffmpeg: pip install "planar-linkages[video]"')
     ):
         animate(planar.load("four-bar"), ".mp4")
 
@@ -218,5 +218,5 @@ def test_hostile_names_do_no_harm():
 def test_without_matplotlib_it_is_said_what_to_install(monkeypatch):
     monkeypatch.setitem(sys.modules, "matplotlib", None)
     monkeypatch.setitem(sys.modules, "PIL", None)
-    with pytest.raises(BadInput, match=re.escape("pip install 'planar-linkages[plot]'")):
+    with pytest.raises(BadInput, match=re.escape('pip install "planar-linkages[plot]"')):
         animate(planar.load("four-bar"))

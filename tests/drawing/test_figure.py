@@ -472,7 +472,7 @@ def test_without_matplotlib_it_is_said_how_to_get_it(monkeypatch):
         lambda: place_labels([Label("A", (0.0, 0.0))], []),
     ):
         with pytest.raises(
-            BadInput, match=r"^matplotlib: drawings need matplotlib: pip install 'planar-linkages\[plot\]'$"
+            BadInput, match=r"^matplotlib: drawings need matplotlib: pip install \"planar-linkages\[plot\]\"$"
         ):
             attempt()
 

@@ -19,6 +19,7 @@ import pytest
 
 import planar
 from planar.cli import main
+from planar.document.answer_lists import AnswerList, HandedInValue
 from planar.document.writer import write_mechanism
 from planar.model.input_laws import SEGMENT_TYPES
 from planar.model.pairs import pair_types
@@ -76,6 +77,9 @@ def results():
         planar.sweep(bars, {"BC.length": [0.066]}, steps=6, reduce={"path": "C.path_length"}),
     )
     yield from (swept, swept[0], prepared, prepared())
+    handed_in = AnswerList(7, (HandedInValue("Ann", 1, "velocity of C", 0.6, "m/s", 3),))
+    marks = planar.mark_answers(bars, handed_in)
+    yield from (marks, student := marks.students[0], student.values[0], planar.problem_variants(bars, 1)[0])
     yield from (planar.BadInput("here", "wrong"), planar.Unknown("no such point"), planar.Outcome.SOLVED)
     yield planar.NoAnswer(planar.Outcome.DEAD_POINT, "it stops", links=["a"])
 

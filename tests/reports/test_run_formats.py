@@ -502,9 +502,9 @@ def test_without_pyarrow_or_xarray_a_sentence_says_what_to_install(monkeypatch):
     for library in ("pyarrow", "pyarrow.parquet", "xarray"):
         monkeypatch.setitem(sys.modules, library, None)
     for asking in (lambda: encode_run(motion, ".parquet"), lambda: check_writable(".parquet")):
-        with pytest.raises(BadInput, match=r"Parquet files need pyarrow: pip install 'planar-linkages\[parquet\]'"):
+        with pytest.raises(BadInput, match=r"Parquet files need pyarrow: pip install \"planar-linkages\[parquet\]\""):
             asking()
-    with pytest.raises(BadInput, match=r"a Dataset needs xarray: pip install 'planar-linkages\[xarray\]'"):
+    with pytest.raises(BadInput, match=r"a Dataset needs xarray: pip install \"planar-linkages\[xarray\]\""):
         planar.dataset(motion)
     for suffix in (".csv", ".json", ".npz"):
         assert encode_run(motion, suffix)

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from planar.analysis.worked.published import Comparison, compare_value
+from planar.document.cursor import suggest_spelling
 from planar.foundation.errors import BadInput, Unknown, join_names
 from planar.model.mechanism import PUBLISHED_QUANTITIES, PublishedValue, relative_motions
 from planar.model.pairs import MeasureKind
@@ -60,16 +61,17 @@ def question_text(item: PublishedValue) -> str:
 
 
 def read_question(text: str, questions: tuple[PublishedValue, ...]) -> PublishedValue:
-    """The question that a text means, capitals and blanks left aside. Raises BadInput."""
-    known = {_plain(question_text(item)): item for item in questions} | {_plain(q.symbol): q for q in questions}
-    found = known.get(_plain(text))
-    if found is None:
-        raise BadInput(text[:60], f"this is not asked; asked are {join_names([question_text(q) for q in questions])}")
-    return found
-
-
-def _plain(text: str) -> str:
-    return " ".join(text.lower().split())
+    """The question that a text means, capitals and blanks left aside where that leaves one. Raises BadInput."""
+    exact = {written: item for item in questions for written in (item.symbol, question_text(item))}
+    found = exact.get(" ".join(text.split()))
+    if found is not None:
+        return found
+    alike = {item for written, item in exact.items() if written.casefold() == " ".join(text.casefold().split())}
+    if len(alike) == 1:
+        return alike.pop()
+    asked = [question_text(item) for item in questions]
+    meant = suggest_spelling(text, asked) or f"; asked are {join_names(asked, 4)}"
+    raise BadInput("quantity", f"{text[:60]!r} is not asked{meant}")
 
 
 def solve_question(state: State, item: PublishedValue) -> Comparison:

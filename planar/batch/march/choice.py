@@ -47,5 +47,5 @@ def _available_attempts(backend: str) -> list[tuple[str, tuple[RunnerAttempt, ..
         except ImportError:
             continue
     if backend not in ("auto", *(name for name, _ in found)):
-        raise BadInput("backend", f"the backend {backend!r} is not installed: pip install 'planar-linkages[{backend}]'")
+        raise BadInput("backend", f'the backend {backend!r} is not installed: pip install "planar-linkages[{backend}]"')
     return found

@@ -169,7 +169,7 @@ def open_store(store: str | Path | None, plan: SweepPlan) -> BlockStore:
         import_module(library)
     except ImportError:
         raise BadInput(
-            "store", f"a {path.suffix} store needs {library}: pip install 'planar-linkages[{extra}]'"
+            "store", f'a {path.suffix} store needs {library}: pip install "planar-linkages[{extra}]"'
         ) from None
     return getattr(import_module(f"planar.batch.stores.{module}"), name)(plan, path)
 

@@ -336,7 +336,7 @@ def _find_ffmpeg() -> str:
 
         return get_ffmpeg_exe()
     except (ImportError, RuntimeError):
-        raise BadInput("imageio-ffmpeg", "MP4 files need ffmpeg: pip install 'planar-linkages[video]'") from None
+        raise BadInput("imageio-ffmpeg", 'MP4 files need ffmpeg: pip install "planar-linkages[video]"') from None
 
 
 def _encode_mp4(script: AnimationScript, fps: float, progress: Progress, ffmpeg: str) -> bytes:

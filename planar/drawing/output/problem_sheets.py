@@ -29,6 +29,9 @@ from planar.results.motion import State
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+FIGURE_SIZE = 115.0, 110.0
+"""mm that the strokes of a problem's figure may take."""
+NAME_LINE = "_" * 40
 Progress = Callable[[float, float], None]
 
 
@@ -67,14 +70,14 @@ def answer_pages(base: State, variants: Sequence[Variant], seed: int, progress: 
 def _problem_strips(variant: Variant, seed: int, questions: Sequence[PublishedValue]) -> Iterator[Strip]:
     state = variant.state
     yield from paragraph((f"{state.mechanism.name}, variant {variant.number}",), TITLE_STYLE)
-    yield from paragraph((f"Problem {seed}. Name:",), space_before=2.0)
+    yield from paragraph((f"Problem {seed}.   Name: {NAME_LINE}",), space_before=2.0)
     yield from paragraph(("Given",), TOPIC_STYLE, space_before=4.0, keep_with_next=True)
     for phrase in given_data(state):
         yield from paragraph(phrase, indent=4.0)
     yield from paragraph(("To find",), TOPIC_STYLE, space_before=3.0, keep_with_next=True)
     for phrase in asked_phrases(questions):
         yield from paragraph(phrase, indent=4.0)
-    figure = scheme(state, space_diagram_scale(state))._replace(title="Figure")
+    figure = scheme(state, space_diagram_scale(state, FIGURE_SIZE))._replace(title="Figure")
     yield from picture_strips([shorten_notes(figure)])
 
 

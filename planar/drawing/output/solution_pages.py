@@ -148,13 +148,13 @@ def _fitting_scales(solution: WorkedSolution) -> dict[str, Scale]:
     return found | {"length": space_diagram_scale(solution.state)}
 
 
-def space_diagram_scale(state: State) -> Scale:
-    """A round scale at which the strokes of the space diagram fit their room, wheels and guides included."""
+def space_diagram_scale(state: State, size: tuple[float, float] = DRAWING_SIZES["length"]) -> Scale:
+    """A round scale at which the strokes of the space diagram fit a room in mm, wheels and guides included."""
     scale, length = space_scale(state.mechanism, plain_frames(state.frames), state.shapes), state.mechanism.units.length
     for _ in range(3):
         low, high = extent([mark for mark in scheme(state, scale).marks if not isinstance(mark, Label)])
         width, height = ((b - a) * scale.per_mm for a, b in zip(low, high, strict=True))
-        room = DRAWING_SIZES["length"][0] + SYMBOL_MARGIN, DRAWING_SIZES["length"][1] + SYMBOL_MARGIN
+        room = size[0] + SYMBOL_MARGIN, size[1] + SYMBOL_MARGIN
         scale, before = round_scale("length", length, width, height, room), scale
         if scale == before:
             break

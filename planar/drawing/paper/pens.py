@@ -69,4 +69,4 @@ def require_matplotlib() -> None:
     try:
         import matplotlib as _  # noqa: F401
     except ImportError:
-        raise BadInput("matplotlib", "drawings need matplotlib: pip install 'planar-linkages[plot]'") from None
+        raise BadInput("matplotlib", 'drawings need matplotlib: pip install "planar-linkages[plot]"') from None

@@ -70,7 +70,7 @@ class WheelPair(Pair):
                     {"minimum": -LARGEST_RATIO, "maximum": -1.0 / LARGEST_RATIO},
                 ],
             },
-            "how fast the second turns beside the first, against the carrier; negative where they turn opposite ways",
+            "how fast the second turns beside the first, in place of radii; negative where they turn opposite ways",
         ),
         "mesh": described(
             {

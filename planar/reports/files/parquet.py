@@ -14,7 +14,7 @@ def require_pyarrow() -> None:
     try:
         import pyarrow.parquet as _  # noqa: F401
     except ImportError:
-        raise BadInput("pyarrow", "Parquet files need pyarrow: pip install 'planar-linkages[parquet]'") from None
+        raise BadInput("pyarrow", 'Parquet files need pyarrow: pip install "planar-linkages[parquet]"') from None
 
 
 def encode_parquet(motion: Motion, more: Iterable[ReportedSeries] = ()) -> bytes:

@@ -44,7 +44,7 @@ def dataset(motion: Motion) -> xr.Dataset:
     try:
         import xarray as xr
     except ImportError:
-        raise BadInput("xarray", "a Dataset needs xarray: pip install 'planar-linkages[xarray]'") from None
+        raise BadInput("xarray", 'a Dataset needs xarray: pip install "planar-linkages[xarray]"') from None
     groups: dict[str, list[ReportedSeries]] = {"inputs": [], "points": [], "links": [], "pairs": []}
     for thing in reported_series(motion):
         groups[thing.group].append(thing)

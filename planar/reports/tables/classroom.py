@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import csv
 from collections.abc import Sequence
+from io import StringIO
 from typing import Any
 
 from rich.console import Group, RenderableType
 from rich.text import Text
 
-from planar.analysis.classroom.marking import RIGHT, MarkedValue, StudentMarks
+from planar.analysis.classroom.marking import RIGHT, MarkedValue, Marks
 from planar.analysis.classroom.questions import problem_questions, question_text, solve_question
 from planar.analysis.classroom.variants import Variant
 from planar.document.dimensions import file_dimensions
@@ -17,6 +19,9 @@ from planar.model.mechanism import PUBLISHED_QUANTITIES
 from planar.reports.fitted_table import plain_table
 from planar.reports.number_format import DIGITS
 from planar.results.motion import State
+
+FORMULA_SIGNS = ("=", "+", "-", "@")
+"""What a spreadsheet takes for the beginning of a formula."""
 
 
 def variants_tables(base: State, variants: Sequence[Variant], seed: int) -> RenderableType:
@@ -50,18 +55,23 @@ def variants_record(base: State, variants: Sequence[Variant], seed: int) -> dict
     return {"mechanism": base.mechanism.name, "seed": seed, "variants": [record(each) for each in variants]}
 
 
-def marks_tables(marks: Sequence[StudentMarks], units: FileUnits) -> RenderableType:
-    """How many answers of each student are right, then each that is not."""
-    whole = plain_table("Marks", "student", "variant", "right", "of", left=(0,), keys=2)
+def marks_tables(marks: Marks, units: FileUnits) -> RenderableType:
+    """How many answers of each student are right, then each that is not, and the lines that could not be read."""
+    whole = plain_table("Marks", "student", "variant", "right", "of", "missing", left=(0,), keys=2)
     wrong = plain_table(
         "Not right", "student", "variant", "what", "handed in", "solved", "unit", "why", left=(0, 2, 5, 6)
     )
-    for each in marks:
-        whole.add_row(each.student, str(each.variant), str(each.right), str(each.asked))
+    for each in marks.students:
+        whole.add_row(each.student, str(each.variant), str(each.right), str(each.asked), str(each.missing))
         for value in each.values:
             if value.verdict != RIGHT:
                 wrong.add_row(each.student, str(each.variant), *_wrong_cells(value, units))
-    return Group(whole, Text(), wrong) if any(each.right < len(each.values) for each in marks) else whole
+    unread = plain_table("Not read", "line", "why", left=(1,))
+    for line in marks.unread:
+        unread.add_row(str(line.line), line.sentence)
+    shown: list[RenderableType] = [each for each in (whole, wrong, unread) if each.rows]
+    shown += [Text(f" - {remark}") for remark in marks.remarks]
+    return Group(*(part for each in shown for part in (each, Text()))) if shown else Text("nobody handed anything in")
 
 
 def _wrong_cells(value: MarkedValue, units: FileUnits) -> tuple[str, ...]:
@@ -71,9 +81,9 @@ def _wrong_cells(value: MarkedValue, units: FileUnits) -> tuple[str, ...]:
     return question_text(value.question), handed_in, solved, name, value.verdict
 
 
-def marks_record(marks: Sequence[StudentMarks]) -> list[dict[str, Any]]:
+def marks_record(marks: Marks) -> dict[str, Any]:
     """The same as a JSON value (SI)."""
-    return [
+    students = [
         {
             "student": each.student,
             "variant": each.variant,
@@ -89,5 +99,20 @@ def marks_record(marks: Sequence[StudentMarks]) -> list[dict[str, Any]]:
                 for value in each.values
             ],
         }
-        for each in marks
+        for each in marks.students
     ]
+    unread = [{"line": each.line, "why": each.sentence} for each in marks.unread]
+    return {"students": students, "unread": unread, "remarks": list(marks.remarks)}
+
+
+def marks_csv(marks: Marks) -> str:
+    """A line for each student, for a spreadsheet: a name that would be a formula there is put in quotes of its own."""
+    rows: list[tuple[str, ...]] = [("student", "variant", "right", "asked", "missing")]
+    rows += [
+        (f"'{each.student}" if each.student.startswith(FORMULA_SIGNS) else each.student, *map(str, numbers))
+        for each in marks.students
+        for numbers in [(each.variant, each.right, each.asked, each.missing)]
+    ]
+    text = StringIO()
+    csv.writer(text, lineterminator="\n").writerows(rows)
+    return text.getvalue()

@@ -1,0 +1,81 @@
+"""What goes to the screen or into a pipe whose alphabet lacks letters, as that of a console of Windows may."""
+
+from __future__ import annotations
+
+import codecs
+import json
+import sys
+import unicodedata
+from typing import Any
+
+import click
+
+ERROR_HANDLER = "planar.plain_letters"
+PLAIN_LETTERS = {
+    "α": "alpha",
+    "ε": "epsilon",
+    "θ": "theta",
+    "λ": "lambda",
+    "μ": "u",
+    "µ": "u",
+    "φ": "phi",
+    "ω": "omega",
+    "Δ": "Delta",
+    "Ω": "Omega",
+    "×": "x",
+    "·": ".",
+    "−": "-",
+    "–": "-",
+    "—": "-",
+    "─": "-",
+    "━": "-",
+    "│": "|",
+    "•": "*",
+    "→": "->",
+    "∥": "||",
+    "⊥": "_|_",
+    "∞": "infinite",
+    "°": " deg",
+    "′": "'",
+    "″": "''",
+    "‴": "'''",
+    "…": "...",
+    "’": "'",
+    "\N{NO-BREAK SPACE}": " ",
+}
+"""What stands for a letter that cannot be shown, of one character where that reads well."""
+
+
+def allow_every_letter() -> None:
+    """Let what is printed show letters that its streams lack by others, and never fail for them."""
+    codecs.register_error(ERROR_HANDLER, _replace_letters)
+    for stream in (sys.stdout, sys.stderr):
+        if hasattr(stream, "reconfigure"):
+            stream.reconfigure(errors=ERROR_HANDLER)
+
+
+def print_json(value: Any, indent: int | None = None, allow_nan: bool = False) -> None:
+    """Print a JSON value; in other alphabets than that of Unicode in plain letters alone, which programs read alike."""
+    plain = not (getattr(sys.stdout, "encoding", None) or "").lower().startswith("utf")
+    click.echo(json.dumps(value, ensure_ascii=plain, indent=indent, allow_nan=allow_nan))
+
+
+def _replace_letters(problem: UnicodeError) -> tuple[str, int]:
+    if not isinstance(problem, UnicodeEncodeError):
+        raise problem
+    found, before = [], problem.object[: problem.start][-1:]
+    for each in problem.object[problem.start : problem.end]:
+        found.append(_plain_letter(each, before))
+        before = each
+    return "".join(found), problem.end
+
+
+def _plain_letter(letter: str, before: str) -> str:
+    if letter in PLAIN_LETTERS:
+        return PLAIN_LETTERS[letter]
+    kind, _, _ = unicodedata.decomposition(letter).partition(" ")
+    if kind not in ("<sub>", "<super>"):
+        return letter.encode("ascii", "backslashreplace").decode()  # a name's, which is to be known again
+    level = unicodedata.normalize("NFKD", letter).replace("−", "-")
+    goes_on = before and unicodedata.decomposition(before).startswith(kind)
+    return level if kind == "<sub>" or goes_on else f"^{level}"
