@@ -116,7 +116,7 @@ def test_branches_of_half_a_thousandth_of_a_radian_are_not_missed():
     assert chain.sampled(2000) != [2, 2, 2, 4]  # so that samples alone could not tell
 
 
-@pytest.mark.parametrize(("seed", "dyads", "driven"), [(23, 2, "Q1"), (31, 2, "Q1"), (35, 3, "Q2")])
+@pytest.mark.parametrize(("seed", "dyads", "driven"), part([(23, 2, "Q1"), (35, 3, "Q2"), (31, 2, "Q1")], 2))
 def test_a_linkage_driven_through_a_larger_group_has_as_many_circuits_as_by_its_crank(seed, dyads, driven):
     chain = Chain(seed, dyads)
     found = planar.circuits(chain.mechanism(driven))
@@ -255,10 +255,9 @@ def test_the_order_does_not_depend_on_the_sketch():
     ("name", "why"),
     [
         ("antiparallelogram", "branches cross"),
-        ("umbrella", "branches cross"),
         ("geared-five-bar", "turns"),
         ("rapsons-slide", "without end"),
-        ("peaucellier-lipkin", "branches cross"),  # of some assemblies no way on is found at all
+        *part([("peaucellier-lipkin", "branches cross"), ("umbrella", "branches cross")], 2),  # of some no way on
     ],
 )
 def test_what_is_not_known_is_not_claimed(name, why):

@@ -25,6 +25,7 @@ from tests.guide_pictures import PICTURES
 
 ROOT = Path(__file__).parents[2]
 FOLDER = ROOT / "planar" / "guide"
+README = (ROOT / "README.md").read_text(encoding="utf-8")
 PAGES = {path: read_page(path) for path in (FIRST_PAGE, *(each.path for each in guide_topics()))}
 FILES = {
     name: text
@@ -44,8 +45,9 @@ COMMANDS = {
     for page in PAGES
     for text in blocks(page, "sh")
     for line in text.splitlines()
-    if line.startswith("planar ")
+    if line.startswith("planar ") and line not in README
 }
+"""Those of README's tour are tried with it."""
 
 
 @pytest.fixture
