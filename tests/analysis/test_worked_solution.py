@@ -19,6 +19,7 @@ from planar.analysis.worked.sections import Section
 from planar.analysis.worked.solution import WorkedSolution, worked_solution
 from planar.drawing.paper.scales import parse_scale
 from planar.foundation.errors import PlanarError
+from planar.model.file_units import rate_unit
 from planar.reports.tables.worked_solution import record, solution_text
 from tests.command import run
 from tests.hostile import NAMES, hostile_document
@@ -301,7 +302,7 @@ def test_every_model_is_explained(model: str) -> None:
             for phrase in section.results:
                 read |= _agreed(phrase, state, order, greatest)
             for row in section.rows:
-                _consistent(row.magnitude, row.value, row.known)
+                _consistent(row.magnitude, rate_unit(half.kind, state.mechanism.units)[1].from_si(row.value), row.known)
     frame = state.mechanism.frame
     fixed = {each.name for each in state._points if any(link == frame for link, _ in each.members)}
     assert read == set(state.point_names) - fixed

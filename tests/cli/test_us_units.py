@@ -151,7 +151,7 @@ def test_lists_have_no_metric_unit_in_their_heads_and_json_is_si(inches: str, tm
 
 
 OF_A_POSITION = ("scheme", "velocity", "acceleration", "centres", "forces", "solution")
-OF_A_MOTION = ("positions", "loci", "diagrams", "centrodes", "circuits", "torque", "bearings", "modes")
+OF_A_MOTION = ("positions", "loci", "diagrams", "centrodes", "circuits", "torque", "bearings")
 
 
 @pytest.mark.parametrize("what", [*OF_A_POSITION, *OF_A_MOTION])

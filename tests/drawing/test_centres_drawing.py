@@ -19,6 +19,7 @@ from planar.drawing.centres.choice import MAX_CENTRES, choose_centres
 from planar.drawing.centres.circle_diagram import circle_picture, circle_radius
 from planar.drawing.centres.two_directions import directions_picture
 from planar.drawing.paper.picture import Arrow, Circle, Label, Pen, Polyline, extent
+from planar.drawing.paper.scales import parse_scale
 from tests.command import run
 from tests.figures import visible_texts
 from tests.known import MODELS as ALL
@@ -47,8 +48,7 @@ def diagram(stem):
 
 def per_mm(picture):
     """The scale (m/mm), read from the notes as a reader would."""
-    amount, written = re.match(r"1 cm = (\S+) (\S+)", picture.notes[0]).groups()
-    return float(amount) * {"mm": 1e-3, "cm": 1e-2, "m": 1.0}[written] / 10.0
+    return parse_scale(picture.notes[0].removesuffix(" (1:1)")).per_mm
 
 
 def marks(picture, start, kind):

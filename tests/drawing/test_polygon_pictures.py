@@ -41,8 +41,7 @@ def picture(stem: str, kind: str) -> Picture:
 def per_mm(stem: str, kind: str) -> float:
     """The scale, read from the notes as a reader would."""
     _, told, _, *_ = picture(stem, kind).notes
-    (amount,) = re.fullmatch(r"1 cm = (\S+) m/s²?", told).groups()
-    return float(amount) / 10.0
+    return parse_scale(told).per_mm
 
 
 def of(stem, kind, about):

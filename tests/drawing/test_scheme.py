@@ -24,6 +24,7 @@ from planar.drawing.scheme.link_strokes import body_marks
 from planar.drawing.scheme.scene import plain_frames
 from planar.drawing.scheme.scheme import scheme
 from planar.foundation.geometry import Vector, frame_at
+from planar.foundation.units import parse_unit
 from planar.model.link_graph import link_numbers
 from planar.model.link_shapes import link_shape
 from planar.model.mechanism import Drive, named_points, replace_inputs
@@ -290,7 +291,7 @@ def test_a_scheme_fits_its_sheet_with_all_names_and_numbers(name):
     texts = {mark.about: mark.text for mark in picture.marks if isinstance(mark, Label)}
     assert all(texts[f"number of {link}"] == text for link, text in number.items())
     assert picture.title == state.mechanism.name
-    assert picture.notes[0].startswith("Space diagram, 1 cm = ")
+    assert picture.notes[0].startswith(("Space diagram, 1 cm = ", "Space diagram, 1 in = "))
 
 
 @every_model
@@ -345,7 +346,8 @@ def test_input_arrows_point_the_way_that_the_input_drives(name):
         assert all(isinstance(letter, Label) for letter in letters)
         along = 1.0 if (given_input.velocity or given_input.acceleration) > 0.0 else -1.0
         told = [rate * along for rate in (given_input.velocity, given_input.acceleration) if rate]
-        read = [float(letter.text.split()[2].replace("−", "-")) for letter in letters]
+        words = [letter.text.replace("−", "-").split() for letter in letters]
+        read = [parse_unit(unit).to_si(float(number)) for _, _, number, unit in words]
         assert read == pytest.approx(told, rel=5e-4)
         if not given_input.velocity:
             continue

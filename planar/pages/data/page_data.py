@@ -15,7 +15,8 @@ from planar.document.dimensions import Dimension, change_dimension
 from planar.drawing.paper.scales import paper_unit
 from planar.equations.mechanism_numbers import scale_lengths, shapes_of_links
 from planar.equations.symbolic_equations import slice_length
-from planar.model.file_units import display_unit
+from planar.foundation.units import parse_unit
+from planar.model.file_units import FileUnits, display_unit
 from planar.model.link_graph import link_numbers
 from planar.model.link_shapes import PointPlacementError
 from planar.model.mechanism import Mechanism, links_counting_turns, named_points, pair_misfits
@@ -81,6 +82,7 @@ def page_data(mechanism: Mechanism, z: np.ndarray | None = None) -> tuple[dict[s
         "name": mechanism.name,
         "about": mechanism.about,
         "units": _unit_data(mechanism),
+        "paces": _pace_data(mechanism.units),
         "paper": dict(zip(("name", "mm"), paper_unit(mechanism.units.length), strict=True)),
         "column": {
             link.name: [solver.column[link.name, part] for part in ("x", "y", "angle")]
@@ -173,6 +175,14 @@ def _unit_data(mechanism: Mechanism) -> dict[str, Any]:
         kind: {"name": name, "si": of.to_si(1.0), "ratio": [of.numerator, of.denominator]}
         for kind, (name, of) in found.items()
     }
+
+
+def _pace_data(units: FileUnits) -> dict[str, Any]:
+    """In what the pace of a page's inputs is told: what the file declares, else its own length by the second, and rpm."""
+    own = f"{units.length}/s", parse_unit(units.length)
+    length = display_unit("velocity", units) if units.velocity else own
+    angle = display_unit("angular velocity", units) if units.angular_velocity else ("rpm", parse_unit("rpm"))
+    return {kind: {"name": name, "si": of.to_si(1.0)} for kind, (name, of) in (("length", length), ("angle", angle))}
 
 
 def _assembly_data(mechanism: Mechanism, solver: PositionSolver) -> dict[str, Any]:

@@ -174,8 +174,8 @@ class Controls {
   told() {
     const { page, pace } = this, given = page.data.inputs[page.running];
     if (!given) return;
-    const rate = this.rate(), { name, si } = page.data.units.length;
-    let text = given.slides ? `${readable(+(rate / si).toPrecision(2))} ${name}/s` : `${readable(+((rate * 30) / Math.PI).toPrecision(2))} rpm`;
+    const rate = this.rate(), { name, si } = page.data.paces[given.slides ? "length" : "angle"];
+    let text = `${readable(+(rate / si).toPrecision(2))} ${name}`;
     if (given.velocity) text += `, ${+(rate / Math.abs(given.velocity)).toPrecision(2)} times the file's`;
     pace.told.textContent = text;
     pace.slider.setAttribute("aria-valuetext", text);
