@@ -84,7 +84,8 @@ def _directive(name: str) -> list[str]:
         return [f".. automodule:: {value.__name__}", "   :members:"]
     if inspect.isclass(value):
         added = class_entries()[name]
-        told = [f"   :ivar {attribute}: {text}" for attribute, text in added.attributes.items()]
+        told = [f"   * ``{attribute}``: {text}" for attribute, text in added.attributes.items()]
+        told = ["   Attributes beside those above:", "", *told] if told else []
         example = [line[1:] if line.strip() else "" for line in added.example.splitlines()]
         return [f".. autoclass:: planar.{name}", "   :members:", "", *told, "", *example]
     return [f".. autofunction:: planar.{name}"]

@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 from jsonschema import Draft202012Validator
 from PIL import Image, ImageChops, ImageStat
+from rich.cells import cell_len
 
 import planar
 from planar import plot
@@ -169,6 +170,13 @@ def test_the_terminal_shows_a_page_and_what_there_is(tmp_path):
     shown = command.run(tmp_path, "guide").done()
     assert all(each.title in shown for each in guide_topics())
     assert "dead point" in command.run(tmp_path, "guide", "glossary").done()
+
+
+def test_every_topic_fits_a_terminal_of_80_columns_without_marks_of_its_source(tmp_path):
+    for each in guide_topics():
+        shown = command.run(tmp_path, "guide", each.name, COLUMNS="80").done()
+        assert max(cell_len(line.rstrip()) for line in shown.splitlines()) <= 80, each.name
+        assert not re.search(r"!\[|<!--|\]\(|^\|", shown, re.MULTILINE), each.name
 
 
 def test_every_public_name_is_in_the_reference():
