@@ -150,6 +150,20 @@ def test_every_command_public_function_and_drawing_stands_on_a_page():
     assert drawn == []
 
 
+def test_every_option_stands_on_a_page_and_every_option_of_a_page_is_one():
+    known = {
+        name
+        for each in main.load_commands().values()
+        for part in each.params
+        for name in (*part.opts, *part.secondary_opts)
+    }
+    known = {name for name in known if name.startswith("--")}
+    whole = "\n".join(PAGES.values())
+    shown = set(re.findall(r"(?<![\w-])--[a-z][a-z-]*[a-z]", whole))
+    assert known - shown == set()
+    assert shown - known - {"--set", "--write"} == set()  # that of every command; that of the benchmarks
+
+
 def test_every_page_of_an_answer_shows_how_and_says_where_its_theory_is_from():
     for page in (each for each in PAGES if each.startswith("answers/")):
         assert blocks(page, "sh") or blocks(page, "python"), page
