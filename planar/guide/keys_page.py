@@ -57,6 +57,8 @@ SHOWN_KEYS = {
     "mass": ("masses", "gravity"),
 }
 """What a page shows of the example of a section; of that of a pair the entry with its keyword."""
+JSON_WIDTH = 74
+"""Characters of a line, which a terminal need not break."""
 
 
 class KeySection(NamedTuple):
@@ -125,9 +127,9 @@ def _example_lines(name: str) -> Iterator[str]:
     example = read_example(name)
     yield f"\n![{example['name']}](../pictures/keys/{name}.png)\n\n```json"
     for key in SHOWN_KEYS.get(name, ()):
-        yield f'"{key}": {_json_lines(example[key], 110)}'
+        yield f'"{key}": {_json_lines(example[key], JSON_WIDTH - len(key))}'
     if name not in SHOWN_KEYS:
-        yield from (_json_lines(pair, 118) for pair in example["pairs"] if name in pair)
+        yield from (_json_lines(pair, JSON_WIDTH) for pair in example["pairs"] if name in pair)
     yield "```"
 
 

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import inspect
+import re
+from typing import NamedTuple
 
 import planar
+from planar.document.files import read_packaged_text
 
 ROOM_TITLES = {
     "document": "Files",
@@ -19,6 +22,28 @@ ROOM_TITLES = {
 }
 """The heading under which the names of a room stand; those of any other are under the last."""
 OTHER_TITLE = "Pictures, pages and tables"
+
+
+EXAMPLES_FILE = "class_examples.txt"
+ENTRY = re.compile(r"^(?P<name>\w+)\n(?P<body>(?:    .*\n|\n(?=    ))*)", re.MULTILINE)
+ATTRIBUTE = re.compile(r"^    (?P<name>\w+): (?P<text>.*)$", re.MULTILINE)
+
+
+class ClassEntry(NamedTuple):
+    """What the reference adds to a class: attributes that its docstring does not tell, and an example."""
+
+    attributes: dict[str, str]
+    example: str
+
+
+def class_entries() -> dict[str, ClassEntry]:
+    """What is added to each public class, by its name."""
+    found = {}
+    for entry in ENTRY.finditer(read_packaged_text("guide", EXAMPLES_FILE)):
+        attributes, prompt, example = entry["body"].partition("    >>> ")
+        told = {each["name"]: each["text"] for each in ATTRIBUTE.finditer(attributes)}
+        found[entry["name"]] = ClassEntry(told, prompt + example)
+    return found
 
 
 def reference_names() -> dict[str, list[str]]:
@@ -58,5 +83,9 @@ def _directive(name: str) -> list[str]:
     if inspect.ismodule(value):
         return [f".. automodule:: {value.__name__}", "   :members:"]
     if inspect.isclass(value):
-        return [f".. autoclass:: planar.{name}", "   :members:"]
+        added = class_entries()[name]
+        told = [f"   * ``{attribute}``: {text}" for attribute, text in added.attributes.items()]
+        told = ["   Attributes beside those above:", "", *told] if told else []
+        example = [line[1:] if line.strip() else "" for line in added.example.splitlines()]
+        return [f".. autoclass:: planar.{name}", "   :members:", "", *told, "", *example]
     return [f".. autofunction:: planar.{name}"]

@@ -29,7 +29,8 @@ SETTINGS: dict[str, Any] = {
     "html_show_sphinx": False,
     "html_copy_source": False,
     "html_show_search_summary": False,  # it would be fetched, which a page opened from a folder may not
-    "html_static_path": [],
+    "html_static_path": ["_static"],
+    "html_css_files": ["guide.css"],
     "default_role": "py:obj",
     "myst_heading_anchors": 3,
     "autodoc_typehints": "signature",
@@ -38,6 +39,8 @@ SETTINGS: dict[str, Any] = {
     "suppress_warnings": ["misc.highlighting_failure"],
 }
 """What Sphinx is told."""
+STYLE = "article img { max-height: 34rem; width: auto; }\n"
+"""No picture is taller than a screen."""
 
 
 def write_site(folder: Path) -> Path:
@@ -80,4 +83,6 @@ def _write_sources(source: Path) -> None:
     for path, text in pages.items():
         (source / path).parent.mkdir(parents=True, exist_ok=True)
         save_file(source / path, text)
+    (source / "_static").mkdir()
+    save_file(source / "_static" / "guide.css", STYLE)
     shutil.copytree(GUIDE_FOLDER / "pictures", source / "pictures")

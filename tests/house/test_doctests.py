@@ -2,13 +2,16 @@
 
 import doctest
 import inspect
+import re
 from importlib import import_module
 
 import pytest
 
 import planar
+from planar.guide.reference import class_entries
 
 FUNCTIONS = [name for name in planar.__all__ if inspect.isroutine(getattr(planar, name))]
+ENTRIES = class_entries()
 CLASSES = [name for name in planar.__all__ if inspect.isclass(getattr(planar, name))]
 
 
@@ -28,3 +31,26 @@ def test_an_example_says_what_comes_of_it(name):
 def test_the_examples_of_classes_and_their_methods_run():
     for name in CLASSES:
         run_examples(name)
+
+
+def test_every_public_class_has_an_example_in_the_reference():
+    assert sorted(ENTRIES) == sorted(CLASSES)
+
+
+@pytest.mark.parametrize("name", CLASSES)
+def test_the_example_of_a_class_makes_one_and_its_attributes_are_told(name):
+    """Attributes are fields and properties; each is told in the docstring of the class, by its own, or there."""
+    kind, entry = getattr(planar, name), ENTRIES[name]
+    assert entry.example.count(">>>") > 1
+    example = doctest.DocTestParser().get_doctest(entry.example, {}, name, None, None)
+    assert doctest.DocTestRunner(verbose=False).run(example, clear_globs=False).failed == 0
+    properties = {key: value.fget.__doc__ for key, value in inspect.getmembers(kind) if isinstance(value, property)}
+    fields = [*getattr(kind, "_fields", ()), *getattr(kind, "__dataclass_fields__", {})]
+    internal = kind.__module__.startswith(("planar.model.pairs", "planar.model.input_laws"))  # told by their keys
+    untold = [
+        key
+        for key in {*fields, *properties} - set(entry.attributes)
+        if not key.startswith("_") and not re.search(rf"\b{key}\b", kind.__doc__ or "") and not properties.get(key)
+    ]
+    assert internal or untold == []
+    assert set(entry.attributes) <= {*fields, *properties}

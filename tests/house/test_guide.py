@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 from jsonschema import Draft202012Validator
 from PIL import Image, ImageChops, ImageStat
+from rich.cells import cell_len
 
 import planar
 from planar import plot
@@ -151,6 +152,20 @@ def test_every_command_public_function_and_drawing_stands_on_a_page():
     assert drawn == []
 
 
+def test_every_option_stands_on_a_page_and_every_option_of_a_page_is_one():
+    known = {
+        name
+        for each in main.load_commands().values()
+        for part in each.params
+        for name in (*part.opts, *part.secondary_opts)
+    }
+    known = {name for name in known if name.startswith("--")}
+    whole = "\n".join(PAGES.values())
+    shown = set(re.findall(r"(?<![\w-])--[a-z][a-z-]*[a-z]", whole))
+    assert known - shown == set()
+    assert shown - known - {"--set", "--write"} == set()  # that of every command; that of the benchmarks
+
+
 def test_every_page_of_an_answer_shows_how_and_says_where_its_theory_is_from():
     for page in (each for each in PAGES if each.startswith("answers/")):
         assert blocks(page, "sh") or blocks(page, "python"), page
@@ -171,6 +186,13 @@ def test_the_terminal_shows_a_page_and_what_there_is(tmp_path):
     shown = command.run(tmp_path, "guide").done()
     assert all(each.title in shown for each in guide_topics())
     assert "dead point" in command.run(tmp_path, "guide", "glossary").done()
+
+
+def test_every_topic_fits_a_terminal_of_80_columns_without_marks_of_its_source(tmp_path):
+    for each in guide_topics():
+        shown = command.run(tmp_path, "guide", each.name, COLUMNS="80").done()
+        assert max(cell_len(line.rstrip()) for line in shown.splitlines()) <= 80, each.name
+        assert not re.search(r"!\[|<!--|\]\(|^\|", shown, re.MULTILINE), each.name
 
 
 def test_every_public_name_is_in_the_reference():
