@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from typing import Any
 
 from planar.document.input_laws import write_law
 from planar.document.loads import write_loads
 from planar.document.schema import DRIVE_SCHEMA, FORMAT_VERSION
-from planar.foundation.units import SI_UNITS, Unit, parse_unit, shortest_number
+from planar.foundation.units import SI_UNITS, Unit, UnitError, parse_unit, shortest_number
 from planar.model.file_units import FileUnits, is_metric, takes_bare_number, unit_of_kind
 from planar.model.link_shapes import Along, At, Link, PointDefinition
 from planar.model.mechanism import (
@@ -67,9 +68,10 @@ def _quantity_text(value: float, kind: str, units: FileUnits) -> str:
     """A quantity (SI) as a text in SI, or where that is not metric in the unit in which it is shown."""
     name, of = unit_of_kind(kind, units)
     if not is_metric(of):
-        number = shortest_number(value, parse_unit(name))
-        if not isinstance(number, str):
-            return f"{number!r} {name}"
+        with suppress(UnitError):  # it may be made of one that is spelled as nobody does: in^1
+            number = shortest_number(value, parse_unit(name))
+            if not isinstance(number, str):
+                return f"{number!r} {name}"
     return f"{value!r} {SI_UNITS[kind]}"
 
 

@@ -14,7 +14,8 @@ RESULT_SI_UNITS = SI_UNITS | {"energy": "J", "area": "m^2"}
 
 _CUSTOMARY = re.compile(
     r"\b(in|inch|inches|ft|foot|feet|yd|yards?|mi|miles?|mil|thou|lb|lbs|pounds?|oz|ounces?|slugs?"
-    r"|k?lbf|pounds?_force|force_pounds?|kips?|ozf|ounces?_force|hp|horsepower)\b"
+    r"|k?lbf|pounds?_force|force_pounds?|kips?|ozf|ounces?_force|hp|horsepower)\b",
+    re.IGNORECASE,
 )
 """Units of the inch and the pound, as they are spelled."""
 _LENGTH_RATES = {"velocity": "/s", "acceleration": "/s^2", "jerk": "/s^3"}
@@ -141,7 +142,8 @@ def rate_length(units: FileUnits, kind: str = "") -> tuple[str, Unit]:
 
 def _coherent_length(units: FileUnits) -> tuple[str, Unit]:
     """The unit of length beside which forces and masses stand: the metre where lengths are metric, else their own."""
-    return coherent_unit(units.length)
+    name, of = coherent_unit(units.length)
+    return spell_unit(name), of
 
 
 def rate_unit(kind: str, units: FileUnits) -> tuple[str, Unit]:

@@ -178,7 +178,7 @@ def _unit_data(mechanism: Mechanism) -> dict[str, Any]:
 
 
 def _pace_data(units: FileUnits) -> dict[str, Any]:
-    """In what the pace of a page's inputs is told: what the file declares, else its own length by the second, and rpm."""
+    """In what the pace of a page's inputs is told: what the file declares, else its length by the second, and rpm."""
     own = f"{units.length}/s", parse_unit(units.length)
     length = display_unit("velocity", units) if units.velocity else own
     angle = display_unit("angular velocity", units) if units.angular_velocity else ("rpm", parse_unit("rpm"))
