@@ -79,19 +79,22 @@ def closed_form_designs(
     return ClosedFormDesigns(joiner, batch, index, signs, runner)
 
 
-def find_ends(designs: ClosedFormDesigns, lengths: Array, good: Array, steps: int) -> FollowedDesigns:
+def find_ends(
+    designs: ClosedFormDesigns, lengths: Array, good: Array, candidates: Array, steps: int
+) -> FollowedDesigns:
     """As `follow_to_dead_points`, of designs of which so many steps are good (designs,), none at first.
 
-    lengths (designs,): how far the input is to go, rad or sizes, in so many steps.
+    lengths (designs,): how far the input is to go, rad or sizes, in so many steps. Of these so many `candidates`
+    (designs,) need not be solved here, see `DesignRunner.run`.
     """
     step, count = np.abs(lengths) / steps, len(good)
     ends = designs.find_dead_points(np.maximum(good - 1, 0) * step, lengths, step).distance
     nearest = np.clip(np.rint(ends / step), 0, steps) * step
     settled = ~np.isnan(ends) & (np.abs(ends - nearest) > DEAD_POINT_MARGIN * np.abs(lengths))
     solved = np.where(settled, np.ceil(np.minimum(ends / step, steps + 1.0)), 0.0).astype(int)
-    left = np.maximum(solved - good, 0)
+    left = np.maximum(solved - candidates, 0)
     design = np.repeat(np.arange(count), left)
-    at = good[design] + np.arange(len(design)) - np.repeat(np.cumsum(left) - left, left)
+    at = candidates[design] + np.arange(len(design)) - np.repeat(np.cumsum(left) - left, left)
     out, passed = designs.solve_positions(design, np.sign(lengths)[design] * at * step[design])
     settled[design[~passed]] = False
     kept = settled[design]

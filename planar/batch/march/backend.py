@@ -82,11 +82,13 @@ class DesignRunner(Protocol):
     def can_help(self, batch: DesignBatch) -> bool:
         """Whether it can do anything for such designs that others have not done before."""
 
-    def run(self, batch: DesignBatch, out: Array) -> Array:
+    def run(self, batch: DesignBatch, out: Array, candidates: Array | None = None) -> Array:
         """Fill out (steps + 1, rows, designs): x and y of each point, then their first, then second rates (m, s); what
         is no number from the first step on that did not pass.
 
-        Where `out` is in single precision, each number is rounded when it is written.
+        Where `out` is in single precision, each number is rounded when it is written. `candidates` (designs,) takes
+        how many of the first steps stand in `out`, where a runner leaves more than passed: those that follow pass the
+        checks of one position, but there may be a dead point before them.
 
         Returns how many of the first steps passed residual and branch check (designs,).
         """
@@ -109,6 +111,14 @@ def erase_from_steps(out: Array, first: Array) -> None:
     np.copyto(out[begin:], np.nan, where=np.arange(begin, len(out))[:, None, None] >= first)
 
 
+def erase_between(out: Array, first: Array, end: Array) -> None:
+    """Make out (steps + 1, rows, designs) no number from a step of each design on, up to another (designs,)."""
+    many = np.maximum(end - first, 0)
+    design = np.repeat(np.arange(len(first)), many)
+    begins = np.repeat(first - (np.cumsum(many) - many), many)
+    out[begins + np.arange(len(design)), :, design] = np.nan
+
+
 class RunnerAttempt(NamedTuple):
     """A runner, and whether it is given all designs that have not come to the end, or those that have not begun."""
 
@@ -126,7 +136,7 @@ class RunnerLadder:
         """See `DesignRunner`."""
         return True
 
-    def run(self, batch: DesignBatch, out: Array) -> Array:
+    def run(self, batch: DesignBatch, out: Array, candidates: Array | None = None) -> Array:
         """See `DesignRunner`."""
         good, runs = np.zeros(out.shape[2], dtype=int), 0
         for runner, runs_to_end in self.attempts:
@@ -137,12 +147,14 @@ class RunnerLadder:
                 continue
             try:
                 if left.size == len(good):
-                    good = runner.run(batch, out)
+                    good = runner.run(batch, out, candidates)
                 else:
                     steps, rows, _ = out.shape
                     own = allocate_aligned(steps, rows, left.size, out.dtype)
                     good[left] = runner.run(batch.select(left), own)
                     out[:, :, left] = own
+                    if candidates is not None:
+                        candidates[left] = good[left]
             except UnsupportedStructure:
                 continue
             runs += 1

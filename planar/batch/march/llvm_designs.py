@@ -7,12 +7,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import inf, nan
-from typing import NamedTuple
 
 import casadi as ca
 
 from planar.batch.march.kernel import BareAngle, KernelBlock, KernelEquations, Operand
-from planar.batch.march.llvm_kernel import KernelWriter, OperandNames
+from planar.batch.march.llvm_kernel import DesignsKernelLayout, KernelWriter, OperandNames
 from planar.batch.march.prediction import MAX_TURN_PER_STEP, PREDICTOR_ORDER
 from planar.batch.march.regularity import LEAST_KERNEL_REGULARITY, LEAST_START_REGULARITY, least_regularity
 from planar.codegen.instructions import UnsupportedOperation
@@ -22,24 +21,9 @@ from planar.equations.linear import solve_by_determinants
 HISTORY_LENGTH = 8
 """Steps before for which there is room: a power of two, more than `PREDICTOR_ORDER`."""
 FUNCTION_NAME = "march"
-ARGUMENT_TYPES = (*("int",) * 5, *("array",) * 7, *("float",) * 3, "array", "array")
+ARGUMENT_TYPES = (*("int",) * 5, *("array",) * 7, *("float",) * 3, *("array",) * 3)
 """Of the function's arguments: blocks, steps, width of the arrays that are read, how far a row and a step of `out` are
-from the next; p, q, state, drives, rates, table, counts; tolerance, astray, scale; out, good."""
-
-
-class DesignsKernelLayout(NamedTuple):
-    """What the function takes and gives, row by row, each with an entry for every design.
-
-    state: cos and sin of an angle, or a length, and what else is carried of it; drives: the same of the inputs; out:
-    rows that a step gives; table: numbers that a step takes.
-    """
-
-    state: tuple[Operand, ...]
-    inputs: tuple[Operand, ...]
-    output_row_count: int
-    table_width: int
-    ir: str
-    lanes: int
+from the next; p, q, state, drives, rates, table, counts; tolerance, astray, scale; out, good, candidates."""
 
 
 def write_designs_kernel(
@@ -54,9 +38,10 @@ def write_designs_kernel(
 ) -> DesignsKernelLayout:
     """The function for points on these links, none of which is the frame. Raises UnsupportedOperation.
 
-    A step gives x and y of every point, then with `rates` all first and all second rates: no numbers from the first
-    that does not pass the checks. With `point_blocks`, of the block that places each point, it gives more: x and y of
-    every point in the other assembly of its block (infinite where that is not in closed form), the state, and how
+    A step gives x and y of every point, then with `rates` all first and second rates: no numbers from the first
+    that does not pass the checks of a position by itself. `good` counts the first steps that pass all checks,
+    `candidates` those that pass these. With `point_blocks`, of the block that places each point, it gives more: x and y
+    of every point in the other assembly of its block (infinite where that is not in closed form), the state, and how
     regular the least regular of the blocks is that Newton's method solves. What it gives goes past the caches where it
     `streams`: it is not read again soon; where `is_single`, it is rounded to single precision when it is written.
     """
@@ -91,6 +76,8 @@ class _DesignsKernelWriter(KernelWriter):
         super().__init__(equations, links, rates, lanes, frozenset({"p", "q", "u1", "u2"}), carried)
         self.point_blocks = levels
         self.other_points: dict[int, list[str]] = {}
+        self.apart_here: list[str] = []
+        "flags of blocks in closed form that say where their assemblies are apart at a step"
         self.state = tuple(leaf for k in range(len(equations.is_angle)) for leaf in self.unknown_operands(k))
         self.input_count = len(equations.input_is_angle)
         self.newton_unknowns = [k for part in equations.blocks if part.closed_form is None for k in part.unknowns]
@@ -105,7 +92,8 @@ class _DesignsKernelWriter(KernelWriter):
         )
         t.write_line(
             f"define void @{FUNCTION_NAME}(i64 %blocks, i64 %steps, i64 %width, i64 %row, i64 %time, {arrays}, "
-            "double %tolerance, double %astray, double %scale, ptr noalias %out, ptr noalias %good) {"
+            "double %tolerance, double %astray, double %scale, ptr noalias %out, ptr noalias %good, "
+            "ptr noalias %candidates) {"
         )
         t.write_label("entry")
         self.state_slots = {leaf: t.allocate() for leaf in self.state}
@@ -118,6 +106,7 @@ class _DesignsKernelWriter(KernelWriter):
         }
         self.bend_slots = [[t.allocate() for _ in range(2)] for _ in self.equations.closed_forms]
         self.regularity_slot, self.passed_slot, self.good_count_slot = (t.allocate() for _ in range(3))
+        self.candidate_slot, self.candidate_count_slot = (t.allocate() for _ in range(2))
         self.counted_angle_slots = [t.allocate() for _ in range(self.counted_angles().numel())]
         large = [len(part.unknowns) for part in self.equations.blocks if part.is_large]
         self.linear_systems = LinearSystems(t, max(large)) if large else None
@@ -137,6 +126,7 @@ class _DesignsKernelWriter(KernelWriter):
         t.close_loop("k", "steps", "step", "blockend")
         t.write_label("blockend")
         t.store(t.load(self.good_count_slot), t.double_pointer("%good", self.lane))
+        t.store(t.load(self.candidate_count_slot), t.double_pointer("%candidates", self.lane))
         t.close_loop("b", "blocks", "block", "done")
         t.write_label("done")
         t.write_line("ret void")
@@ -179,8 +169,10 @@ class _DesignsKernelWriter(KernelWriter):
             for k in range(HISTORY_LENGTH - 1):
                 t.store("zeroinitializer", t.element_pointer(ring, str(k)))
             t.store(state[leaf], t.element_pointer(ring, str(HISTORY_LENGTH - 1)))
-        t.store(t.constant(1.0), self.passed_slot)
-        t.store("zeroinitializer", self.good_count_slot)
+        for slot in (self.passed_slot, self.candidate_slot):
+            t.store(t.constant(1.0), slot)
+        for slot in (self.good_count_slot, self.candidate_count_slot):
+            t.store("zeroinitializer", slot)
         t.write_line("br label %step")
         return have, at_start
 
@@ -233,7 +225,9 @@ class _DesignsKernelWriter(KernelWriter):
             t.store(value, slot)
         change = t.binary("mul", t.call_intrinsic("fabs", change), t.constant(0.5))
         kept = t.select_or_zero(t.broadcast_counter_test("%k", "sgt", 1), change)
-        return [t.compare("oge", t.binary("sub", room, kept), t.constant(LEAST_KERNEL_REGULARITY**2))]
+        apart = t.compare("oge", t.binary("sub", room, kept), t.constant(LEAST_KERNEL_REGULARITY**2))
+        self.apart_here.append(t.or_flags(apart, self.write_apart_here(part, bend, have)))
+        return [apart]
 
     def _write_other_assembly(self, part: KernelBlock, have: OperandNames) -> None:
         """Where the block places its points in its other assembly."""
@@ -382,11 +376,11 @@ class _DesignsKernelWriter(KernelWriter):
             flags.append(t.compare("oge", t.load(self.regularity_slot), t.constant(least)))
             near = t.compare("ole", t.load(self.correction_slot), t.broadcast("%astray"))
             flags.append(t.or_flags(near, t.broadcast_counter_test("%k", "sle", PREDICTOR_ORDER)))
-        for flag in flags[1:]:
-            flags[0] = t.and_flags(flags[0], flag)
-        t.store(t.select_or_zero(flags[0], t.load(self.passed_slot)), self.passed_slot)
+        self.write_passed(flags, self.passed_slot, self.good_count_slot)
+        here = [*self.apart_here, *flags[len(self.apart_here) :]]
+        candidate = self.write_passed(here, self.candidate_slot, self.candidate_count_slot)
         if self.point_blocks is None:
-            fine = t.compare("ogt", t.load(self.passed_slot), "zeroinitializer")
+            fine = t.compare("ogt", candidate, "zeroinitializer")
             many = [t.select(fine, each, t.constant(nan)) for each in many]
         for k, each in enumerate(many):
             place = t.add_instruction(
@@ -397,4 +391,3 @@ class _DesignsKernelWriter(KernelWriter):
                 t.store_streaming_rounded(each, t.single_pointer("%out", place))
             else:
                 (t.store_streaming if self.streams else t.store)(each, t.double_pointer("%out", place))
-        t.store(t.binary("add", t.load(self.good_count_slot), t.load(self.passed_slot)), self.good_count_slot)

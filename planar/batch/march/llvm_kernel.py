@@ -3,15 +3,35 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
 import casadi as ca
 
 from planar.batch.march.kernel import BareAngle, KernelBlock, KernelEquations, KernelInstructions, Operand
+from planar.batch.march.regularity import LEAST_KERNEL_REGULARITY
 from planar.codegen.instructions import check_length, required_values
 from planar.codegen.llvm_ir import IRWriter
+from planar.solving.checks.residual_check import EPS, NEGLIGIBLE_ERROR
 
 OperandNames = dict[Operand, str]
 """The names under which numbers stand in the text."""
+LEAST_CANDIDATE_REGULARITY = 1e-3
+"""Of a position that may stand as it is once it is known that there is no dead point before it."""
+
+
+class DesignsKernelLayout(NamedTuple):
+    """What the function takes and gives, row by row, each with an entry for every design.
+
+    state: cos and sin of an angle, or a length, and what else is carried of it; drives: the same of the inputs; out:
+    rows that a step gives; table: numbers that a step takes.
+    """
+
+    state: tuple[Operand, ...]
+    inputs: tuple[Operand, ...]
+    output_row_count: int
+    table_width: int
+    ir: str
+    lanes: int
 
 
 class KernelWriter(KernelInstructions):
@@ -83,6 +103,30 @@ class KernelWriter(KernelInstructions):
         square = t.binary("add", t.binary("mul", c, c), t.binary("mul", s, s))
         scale = t.binary("sub", t.constant(1.5), t.binary("mul", square, t.constant(0.5)))
         return t.binary("mul", c, scale), t.binary("mul", s, scale)
+
+    def write_apart_here(self, part: KernelBlock, coalescence: str, have: OperandNames) -> str:
+        """Where the two assemblies of a block are apart enough at a step for its position, whatever lies between steps:
+        by what the error of a start may be, for positions alone; for rates as far as everywhere."""
+        t, form = self.ir, part.closed_form
+        assert form is not None
+        room = t.binary("sub", t.constant(1.0), coalescence)
+        if self.rates:
+            return t.compare("oge", room, t.constant(LEAST_KERNEL_REGULARITY**2))
+        one, other = self.write_values([form.squared_lengths], have)
+        arm = t.call_intrinsic("minnum", one, other)
+        digits = t.binary("mul", t.binary("mul", room, room), arm)
+        fine = t.compare("oge", digits, t.constant((EPS / NEGLIGIBLE_ERROR) ** 2))
+        return t.and_flags(fine, t.compare("oge", room, t.constant(LEAST_CANDIDATE_REGULARITY**2)))
+
+    def write_passed(self, flags: Sequence[str], slot: str, count_slot: str) -> str:
+        """One in every lane where all steps so far passed, this one by its flags, else zero; and counted."""
+        t, all_flags = self.ir, flags[0]
+        for flag in flags[1:]:
+            all_flags = t.and_flags(all_flags, flag)
+        passed = t.select_or_zero(all_flags, t.load(slot))
+        t.store(passed, slot)
+        t.store(t.binary("add", t.load(count_slot), passed), count_slot)
+        return passed
 
     def write_circle_residuals(self, have: OperandNames) -> list[str]:
         """How far the square of every unknown angle's cos and sin is from one."""

@@ -8,14 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from planar.batch.march.backend import CorrectedAssemblies, DesignBatch
+from planar.batch.march.backend import CorrectedAssemblies, DesignBatch, erase_between
 from planar.batch.march.kernel import KernelEquations, batch_equations
 from planar.batch.march.llvm_designs import (
     ARGUMENT_TYPES,
     FUNCTION_NAME,
-    DesignsKernelLayout,
     write_designs_kernel,
 )
+from planar.batch.march.llvm_kernel import DesignsKernelLayout
 from planar.batch.march.prediction import (
     LONGEST_STEP,
     PREDICTOR_ORDER,
@@ -66,23 +66,27 @@ def _designs_kernel_or_reason(
         return str(why)
 
 
-def run_designs_kernel(batch: DesignBatch, extra_corrections: int = 0, out: Array | None = None) -> tuple[Array, Array]:
+def run_designs_kernel(
+    batch: DesignBatch, extra_corrections: int = 0, out: Array | None = None, candidates: Array | None = None
+) -> tuple[Array, Array]:
     """The points of a batch over its steps, and how many of its first steps every design did well (designs,).
 
     `extra_corrections` are made at every step for designs that are less well predicted. The points are out (steps + 1,
-    rows, designs), as for `DesignRunner`, in single precision where `out` is. Raises UnsupportedOperation where the
-    structure is not for machine code.
+    rows, designs), as for `DesignRunner`, with `candidates`, in single precision where `out` is. Raises
+    UnsupportedOperation where the structure is not for machine code.
     """
     longest = _longest_step(batch)
     is_single = out is not None and out.dtype == np.float32
     kernel = designs_kernel(batch_equations(batch), tuple(batch.links), batch.rates, None, is_single)
     table, counts = step_table(batch.input_offsets)
     tolerances = batch.tolerance, correction_limit(longest), batch.unit
-    out, good = _run_kernel(kernel, batch, batch.rates, (table, counts + extra_corrections), tolerances, out)
+    out, good, found = _run_kernel(kernel, batch, batch.rates, (table, counts + extra_corrections), tolerances, out)
     # what is told of a step only at the next one condemns the step too
-    condemned = np.flatnonzero((good > 1) & (good < len(table)))
-    good[condemned] -= 1
-    out[good[condemned], :, condemned] = np.nan
+    good -= (good > 1) & (good < len(table))
+    if candidates is None:
+        erase_between(out, good, found)
+    else:
+        candidates[:] = found
     return out, good
 
 
@@ -91,7 +95,7 @@ def unknowns_at_steps(batch: DesignBatch, extra_corrections: int, steps: Array) 
     kernel = designs_kernel(batch_equations(batch), (), False, ())
     table, counts = step_table(batch.input_offsets)
     tolerances = batch.tolerance, correction_limit(_longest_step(batch)), 1.0
-    found, _ = _run_kernel(kernel, batch, False, (table, counts + extra_corrections), tolerances, None)
+    found = _run_kernel(kernel, batch, False, (table, counts + extra_corrections), tolerances, None)[0]
     return _unknowns_from_state(kernel, found[steps, :, np.arange(len(steps))].T, len(batch.z0))
 
 
@@ -100,7 +104,7 @@ def correct_designs(batch: DesignBatch, point_blocks: Sequence[int], corrections
     kernel = designs_kernel(batch_equations(batch), tuple(batch.links), False, tuple(point_blocks))
     table, counts = step_table(np.zeros((1, len(batch.u0))))
     counts[:] = corrections
-    out, good = _run_kernel(kernel, batch, False, (table, counts), (batch.tolerance, np.inf, 1.0), None)
+    out, good, _ = _run_kernel(kernel, batch, False, (table, counts), (batch.tolerance, np.inf, 1.0), None)
     rows, places = out[0], 2 * len(batch.links)
     z = _unknowns_from_state(kernel, rows[2 * places :], len(batch.z0))
     both = rows[: 2 * places].reshape(2, len(batch.links), 2, rows.shape[1])
@@ -131,7 +135,8 @@ def _run_kernel(
     tables: tuple[Array, Array],
     tolerances: tuple[float, float, float],
     out: Array | None,
-) -> tuple[Array, Array]:
+) -> tuple[Array, Array, Array]:
+    """What the kernel gives: out, good, candidates."""
     function = compile_function(kernel.ir, FUNCTION_NAME, *ARGUMENT_TYPES)
     many, steps, lanes = batch.p.shape[1], len(tables[0]), kernel.lanes
     rows = (
@@ -145,19 +150,21 @@ def _run_kernel(
     dtype = np.dtype(np.float64) if out is None else out.dtype
     if out is None or not is_aligned(out):
         out = allocate_aligned(steps, kernel.output_row_count, many, dtype)
-    good = np.empty(-(-many // lanes) * lanes)
+    counted = np.empty((2, -(-many // lanes) * lanes))
     whole = many // lanes * lanes
     if whole:
-        _call_function(function, kernel, rows, whole, tables, tolerances, out, good)
+        _call_function(function, kernel, rows, whole, tables, tolerances, out, counted)
     if whole < many:
         # those that do not fill the lanes, with copies of the last beside them
         which = np.minimum(np.arange(whole, whole + lanes), many - 1)
         last = allocate_aligned(steps, kernel.output_row_count, lanes, dtype)
-        _call_function(function, kernel, [row[:, which] for row in rows], lanes, tables, tolerances, last, good[whole:])
+        own = [row[:, which] for row in rows]
+        _call_function(function, kernel, own, lanes, tables, tolerances, last, counted[:, whole:])
         out[:, :, whole:] = last[:, :, : many - whole]
     if given is not None and given is not out:
         given[...] = out
-    return out, good[:many].astype(int)
+    good, candidates = counted[:, :many].astype(int)
+    return out, good, candidates
 
 
 def _call_function(
@@ -168,7 +175,7 @@ def _call_function(
     tables: tuple[Array, Array],
     tolerances: tuple[float, float, float],
     out: Array,
-    good: Array,
+    counted: Array,
 ) -> None:
     arrays = [np.ascontiguousarray(row) for row in (*rows, *tables)]
     width = rows[0].shape[1]
@@ -182,7 +189,7 @@ def _call_function(
             *(each.ctypes.data for each in arrays),
             *tolerances,
             out.ctypes.data,
-            good.ctypes.data,
+            *(each.ctypes.data for each in counted),
         )
 
 
