@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import reduce
 from typing import NamedTuple
 
 import casadi as ca
@@ -104,42 +105,40 @@ class KernelWriter(KernelInstructions):
         scale = t.binary("sub", t.constant(1.5), t.binary("mul", square, t.constant(0.5)))
         return t.binary("mul", c, scale), t.binary("mul", s, scale)
 
-    def write_apart_here(self, part: KernelBlock, coalescence: str, have: OperandNames) -> str:
-        """Where the two assemblies of a block are apart enough at a step for its position, whatever lies between steps:
-        by what the error of a start may be, for positions alone; for rates as far as everywhere."""
+    def write_apart_here(self, part: KernelBlock, coalescence: str, names: OperandNames) -> str:
+        """A flag: the two assemblies of a block are apart enough for a position, whatever lies before it.
+
+        Of positions alone, where no arm changes, by what of their digits is lost; else as far as everywhere.
+        """
         t, form = self.ir, part.closed_form
         assert form is not None
-        room = t.binary("sub", t.constant(1.0), coalescence)
-        if self.rates:
-            return t.compare("oge", room, t.constant(LEAST_KERNEL_REGULARITY**2))
-        one, other = self.write_values([form.squared_lengths], have)
-        arm = t.call_intrinsic("minnum", one, other)
-        digits = t.binary("mul", t.binary("mul", room, room), arm)
-        fine = t.compare("oge", digits, t.constant((EPS / NEGLIGIBLE_ERROR) ** 2))
-        return t.and_flags(fine, t.compare("oge", room, t.constant(LEAST_CANDIDATE_REGULARITY**2)))
+        most = t.constant(1.0 - LEAST_KERNEL_REGULARITY**2)
+        if not self.rates and form.squared_arm is None:
+            arm = ca.sqrt(ca.mmin(form.squared_lengths))
+            (most,) = self.write_values(
+                [1.0 - ca.fmax(LEAST_CANDIDATE_REGULARITY**2, EPS / NEGLIGIBLE_ERROR / arm)], names
+            )
+        return t.compare("ole", coalescence, most)
 
     def write_passed(self, flags: Sequence[str], slot: str, count_slot: str) -> str:
-        """One in every lane where all steps so far passed, this one by its flags, else zero; and counted."""
-        t, all_flags = self.ir, flags[0]
-        for flag in flags[1:]:
-            all_flags = t.and_flags(all_flags, flag)
-        passed = t.select_or_zero(all_flags, t.load(slot))
-        t.store(passed, slot)
-        t.store(t.binary("add", t.load(count_slot), passed), count_slot)
+        """A flag: all steps so far passed, this one by its flags; it is kept, and counted."""
+        t = self.ir
+        passed = reduce(t.and_flags, flags, t.load_flags(slot))
+        t.store_flags(passed, slot)
+        count = t.load(count_slot)
+        t.store(t.select(passed, t.binary("add", count, t.constant(1.0)), count), count_slot)
         return passed
 
     def write_circle_residuals(self, have: OperandNames) -> list[str]:
         """How far the square of every unknown angle's cos and sin is from one."""
         t = self.ir
-        return [
-            t.binary(
-                "sub",
-                t.add_all([t.binary("mul", have[part, k], have[part, k]) for part in ("zc", "zs")]),
-                t.constant(1.0),
+
+        def residual(cos: str, sin: str) -> str:
+            return t.binary(
+                "add", t.binary("sub", t.binary("mul", cos, cos), t.constant(1.0)), t.binary("mul", sin, sin)
             )
-            for k, turns in enumerate(self.equations.is_angle)
-            if turns
-        ]
+
+        return [residual(have["zc", k], have["zs", k]) for k, turns in enumerate(self.equations.is_angle) if turns]
 
 
 def write_angle_sum(t: IRWriter, cos: str, sin: str, c: str, s: str) -> tuple[str, str]:
