@@ -130,10 +130,9 @@ class _DesignBlockSolver:
         code[failed] = status_code(Outcome.CANNOT_BE_ASSEMBLED)
         if any(self.reference.point_member(name)[0] == self.reference.mechanism.frame for name in block.points):
             erase_from_steps(out, solved)
-        status = np.zeros((self.design_count, block.steps + 1), dtype=np.int8)
-        stopped = np.flatnonzero(code)
-        step, first = np.arange(block.steps + 1, dtype=np.int32), solved[stopped, None].astype(np.int32)
-        status[stopped] = (step >= first) * code[stopped, None]
+        ended_at = solved.astype(np.int32)[:, None]
+        status = (np.arange(block.steps + 1, dtype=np.int32) >= ended_at).view(np.int8)
+        status *= code[:, None]
         inputs = self._input_positions(same)
         self.endings = {
             int(each): (int(np.sum(code == each)), self._question(int(np.argmax(code == each)), inputs))

@@ -141,10 +141,12 @@ class RunnerLadder:
         good, runs = np.zeros(out.shape[2], dtype=int), 0
         for runner, runs_to_end in self.attempts:
             left = np.flatnonzero(good < (len(batch.input_offsets) if runs_to_end else 1))
-            if runs:  # what has nowhere to start is given once
-                left = left[np.isfinite(batch.z0[:, left]).all(axis=0) & np.isfinite(batch.u0[:, left]).all(axis=0)]
             if not left.size or not runner.can_help(batch):
                 continue
+            if runs:  # what has nowhere to start is given once
+                left = left[np.isfinite(batch.z0[:, left]).all(axis=0) & np.isfinite(batch.u0[:, left]).all(axis=0)]
+                if not left.size:
+                    continue
             try:
                 if left.size == len(good):
                     good = runner.run(batch, out, candidates)

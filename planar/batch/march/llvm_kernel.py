@@ -108,12 +108,12 @@ class KernelWriter(KernelInstructions):
     def write_apart_here(self, part: KernelBlock, coalescence: str, names: OperandNames) -> str:
         """A flag: the two assemblies of a block are apart enough for a position, whatever lies before it.
 
-        Of positions alone, where no arm changes, by what of their digits is lost; else as far as everywhere.
+        Where no arm changes by what of its digits is lost, else as far as everywhere.
         """
         t, form = self.ir, part.closed_form
         assert form is not None
         most = t.constant(1.0 - LEAST_KERNEL_REGULARITY**2)
-        if not self.rates and form.squared_arm is None:
+        if form.squared_arm is None:
             arm = ca.sqrt(ca.mmin(form.squared_lengths))
             (most,) = self.write_values(
                 [1.0 - ca.fmax(LEAST_CANDIDATE_REGULARITY**2, EPS / NEGLIGIBLE_ERROR / arm)], names
