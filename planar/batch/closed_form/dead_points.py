@@ -37,7 +37,7 @@ def find_dead_points(joiner: BlockJoiner, batch: DesignBatch, signs: Array, rang
     for sense in (1.0, -1.0):
         which = np.flatnonzero(np.sign(ranges.lengths) == sense)
         if which.size:
-            direction = np.where(np.arange(len(batch.u0)) == ranges.index, sense, 0.0)
+            direction = np.where(np.arange(len(batch.u0)) == ranges.running, sense, 0.0)
             own, span = np.take(signs, which, axis=1), np.abs(ranges.lengths)[which]
             with np.errstate(all="ignore"):  # beyond a dead point there is no number
                 search = _DeadPointSearch(joiner, batch.select(which), own, direction, span)

@@ -39,10 +39,10 @@ class FollowedBlocks(NamedTuple):
 
 
 class InputRanges(NamedTuple):
-    """How the input `index` of designs runs on from where they start, each array (designs,), rad or sizes: how far each
-    surely came, how far it is to go, to either side, and the steps in which it went."""
+    """How one input of designs, `running`, goes on from where they start, each array (designs,), rad or sizes: how far
+    it surely came, how far it is to go, to either side, and the steps in which it went."""
 
-    index: int
+    running: int
     reached: Array
     lengths: Array
     step: Array

@@ -172,9 +172,9 @@ class NativeBlockJoiner:
 
     def find_dead_points(self, batch: DesignBatch, signs: Array, ranges: InputRanges) -> DeadPoints:
         """See `BlockJoiner`."""
-        text = self.search_texts.get(ranges.index)
+        text = self.search_texts.get(ranges.running)
         if text is None:
-            text = self.search_texts[ranges.index] = DeadPointWriter(self.equations, ranges.index, LANES).write()
+            text = self.search_texts[ranges.running] = DeadPointWriter(self.equations, ranges.running, LANES).write()
         span = np.abs(ranges.lengths)
         own = np.stack([ranges.reached, span, ranges.step, np.sign(ranges.lengths)])
         with np.errstate(all="ignore"):
