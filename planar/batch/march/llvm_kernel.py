@@ -20,6 +20,17 @@ LEAST_CANDIDATE_REGULARITY = 1e-3
 """Of a position that may stand as it is once it is known that there is no dead point before it."""
 
 
+class KernelStart(NamedTuple):
+    """What of the start is told: the signs of the blocks' assemblies in place of the state, where all of them are in
+    closed form; with these, whether all designs have the same inputs, which then stand in the table."""
+
+    has_signs: bool = False
+    has_common_inputs: bool = False
+
+
+STATE_GIVEN = KernelStart()
+
+
 class DesignsKernelLayout(NamedTuple):
     """What the function takes and gives, row by row, each with an entry for every design.
 
@@ -33,6 +44,7 @@ class DesignsKernelLayout(NamedTuple):
     table_width: int
     ir: str
     lanes: int
+    start: KernelStart
 
 
 class KernelWriter(KernelInstructions):
