@@ -50,9 +50,8 @@ def write_designs_kernel(
     carried: frozenset[Operand] = frozenset()
     while True:
         try:
-            writer = _DesignsKernelWriter(
-                equations, tuple(links), rates, lanes, point_blocks, carried, start if not carried else STATE_GIVEN
-            )
+            own = start if not carried else STATE_GIVEN
+            writer = _DesignsKernelWriter(equations, tuple(links), rates, lanes, point_blocks, carried, own)
             writer.streams = streams
             writer.is_single = is_single
             return writer.write()
@@ -95,14 +94,12 @@ class _DesignsKernelWriter(KernelWriter):
         t = self.ir
         rows = 2 * len(self.links) * (3 if self.rates else 1)
         rows += 0 if self.point_blocks is None else 2 * len(self.links) + len(self.state) + 1
-        arrays = ", ".join(
-            f"ptr noalias readonly %{name}" for name in ("p", "q", "state", "drive", "rate", "table", "counts")
-        )
-        t.write_line(
-            f"define void @{FUNCTION_NAME}(i64 %blocks, i64 %steps, i64 %width, i64 %row, i64 %time, {arrays}, "
-            "double %tolerance, double %astray, double %scale, ptr noalias %out, ptr noalias %good, "
-            "ptr noalias %candidates) {"
-        )
+        read = ("p", "q", "state", "drive", "rate", "table", "counts")
+        arrays = ", ".join(f"ptr noalias readonly %{name}" for name in read)
+        numbers = ", ".join(f"double %{name}" for name in ("tolerance", "astray", "scale"))
+        written = ", ".join(f"ptr noalias %{name}" for name in ("out", "good", "candidates"))
+        sizes = ", ".join(f"i64 %{name}" for name in ("blocks", "steps", "width", "row", "time"))
+        t.write_line(f"define void @{FUNCTION_NAME}({sizes}, {arrays}, {numbers}, {written}) {{")
         t.write_label("entry")
         self.state_slots = {leaf: t.allocate() for leaf in self.state}
         self.history_slots = {
