@@ -13,7 +13,13 @@ from planar.batch.dead_point_tracking import DEAD_POINT_MARGIN, FollowedDesigns,
 from planar.batch.design_arrays import values_of_design, with_design_values
 from planar.batch.general_path import OUTCOMES, DesignQuestion, solve_design
 from planar.batch.initial_assembly import find_assemblies, given_assemblies
-from planar.batch.march.backend import DesignBatch, DesignRunner, UnsupportedStructure, erase_from_steps
+from planar.batch.march.backend import (
+    DesignBatch,
+    DesignRunner,
+    UnsupportedStructure,
+    erase_between,
+    erase_from_steps,
+)
 from planar.batch.march.choice import find_runner
 from planar.batch.march.numpy_backend import NumpyRunner
 from planar.batch.reference_design import ReferenceDesign, reference_design
@@ -124,10 +130,9 @@ class _DesignBlockSolver:
         code[failed] = status_code(Outcome.CANNOT_BE_ASSEMBLED)
         if any(self.reference.point_member(name)[0] == self.reference.mechanism.frame for name in block.points):
             erase_from_steps(out, solved)
-        status = np.zeros((self.design_count, block.steps + 1), dtype=np.int8)
-        stopped = np.flatnonzero(code)
-        step, first = np.arange(block.steps + 1, dtype=np.int32), solved[stopped, None].astype(np.int32)
-        status[stopped] = (step >= first) * code[stopped, None]
+        ended_at = solved.astype(np.int32)[:, None]
+        status = (np.arange(block.steps + 1, dtype=np.int32) >= ended_at).view(np.int8)
+        status *= code[:, None]
         inputs = self._input_positions(same)
         self.endings = {
             int(each): (int(np.sum(code == each)), self._question(int(np.argmax(code == each)), inputs))
@@ -198,16 +203,17 @@ class _DesignBlockSolver:
         u0[base_.running_index] = self.start / self.scale
         offsets[:, base_.running_index] = np.linspace(0.0, self.range_length[0] / self.scale, block.steps + 1)
         march = base_.design_batch(shapes, p, (u0, self.u1, self.u2), moving.values(), block.rates)
-        march = march._replace(z0=start.z, input_offsets=offsets)
+        march = march._replace(z0=start.z, signs=start.signs, input_offsets=offsets)
         try:
             if not is_common:
                 out = self._run_own_ranges(march, fit, start.signs, runner)
                 return None if out is None else (self._with_frame_points(out, told, shapes), np.zeros(len(fit), int))
             march, fit = self._lead_to_start(march, fit, start.signs, runner)
-            out, good = self._run_fit_designs(runner, march, fit)
+            out, good, candidates = self._run_fit_designs(runner, march, fit)
         except UnsupportedStructure:
             return None
-        self._follow_to_dead_points(march, out, good, start.signs, runner)
+        self._follow_to_dead_points(march, out, (good, candidates), start.signs, runner)
+        erase_between(out, np.where(self.solved_steps >= 0, self.solved_steps, good), candidates)
         return self._with_frame_points(out, told, shapes), good
 
     def _run_own_ranges(
@@ -223,7 +229,7 @@ class _DesignBlockSolver:
         out[:] = np.nan
         if not self.has_own_range:
             lengths, none = self.range_length[some] / self.scale, np.zeros(some.size, dtype=int)
-            self._settle(some, find_ends(designs, lengths, none, self.block.steps), out)
+            self._settle(some, find_ends(designs, lengths, none, none, self.block.steps), out)
             return out
         found = run_between_limits(designs, self.block.steps)
         self.limits[:, some] = found.limits
@@ -247,24 +253,33 @@ class _DesignBlockSolver:
             self.out = allocate_aligned(block.steps + 1, rows, self.design_count, block.dtype)
         return self.out
 
-    def _run_fit_designs(self, runner: DesignRunner, march: DesignBatch, fit: Array) -> tuple[Array, Array]:
-        """out and good of all designs, of which only the fit ones are run."""
-        out = self._own_output(march)
+    def _run_fit_designs(self, runner: DesignRunner, march: DesignBatch, fit: Array) -> tuple[Array, Array, Array]:
+        """out, good and candidates of all designs, of which only the fit ones are run."""
+        out, candidates = self._own_output(march), np.zeros(self.design_count, dtype=int)
         if fit.mean() > RUN_ALL_RATIO:
             march.u0[:, ~fit] = np.nan
-            return out, runner.run(march, out)
+            return out, runner.run(march, out, candidates), candidates
         out[:] = np.nan
         some, good = np.flatnonzero(fit), np.zeros(self.design_count, dtype=int)
         if some.size:
-            own = allocate_aligned(len(out), march.output_row_count, some.size, out.dtype)
-            good[some] = runner.run(march.select(some), own)
-            out[:, :, some] = own
-        return out, good
+            own, found = allocate_aligned(len(out), march.output_row_count, some.size, out.dtype), good[some]
+            good[some] = runner.run(march.select(some), own, found)
+            out[:, :, some], candidates[some] = own, found
+        return out, good, candidates
 
     def _follow_to_dead_points(
-        self, march: DesignBatch, out: Array, good: Array, signs: Array | None, runner: DesignRunner
+        self,
+        march: DesignBatch,
+        out: Array,
+        counts: tuple[Array, Array],
+        signs: Array | None,
+        runner: DesignRunner,
     ) -> None:
-        """Follow those that a backend did not bring to the end, all at once, as far as they come."""
+        """Follow those that a backend did not bring to the end, all at once, as far as they come.
+
+        counts: how many steps of each design are good, and how many candidates (designs,).
+        """
+        good, candidates = counts
         some = np.flatnonzero((good > 0) & (good < len(march.input_offsets)))
         if not some.size:
             return
@@ -272,7 +287,8 @@ class _DesignBlockSolver:
         own = None if signs is None else signs[:, some]
         designs = closed_form_designs(march.select(some), index, own, runner, self.block.backend)
         if designs is not None:
-            ends = find_ends(designs, self.range_length[some] / self.scale, good[some], self.block.steps)
+            lengths = self.range_length[some] / self.scale
+            ends = find_ends(designs, lengths, good[some], candidates[some], self.block.steps)
             self._settle(some, ends, out)
             some = some[~ends.is_settled]
         if some.size:

@@ -12,6 +12,9 @@ LLVM_OPERATIONS = {"add": "fadd", "sub": "fsub", "mul": "fmul", "div": "fdiv"}
 LLVM_INTRINSICS = {"sqrt": "sqrt", "abs": "fabs"}
 LIBRARY_ARGUMENT_COUNTS = {"cos": 1, "sin": 1, "atan": 1, "atan2": 2}
 """What is called lane by lane, and how many arguments it has."""
+STACK_ALIGNMENT = 64
+"""Bytes: so that each vector that a function keeps on it lies in one line of the cache. Else the widest lie over two
+wherever the caller's stack happens to begin so, and the function takes up to twice as long."""
 
 
 class IRWriter:
@@ -122,9 +125,23 @@ class IRWriter:
         """One value where a flag is up, else the other."""
         return self.add_instruction(f"select <{self.lanes} x i1> {flag}, {self.vector} {value}, {self.vector} {other}")
 
+    def greater(self, value: str, other: str) -> str:
+        """The greater of two values; the other where one is not a number."""
+        return self.select(self.compare("ogt", value, other), value, other)
+
     def allocate(self, many: int = 1) -> str:
         """Room for values."""
         return self.add_instruction(f"alloca {self.vector}, i64 {many}, align 64")
+
+    def allocate_flags(self) -> str:
+        """Room for a flag in every lane."""
+        return self.add_instruction(f"alloca <{self.lanes} x i1>")
+
+    def load_flags(self, pointer: str) -> str:
+        return self.add_instruction(f"load <{self.lanes} x i1>, ptr {pointer}")
+
+    def store_flags(self, flags: str, pointer: str) -> None:
+        self.write_line(f"store <{self.lanes} x i1> {flags}, ptr {pointer}")
 
     def element_pointer(self, slot: str, index: str) -> str:
         """One of the places of a slot that has room for several."""
@@ -164,7 +181,7 @@ class IRWriter:
             calls |= {f"declare double @llvm.vector.reduce.{name}.{of}({v})" for name in ("fmin", "fmax")}
             calls.add(f"declare double @llvm.vector.reduce.fadd.{of}(double, {v})")
         lines = [line for each in (*others, self) for section in each._sections for line in section]
-        return "\n".join([*lines, *sorted(calls), "!0 = !{i32 1}"])
+        return "\n".join([*map(_with_aligned_stack, lines), *sorted(calls), "!0 = !{i32 1}"])
 
     def reduce(self, what: str, value: str) -> str:
         """The least ("fmin"), greatest ("fmax") or sum ("fadd") of the lanes: one number."""
@@ -215,6 +232,12 @@ class IRWriter:
                 names[each] = self.call_intrinsic(LLVM_INTRINSICS[value.operation], *of)
             else:
                 raise UnsupportedOperation(f"there is no {value.operation} on vectors")
+
+
+def _with_aligned_stack(line: str) -> str:
+    """A line of text; where a function begins, with what its stack is aligned to."""
+    begins = line.startswith("define ") and line.endswith(") {")
+    return f"{line[:-1]}alignstack({STACK_ALIGNMENT}) {{" if begins else line
 
 
 def _double_literal(value: float) -> str:

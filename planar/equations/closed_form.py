@@ -35,12 +35,14 @@ class ClosedForm(NamedTuple):
     or -1, which of the two assemblies; `side`: an expression in all unknowns that has this sign; `bend`: 0 to 1, where
     both assemblies meet, beyond it there is none: the squared cosine of the angle between what holds the block.
     `squared_arm`: of the arm on which a length turns, where that changes as the mechanism moves; else None.
+    `squared_lengths` (2,): of the Jacobian's columns.
     """
 
     values: tuple[tuple[ca.SX, ...], ...]
     sign: ca.SX
     sign_expression: ca.SX
     coalescence: ca.SX
+    squared_lengths: ca.SX
     squared_arm: ca.SX | None = None
 
 
@@ -107,18 +109,19 @@ def _solve_two_angles(e: ConstraintEquations, stage: Block, unknowns: list[ca.SX
     a, b, g = (_rows_as_complex(part, signs) for part in (by_one[0], by_two[0], rest))
     d = -g
     sign = ca.SX.sym("sign")
-    spanned, gap = a.squared_length * b.squared_length, 0.5 * (a.squared_length + b.squared_length - d.squared_length)
-    # spanned less the gap's square, as Heron has it: so nothing cancels where the angles are small
+    # the square of four times a triangle's area, as Heron has it: so nothing cancels where the angles are small
     one_length, other_length = ca.sqrt(a.squared_length), ca.sqrt(b.squared_length)
     least, greatest = one_length - other_length, one_length + other_length
-    across = sign * 0.5 * ca.sqrt((d.squared_length - least * least) * (greatest * greatest - d.squared_length))
-    scale = 1.0 / d.squared_length
-    along = 0.5 + 0.5 * (a.squared_length - b.squared_length) * scale
-    reached = d.scale(along) + _ComplexNumber(-d.y, d.x).scale(across * scale)
+    area = (d.squared_length - least * least) * (greatest * greatest - d.squared_length)
+    half = 0.5 * sign / d.squared_length
+    along = 0.5 + (a.squared_length - b.squared_length) * sign * half
+    reached = d.scale(along) + _ComplexNumber(-d.y, d.x).scale(ca.sqrt(area) * half)
     e1 = reached.multiply(a.conjugate).scale(1.0 / a.squared_length)
     e2 = (d + -reached).multiply(b.conjugate).scale(1.0 / b.squared_length)
     side = a.multiply(_unit_number(one)).cross(b.multiply(_unit_number(two)))
-    return ClosedForm((tuple(e1), tuple(e2)), sign, side, gap * gap / spanned)
+    coalescence = 1.0 - area / (4.0 * a.squared_length * b.squared_length)
+    lengths = ca.vertcat(a.squared_length, b.squared_length)
+    return ClosedForm((tuple(e1), tuple(e2)), sign, side, coalescence, lengths)
 
 
 def _solve_angle_and_length(e: ConstraintEquations, stage: Block, unknowns: list[ca.SX]) -> ClosedForm | None:
@@ -155,7 +158,8 @@ def _solve_angle_and_length(e: ConstraintEquations, stage: Block, unknowns: list
     else:
         unit = (-g).multiply((a + d.scale(length)).conjugate).scale(1.0 / g.squared_length)
     squared_arm = None if way is fixed else g.squared_length
-    return ClosedForm((tuple(unit), (length,)), sign, side, gap * gap / spanned, squared_arm)
+    lengths = ca.vertcat(reach.squared_length, way.squared_length)
+    return ClosedForm((tuple(unit), (length,)), sign, side, gap * gap / spanned, lengths, squared_arm)
 
 
 def _cos_sin_coefficients(rows: ca.SX, angle: ca.SX) -> tuple[ca.SX, ca.SX]:

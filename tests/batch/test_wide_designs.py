@@ -100,6 +100,16 @@ def test_random_four_bars_are_refused_where_they_cannot_turn_and_told_where(back
     assert found.general < 0.01 * comes.sum()
 
 
+def test_dead_points_of_several_blocks_are_the_same_by_machine_code_and_by_numpy():
+    designs = wide_designs(MODELS["watt-six-bar"], 0.15, 40, 4)
+    native, slow = (
+        planar.sweep(MODELS["watt-six-bar"], designs, STEPS, rates=False, backend=name) for name in ("auto", "numpy")
+    )
+    assert np.array_equal(native.status, slow.status)
+    assert np.count_nonzero(np.isfinite(native.dead_point)) > 5
+    np.testing.assert_allclose(native.dead_point, slow.dead_point, rtol=0.0, atol=1e-12)
+
+
 def test_ranges_of_different_lengths_and_starts_far_off():
     mechanism = four_bar(CRANK, COUPLER, ROCKER, GROUND, FIRST)
     designs = wide_designs(mechanism, 0.3, 10, 5)

@@ -289,3 +289,22 @@ def test_a_long_text_is_compiled_briefly(monkeypatch):
     llvm_compile._compile_object(plan.ir)
     assert asked == [llvm_compile.CODEGEN_LEVEL, llvm_compile.FAST_CODEGEN_LEVEL]
     assert llvm_compile.fingerprint(plan.ir) != usual
+
+
+def test_cosines_and_sines_of_lanes_have_all_their_digits():
+    from planar.codegen.llvm_ir import IRWriter
+    from planar.codegen.llvm_trigonometry import write_cos_sin
+
+    t = IRWriter(8)
+    t.write_line("define void @turn(ptr %angle, ptr %cos, ptr %sin) {")
+    for value, into in zip(write_cos_sin(t, t.load("%angle")), ("%cos", "%sin"), strict=True):
+        t.store(value, into)
+    t.write_line("ret void\n}")
+    turn = llvm_compile.compile_function(t.module_text(), "turn", "array", "array", "array")
+    right = np.arange(-20, 20) * (0.5 * np.pi)
+    angles = np.concatenate([right, right + 0.25 * np.pi, np.random.default_rng(0).uniform(-1e4, 1e4, 800)])
+    angles = np.append(angles, np.full(-len(angles) % 8, np.nan)).reshape(-1, 8)
+    found = np.empty((2, *angles.shape))
+    for row, (cos, sin) in zip(angles, found.swapaxes(0, 1), strict=True):
+        turn(row.ctypes.data, cos.ctypes.data, sin.ctypes.data)
+    np.testing.assert_allclose(found, [np.cos(angles), np.sin(angles)], rtol=4e-16, atol=1e-32)

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.batch.closed_form.joined_blocks import BlockJoiner, FollowedBlocks
+from planar.batch.closed_form.joined_blocks import BlockJoiner, DeadPoints, FollowedBlocks, InputRanges
 from planar.batch.march.backend import DesignBatch
 
 Array = np.ndarray
@@ -27,25 +27,22 @@ ZERO_TOLERANCE, BRACKET_TOLERANCE = 4e-15, 1e-15
 """Coalescence from one, and rad or sizes, at which a dead point is found."""
 FOUND_TOLERANCE = 1e-12
 """Coalescence from one at which it is taken for found."""
+OTHER_PLACES = (0.25, 1e-10)
+"""Parts of the way to a dead point that are left where other blocks are looked at."""
 
 
-class DeadPoints(NamedTuple):
-    """How far designs surely go (designs,), rad or sizes from their start: to a dead point, or infinitely far where
-    there is none up to the end; not a number where that is not decided. And the block that ends it, else -1."""
-
-    distance: Array
-    block: Array
-
-
-def find_dead_points(
-    joiner: BlockJoiner, batch: DesignBatch, signs: Array, direction: Array, reached: Array, span: Array, step: Array
-) -> DeadPoints:
-    """The first dead points of designs whose inputs go along `direction` (inputs,) from u0, by blocks' signs.
-
-    reached, span, step (designs,): how far each surely came, how far it is to go, and the steps in which it went.
-    """
-    with np.errstate(all="ignore"):  # beyond a dead point there is no number
-        return _DeadPointSearch(joiner, batch, signs, direction, span).search(reached, step)
+def find_dead_points(joiner: BlockJoiner, batch: DesignBatch, signs: Array, ranges: InputRanges) -> DeadPoints:
+    """See `BlockJoiner.find_dead_points`, by what it joins (`BlockJoiner.follow`)."""
+    found = DeadPoints(np.full(signs.shape[1], np.nan), np.full(signs.shape[1], -1))
+    for sense in (1.0, -1.0):
+        which = np.flatnonzero(np.sign(ranges.lengths) == sense)
+        if which.size:
+            direction = np.where(np.arange(len(batch.u0)) == ranges.running, sense, 0.0)
+            own, span = np.take(signs, which, axis=1), np.abs(ranges.lengths)[which]
+            with np.errstate(all="ignore"):  # beyond a dead point there is no number
+                search = _DeadPointSearch(joiner, batch.select(which), own, direction, span)
+                found.distance[which], found.block[which] = search.search(ranges.reached[which], ranges.step[which])
+    return found
 
 
 class _Brackets(NamedTuple):
@@ -82,7 +79,7 @@ class _DeadPointSearch:
         self.block_count = len(signs)
 
     def search(self, reached: Array, step: Array) -> DeadPoints:
-        """See `find_dead_points`."""
+        """See `find_dead_points`; how far each came, and the steps in which it went."""
         count = len(reached)
         distance, block = np.full(count, np.nan), np.full(count, -1)
         active, x, longest, h = np.arange(count), reached.copy(), step, step.copy()
@@ -177,10 +174,8 @@ class _DeadPointSearch:
         """
         if self.block_count == 1:
             return np.ones(len(of), dtype=bool)
-        left = end - begin
-        f = np.array(
-            [1.0 - self._evaluate(batch, signs, x).coalescences for x in (begin, end - 0.25 * left, end - 1e-10 * left)]
-        )
+        places = (begin, *(end - part * (end - begin) for part in OTHER_PLACES))
+        f = np.array([1.0 - self._evaluate(batch, signs, x).coalescences for x in places])
         bend = np.abs(f[0] - 2.0 * f[1] + f[2])
         fine = f.min(axis=0) > 0.5 * bend
         fine[of, np.arange(len(of))] = True

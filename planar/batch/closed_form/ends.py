@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from planar.batch.closed_form.choice import find_joiner
-from planar.batch.closed_form.dead_points import DeadPoints, find_dead_points
-from planar.batch.closed_form.joined_blocks import BlockJoiner, unknowns_from_state
+from planar.batch.closed_form.joined_blocks import BlockJoiner, DeadPoints, InputRanges, unknowns_from_state
 from planar.batch.dead_point_tracking import DEAD_POINT_MARGIN, FollowedDesigns
 from planar.batch.design_arrays import split_into_blocks
 from planar.batch.march.backend import DesignBatch, DesignRunner
@@ -25,22 +24,14 @@ class ClosedFormDesigns:
     """Designs whose blocks are all in closed form, in assemblies that are known, one of whose inputs runs."""
 
     def __init__(self, joiner: BlockJoiner, batch: DesignBatch, index: int, signs: Array, runner: DesignRunner):
-        self.joiner, self.batch, self.signs, self.runner = joiner, batch, signs, runner
+        self.joiner, self.batch, self.index, self.signs, self.runner = joiner, batch, index, signs, runner
         self.direction = np.where(np.arange(len(batch.u0)) == index, 1.0, 0.0)
 
     def find_dead_points(self, reached: Array, lengths: Array, step: Array) -> DeadPoints:
-        """As `find_dead_points`, of inputs that go so far (designs,), to either side."""
-        distance, block = np.full(len(lengths), np.nan), np.full(len(lengths), -1)
-        for sense in (1.0, -1.0):
-            which = np.flatnonzero(np.sign(lengths) == sense)
-            if which.size:
-                own, signs = self.batch, self.signs
-                if which.size < len(lengths):
-                    own, signs = own.select(which), np.take(signs, which, axis=1)
-                span, longest = np.abs(lengths)[which], np.minimum(step, LONGEST_STEP)[which]
-                found = find_dead_points(self.joiner, own, signs, sense * self.direction, reached[which], span, longest)
-                distance[which], block[which] = found
-        return DeadPoints(distance, block)
+        """The first dead points of designs that surely came so far, whose input is to go so far to either side, in
+        steps of so much (designs,)."""
+        ranges = InputRanges(self.index, reached, lengths, np.minimum(step, LONGEST_STEP))
+        return self.joiner.find_dead_points(self.batch, self.signs, ranges)
 
     def lead(self, span: Array, step: float) -> tuple[Array, Array]:
         """Designs led on so far (designs,): the unknowns there (unknowns, designs), and how far there was a dead point,
@@ -82,23 +73,28 @@ def closed_form_designs(
     if joiner is None:
         return None
     unknown = np.flatnonzero(~signs.all(axis=0))
-    signs[:, unknown] = joiner.equations.assembly_signs(*(rows[:, unknown] for rows in (batch.z0, batch.u0, batch.p)))
+    if unknown.size:
+        rows = (each[:, unknown] for each in (batch.z0, batch.u0, batch.p))
+        signs[:, unknown] = joiner.equations.assembly_signs(*rows)
     return ClosedFormDesigns(joiner, batch, index, signs, runner)
 
 
-def find_ends(designs: ClosedFormDesigns, lengths: Array, good: Array, steps: int) -> FollowedDesigns:
+def find_ends(
+    designs: ClosedFormDesigns, lengths: Array, good: Array, candidates: Array, steps: int
+) -> FollowedDesigns:
     """As `follow_to_dead_points`, of designs of which so many steps are good (designs,), none at first.
 
-    lengths (designs,): how far the input is to go, rad or sizes, in so many steps.
+    lengths (designs,): how far the input is to go, rad or sizes, in so many steps. Of these so many `candidates`
+    (designs,) need not be solved here, see `DesignRunner.run`.
     """
     step, count = np.abs(lengths) / steps, len(good)
     ends = designs.find_dead_points(np.maximum(good - 1, 0) * step, lengths, step).distance
     nearest = np.clip(np.rint(ends / step), 0, steps) * step
     settled = ~np.isnan(ends) & (np.abs(ends - nearest) > DEAD_POINT_MARGIN * np.abs(lengths))
     solved = np.where(settled, np.ceil(np.minimum(ends / step, steps + 1.0)), 0.0).astype(int)
-    left = np.maximum(solved - good, 0)
+    left = np.maximum(solved - candidates, 0)
     design = np.repeat(np.arange(count), left)
-    at = good[design] + np.arange(len(design)) - np.repeat(np.cumsum(left) - left, left)
+    at = candidates[design] + np.arange(len(design)) - np.repeat(np.cumsum(left) - left, left)
     out, passed = designs.solve_positions(design, np.sign(lengths)[design] * at * step[design])
     settled[design[~passed]] = False
     kept = settled[design]

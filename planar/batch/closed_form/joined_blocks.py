@@ -38,6 +38,24 @@ class FollowedBlocks(NamedTuple):
     state: Array
 
 
+class InputRanges(NamedTuple):
+    """How one input of designs, `running`, goes on from where they start, each array (designs,), rad or sizes: how far
+    it surely came, how far it is to go, to either side, and the steps in which it went."""
+
+    running: int
+    reached: Array
+    lengths: Array
+    step: Array
+
+
+class DeadPoints(NamedTuple):
+    """How far designs surely go (designs,), rad or sizes from their start: to a dead point, or infinitely where there
+    is none up to the end; not a number where that is not decided. And the block that ends it, else -1."""
+
+    distance: Array
+    block: Array
+
+
 class BlockJoiner(Protocol):
     """Joins the blocks of the designs of a batch."""
 
@@ -53,6 +71,10 @@ class BlockJoiner(Protocol):
 
     def follow(self, batch: DesignBatch, signs: Array, u: Array) -> FollowedBlocks:
         """At inputs u (inputs, designs), in the assemblies of these signs (blocks, designs)."""
+
+    def find_dead_points(self, batch: DesignBatch, signs: Array, ranges: InputRanges) -> DeadPoints:
+        """The first dead points of designs in the assemblies of these signs (blocks, designs), of none that goes no
+        way."""
 
 
 LEAST_ARM = 0.1

@@ -8,25 +8,28 @@ from typing import NamedTuple
 import numpy as np
 
 from planar.batch.closed_form.joined_blocks import (
+    DeadPoints,
     FollowedBlocks,
+    InputRanges,
     JoinedBlocks,
     input_rows,
     state_operands,
     without_short_arms,
 )
+from planar.batch.closed_form.llvm_dead_points import MOST_WITHOUT_INTERVALS, SEARCH_NAME, DeadPointWriter
 from planar.batch.march.backend import DesignBatch
 from planar.batch.march.kernel import BareAngle, KernelBlock, KernelEquations
 from planar.batch.march.llvm_kernel import KernelWriter, OperandNames
 from planar.codegen.instructions import UnsupportedOperation
 from planar.codegen.llvm_compile import compile_function
+from planar.foundation.turns import leave_turn
 
 Array = np.ndarray
 
 LANES = 8
+LONG_CALL_DESIGNS = 2**9
+"""Designs from which on other threads go on meanwhile."""
 FUNCTION_NAME = "join"
-ARGUMENT_TYPES = (*("int",) * 4, *("array",) * 6)
-"""Of the function's arguments: blocks of designs, the first design of the last of these, how far a row is from the next
-where it is read, and in `out`; p, q, sketch, drives, signs; out."""
 JOINED_ROWS = 4
 """Rows that are told of a block where the sketch chooses, see `JoinedBlocks`."""
 
@@ -81,10 +84,8 @@ class BlockJoinWriter(KernelWriter):
     def write(self) -> str:
         """The whole function: blocks of designs, the last of which may lie over the one before."""
         t = self.ir
-        arrays = ", ".join(f"ptr noalias readonly %{name}" for name in ("p", "q", "sketch", "drive", "sign"))
-        t.write_line(
-            f"define void @{FUNCTION_NAME}(i64 %blocks, i64 %last, i64 %width, i64 %row, {arrays}, ptr noalias %out) {{"
-        )
+        arrays = ", ".join(f"ptr noalias readonly %{name}" for name in ("p", "q", "drive", "sign", "sketch"))
+        t.write_line(f"define void @{FUNCTION_NAME}(i64 %blocks, i64 %last, i64 %width, {arrays}, ptr noalias %out) {{")
         t.write_label("entry")
         names: OperandNames = {}
         if self.point_blocks is not None:
@@ -115,21 +116,21 @@ class BlockJoinWriter(KernelWriter):
                 rows += self.write_block(part, names, sign)
         state = [names[operand] for operand in state_operands(self.equations)]
         for k, value in enumerate([*rows, *state, *arms]):
-            t.store(value, self._pointer("%out", "%row", k))
+            t.store(value, self._pointer("%out", k))
         t.close_loop("b", "blocks", "block", "done")
         t.write_label("done")
         t.write_line("ret void")
         t.write_line("}")
         return t.module_text()
 
-    def _pointer(self, base: str, width: str, row: int) -> str:
+    def _pointer(self, base: str, row: int) -> str:
         t = self.ir
         return t.double_pointer(
-            base, t.add_instruction(f"add i64 {t.add_instruction(f'mul i64 {width}, {row}')}, {self.lane}")
+            base, t.add_instruction(f"add i64 {t.add_instruction(f'mul i64 %width, {row}')}, {self.lane}")
         )
 
     def _load(self, base: str, row: int) -> str:
-        return self.ir.load(self._pointer(base, "%width", row))
+        return self.ir.load(self._pointer(base, row))
 
 
 @lru_cache(maxsize=256)
@@ -150,12 +151,14 @@ class NativeBlockJoiner:
         self.joining_text = _write_join(equations, links, point_blocks) if point_blocks else ""
         "what needs sketched points"
         self.following_text = _write_join(equations, (), None)
+        self.search_texts: dict[int, str] = {}
+        "for dead points, by the input that runs"
 
     def join(self, batch: DesignBatch, sketch: Array, forced: Array) -> JoinedBlocks:
         """See `BlockJoiner`."""
         row_count = JOINED_ROWS * self.block_count + len(self.state)
         rows = (batch.p, batch.q, input_rows(self.equations, batch.u0), forced)
-        out = _call(self.joining_text, rows, sketch, row_count)
+        out = _call(self.joining_text, FUNCTION_NAME, rows, sketch, row_count)
         known = out[: JOINED_ROWS * self.block_count].reshape(self.block_count, JOINED_ROWS, -1).transpose(1, 0, 2)
         return JoinedBlocks(known[0], known[1], known[2], known[3], out[JOINED_ROWS * self.block_count :])
 
@@ -163,23 +166,37 @@ class NativeBlockJoiner:
         """See `BlockJoiner`."""
         count, last = self.block_count, self.block_count + len(self.state)
         arms = sum(form.squared_arm is not None for form in self.equations.closed_forms)
-        out = _call(
-            self.following_text, (batch.p, batch.q, input_rows(self.equations, u), signs), np.zeros(0), last + arms
-        )
+        rows = (batch.p, batch.q, input_rows(self.equations, u), signs)
+        out = _call(self.following_text, FUNCTION_NAME, rows, np.zeros(0), last + arms)
         return FollowedBlocks(without_short_arms(out[:count], self.equations, list(out[last:])), out[count:last])
 
+    def find_dead_points(self, batch: DesignBatch, signs: Array, ranges: InputRanges) -> DeadPoints:
+        """See `BlockJoiner`."""
+        text = self.search_texts.get(ranges.running)
+        if text is None:
+            text = self.search_texts[ranges.running] = DeadPointWriter(self.equations, ranges.running, LANES).write()
+        span = np.abs(ranges.lengths)
+        own = np.stack([ranges.reached, span, ranges.step, np.sign(ranges.lengths)])
+        with np.errstate(all="ignore"):
+            intervals = float(np.fmax.reduce((span - ranges.reached) / ranges.step, initial=0.0))
+        most = np.array([MOST_WITHOUT_INTERVALS + 2.0 * intervals])
+        rows = (batch.p, input_rows(self.equations, batch.u0), signs, own)
+        distance, block = _call(text, SEARCH_NAME, rows, most, 2)
+        return DeadPoints(np.where(span > 0.0, distance, np.nan), block.astype(int))
 
-def _call(text: str, rows: tuple[Array, ...], sketch: Array, row_count: int) -> Array:
-    """out (rows, designs) by the function of a text, of designs whose rows (..., designs) are p, q, drives, signs."""
+
+def _call(text: str, name: str, rows: tuple[Array, ...], common: Array, row_count: int) -> Array:
+    """out (rows, designs) by the function of a text, of designs whose rows (..., designs) it takes, and what is common
+    to all."""
     count = rows[0].shape[1]
     if not count:
         return np.empty((row_count, 0))
     if count < LANES:  # those that do not fill the lanes, with copies of the last beside them
         which = np.minimum(np.arange(LANES), count - 1)
-        return _call(text, tuple(row[:, which] for row in rows), sketch, row_count)[:, :count]
-    p, q, drives, signs = (np.ascontiguousarray(row, dtype=float) for row in rows)
-    sketch, out = np.ascontiguousarray(sketch, dtype=float), np.empty((row_count, count))
-    addresses = (each.ctypes.data for each in (p, q, sketch, drives, signs, out))
-    function = compile_function(text, FUNCTION_NAME, *ARGUMENT_TYPES)
-    function(-(-count // LANES), count - LANES, count, count, *addresses)
+        return _call(text, name, tuple(row[:, which] for row in rows), common, row_count)[:, :count]
+    given = [np.ascontiguousarray(each, dtype=float) for each in (*rows, common)]
+    out = np.empty((row_count, count))
+    function = compile_function(text, name, *("int",) * 3, *("array",) * (len(given) + 1))
+    with leave_turn(count >= LONG_CALL_DESIGNS):
+        function(-(-count // LANES), count - LANES, count, *(each.ctypes.data for each in (*given, out)))
     return out

@@ -6,8 +6,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from planar.batch.closed_form.dead_points import find_dead_points
 from planar.batch.closed_form.joined_blocks import (
+    DeadPoints,
     FollowedBlocks,
+    InputRanges,
     JoinedBlocks,
     input_rows,
     state_operands,
@@ -102,3 +105,7 @@ class NumpyBlockJoiner:
             arms += arm
         state = np.array([np.broadcast_to(values[each], signs.shape[1:]) for each in self.state])
         return FollowedBlocks(without_short_arms(found, self.equations, arms), state)
+
+    def find_dead_points(self, batch: DesignBatch, signs: Array, ranges: InputRanges) -> DeadPoints:
+        """See `BlockJoiner`."""
+        return find_dead_points(self, batch, signs, ranges)

@@ -28,6 +28,7 @@ class DesignBatch(NamedTuple):
     rates, the same at every step. `rates`: whether first and second rates are wanted. `tolerance`: what a constraint
     may leave open. `mechanism` has the pairs and inputs; its numbers are not those of the designs. `unit`: the size, m.
     `zeros`: rows of p and q, as ("p", row), that are nothing in all designs and are left out of what is computed.
+    `signs` (blocks, designs): of the assemblies of blocks in closed form, 0 where one is not known; None of none.
     """
 
     functions: EquationFunctions
@@ -44,6 +45,7 @@ class DesignBatch(NamedTuple):
     tolerance: float
     unit: float
     zeros: frozenset[tuple[str, int]] = frozenset()
+    signs: Array | None = None
 
     @property
     def output_row_count(self) -> int:
@@ -52,7 +54,8 @@ class DesignBatch(NamedTuple):
 
     def select(self, designs: Array | slice, z0: Array | None = None) -> DesignBatch:
         """The batch of some of the designs, from other unknowns if they are given."""
-        rows = {name: getattr(self, name) for name in ("p", "q", "z0", "u0", "u1", "u2")}
+        names = ("p", "q", "z0", "u0", "u1", "u2", *(["signs"] if self.signs is not None else []))
+        rows = {name: getattr(self, name) for name in names}
         if isinstance(designs, slice):
             parts = {name: row[:, designs] for name, row in rows.items()}
         else:  # of which rows lie in one piece, unlike what an index gives
@@ -82,11 +85,13 @@ class DesignRunner(Protocol):
     def can_help(self, batch: DesignBatch) -> bool:
         """Whether it can do anything for such designs that others have not done before."""
 
-    def run(self, batch: DesignBatch, out: Array) -> Array:
+    def run(self, batch: DesignBatch, out: Array, candidates: Array | None = None) -> Array:
         """Fill out (steps + 1, rows, designs): x and y of each point, then their first, then second rates (m, s); what
         is no number from the first step on that did not pass.
 
-        Where `out` is in single precision, each number is rounded when it is written.
+        Where `out` is in single precision, each number is rounded when it is written. `candidates` (designs,) takes
+        how many of the first steps stand in `out`, where a runner leaves more than passed: those that follow pass the
+        checks of one position, but there may be a dead point before them.
 
         Returns how many of the first steps passed residual and branch check (designs,).
         """
@@ -109,6 +114,14 @@ def erase_from_steps(out: Array, first: Array) -> None:
     np.copyto(out[begin:], np.nan, where=np.arange(begin, len(out))[:, None, None] >= first)
 
 
+def erase_between(out: Array, first: Array, end: Array) -> None:
+    """Make out (steps + 1, rows, designs) no number from a step of each design on, up to another (designs,)."""
+    many = np.maximum(end - first, 0)
+    design = np.repeat(np.arange(len(first)), many)
+    begins = np.repeat(first - (np.cumsum(many) - many), many)
+    out[begins + np.arange(len(design)), :, design] = np.nan
+
+
 class RunnerAttempt(NamedTuple):
     """A runner, and whether it is given all designs that have not come to the end, or those that have not begun."""
 
@@ -126,23 +139,27 @@ class RunnerLadder:
         """See `DesignRunner`."""
         return True
 
-    def run(self, batch: DesignBatch, out: Array) -> Array:
+    def run(self, batch: DesignBatch, out: Array, candidates: Array | None = None) -> Array:
         """See `DesignRunner`."""
         good, runs = np.zeros(out.shape[2], dtype=int), 0
         for runner, runs_to_end in self.attempts:
             left = np.flatnonzero(good < (len(batch.input_offsets) if runs_to_end else 1))
-            if runs:  # what has nowhere to start is given once
-                left = left[np.isfinite(batch.z0[:, left]).all(axis=0) & np.isfinite(batch.u0[:, left]).all(axis=0)]
             if not left.size or not runner.can_help(batch):
                 continue
+            if runs:  # what has nowhere to start is given once
+                left = left[np.isfinite(batch.z0[:, left]).all(axis=0) & np.isfinite(batch.u0[:, left]).all(axis=0)]
+                if not left.size:
+                    continue
             try:
                 if left.size == len(good):
-                    good = runner.run(batch, out)
+                    good = runner.run(batch, out, candidates)
                 else:
                     steps, rows, _ = out.shape
                     own = allocate_aligned(steps, rows, left.size, out.dtype)
                     good[left] = runner.run(batch.select(left), own)
                     out[:, :, left] = own
+                    if candidates is not None:
+                        candidates[left] = good[left]
             except UnsupportedStructure:
                 continue
             runs += 1

@@ -31,10 +31,10 @@ class LLVMRunner:
         except UnsupportedOperation:
             return False
 
-    def run(self, batch: DesignBatch, out: Array) -> Array:
+    def run(self, batch: DesignBatch, out: Array, candidates: Array | None = None) -> Array:
         """See `DesignRunner`."""
         with _refusing_structures():
-            return run_designs_kernel(batch, self.extra_corrections, out)[1]
+            return run_designs_kernel(batch, self.extra_corrections, out, candidates)[1]
 
     def last_good_unknowns(self, batch: DesignBatch, good: Array) -> Array:
         """See `DesignRunner`."""

@@ -7,12 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import inf, nan
-from typing import NamedTuple
 
 import casadi as ca
 
 from planar.batch.march.kernel import BareAngle, KernelBlock, KernelEquations, Operand
-from planar.batch.march.llvm_kernel import KernelWriter, OperandNames
+from planar.batch.march.llvm_checks import write_closes, write_keeps_apart
+from planar.batch.march.llvm_kernel import STATE_GIVEN, DesignsKernelLayout, KernelStart, KernelWriter, OperandNames
 from planar.batch.march.prediction import MAX_TURN_PER_STEP, PREDICTOR_ORDER
 from planar.batch.march.regularity import LEAST_KERNEL_REGULARITY, LEAST_START_REGULARITY, least_regularity
 from planar.codegen.instructions import UnsupportedOperation
@@ -22,24 +22,9 @@ from planar.equations.linear import solve_by_determinants
 HISTORY_LENGTH = 8
 """Steps before for which there is room: a power of two, more than `PREDICTOR_ORDER`."""
 FUNCTION_NAME = "march"
-ARGUMENT_TYPES = (*("int",) * 5, *("array",) * 7, *("float",) * 3, "array", "array")
+ARGUMENT_TYPES = (*("int",) * 5, *("array",) * 7, *("float",) * 3, *("array",) * 3)
 """Of the function's arguments: blocks, steps, width of the arrays that are read, how far a row and a step of `out` are
-from the next; p, q, state, drives, rates, table, counts; tolerance, astray, scale; out, good."""
-
-
-class DesignsKernelLayout(NamedTuple):
-    """What the function takes and gives, row by row, each with an entry for every design.
-
-    state: cos and sin of an angle, or a length, and what else is carried of it; drives: the same of the inputs; out:
-    rows that a step gives; table: numbers that a step takes.
-    """
-
-    state: tuple[Operand, ...]
-    inputs: tuple[Operand, ...]
-    output_row_count: int
-    table_width: int
-    ir: str
-    lanes: int
+from the next; p, q, state, drives, rates, table, counts; tolerance, astray, scale; out, good, candidates."""
 
 
 def write_designs_kernel(
@@ -51,19 +36,22 @@ def write_designs_kernel(
     *,
     streams: bool = True,
     is_single: bool = False,
+    start: KernelStart = STATE_GIVEN,
 ) -> DesignsKernelLayout:
     """The function for points on these links, none of which is the frame. Raises UnsupportedOperation.
 
-    A step gives x and y of every point, then with `rates` all first and all second rates: no numbers from the first
-    that does not pass the checks. With `point_blocks`, of the block that places each point, it gives more: x and y of
-    every point in the other assembly of its block (infinite where that is not in closed form), the state, and how
+    A step gives x and y of every point, then with `rates` all first and second rates: no numbers from the first
+    that does not pass the checks of a position by itself. `good` counts the first steps that pass all checks,
+    `candidates` those that pass these. With `point_blocks`, of the block that places each point, it gives more: x and y
+    of every point in the other assembly of its block (infinite where that is not in closed form), the state, and how
     regular the least regular of the blocks is that Newton's method solves. What it gives goes past the caches where it
     `streams`: it is not read again soon; where `is_single`, it is rounded to single precision when it is written.
     """
     carried: frozenset[Operand] = frozenset()
     while True:
         try:
-            writer = _DesignsKernelWriter(equations, tuple(links), rates, lanes, point_blocks, carried)
+            own = start if not carried else STATE_GIVEN
+            writer = _DesignsKernelWriter(equations, tuple(links), rates, lanes, point_blocks, carried, own)
             writer.streams = streams
             writer.is_single = is_single
             return writer.write()
@@ -87,11 +75,17 @@ class _DesignsKernelWriter(KernelWriter):
         lanes: int,
         levels: tuple[int, ...] | None,
         carried: frozenset[Operand],
+        start: KernelStart,
     ):
-        super().__init__(equations, links, rates, lanes, frozenset({"p", "q", "u1", "u2"}), carried)
+        super().__init__(equations, links, rates, lanes, frozenset({"p", "q", "u1", "u2", "scale"}), carried)
         self.point_blocks = levels
         self.other_points: dict[int, list[str]] = {}
+        self.apart_here: list[str] = []
+        "flags of blocks in closed form that say where their assemblies are apart at a step"
+        self.start = start
         self.state = tuple(leaf for k in range(len(equations.is_angle)) for leaf in self.unknown_operands(k))
+        if start.has_signs:
+            self.state = tuple(("sign", k) for k in range(len(equations.closed_forms)))
         self.input_count = len(equations.input_is_angle)
         self.newton_unknowns = [k for part in equations.blocks if part.closed_form is None for k in part.unknowns]
 
@@ -100,13 +94,12 @@ class _DesignsKernelWriter(KernelWriter):
         t = self.ir
         rows = 2 * len(self.links) * (3 if self.rates else 1)
         rows += 0 if self.point_blocks is None else 2 * len(self.links) + len(self.state) + 1
-        arrays = ", ".join(
-            f"ptr noalias readonly %{name}" for name in ("p", "q", "state", "drive", "rate", "table", "counts")
-        )
-        t.write_line(
-            f"define void @{FUNCTION_NAME}(i64 %blocks, i64 %steps, i64 %width, i64 %row, i64 %time, {arrays}, "
-            "double %tolerance, double %astray, double %scale, ptr noalias %out, ptr noalias %good) {"
-        )
+        read = ("p", "q", "state", "drive", "rate", "table", "counts")
+        arrays = ", ".join(f"ptr noalias readonly %{name}" for name in read)
+        numbers = ", ".join(f"double %{name}" for name in ("tolerance", "astray", "scale"))
+        written = ", ".join(f"ptr noalias %{name}" for name in ("out", "good", "candidates"))
+        sizes = ", ".join(f"i64 %{name}" for name in ("blocks", "steps", "width", "row", "time"))
+        t.write_line(f"define void @{FUNCTION_NAME}({sizes}, {arrays}, {numbers}, {written}) {{")
         t.write_label("entry")
         self.state_slots = {leaf: t.allocate() for leaf in self.state}
         self.history_slots = {
@@ -117,13 +110,15 @@ class _DesignsKernelWriter(KernelWriter):
             part.block.block_index: t.allocate() for part in self.equations.blocks if part.closed_form is None
         }
         self.bend_slots = [[t.allocate() for _ in range(2)] for _ in self.equations.closed_forms]
-        self.regularity_slot, self.passed_slot, self.good_count_slot = (t.allocate() for _ in range(3))
+        self.regularity_slot, self.good_count_slot, self.candidate_count_slot = (t.allocate() for _ in range(3))
+        self.passed_slot, self.candidate_slot = (t.allocate_flags() for _ in range(2))
         self.counted_angle_slots = [t.allocate() for _ in range(self.counted_angles().numel())]
         large = [len(part.unknowns) for part in self.equations.blocks if part.is_large]
         self.linear_systems = LinearSystems(t, max(large)) if large else None
         scale = t.broadcast("%scale")
         t.write_line("br label %block")
         have, at_start = self._write_lanes_start()
+        have["scale", 0] = scale
         self._write_step_start(have, at_start)
         flags = []
         for part in self.equations.blocks:
@@ -133,10 +128,11 @@ class _DesignsKernelWriter(KernelWriter):
                 flags += self._write_closed_form_block(part, have)
         t.write_line("br label %told")
         t.write_label("told")
-        self._write_step_end(have, flags, scale)
+        self._write_step_end(have, flags)
         t.close_loop("k", "steps", "step", "blockend")
         t.write_label("blockend")
         t.store(t.load(self.good_count_slot), t.double_pointer("%good", self.lane))
+        t.store(t.load(self.candidate_count_slot), t.double_pointer("%candidates", self.lane))
         t.close_loop("b", "blocks", "block", "done")
         t.write_label("done")
         t.write_line("ret void")
@@ -144,7 +140,13 @@ class _DesignsKernelWriter(KernelWriter):
         if self.linear_systems is not None:
             t.write_line(self.linear_systems.function_text)
         return DesignsKernelLayout(
-            self.state, self.input_operands, rows, PREDICTOR_ORDER + 3 * self.input_count, t.module_text(), t.lanes
+            self.state,
+            self.input_operands,
+            rows,
+            PREDICTOR_ORDER + 3 * self.input_count,
+            t.module_text(),
+            t.lanes,
+            self.start,
         )
 
     def _row_pointer(self, base: str, k: int) -> str:
@@ -167,7 +169,9 @@ class _DesignsKernelWriter(KernelWriter):
         t.mark_hoist_point()
         at_start = {leaf: t.load(self._row_pointer("%drive", k)) for k, leaf in enumerate(self.input_operands)}
         state = {leaf: t.load(self._row_pointer("%state", k)) for k, leaf in enumerate(self.state)}
-        if self.equations.closed_forms:
+        if self.start.has_signs:
+            have |= state
+        elif self.equations.closed_forms:
             sides = self.write_values([self.equations.sides], have | at_start | state)
             for k, side in enumerate(sides):
                 have["sign", k] = t.call_intrinsic("copysign", t.constant(1.0), side)
@@ -179,8 +183,10 @@ class _DesignsKernelWriter(KernelWriter):
             for k in range(HISTORY_LENGTH - 1):
                 t.store("zeroinitializer", t.element_pointer(ring, str(k)))
             t.store(state[leaf], t.element_pointer(ring, str(HISTORY_LENGTH - 1)))
-        t.store(t.constant(1.0), self.passed_slot)
-        t.store("zeroinitializer", self.good_count_slot)
+        for slot in (self.passed_slot, self.candidate_slot):
+            t.store_flags("splat (i1 true)", slot)
+        for slot in (self.good_count_slot, self.candidate_count_slot):
+            t.store("zeroinitializer", slot)
         t.write_line("br label %step")
         return have, at_start
 
@@ -201,6 +207,9 @@ class _DesignsKernelWriter(KernelWriter):
         self.predictor_weights = [tabled(k) for k in range(PREDICTOR_ORDER)] if self.newton_unknowns else []
         for k, turns in enumerate(self.equations.input_is_angle):
             by, cos, sin = (tabled(PREDICTOR_ORDER + 3 * k + j) for j in range(3))
+            if self.start.has_common_inputs:
+                have |= {("u", k): by, ("uc", k): cos, ("us", k): sin}
+                continue
             have["u", k] = t.binary("add", at_start["u", k], by)
             if turns:
                 have["uc", k], have["us", k] = self.write_angle_sum(at_start["uc", k], at_start["us", k], cos, sin)
@@ -224,16 +233,13 @@ class _DesignsKernelWriter(KernelWriter):
         for k in part.unknowns:
             if self.is_carried(("z", k)):
                 self._write_carried_angle(k, have)
-        before, earlier = (t.load(slot) for slot in self.bend_slots[self.sign_index[part.block.block_index]])
-        change = t.binary("sub", t.binary("add", bend, earlier), t.binary("add", before, before))
-        # of all three: the middle of the change may lie a step back, as where a run starts just before a dead point
-        most = t.call_intrinsic("maxnum", t.call_intrinsic("maxnum", bend, before), earlier)
-        room = t.binary("sub", t.constant(1.0), most)
-        for slot, value in zip(self.bend_slots[self.sign_index[part.block.block_index]], (bend, before), strict=True):
+        slots = self.bend_slots[self.sign_index[part.block.block_index]]
+        before, earlier = (t.load(slot) for slot in slots)
+        for slot, value in zip(slots, (bend, before), strict=True):
             t.store(value, slot)
-        change = t.binary("mul", t.call_intrinsic("fabs", change), t.constant(0.5))
-        kept = t.select_or_zero(t.broadcast_counter_test("%k", "sgt", 1), change)
-        return [t.compare("oge", t.binary("sub", room, kept), t.constant(LEAST_KERNEL_REGULARITY**2))]
+        apart = write_keeps_apart(t, earlier, before, bend, t.broadcast_counter_test("%k", "sgt", 1))
+        self.apart_here.append(t.or_flags(apart, self.write_apart_here(part, bend, have)))
+        return [apart]
 
     def _write_other_assembly(self, part: KernelBlock, have: OperandNames) -> None:
         """Where the block places its points in its other assembly."""
@@ -361,33 +367,28 @@ class _DesignsKernelWriter(KernelWriter):
         room = t.binary("sub", spanned, t.binary("mul", lengths, t.constant(least)))
         return t.call_intrinsic("minnum", room, t.binary("sub", squared_arm, t.constant(LEAST_START_REGULARITY**2)))
 
-    def _write_step_end(self, have: OperandNames, flags: list[str], scale: str) -> None:
+    def _write_step_end(self, have: OperandNames, flags: list[str]) -> None:
         """The step ends: its results are written, and judged."""
-        t, told = self.ir, self.output_expressions()
+        t, told = self.ir, [each * self.symbols["scale"] for each in self.output_expressions()]
         self._write_rates(have)
         left, counted, *values = self.write_separately([self.equations.residuals(), self.counted_angles(), *told], have)
         flags = [*flags, *self._write_turn_checks(counted)]
-        many = [t.binary("mul", scale, each) for of in values for each in of]
+        many = [each for of in values for each in of]
         if self.point_blocks is not None:
             nowhere = [t.constant(inf)] * 2
             many += [part for k in range(len(self.links)) for part in self.other_points.get(k, nowhere)]
             many += [*(have[leaf] for leaf in self.state), t.load(self.regularity_slot)]
-        # sums, since what is not a number stays so in them, and is not below anything
-        worst = t.add_all(
-            [t.constant(0.0), *(t.call_intrinsic("fabs", each) for each in (*left, *self.write_circle_residuals(have)))]
-        )
-        flags = [*flags, t.compare("ole", worst, t.broadcast("%tolerance"))]
+        flags.append(write_closes(t, [*left, *self.write_circle_residuals(have)], "%tolerance"))
         if self.newton_unknowns:
             least = LEAST_KERNEL_REGULARITY**3 if self.point_blocks is not None else 0.0
             flags.append(t.compare("oge", t.load(self.regularity_slot), t.constant(least)))
             near = t.compare("ole", t.load(self.correction_slot), t.broadcast("%astray"))
             flags.append(t.or_flags(near, t.broadcast_counter_test("%k", "sle", PREDICTOR_ORDER)))
-        for flag in flags[1:]:
-            flags[0] = t.and_flags(flags[0], flag)
-        t.store(t.select_or_zero(flags[0], t.load(self.passed_slot)), self.passed_slot)
+        self.write_passed(flags, self.passed_slot, self.good_count_slot)
+        here = [*self.apart_here, *flags[len(self.apart_here) :]]
+        candidate = self.write_passed(here, self.candidate_slot, self.candidate_count_slot)
         if self.point_blocks is None:
-            fine = t.compare("ogt", t.load(self.passed_slot), "zeroinitializer")
-            many = [t.select(fine, each, t.constant(nan)) for each in many]
+            many = [t.select(candidate, each, t.constant(nan)) for each in many]
         for k, each in enumerate(many):
             place = t.add_instruction(
                 f"add i64 {t.add_instruction('mul i64 %k, %time')}, {t.add_instruction(f'mul i64 %row, {k}')}"
@@ -397,4 +398,3 @@ class _DesignsKernelWriter(KernelWriter):
                 t.store_streaming_rounded(each, t.single_pointer("%out", place))
             else:
                 (t.store_streaming if self.streams else t.store)(each, t.double_pointer("%out", place))
-        t.store(t.binary("add", t.load(self.good_count_slot), t.load(self.passed_slot)), self.good_count_slot)

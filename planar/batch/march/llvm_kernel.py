@@ -3,15 +3,48 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import reduce
+from typing import NamedTuple
 
 import casadi as ca
 
 from planar.batch.march.kernel import BareAngle, KernelBlock, KernelEquations, KernelInstructions, Operand
+from planar.batch.march.regularity import LEAST_KERNEL_REGULARITY
 from planar.codegen.instructions import check_length, required_values
 from planar.codegen.llvm_ir import IRWriter
+from planar.solving.checks.residual_check import EPS, NEGLIGIBLE_ERROR
 
 OperandNames = dict[Operand, str]
 """The names under which numbers stand in the text."""
+LEAST_CANDIDATE_REGULARITY = 1e-3
+"""Of a position that may stand as it is once it is known that there is no dead point before it."""
+
+
+class KernelStart(NamedTuple):
+    """What of the start is told: the signs of the blocks' assemblies in place of the state, where all of them are in
+    closed form; with these, whether all designs have the same inputs, which then stand in the table."""
+
+    has_signs: bool = False
+    has_common_inputs: bool = False
+
+
+STATE_GIVEN = KernelStart()
+
+
+class DesignsKernelLayout(NamedTuple):
+    """What the function takes and gives, row by row, each with an entry for every design.
+
+    state: cos and sin of an angle, or a length, and what else is carried of it; drives: the same of the inputs; out:
+    rows that a step gives; table: numbers that a step takes.
+    """
+
+    state: tuple[Operand, ...]
+    inputs: tuple[Operand, ...]
+    output_row_count: int
+    table_width: int
+    ir: str
+    lanes: int
+    start: KernelStart
 
 
 class KernelWriter(KernelInstructions):
@@ -84,18 +117,40 @@ class KernelWriter(KernelInstructions):
         scale = t.binary("sub", t.constant(1.5), t.binary("mul", square, t.constant(0.5)))
         return t.binary("mul", c, scale), t.binary("mul", s, scale)
 
+    def write_apart_here(self, part: KernelBlock, coalescence: str, names: OperandNames) -> str:
+        """A flag: the two assemblies of a block are apart enough for a position, whatever lies before it.
+
+        Where no arm changes by what of its digits is lost, else as far as everywhere.
+        """
+        t, form = self.ir, part.closed_form
+        assert form is not None
+        most = t.constant(1.0 - LEAST_KERNEL_REGULARITY**2)
+        if form.squared_arm is None:
+            arm = ca.sqrt(ca.mmin(form.squared_lengths))
+            (most,) = self.write_values(
+                [1.0 - ca.fmax(LEAST_CANDIDATE_REGULARITY**2, EPS / NEGLIGIBLE_ERROR / arm)], names
+            )
+        return t.compare("ole", coalescence, most)
+
+    def write_passed(self, flags: Sequence[str], slot: str, count_slot: str) -> str:
+        """A flag: all steps so far passed, this one by its flags; it is kept, and counted."""
+        t = self.ir
+        passed = reduce(t.and_flags, flags, t.load_flags(slot))
+        t.store_flags(passed, slot)
+        count = t.load(count_slot)
+        t.store(t.select(passed, t.binary("add", count, t.constant(1.0)), count), count_slot)
+        return passed
+
     def write_circle_residuals(self, have: OperandNames) -> list[str]:
         """How far the square of every unknown angle's cos and sin is from one."""
         t = self.ir
-        return [
-            t.binary(
-                "sub",
-                t.add_all([t.binary("mul", have[part, k], have[part, k]) for part in ("zc", "zs")]),
-                t.constant(1.0),
+
+        def residual(cos: str, sin: str) -> str:
+            return t.binary(
+                "add", t.binary("sub", t.binary("mul", cos, cos), t.constant(1.0)), t.binary("mul", sin, sin)
             )
-            for k, turns in enumerate(self.equations.is_angle)
-            if turns
-        ]
+
+        return [residual(have["zc", k], have["zs", k]) for k, turns in enumerate(self.equations.is_angle) if turns]
 
 
 def write_angle_sum(t: IRWriter, cos: str, sin: str, c: str, s: str) -> tuple[str, str]:

@@ -8,14 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from planar.batch.march.backend import CorrectedAssemblies, DesignBatch
+from planar.batch.march.backend import CorrectedAssemblies, DesignBatch, erase_between
 from planar.batch.march.kernel import KernelEquations, batch_equations
 from planar.batch.march.llvm_designs import (
     ARGUMENT_TYPES,
     FUNCTION_NAME,
-    DesignsKernelLayout,
     write_designs_kernel,
 )
+from planar.batch.march.llvm_kernel import STATE_GIVEN, DesignsKernelLayout, KernelStart
 from planar.batch.march.prediction import (
     LONGEST_STEP,
     PREDICTOR_ORDER,
@@ -43,9 +43,10 @@ def designs_kernel(
     rates: bool,
     point_blocks: tuple[int, ...] | None = None,
     is_single: bool = False,
+    start: KernelStart = STATE_GIVEN,
 ) -> DesignsKernelLayout:
     """The function for points on links of a structure, see `march`. Raises UnsupportedOperation."""
-    found = _designs_kernel_or_reason(equations, links, rates, point_blocks, is_single)
+    found = _designs_kernel_or_reason(equations, links, rates, point_blocks, is_single, start)
     if isinstance(found, str):
         raise UnsupportedOperation(found)
     return found
@@ -58,31 +59,41 @@ def _designs_kernel_or_reason(
     rates: bool,
     point_blocks: tuple[int, ...] | None,
     is_single: bool,
+    start: KernelStart,
 ) -> DesignsKernelLayout | str:
     """The same, or why there is none: every block of a sweep would find that out again."""
     try:
-        return write_designs_kernel(equations, links, rates, LANES, point_blocks, is_single=is_single)
+        return write_designs_kernel(equations, links, rates, LANES, point_blocks, is_single=is_single, start=start)
     except UnsupportedOperation as why:
         return str(why)
 
 
-def run_designs_kernel(batch: DesignBatch, extra_corrections: int = 0, out: Array | None = None) -> tuple[Array, Array]:
+def run_designs_kernel(
+    batch: DesignBatch, extra_corrections: int = 0, out: Array | None = None, candidates: Array | None = None
+) -> tuple[Array, Array]:
     """The points of a batch over its steps, and how many of its first steps every design did well (designs,).
 
     `extra_corrections` are made at every step for designs that are less well predicted. The points are out (steps + 1,
-    rows, designs), as for `DesignRunner`, in single precision where `out` is. Raises UnsupportedOperation where the
-    structure is not for machine code.
+    rows, designs), as for `DesignRunner`, with `candidates`, in single precision where `out` is. Raises
+    UnsupportedOperation where the structure is not for machine code.
     """
     longest = _longest_step(batch)
     is_single = out is not None and out.dtype == np.float32
-    kernel = designs_kernel(batch_equations(batch), tuple(batch.links), batch.rates, None, is_single)
-    table, counts = step_table(batch.input_offsets)
+    equations = batch_equations(batch)
+    signs, common = _known_signs(batch, equations), _common_inputs(batch.u0)
+    start = KernelStart(signs is not None, signs is not None and common is not None)
+    kernel = designs_kernel(equations, tuple(batch.links), batch.rates, None, is_single, start)
+    table, counts = step_table(batch.input_offsets, common if kernel.start.has_common_inputs else None)
     tolerances = batch.tolerance, correction_limit(longest), batch.unit
-    out, good = _run_kernel(kernel, batch, batch.rates, (table, counts + extra_corrections), tolerances, out)
+    out, good, found = _run_kernel(
+        kernel, batch._replace(signs=signs), batch.rates, (table, counts + extra_corrections), tolerances, out
+    )
     # what is told of a step only at the next one condemns the step too
-    condemned = np.flatnonzero((good > 1) & (good < len(table)))
-    good[condemned] -= 1
-    out[good[condemned], :, condemned] = np.nan
+    good -= (good > 1) & (good < len(table))
+    if candidates is None:
+        erase_between(out, good, found)
+    else:
+        candidates[:] = found
     return out, good
 
 
@@ -91,7 +102,7 @@ def unknowns_at_steps(batch: DesignBatch, extra_corrections: int, steps: Array) 
     kernel = designs_kernel(batch_equations(batch), (), False, ())
     table, counts = step_table(batch.input_offsets)
     tolerances = batch.tolerance, correction_limit(_longest_step(batch)), 1.0
-    found, _ = _run_kernel(kernel, batch, False, (table, counts + extra_corrections), tolerances, None)
+    found = _run_kernel(kernel, batch, False, (table, counts + extra_corrections), tolerances, None)[0]
     return _unknowns_from_state(kernel, found[steps, :, np.arange(len(steps))].T, len(batch.z0))
 
 
@@ -100,11 +111,29 @@ def correct_designs(batch: DesignBatch, point_blocks: Sequence[int], corrections
     kernel = designs_kernel(batch_equations(batch), tuple(batch.links), False, tuple(point_blocks))
     table, counts = step_table(np.zeros((1, len(batch.u0))))
     counts[:] = corrections
-    out, good = _run_kernel(kernel, batch, False, (table, counts), (batch.tolerance, np.inf, 1.0), None)
+    out, good, _ = _run_kernel(kernel, batch, False, (table, counts), (batch.tolerance, np.inf, 1.0), None)
     rows, places = out[0], 2 * len(batch.links)
     z = _unknowns_from_state(kernel, rows[2 * places :], len(batch.z0))
     both = rows[: 2 * places].reshape(2, len(batch.links), 2, rows.shape[1])
     return CorrectedAssemblies(good > 0, np.sqrt(np.maximum(rows[-1], 0.0)), z, *both)
+
+
+def _known_signs(batch: DesignBatch, equations: KernelEquations) -> Array | None:
+    """The signs (blocks, designs) of a batch's assemblies, not numbers of a design that starts nowhere; None where not
+    all blocks are in closed form, or nothing is known of them."""
+    if batch.signs is None or equations.has_newton_blocks:
+        return None
+    signs = np.where(np.isfinite(batch.u0).all(axis=0), batch.signs, np.nan)
+    unknown = np.flatnonzero((signs == 0.0).any(axis=0))
+    if unknown.size:
+        signs[:, unknown] = equations.assembly_signs(*(rows[:, unknown] for rows in (batch.z0, batch.u0, batch.p)))
+    return signs
+
+
+def _common_inputs(u0: Array) -> Array | None:
+    """The inputs (inputs,) at which all designs start that start anywhere; None where they differ."""
+    least, most = (np.array([of(row) for row in u0]) for of in (np.fmin.reduce, np.fmax.reduce))
+    return least if np.array_equal(least, most) else None
 
 
 def _longest_step(batch: DesignBatch) -> float:
@@ -131,33 +160,36 @@ def _run_kernel(
     tables: tuple[Array, Array],
     tolerances: tuple[float, float, float],
     out: Array | None,
-) -> tuple[Array, Array]:
+) -> tuple[Array, Array, Array]:
+    """What the kernel gives: out, good, candidates."""
     function = compile_function(kernel.ir, FUNCTION_NAME, *ARGUMENT_TYPES)
     many, steps, lanes = batch.p.shape[1], len(tables[0]), kernel.lanes
     rows = (
         batch.p,
         batch.q,
-        operand_rows(kernel.state, batch.z0),
-        operand_rows(kernel.inputs, batch.u0),
+        operand_rows(kernel.state, batch.z0) if not kernel.start.has_signs else batch.signs,
+        operand_rows(kernel.inputs, batch.u0) if not kernel.start.has_common_inputs else np.zeros((0, many)),
         np.concatenate([batch.u1, batch.u2]) if rates else np.zeros((0, many)),
     )
     given = out
     dtype = np.dtype(np.float64) if out is None else out.dtype
     if out is None or not is_aligned(out):
         out = allocate_aligned(steps, kernel.output_row_count, many, dtype)
-    good = np.empty(-(-many // lanes) * lanes)
+    counted = np.empty((2, -(-many // lanes) * lanes))
     whole = many // lanes * lanes
     if whole:
-        _call_function(function, kernel, rows, whole, tables, tolerances, out, good)
+        _call_function(function, kernel, rows, whole, tables, tolerances, out, counted)
     if whole < many:
         # those that do not fill the lanes, with copies of the last beside them
         which = np.minimum(np.arange(whole, whole + lanes), many - 1)
         last = allocate_aligned(steps, kernel.output_row_count, lanes, dtype)
-        _call_function(function, kernel, [row[:, which] for row in rows], lanes, tables, tolerances, last, good[whole:])
+        own = [row[:, which] for row in rows]
+        _call_function(function, kernel, own, lanes, tables, tolerances, last, counted[:, whole:])
         out[:, :, whole:] = last[:, :, : many - whole]
     if given is not None and given is not out:
         given[...] = out
-    return out, good[:many].astype(int)
+    good, candidates = counted[:, :many].astype(int)
+    return out, good, candidates
 
 
 def _call_function(
@@ -168,7 +200,7 @@ def _call_function(
     tables: tuple[Array, Array],
     tolerances: tuple[float, float, float],
     out: Array,
-    good: Array,
+    counted: Array,
 ) -> None:
     arrays = [np.ascontiguousarray(row) for row in (*rows, *tables)]
     width = rows[0].shape[1]
@@ -182,7 +214,7 @@ def _call_function(
             *(each.ctypes.data for each in arrays),
             *tolerances,
             out.ctypes.data,
-            good.ctypes.data,
+            *(each.ctypes.data for each in counted),
         )
 
 
@@ -197,9 +229,19 @@ def operand_rows(operands: Sequence[tuple[str, int]], values: Array) -> Array:
     return found
 
 
-def step_table(offsets: Array) -> tuple[Array, Array]:
-    """What every step needs to know: the weights of the steps before, and how far each input has gone."""
-    steps, inputs = offsets.shape
+def step_table(offsets: Array, start: Array | None = None) -> tuple[Array, Array]:
+    """What every step needs to know: the weights of the steps before, and how far each input has gone, or where it is
+    if all designs `start` (inputs,) at one position."""
+    offsets = np.ascontiguousarray(offsets if start is None else offsets + start)
+    table, counts = _step_table(offsets.tobytes(), offsets.shape)
+    return table, counts.copy()
+
+
+@lru_cache(maxsize=64)
+def _step_table(content: bytes, shape: tuple[int, int]) -> tuple[Array, Array]:
+    """The same of offsets (steps + 1, inputs) as bytes: the blocks of a sweep have them in common."""
+    steps, inputs = shape
+    offsets = np.frombuffer(content).reshape(shape)
     table = np.zeros((steps, PREDICTOR_ORDER + 3 * inputs))
     for step in range(min(steps, PREDICTOR_ORDER)):
         # ahead of the first there is its start
@@ -209,4 +251,5 @@ def step_table(offsets: Array) -> tuple[Array, Array]:
         table[:, PREDICTOR_ORDER + 3 * k : PREDICTOR_ORDER + 3 * k + 3] = np.stack(
             [offsets[:, k], np.cos(offsets[:, k]), np.sin(offsets[:, k])], axis=1
         )
+    table.flags.writeable = False
     return table, correction_counts(steps, longest_step(offsets))

@@ -47,7 +47,7 @@ class NumpyRunner:
         """See `DesignRunner`."""
         return True
 
-    def run(self, batch: DesignBatch, out: Array) -> Array:
+    def run(self, batch: DesignBatch, out: Array, candidates: Array | None = None) -> Array:
         """See `DesignRunner`."""
         kernel = _kernel(batch, batch.links, batch.rates)
         good = _run(kernel, batch, out, 0)
@@ -57,6 +57,8 @@ class NumpyRunner:
             good[rest] = _run(kernel, batch.select(rest), own, EXTRA_CORRECTIONS)
             out[:, :, rest] = own
         erase_from_steps(out, good)
+        if candidates is not None:
+            candidates[:] = good
         return good
 
     def last_good_unknowns(self, batch: DesignBatch, good: Array) -> Array:
@@ -125,7 +127,7 @@ class StartRunner:
         """See `DesignRunner`."""
         return True
 
-    def run(self, batch: DesignBatch, out: Array) -> Array:
+    def run(self, batch: DesignBatch, out: Array, candidates: Array | None = None) -> Array:
         """See `DesignRunner`."""
         if not batch.functions.is_square:
             raise UnsupportedStructure("constraints hold each other more than once")
@@ -134,6 +136,8 @@ class StartRunner:
             row = design_positions(functions, batch, self._start(functions, batch), batch.u0)
             good = (PointWriter(batch, functions).write(out[0], row) & row.passed).astype(int)
         erase_from_steps(out, good)
+        if candidates is not None:
+            candidates[:] = good
         return good
 
     def last_good_unknowns(self, batch: DesignBatch, good: Array) -> Array:

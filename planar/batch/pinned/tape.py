@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -95,7 +96,7 @@ def make_tape(linkages: PinnedLinkages) -> PinTape:
     owner = pin_owner[steps.placed]
     odd[owner[arm < SHORT_ARM]] = True
     which = np.flatnonzero(~odd)
-    order = np.argsort(owner, kind="stable")
+    order = _stable_order(owner)
     if len(which) < many:
         order = order[~odd[owner[order]]]
     first = np.zeros(len(which) + 1, dtype=np.int64)
@@ -132,10 +133,11 @@ def _find_steps(linkages: PinnedLinkages, entry_bar: Array, entry_pin: Array, is
         held = np.flatnonzero(known[other])
         at = pin[held]
         # sorted by pin, so that the two stand side by side
-        held = held[np.bincount(at, minlength=len(known))[at] == 2]
-        if not len(held):
+        alike = np.concatenate([[False], at[1:] == at[:-1], [False, False]])
+        of_two = np.flatnonzero(alike[1:-1] & ~alike[:-2] & ~alike[2:])
+        if not len(of_two):
             break
-        one, two = held[::2], held[1::2]
+        one, two = held[of_two], held[of_two + 1]
         found.append((other[one], other[two], pin[one], bar[one], bar[two]))
         known[pin[one]] = True
     level = np.repeat(np.arange(len(found)), [len(each[2]) for each in found])
@@ -159,8 +161,14 @@ def _pairs_on_bars(linkages: PinnedLinkages, entry_bar: Array, entry_pin: Array)
         of.append(entry_pin[begin[there] + (place[there] + step) % size[there]])
         bar.append(entry_bar[there])
     pin, other, bars = (np.concatenate(parts) for parts in (own, of, bar))
-    order = np.argsort(pin, kind="stable")
+    order = _stable_order(pin)
     return pin[order], other[order], bars[order]
+
+
+def _stable_order(numbers: Array) -> Array:
+    """The order of whole numbers from zero on, alike ones as they stand: short ones are counted, not compared."""
+    is_short = len(numbers) and numbers.max() <= np.iinfo(np.uint16).max
+    return np.argsort(numbers.astype(np.uint16) if is_short else numbers, kind="stable")
 
 
 def _numbers(
@@ -193,23 +201,24 @@ def _numbers(
 
 def _sizes(linkages: PinnedLinkages, entry_bar: Array, entry_pin: Array) -> tuple[Array, Array]:
     """The greatest extent of a link of each linkage, and how far its numbers reach (m)."""
-    at, starts = linkages.positions, linkages.first_entry[:-1]
-    base, way = at[entry_pin[starts]], at[entry_pin[starts + 1]] - at[entry_pin[starts]]
-    length = np.sqrt(way[:, 0] ** 2 + way[:, 1] ** 2)
-    heads, frames = linkages.first_bar[:-1], linkages.first_frame_pin[:-1]
-    fixed = at[frame_pins(linkages)]
+    starts, frames = linkages.first_entry[:-1], linkages.first_frame_pin[:-1]
+    at, first, fixed = linkages.positions.T.copy(), entry_pin[starts], frame_pins(linkages)
+    base = [each[first] for each in at]
+    way = [each[entry_pin[starts + 1]] - begin for each, begin in zip(at, base, strict=True)]
+    length = np.sqrt(way[0] ** 2 + way[1] ** 2)
     extents, reaches = length, length
     if len(entry_bar) > 2 * len(starts):
-        c, s = (way.T / length)[:, entry_bar]
-        x, y = (at[entry_pin] - base[entry_bar]).T
-        local = np.stack([c * x + s * y, c * y - s * x], axis=1)
-        extents = np.hypot(*_extents(local, starts))
-        reaches = np.maximum.reduceat(np.abs(local).max(axis=1), starts)
-    unit = np.maximum(np.maximum.reduceat(extents, heads), np.hypot(*_extents(fixed, frames)))
-    reach = np.maximum.reduceat(np.abs(fixed).max(axis=1), frames)
+        c, s = ((each / length)[entry_bar] for each in way)
+        x, y = (each[entry_pin] - begin[entry_bar] for each, begin in zip(at, base, strict=True))
+        extents, reaches = _extents((c * x + s * y, c * y - s * x), starts)
+    (extent, reach), heads = _extents([each[fixed] for each in at], frames), linkages.first_bar[:-1]
+    unit = np.maximum(np.maximum.reduceat(extents, heads), extent)
     return unit, np.maximum(np.maximum.reduceat(reaches, heads), reach)
 
 
-def _extents(points: Array, starts: Array) -> Array:
-    """How far points (points, 2) reach in x and in y (2, parts), part by part."""
-    return (np.maximum.reduceat(points, starts) - np.minimum.reduceat(points, starts)).T
+def _extents(points: Sequence[Array], starts: Array) -> tuple[Array, Array]:
+    """Of the boxes around points x, y (points,), part by part: the diagonals, and the greatest number (parts,)."""
+    bounds = [(np.minimum.reduceat(each, starts), np.maximum.reduceat(each, starts)) for each in points]
+    (left, right), (low, high) = bounds
+    wide, tall = right - left, high - low
+    return np.sqrt(wide * wide + tall * tall), np.maximum(np.maximum(-left, right), np.maximum(-low, high))
