@@ -8,6 +8,7 @@ import sys
 from collections import Counter
 from concurrent.futures import ProcessPoolExecutor
 from itertools import cycle, islice, repeat
+from math import inf
 from time import perf_counter
 
 from rich.console import Console
@@ -34,6 +35,7 @@ def main() -> None:
     parser.add_argument("--first", type=int, default=0, help="the first seed")
     parser.add_argument("--kinds", nargs="+", choices=list(KINDS), default=list(KINDS), help="of mechanisms")
     parser.add_argument("--workers", type=int, default=os.cpu_count(), help="processes")
+    parser.add_argument("--seconds", type=float, default=inf, help="after which no more are drawn")
     parser.add_argument("--case", nargs=2, metavar=("KIND", "SEED"), help="one case alone, all of it printed")
     wanted = parser.parse_args()
     console = Console(width=200, soft_wrap=True)
@@ -51,9 +53,12 @@ def main() -> None:
         verdicts = []
         with ProcessPoolExecutor(wanted.workers) as pool:
             for found in pool.map(
-                compare_random_case, islice(cycle(wanted.kinds), cases), seeds, repeat(wanted.designs), chunksize=4
+                compare_random_case, islice(cycle(wanted.kinds), cases), seeds, repeat(wanted.designs)
             ):
                 verdicts += found
+                if perf_counter() - start > wanted.seconds:
+                    pool.shutdown(wait=False, cancel_futures=True)
+                    break
         _print(console, verdicts, perf_counter() - start)
     sys.exit(any(not agrees(each) for each in verdicts))
 
