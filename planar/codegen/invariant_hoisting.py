@@ -28,12 +28,16 @@ class InvariantHoister(Generic[Key]):
         self.invariants: set[int] = set()
         self.linear_forms: dict[int, _LinearForm] = {}
         self.value_numbers: dict[int, int] = {}
+        self.divided: Counter[int] = Counter()
+        "how many values of the listing are divided by each"
 
     def rebuild(self, listing: InstructionList[Key], wanted: Sequence[int]) -> list[int]:
         """The numbers of the wanted values in the listing that is made."""
         self.linear_forms, self.value_numbers = {}, {}
         order = required_values(listing, wanted)
         uses = Counter(each for k in order for each in listing.instructions[k].operands)
+        values = [listing.instructions[k] for k in order]
+        self.divided = Counter(value.operands[1] for value in values if value.operation == "div")
         for k in order:
             found = self._linear_form(listing.instructions[k])
             if uses[k] > 1 and (len(found.factors) > MAX_REUSED_TERMS or self._computed_term_count(found) > 1):
@@ -58,9 +62,11 @@ class InvariantHoister(Generic[Key]):
         return self._single_term(self.result.add_again(value, [self._value_number(k) for k in value.operands]))
 
     def _divide(self, value: Instruction[Key], above: _LinearForm, below: _LinearForm) -> _LinearForm:
-        """One division for all that is divided by the same."""
+        """One division for all that is divided by the same, and by what does not vary none."""
         if not below.factors:
             return self._scale_form(above, self._add_invariant("div", self._constant(1.0), self._rest_or_zero(below)))
+        if self.divided[value.operands[1]] == 1:
+            return self._single_term(self.result.add("div", *map(self._value_number, value.operands)))
         inverse = self.result.add("div", self._constant(1.0), self._value_number(value.operands[1]))
         if not above.factors:
             return self._scale_form(self._single_term(inverse), self._rest_or_zero(above))

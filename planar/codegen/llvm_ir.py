@@ -13,8 +13,8 @@ LLVM_INTRINSICS = {"sqrt": "sqrt", "abs": "fabs"}
 LIBRARY_ARGUMENT_COUNTS = {"cos": 1, "sin": 1, "atan": 1, "atan2": 2}
 """What is called lane by lane, and how many arguments it has."""
 STACK_ALIGNMENT = 64
-"""Bytes: where a function's vectors are kept between, each lies in one line of the cache. Without it the widest lie over
-two wherever the caller's stack happens to begin so, and take up to twice as long."""
+"""Bytes: so that each vector that a function keeps on it lies in one line of the cache. Else the widest lie over two
+wherever the caller's stack happens to begin so, and the function takes up to twice as long."""
 
 
 class IRWriter:
@@ -125,9 +125,23 @@ class IRWriter:
         """One value where a flag is up, else the other."""
         return self.add_instruction(f"select <{self.lanes} x i1> {flag}, {self.vector} {value}, {self.vector} {other}")
 
+    def greater(self, value: str, other: str) -> str:
+        """The greater of two values; the other where one is not a number."""
+        return self.select(self.compare("ogt", value, other), value, other)
+
     def allocate(self, many: int = 1) -> str:
         """Room for values."""
         return self.add_instruction(f"alloca {self.vector}, i64 {many}, align 64")
+
+    def allocate_flags(self) -> str:
+        """Room for a flag in every lane."""
+        return self.add_instruction(f"alloca <{self.lanes} x i1>")
+
+    def load_flags(self, pointer: str) -> str:
+        return self.add_instruction(f"load <{self.lanes} x i1>, ptr {pointer}")
+
+    def store_flags(self, flags: str, pointer: str) -> None:
+        self.write_line(f"store <{self.lanes} x i1> {flags}, ptr {pointer}")
 
     def element_pointer(self, slot: str, index: str) -> str:
         """One of the places of a slot that has room for several."""

@@ -107,18 +107,18 @@ def _solve_two_angles(e: ConstraintEquations, stage: Block, unknowns: list[ca.SX
     a, b, g = (_rows_as_complex(part, signs) for part in (by_one[0], by_two[0], rest))
     d = -g
     sign = ca.SX.sym("sign")
-    spanned, gap = a.squared_length * b.squared_length, 0.5 * (a.squared_length + b.squared_length - d.squared_length)
-    # spanned less the gap's square, as Heron has it: so nothing cancels where the angles are small
+    # the square of four times a triangle's area, as Heron has it: so nothing cancels where the angles are small
     one_length, other_length = ca.sqrt(a.squared_length), ca.sqrt(b.squared_length)
     least, greatest = one_length - other_length, one_length + other_length
-    across = sign * 0.5 * ca.sqrt((d.squared_length - least * least) * (greatest * greatest - d.squared_length))
-    scale = 1.0 / d.squared_length
-    along = 0.5 + 0.5 * (a.squared_length - b.squared_length) * scale
-    reached = d.scale(along) + _ComplexNumber(-d.y, d.x).scale(across * scale)
+    area = (d.squared_length - least * least) * (greatest * greatest - d.squared_length)
+    half = 0.5 * sign / d.squared_length
+    along = 0.5 + (a.squared_length - b.squared_length) * sign * half
+    reached = d.scale(along) + _ComplexNumber(-d.y, d.x).scale(ca.sqrt(area) * half)
     e1 = reached.multiply(a.conjugate).scale(1.0 / a.squared_length)
     e2 = (d + -reached).multiply(b.conjugate).scale(1.0 / b.squared_length)
     side = a.multiply(_unit_number(one)).cross(b.multiply(_unit_number(two)))
-    return ClosedForm((tuple(e1), tuple(e2)), sign, side, gap * gap / spanned)
+    coalescence = 1.0 - area / (4.0 * a.squared_length * b.squared_length)
+    return ClosedForm((tuple(e1), tuple(e2)), sign, side, coalescence)
 
 
 def _solve_angle_and_length(e: ConstraintEquations, stage: Block, unknowns: list[ca.SX]) -> ClosedForm | None:

@@ -213,6 +213,7 @@ class KernelInstructions:
             "z1": ca.SX.sym("z1", e.z.numel()),
             "z2": ca.SX.sym("z2", e.z.numel()),
             "sign": ca.vertcat(ca.SX(0, 1), *(form.sign for form in equations.closed_forms)),
+            "scale": ca.SX.sym("scale"),
         }
         self.hoister = InvariantHoister[Operand](lambda operand: operand[0] in invariant)
         self.sign_index = {

@@ -6,12 +6,14 @@ What Newton's method solves is predicted by the polynomial through the steps bef
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import reduce
 from math import inf, nan
 from typing import NamedTuple
 
 import casadi as ca
 
 from planar.batch.march.kernel import BareAngle, KernelBlock, KernelEquations, Operand
+from planar.batch.march.llvm_checks import write_closes, write_keeps_apart
 from planar.batch.march.llvm_kernel import KernelWriter, OperandNames
 from planar.batch.march.prediction import MAX_TURN_PER_STEP, PREDICTOR_ORDER
 from planar.batch.march.regularity import LEAST_KERNEL_REGULARITY, LEAST_START_REGULARITY, least_regularity
@@ -88,7 +90,7 @@ class _DesignsKernelWriter(KernelWriter):
         levels: tuple[int, ...] | None,
         carried: frozenset[Operand],
     ):
-        super().__init__(equations, links, rates, lanes, frozenset({"p", "q", "u1", "u2"}), carried)
+        super().__init__(equations, links, rates, lanes, frozenset({"p", "q", "u1", "u2", "scale"}), carried)
         self.point_blocks = levels
         self.other_points: dict[int, list[str]] = {}
         self.state = tuple(leaf for k in range(len(equations.is_angle)) for leaf in self.unknown_operands(k))
@@ -117,13 +119,15 @@ class _DesignsKernelWriter(KernelWriter):
             part.block.block_index: t.allocate() for part in self.equations.blocks if part.closed_form is None
         }
         self.bend_slots = [[t.allocate() for _ in range(2)] for _ in self.equations.closed_forms]
-        self.regularity_slot, self.passed_slot, self.good_count_slot = (t.allocate() for _ in range(3))
+        self.regularity_slot, self.good_count_slot = (t.allocate() for _ in range(2))
+        self.passed_slot = t.allocate_flags()
         self.counted_angle_slots = [t.allocate() for _ in range(self.counted_angles().numel())]
         large = [len(part.unknowns) for part in self.equations.blocks if part.is_large]
         self.linear_systems = LinearSystems(t, max(large)) if large else None
         scale = t.broadcast("%scale")
         t.write_line("br label %block")
         have, at_start = self._write_lanes_start()
+        have["scale", 0] = scale
         self._write_step_start(have, at_start)
         flags = []
         for part in self.equations.blocks:
@@ -133,7 +137,7 @@ class _DesignsKernelWriter(KernelWriter):
                 flags += self._write_closed_form_block(part, have)
         t.write_line("br label %told")
         t.write_label("told")
-        self._write_step_end(have, flags, scale)
+        self._write_step_end(have, flags)
         t.close_loop("k", "steps", "step", "blockend")
         t.write_label("blockend")
         t.store(t.load(self.good_count_slot), t.double_pointer("%good", self.lane))
@@ -179,7 +183,7 @@ class _DesignsKernelWriter(KernelWriter):
             for k in range(HISTORY_LENGTH - 1):
                 t.store("zeroinitializer", t.element_pointer(ring, str(k)))
             t.store(state[leaf], t.element_pointer(ring, str(HISTORY_LENGTH - 1)))
-        t.store(t.constant(1.0), self.passed_slot)
+        t.store_flags("splat (i1 true)", self.passed_slot)
         t.store("zeroinitializer", self.good_count_slot)
         t.write_line("br label %step")
         return have, at_start
@@ -224,16 +228,11 @@ class _DesignsKernelWriter(KernelWriter):
         for k in part.unknowns:
             if self.is_carried(("z", k)):
                 self._write_carried_angle(k, have)
-        before, earlier = (t.load(slot) for slot in self.bend_slots[self.sign_index[part.block.block_index]])
-        change = t.binary("sub", t.binary("add", bend, earlier), t.binary("add", before, before))
-        # of all three: the middle of the change may lie a step back, as where a run starts just before a dead point
-        most = t.call_intrinsic("maxnum", t.call_intrinsic("maxnum", bend, before), earlier)
-        room = t.binary("sub", t.constant(1.0), most)
-        for slot, value in zip(self.bend_slots[self.sign_index[part.block.block_index]], (bend, before), strict=True):
+        slots = self.bend_slots[self.sign_index[part.block.block_index]]
+        before, earlier = (t.load(slot) for slot in slots)
+        for slot, value in zip(slots, (bend, before), strict=True):
             t.store(value, slot)
-        change = t.binary("mul", t.call_intrinsic("fabs", change), t.constant(0.5))
-        kept = t.select_or_zero(t.broadcast_counter_test("%k", "sgt", 1), change)
-        return [t.compare("oge", t.binary("sub", room, kept), t.constant(LEAST_KERNEL_REGULARITY**2))]
+        return [write_keeps_apart(t, earlier, before, bend, t.broadcast_counter_test("%k", "sgt", 1))]
 
     def _write_other_assembly(self, part: KernelBlock, have: OperandNames) -> None:
         """Where the block places its points in its other assembly."""
@@ -361,33 +360,27 @@ class _DesignsKernelWriter(KernelWriter):
         room = t.binary("sub", spanned, t.binary("mul", lengths, t.constant(least)))
         return t.call_intrinsic("minnum", room, t.binary("sub", squared_arm, t.constant(LEAST_START_REGULARITY**2)))
 
-    def _write_step_end(self, have: OperandNames, flags: list[str], scale: str) -> None:
+    def _write_step_end(self, have: OperandNames, flags: list[str]) -> None:
         """The step ends: its results are written, and judged."""
-        t, told = self.ir, self.output_expressions()
+        t, told = self.ir, [each * self.symbols["scale"] for each in self.output_expressions()]
         self._write_rates(have)
         left, counted, *values = self.write_separately([self.equations.residuals(), self.counted_angles(), *told], have)
         flags = [*flags, *self._write_turn_checks(counted)]
-        many = [t.binary("mul", scale, each) for of in values for each in of]
+        many = [each for of in values for each in of]
         if self.point_blocks is not None:
             nowhere = [t.constant(inf)] * 2
             many += [part for k in range(len(self.links)) for part in self.other_points.get(k, nowhere)]
             many += [*(have[leaf] for leaf in self.state), t.load(self.regularity_slot)]
-        # sums, since what is not a number stays so in them, and is not below anything
-        worst = t.add_all(
-            [t.constant(0.0), *(t.call_intrinsic("fabs", each) for each in (*left, *self.write_circle_residuals(have)))]
-        )
-        flags = [*flags, t.compare("ole", worst, t.broadcast("%tolerance"))]
+        flags.append(write_closes(t, [*left, *self.write_circle_residuals(have)], "%tolerance"))
         if self.newton_unknowns:
             least = LEAST_KERNEL_REGULARITY**3 if self.point_blocks is not None else 0.0
             flags.append(t.compare("oge", t.load(self.regularity_slot), t.constant(least)))
             near = t.compare("ole", t.load(self.correction_slot), t.broadcast("%astray"))
             flags.append(t.or_flags(near, t.broadcast_counter_test("%k", "sle", PREDICTOR_ORDER)))
-        for flag in flags[1:]:
-            flags[0] = t.and_flags(flags[0], flag)
-        t.store(t.select_or_zero(flags[0], t.load(self.passed_slot)), self.passed_slot)
+        passed = reduce(t.and_flags, flags, t.load_flags(self.passed_slot))
+        t.store_flags(passed, self.passed_slot)
         if self.point_blocks is None:
-            fine = t.compare("ogt", t.load(self.passed_slot), "zeroinitializer")
-            many = [t.select(fine, each, t.constant(nan)) for each in many]
+            many = [t.select(passed, each, t.constant(nan)) for each in many]
         for k, each in enumerate(many):
             place = t.add_instruction(
                 f"add i64 {t.add_instruction('mul i64 %k, %time')}, {t.add_instruction(f'mul i64 %row, {k}')}"
@@ -397,4 +390,5 @@ class _DesignsKernelWriter(KernelWriter):
                 t.store_streaming_rounded(each, t.single_pointer("%out", place))
             else:
                 (t.store_streaming if self.streams else t.store)(each, t.double_pointer("%out", place))
-        t.store(t.binary("add", t.load(self.good_count_slot), t.load(self.passed_slot)), self.good_count_slot)
+        count = t.load(self.good_count_slot)
+        t.store(t.select(passed, t.binary("add", count, t.constant(1.0)), count), self.good_count_slot)

@@ -87,15 +87,13 @@ class KernelWriter(KernelInstructions):
     def write_circle_residuals(self, have: OperandNames) -> list[str]:
         """How far the square of every unknown angle's cos and sin is from one."""
         t = self.ir
-        return [
-            t.binary(
-                "sub",
-                t.add_all([t.binary("mul", have[part, k], have[part, k]) for part in ("zc", "zs")]),
-                t.constant(1.0),
+
+        def residual(cos: str, sin: str) -> str:
+            return t.binary(
+                "add", t.binary("sub", t.binary("mul", cos, cos), t.constant(1.0)), t.binary("mul", sin, sin)
             )
-            for k, turns in enumerate(self.equations.is_angle)
-            if turns
-        ]
+
+        return [residual(have["zc", k], have["zs", k]) for k, turns in enumerate(self.equations.is_angle) if turns]
 
 
 def write_angle_sum(t: IRWriter, cos: str, sin: str, c: str, s: str) -> tuple[str, str]:

@@ -6,8 +6,8 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from planar.batch.march.kernel import KernelEquations
+from planar.batch.march.llvm_checks import write_keeps_apart
 from planar.batch.march.prediction import MAX_TURN_PER_STEP
-from planar.batch.march.regularity import LEAST_KERNEL_REGULARITY
 from planar.batch.prepare.run_endings import CLEARLY_OPEN, DEAD_POINT, UNSURE
 from planar.codegen.llvm_ir import IRWriter
 
@@ -31,15 +31,6 @@ class PositionRows(NamedTuple):
     @property
     def row_count(self) -> int:
         return self.worst + 1
-
-
-def write_keeps_apart(t: IRWriter, one: str, two: str, three: str) -> str:
-    """A flag: over three positions, and between them, the two assemblies of a block keep apart, by its coalescence."""
-    change = t.binary("sub", t.binary("add", one, three), t.binary("add", two, two))
-    kept = t.binary("mul", t.call_intrinsic("fabs", change), t.constant(0.5))
-    margins = [t.binary("sub", t.constant(1.0), bend) for bend in (one, two, three)]
-    least = t.call_intrinsic("minnum", t.call_intrinsic("minnum", *margins[:2]), margins[2])
-    return t.compare("oge", t.binary("sub", least, kept), t.constant(LEAST_KERNEL_REGULARITY**2))
 
 
 def write_ending(equations: KernelEquations, rows: PositionRows) -> IRWriter:
