@@ -198,7 +198,7 @@ class _DesignBlockSolver:
         u0[base_.running_index] = self.start / self.scale
         offsets[:, base_.running_index] = np.linspace(0.0, self.range_length[0] / self.scale, block.steps + 1)
         march = base_.design_batch(shapes, p, (u0, self.u1, self.u2), moving.values(), block.rates)
-        march = march._replace(z0=start.z, input_offsets=offsets)
+        march = march._replace(z0=start.z, signs=start.signs, input_offsets=offsets)
         try:
             if not is_common:
                 out = self._run_own_ranges(march, fit, start.signs, runner)

@@ -264,6 +264,8 @@ def check_range(mechanism: Mechanism, steps: object, start: object, stop: object
     if lawful and start is None and stop is None and pair is None:
         told = f"the input at {lawful[0]!r} has a law of time, which is not run here; give it a start and a stop"
         raise BadInput("designs", told)
+    if not lawful:  # the same, of which more is known already
+        return mechanism
     return replace(mechanism, inputs=tuple(given._replace(law=None) for given in mechanism.inputs))
 
 

@@ -28,6 +28,7 @@ class DesignBatch(NamedTuple):
     rates, the same at every step. `rates`: whether first and second rates are wanted. `tolerance`: what a constraint
     may leave open. `mechanism` has the pairs and inputs; its numbers are not those of the designs. `unit`: the size, m.
     `zeros`: rows of p and q, as ("p", row), that are nothing in all designs and are left out of what is computed.
+    `signs` (blocks, designs): of the assemblies of blocks in closed form, 0 where one is not known; None of none.
     """
 
     functions: EquationFunctions
@@ -44,6 +45,7 @@ class DesignBatch(NamedTuple):
     tolerance: float
     unit: float
     zeros: frozenset[tuple[str, int]] = frozenset()
+    signs: Array | None = None
 
     @property
     def output_row_count(self) -> int:
@@ -52,7 +54,8 @@ class DesignBatch(NamedTuple):
 
     def select(self, designs: Array | slice, z0: Array | None = None) -> DesignBatch:
         """The batch of some of the designs, from other unknowns if they are given."""
-        rows = {name: getattr(self, name) for name in ("p", "q", "z0", "u0", "u1", "u2")}
+        names = ("p", "q", "z0", "u0", "u1", "u2", *(["signs"] if self.signs is not None else []))
+        rows = {name: getattr(self, name) for name in names}
         if isinstance(designs, slice):
             parts = {name: row[:, designs] for name, row in rows.items()}
         else:  # of which rows lie in one piece, unlike what an index gives

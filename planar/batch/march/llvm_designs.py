@@ -8,13 +8,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import reduce
 from math import inf, nan
-from typing import NamedTuple
 
 import casadi as ca
 
 from planar.batch.march.kernel import BareAngle, KernelBlock, KernelEquations, Operand
 from planar.batch.march.llvm_checks import write_closes, write_keeps_apart
-from planar.batch.march.llvm_kernel import KernelWriter, OperandNames
+from planar.batch.march.llvm_kernel import STATE_GIVEN, DesignsKernelLayout, KernelStart, KernelWriter, OperandNames
 from planar.batch.march.prediction import MAX_TURN_PER_STEP, PREDICTOR_ORDER
 from planar.batch.march.regularity import LEAST_KERNEL_REGULARITY, LEAST_START_REGULARITY, least_regularity
 from planar.codegen.instructions import UnsupportedOperation
@@ -29,21 +28,6 @@ ARGUMENT_TYPES = (*("int",) * 5, *("array",) * 7, *("float",) * 3, "array", "arr
 from the next; p, q, state, drives, rates, table, counts; tolerance, astray, scale; out, good."""
 
 
-class DesignsKernelLayout(NamedTuple):
-    """What the function takes and gives, row by row, each with an entry for every design.
-
-    state: cos and sin of an angle, or a length, and what else is carried of it; drives: the same of the inputs; out:
-    rows that a step gives; table: numbers that a step takes.
-    """
-
-    state: tuple[Operand, ...]
-    inputs: tuple[Operand, ...]
-    output_row_count: int
-    table_width: int
-    ir: str
-    lanes: int
-
-
 def write_designs_kernel(
     equations: KernelEquations,
     links: Sequence[str],
@@ -53,6 +37,7 @@ def write_designs_kernel(
     *,
     streams: bool = True,
     is_single: bool = False,
+    start: KernelStart = STATE_GIVEN,
 ) -> DesignsKernelLayout:
     """The function for points on these links, none of which is the frame. Raises UnsupportedOperation.
 
@@ -65,7 +50,9 @@ def write_designs_kernel(
     carried: frozenset[Operand] = frozenset()
     while True:
         try:
-            writer = _DesignsKernelWriter(equations, tuple(links), rates, lanes, point_blocks, carried)
+            writer = _DesignsKernelWriter(
+                equations, tuple(links), rates, lanes, point_blocks, carried, start if not carried else STATE_GIVEN
+            )
             writer.streams = streams
             writer.is_single = is_single
             return writer.write()
@@ -89,11 +76,15 @@ class _DesignsKernelWriter(KernelWriter):
         lanes: int,
         levels: tuple[int, ...] | None,
         carried: frozenset[Operand],
+        start: KernelStart,
     ):
         super().__init__(equations, links, rates, lanes, frozenset({"p", "q", "u1", "u2", "scale"}), carried)
         self.point_blocks = levels
         self.other_points: dict[int, list[str]] = {}
+        self.start = start
         self.state = tuple(leaf for k in range(len(equations.is_angle)) for leaf in self.unknown_operands(k))
+        if start.has_signs:
+            self.state = tuple(("sign", k) for k in range(len(equations.closed_forms)))
         self.input_count = len(equations.input_is_angle)
         self.newton_unknowns = [k for part in equations.blocks if part.closed_form is None for k in part.unknowns]
 
@@ -148,7 +139,13 @@ class _DesignsKernelWriter(KernelWriter):
         if self.linear_systems is not None:
             t.write_line(self.linear_systems.function_text)
         return DesignsKernelLayout(
-            self.state, self.input_operands, rows, PREDICTOR_ORDER + 3 * self.input_count, t.module_text(), t.lanes
+            self.state,
+            self.input_operands,
+            rows,
+            PREDICTOR_ORDER + 3 * self.input_count,
+            t.module_text(),
+            t.lanes,
+            self.start,
         )
 
     def _row_pointer(self, base: str, k: int) -> str:
@@ -171,7 +168,9 @@ class _DesignsKernelWriter(KernelWriter):
         t.mark_hoist_point()
         at_start = {leaf: t.load(self._row_pointer("%drive", k)) for k, leaf in enumerate(self.input_operands)}
         state = {leaf: t.load(self._row_pointer("%state", k)) for k, leaf in enumerate(self.state)}
-        if self.equations.closed_forms:
+        if self.start.has_signs:
+            have |= state
+        elif self.equations.closed_forms:
             sides = self.write_values([self.equations.sides], have | at_start | state)
             for k, side in enumerate(sides):
                 have["sign", k] = t.call_intrinsic("copysign", t.constant(1.0), side)
@@ -205,6 +204,9 @@ class _DesignsKernelWriter(KernelWriter):
         self.predictor_weights = [tabled(k) for k in range(PREDICTOR_ORDER)] if self.newton_unknowns else []
         for k, turns in enumerate(self.equations.input_is_angle):
             by, cos, sin = (tabled(PREDICTOR_ORDER + 3 * k + j) for j in range(3))
+            if self.start.has_common_inputs:
+                have |= {("u", k): by, ("uc", k): cos, ("us", k): sin}
+                continue
             have["u", k] = t.binary("add", at_start["u", k], by)
             if turns:
                 have["uc", k], have["us", k] = self.write_angle_sum(at_start["uc", k], at_start["us", k], cos, sin)

@@ -13,9 +13,9 @@ from planar.batch.march.kernel import KernelEquations, batch_equations
 from planar.batch.march.llvm_designs import (
     ARGUMENT_TYPES,
     FUNCTION_NAME,
-    DesignsKernelLayout,
     write_designs_kernel,
 )
+from planar.batch.march.llvm_kernel import STATE_GIVEN, DesignsKernelLayout, KernelStart
 from planar.batch.march.prediction import (
     LONGEST_STEP,
     PREDICTOR_ORDER,
@@ -43,9 +43,10 @@ def designs_kernel(
     rates: bool,
     point_blocks: tuple[int, ...] | None = None,
     is_single: bool = False,
+    start: KernelStart = STATE_GIVEN,
 ) -> DesignsKernelLayout:
     """The function for points on links of a structure, see `march`. Raises UnsupportedOperation."""
-    found = _designs_kernel_or_reason(equations, links, rates, point_blocks, is_single)
+    found = _designs_kernel_or_reason(equations, links, rates, point_blocks, is_single, start)
     if isinstance(found, str):
         raise UnsupportedOperation(found)
     return found
@@ -58,10 +59,11 @@ def _designs_kernel_or_reason(
     rates: bool,
     point_blocks: tuple[int, ...] | None,
     is_single: bool,
+    start: KernelStart,
 ) -> DesignsKernelLayout | str:
     """The same, or why there is none: every block of a sweep would find that out again."""
     try:
-        return write_designs_kernel(equations, links, rates, LANES, point_blocks, is_single=is_single)
+        return write_designs_kernel(equations, links, rates, LANES, point_blocks, is_single=is_single, start=start)
     except UnsupportedOperation as why:
         return str(why)
 
@@ -75,10 +77,15 @@ def run_designs_kernel(batch: DesignBatch, extra_corrections: int = 0, out: Arra
     """
     longest = _longest_step(batch)
     is_single = out is not None and out.dtype == np.float32
-    kernel = designs_kernel(batch_equations(batch), tuple(batch.links), batch.rates, None, is_single)
-    table, counts = step_table(batch.input_offsets)
+    equations = batch_equations(batch)
+    signs, common = _known_signs(batch, equations), _common_inputs(batch.u0)
+    start = KernelStart(signs is not None, signs is not None and common is not None)
+    kernel = designs_kernel(equations, tuple(batch.links), batch.rates, None, is_single, start)
+    table, counts = step_table(batch.input_offsets, common if kernel.start.has_common_inputs else None)
     tolerances = batch.tolerance, correction_limit(longest), batch.unit
-    out, good = _run_kernel(kernel, batch, batch.rates, (table, counts + extra_corrections), tolerances, out)
+    out, good = _run_kernel(
+        kernel, batch._replace(signs=signs), batch.rates, (table, counts + extra_corrections), tolerances, out
+    )
     # what is told of a step only at the next one condemns the step too
     condemned = np.flatnonzero((good > 1) & (good < len(table)))
     good[condemned] -= 1
@@ -105,6 +112,24 @@ def correct_designs(batch: DesignBatch, point_blocks: Sequence[int], corrections
     z = _unknowns_from_state(kernel, rows[2 * places :], len(batch.z0))
     both = rows[: 2 * places].reshape(2, len(batch.links), 2, rows.shape[1])
     return CorrectedAssemblies(good > 0, np.sqrt(np.maximum(rows[-1], 0.0)), z, *both)
+
+
+def _known_signs(batch: DesignBatch, equations: KernelEquations) -> Array | None:
+    """The signs (blocks, designs) of a batch's assemblies, not numbers of a design that starts nowhere; None where not
+    all blocks are in closed form, or nothing is known of them."""
+    if batch.signs is None or equations.has_newton_blocks:
+        return None
+    signs = np.where(np.isfinite(batch.u0).all(axis=0), batch.signs, np.nan)
+    unknown = np.flatnonzero((signs == 0.0).any(axis=0))
+    if unknown.size:
+        signs[:, unknown] = equations.assembly_signs(*(rows[:, unknown] for rows in (batch.z0, batch.u0, batch.p)))
+    return signs
+
+
+def _common_inputs(u0: Array) -> Array | None:
+    """The inputs (inputs,) at which all designs start that start anywhere; None where they differ."""
+    least, most = (np.array([of(row) for row in u0]) for of in (np.fmin.reduce, np.fmax.reduce))
+    return least if np.array_equal(least, most) else None
 
 
 def _longest_step(batch: DesignBatch) -> float:
@@ -137,7 +162,7 @@ def _run_kernel(
     rows = (
         batch.p,
         batch.q,
-        operand_rows(kernel.state, batch.z0),
+        operand_rows(kernel.state, batch.z0) if not kernel.start.has_signs else batch.signs,
         operand_rows(kernel.inputs, batch.u0),
         np.concatenate([batch.u1, batch.u2]) if rates else np.zeros((0, many)),
     )
@@ -197,8 +222,10 @@ def operand_rows(operands: Sequence[tuple[str, int]], values: Array) -> Array:
     return found
 
 
-def step_table(offsets: Array) -> tuple[Array, Array]:
-    """What every step needs to know: the weights of the steps before, and how far each input has gone."""
+def step_table(offsets: Array, start: Array | None = None) -> tuple[Array, Array]:
+    """What every step needs to know: the weights of the steps before, and how far each input has gone, or where it is
+    if all designs `start` (inputs,) at one position."""
+    offsets = offsets if start is None else offsets + start
     steps, inputs = offsets.shape
     table = np.zeros((steps, PREDICTOR_ORDER + 3 * inputs))
     for step in range(min(steps, PREDICTOR_ORDER)):
