@@ -36,6 +36,8 @@ from planar.solving.position import PositionSolver
 
 Array = np.ndarray
 
+LARGEST_SQUARE = 1e200
+"""Of lengths: no square up to it is beyond the numbers."""
 MAX_ROOTS = 16
 """Assemblies of the base from which those of its designs are looked for."""
 
@@ -130,9 +132,21 @@ class ReferenceDesign:
     def tolerance(self, p: Array) -> float:
         """What the residual check lets pass for these designs: as `ResidualCheck.tolerance`, of the longest of any."""
         rows = self._length_rows
-        reach = max((max(float(p[k].max()), -float(p[k].min())) for k in rows), default=0.0) if p.shape[1] else 0.0
-        reach = max(reach, 0.0) if np.isfinite(reach) else float(np.nanmax(np.abs(p[rows]), initial=0.0))
+        least, greatest = (bound[rows] for bound in self._row_bounds(p))
+        reach = float(np.max([greatest, -least], initial=0.0))
+        if not np.isfinite(reach):
+            reach = float(np.nanmax(np.abs(p[rows]), initial=0.0))
         return float(residual_tolerance(len(self.mechanism.links), reach))
+
+    def _row_bounds(self, p: Array) -> tuple[Array, Array]:
+        """The least and the greatest of each row of p (numbers, designs), not numbers where one is none; kept for the
+        last p, which is asked for several times."""
+        if self._last_bounds[0] is not p:
+            ends = (p.min(axis=1), p.max(axis=1)) if p.size else (np.zeros(len(p)), np.zeros(len(p)))
+            self._last_bounds = p, ends
+        return self._last_bounds[1]
+
+    _last_bounds: tuple[Array | None, tuple[Array, Array]] = None, (np.zeros(0), np.zeros(0))
 
     @cached_property
     def _length_rows(self) -> list[int]:
@@ -180,10 +194,11 @@ class ReferenceDesign:
         """
         shapes = self.solver.shapes
         base_q = [part for link, point in members for part in place_in_link(shapes[link], point)]
-        rows = [("p", k) for k in np.flatnonzero(self._base_numbers == 0.0).tolist()]
-        rows += [("q", k) for k, part in enumerate(base_q) if part == 0.0]
-        given = {"p": p, "q": q}
-        return frozenset(rows) if not any(np.any(given[name][k]) for name, k in rows) else frozenset()
+        of_p = np.flatnonzero(self._base_numbers == 0.0)
+        of_q = [k for k, part in enumerate(base_q) if part == 0.0]
+        if any(np.any(bound[of_p]) for bound in self._row_bounds(p)) or any(np.any(q[k]) for k in of_q):
+            return frozenset()
+        return frozenset([*(("p", k) for k in of_p.tolist()), *(("q", k) for k in of_q)])
 
     @cached_property
     def _base_numbers(self) -> Array:
@@ -192,7 +207,9 @@ class ReferenceDesign:
 
     def is_fit(self, values: Mapping[str, Array], shapes: Mapping[str, LinkShape], p: Array) -> Array:
         """The designs that a backend may run (designs,): see `is_unfit` and `has_short_arm`."""
-        fit = np.all(np.isfinite(p), axis=0) & ~self.has_short_arm(shapes, p.shape[1])
+        fit = ~self.has_short_arm(shapes, p.shape[1])
+        if not np.isfinite(self._row_bounds(p)).all():
+            fit &= np.isfinite(p).all(axis=0)
         return fit & ~self.is_unfit(values, shapes) if values else fit
 
     def is_unfit(self, values: Mapping[str, Array], shapes: Mapping[str, LinkShape]) -> Array:
@@ -224,12 +241,15 @@ class ReferenceDesign:
         found = np.zeros(many, dtype=bool)
         if not many:
             return found
-        sizes = [np.hypot(point.x, point.y) for at in shapes.values() for point in at.points.values()]
+        points = [point for at in shapes.values() for point in at.points.values()]
         ends = [(shapes[link].points[first], shapes[link].points[second]) for link, first, second in self.arms]
-        arms = [np.hypot(other.x - one.x, other.y - one.y) for one, other in ends]
-        greatest = max((float(np.max(each)) for each in sizes), default=0.0)
-        if all(float(np.min(arm)) >= SHORT_ARM * max(greatest, self.unit) for arm in arms):
+        apart = [(other.x - one.x, other.y - one.y) for one, other in ends]
+        farthest = max((float(np.max(point.x**2 + point.y**2)) for point in points), default=0.0)
+        least = SHORT_ARM**2 * max(farthest, self.unit**2)
+        if farthest < LARGEST_SQUARE and all(float(np.min(x * x + y * y)) > least for x, y in apart):
             return found  # as mostly; a number that is none compares as false
+        sizes = [np.hypot(point.x, point.y) for point in points]
+        arms = [np.hypot(x, y) for x, y in apart]
         size = reduce(np.fmax, sizes, np.full(many, self.unit))
         for arm in arms:
             found |= (arm > 0.0) & (arm < SHORT_ARM * size)

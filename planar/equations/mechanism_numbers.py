@@ -22,13 +22,17 @@ EQUATION_ROOMS = ("equations", "foundation", "model")
 
 def equation_structure(mechanism: Mechanism) -> Mechanism:
     """All of a mechanism that its equations depend on: names of links, pairs, which motions are driven."""
-    return Mechanism(
-        name="",
-        frame=mechanism.frame,
-        links=tuple(Link(link.name) for link in mechanism.links),
-        pairs=mechanism.pairs,
-        inputs=tuple(Input(given.pair, 0.0) for given in mechanism.inputs),
-    )
+    found: Mechanism | None = mechanism.__dict__.get("_equation_structure")  # kept: asked often, and hashed
+    if found is None:
+        found = Mechanism(
+            name="",
+            frame=mechanism.frame,
+            links=tuple(Link(link.name) for link in mechanism.links),
+            pairs=mechanism.pairs,
+            inputs=tuple(Input(given.pair, 0.0) for given in mechanism.inputs),
+        )
+        object.__setattr__(mechanism, "_equation_structure", found)
+    return found
 
 
 def structure_fingerprint(structure: Mechanism) -> str | None:
