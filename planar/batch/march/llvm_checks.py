@@ -27,8 +27,9 @@ def write_keeps_apart(t: IRWriter, earlier: str, before: str, here: str, is_know
     """
     change = t.binary("sub", t.binary("add", here, earlier), t.binary("add", before, before))
     change = t.call_intrinsic("fabs", change)
+    half = t.constant(0.5)
     if is_known is not None:
-        change = t.select_or_zero(is_known, change)
+        half = t.select_or_zero(is_known, half)
     most = t.greater(earlier, t.greater(before, here))  # what is not a number here stays so
-    twice = t.binary("add", t.binary("add", most, most), change)
-    return t.compare("ole", twice, t.constant(2.0 * (1.0 - LEAST_KERNEL_REGULARITY**2)))
+    reached = t.binary("add", most, t.binary("mul", change, half))
+    return t.compare("ole", reached, t.constant(1.0 - LEAST_KERNEL_REGULARITY**2))

@@ -163,7 +163,7 @@ def _run_kernel(
         batch.p,
         batch.q,
         operand_rows(kernel.state, batch.z0) if not kernel.start.has_signs else batch.signs,
-        operand_rows(kernel.inputs, batch.u0),
+        operand_rows(kernel.inputs, batch.u0) if not kernel.start.has_common_inputs else np.zeros((0, many)),
         np.concatenate([batch.u1, batch.u2]) if rates else np.zeros((0, many)),
     )
     given = out
@@ -225,8 +225,16 @@ def operand_rows(operands: Sequence[tuple[str, int]], values: Array) -> Array:
 def step_table(offsets: Array, start: Array | None = None) -> tuple[Array, Array]:
     """What every step needs to know: the weights of the steps before, and how far each input has gone, or where it is
     if all designs `start` (inputs,) at one position."""
-    offsets = offsets if start is None else offsets + start
-    steps, inputs = offsets.shape
+    offsets = np.ascontiguousarray(offsets if start is None else offsets + start)
+    table, counts = _step_table(offsets.tobytes(), offsets.shape)
+    return table, counts.copy()
+
+
+@lru_cache(maxsize=64)
+def _step_table(content: bytes, shape: tuple[int, int]) -> tuple[Array, Array]:
+    """The same of offsets (steps + 1, inputs) as bytes: the blocks of a sweep have them in common."""
+    steps, inputs = shape
+    offsets = np.frombuffer(content).reshape(shape)
     table = np.zeros((steps, PREDICTOR_ORDER + 3 * inputs))
     for step in range(min(steps, PREDICTOR_ORDER)):
         # ahead of the first there is its start
@@ -236,4 +244,5 @@ def step_table(offsets: Array, start: Array | None = None) -> tuple[Array, Array
         table[:, PREDICTOR_ORDER + 3 * k : PREDICTOR_ORDER + 3 * k + 3] = np.stack(
             [offsets[:, k], np.cos(offsets[:, k]), np.sin(offsets[:, k])], axis=1
         )
+    table.flags.writeable = False
     return table, correction_counts(steps, longest_step(offsets))
