@@ -168,7 +168,7 @@ def _run_kernel(
     rows = (
         batch.p,
         batch.q,
-        operand_rows(kernel.state, batch.z0) if not kernel.start.has_signs else batch.signs,
+        batch.signs if kernel.start.has_signs and batch.signs is not None else operand_rows(kernel.state, batch.z0),
         operand_rows(kernel.inputs, batch.u0) if not kernel.start.has_common_inputs else np.zeros((0, many)),
         np.concatenate([batch.u1, batch.u2]) if rates else np.zeros((0, many)),
     )
