@@ -204,6 +204,27 @@ def test_a_list_is_read_as_spreadsheets_of_any_country_save_it(tmp_path, encodin
     assert "lost" in command.run(tmp_path, "mark", "four-bar", path.name, "-o", path.name).refused(2)
 
 
+@pytest.mark.parametrize(
+    ("written", "meant"),
+    [
+        ("0,52", 0.52),
+        ("1.234,5", 1234.5),
+        ("1,234.5", 1234.5),
+        ("1 234,5", 1234.5),
+        ("1,234,567", 1234567.0),
+        ("−5.1", -5.1),
+        ("+.5e1", 5.0),
+        ("12 345 mm/s", 12.345),
+        ("0.5 0.6", None),
+        ("1e999", None),
+        ("nan", None),
+    ],
+)
+def test_a_number_is_read_as_people_write_it(handed_in, written, meant):
+    (marks,) = mark_answers("four-bar", handed_in(f'Ann,1,velocity of C,"{written}",')).students
+    assert marks.values[0].handed_in == (None if meant is None else pytest.approx(meant))
+
+
 @pytest.mark.parametrize("content", [b"", b"\xff\xfe", b"seed 7\n\n", b"seed 7\na,b\n", b"seed 7\n" + b"9" * 200_000])
 def test_a_file_that_is_no_list_is_refused_in_a_sentence(tmp_path, content):
     (tmp_path / "a.csv").write_bytes(content)
