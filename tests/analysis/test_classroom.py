@@ -75,6 +75,11 @@ def test_the_worked_solution_of_a_variant_reads_off_what_is_solved(name, tmp_pat
     assert checked >= 4
 
 
+def test_what_slides_stays_between_the_ends_of_its_slot_as_in_the_mechanism_itself():
+    for each in planar.problem_variants("whitworth", 30, seed=7):
+        assert each.state.pair("slot")["displacement"] <= each.values["slotted link.length"]
+
+
 def test_a_variant_is_the_same_however_many_there_are_and_others_with_another_seed():
     few, many = planar.problem_variants("four-bar", 2, seed=3), planar.problem_variants("four-bar", 5, seed=3)
     assert [each.values for each in few] == [each.values for each in many[:2]]
