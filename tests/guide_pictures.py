@@ -168,7 +168,7 @@ def write_picture(figure: object, path: Path) -> None:
     """Write a figure in few colours."""
     plot.save(figure, path)
     with Image.open(path) as whole:
-        few = whole.convert("RGB").quantize(COLOURS)
+        few = whole.convert("RGB").quantize(COLOURS, Image.Quantize.MAXCOVERAGE)
     few.save(path, optimize=True)
 
 

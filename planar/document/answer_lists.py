@@ -17,6 +17,7 @@ COLUMNS = ("student", "variant", "quantity", "value", "unit")
 SEED_LINE = re.compile(r"#?\s*seed[\s:=,;]*(\d{1,18})", re.IGNORECASE)
 SEPARATOR_LINE = re.compile(r"sep=.\s*$", re.IGNORECASE)
 """What some spreadsheets write in front."""
+THOUSANDS_BLANK = re.compile(r"(?<=\d)[ \u00a0\u202f](?=\d{3}(?!\d))")
 NUMBER = re.compile(r"([+-]?[\d.,]*\d[\d.,]*(?:[eE][+-]?\d+)?)\s*(|[^\d\s.,].*)")
 
 
@@ -131,7 +132,8 @@ def _read_line(cells: dict[str, str], line: int) -> HandedInValue:
 
 def _read_number(written: str) -> tuple[float | None, str]:
     """The number of a cell, with a decimal point or comma, or None; and the unit that stands behind it."""
-    parts = NUMBER.fullmatch(written.replace("−", "-")) if len(written) <= MAX_CELL_LENGTH else None
+    plain = THOUSANDS_BLANK.sub("", written[: MAX_CELL_LENGTH + 1].replace("−", "-"))
+    parts = NUMBER.fullmatch(plain) if len(written) <= MAX_CELL_LENGTH else None
     if parts is None:
         return None, ""
     digits, unit = parts.groups()

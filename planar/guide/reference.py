@@ -25,7 +25,9 @@ OTHER_TITLE = "Pictures, pages and tables"
 
 
 EXAMPLES_FILE = "class_examples.txt"
-ENTRY = re.compile(r"^(?P<name>\w+)\n(?P<body>(?:    .*\n|\n(?=    ))*)", re.MULTILINE)
+ENTRY = re.compile(
+    r"^(?P<name>\w+)\n(?P<attributes>(?:    \w+: .*\n)*)(?P<example>(?:    .*\n|\n(?=    ))*)", re.MULTILINE
+)
 ATTRIBUTE = re.compile(r"^    (?P<name>\w+): (?P<text>.*)$", re.MULTILINE)
 
 
@@ -40,9 +42,8 @@ def class_entries() -> dict[str, ClassEntry]:
     """What is added to each public class, by its name."""
     found = {}
     for entry in ENTRY.finditer(read_packaged_text("guide", EXAMPLES_FILE)):
-        attributes, prompt, example = entry["body"].partition("    >>> ")
-        told = {each["name"]: each["text"] for each in ATTRIBUTE.finditer(attributes)}
-        found[entry["name"]] = ClassEntry(told, prompt + example)
+        told = {each["name"]: each["text"] for each in ATTRIBUTE.finditer(entry["attributes"])}
+        found[entry["name"]] = ClassEntry(told, entry["example"])
     return found
 
 

@@ -75,6 +75,11 @@ def test_the_worked_solution_of_a_variant_reads_off_what_is_solved(name, tmp_pat
     assert checked >= 4
 
 
+def test_what_slides_stays_between_the_ends_of_its_slot_as_in_the_mechanism_itself():
+    for each in planar.problem_variants("whitworth", 30, seed=7):
+        assert each.state.pair("slot")["displacement"] <= each.values["slotted link.length"]
+
+
 def test_a_variant_is_the_same_however_many_there_are_and_others_with_another_seed():
     few, many = planar.problem_variants("four-bar", 2, seed=3), planar.problem_variants("four-bar", 5, seed=3)
     assert [each.values for each in few] == [each.values for each in many[:2]]
@@ -202,6 +207,27 @@ def test_a_list_is_read_as_spreadsheets_of_any_country_save_it(tmp_path, encodin
     command.run(tmp_path, "mark", "four-bar", path.name, "-o", "marks.csv").done()
     assert (tmp_path / "marks.csv").read_text(encoding="utf-8").splitlines()[1].startswith("Jürgen Groß,1,1,")
     assert "lost" in command.run(tmp_path, "mark", "four-bar", path.name, "-o", path.name).refused(2)
+
+
+@pytest.mark.parametrize(
+    ("written", "meant"),
+    [
+        ("0,52", 0.52),
+        ("1.234,5", 1234.5),
+        ("1,234.5", 1234.5),
+        ("1 234,5", 1234.5),
+        ("1,234,567", 1234567.0),
+        ("−5.1", -5.1),
+        ("+.5e1", 5.0),
+        ("12 345 mm/s", 12.345),
+        ("0.5 0.6", None),
+        ("1e999", None),
+        ("nan", None),
+    ],
+)
+def test_a_number_is_read_as_people_write_it(handed_in, written, meant):
+    (marks,) = mark_answers("four-bar", handed_in(f'Ann,1,velocity of C,"{written}",')).students
+    assert marks.values[0].handed_in == (None if meant is None else pytest.approx(meant))
 
 
 @pytest.mark.parametrize("content", [b"", b"\xff\xfe", b"seed 7\n\n", b"seed 7\na,b\n", b"seed 7\n" + b"9" * 200_000])

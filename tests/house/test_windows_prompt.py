@@ -7,6 +7,7 @@ import ast
 import json
 import re
 import shlex
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -92,6 +93,7 @@ def test_the_setup_on_windows_is_that_of_other_systems_spelt_otherwise():
     assert "py -m venv .venv && .venv\\Scripts\\pip install" in TEXTS[0]
 
 
+@cache
 def own_letters() -> set[str]:
     """Letters beyond ASCII in texts of the command line's rooms that are no patterns of what is read."""
     found: set[str] = set()

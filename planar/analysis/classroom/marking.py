@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping
 from difflib import SequenceMatcher
 from itertools import combinations
@@ -122,7 +123,8 @@ def _name_remarks(handed_in: list[tuple[str, int]]) -> Iterator[str]:
     for variant, names in students.items():
         for first, second in combinations(names[:MAX_NAMES_COMPARED], 2):
             alike = SequenceMatcher(None, first.casefold(), second.casefold()).ratio()
-            if alike >= LIKENESS_OF_NAMES:
+            same_digits = re.findall(r"\d", first) == re.findall(r"\d", second)  # else they are two by their numbers
+            if alike >= LIKENESS_OF_NAMES and same_digits:
                 yield f"{first} and {second}, who hand in variant {variant}, may be one student"
 
 

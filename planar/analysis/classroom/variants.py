@@ -15,6 +15,7 @@ from planar.foundation.errors import BadInput, NoAnswer
 from planar.foundation.units import parse_unit
 from planar.model.file_units import FileUnits, unit_of_kind
 from planar.model.mechanism import Mechanism
+from planar.model.pairs.guide_line import LinkLine
 from planar.results.motion import State
 from planar.solving.position import solve
 
@@ -32,6 +33,8 @@ GREATEST_RATE_RATIO = 4.0
 """How many times as fast as in the mechanism itself a link may turn: beyond, it is near a dead point."""
 LEAST_RATE = 0.05
 """Of the greatest rate of its kind: what is slower, and was not in the mechanism itself, is not read off a drawing."""
+ON_LINE = 1e-6
+"""Of its distance by which a point may be off a line that it lies on."""
 GREATEST_SHIFT = 0.6
 """Sizes of the mechanism by which a point may stand elsewhere: beyond, it is another assembly."""
 
@@ -128,11 +131,34 @@ def _is_alike(state: State, base: State) -> bool:
     shifts = (hypot(*(state.point(name).position - each.position)) for name, each in base.points.items())
     if max(shifts, default=0.0) > GREATEST_SHIFT * size:
         return False
+    if _slots_held(base) - _slots_held(state):
+        return False  # what slides is drawn beyond the end of its slot
     turning, before = _turning_rates(state), _turning_rates(base)
     if max(turning, default=0.0) > GREATEST_RATE_RATIO * max(before, default=0.0):
         return False
     kinds = (turning, before), (_point_rates(state), _point_rates(base))
     return all(_is_readable(*each) for each in kinds)
+
+
+def _slots_held(state: State) -> set[str]:
+    """The pairs of which what slides is between the ends of its line, as far as points of the link lie on that."""
+    found = set()
+    for pair in state.mechanism.pairs:
+        line = getattr(pair, "line", None)
+        reach = state.pair(pair.name).get("displacement") if isinstance(line, LinkLine) else None
+        if reach is None or not isinstance(line, LinkLine):
+            continue
+        shape = state.shapes[pair.links[0]]
+        x, y, along_x, along_y = line.measure_line(shape)
+        offsets = [(place.x - x, place.y - y) for place in shape.points.values()]
+        on_line = [
+            dx * along_x + dy * along_y
+            for dx, dy in offsets
+            if abs(dx * along_y - dy * along_x) <= ON_LINE * hypot(dx, dy)
+        ]
+        if len(on_line) > 1 and min(on_line) <= reach <= max(on_line):
+            found.add(pair.name)
+    return found
 
 
 def _is_readable(rates: list[float], before: list[float]) -> bool:
