@@ -29,7 +29,8 @@ NOT_ASSEMBLED, DEAD = (OUTCOMES.index(each) for each in (Outcome.CANNOT_BE_ASSEM
 
 class PreparedRun(NamedTuple):
     """A run: of every point position, velocity and acceleration (m, s), each (steps + 1, 2), the two latter None where
-    no rates were asked for; status (steps + 1,): 0 is solved, any other number k is `Sweep.outcomes[k]`; what is said.
+    no rates were asked for; status (steps + 1,): 0 is solved, any other number k is `Sweep.outcomes[k]`;
+    `remarks` say why.
     """
 
     position: Mapping[str, Array]

@@ -21,6 +21,7 @@ from planar.foundation.errors import BadInput
 from planar.guide.keys_page import key_sections, keys_page, read_example
 from planar.guide.reference import reference_names
 from planar.guide.topics import FIRST_PAGE, find_topic, guide_topics, read_page
+from planar.model.file_units import FileUnits
 from tests import command
 from tests.guide_pictures import PICTURES
 
@@ -112,8 +113,8 @@ def keys_of(value) -> set[str]:
 
 NOT_DRAWN = {"A published value", "Units"}
 """Sections of keys that no drawing has."""
-WORDS = {"ids", "about", "source", "geometry", "notes", "published"}
-"""Keys of the file that are words."""
+WORDS = {"ids", "about", "source", "geometry", "notes", "published", *FileUnits._fields[2:]}
+"""Keys of the file that are words, and those of its units."""
 
 
 DRAWN_SECTIONS = [each for each in key_sections() if each.title not in NOT_DRAWN]
