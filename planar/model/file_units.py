@@ -43,6 +43,10 @@ _SAME_DIMENSION = {"energy": "torque"}
 class FileUnits(NamedTuple):
     """The units that a mechanism's file declares for its bare numbers and its results; empty where it declares none.
 
+    Of every quantity one: `length`, `angle`; `velocity`, `acceleration`, `jerk`; `angular_velocity`,
+    `angular_acceleration`, `angular_jerk`; `force`, `torque`, `power`, `energy`; `mass`, `moment_of_inertia`;
+    `stiffness`, `damping`, `torsional_stiffness`, `torsional_damping`.
+
     >>> FileUnits("in", "deg", force="lbf").force
     'lbf'
     """
