@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property, lru_cache, reduce
 from itertools import combinations
+from math import isfinite
 
 import numpy as np
 
@@ -133,8 +134,8 @@ class ReferenceDesign:
         """What the residual check lets pass for these designs: as `ResidualCheck.tolerance`, of the longest of any."""
         rows = self._length_rows
         least, greatest = (bound[rows] for bound in self._row_bounds(p))
-        reach = float(np.max([greatest, -least], initial=0.0))
-        if not np.isfinite(reach):
+        reach = float(max(greatest.max(initial=0.0), -least.min(initial=0.0)))
+        if not isfinite(reach):
             reach = float(np.nanmax(np.abs(p[rows]), initial=0.0))
         return float(residual_tolerance(len(self.mechanism.links), reach))
 
@@ -192,18 +193,20 @@ class ReferenceDesign:
 
         So all designs of a mechanism share their code, but for those that give such a number a value.
         """
-        shapes = self.solver.shapes
-        base_q = [part for link, point in members for part in place_in_link(shapes[link], point)]
-        of_p = np.flatnonzero(self._base_numbers == 0.0)
-        of_q = [k for k, part in enumerate(base_q) if part == 0.0]
-        if any(np.any(bound[of_p]) for bound in self._row_bounds(p)) or any(np.any(q[k]) for k in of_q):
+        of_p, of_q = self._zero_rows_of_p, [k for k, part in enumerate(self._base_places(members)) if part == 0.0]
+        if any(bound[of_p].any() for bound in self._row_bounds(p)) or any(q[k].any() for k in of_q):
             return frozenset()
         return frozenset([*(("p", k) for k in of_p.tolist()), *(("q", k) for k in of_q)])
 
+    def _base_places(self, members: Sequence[PointMember]) -> Iterator[Scalar]:
+        """q of the base, number by number."""
+        for link, point in members:
+            yield from place_in_link(self.solver.shapes[link], point)
+
     @cached_property
-    def _base_numbers(self) -> Array:
-        """p of the base (numbers,)."""
-        return self.pair_numbers(self.solver.shapes, 1, self.mechanism)[:, 0]
+    def _zero_rows_of_p(self) -> Array:
+        """The rows of p that are nothing in the base."""
+        return np.flatnonzero(self.pair_numbers(self.solver.shapes, 1, self.mechanism)[:, 0] == 0.0)
 
     def is_fit(self, values: Mapping[str, Array], shapes: Mapping[str, LinkShape], p: Array) -> Array:
         """The designs that a backend may run (designs,): see `is_unfit` and `has_short_arm`."""
@@ -219,7 +222,9 @@ class ReferenceDesign:
         found = np.zeros(many, dtype=bool)
         for shape_ in shapes.values():
             for at in shape_.points.values():
-                found |= ~np.isfinite(np.asarray(at.x + at.y))
+                total = at.x + at.y
+                if isinstance(total, np.ndarray) or not isfinite(total):
+                    found |= ~np.isfinite(total)
         choosy = [pair for pair in self.mechanism.pairs if type(pair).find_misfit is not Pair.find_misfit]
         known = design_variables(self.mechanism)
         for name, value in values.items():
@@ -244,9 +249,12 @@ class ReferenceDesign:
         points = [point for at in shapes.values() for point in at.points.values()]
         ends = [(shapes[link].points[first], shapes[link].points[second]) for link, first, second in self.arms]
         apart = [(other.x - one.x, other.y - one.y) for one, other in ends]
-        farthest = max((float(np.max(point.x**2 + point.y**2)) for point in points), default=0.0)
+        squares = [point.x * point.x + point.y * point.y for point in points]
+        farthest = max((each.max() if isinstance(each, np.ndarray) else each for each in squares), default=0.0)
         least = SHORT_ARM**2 * max(farthest, self.unit**2)
-        if farthest < LARGEST_SQUARE and all(float(np.min(x * x + y * y)) > least for x, y in apart):
+        squares = [x * x + y * y for x, y in apart]
+        shortest = (each.min() if isinstance(each, np.ndarray) else each for each in squares)
+        if farthest < LARGEST_SQUARE and all(each > least for each in shortest):
             return found  # as mostly; a number that is none compares as false
         sizes = [np.hypot(point.x, point.y) for point in points]
         arms = [np.hypot(x, y) for x, y in apart]

@@ -123,15 +123,21 @@ def _known_signs(batch: DesignBatch, equations: KernelEquations) -> Array | None
     all blocks are in closed form, or nothing is known of them."""
     if batch.signs is None or equations.has_newton_blocks:
         return None
-    signs = np.where(np.isfinite(batch.u0).all(axis=0), batch.signs, np.nan)
-    unknown = np.flatnonzero((signs == 0.0).any(axis=0))
-    if unknown.size:
-        signs[:, unknown] = equations.assembly_signs(*(rows[:, unknown] for rows in (batch.z0, batch.u0, batch.p)))
+    signs = batch.signs
+    if not np.isfinite(batch.u0.sum()):  # as where a design is not to run
+        signs = np.where(np.isfinite(batch.u0).all(axis=0), signs, np.nan)
+    if signs.all():
+        return signs
+    unknown, signs = np.flatnonzero((signs == 0.0).any(axis=0)), signs.copy()
+    signs[:, unknown] = equations.assembly_signs(*(rows[:, unknown] for rows in (batch.z0, batch.u0, batch.p)))
     return signs
 
 
 def _common_inputs(u0: Array) -> Array | None:
     """The inputs (inputs,) at which all designs start that start anywhere; None where they differ."""
+    first = u0[:, 0]
+    if (u0 == first[:, None]).all():
+        return first
     least, most = (np.array([of(row) for row in u0]) for of in (np.fmin.reduce, np.fmax.reduce))
     return least if np.array_equal(least, most) else None
 
