@@ -173,7 +173,7 @@ def _run_kernel(
     rows = (
         batch.p,
         batch.q,
-        operand_rows(kernel.state, batch.z0) if not kernel.start.has_signs else batch.signs,
+        batch.signs if kernel.start.has_signs and batch.signs is not None else operand_rows(kernel.state, batch.z0),
         operand_rows(kernel.inputs, batch.u0) if not kernel.start.has_common_inputs else np.zeros((0, many)),
         np.concatenate([batch.u1, batch.u2]) if rates else np.zeros((0, many)),
     )
@@ -181,7 +181,7 @@ def _run_kernel(
     dtype = np.dtype(np.float64) if out is None else out.dtype
     if out is None or not is_aligned(out):
         out = allocate_aligned(steps, kernel.output_row_count, many, dtype)
-    counted = np.empty((2, -(-many // lanes) * lanes))
+    counted = np.zeros((2, -(-many // lanes) * lanes))
     whole = many // lanes * lanes
     if whole:
         _call_function(function, kernel, rows, whole, tables, tolerances, out, counted)
