@@ -102,6 +102,28 @@ def test_a_run_of_a_model_is_the_one_that_casadi_gives(stem, runner):
             np.testing.assert_allclose(told, wanted, rtol=0, atol=(1e-12, 1e-9, 2e-7)[order] * scale)
 
 
+@pytest.mark.parametrize("at_two", [False, True])
+@pytest.mark.parametrize("stem", ["four-bar", "offset-slider-crank", "crank-and-slotted-lever"])
+def test_a_run_from_signs_is_that_from_the_unknowns(stem, at_two):
+    """Of designs at one input, or at two; one starts nowhere, and of another the assembly is to be found yet."""
+    motion = planar.cycle(MODELS[stem])
+    given = repeated(arguments(motion, motion.point_names[-1:]), 20)
+    one, other = given.z0[:, 0], motion.course.found.z[PART][1]
+    step = given.input_offsets[1]
+    if at_two:
+        given.u0[:, 7], given.z0[:, 7] = given.u0[:, 7] + step, other
+    given.u0[:, 3] = np.nan
+    equations = kernel.batch_equations(given)
+    assert not equations.has_newton_blocks
+    signs = np.repeat(equations.assembly_signs(one, given.u0[:, 0], given.p[:, 0])[:, None], 20, axis=1)
+    signs[:, 5] = 0.0
+    wanted, found = (run(LLVMRunner(), given._replace(signs=each)) for each in (None, signs))
+    np.testing.assert_array_equal(found[1], wanted[1])
+    assert found[1][3] == 0
+    assert np.delete(found[1], 3).min() == len(given.input_offsets)
+    np.testing.assert_allclose(found[0], wanted[0], rtol=0, atol=1e-9 * np.nanmax(np.abs(wanted[0])))
+
+
 def test_cos_and_sin_of_sums_are_put_together_from_the_angles_own():
     made_of = InstructionList()
     a, b, c = (made_of.add_input(("z", k)) for k in range(3))
