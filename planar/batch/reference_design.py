@@ -142,10 +142,11 @@ class ReferenceDesign:
     def _row_bounds(self, p: Array) -> tuple[Array, Array]:
         """The least and the greatest of each row of p (numbers, designs), not numbers where one is none; kept for the
         last p, which is asked for several times."""
-        if self._last_bounds[0] is not p:
-            ends = (p.min(axis=1), p.max(axis=1)) if p.size else (np.zeros(len(p)), np.zeros(len(p)))
-            self._last_bounds = p, ends
-        return self._last_bounds[1]
+        of, bounds = self._last_bounds
+        if of is not p:
+            bounds = (p.min(axis=1), p.max(axis=1)) if p.size else (np.zeros(len(p)), np.zeros(len(p)))
+            self._last_bounds = p, bounds
+        return bounds
 
     _last_bounds: tuple[Array | None, tuple[Array, Array]] = None, (np.zeros(0), np.zeros(0))
 

@@ -113,7 +113,7 @@ def _solve_two_angles(e: ConstraintEquations, stage: Block, unknowns: list[ca.SX
     one_length, other_length = ca.sqrt(a.squared_length), ca.sqrt(b.squared_length)
     least, greatest = one_length - other_length, one_length + other_length
     area = (d.squared_length - least * least) * (greatest * greatest - d.squared_length)
-    half = 0.5 * sign / d.squared_length
+    half = 0.5 * sign / d.squared_length  # the only division by what varies; the sign's square is one
     along = 0.5 + (a.squared_length - b.squared_length) * sign * half
     reached = d.scale(along) + _ComplexNumber(-d.y, d.x).scale(ca.sqrt(area) * half)
     e1 = reached.multiply(a.conjugate).scale(1.0 / a.squared_length)
