@@ -130,8 +130,9 @@ class _DesignBlockSolver:
         code[failed] = status_code(Outcome.CANNOT_BE_ASSEMBLED)
         if any(self.reference.point_member(name)[0] == self.reference.mechanism.frame for name in block.points):
             erase_from_steps(out, solved)
-        ended_at = solved.astype(np.int32)[:, None]
-        status = (np.arange(block.steps + 1, dtype=np.int32) >= ended_at).view(np.int8)
+        # no wider than steps are counted: of all positions
+        counter = np.min_scalar_type(-block.steps - 2)
+        status = (np.arange(block.steps + 1).astype(counter) >= solved.astype(counter)[:, None]).view(np.int8)
         status *= code[:, None]
         inputs = self._input_positions(same)
         self.endings = {
@@ -288,7 +289,7 @@ class _DesignBlockSolver:
         designs = closed_form_designs(march.select(some), index, own, runner, self.block.backend)
         if designs is not None:
             lengths = self.range_length[some] / self.scale
-            ends = find_ends(designs, lengths, good[some], candidates[some], self.block.steps)
+            ends = find_ends(designs, lengths, good[some], np.maximum(good, candidates)[some], self.block.steps)
             self._settle(some, ends, out)
             some = some[~ends.is_settled]
         if some.size:

@@ -212,7 +212,7 @@ def test_what_a_backend_does_not_let_pass_is_solved_all_the_same_and_counted(mon
     wanted = planar.sweep(mechanism, designs, 30, "E", rates=rates)
 
     class Failing(NumpyRunner):
-        def run(self, batch, out):
+        def run(self, batch, out, candidates=None):
             good = super().run(batch, out)
             out[7:, :, 1] = np.nan
             out[:, :, 2] = np.nan
@@ -232,7 +232,7 @@ def test_what_a_backend_does_not_let_pass_is_solved_all_the_same_and_counted(mon
 
 def test_a_structure_that_a_backend_cannot_do_is_done_by_the_next(monkeypatch):
     class Refusing(NumpyRunner):
-        def run(self, batch, out):
+        def run(self, batch, out, candidates=None):
             raise UnsupportedStructure("not this one")
 
     backend(monkeypatch, "native", Refusing())
@@ -244,7 +244,7 @@ def test_designs_that_one_runner_does_not_begin_are_begun_by_the_next(monkeypatc
     asked = []
 
     class Lame(NumpyRunner):
-        def run(self, batch, out):
+        def run(self, batch, out, candidates=None):
             asked.append(batch.p.shape[1])
             return np.where(np.arange(out.shape[2]) % 2, super().run(batch, out), 0)
 

@@ -40,12 +40,12 @@ def write_designs_kernel(
 ) -> DesignsKernelLayout:
     """The function for points on these links, none of which is the frame. Raises UnsupportedOperation.
 
-    A step gives x and y of every point, then with `rates` all first and second rates: no numbers from the first
-    that does not pass the checks of a position by itself. `good` counts the first steps that pass all checks,
-    `candidates` those that pass these. With `point_blocks`, of the block that places each point, it gives more: x and y
-    of every point in the other assembly of its block (infinite where that is not in closed form), the state, and how
-    regular the least regular of the blocks is that Newton's method solves. What it gives goes past the caches where it
-    `streams`: it is not read again soon; where `is_single`, it is rounded to single precision when it is written.
+    A step gives x and y of every point, then with `rates` all first and second rates: no numbers from the first that
+    does not pass the checks of a position by itself. `good` counts the first steps that pass all, `candidates` those
+    that pass these. With `point_blocks`, of the block that places each point, no candidates are counted, and a step
+    gives more: x and y of every point in the other assembly of its block (infinite where that is not in closed form),
+    the state, and how regular the least regular of the blocks is that Newton's method solves. What it gives goes past
+    the caches where it `streams`: it is not read again soon; where `is_single`, it is rounded when it is written.
     """
     carried: frozenset[Operand] = frozenset()
     while True:
@@ -80,8 +80,7 @@ class _DesignsKernelWriter(KernelWriter):
         super().__init__(equations, links, rates, lanes, frozenset({"p", "q", "u1", "u2", "scale"}), carried)
         self.point_blocks = levels
         self.other_points: dict[int, list[str]] = {}
-        self.apart_here: list[str] = []
-        "flags of blocks in closed form that say where their assemblies are apart at a step"
+        self.apart_here: list[str] = []  # flags of blocks in closed form: their assemblies are apart at a step
         self.start = start
         self.state = tuple(leaf for k in range(len(equations.is_angle)) for leaf in self.unknown_operands(k))
         if start.has_signs:
@@ -132,7 +131,8 @@ class _DesignsKernelWriter(KernelWriter):
         t.close_loop("k", "steps", "step", "blockend")
         t.write_label("blockend")
         t.store(t.load(self.good_count_slot), t.double_pointer("%good", self.lane))
-        t.store(t.load(self.candidate_count_slot), t.double_pointer("%candidates", self.lane))
+        if self.point_blocks is None:
+            t.store(t.load(self.candidate_count_slot), t.double_pointer("%candidates", self.lane))
         t.close_loop("b", "blocks", "block", "done")
         t.write_label("done")
         t.write_line("ret void")
@@ -177,15 +177,13 @@ class _DesignsKernelWriter(KernelWriter):
                 have["sign", k] = t.call_intrinsic("copysign", t.constant(1.0), side)
         for leaf, value in state.items():
             t.store(value, self.state_slots[leaf])
-        for slot in [slot for of in self.bend_slots for slot in of]:
-            t.store("zeroinitializer", slot)
         for leaf, ring in self.history_slots.items():
             for k in range(HISTORY_LENGTH - 1):
                 t.store("zeroinitializer", t.element_pointer(ring, str(k)))
             t.store(state[leaf], t.element_pointer(ring, str(HISTORY_LENGTH - 1)))
         for slot in (self.passed_slot, self.candidate_slot):
             t.store_flags("splat (i1 true)", slot)
-        for slot in (self.good_count_slot, self.candidate_count_slot):
+        for slot in (self.good_count_slot, self.candidate_count_slot, *(slot for of in self.bend_slots for slot in of)):
             t.store("zeroinitializer", slot)
         t.write_line("br label %step")
         return have, at_start
@@ -238,7 +236,8 @@ class _DesignsKernelWriter(KernelWriter):
         for slot, value in zip(slots, (bend, before), strict=True):
             t.store(value, slot)
         apart = write_keeps_apart(t, earlier, before, bend, t.broadcast_counter_test("%k", "sgt", 1))
-        self.apart_here.append(t.or_flags(apart, self.write_apart_here(part, bend, have)))
+        if self.point_blocks is None:
+            self.apart_here.append(t.or_flags(apart, self.write_apart_here(part, bend, have)))
         return [apart]
 
     def _write_other_assembly(self, part: KernelBlock, have: OperandNames) -> None:
@@ -385,9 +384,9 @@ class _DesignsKernelWriter(KernelWriter):
             near = t.compare("ole", t.load(self.correction_slot), t.broadcast("%astray"))
             flags.append(t.or_flags(near, t.broadcast_counter_test("%k", "sle", PREDICTOR_ORDER)))
         self.write_passed(flags, self.passed_slot, self.good_count_slot)
-        here = [*self.apart_here, *flags[len(self.apart_here) :]]
-        candidate = self.write_passed(here, self.candidate_slot, self.candidate_count_slot)
         if self.point_blocks is None:
+            flags[: len(self.apart_here)] = self.apart_here
+            candidate = self.write_passed(flags, self.candidate_slot, self.candidate_count_slot)
             many = [t.select(candidate, each, t.constant(nan)) for each in many]
         for k, each in enumerate(many):
             place = t.add_instruction(

@@ -181,7 +181,7 @@ def _run_kernel(
     dtype = np.dtype(np.float64) if out is None else out.dtype
     if out is None or not is_aligned(out):
         out = allocate_aligned(steps, kernel.output_row_count, many, dtype)
-    counted = np.empty((2, -(-many // lanes) * lanes))
+    counted = np.zeros((2, -(-many // lanes) * lanes))
     whole = many // lanes * lanes
     if whole:
         _call_function(function, kernel, rows, whole, tables, tolerances, out, counted)

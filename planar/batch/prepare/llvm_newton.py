@@ -177,7 +177,7 @@ class _NewtonRunWriter:
         given = ", ".join(f"ptr {each}" for each in arrays)
         t.write_line(
             f"call void {function}(i64 1, i64 {steps}, i64 {LANES}, i64 {LANES}, i64 {row_count * LANES}, "
-            f"{given}, {ends})"
+            f"{given}, {ends}, ptr null)"  # kernels with the blocks of points count no candidates
         )
 
     def _write_correction(self, rows: dict[str, str]) -> tuple[str, str]:
