@@ -3,7 +3,6 @@
 Nothing of it runs on Windows here: how `cmd` and the C library take a line apart is written down in the tests.
 """
 
-import ast
 import json
 import re
 import shlex
@@ -94,15 +93,11 @@ def test_the_setup_on_windows_is_that_of_other_systems_spelt_otherwise():
 
 
 @cache
-def own_letters() -> set[str]:
-    """Letters beyond ASCII in texts of the command line's rooms that are no patterns of what is read."""
-    found: set[str] = set()
-    for room in ("cli", "reports", "analysis"):
-        for path in (ROOT / "planar" / room).rglob("*.py"):
-            for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-                if isinstance(node, ast.Constant) and isinstance(node.value, str):
-                    found |= {letter for letter in node.value if not letter.isascii()}
-    return found
+def own_letters() -> frozenset[str]:
+    """Letters beyond ASCII in the sources of the rooms that make texts for the screen."""
+    rooms = [ROOT / "planar" / room for room in ("cli", "reports", "analysis")]
+    sources = "".join(path.read_text(encoding="utf-8") for room in rooms for path in room.rglob("*.py"))
+    return frozenset(re.findall(r"[^\x00-\x7f]", sources))
 
 
 @pytest.mark.parametrize("encoding", ENCODINGS)
