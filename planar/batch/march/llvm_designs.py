@@ -12,9 +12,9 @@ from math import inf, nan
 import casadi as ca
 
 from planar.batch.march.kernel import BareAngle, KernelBlock, KernelEquations, Operand
-from planar.batch.march.llvm_checks import write_closes, write_keeps_apart
+from planar.batch.march.llvm_checks import write_closes, write_keeps_apart, write_turns_little
 from planar.batch.march.llvm_kernel import STATE_GIVEN, DesignsKernelLayout, KernelStart, KernelWriter, OperandNames
-from planar.batch.march.prediction import MAX_TURN_PER_STEP, PREDICTOR_ORDER
+from planar.batch.march.prediction import PREDICTOR_ORDER
 from planar.batch.march.regularity import LEAST_KERNEL_REGULARITY, LEAST_START_REGULARITY, least_regularity
 from planar.codegen.instructions import UnsupportedOperation
 from planar.codegen.llvm_linear import LinearSystems
@@ -131,22 +131,17 @@ class _DesignsKernelWriter(KernelWriter):
         self._write_step_end(have, flags)
         t.close_loop("k", "steps", "step", "blockend")
         t.write_label("blockend")
-        t.store(t.load(self.good_count_slot), t.double_pointer("%good", self.lane))
+        steps = t.broadcast(t.add_instruction("sitofp i64 %steps to double"))
+        good = t.select(t.load_flags(self.passed_slot), steps, t.load(self.good_count_slot))
+        t.store(good, t.double_pointer("%good", self.lane))
         t.close_loop("b", "blocks", "block", "done")
         t.write_label("done")
         t.write_line("ret void")
         t.write_line("}")
         if self.linear_systems is not None:
             t.write_line(self.linear_systems.function_text)
-        return DesignsKernelLayout(
-            self.state,
-            self.input_operands,
-            rows,
-            PREDICTOR_ORDER + 3 * self.input_count,
-            t.module_text(),
-            t.lanes,
-            self.start,
-        )
+        width = PREDICTOR_ORDER + 3 * self.input_count
+        return DesignsKernelLayout(self.state, self.input_operands, rows, width, t.module_text(), t.lanes, self.start)
 
     def _row_pointer(self, base: str, k: int) -> str:
         """Where the entries of a row that is read stand for this block of designs."""
@@ -191,7 +186,7 @@ class _DesignsKernelWriter(KernelWriter):
         """A step begins: where the inputs are."""
         t = self.ir
         t.write_label("step")
-        t.write_line("%k = phi i64 [0, %block], [%knext, %told]")
+        t.write_line("%k = phi i64 [0, %block], [%knext, %stepend]")
         begin = t.add_instruction(f"mul i64 %k, {PREDICTOR_ORDER + 3 * self.input_count}")
 
         def tabled(k: int) -> str:
@@ -340,19 +335,6 @@ class _DesignsKernelWriter(KernelWriter):
                     for k, value in zip(part.unknowns, found, strict=True)
                 }
 
-    def _write_turn_checks(self, angles: Sequence[str]) -> list[str]:
-        """Flags that say of counted angles that they are not far from where they were a step before."""
-        t, flags = self.ir, []
-        for angle, slot in zip(angles, self.counted_angle_slots, strict=True):
-            far = t.call_intrinsic("fabs", t.binary("sub", angle, t.load(slot)))
-            t.store(angle, slot)
-            flags.append(
-                t.or_flags(
-                    t.compare("ole", far, t.constant(MAX_TURN_PER_STEP)), t.broadcast_counter_test("%k", "sle", 0)
-                )
-            )
-        return flags
-
     def _write_regularity(self, spanned: str, lengths: str, squared_arm: str, count: int) -> str:
         """How regular a Jacobian is, where that is told; else only whether it is enough: not below nothing."""
         t = self.ir
@@ -367,7 +349,7 @@ class _DesignsKernelWriter(KernelWriter):
         t, told = self.ir, [each * self.symbols["scale"] for each in self.output_expressions()]
         self._write_rates(have)
         left, counted, *values = self.write_separately([self.equations.residuals(), self.counted_angles(), *told], have)
-        flags = [*flags, *self._write_turn_checks(counted)]
+        flags = [*flags, *write_turns_little(t, counted, self.counted_angle_slots)]
         many = [each for of in values for each in of]
         if self.point_blocks is not None:
             nowhere = [t.constant(inf)] * 2
@@ -379,18 +361,33 @@ class _DesignsKernelWriter(KernelWriter):
             flags.append(t.compare("oge", t.load(self.regularity_slot), t.constant(least)))
             near = t.compare("ole", t.load(self.correction_slot), t.broadcast("%astray"))
             flags.append(t.or_flags(near, t.broadcast_counter_test("%k", "sle", PREDICTOR_ORDER)))
-        passed = reduce(t.and_flags, flags, t.load_flags(self.passed_slot))
+        before = t.load_flags(self.passed_slot)
+        passed = reduce(t.and_flags, flags, before)
         t.store_flags(passed, self.passed_slot)
+        # mostly all designs pass: then nothing of theirs is erased or counted
+        pointers = self._result_pointers(len(many))
+        t.write_line(f"br i1 {t.all_flags(passed)}, label %whole, label %judged")
+        t.write_label("whole")
+        self._write_results(many, pointers)
+        t.write_line("br label %stepend")
+        t.write_label("judged")
         if self.point_blocks is None:
             many = [t.select(passed, each, t.constant(nan)) for each in many]
-        for k, each in enumerate(many):
-            place = t.add_instruction(
-                f"add i64 {t.add_instruction('mul i64 %k, %time')}, {t.add_instruction(f'mul i64 %row, {k}')}"
-            )
-            place = t.add_instruction(f"add i64 {place}, {self.lane}")
-            if self.is_single:
-                t.store_streaming_rounded(each, t.single_pointer("%out", place))
-            else:
-                (t.store_streaming if self.streams else t.store)(each, t.double_pointer("%out", place))
-        count = t.load(self.good_count_slot)
-        t.store(t.select(passed, t.binary("add", count, t.constant(1.0)), count), self.good_count_slot)
+        self._write_results(many, pointers)
+        step, count = t.broadcast(t.add_instruction("sitofp i64 %k to double")), t.load(self.good_count_slot)
+        t.store(t.select(passed, count, t.select(before, step, count)), self.good_count_slot)
+        t.write_line("br label %stepend")
+        t.write_label("stepend")
+
+    def _result_pointers(self, many: int) -> list[str]:
+        """Where the rows of the results of this step stand."""
+        t = self.ir
+        first = t.add_instruction(f"add i64 {t.add_instruction('mul i64 %k, %time')}, {self.lane}")
+        rows = [t.add_instruction(f"add i64 {first}, {t.add_instruction(f'mul i64 %row, {k}')}") for k in range(many)]
+        return [(t.single_pointer if self.is_single else t.double_pointer)("%out", row) for row in rows]
+
+    def _write_results(self, values: Sequence[str], pointers: Sequence[str]) -> None:
+        t = self.ir
+        store = t.store_streaming_rounded if self.is_single else t.store_streaming if self.streams else t.store
+        for value, pointer in zip(values, pointers, strict=True):
+            store(value, pointer)
