@@ -115,6 +115,11 @@ class IRWriter:
         """One flag or the other."""
         return self.add_instruction(f"or <{self.lanes} x i1> {a}, {b}")
 
+    def all_flags(self, flags: str) -> str:
+        """Whether the flags of all lanes are up."""
+        bits = self.add_instruction(f"bitcast <{self.lanes} x i1> {flags} to i{self.lanes}")
+        return self.add_instruction(f"icmp eq i{self.lanes} {bits}, -1")
+
     def select_or_zero(self, flag: str, value: str) -> str:
         """A value where a flag is up, else nothing."""
         return self.add_instruction(

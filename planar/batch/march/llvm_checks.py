@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from planar.batch.march.prediction import MAX_TURN_PER_STEP
 from planar.batch.march.regularity import LEAST_KERNEL_REGULARITY
 from planar.codegen.llvm_ir import IRWriter
 
@@ -33,3 +34,14 @@ def write_keeps_apart(t: IRWriter, earlier: str, before: str, here: str, is_know
     most = t.greater(earlier, t.greater(before, here))  # what is not a number here stays so
     reached = t.binary("add", most, t.binary("mul", change, half))
     return t.compare("ole", reached, t.constant(1.0 - LEAST_KERNEL_REGULARITY**2))
+
+
+def write_turns_little(t: IRWriter, angles: Sequence[str], slots: Sequence[str]) -> list[str]:
+    """Flags that say of angles that they are not far from where they were a step before, as their slots have it."""
+    flags = []
+    for angle, slot in zip(angles, slots, strict=True):
+        far = t.call_intrinsic("fabs", t.binary("sub", angle, t.load(slot)))
+        t.store(angle, slot)
+        is_near = t.compare("ole", far, t.constant(MAX_TURN_PER_STEP))
+        flags.append(t.or_flags(is_near, t.broadcast_counter_test("%k", "sle", 0)))
+    return flags

@@ -11,9 +11,17 @@ from math import inf, nan
 import casadi as ca
 
 from planar.batch.march.kernel import BareAngle, KernelBlock, KernelEquations, Operand
-from planar.batch.march.llvm_checks import write_closes, write_keeps_apart
-from planar.batch.march.llvm_kernel import STATE_GIVEN, DesignsKernelLayout, KernelStart, KernelWriter, OperandNames
-from planar.batch.march.prediction import MAX_TURN_PER_STEP, PREDICTOR_ORDER
+from planar.batch.march.llvm_checks import write_closes, write_keeps_apart, write_turns_little
+from planar.batch.march.llvm_kernel import (
+    STATE_GIVEN,
+    DesignsKernelLayout,
+    KernelStart,
+    KernelWriter,
+    OperandNames,
+    result_pointers,
+    store_results,
+)
+from planar.batch.march.prediction import PREDICTOR_ORDER
 from planar.batch.march.regularity import LEAST_KERNEL_REGULARITY, LEAST_START_REGULARITY, least_regularity
 from planar.codegen.instructions import UnsupportedOperation
 from planar.codegen.llvm_linear import LinearSystems
@@ -130,24 +138,18 @@ class _DesignsKernelWriter(KernelWriter):
         self._write_step_end(have, flags)
         t.close_loop("k", "steps", "step", "blockend")
         t.write_label("blockend")
-        t.store(t.load(self.good_count_slot), t.double_pointer("%good", self.lane))
-        if self.point_blocks is None:
-            t.store(t.load(self.candidate_count_slot), t.double_pointer("%candidates", self.lane))
+        steps = t.broadcast(t.add_instruction("sitofp i64 %steps to double"))
+        for passed_slot, count_slot, counts in self._counted():
+            count = t.select(t.load_flags(passed_slot), steps, t.load(count_slot))
+            t.store(count, t.double_pointer(counts, self.lane))
         t.close_loop("b", "blocks", "block", "done")
         t.write_label("done")
         t.write_line("ret void")
         t.write_line("}")
         if self.linear_systems is not None:
             t.write_line(self.linear_systems.function_text)
-        return DesignsKernelLayout(
-            self.state,
-            self.input_operands,
-            rows,
-            PREDICTOR_ORDER + 3 * self.input_count,
-            t.module_text(),
-            t.lanes,
-            self.start,
-        )
+        width = PREDICTOR_ORDER + 3 * self.input_count
+        return DesignsKernelLayout(self.state, self.input_operands, rows, width, t.module_text(), t.lanes, self.start)
 
     def _row_pointer(self, base: str, k: int) -> str:
         """Where the entries of a row that is read stand for this block of designs."""
@@ -192,7 +194,7 @@ class _DesignsKernelWriter(KernelWriter):
         """A step begins: where the inputs are."""
         t = self.ir
         t.write_label("step")
-        t.write_line("%k = phi i64 [0, %block], [%knext, %told]")
+        t.write_line("%k = phi i64 [0, %block], [%knext, %stepend]")
         begin = t.add_instruction(f"mul i64 %k, {PREDICTOR_ORDER + 3 * self.input_count}")
 
         def tabled(k: int) -> str:
@@ -344,19 +346,6 @@ class _DesignsKernelWriter(KernelWriter):
                     for k, value in zip(part.unknowns, found, strict=True)
                 }
 
-    def _write_turn_checks(self, angles: Sequence[str]) -> list[str]:
-        """Flags that say of counted angles that they are not far from where they were a step before."""
-        t, flags = self.ir, []
-        for angle, slot in zip(angles, self.counted_angle_slots, strict=True):
-            far = t.call_intrinsic("fabs", t.binary("sub", angle, t.load(slot)))
-            t.store(angle, slot)
-            flags.append(
-                t.or_flags(
-                    t.compare("ole", far, t.constant(MAX_TURN_PER_STEP)), t.broadcast_counter_test("%k", "sle", 0)
-                )
-            )
-        return flags
-
     def _write_regularity(self, spanned: str, lengths: str, squared_arm: str, count: int) -> str:
         """How regular a Jacobian is, where that is told; else only whether it is enough: not below nothing."""
         t = self.ir
@@ -371,7 +360,7 @@ class _DesignsKernelWriter(KernelWriter):
         t, told = self.ir, [each * self.symbols["scale"] for each in self.output_expressions()]
         self._write_rates(have)
         left, counted, *values = self.write_separately([self.equations.residuals(), self.counted_angles(), *told], have)
-        flags = [*flags, *self._write_turn_checks(counted)]
+        flags = [*flags, *write_turns_little(t, counted, self.counted_angle_slots)]
         many = [each for of in values for each in of]
         if self.point_blocks is not None:
             nowhere = [t.constant(inf)] * 2
@@ -383,17 +372,27 @@ class _DesignsKernelWriter(KernelWriter):
             flags.append(t.compare("oge", t.load(self.regularity_slot), t.constant(least)))
             near = t.compare("ole", t.load(self.correction_slot), t.broadcast("%astray"))
             flags.append(t.or_flags(near, t.broadcast_counter_test("%k", "sle", PREDICTOR_ORDER)))
-        self.write_passed(flags, self.passed_slot, self.good_count_slot)
+        passed = [self.write_passed(flags, self.passed_slot)]
+        pointers = result_pointers(t, self.lane, len(many), self.is_single)
+        # mostly all designs pass, and are candidates too: then nothing of theirs is erased or counted
+        t.write_line(f"br i1 {t.all_flags(passed[0][1])}, label %whole, label %judged")
+        t.write_label("whole")
+        store_results(t, many, pointers, self.streams, self.is_single)
+        t.write_line("br label %stepend")
+        t.write_label("judged")
         if self.point_blocks is None:
-            flags[: len(self.apart_here)] = self.apart_here
-            candidate = self.write_passed(flags, self.candidate_slot, self.candidate_count_slot)
-            many = [t.select(candidate, each, t.constant(nan)) for each in many]
-        for k, each in enumerate(many):
-            place = t.add_instruction(
-                f"add i64 {t.add_instruction('mul i64 %k, %time')}, {t.add_instruction(f'mul i64 %row, {k}')}"
-            )
-            place = t.add_instruction(f"add i64 {place}, {self.lane}")
-            if self.is_single:
-                t.store_streaming_rounded(each, t.single_pointer("%out", place))
-            else:
-                (t.store_streaming if self.streams else t.store)(each, t.double_pointer("%out", place))
+            here = [*self.apart_here, *flags[len(self.apart_here) :]]
+            passed.append(self.write_passed(here, self.candidate_slot))
+            many = [t.select(passed[1][1], each, t.constant(nan)) for each in many]
+        store_results(t, many, pointers, self.streams, self.is_single)
+        step = t.broadcast(t.add_instruction("sitofp i64 %k to double"))
+        for (_, slot, _), (before, now) in zip(self._counted(), passed, strict=True):
+            t.store(t.select(now, t.load(slot), t.select(before, step, t.load(slot))), slot)
+        t.write_line("br label %stepend")
+        t.write_label("stepend")
+
+    def _counted(self) -> list[tuple[str, str, str]]:
+        """Of the steps that pass all checks, and of candidates: slots of the flags and of the count, and its array."""
+        good = self.passed_slot, self.good_count_slot, "%good"
+        candidates = self.candidate_slot, self.candidate_count_slot, "%candidates"
+        return [good, candidates] if self.point_blocks is None else [good]

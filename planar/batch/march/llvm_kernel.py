@@ -132,14 +132,12 @@ class KernelWriter(KernelInstructions):
             )
         return t.compare("ole", coalescence, most)
 
-    def write_passed(self, flags: Sequence[str], slot: str, count_slot: str) -> str:
-        """A flag: all steps so far passed, this one by its flags; it is kept, and counted."""
-        t = self.ir
-        passed = reduce(t.and_flags, flags, t.load_flags(slot))
-        t.store_flags(passed, slot)
-        count = t.load(count_slot)
-        t.store(t.select(passed, t.binary("add", count, t.constant(1.0)), count), count_slot)
-        return passed
+    def write_passed(self, flags: Sequence[str], slot: str) -> tuple[str, str]:
+        """Two flags: all steps before passed, and this one by its own flags too, which is kept."""
+        before = self.ir.load_flags(slot)
+        passed = reduce(self.ir.and_flags, flags, before)
+        self.ir.store_flags(passed, slot)
+        return before, passed
 
     def write_circle_residuals(self, have: OperandNames) -> list[str]:
         """How far the square of every unknown angle's cos and sin is from one."""
@@ -159,3 +157,17 @@ def write_angle_sum(t: IRWriter, cos: str, sin: str, c: str, s: str) -> tuple[st
         t.binary("sub", t.binary("mul", cos, c), t.binary("mul", sin, s)),
         t.binary("add", t.binary("mul", sin, c), t.binary("mul", cos, s)),
     )
+
+
+def result_pointers(t: IRWriter, lane: str, many: int, is_single: bool) -> list[str]:
+    """Where the rows of a step's results stand, for the designs from a lane on."""
+    first = t.add_instruction(f"add i64 {t.add_instruction('mul i64 %k, %time')}, {lane}")
+    rows = [t.add_instruction(f"add i64 {first}, {t.add_instruction(f'mul i64 %row, {k}')}") for k in range(many)]
+    return [(t.single_pointer if is_single else t.double_pointer)("%out", row) for row in rows]
+
+
+def store_results(t: IRWriter, values: Sequence[str], pointers: Sequence[str], streams: bool, is_single: bool) -> None:
+    """Write the results of a step: past the caches where it `streams`, rounded where it `is_single`."""
+    store = t.store_streaming_rounded if is_single else t.store_streaming if streams else t.store
+    for value, pointer in zip(values, pointers, strict=True):
+        store(value, pointer)
