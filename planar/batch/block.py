@@ -259,7 +259,8 @@ class _DesignBlockSolver:
         out, candidates = self._own_output(march), np.zeros(self.design_count, dtype=int)
         if fit.mean() > RUN_ALL_RATIO:
             march.u0[:, ~fit] = np.nan
-            return out, runner.run(march, out, candidates), candidates
+            # where all go together, few stop
+            return out, runner.run(march, out, None if fit.all() else candidates), candidates
         out[:] = np.nan
         some, good = np.flatnonzero(fit), np.zeros(self.design_count, dtype=int)
         if some.size:

@@ -29,13 +29,13 @@ from planar.equations.linear import solve_by_determinants
 
 HISTORY_LENGTH = 8
 """Steps before for which there is room: a power of two, more than `PREDICTOR_ORDER`."""
-FUNCTION_NAME = "march"
+FUNCTION_NAME, _READ_ARRAYS = "march", ("p", "q", "state", "drive", "rate", "table", "counts")
 ARGUMENT_TYPES = (*("int",) * 5, *("array",) * 7, *("float",) * 3, *("array",) * 3)
 """Of the function's arguments: blocks, steps, width of the arrays that are read, how far a row and a step of `out` are
 from the next; p, q, state, drives, rates, table, counts; tolerance, astray, scale; out, good, candidates."""
 
 
-def write_designs_kernel(
+def write_designs_kernel(  # many: what a text is written for
     equations: KernelEquations,
     links: Sequence[str],
     rates: bool,
@@ -44,24 +44,24 @@ def write_designs_kernel(
     *,
     streams: bool = True,
     is_single: bool = False,
+    counts_candidates: bool = False,
     start: KernelStart = STATE_GIVEN,
 ) -> DesignsKernelLayout:
     """The function for points on these links, none of which is the frame. Raises UnsupportedOperation.
 
     A step gives x and y of every point, then with `rates` all first and second rates: no numbers from the first that
-    does not pass the checks of a position by itself. `good` counts the first steps that pass all, `candidates` those
-    that pass these. With `point_blocks`, of the block that places each point, no candidates are counted, and a step
-    gives more: x and y of every point in the other assembly of its block (infinite where that is not in closed form),
-    the state, and how regular the least regular of the blocks is that Newton's method solves. What it gives goes past
-    the caches where it `streams`: it is not read again soon; where `is_single`, it is rounded when it is written.
+    does not pass the checks; `good` counts the steps that do. With `counts_candidates`, of blocks in closed form alone,
+    numbers up to the first that does not pass the checks of a position by itself, which `candidates` counts. With
+    `point_blocks`, of the block that places each point, it gives more: x and y of every point in the other assembly of
+    its block (infinite where that is not known), the state, and how regular the least regular of the blocks is that
+    Newton's method solves. What it gives goes past the caches where it `streams`; where `is_single`, it is rounded.
     """
     carried: frozenset[Operand] = frozenset()
     while True:
         try:
             own = start if not carried else STATE_GIVEN
             writer = _DesignsKernelWriter(equations, tuple(links), rates, lanes, point_blocks, carried, own)
-            writer.streams = streams
-            writer.is_single = is_single
+            writer.streams, writer.is_single, writer.counts_candidates = streams, is_single, counts_candidates
             return writer.write()
         except BareAngle as angle:
             if angle.operand in carried:  # its value is wanted before its own block is solved
@@ -70,10 +70,9 @@ def write_designs_kernel(
 
 
 class _DesignsKernelWriter(KernelWriter):
-    streams = True
-    "whether results are written past the caches"
-    is_single = False
-    "whether what a step gives is written in single precision"
+    streams = True  # whether results are written past the caches
+    is_single = False  # whether what a step gives is written in single precision
+    counts_candidates = False  # whether what passes the checks of a position by itself is written too
 
     def __init__(
         self,
@@ -101,8 +100,7 @@ class _DesignsKernelWriter(KernelWriter):
         t = self.ir
         rows = 2 * len(self.links) * (3 if self.rates else 1)
         rows += 0 if self.point_blocks is None else 2 * len(self.links) + len(self.state) + 1
-        read = ("p", "q", "state", "drive", "rate", "table", "counts")
-        arrays = ", ".join(f"ptr noalias readonly %{name}" for name in read)
+        arrays = ", ".join(f"ptr noalias readonly %{name}" for name in _READ_ARRAYS)
         numbers = ", ".join(f"double %{name}" for name in ("tolerance", "astray", "scale"))
         written = ", ".join(f"ptr noalias %{name}" for name in ("out", "good", "candidates"))
         sizes = ", ".join(f"i64 %{name}" for name in ("blocks", "steps", "width", "row", "time"))
@@ -183,10 +181,10 @@ class _DesignsKernelWriter(KernelWriter):
             for k in range(HISTORY_LENGTH - 1):
                 t.store("zeroinitializer", t.element_pointer(ring, str(k)))
             t.store(state[leaf], t.element_pointer(ring, str(HISTORY_LENGTH - 1)))
-        for slot in (self.passed_slot, self.candidate_slot):
-            t.store_flags("splat (i1 true)", slot)
-        for slot in (self.good_count_slot, self.candidate_count_slot, *(slot for of in self.bend_slots for slot in of)):
-            t.store("zeroinitializer", slot)
+        t.store_flags("splat (i1 true)", self.passed_slot)
+        t.store_flags("splat (i1 true)", self.candidate_slot)
+        for each in (self.good_count_slot, self.candidate_count_slot, *(slot for of in self.bend_slots for slot in of)):
+            t.store("zeroinitializer", each)
         t.write_line("br label %step")
         return have, at_start
 
@@ -238,8 +236,8 @@ class _DesignsKernelWriter(KernelWriter):
         for slot, value in zip(slots, (bend, before), strict=True):
             t.store(value, slot)
         apart = write_keeps_apart(t, earlier, before, bend, t.broadcast_counter_test("%k", "sgt", 1))
-        if self.point_blocks is None:
-            self.apart_here.append(t.or_flags(apart, self.write_apart_here(part, bend, have)))
+        if self.counts_candidates:
+            self.apart_here.append(self.write_apart_here(part, bend, have))
         return [apart]
 
     def _write_other_assembly(self, part: KernelBlock, have: OperandNames) -> None:
@@ -380,10 +378,11 @@ class _DesignsKernelWriter(KernelWriter):
         store_results(t, many, pointers, self.streams, self.is_single)
         t.write_line("br label %stepend")
         t.write_label("judged")
-        if self.point_blocks is None:
+        if self.counts_candidates:
             here = [*self.apart_here, *flags[len(self.apart_here) :]]
             passed.append(self.write_passed(here, self.candidate_slot))
-            many = [t.select(passed[1][1], each, t.constant(nan)) for each in many]
+        if self.point_blocks is None:
+            many = [t.select(passed[-1][1], each, t.constant(nan)) for each in many]
         store_results(t, many, pointers, self.streams, self.is_single)
         step = t.broadcast(t.add_instruction("sitofp i64 %k to double"))
         for (_, slot, _), (before, now) in zip(self._counted(), passed, strict=True):
@@ -395,4 +394,4 @@ class _DesignsKernelWriter(KernelWriter):
         """Of the steps that pass all checks, and of candidates: slots of the flags and of the count, and its array."""
         good = self.passed_slot, self.good_count_slot, "%good"
         candidates = self.candidate_slot, self.candidate_count_slot, "%candidates"
-        return [good, candidates] if self.point_blocks is None else [good]
+        return [good, candidates] if self.counts_candidates else [good]

@@ -120,16 +120,17 @@ class KernelWriter(KernelInstructions):
     def write_apart_here(self, part: KernelBlock, coalescence: str, names: OperandNames) -> str:
         """A flag: the two assemblies of a block are apart enough for a position, whatever lies before it.
 
-        Where no arm changes by what of its digits is lost, else as far as everywhere.
+        Where no arm changes by what of its digits is lost, else as far as everywhere, less by more than rounding: where
+        assemblies keep apart between steps too, this flag is up.
         """
         t, form = self.ir, part.closed_form
         assert form is not None
-        most = t.constant(1.0 - LEAST_KERNEL_REGULARITY**2)
+        greatest = 0.99 * LEAST_KERNEL_REGULARITY**2
+        most = t.constant(1.0 - greatest)
         if form.squared_arm is None:
             arm = ca.sqrt(ca.mmin(form.squared_lengths))
-            (most,) = self.write_values(
-                [1.0 - ca.fmax(LEAST_CANDIDATE_REGULARITY**2, EPS / NEGLIGIBLE_ERROR / arm)], names
-            )
+            least = ca.fmax(LEAST_CANDIDATE_REGULARITY**2, EPS / NEGLIGIBLE_ERROR / arm)
+            (most,) = self.write_values([1.0 - ca.fmin(greatest, least)], names)
         return t.compare("ole", coalescence, most)
 
     def write_passed(self, flags: Sequence[str], slot: str) -> tuple[str, str]:

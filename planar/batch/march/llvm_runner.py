@@ -44,9 +44,10 @@ def designs_kernel(
     point_blocks: tuple[int, ...] | None = None,
     is_single: bool = False,
     start: KernelStart = STATE_GIVEN,
+    counts_candidates: bool = False,
 ) -> DesignsKernelLayout:
     """The function for points on links of a structure, see `march`. Raises UnsupportedOperation."""
-    found = _designs_kernel_or_reason(equations, links, rates, point_blocks, is_single, start)
+    found = _designs_kernel_or_reason(equations, links, rates, point_blocks, is_single, start, counts_candidates)
     if isinstance(found, str):
         raise UnsupportedOperation(found)
     return found
@@ -60,10 +61,12 @@ def _designs_kernel_or_reason(
     point_blocks: tuple[int, ...] | None,
     is_single: bool,
     start: KernelStart,
+    counts_candidates: bool,
 ) -> DesignsKernelLayout | str:
     """The same, or why there is none: every block of a sweep would find that out again."""
     try:
-        return write_designs_kernel(equations, links, rates, LANES, point_blocks, is_single=is_single, start=start)
+        more = {"is_single": is_single, "counts_candidates": counts_candidates}
+        return write_designs_kernel(equations, links, rates, LANES, point_blocks, start=start, **more)
     except UnsupportedOperation as why:
         return str(why)
 
@@ -82,18 +85,20 @@ def run_designs_kernel(
     equations = batch_equations(batch)
     signs, common = _known_signs(batch, equations), _common_inputs(batch.u0)
     start = KernelStart(signs is not None, signs is not None and common is not None)
-    kernel = designs_kernel(equations, tuple(batch.links), batch.rates, None, is_single, start)
-    table, counts = step_table(batch.input_offsets, common if kernel.start.has_common_inputs else None)
+    counts = candidates is not None and not equations.has_newton_blocks
+    kernel = designs_kernel(equations, tuple(batch.links), batch.rates, None, is_single, start, counts)
+    table, corrections = step_table(batch.input_offsets, common if kernel.start.has_common_inputs else None)
     tolerances = batch.tolerance, correction_limit(longest), batch.unit
     out, good, found = _run_kernel(
-        kernel, batch._replace(signs=signs), batch.rates, (table, counts + extra_corrections), tolerances, out
+        kernel, batch._replace(signs=signs), batch.rates, (table, corrections + extra_corrections), tolerances, out
     )
+    written = found if counts else good.copy()
     # what is told of a step only at the next one condemns the step too
     good -= (good > 1) & (good < len(table))
     if candidates is None:
-        erase_between(out, good, found)
+        erase_between(out, good, written)
     else:
-        candidates[:] = found
+        candidates[:] = written
     return out, good
 
 
