@@ -70,6 +70,7 @@ if TYPE_CHECKING:
     from planar.model.pairs.turning import TurningPair
     from planar.model.pin_linkage import pinned
     from planar.model.pin_linkages import PinnedLinkages, pinned_linkages
+    from planar.model.stops import Stops
     from planar.pages.view import view
     from planar.reports.files.xarray_dataset import dataset
     from planar.results.motion import Motion, State
@@ -151,6 +152,7 @@ _ROOMS = {
     "SlotPair": "model.pairs.slot",
     "Spring": "model.mechanism",
     "State": "results.motion",
+    "Stops": "model.stops",
     "Stroke": "analysis.motion.extremes",
     "Sweep": "batch.results",
     "Swept": "batch.mechanisms.results",
@@ -281,6 +283,7 @@ __all__ = [
     "SlotPair",
     "Spring",
     "State",
+    "Stops",
     "Stroke",
     "Sweep",
     "Swept",

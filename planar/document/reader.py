@@ -20,8 +20,10 @@ from planar.document.schema import (
     LINK_SCHEMA,
     PUBLISHED_SCHEMA,
     SENSE_WORDS,
+    STOP_SCHEMA,
     UNITS_SCHEMA,
 )
+from planar.document.stops import read_stops, without_stops
 from planar.foundation.units import UnitError, parse_unit
 from planar.model.link_shapes import Along, At, Distances, Link, Point, PointDefinition, PointPlacementError, link_shape
 from planar.model.mechanism import (
@@ -31,6 +33,7 @@ from planar.model.mechanism import (
     Input,
     Mechanism,
     PublishedValue,
+    pair_entries,
     pair_misfits,
     relative_motions,
 )
@@ -69,7 +72,8 @@ def read_mechanism(value: Any) -> Mechanism:
         remarks=_unpinned_link_remarks(full, pairs),
     )
     inputs = _read_inputs(full, relative_motions(bare))
-    driven = replace(bare, inputs=inputs)
+    entries = zip(full["pairs"].items(), pair_entries(bare), strict=True)
+    driven = replace(bare, inputs=inputs, stops=tuple(each for entry in entries for each in read_stops(*entry)))
     if any(given.law is not None for given in inputs):
         from planar.document.input_laws import speed_jump_remarks
 
@@ -108,7 +112,8 @@ def _expand_short_forms(top: Cursor) -> Cursor:
     entries = [dict(item.fields()) for item in top["pairs"].items()]
     for index, entry in enumerate(entries):
         cursor = Cursor(entry, f"$.pairs[{index}]", top.context)
-        whole = _pair_type(cursor).expand_short_form(cursor)
+        bare = without_stops(cursor)
+        whole = _pair_type(bare).expand_short_form(bare)
         if whole is None:
             continue
         for name, link in whole.links.items():
@@ -117,7 +122,7 @@ def _expand_short_forms(top: Cursor) -> Cursor:
                 told += "a link of its own, with 'links' and 'point'"
                 raise cursor.error_at(None, told)
             links[name] = _read_link(name, Cursor(link, cursor.path, top.context))
-        entries[index] = whole.entry
+        entries[index] = whole.entry | {key: entry[key] for key in STOP_SCHEMA if key in entry}
         _add_links_to_entry(whole.joining_entry, tuple(whole.links), entries)
     context = replace(top.context, links=links)
     return replace(top, value=dict(top.fields()) | {"pairs": entries}, context=context)
@@ -228,7 +233,8 @@ def _read_pairs(top: Cursor) -> tuple[Pair, ...]:
     named: dict[str, str] = {}
     placed: dict[tuple[str, str], str] = {}
     for entry in top["pairs"].items():
-        group = _pair_type(entry).read(entry)
+        bare = without_stops(entry)
+        group = _pair_type(bare).read(bare)
         name = group[0].entry_name()
         pinned = {member for pair in group for member in pair.coincident_points()}
         shared = [member for member in pinned if member in placed]

@@ -107,6 +107,25 @@ INPUT_SCHEMA: Schema = {
         "its motion in time: one piece, or a list of pieces, one after the other",
     ),
 }
+_STOP_LIMITS: Schema = {
+    "type": "array",
+    "items": {"anyOf": [{"type": "null"}, schema_reference("quantity")]},
+    "minItems": 2,
+    "maxItems": 2,
+}
+STOP_SCHEMA: Schema = {
+    "stops": described(
+        {"anyOf": [_STOP_LIMITS, {"type": "object", "additionalProperties": _STOP_LIMITS, "minProperties": 1}]},
+        "between which positions its motion can go, as [10, 95], measured as an input there; null where it is open "
+        "(an angle: to the other stop's back, a turn on); "
+        'at a pin of several links by their names, as {"B:a,b": [10, 95]}',
+    ),
+    "restitution": described(
+        {"type": "number", "minimum": 0, "maximum": 1},
+        "the speed after an impact on a stop beside that before it; left out: 0",
+    ),
+}
+"""Keys that the entry of any pair may have."""
 DRIVE_SCHEMA: Schema = {key: INPUT_SCHEMA[key] for key in ("position", "velocity", "acceleration")}
 VARIATION_SCHEMA: Schema = {
     "with": described(_TEXT, "the input's pair whose position it varies with; left out: time"),
@@ -291,8 +310,9 @@ def schema() -> dict[str, Any]:
 
 
 def _pair_schema(kind: type[Pair]) -> Schema:
-    properties = {kind.keyword: described(schema_reference("name"), kind.entry_description), **kind.entry_schemas}
-    return _object_schema(properties, kind.keyword, *kind.required_keys) | dict(kind.entry_rule)
+    own = {kind.keyword: described(schema_reference("name"), kind.entry_description), **kind.entry_schemas}
+    dependent = {"dependentRequired": {"restitution": ["stops"]}}
+    return _object_schema({**own, **STOP_SCHEMA}, kind.keyword, *kind.required_keys) | dict(kind.entry_rule) | dependent
 
 
 def _segment_schema(kind: type[LawSegment]) -> Schema:

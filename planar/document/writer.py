@@ -8,6 +8,7 @@ from typing import Any
 from planar.document.input_laws import write_law
 from planar.document.loads import write_loads
 from planar.document.schema import DRIVE_SCHEMA, FORMAT_VERSION
+from planar.document.stops import write_stops
 from planar.foundation.units import SI_UNITS, Unit, parse_unit, shortest_number
 from planar.model.link_shapes import Along, At, Link, PointDefinition
 from planar.model.mechanism import (
@@ -36,7 +37,10 @@ def write_mechanism(mechanism: Mechanism) -> dict[str, Any]:
     value["units"] = {"length": mechanism.units.length, "angle": mechanism.units.angle}
     value["frame"] = mechanism.frame
     value["links"] = {link.name: write_link(link, quantity) for link in mechanism.links}
-    value["pairs"] = [type(group[0]).write(group, quantity) for group in pair_entries(mechanism)]
+    value["pairs"] = [
+        write_stops(type(group[0]).write(group, quantity), mechanism.stops, group, quantity)
+        for group in pair_entries(mechanism)
+    ]
     value |= _nonempty_fields(
         inputs=[write_input(given, motions, quantity) for given in mechanism.inputs],
         **write_loads(mechanism, quantity),

@@ -16,6 +16,7 @@ from planar.foundation.units import parse_unit
 from planar.model.link_shapes import Along, At, Distances, Link, LinkShape, Point, PointDefinition
 from planar.model.loads import Course, Load, Mass, Spring
 from planar.model.pairs.base import Pair
+from planar.model.stops import Stops
 
 if TYPE_CHECKING:
     from planar.model.input_laws import InputLaw
@@ -38,6 +39,7 @@ __all__ = [
     "PointDefinition",
     "PublishedValue",
     "Spring",
+    "Stops",
     "check_mechanism",
     "find_law_problem",
     "links_counting_turns",
@@ -150,6 +152,7 @@ class Mechanism(Displayable, Revisable):
     springs: tuple[Spring, ...] = ()
     masses: tuple[Mass, ...] = ()
     gravity: tuple[float, float] = (0.0, 0.0)
+    stops: tuple[Stops, ...] = ()
     sketch: tuple[tuple[str, float, float], ...] = ()
     units: FileUnits = field(default_factory=FileUnits)
     ids: tuple[str, ...] = ()
@@ -253,9 +256,19 @@ def check_mechanism(mechanism: Mechanism) -> None:
     for given in mechanism.inputs:
         if given.pair not in named:
             raise BadInput(given.pair, f"there is no pair {given.pair!r} to be driven; pairs are {join_names(named)}")
+    _check_stops(mechanism, named)
     wrong = find_law_problem(mechanism)
     if wrong:
         raise BadInput(*wrong)
+
+
+def _check_stops(mechanism: Mechanism, named: Mapping[str, Pair]) -> None:
+    for each in mechanism.stops:
+        if each.pair not in named:
+            raise BadInput(each.pair, f"there is no pair {each.pair!r} to have stops; pairs are {join_names(named)}")
+        unfit = each.find_problem()
+        if unfit:
+            raise BadInput(f"{each.pair}.{unfit[0]}", unfit[1])
 
 
 def find_law_problem(mechanism: Mechanism) -> tuple[str, str] | None:

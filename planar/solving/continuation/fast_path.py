@@ -14,6 +14,7 @@ from planar.solving.checks.branch_check import is_move_allowed
 from planar.solving.checks.residual_check import CONTACT_TOLERANCE, EPS, NEGLIGIBLE_ERROR
 from planar.solving.checks.singular_values import SINGULAR_DISTANCE_RATIO
 from planar.solving.prepared_mechanism import PositionInputs, PreparedMechanism
+from planar.solving.stops import PairStops
 
 MIN_FAST_REGULARITY = 1e-3
 """Strength of a block from which on its rates are taken as they come; what is weaker is looked at in doubles' whole
@@ -105,6 +106,10 @@ class FastSolver(Protocol):
         """What judges positions in compiled functions."""
 
     @property
+    def stops(self) -> PairStops | None:
+        """The stops of its pairs, if it has any."""
+
+    @property
     def tolerance(self) -> float:
         """What the residual check lets pass."""
 
@@ -130,7 +135,7 @@ def fast_run(setup: FastSolver, z: Array, u: Array, u1: Array, u2: Array) -> Fas
     """A run along a straight way of inputs (rows, inputs) with rates u1, u2 from the unknowns of its first row, as far
     as it is surely sound: both checks, rates, contacts. None for what is no such run."""
     judged, p = setup.acceptance, setup.inputs.p
-    if judged is None or not u.size:
+    if judged is None or not u.size or setup.stops is not None:
         return None
     steps = u[1:] - u[:-1]
     sizes = np.abs(steps).max(axis=1, initial=0.0)
@@ -199,7 +204,7 @@ class StraightPathCache:
 
     def unknowns_at(self, stop: Array) -> Array | None:
         """The unknowns to which the straight way to other inputs leads; None where not all of it is surely sound."""
-        if self.setup.acceptance is None:
+        if self.setup.acceptance is None or self.setup.stops is not None:
             return None
         way = stop - self.start
         reach = max(map(abs, way.tolist()), default=0.0)
