@@ -11,7 +11,7 @@ import numpy as np
 from planar.equations.coordinates import frames_from_coordinates
 from planar.foundation.arrays import Array
 from planar.foundation.errors import TrackingEnd
-from planar.foundation.root_finding import find_root
+from planar.foundation.root_finding import find_root, lowest_on_cubic
 from planar.model.pairs import MeasureKind, Pair
 from planar.results.records import Limit
 from planar.solving.continuation.change_point_remarks import change_point_remark
@@ -26,7 +26,7 @@ from planar.solving.continuation.path_pieces import (
 from planar.solving.continuation.period import PeriodSearch
 from planar.solving.continuation.predictor_corrector import CurveTracker
 from planar.solving.continuation.solution_curve import Arc, CurvePoint, SolutionCurve
-from planar.solving.continuation.turning_points import is_dead_point, lowest_on_cubic
+from planar.solving.continuation.turning_points import is_dead_point
 from planar.solving.prepared_mechanism import PreparedMechanism
 
 STANDING_RATE = 1e-9

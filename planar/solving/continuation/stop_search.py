@@ -2,21 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 
 from planar.foundation.arrays import Array
-from planar.foundation.root_finding import find_root
+from planar.foundation.root_finding import find_first_passage
 from planar.solving.continuation.pair_motions import pair_motions_at
 from planar.solving.continuation.solution_curve import Arc, CurvePoint, SolutionCurve
-from planar.solving.continuation.turning_points import lowest_on_cubic
 from planar.solving.prepared_mechanism import PreparedMechanism
 from planar.solving.stops import STOP_TOLERANCE
-
-TOUCH_TOLERANCE = 1e-12
-"""rad or sizes: a stop that would be passed by no more is touched, and the motion goes on."""
 
 
 class StopOnArc(NamedTuple):
@@ -74,29 +69,10 @@ class StopSearch:
         def rate(x: float) -> float:
             return float(self.rooms_at(self._point_at(arc, x))[*which, 1])
 
-        gone = abs(last - first)
-        if g0 <= STOP_TOLERANCE:
-            # it stands at the stop, and what rounding leaves has no sign
-            if g0 < -STOP_TOLERANCE or s0 < 0.0 or (s0 == 0.0 and g1 < g0):
-                return first
-            g0 = max(g0, TOUCH_TOLERANCE)
-        lowest, part = lowest_on_cubic((g0, s0 * gone), (g1, s1 * gone))
-        if g1 < -TOUCH_TOLERANCE and not (lowest < 0.0 and s1 > 0.0):
-            return self._first_zero(room, g0, first, last)
-        if s0 < 0.0 < s1:
-            middle = find_root(rate, first, last)
-        elif lowest < min(g0, g1):
-            middle = first + part * (last - first)
-        else:
-            return None if g1 >= -TOUCH_TOLERANCE else self._first_zero(room, g0, first, last)
-        if room(middle) < -TOUCH_TOLERANCE:
-            return self._first_zero(room, g0, first, middle)
-        return None if g1 >= -TOUCH_TOLERANCE else self._first_zero(room, g0, middle, last)
-
-    @staticmethod
-    def _first_zero(room: Callable[[float], float], g0: float, first: float, last: float) -> float:
-        """The zero of a room between where it is positive and where it is not."""
-        return find_root(lambda x: max(room(x), g0) if x == first else room(x), first, last)
+        sense = 1.0 if last >= first else -1.0
+        if g0 <= STOP_TOLERANCE and (g0 < -STOP_TOLERANCE or s0 < 0.0 or (s0 == 0.0 and g1 < g0)):
+            return first  # it stands at the stop, and goes on beyond
+        return find_first_passage(room, lambda x: sense * rate(x), (first, last), ((g0, s0), (g1, s1)))
 
 
 def stop_search(curve: SolutionCurve, start: CurvePoint) -> StopSearch | None:
