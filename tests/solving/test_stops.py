@@ -77,7 +77,12 @@ def test_positions_outside_are_refused_by_pair_position_and_remedy():
         assert "pair 'D' is at 100.35 deg, outside of its stops at 30 deg and 60 deg; move" in problem.value.reason
     with pytest.raises(planar.NoAnswer, match=r"beyond A = 72\.5043 deg"):
         planar.solve(mechanism, {"A": 80 * DEG})
-    assert planar.solve(mechanism, {"A": 72 * DEG}).mobility == 1
+    at_stop = planar.solve(mechanism, {"A": crank_angle(110 * DEG)})
+    assert at_stop.pairs["D"]["relative_angle"] == pytest.approx(110 * DEG, abs=1e-12)
+    tipper = planar.load("tipper")
+    assert planar.solve(tipper, {"stroke": 1.2}).inputs["stroke"].position == 1.2
+    whole = planar.cycle(tipper, 5, 0.7, 1.2)
+    assert (whole.outcome, len(whole)) == (planar.Outcome.SOLVED, 6)
 
 
 def test_circuits_are_cut_at_stops_and_the_list_stays_complete():
@@ -146,3 +151,22 @@ def test_sweeps_have_the_statuses_of_the_general_path():
     (each,) = planar.sweep_each([mechanism], 72)
     assert stop in each.status
     assert stop in planar.prepared(mechanism, 72, "C")({}).status
+
+
+def test_the_tippers_cylinder_holds_its_body_between_its_stops():
+    """By the law of cosines in the triangle OAB, and by virtual work: the stop carries what the weight asks for."""
+    mechanism = planar.load("tipper")
+    motion = planar.cycle(mechanism, 10)
+    eye, arm = np.hypot(0.8, 0.45), np.hypot(1.0, 0.21)
+    stroke = motion.inputs["stroke"].position
+    inner = np.arccos((eye**2 + arm**2 - stroke**2) / (2.0 * eye * arm))
+    expected = inner + np.arctan2(-0.45, 0.8) - np.arctan2(0.21, 1.0)
+    np.testing.assert_allclose(motion.link("body").angle, expected, atol=1e-13)
+    state = planar.solve(mechanism, {"stroke": 0.7})
+    forces = planar.forces(state, inertia=False)
+    assert forces.stops["stroke"] == pytest.approx(forces.inputs["stroke"])
+    rate = (
+        planar.solve(mechanism, {"stroke": 0.7 + 1e-6}).point("G").position[1] - state.point("G").position[1]
+    ) / 1e-6
+    assert forces.stops["stroke"] == pytest.approx(2000 * 9.81 * rate, rel=1e-5)
+    assert planar.forces(planar.solve(mechanism, {"stroke": 1.2})).stops == {"stroke": 0.0}

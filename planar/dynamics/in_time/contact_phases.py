@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -13,7 +13,7 @@ from planar.dynamics.lagrangian import LagrangianFunctions
 from planar.foundation.arrays import Array
 from planar.foundation.errors import NoAnswer, Outcome
 from planar.foundation.root_finding import find_first_passage, find_root
-from planar.solving.stops import PairStops
+from planar.solving.stops import MetStop, PairStops
 
 MAX_IMPACTS = 20_000
 """Impacts that are followed."""
@@ -76,19 +76,24 @@ class ContactPhases:
         for k, side in enumerate(contacts.sides):
             if side in self.resting:
                 continue
-            at = find_first_passage(
-                lambda time, k=k: float(contacts.rooms(*state(time))[k, 0]),
-                lambda time, k=k: float(contacts.rooms(*state(time))[k, 1]),
-                (first, last),
-                (tuple(rooms0[k]), tuple(rooms1[k])),
-            )
+
+            def room(time: float, k: int = k) -> float:
+                return float(contacts.rooms(*state(time))[k, 0])
+
+            def rate(time: float, k: int = k) -> float:
+                return float(contacts.rooms(*state(time))[k, 1])
+
+            known = (float(rooms0[k, 0]), float(rooms0[k, 1])), (float(rooms1[k, 0]), float(rooms1[k, 1]))
+            at = find_first_passage(room, rate, (first, last), known)
             if at is not None:
                 found.append(ContactEvent(at, side, False))
-        if self.resting:
-            forces = self.contact_forces(last, *self.split(y1))
-            for k in np.flatnonzero(forces < 0.0):
-                at = find_root(lambda time, k=k: float(self.contact_forces(time, *state(time))[k]), first, last)
-                found.append(ContactEvent(at, self.resting[k], True))
+        pulled = np.flatnonzero(self.contact_forces(last, *self.split(y1)) < 0.0) if self.resting else ()
+        for number in pulled:
+
+            def force(time: float, number: int = int(number)) -> float:
+                return float(self.contact_forces(time, *state(time))[number])
+
+            found.append(ContactEvent(find_root(force, first, last), self.resting[number], True))
         return min(found, key=lambda each: each.time, default=None)
 
     def contact_forces(self, time: float, q: Array, q1: Array) -> Array:
@@ -142,7 +147,7 @@ def make_phases(
 ) -> ContactPhases:
     """The phases of a motion from coordinates q, before which nothing rests."""
 
-    def make(resting: tuple = ()) -> EquationsOfMotion:  # type: ignore[type-arg]
+    def make(resting: Sequence[MetStop] = ()) -> EquationsOfMotion:
         return EquationsOfMotion(work, driven, unit, wound, resting)
 
     stops = PairStops(work.mechanism, unit) if work.mechanism.stops else None

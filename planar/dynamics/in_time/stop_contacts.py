@@ -66,7 +66,7 @@ class StopContacts:
         self.turns = stops.turns(self._evaluate(q, np.zeros(len(q)))[0])
         numbers = enumerate(zip(stops.low, stops.high, strict=True))
         self.sides: tuple[StopSide, ...] = tuple(
-            (upper, k) for k, both in numbers for upper, at in enumerate(both) if np.isfinite(at)
+            (bool(upper), k) for k, both in numbers for upper, at in enumerate(both) if np.isfinite(at)
         )
 
     def rooms(self, q: Array, q1: Array) -> Array:
@@ -117,11 +117,13 @@ class StopContacts:
         compliance = equations.impulse_response(time, q, q1)
         matrix, before = normal @ compliance @ normal.T, normal @ q1
         own = np.array([self.stops.side(*side).restitution for side in at])
+        hits: Array = np.zeros(len(at))
+        after, lost = before, hits
         for restitution in (own, np.full(len(at), own.min(initial=1.0)), np.zeros(len(at))):
-            hits = solve_complementarity(matrix, np.where(before < 0.0, (1.0 + restitution) * before, before))
-            if hits is None:
+            found = solve_complementarity(matrix, np.where(before < 0.0, (1.0 + restitution) * before, before))
+            if found is None:
                 return None
-            after = before + matrix @ hits
+            hits, after = found, before + matrix @ found
             lost = -0.5 * hits * (before + after)
             if lost.sum() >= 0.0:
                 break

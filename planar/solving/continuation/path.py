@@ -32,6 +32,10 @@ MAX_SAMPLES_AHEAD = 1000
 """Samples that one trip is to come to at most."""
 
 
+STOP_ROUNDING = 1e-11
+"""rad or sizes: a place that is no farther beyond a stop is at it."""
+
+
 class PathSolver(CurveSolver, FastSolver, Protocol):
     """What following needs of a solver beyond that."""
 
@@ -120,9 +124,13 @@ class PathFollower:
         while self._piece is None or not self.has_position(position):
             if self.dead_point is not None:
                 return None
-            self._piece = next(self._pieces, None)
+            before, self._piece = self._piece, next(self._pieces, None)
             if self._piece is None:
-                return None
+                at_stop = before is not None and self.tracker.ending is TrackingEnd.STOP
+                if not at_stop or before is None or position > before.stop + STOP_ROUNDING:
+                    return None
+                self._piece = before
+                break
             self.dead_point = self._piece.dead_point
             self.point = self.dead_point or self._piece.arc.after
             self._period = self._period_search.period_after(self._piece)

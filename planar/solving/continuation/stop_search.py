@@ -11,7 +11,7 @@ from planar.foundation.root_finding import find_first_passage
 from planar.solving.continuation.pair_motions import pair_motions_at
 from planar.solving.continuation.solution_curve import Arc, CurvePoint, SolutionCurve
 from planar.solving.prepared_mechanism import PreparedMechanism
-from planar.solving.stops import STOP_TOLERANCE
+from planar.solving.stops import STOP_TOLERANCE, PairStops
 
 
 class StopOnArc(NamedTuple):
@@ -24,10 +24,8 @@ class StopOnArc(NamedTuple):
 class StopSearch:
     """Looks for stops along one curve from its start; `rooms` are how far the pairs are from them."""
 
-    def __init__(self, setup: PreparedMechanism, curve: SolutionCurve, start: CurvePoint):
-        self.setup, self.curve = setup, curve
-        self.stops = setup.stops
-        assert self.stops is not None
+    def __init__(self, setup: PreparedMechanism, stops: PairStops, curve: SolutionCurve, start: CurvePoint):
+        self.setup, self.stops, self.curve = setup, stops, curve
         self.turns = self.stops.turns(pair_motions_at(setup, self.stops.pairs, curve, start)[:, 0])
 
     def rooms_at(self, point: CurvePoint) -> Array:
@@ -80,4 +78,4 @@ def stop_search(curve: SolutionCurve, start: CurvePoint) -> StopSearch | None:
     setup = curve.solver
     if not isinstance(setup, PreparedMechanism) or setup.stops is None:
         return None
-    return StopSearch(setup, curve, start)
+    return StopSearch(setup, setup.stops, curve, start)

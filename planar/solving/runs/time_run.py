@@ -59,7 +59,7 @@ class TimeRun:
             told = told._replace(
                 z=np.vstack([told.z, found.last_position[0]]),
                 inputs=whole,
-                dead_points=(len(told.z),) if found.stopped.outcome is Outcome.DEAD_POINT else (),
+                dead_points=(len(told.z),) if told.outcome is Outcome.DEAD_POINT else (),
                 fast_samples=sure,
             )
             time = np.append(time, last)

@@ -18,9 +18,10 @@ from planar.foundation.errors import Outcome
 from planar.foundation.units import display_unit
 from planar.model.link_graph import link_label, link_numbers
 from planar.model.mechanism import relative_motions
+from planar.model.pairs import MeasureKind
 from planar.model.wording import amount, join_all_names
 from planar.reports.fitted_table import FittedTable, plain_table
-from planar.reports.number_format import ROUNDING_RATIO, format_or_zero, paragraphs, precision_text
+from planar.reports.number_format import ROUNDING_RATIO, format_number, format_or_zero, paragraphs, precision_text
 from planar.reports.tables.forces import loads
 from planar.reports.tables.forces import mechanical_advantage as ratios
 from planar.reports.tables.position import published_table
@@ -56,7 +57,7 @@ def tables(forces: Forces, advantages: ratios.Advantages, comparisons: Sequence[
         *_time_remarks(forces),
         *dict.fromkeys(each.why for each in told if each.why),
     )
-    notes += (*attachment_remarks(forces.mechanism), *state.remarks)
+    notes += (*stop_remarks(forces), *attachment_remarks(forces.mechanism), *state.remarks)
     if notes:
         parts += [Text(), paragraphs(("-", sentence) for sentence in notes)]
     return Group(*head, *parts)
@@ -186,6 +187,15 @@ def _balanced_links_text(forces: Forces) -> str:
     return f"as free bodies {told} of {moving} links balance, the others feel what is not determined"
 
 
+def stop_remarks(forces: Forces) -> Iterator[str]:
+    """What stops carry in place of the input."""
+    motions = relative_motions(forces.mechanism)
+    for name, force in forces.stops.items():
+        unit = "N" if motions[name].input_kind is MeasureKind.LENGTH else "N·m"
+        carried = f"let go, the input is held by it with {format_number(force)} {unit}"
+        yield f"pair {name!r} stands at its stop: {carried if force else 'let go, the mechanism leaves it'}"
+
+
 def undetermined_sentences(forces: Forces) -> tuple[str, ...]:
     """What equilibrium does not tell, with why; what has the same reason together."""
     by: dict[str, list[str]] = {}
@@ -216,6 +226,7 @@ def record(forces: Forces, advantages: ratios.Advantages, comparisons: Sequence[
         "loads": loads.record(loads.actions_with_motion(forces, inertia=False)),
         "inertia": loads.record(loads.actions_with_motion(forces, inertia=True)),
         "reactions": {name: _reaction_record(each) for name, each in forces.reactions.items()},
+        **({"stops": dict(forces.stops)} if forces.stops else {}),
         **({"shaking": {"force": force.tolist(), "moment": float(moment)}} if has_inertia(forces) else {}),
         "power": {"in": _finite_or_none(float(forces.power_in)), "out": forces.power_out},
         "advantage": ratios.record(advantages),
