@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from planar.analysis.motion.harmonics import Harmonics, harmonics
     from planar.analysis.motion.mechanical_advantage import Advantage, advantage
     from planar.analysis.motion.mechanical_advantage_over_motion import AdvantageOver, advantage_over
+    from planar.analysis.motion.motor_duty import MotorDuty, motor_duty
     from planar.analysis.motion.output import Extreme
     from planar.analysis.motion.time_ratio import TimeRatio, time_ratio
     from planar.analysis.motion.transmission_angle import Transmission, transmission
@@ -43,6 +44,7 @@ if TYPE_CHECKING:
     from planar.document.schema import schema
     from planar.dynamics.flywheel import Flywheel, flywheel
     from planar.dynamics.forces import Forces, forces
+    from planar.dynamics.in_time.stop_contacts import Impact
     from planar.dynamics.reactions import Reaction
     from planar.dynamics.simulation import Simulation, simulate
     from planar.foundation.errors import BadInput, NoAnswer, Outcome, PlanarError, Unknown
@@ -60,6 +62,7 @@ if TYPE_CHECKING:
     from planar.model.link_shapes import Along, At, Distances, Link, Point
     from planar.model.loads import Course, Load, Mass, Spring
     from planar.model.mechanism import Drive, FileUnits, Input, Mechanism
+    from planar.model.motors import Motor
     from planar.model.pairs.base import Pair
     from planar.model.pairs.belt import BeltPair, ChainPair
     from planar.model.pairs.gear import GearPair
@@ -115,6 +118,7 @@ _ROOMS = {
     "GearPair": "model.pairs.gear",
     "HarmonicRise": "model.input_laws.cam_rises",
     "Harmonics": "analysis.motion.harmonics",
+    "Impact": "dynamics.in_time.stop_contacts",
     "Input": "model.mechanism",
     "InputLaw": "model.input_laws.input_law",
     "Inspection": "analysis.identity.inspection",
@@ -131,6 +135,8 @@ _ROOMS = {
     "Modes": "assemblies.modes",
     "ModifiedTrapezoidalRise": "model.input_laws.cam_rises",
     "Motion": "results.motion",
+    "Motor": "model.motors",
+    "MotorDuty": "analysis.motion.motor_duty",
     "NoAnswer": "foundation.errors",
     "Outcome": "foundation.errors",
     "Pair": "model.pairs.base",
@@ -191,6 +197,7 @@ _ROOMS = {
     "mobility": "analysis.identity.mobility",
     "mark_answers": "analysis.classroom.marking",
     "modes": "assemblies.modes",
+    "motor_duty": "analysis.motion.motor_duty",
     "problem_variants": "analysis.classroom.variants",
     "pinned": "model.pin_linkage",
     "pinned_linkages": "model.pin_linkages",
@@ -246,6 +253,7 @@ __all__ = [
     "GearPair",
     "HarmonicRise",
     "Harmonics",
+    "Impact",
     "Input",
     "InputLaw",
     "Inspection",
@@ -262,6 +270,8 @@ __all__ = [
     "Modes",
     "ModifiedTrapezoidalRise",
     "Motion",
+    "Motor",
+    "MotorDuty",
     "NoAnswer",
     "Outcome",
     "Pair",
@@ -322,6 +332,7 @@ __all__ = [
     "mark_answers",
     "mobility",
     "modes",
+    "motor_duty",
     "pinned",
     "pinned_linkages",
     "plot",

@@ -43,17 +43,28 @@ ONE_DESTINATION = "results go to a file or are printed with --json; give one of 
 @mode_option
 @click.option("--static", is_flag=True, help="Leave the links' inertia out: at rest, or in slow motion.")
 @click.option("--cycle", "whole", is_flag=True, help="Over the whole motion, as `planar cycle` has it.")
+@click.option(
+    "--fluctuation",
+    type=float,
+    metavar="NUMBER",
+    help="With --cycle: the flywheel for this coefficient of fluctuation of speed, as 0.02.",
+)
+@click.option(
+    "--rim-radius", metavar="LENGTH", help="With --fluctuation: the mass of its rim at this radius, as 400mm."
+)
 @motion_options
 @output_option(
     "Write the tables to a .txt, .svg or .html file; with --cycle every position to .csv, .json, .npz or .parquet."
 )
-def forces(
+def forces(  # many: options of the command
     model: str,
     as_json: bool,
     at: tuple[str, ...],
     mode: int | None,
     static: bool,
     whole: bool,
+    fluctuation: float | None,
+    rim_radius: str | None,
     output: Path | None,
     **course: Any,
 ) -> None:
@@ -63,14 +74,16 @@ def forces(
     if whole and at:
         raise BadInput("--at", "the forces of a whole motion have no one position; say where it starts with --from")
     if not whole:
-        _refuse_motion_options(course)
+        _refuse_motion_options((*course, "fluctuation", "rim_radius"))
+    if rim_radius is not None and fluctuation is None:
+        raise BadInput("--rim-radius", "this is the radius of a flywheel; say for which --fluctuation")
     from planar.dynamics.load_validation import require_loads
 
     mechanism = load_model(model, mode)
     refuse_overwriting(model, output)
     require_loads(mechanism)
     if whole:
-        _forces_over_motion(mechanism, not static, as_json, output, course)
+        _forces_over_motion(mechanism, not static, as_json, output, (fluctuation, rim_radius), course)
     else:
         _forces_at_position(mechanism, at, not static, as_json, output)
 
@@ -107,11 +120,18 @@ def _forces_at_position(
 
 
 def _forces_over_motion(
-    mechanism: Mechanism, inertia: bool, as_json: bool, output: Path | None, course: dict[str, Any]
+    mechanism: Mechanism,
+    inertia: bool,
+    as_json: bool,
+    output: Path | None,
+    wheel: tuple[float | None, str | None],
+    course: dict[str, Any],
 ) -> None:
     """The forces over a whole motion."""
+    from planar.document import read_length
     from planar.dynamics.forces import forces as over_motion
     from planar.reports.files.run_formats import check_writable
+    from planar.reports.tables.forces.flywheels import wanted_flywheel
     from planar.reports.tables.forces.forces_over_motion import force_series, run_facts, tables
 
     if output is not None:
@@ -119,7 +139,11 @@ def _forces_over_motion(
     with show_status(f"{mechanism.name}: {course['steps']} steps"):
         motion = run_motion(mechanism, **course)
         found = over_motion(motion, inertia)
-    report_motion(motion, as_json, output, lambda: [tables(found)], force_series(found), run_facts(found))
+        wanted = wanted_flywheel(
+            found, wheel[0], None if wheel[1] is None else read_length(mechanism, wheel[1], "--rim-radius")
+        )
+    facts = run_facts(found, wanted)
+    report_motion(motion, as_json, output, lambda: [tables(found, wanted)], force_series(found), facts)
 
 
 @main.command()
@@ -133,7 +157,7 @@ def _forces_over_motion(
     "driven",
     multiple=True,
     metavar="PAIR",
-    help="An input that keeps to the file's velocity and acceleration; one with a law keeps to it anyway.",
+    help="An input that keeps to its law, or the file's velocity and acceleration, though it has a motor or no law.",
 )
 @click.option("--moving", is_flag=True, help="Start with the file's velocities, not from rest.")
 @output_option("Write positions, velocities, accelerations and energies to a .csv, .json, .npz or .parquet file.")

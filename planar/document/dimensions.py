@@ -50,6 +50,7 @@ SPELLINGS: dict[tuple[str | int, int, str], str] = {
 }
 """Keys that a name spells otherwise than the file, by their list and depth there."""
 LAW_LISTS = frozenset(name for kind in SEGMENT_TYPES.values() for name, key in kind.keys.items() if key.is_list)
+MOTOR_LISTS = frozenset({"speeds", "torques", "forces"})
 VARIATION_LISTS = frozenset({"at", "factors"})
 """Keys whose numbers are counted; of other keys two numbers are x and y."""
 
@@ -238,7 +239,7 @@ def _input_dimensions(mechanism: Mechanism) -> Iterator[Dimension]:
     motions = relative_motions(mechanism)
     for index, given in enumerate(mechanism.inputs):
         written = write_input(_tagged(given, ("inputs", index)), motions, _mark)
-        yield from _written_numbers(["inputs", index], written, given.pair, lists=LAW_LISTS)
+        yield from _written_numbers(["inputs", index], written, given.pair, lists=LAW_LISTS | MOTOR_LISTS)
 
 
 def _load_dimensions(mechanism: Mechanism) -> Iterator[Dimension]:

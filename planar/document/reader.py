@@ -8,6 +8,7 @@ from typing import Any
 
 from planar.document.cursor import Cursor, FileContext, describe_value, suggest_name, suggest_spelling
 from planar.document.loads import read_loads
+from planar.document.motors import read_motor
 from planar.document.names import find_motion, find_point, point_aliases
 from planar.document.schema import (
     ALONG_SCHEMA,
@@ -291,6 +292,8 @@ def _read_inputs(top: Cursor, known: Mapping[str, Pair]) -> tuple[Input, ...]:
             from planar.document.input_laws import read_law  # few mechanisms run by laws
 
             given = given._replace(law=read_law(cursor["law"], given, pair.input_quantity_kinds()))
+        if cursor.has("motor"):
+            given = given._replace(motor=read_motor(cursor["motor"], pair))
         found[pair.name] = given
     return tuple(found.values())
 

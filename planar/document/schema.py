@@ -93,6 +93,15 @@ LINK_SCHEMA: Schema = {
         "two points whose direction is the link's angle, where coordinates were read off a drawing",
     ),
 }
+MOTOR_SCHEMA: Schema = {
+    "stall": described(schema_reference("quantity"), "what it supplies at rest: a torque, at a slide a force"),
+    "no_load": described(schema_reference("quantity"), "the speed at which it supplies nothing, as 3000 rpm"),
+    "speeds": described(
+        list_schema("quantity", 2, MAX_LAW_ITEMS), "in place of both: rising speeds, between which it is straight"
+    ),
+    "torques": described(list_schema("quantity", 2, MAX_LAW_ITEMS), "what it supplies at these speeds"),
+    "forces": described(list_schema("quantity", 2, MAX_LAW_ITEMS), "what it supplies at these speeds, at a slide"),
+}
 INPUT_SCHEMA: Schema = {
     "pair": described(_TEXT, "the pair that is driven; at a pin of several links as B:a,b, link b against a"),
     "position": described(
@@ -105,6 +114,16 @@ INPUT_SCHEMA: Schema = {
     "law": described(
         {"anyOf": [schema_reference("piece"), list_schema("piece", 1, MAX_LAW_ITEMS)]},
         "its motion in time: one piece, or a list of pieces, one after the other",
+    ),
+    "motor": described(
+        _object_schema(
+            MOTOR_SCHEMA,
+            oneOf=[
+                {"required": ["stall", "no_load"]},
+                {"required": ["speeds"], "oneOf": [{"required": ["torques"]}, {"required": ["forces"]}]},
+            ],
+        ),
+        "the motor that drives it: a simulation runs by it, and forces tell whether it is strong enough",
     ),
 }
 _STOP_LIMITS: Schema = {

@@ -7,6 +7,7 @@ from typing import Any
 
 from planar.document.input_laws import write_law
 from planar.document.loads import write_loads
+from planar.document.motors import write_motor
 from planar.document.schema import DRIVE_SCHEMA, FORMAT_VERSION
 from planar.document.stops import write_stops
 from planar.foundation.units import SI_UNITS, Unit, parse_unit, shortest_number
@@ -110,7 +111,8 @@ def _write_point_definition(place: PointDefinition, quantity: QuantityWriter) ->
 def write_input(drive: Input, motions: Mapping[str, Pair], quantity: QuantityWriter) -> dict[str, Any]:
     """An input as a file has it."""
     law = None if drive.law is None else write_law(drive.law, motions[drive.pair].input_quantity_kinds(), quantity)
-    return {"pair": drive.pair} | _write_drive(drive, motions, quantity) | _nonempty_fields(law=law)
+    motor = None if drive.motor is None else write_motor(drive.motor, motions[drive.pair], quantity)
+    return {"pair": drive.pair} | _write_drive(drive, motions, quantity) | _nonempty_fields(law=law, motor=motor)
 
 
 def _write_drive(drive: Any, motions: Mapping[str, Pair], quantity: QuantityWriter) -> dict[str, Any]:

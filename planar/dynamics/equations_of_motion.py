@@ -35,6 +35,8 @@ CLOSED_TOLERANCE, MAX_NEWTON_STEPS = 1e-14, 8
 
 
 NO_EFFORTS = np.zeros(0)
+FORCE_OUTPUT = 4
+"""Of what is evaluated: the number of the forces on the coordinates."""
 
 
 class AccelerationResult(NamedTuple):
@@ -59,6 +61,11 @@ class HeldMotions:
         self.index = [names.index(pair) for pair in pairs]
         self.inputs = [work.mechanism.inputs[k] for k in self.index]
         self.let_go = tuple(name for name in names if name not in pairs)
+        self.motors = [
+            (k, given.motor)
+            for k, given in enumerate(work.mechanism.inputs)
+            if given.motor is not None and given.pair not in pairs
+        ]
         self.count = len(self.index) + len(self.resting)
         self._stops = [(each.position, 0.0, 0.0) for each in self.resting]
 
@@ -100,6 +107,9 @@ class EquationsOfMotion:
             work.input_positions,
             ca.vertcat(*work.energies[:2]),
         ]
+        outputs.append(
+            ca.jacobian(ca.vertcat(ca.SX(0, 1), *(work.input_positions[k] for k, _ in self.driven.motors)), q)
+        )
         given = [q, q1, work.factors, work.spring_turns]
         self._called = BufferedFunction(ca.Function("accelerations", given, [ca.densify(each) for each in outputs]))
         self._closing = BufferedFunction(ca.Function("closing", [q], [ca.densify(rows), ca.densify(slope)]))
@@ -238,7 +248,13 @@ class EquationsOfMotion:
                 if k is not None
             }
             by = load_factors(self.work.mechanism, inputs, np.array([time]), 1)[0]
-        return self._called(q, q1, by, self.spring_turns)
+        *found, slopes = self._called(q, q1, by, self.spring_turns)
+        if self.driven.motors:
+            efforts = [
+                float(motor.effort_at(rate)) for (_, motor), rate in zip(self.driven.motors, q1 @ slopes, strict=True)
+            ]
+            found[FORCE_OUTPUT] = found[FORCE_OUTPUT] + slopes @ np.array(efforts)
+        return found
 
     def _constraint_rank(self, values: Array) -> int:
         """How many constraints hold: at the start they are counted, and near a change point they stay as many."""

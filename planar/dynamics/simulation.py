@@ -90,8 +90,9 @@ def simulate(
 ) -> Simulation:
     """The motion of a mechanism that is let go at the file's position, for a duration (s), in so many steps.
 
-    Inputs that have a law keep to it, the others only say where the motion starts; `driven` names others that are to
-    keep to their laws, or to the file's velocity and acceleration. From rest, or `moving` with the file's velocities.
+    An input that has a motor runs by it: by what that supplies at the input's speed. Of the others those that have a
+    law keep to it, and the rest only say where the motion starts; `driven` names inputs that are to keep to their laws,
+    or to the file's velocity and acceleration. From rest, or `moving` with the file's velocities.
     Accelerations come from masses, loads, weights, springs and dampers; they are integrated by the method of order 8 of
     Dormand and Prince (E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, 1993, II.5), and
     after every step the position is brought back onto the constraints. A pair that meets its stop strikes it, with the
@@ -114,7 +115,11 @@ def simulate(
             raise BadInput(
                 "driven", f"there is no input at {pair!r} to be driven; the inputs are at {', '.join(names)}"
             )
-    kept = [given.pair for given in mechanism.inputs if given.law is not None or given.pair in driven]
+    kept = [
+        given.pair
+        for given in mechanism.inputs
+        if (given.law is not None and given.motor is None) or given.pair in driven
+    ]
     check_loads(mechanism)
     started = (
         mechanism

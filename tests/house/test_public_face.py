@@ -75,6 +75,8 @@ def results():
         planar.sweep(bars, {"BC.length": [0.066]}, steps=6),
         planar.sweep(bars, {"BC.length": [0.066]}, steps=6, reduce={"path": "C.path_length"}),
     )
+    yield planar.simulate("tipper", 0.3, steps=4).impacts[0]
+    yield planar.motor_duty(planar.forces(planar.solve("motor-press")))
     yield from (swept, swept[0], prepared, prepared())
     yield from (planar.BadInput("here", "wrong"), planar.Unknown("no such point"), planar.Outcome.SOLVED)
     yield planar.NoAnswer(planar.Outcome.DEAD_POINT, "it stops", links=["a"])

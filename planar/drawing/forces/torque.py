@@ -53,6 +53,9 @@ def torque_picture(
     mean = even.mean if even is not None else None
     seen = axes.without_outliers(effort)
     parts = {label: np.where(np.isfinite(seen), part, np.nan) for label, part in _effort_parts(drawn, name).items()}
+    motor = next(given.motor for given in found.mechanism.inputs if given.pair == name)
+    if motor is not None:
+        parts["motor"] = drawn.in_order(motor.effort_at(drawn.motion.inputs[name].velocity))
     across = axes.fit_axis(
         drawn.abscissa, DIAGRAM_WIDTH, drawn.axis_name, end_at_ticks=False, degrees=drawn.unit == "deg"
     )

@@ -63,6 +63,7 @@ def _impacts_table(simulation: Simulation) -> FittedTable:
 def _inputs_table(simulation: Simulation) -> FittedTable:
     motion = simulation.motion
     units = motion.mechanism.units
+    motors = {given.pair for given in motion.mechanism.inputs if given.motor is not None}
     headings = ("input", "", ("unit", "start", "end", "least", "greatest"), ("greatest speed", "unit"))
     table = plain_table("Inputs, among these positions", *headings, left=(0, 1, 2, 8), keys=2)
     for name, each in motion.inputs.items():
@@ -72,7 +73,7 @@ def _inputs_table(simulation: Simulation) -> FittedTable:
         places = (each.position[0], each.position[-1], each.position.min(), each.position.max())
         table.add_row(
             name,
-            "driven" if name in simulation.driven else "let go",
+            "driven" if name in simulation.driven else "by its motor" if name in motors else "let go",
             own,
             *(format_number(of(float(place))) for place in places),
             format_number(rate.from_si(float(np.abs(each.velocity).max()))),

@@ -22,7 +22,7 @@ from planar.model.pairs import MeasureKind
 from planar.model.wording import amount, join_all_names
 from planar.reports.fitted_table import FittedTable, plain_table
 from planar.reports.number_format import ROUNDING_RATIO, format_number, format_or_zero, paragraphs, precision_text
-from planar.reports.tables.forces import loads
+from planar.reports.tables.forces import loads, motors
 from planar.reports.tables.forces import mechanical_advantage as ratios
 from planar.reports.tables.position import published_table
 
@@ -36,6 +36,9 @@ def tables(forces: Forces, advantages: ratios.Advantages, comparisons: Sequence[
     parts: list[RenderableType] = [Text(equilibrium_text(forces)), Text()]
     if forces.inputs:
         parts.append(_inputs_table(forces))
+    duties = motors.motor_duties(forces)
+    if duties:
+        parts.append(motors.motors_table(forces, duties))
     acting, inertia = loads.actions_with_motion(forces, inertia=False), loads.actions_with_motion(forces, inertia=True)
     if acting:
         parts.append(loads.actions_table("Loads", acting, units, greatest_moment_and_force(forces)[0]))
@@ -57,7 +60,12 @@ def tables(forces: Forces, advantages: ratios.Advantages, comparisons: Sequence[
         *_time_remarks(forces),
         *dict.fromkeys(each.why for each in told if each.why),
     )
-    notes += (*stop_remarks(forces), *attachment_remarks(forces.mechanism), *state.remarks)
+    notes += (
+        *motors.motor_sentences(forces, duties),
+        *stop_remarks(forces),
+        *attachment_remarks(forces.mechanism),
+        *state.remarks,
+    )
     if notes:
         parts += [Text(), paragraphs(("-", sentence) for sentence in notes)]
     return Group(*head, *parts)
@@ -226,6 +234,7 @@ def record(forces: Forces, advantages: ratios.Advantages, comparisons: Sequence[
         "loads": loads.record(loads.actions_with_motion(forces, inertia=False)),
         "inertia": loads.record(loads.actions_with_motion(forces, inertia=True)),
         "reactions": {name: _reaction_record(each) for name, each in forces.reactions.items()},
+        **({"motors": motors.record(duties)} if (duties := motors.motor_duties(forces)) else {}),
         **({"stops": dict(forces.stops)} if forces.stops else {}),
         **({"shaking": {"force": force.tolist(), "moment": float(moment)}} if has_inertia(forces) else {}),
         "power": {"in": _finite_or_none(float(forces.power_in)), "out": forces.power_out},
