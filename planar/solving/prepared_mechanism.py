@@ -98,11 +98,11 @@ class PreparedMechanism:
         return PairStops(self.mechanism, self.unit) if self.mechanism.stops else None
 
     def stop_positions(self, z: Array, u: Array) -> Array:
-        """The positions of the pairs that have stops (stops,), rad or m."""
+        """The positions of the pairs that have stops (stops,), rad or m; of rows of unknowns (stops, rows)."""
         if self.stops is None:
             return np.zeros(0)
         w = self.functions.coordinates(z, u, self.inputs.p) * self.scale
-        frames, own = frames_from_coordinates(w.tolist(), self.column, self.shapes, self.pairs)
+        frames, own = frames_from_coordinates(list(w.T), self.column, self.shapes, self.pairs)
         return self.stops.positions(self.shapes, frames, own)
 
     def stops_at(self, z: Array, u: Array) -> tuple[MetStop, ...]:

@@ -19,6 +19,8 @@ from planar.model.wording import amount
 STOP_TOLERANCE = 1e-9
 """rad or sizes: so near to its stop, or beyond it, a pair is at its stop."""
 TURN = 2.0 * np.pi
+MIN_SURE_ROWS, MAX_SURE_MOVE = 4, 0.3
+"""Rows from which on, and how far apart (rad or sizes), those of a run tell what lies between them."""
 
 
 class MetStop(NamedTuple):
@@ -61,9 +63,9 @@ class PairStops:
     def positions(
         self, shapes: Mapping[str, LinkShape], frames: Mapping[str, Frame], own: Mapping[str, Sequence[Any]]
     ) -> Array:
-        """The positions of the pairs that have stops (stops,)."""
+        """The positions of the pairs that have stops (stops,); (stops, rows) where frames are arrays."""
         found = [value_and_rates(pair.input_position_at(shapes, frames, own))[0] for pair in self.pairs]
-        return np.array(found, dtype=float)
+        return np.array(np.broadcast_arrays(*found), dtype=float)
 
     def turns(self, positions: Array) -> Array:
         """Whole turns (rad) to add to positions (stops,) so that they lie between their stops; as few as can be, or
@@ -89,6 +91,25 @@ class PairStops:
         """How far positions (stops,) are from their lower and upper stops (2, stops), rad or sizes; negative beyond."""
         at = positions + (self.turns(positions) if turns is None else turns)
         return np.array([at - self.low, self.high - at]) / self.scale
+
+    def sure_rows(self, positions: Array, z: Array) -> Array:
+        """Which rows of a run surely come before any stop (rows,): positions (stops, rows), unknowns (rows, unknowns).
+
+        Between two rows a smooth motion leaves the stretch between them by an eighth of its second difference; eight
+        times that is allowed for, and rows that are far apart are not judged.
+        """
+        many = positions.shape[1]
+        if many < MIN_SURE_ROWS:
+            return np.zeros(many, dtype=bool)
+        at = (positions + self.turns(positions[:, 0])[:, None]) / self.scale[:, None]
+        low, high = (each[:, None] / self.scale[:, None] for each in (self.low, self.high))
+        room = np.minimum(at - low, high - at)
+        bend = np.abs(np.diff(at, 2, axis=1))
+        beside = np.pad(bend, ((0, 0), (1, 1)), mode="edge")
+        steps = np.maximum(beside[:, :-1], beside[:, 1:])
+        clear = np.minimum(room[:, :-1], room[:, 1:]) > steps + STOP_TOLERANCE
+        near = np.abs(np.diff(z, axis=0)).max(axis=1, initial=0.0) <= MAX_SURE_MOVE
+        return np.append(room[:, 0].min() > STOP_TOLERANCE, clear.all(axis=0) & near)
 
     def side(self, is_upper: bool, index: int) -> MetStop:
         """One stop."""

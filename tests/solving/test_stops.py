@@ -2,6 +2,7 @@
 
 import json
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -151,6 +152,27 @@ def test_sweeps_have_the_statuses_of_the_general_path():
     (each,) = planar.sweep_each([mechanism], 72)
     assert stop in each.status
     assert stop in planar.prepared(mechanism, 72, "C")({}).status
+
+
+@pytest.mark.parametrize(
+    ("model", "pair", "steps"),
+    [("crank-rocker", "B0", 72), ("slider-crank", "stroke", 7), ("watt-1-six-bar", "B0", 144)],
+)
+def test_compiled_rows_meet_the_stops_that_the_general_path_meets(model, pair, steps, monkeypatch):
+    free = planar.load(model)
+    here = next(iter(planar.solve(free).pair(pair).values()))
+    values = next(iter(planar.cycle(free, 72).pair(pair).values()))
+    span = float(np.ptp(values))
+    stops = planar.Stops(pair, float(here - 0.2 * span), float(here + 0.3 * span))
+    mechanism = replace(free, stops=(stops,), published=())
+    fast = planar.cycle(mechanism, steps)
+    monkeypatch.setattr("planar.solving.continuation.path.fast_run", lambda *_: None)
+    monkeypatch.setattr("planar.solving.runs.range_run.fast_run", lambda *_: None)
+    slow = planar.cycle(replace(mechanism, name="again"), steps)
+    assert (fast.outcome, fast.reason, len(fast)) == (slow.outcome, slow.reason, len(slow))
+    (given,) = fast.inputs
+    np.testing.assert_allclose(fast.inputs[given].position, slow.inputs[given].position, atol=1e-12)
+    assert [each.kind for each in fast.limits] == [each.kind for each in slow.limits]
 
 
 def test_the_tippers_cylinder_holds_its_body_between_its_stops():

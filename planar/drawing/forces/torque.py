@@ -27,7 +27,7 @@ ROUND_OFF_RATIO = 1e-9
 """A part of the greatest below this is round-off."""
 
 
-def torque_picture(
+def torque_picture(  # long: one part of the diagram after the other
     source: Forces | Motion | Mechanism, of: str | None = None, fluctuation: float = DEFAULT_FLUCTUATION
 ) -> Picture:
     """The effort of an input (left out: of the one that runs) over a cycle.
@@ -53,9 +53,7 @@ def torque_picture(
     mean = even.mean if even is not None else None
     seen = axes.without_outliers(effort)
     parts = {label: np.where(np.isfinite(seen), part, np.nan) for label, part in _effort_parts(drawn, name).items()}
-    motor = next(given.motor for given in found.mechanism.inputs if given.pair == name)
-    if motor is not None:
-        parts["motor"] = drawn.in_order(motor.effort_at(drawn.motion.inputs[name].velocity))
+    parts |= _motor_curve(drawn, name)
     across = axes.fit_axis(
         drawn.abscissa, DIAGRAM_WIDTH, drawn.axis_name, end_at_ticks=False, degrees=drawn.unit == "deg"
     )
@@ -108,6 +106,12 @@ def _notes(even: Flywheel | None, why: str, measure: str, drawn: ForceRun) -> It
             f"flywheel for a coefficient of fluctuation {even.fluctuation:g} at {even.speed:.4g} rad/s: "
             f"I = ΔE / (C ω²) = {even.inertia:.4g} kg·m²"
         )
+
+
+def _motor_curve(drawn: ForceRun, name: str) -> dict[str, Array]:
+    """What the motor of the input supplies at its speed, if it has one."""
+    motor = next(given.motor for given in drawn.motion.mechanism.inputs if given.pair == name)
+    return {} if motor is None else {"motor": drawn.in_order(motor.effort_at(drawn.motion.inputs[name].velocity))}
 
 
 def _effort_parts(drawn: ForceRun, name: str) -> dict[str, Array]:

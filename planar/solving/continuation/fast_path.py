@@ -14,7 +14,7 @@ from planar.solving.checks.branch_check import is_move_allowed
 from planar.solving.checks.residual_check import CONTACT_TOLERANCE, EPS, NEGLIGIBLE_ERROR
 from planar.solving.checks.singular_values import SINGULAR_DISTANCE_RATIO
 from planar.solving.prepared_mechanism import PositionInputs, PreparedMechanism
-from planar.solving.stops import PairStops
+from planar.solving.stops import MAX_SURE_MOVE, PairStops
 
 MIN_FAST_REGULARITY = 1e-3
 """Strength of a block from which on its rates are taken as they come; what is weaker is looked at in doubles' whole
@@ -109,6 +109,9 @@ class FastSolver(Protocol):
     def stops(self) -> PairStops | None:
         """The stops of its pairs, if it has any."""
 
+    def stop_positions(self, z: Array, u: Array) -> Array:
+        """The positions of the pairs that have stops (stops,), or (stops, rows)."""
+
     @property
     def tolerance(self) -> float:
         """What the residual check lets pass."""
@@ -135,7 +138,7 @@ def fast_run(setup: FastSolver, z: Array, u: Array, u1: Array, u2: Array) -> Fas
     """A run along a straight way of inputs (rows, inputs) with rates u1, u2 from the unknowns of its first row, as far
     as it is surely sound: both checks, rates, contacts. None for what is no such run."""
     judged, p = setup.acceptance, setup.inputs.p
-    if judged is None or not u.size or setup.stops is not None:
+    if judged is None or not u.size:
         return None
     steps = u[1:] - u[:-1]
     sizes = np.abs(steps).max(axis=1, initial=0.0)
@@ -161,6 +164,9 @@ def fast_run(setup: FastSolver, z: Array, u: Array, u1: Array, u2: Array) -> Fas
     if z.size:
         with np.errstate(invalid="ignore", over="ignore"):
             fine[1:] &= _keeps_branch(judged.block_starts, settled, gone, ways[:, 0], distances[:, 0], square)
+    if setup.stops is not None:
+        fine &= setup.stops.sure_rows(setup.stop_positions(settled, u), settled)
+        fine[1:] &= sizes <= MAX_SURE_MOVE
     many = len(fine) if fine.all() else int(np.argmin(fine))
     return FastRun(settled[:many], parts[:many], float(told.residual[:many].max(initial=0.0)))
 
