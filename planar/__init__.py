@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from planar.analysis.motion.output import Extreme
     from planar.analysis.motion.time_ratio import TimeRatio, time_ratio
     from planar.analysis.motion.transmission_angle import Transmission, transmission
+    from planar.analysis.motion.unknown_load import UnknownLoad, unknown_load
     from planar.assemblies.circuits.circuits import Circuit, Circuits, circuits
     from planar.assemblies.circuits.traced_circuit import Branch
     from planar.assemblies.conflict import Conflict, conflict
@@ -169,6 +170,7 @@ _ROOMS = {
     "TrapezoidalRise": "model.input_laws.cam_rises",
     "TurningPair": "model.pairs.turning",
     "Unknown": "foundation.errors",
+    "UnknownLoad": "analysis.motion.unknown_load",
     "advantage": "analysis.motion.mechanical_advantage",
     "advantage_over": "analysis.motion.mechanical_advantage_over_motion",
     "answers": "analysis.motion.answers",
@@ -215,6 +217,7 @@ _ROOMS = {
     "transmission": "analysis.motion.transmission_angle",
     "velocity_by_centres": "analysis.centres.velocities",
     "view": "pages.view",
+    "unknown_load": "analysis.motion.unknown_load",
 }
 """Where each public name lives: it is loaded when it is first used."""
 
@@ -304,6 +307,7 @@ __all__ = [
     "TrapezoidalRise",
     "TurningPair",
     "Unknown",
+    "UnknownLoad",
     "advantage",
     "advantage_over",
     "answers",
@@ -348,6 +352,7 @@ __all__ = [
     "time_ratio",
     "to_dict",
     "transmission",
+    "unknown_load",
     "velocity_by_centres",
     "view",
 ]

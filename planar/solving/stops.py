@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from planar.foundation.arrays import Array
+from planar.foundation.arrays import Array, BoolArray
 from planar.foundation.errors import NoAnswer, Outcome, join_names
 from planar.foundation.geometry import Frame
 from planar.foundation.jets import value_and_rates
@@ -92,7 +92,7 @@ class PairStops:
         at = positions + (self.turns(positions) if turns is None else turns)
         return np.array([at - self.low, self.high - at]) / self.scale
 
-    def sure_rows(self, positions: Array, z: Array) -> Array:
+    def sure_rows(self, positions: Array, z: Array) -> BoolArray:
         """Which rows of a run surely come before any stop (rows,): positions (stops, rows), unknowns (rows, unknowns).
 
         Between two rows a smooth motion leaves the stretch between them by an eighth of its second difference; eight

@@ -76,6 +76,7 @@ def results():
         planar.sweep(bars, {"BC.length": [0.066]}, steps=6, reduce={"path": "C.path_length"}),
     )
     yield planar.simulate("tipper", 0.3, steps=4).impacts[0]
+    yield planar.unknown_load(planar.solve("balanced-lamp"), "springs.0")
     yield planar.motor_duty(planar.forces(planar.solve("motor-press")))
     yield from (swept, swept[0], prepared, prepared())
     yield from (planar.BadInput("here", "wrong"), planar.Unknown("no such point"), planar.Outcome.SOLVED)

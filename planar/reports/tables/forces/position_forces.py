@@ -9,6 +9,7 @@ import numpy as np
 from rich.console import Group, RenderableType
 from rich.text import Text
 
+from planar.analysis.motion.unknown_load import UnknownLoad
 from planar.analysis.worked.published import Comparison
 from planar.dynamics.forces import Forces
 from planar.dynamics.load_attachment import attachment_remarks
@@ -22,12 +23,17 @@ from planar.model.pairs import MeasureKind
 from planar.model.wording import amount, join_all_names
 from planar.reports.fitted_table import FittedTable, plain_table
 from planar.reports.number_format import ROUNDING_RATIO, format_number, format_or_zero, paragraphs, precision_text
-from planar.reports.tables.forces import loads, motors
+from planar.reports.tables.forces import loads, motors, unknown_loads
 from planar.reports.tables.forces import mechanical_advantage as ratios
 from planar.reports.tables.position import published_table
 
 
-def tables(forces: Forces, advantages: ratios.Advantages, comparisons: Sequence[Comparison] = ()) -> RenderableType:
+def tables(
+    forces: Forces,
+    advantages: ratios.Advantages,
+    comparisons: Sequence[Comparison] = (),
+    unknown: UnknownLoad | None = None,
+) -> RenderableType:
     """Inputs, what acts, reactions, power, mechanical advantages, and the published torques beside the solved ones."""
     state, units = forces.moving, forces.mechanism.units
     head = [Text(forces.mechanism.name, style="bold")]
@@ -46,6 +52,8 @@ def tables(forces: Forces, advantages: ratios.Advantages, comparisons: Sequence[
         parts.append(loads.actions_table("Inertia", inertia, units, greatest_moment_and_force(forces)[0]))
     most = sum(each.max_power for each in (*acting, *inertia))
     parts += [_reactions_table(forces), paragraphs(_power_and_shaking(forces, most)), Text()]
+    if unknown is not None:
+        parts += [paragraphs(unknown_loads.unknown_load_facts(forces, unknown)), Text()]
     told = ratios.all_advantages(advantages)
     if told:
         parts.append(ratios.advantages_table(told))
@@ -217,7 +225,12 @@ def _time_remarks(forces: Forces) -> tuple[str, ...]:
     return ("loads that vary with time are those at 0 s",) if varying else ()
 
 
-def record(forces: Forces, advantages: ratios.Advantages, comparisons: Sequence[Comparison] = ()) -> dict[str, Any]:
+def record(
+    forces: Forces,
+    advantages: ratios.Advantages,
+    comparisons: Sequence[Comparison] = (),
+    unknown: UnknownLoad | None = None,
+) -> dict[str, Any]:
     """All of it as a JSON value (SI); null for what is not determined."""
     given = forces.moving.inputs
     force, moment = forces.shaking
@@ -236,6 +249,7 @@ def record(forces: Forces, advantages: ratios.Advantages, comparisons: Sequence[
         "reactions": {name: _reaction_record(each) for name, each in forces.reactions.items()},
         **({"motors": motors.record(duties)} if (duties := motors.motor_duties(forces)) else {}),
         **({"stops": dict(forces.stops)} if forces.stops else {}),
+        **({"solved_for": unknown_loads.record(unknown)} if unknown is not None else {}),
         **({"shaking": {"force": force.tolist(), "moment": float(moment)}} if has_inertia(forces) else {}),
         "power": {"in": _finite_or_none(float(forces.power_in)), "out": forces.power_out},
         "advantage": ratios.record(advantages),
