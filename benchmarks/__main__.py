@@ -42,7 +42,7 @@ def main() -> None:
         **{contest.name: contest.measure for contest in held},
         DESIGNS: against_designs,
         ROW: against_links,
-        **{linkage.name: _compared(linkage) for linkage in LINKAGES},
+        **{linkage.name: _compare(linkage) for linkage in LINKAGES},
         "links": lambda: tables.growth(grow(links) for links in LINKS),
         "many links": lambda: tables.far(grow_far(*each) for each in FAR),
         LONG: long,
@@ -60,7 +60,7 @@ def main() -> None:
     console.print(Text(versions(), style="bold"))
     console.print(tables.notes())
     for name, each in found.items():
-        console.print(_shown(name, each, {contest.name for contest in held}))
+        console.print(_render(name, each, {contest.name for contest in held}))
     if wanted.write:
         results = [result for contest in held for result in found[contest.name]]
         speed_page.write(
@@ -68,7 +68,7 @@ def main() -> None:
         )
 
 
-def _shown(name: str, found: Any, contested: set[str]) -> RenderableType:
+def _render(name: str, found: Any, contested: set[str]) -> RenderableType:
     if name in contested:
         return tables.contest(found)
     if name in (DESIGNS, ROW):
@@ -77,7 +77,7 @@ def _shown(name: str, found: Any, contested: set[str]) -> RenderableType:
     return kinds[name](found) if name in kinds else found
 
 
-def _compared(linkage: Linkage) -> Callable[[], RenderableType]:
+def _compare(linkage: Linkage) -> Callable[[], RenderableType]:
     return lambda: tables.comparison(linkage.name, compare(linkage))
 
 

@@ -30,11 +30,11 @@ def sweeps(swept: Swept, d: Array, steps: int) -> list[Entry]:
     """Designs d (dimensions, designs) over a turn, positions alone and with rates; refused ones are NaN."""
     mechanism = planar.from_dict(swept.document())
     found = [
-        _swept(mechanism, swept, d[:, : BACKENDS[backend]], steps, backend, rates)
+        _sweep(mechanism, swept, d[:, : BACKENDS[backend]], steps, backend, rates)
         for backend in backends(mechanism, swept)
         for rates in (False, True)
     ]
-    return [*found, _cycled(mechanism, swept, d[:, :CYCLED], steps)]
+    return [*found, _cycle_each(mechanism, swept, d[:, :CYCLED], steps)]
 
 
 def backends(mechanism: Mechanism, swept: Swept) -> list[str]:
@@ -43,7 +43,7 @@ def backends(mechanism: Mechanism, swept: Swept) -> list[str]:
     for backend in BACKENDS if hasattr(planar, "sweep") else ():
         try:
             planar.sweep(
-                mechanism, _named(swept, swept.base()[:, None]), steps=4, points=[swept.point], backend=backend
+                mechanism, _name_values(swept, swept.base()[:, None]), steps=4, points=[swept.point], backend=backend
             )
         except (ImportError, planar.BadInput):
             continue
@@ -70,7 +70,7 @@ def turns(swept: Swept, steps: int) -> list[Entry]:
     one, all_steps = np.arange(1), np.arange(steps + 1)
     return [
         Entry("planar, a run with its checks", False, one, all_steps, lambda: follow_samples(solver, p, z, u).z, read),
-        *(_prepared(mechanism, swept, steps, rates) for rates in (False, True)),
+        *(_prepare(mechanism, swept, steps, rates) for rates in (False, True)),
         Entry(
             "planar.cycle, from the sketch",
             True,
@@ -82,7 +82,7 @@ def turns(swept: Swept, steps: int) -> list[Entry]:
     ]
 
 
-def renewed(swept: Swept, d: Array, steps: int) -> list[Entry]:
+def sweep_new_designs(swept: Swept, d: Array, steps: int) -> list[Entry]:
     """Designs d (dimensions, designs) by `planar.prepared`, a call each."""
     mechanism = planar.from_dict(swept.document())
     names = [dimension.name for dimension in swept.dimensions]
@@ -106,7 +106,7 @@ def _read_prepared(found: Any, point: str, rates: bool) -> Array:
     return np.concatenate([order[point].T for order in orders])
 
 
-def _prepared(mechanism: Mechanism, swept: Swept, steps: int, rates: bool) -> Entry:
+def _prepare(mechanism: Mechanism, swept: Swept, steps: int, rates: bool) -> Entry:
     ready = planar.prepared(mechanism, steps, swept.point, rates=rates)
 
     def read(found: Any) -> Array:
@@ -115,8 +115,8 @@ def _prepared(mechanism: Mechanism, swept: Swept, steps: int, rates: bool) -> En
     return Entry("planar.prepared", rates, np.arange(1), np.arange(steps + 1), ready, read)
 
 
-def _swept(mechanism: Mechanism, swept: Swept, d: Array, steps: int, backend: str, rates: bool) -> Entry:
-    named, points = _named(swept, d), [swept.point]
+def _sweep(mechanism: Mechanism, swept: Swept, d: Array, steps: int, backend: str, rates: bool) -> Entry:
+    named, points = _name_values(swept, d), [swept.point]
 
     def read(found: Any) -> Array:
         orders = (found.position, found.velocity, found.acceleration)[: 3 if rates else 1]
@@ -134,7 +134,7 @@ def _swept(mechanism: Mechanism, swept: Swept, d: Array, steps: int, backend: st
     )
 
 
-def _cycled(mechanism: Mechanism, swept: Swept, d: Array, steps: int) -> Entry:
+def _cycle_each(mechanism: Mechanism, swept: Swept, d: Array, steps: int) -> Entry:
     remade = []
     for values in d.T:
         each = mechanism
@@ -169,7 +169,7 @@ def _all(mechanism: Mechanism) -> list:
     return list(link_lengths(mechanism, frozenset(link.name for link in mechanism.links)))
 
 
-def _named(swept: Swept, d: Array) -> dict[str, Array]:
+def _name_values(swept: Swept, d: Array) -> dict[str, Array]:
     return {dimension.name: values for dimension, values in zip(swept.dimensions, d, strict=True)}
 
 

@@ -37,13 +37,13 @@ def compare(linkage: Linkage) -> tuple[Row, ...]:
             rates,
             seconds[way, rates],
             seconds[way, rates] / seconds[FLOATS, rates],
-            _checked(trial, linkage, exact),
+            _check(trial, linkage, exact),
         )
         for (way, rates), trial in tried.items()
     )
 
 
-def _checked(trial: Trial, linkage: Linkage, exact: Array) -> float:
+def _check(trial: Trial, linkage: Linkage, exact: Array) -> float:
     found = trial.read(trial.solve())
     return error(found, exact[: len(found), : trial.samples], [part == "angle" for _, part in linkage.answers], exact)
 

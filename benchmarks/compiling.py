@@ -44,10 +44,10 @@ def compilings() -> tuple[Compiling, ...]:
     """Every structure, in processes of its own; none without what compiles."""
     if find_spec("llvmlite") is None:
         return ()
-    return tuple(_told(structure) for structure in STRUCTURES)
+    return tuple(_measure_structure(structure) for structure in STRUCTURES)
 
 
-def _told(structure: str) -> Compiling:
+def _measure_structure(structure: str) -> Compiling:
     found = []
     for _ in range(RUNS):
         with TemporaryDirectory() as folder:

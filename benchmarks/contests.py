@@ -97,7 +97,7 @@ class Contest:
 
     def _cannot(self) -> Array:
         """Whether a design cannot be closed at a step (steps + 1, designs)."""
-        return self.swept.stopped(self._d(), angles(self.steps))
+        return self.swept.stops(self._d(), angles(self.steps))
 
     def _limits(self, theta: Array) -> list[Entry]:
         limit = compiled()
@@ -139,7 +139,7 @@ class Renewed(Contest):
     def entries(self) -> list[Entry]:
         """See `Contest`."""
         theta = angles(self.steps)
-        found = [*by_planar.renewed(self.swept, self.d, self.steps), *peers.sweeps(self.swept, self.d, theta)]
+        found = [*by_planar.sweep_new_designs(self.swept, self.d, self.steps), *peers.sweeps(self.swept, self.d, theta)]
         limit = compiled()
         if limit is None:
             return found

@@ -51,7 +51,7 @@ class Linkages:
     """Random linkages of dyads of up to twenty joints, as arrays."""
 
     def __init__(self) -> None:
-        tape = dyadic.drawn(STRUCTURES, False)
+        tape = dyadic.random_tape(STRUCTURES, False)
         made = dyadic.mechanisms(tape, [dyadic.sketch(tape, k) for k in range(STRUCTURES)])
         layouts = [each.layout for each in made]
         pins = max(len(each.pin_positions) for each in layouts)
@@ -66,7 +66,7 @@ class Linkages:
             self.frame[k, : len(each.frame_pins)] = each.frame_pins
         self.crank = np.array([each.crank for each in layouts])
 
-    def drawn(self, seed: int) -> planar.PinnedLinkages:
+    def draw(self, seed: int) -> planar.PinnedLinkages:
         """As many as there are structures, no two alike."""
         moved = self.places + np.random.default_rng(seed).normal(0.0, 1e-3, self.places.shape)
         return planar.pinned_linkages(moved, self.bars, self.frame, self.crank, velocity=2.0)
@@ -85,7 +85,7 @@ def compare_workers() -> Iterator[str]:
     hold()
     if hasattr(os, "sched_setaffinity"):
         os.sched_setaffinity(0, sorted(os.sched_getaffinity(0))[:2])
-    linkages = [Linkages().drawn(seed) for seed in range(8)]
+    linkages = [Linkages().draw(seed) for seed in range(8)]
     tasks: dict[str, Callable[[int], object]] = {
         name: lambda workers, of=of: planar.sweep(*of, STEPS, workers=workers)
         for name, of in (
@@ -119,7 +119,7 @@ def reduce_designs(many: int) -> str:
 def reduce_linkages(many: int) -> str:
     """Random linkages, drawn as they are taken, of which the box of all joints is kept."""
     source, began = Linkages(), perf_counter()
-    stream = (source.drawn(seed) for seed in range(many // STRUCTURES))
+    stream = (source.draw(seed) for seed in range(many // STRUCTURES))
     planar.sweep_each(stream, STEPS, rates=False, reduce={"boxes": boxes})
     return f"{many:,} linkages x {STEPS}, reduced: {perf_counter() - began:.0f} s, {_peak():.0f} MB at the most"
 

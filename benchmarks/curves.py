@@ -43,7 +43,7 @@ def against_designs() -> tuple[Curve, ...]:
         limit = compiled()
         if limit is not None:
             call = limit.sweep(swept.limit, d, theta)
-            told.append((many, Entry(LIMIT, False, np.arange(many), np.arange(len(theta)), call, _moved)))
+            told.append((many, Entry(LIMIT, False, np.arange(many), np.arange(len(theta)), call, _move)))
         for entry in (*by_planar.sweeps(swept, d, STEPS), *peers.sweeps(swept, d, theta)):
             if len(entry.designs) == many and (not entry.rates or entry.system.startswith("planar.cycle")):
                 told.append((many, entry))
@@ -69,10 +69,10 @@ def against_links() -> tuple[Curve, ...]:
                 continue
             entries = import_module(f"benchmarks.peers.{peers.PACKAGES[name]}").entries(row, theta)
             told += [(links, entry) for entry in entries if not entry.rates]
-    return _lengthened(_curves(told, exact))
+    return _lengthen(_curves(told, exact))
 
 
-def _lengthened(curves: tuple[Curve, ...]) -> tuple[Curve, ...]:
+def _lengthen(curves: tuple[Curve, ...]) -> tuple[Curve, ...]:
     """The same, with rows of up to ten thousand links by `planar.sweep_each`, and by C."""
     found = long_of("rows of four-bars")
     # its error is a part of the greatest coordinate
@@ -114,7 +114,7 @@ def _off(entry: Entry, exact: Array) -> float:
     return float(np.max(np.abs(found - exact[:, entry.steps][:, :, entry.designs])))
 
 
-def _moved(found: Array) -> Array:
+def _move(found: Array) -> Array:
     return np.moveaxis(found, 1, 0)
 
 

@@ -27,7 +27,7 @@ CHECKED = 400
 
 
 @lru_cache(maxsize=2)
-def drawn(many: int, stops: bool) -> Tape:
+def random_tape(many: int, stops: bool) -> Tape:
     """So many random linkages, the same ones each time; some of which stop, or none."""
     rng = np.random.default_rng(7)
     sizes = rng.integers(FEWEST, MOST + 1, many)
@@ -62,7 +62,7 @@ class _Growing:
         self.at.append(np.repeat(place[:, None], CHECKED + 1, axis=1))
         return len(self.kind) - 1
 
-    def joined(self, p: int, q: int) -> bool:
+    def join(self, p: int, q: int) -> bool:
         """Whether a new joint beside two could be drawn that goes round."""
         place = self.rng.uniform(-1.2, 1.2, 2)
         own = place - self.at[p][:, 0]
@@ -107,17 +107,17 @@ def _grow(grown: _Growing, rng: np.random.Generator, joints: int) -> None:
         fixed = len(moving) == 1 or (rng.random() < ON_FRAME and len(grown.kind) + 2 <= joints)
         p = int(rng.choice(moving))
         q = grown.on_frame() if fixed else int(rng.choice([each for each in moving if each != p]))
-        if not any(grown.joined(p, q) for _ in range(TRIES)) and fixed:
+        if not any(grown.join(p, q) for _ in range(TRIES)) and fixed:
             for each in (grown.kind, grown.of, grown.size, grown.at):
                 each.pop()
 
 
 def sketch(tape: Tape, linkage: int) -> Array:
     """Where the joints are at the start (joints, 2), m."""
-    return closed(tape, np.zeros(1), linkage, rates=False)[:, :, 0]
+    return closed_form(tape, np.zeros(1), linkage, rates=False)[:, :, 0]
 
 
-def closed(tape: Tape, turned: Array, linkage: int, rates: bool = True) -> Array:
+def closed_form(tape: Tape, turned: Array, linkage: int, rates: bool = True) -> Array:
     """Rows (joints, 2 or 6, steps) of the joints of one linkage in the arithmetic of the angles (steps,)."""
     part = slice(tape.first[linkage], tape.first[linkage + 1])
     found: list[Moving] = []
@@ -132,7 +132,7 @@ def closed(tape: Tape, turned: Array, linkage: int, rates: bool = True) -> Array
             moved, (x, y) = crank_pin(a, turned + np.arctan2(c, b)), found[p].p
             found.append(Moving((x + moved.p[0], y + moved.p[1]), moved.v, moved.a))
         elif kind == CARRIED:
-            found.append(Moving(*(_carried(*each, a, b) for each in zip(found[p], found[q], strict=True))))
+            found.append(Moving(*(_carry(*each, a, b) for each in zip(found[p], found[q], strict=True))))
         else:
             first, second = (p, q) if c > 0 else (q, p)
             lengths = (np.sqrt(a), np.sqrt(b)) if c > 0 else (np.sqrt(b), np.sqrt(a))
@@ -140,7 +140,7 @@ def closed(tape: Tape, turned: Array, linkage: int, rates: bool = True) -> Array
     return np.stack([rows(each) for each in found])[:, : 6 if rates else 2]
 
 
-def _carried(p: tuple[Array, Array], q: tuple[Array, Array], a: float, b: float) -> tuple[Array, Array]:
+def _carry(p: tuple[Array, Array], q: tuple[Array, Array], a: float, b: float) -> tuple[Array, Array]:
     """A point on the link through two others, or its rate."""
     x, y = q[0] - p[0], q[1] - p[1]
     return p[0] + a * x - b * y, p[1] + a * y + b * x
@@ -189,14 +189,14 @@ def linkages(tape: Tape, places: Array) -> Any:
     bars = np.stack([np.where(second, tape.of[of, 1], tape.of[of, 0]), joint[of]], axis=1)
     return planar.pinned_linkages(
         at,
-        _padded(bars, owner[of], many),
-        _padded(joint[fixed], owner[fixed], many),
+        _pad(bars, owner[of], many),
+        _pad(joint[fixed], owner[fixed], many),
         velocity=OMEGA,
         acceleration=ALPHA,
     )
 
 
-def _padded(values: Array, owner: Array, many: int) -> Array:
+def _pad(values: Array, owner: Array, many: int) -> Array:
     """Rows of several owners, one owner after the other, with an entry for each owner; -1 where one has fewer."""
     counts = np.bincount(owner, minlength=many)
     found = np.full((many, counts.max(), *values.shape[1:]), -1)

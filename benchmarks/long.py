@@ -13,7 +13,7 @@ import numpy as np
 
 import planar
 from benchmarks.chain import FIRST
-from benchmarks.dyadic import CARRIED, CRANK, DYAD, FRAME, closed, together
+from benchmarks.dyadic import CARRIED, CRANK, DYAD, FRAME, closed_form, together
 from benchmarks.limit import Tape, compiled
 from benchmarks.linkages import FourBar
 from benchmarks.linkages.base import THETA
@@ -87,7 +87,7 @@ class _Tape:
             DYAD, (p, q), (b * b, c * c, side), (px + along * ex - across * ey, py + along * ey + across * ex)
         )
 
-    def carried(self, p: int, q: int, along: float, across: float = 0.0) -> int:
+    def carry(self, p: int, q: int, along: float, across: float = 0.0) -> int:
         (px, py), (qx, qy) = self.at[p], self.at[q]
         x, y = qx - px, qy - py
         return self._add(
@@ -119,7 +119,7 @@ def row(links: int) -> Pinned:
         joint = tape.dyad(pin, end, cell.b, cell.c, 1.0)
         bars.append((pin, joint))
         if k + 1 < len(cells):
-            pin = tape.carried(end, joint, cells[k + 1].a / cell.c)
+            pin = tape.carry(end, joint, cells[k + 1].a / cell.c)
             bars.append((end, joint, pin))
         else:
             bars.append((end, joint))
@@ -134,13 +134,13 @@ def scissors(links: int) -> Pinned:
     pin = tape.crank(pivot, 0.07, THETA)
     middle = tape.dyad(pin, foot, 0.9, half, 1.0)
     other = tape.dyad(middle, guide, half, 5.0, 1.0)
-    right, left = tape.carried(foot, middle, 2.0), tape.carried(other, middle, 2.0)
+    right, left = tape.carry(foot, middle, 2.0), tape.carry(other, middle, 2.0)
     bars: list[tuple[int, ...]] = [(pivot, pin), (pin, middle), (foot, middle, right), (other, middle, left)]
     bars.append((guide, other))
     while len(bars) + 1 < links:
         # the bars change sides at every crossing
         middle = tape.dyad(left, right, half, half, 1.0)
-        to_right, to_left = tape.carried(left, middle, 2.0), tape.carried(right, middle, 2.0)
+        to_right, to_left = tape.carry(left, middle, 2.0), tape.carry(right, middle, 2.0)
         bars += [(left, middle, to_right), (right, middle, to_left)]
         left, right = to_left, to_right
     return tape.pinned(bars)
@@ -211,6 +211,6 @@ def _error(linkage: Pinned, position: Any, turned: Array) -> float:
             found[joint] = np.asarray(position[f"P{joint}"]).T
     greatest = float(np.abs(found).max())
     if linkage.tape is not None:
-        return float(np.abs(found - closed(linkage.tape, turned, 0, rates=False)).max()) / greatest
+        return float(np.abs(found - closed_form(linkage.tape, turned, 0, rates=False)).max()) / greatest
     apart = [np.hypot(*(found[a] - found[b])) for bar in linkage.bars for a, b in pairwise(bar)]
     return float(max(np.abs(each - each[0]).max() for each in apart)) / greatest

@@ -12,7 +12,7 @@ import numpy as np
 import planar
 from benchmarks import dyadic, peers
 from benchmarks.contests import LIMIT, Result
-from benchmarks.dyadic import DYAD, MOST, closed, moving, sketch
+from benchmarks.dyadic import DYAD, MOST, closed_form, moving, sketch
 from benchmarks.limit import compiled
 from benchmarks.peers import by_link
 from benchmarks.swept import RATES
@@ -64,7 +64,7 @@ class Mixed:
 
     @property
     def tape(self) -> dyadic.Tape:
-        return dyadic.drawn(self.many, self.stops)
+        return dyadic.random_tape(self.many, self.stops)
 
     @property
     def turned(self) -> Array:
@@ -121,12 +121,12 @@ class Mixed:
         off, greatest, refused, wrong = [], [], 0, 0
         for k in range(self.many):
             found = entry.read(told, k)
-            last = np.isnan(closed(tape, self.turned, k, rates=False)).any(axis=(0, 1))[entry.first :]
+            last = np.isnan(closed_form(tape, self.turned, k, rates=False)).any(axis=(0, 1))[entry.first :]
             gone = np.isnan(found[:, :2]).any(axis=(0, 1))
             refused += bool(gone.any())
             wrong += not np.array_equal(np.logical_or.accumulate(last), np.logical_or.accumulate(gone))
             if not last.any() and not gone.any() and len(off) < SAMPLE:
-                exact = closed(tape, self.turned.astype(np.longdouble), k)[:, : found.shape[1], entry.first :]
+                exact = closed_form(tape, self.turned.astype(np.longdouble), k)[:, : found.shape[1], entry.first :]
                 greatest.append(np.abs(exact).max(axis=(0, 2)).reshape(-1, 2).max(axis=1))
                 off.append(np.abs(found - exact).max(axis=(0, 2)).reshape(-1, 2).max(axis=1) / greatest[-1])
         error = float(np.max(off)) if off else float("nan")

@@ -30,7 +30,7 @@ SHARES = {4: 0.48, 6: 0.48, 8: 0.04}
 """Of the linkages that are compared: how many have a group of so many links."""
 
 
-class Judged(NamedTuple):
+class LinkageComparison(NamedTuple):
     """What came out of one linkage: its complex solutions, its assemblies, how surely they are all, and what failed."""
 
     links: int
@@ -40,7 +40,7 @@ class Judged(NamedTuple):
     failed: str
 
 
-def judged(seed: int) -> Judged:
+def compare_linkage(seed: int) -> LinkageComparison:
     """One linkage, listed and compared."""
     rng = np.random.default_rng(seed)
     links = int(rng.choice(list(SHARES), p=list(SHARES.values())))
@@ -54,11 +54,11 @@ def judged(seed: int) -> Judged:
         failed = "a start found one more"
     if not failed and (found.found != found.expected or found.complete is Completeness.NOT):
         failed = "not all complex solutions found"
-    return Judged(links, found.expected or 0, len(found.real), found.complete.value, failed)
+    return LinkageComparison(links, found.expected or 0, len(found.real), found.complete.value, failed)
 
 
-def _chunk(first: int, many: int) -> list[tuple[int, Judged]]:
-    return [(seed, judged(seed)) for seed in range(first, min(first + CHUNK, many))]
+def _chunk(first: int, many: int) -> list[tuple[int, LinkageComparison]]:
+    return [(seed, compare_linkage(seed)) for seed in range(first, min(first + CHUNK, many))]
 
 
 def times() -> Table:

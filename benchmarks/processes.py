@@ -56,29 +56,29 @@ def cold_starts() -> tuple[Process, ...]:
     others = tuple(Command(("-c", f"import {name}")) for name in peers.installed())
     times: dict[Command, list[float]] = {command: [] for command in (*COMMANDS, *others)}
     for command in times:
-        _timed(command)
+        _time(command)
     for run in range(RUNS):
         for command, seconds in times.items():
             if run < OF_PEERS or command in COMMANDS:
-                seconds.append(_timed(command)[0])
+                seconds.append(_time(command)[0])
     middle = {command: median(seconds) for command, seconds in times.items()}
     return tuple(
-        Process(_shown(command), seconds, seconds / middle[COMMANDS[0]], command.remark)
+        Process(_words(command), seconds, seconds / middle[COMMANDS[0]], command.remark)
         for command, seconds in middle.items()
     )
 
 
 def imports_traced() -> tuple[float, str]:
     """Seconds of a process that solves the model, and what `-X importtime` says of it."""
-    return _timed(Command(("-X", "importtime", *SOLVE)))
+    return _time(Command(("-X", "importtime", *SOLVE)))
 
 
 def bare() -> float:
     """Seconds of a process that does nothing."""
-    return _timed(Command(("-c", "pass")))[0]
+    return _time(Command(("-c", "pass")))[0]
 
 
-def _timed(command: Command) -> tuple[float, str]:
+def _time(command: Command) -> tuple[float, str]:
     """Seconds of a Python process, and what it wrote to its standard error."""
     with TemporaryDirectory() as empty:
         kept = str(Path(_folder().name, "kept")) if command.is_known else empty
@@ -97,5 +97,5 @@ def _folder() -> TemporaryDirectory[str]:
     return TemporaryDirectory()
 
 
-def _shown(command: Command) -> str:
+def _words(command: Command) -> str:
     return "python " + " ".join(f'"{word}"' if " " in word else word for word in command.arguments)

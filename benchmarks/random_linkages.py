@@ -31,7 +31,7 @@ WRONG = "finite and wrong"
 UNEXPLAINED = "refused though determinate"
 
 
-def judged(seed: int) -> str:
+def outcome_of_linkage(seed: int) -> str:
     """What came out of one linkage, in words."""
     built = random_linkage(seed, 1 + seed % 12, BLUR, HIGHER * (seed % 2))
     mechanism = planar.from_dict(built.value)
@@ -86,7 +86,7 @@ def _value(part: object) -> float:
 
 
 def _chunk(first: int) -> list[tuple[str, int]]:
-    return [(judged(seed), seed) for seed in range(first, first + CHUNK)]
+    return [(outcome_of_linkage(seed), seed) for seed in range(first, first + CHUNK)]
 
 
 def main() -> None:

@@ -24,12 +24,14 @@ def comparison(linkage: str, rows: Iterable[Row]) -> RenderableType:
     """Every way to solve one linkage, in the order of their times: positions alone, then with rates."""
     rows = sorted(rows, key=lambda row: row.seconds)
     return Group(
-        _compared(f"{linkage}, a position", (row for row in rows if not row.rates)),
-        _compared(f"{linkage}, a position with velocities and accelerations", (row for row in rows if row.rates)),
+        _comparison_table(f"{linkage}, a position", (row for row in rows if not row.rates)),
+        _comparison_table(
+            f"{linkage}, a position with velocities and accelerations", (row for row in rows if row.rates)
+        ),
     )
 
 
-def _compared(title: str, rows: Iterable[Row]) -> Table:
+def _comparison_table(title: str, rows: Iterable[Row]) -> Table:
     table = _table(title, "way", "time", "ratio", "greatest error")
     table.columns[0].min_width = 34
     for row in rows:

@@ -82,7 +82,7 @@ if TYPE_CHECKING:
     from planar.solving.cycle import cycle
     from planar.solving.position import solve
 
-__version__ = "0.10.0"
+__version__ = "0.11.0"
 
 _ROOMS = {
     "Advantage": "analysis.motion.mechanical_advantage",

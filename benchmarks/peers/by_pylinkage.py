@@ -74,7 +74,7 @@ def _four_bar(d: Array, theta: Array) -> tuple:
     crank = Crank(A, radius=0.3)
     parts = [A, D, crank, RRRDyad(crank.output, D, 0.8, 0.7)]
     at = [(0.0 * a, 0.0 * a), (g, 0.0 * g), B.p, C.p]
-    return _told(parts, (a, 0.0 * a, b, c), at, 3)
+    return _model(parts, (a, 0.0 * a, b, c), at, 3)
 
 
 def _watt(d: Array, theta: Array) -> tuple:
@@ -91,7 +91,7 @@ def _watt(d: Array, theta: Array) -> tuple:
     along = FixedDyad(D, rocker, distance=0.45, angle=BELL)
     parts = [A, D, crank, H, rocker, along, RRRDyad(along, H, 1.05, 0.6)]
     at = [(0.0 * a, 0.0 * a), (g, 0.0 * g), B.p, (x, y), C.p, F.p, G.p]
-    return _told(parts, (a, 0.0 * a, b, c, f, 0.0 * a + BELL, first, second), at, 6)
+    return _model(parts, (a, 0.0 * a, b, c, f, 0.0 * a + BELL, first, second), at, 6)
 
 
 def _quick_return(d: Array, theta: Array) -> tuple:
@@ -103,10 +103,10 @@ def _quick_return(d: Array, theta: Array) -> tuple:
     crank = Crank(pivot, radius=0.15)
     parts = [pivot, Q, crank, FixedDyad(Q, crank.output, distance=0.6, angle=0.0)]
     at = [(0.0 * r, 0.0 * r), (0.0 * r, q), B.p, (end * B.p[0] / far, q + end * (B.p[1] - q) / far)]
-    return _told(parts, (r, 0.0 * r, end, 0.0 * r), at, 3)
+    return _model(parts, (r, 0.0 * r, end, 0.0 * r), at, 3)
 
 
-def _told(parts: list, constraints: tuple[Array, ...], at: list, asked: int) -> tuple:
+def _model(parts: list, constraints: tuple[Array, ...], at: list, asked: int) -> tuple:
     template = linkage_to_solver_data(Linkage(parts))
     many = len(constraints[0])
     positions = np.empty((many, len(at), 2))
@@ -125,7 +125,7 @@ def mixed(tape: Tape, places: list[Array], steps: int) -> list[tuple]:
     turn = 2.0 * np.pi / steps
 
     def build() -> list[tuple]:
-        return [_built(tape, places, k, turn) for k in range(len(places))]
+        return [_build(tape, places, k, turn) for k in range(len(places))]
 
     built = build()
     rates = [np.array([rate]) for rate in RATES]
@@ -156,7 +156,7 @@ def mixed(tape: Tape, places: list[Array], steps: int) -> list[tuple]:
     ]
 
 
-def _built(tape: Tape, places: list[Array], linkage: int, turn: float) -> tuple:
+def _build(tape: Tape, places: list[Array], linkage: int, turn: float) -> tuple:
     """One linkage as its solver takes it: places, constraints, structure, its crank's joint."""
     part, parts, crank = slice(tape.first[linkage], tape.first[linkage + 1]), [], 0
     at = places[linkage]

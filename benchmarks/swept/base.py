@@ -67,7 +67,7 @@ class Swept(ABC):
         drawn = np.random.default_rng(0).uniform(-self.spread, self.spread, (len(self.dimensions), many))
         return np.ascontiguousarray(self.base()[:, None] * (1.0 + drawn))
 
-    def stopped(self, d: Array, theta: Array) -> Array:
+    def stops(self, d: Array, theta: Array) -> Array:
         """Which designs have stopped at a step, or before it (steps, designs)."""
         if not self.dyadic:
             return np.zeros((len(theta), d.shape[1]), dtype=bool)
@@ -107,12 +107,12 @@ def dyad_pin(P: Moving, Q: Moving, b: Array, c: Array) -> Moving:
     with np.errstate(invalid="ignore"):
         across = np.sqrt(b * b / square - along * along)
     at = P.p[0] + along * ex - across * ey, P.p[1] + along * ey + across * ex
-    v = _carried(P, Q, at, P.v, Q.v, 0.0, 0.0)
+    v = _carry(P, Q, at, P.v, Q.v, 0.0, 0.0)
     turn_p, turn_q = ((v[0] - end.v[0]) ** 2 + (v[1] - end.v[1]) ** 2 for end in (P, Q))
-    return Moving(at, v, _carried(P, Q, at, P.a, Q.a, turn_p, turn_q))
+    return Moving(at, v, _carry(P, Q, at, P.a, Q.a, turn_p, turn_q))
 
 
-def _carried(P: Moving, Q: Moving, at: Any, of_p: Any, of_q: Any, to_p: Any, to_q: Any) -> tuple[Array, Array]:
+def _carry(P: Moving, Q: Moving, at: Any, of_p: Any, of_q: Any, to_p: Any, to_q: Any) -> tuple[Array, Array]:
     """The rate of a pin from those of the two ends, less the squared rates about them."""
     bx, by, cx, cy = at[0] - P.p[0], at[1] - P.p[1], at[0] - Q.p[0], at[1] - Q.p[1]
     f, g = bx * of_p[0] + by * of_p[1] - to_p, cx * of_q[0] + cy * of_q[1] - to_q

@@ -50,7 +50,7 @@ class SweptFourBar(Swept):
         d[0] = np.random.default_rng(1).uniform(0.2, 0.52, many)
         return d
 
-    def stopped(self, d: Array, theta: Array) -> Array:
+    def stops(self, d: Array, theta: Array) -> Array:
         """See `Swept`: between two steps too, where the diagonal is longest or shortest."""
         a, b, c, g = d
         found = np.empty((len(theta), d.shape[1]), dtype=bool)

@@ -130,8 +130,8 @@ class Stephenson(Swept):
             v, a = zero.copy(), zero.copy()
             v[5], a[5] = F.v, F.a
             slope = self._slope(pins[:, :, 0])
-            v[_FREE] = self._solved(slope, -self._moved(pins[:, :, 0], v))
-            a[_FREE] = self._solved(slope, -self._moved(pins[:, :, 0], a) - self._squares(v))
+            v[_FREE] = self._solve(slope, -self._move(pins[:, :, 0], v))
+            a[_FREE] = self._solve(slope, -self._move(pins[:, :, 0], a) - self._squares(v))
             found[0:2, step], found[2:4, step], found[4:6, step] = pins[4, :, 0], v[4], a[4]
         return found
 
@@ -150,7 +150,7 @@ class Stephenson(Swept):
         wanted = np.stack([a, b, c, np.hypot(x, y), np.hypot(b - x, y), to_e]) ** 2
         for _ in range(60):
             off = self._squares(at) - wanted
-            step = self._solved(self._slope(at), -0.5 * off)
+            step = self._solve(self._slope(at), -0.5 * off)
             at[_FREE] += step
             if np.max(np.abs(step)) < 1e-17:
                 break
@@ -166,13 +166,13 @@ class Stephenson(Swept):
                     slope[:, row, column : column + 2] = sign * (at[i] - at[j]).T
         return slope
 
-    def _moved(self, at: Array, rate: Array) -> Array:
+    def _move(self, at: Array, rate: Array) -> Array:
         return np.stack([np.sum((at[i] - at[j]) * (rate[i] - rate[j]), axis=0) for i, j in self.BARS])
 
     def _squares(self, at: Array) -> Array:
         return np.stack([np.sum((at[i] - at[j]) ** 2, axis=0) for i, j in self.BARS])
 
-    def _solved(self, slope: Array, right: Array) -> Array:
+    def _solve(self, slope: Array, right: Array) -> Array:
         """The system solved in doubles, three times on what is left, which is reckoned as `right` is."""
         found = np.zeros_like(right)
         inverse = np.linalg.inv(slope)

@@ -7,29 +7,30 @@ import os
 import sys
 from collections import Counter
 from concurrent.futures import ProcessPoolExecutor
-from itertools import cycle, islice
+from itertools import cycle, islice, repeat
 from time import perf_counter
 
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks.truth.draws import DESIGNS, KINDS, drawn
-from benchmarks.truth.judge import Verdict, agrees, verdicts
+from benchmarks.truth.comparison import Verdict, agrees, compare_case
+from benchmarks.truth.random_cases import DESIGNS, KINDS, random_case
 
 SHOWN = 40
 """Differing designs of each way and kind of difference that are printed."""
 
 
-def tried(kind: str, seed: int) -> list[Verdict]:
-    """What every way told of the case of a kind and seed; nothing where there is no such case."""
-    case = drawn(kind, seed)
-    return [] if case is None else verdicts(case)
+def compare_random_case(kind: str, seed: int, designs: int = DESIGNS) -> list[Verdict]:
+    """The verdicts over the case of a kind and seed; none where there is no such case."""
+    case = random_case(kind, seed, designs)
+    return [] if case is None else compare_case(case)
 
 
 def main() -> None:
     """Draw, compare, print."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.truth", description=__doc__)
     parser.add_argument("--count", type=int, default=1000, help="designs")
+    parser.add_argument("--designs", type=int, default=DESIGNS, help="of a case, which is one mechanism")
     parser.add_argument("--first", type=int, default=0, help="the first seed")
     parser.add_argument("--kinds", nargs="+", choices=list(KINDS), default=list(KINDS), help="of mechanisms")
     parser.add_argument("--workers", type=int, default=os.cpu_count(), help="processes")
@@ -39,33 +40,35 @@ def main() -> None:
     start = perf_counter()
     if wanted.case:
         kind, seed = wanted.case[0], int(wanted.case[1])
-        case = drawn(kind, seed)
+        case = random_case(kind, seed, wanted.designs)
         console.print(case)
-        told = tried(kind, seed)
-        for each in told:
+        verdicts = compare_random_case(kind, seed, wanted.designs)
+        for each in verdicts:
             console.print(f"design {each.design}, {each.way}: {each.what}. {each.detail}", highlight=False)
     else:
-        cases = -(-wanted.count // DESIGNS)
+        cases = -(-wanted.count // wanted.designs)
         seeds = (wanted.first + n // len(wanted.kinds) for n in range(cases))
-        told = []
+        verdicts = []
         with ProcessPoolExecutor(wanted.workers) as pool:
-            for found in pool.map(tried, islice(cycle(wanted.kinds), cases), seeds, chunksize=4):
-                told += found
-        _print(console, told, perf_counter() - start)
-    sys.exit(any(not agrees(each) for each in told))
+            for found in pool.map(
+                compare_random_case, islice(cycle(wanted.kinds), cases), seeds, repeat(wanted.designs), chunksize=4
+            ):
+                verdicts += found
+        _print(console, verdicts, perf_counter() - start)
+    sys.exit(any(not agrees(each) for each in verdicts))
 
 
-def _print(console: Console, told: list[Verdict], seconds: float) -> None:
-    designs = len({(each.kind, each.seed, each.design) for each in told})
+def _print(console: Console, verdicts: list[Verdict], seconds: float) -> None:
+    designs = len({(each.kind, each.seed, each.design) for each in verdicts})
     table = Table(title=f"{designs:,} designs, {seconds:.0f} s; {SHOWN} of a row at most are listed below")
-    for name in ("mechanisms", "way", "what it told beside the general path", "designs"):
+    for name in ("mechanisms", "way", "beside the general path", "designs"):
         table.add_column(name)
-    counts = Counter((each.kind, each.way, each.what) for each in told)
+    counts = Counter((each.kind, each.way, each.what) for each in verdicts)
     for (kind, way, what), many in sorted(counts.items()):
         table.add_row(kind, way, what, f"{many:,}")
     console.print(table)
     shown: Counter[tuple[str, str, str]] = Counter()
-    for each in told:
+    for each in verdicts:
         row = each.kind, each.way, each.what
         if not agrees(each) and shown[row] < SHOWN:
             shown[row] += 1

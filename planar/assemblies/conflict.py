@@ -69,7 +69,7 @@ class Conflict:
         return tuple(mending_inputs(self._solver, self._failure, self.inputs, thorough=True))
 
     @property
-    def said(self) -> tuple[str, ...]:
+    def remarks(self) -> tuple[str, ...]:
         """What is in conflict, and how surely."""
         held = f"pair{'s' * (len(self.pairs) != 1)} {quote_names(self.pairs)}"
         if self.inputs:

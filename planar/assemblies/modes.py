@@ -74,7 +74,7 @@ class ModesBlock(NamedTuple):
     complete: Completeness
     curve: bool
     "whether its links can move, the inputs held: a curve of assemblies"
-    said: str
+    method: str
     solved: int
     "for how many of the choices before it"
 
@@ -206,12 +206,12 @@ class Modes(Displayable, Sequence["Mode"]):
         return tuple(found)
 
     @property
-    def said(self) -> tuple[str, ...]:
+    def remarks(self) -> tuple[str, ...]:
         """What there is to say of the list: how the groups were solved, and what is not proved."""
         how: dict[str, list[int]] = {}
         for number, group in enumerate(self.groups, start=1):
-            how.setdefault(group.said, []).append(number)
-        told = [f"group{'s' * (len(of) > 1)} {_number_ranges(of)}: {said}" for said, of in how.items()]
+            how.setdefault(group.method, []).append(number)
+        told = [f"group{'s' * (len(of) > 1)} {_number_ranges(of)}: {method}" for method, of in how.items()]
         if any(group.curve for group in self.groups):
             told.append(
                 "some links can move while the inputs are held: of each curve of assemblies that was found one place "

@@ -36,7 +36,7 @@ class PreparedRun(NamedTuple):
     velocity: Mapping[str, Array] | None
     acceleration: Mapping[str, Array] | None
     status: Array
-    said: Sequence[str] = ()
+    remarks: Sequence[str] = ()
 
     def __repr__(self) -> str:
         return short_repr(self)
@@ -137,7 +137,7 @@ class PreparedSweep:
             status = np.zeros(len(self._solved_status), dtype=np.int8)
             status[end:] = NOT_ASSEMBLED if ending == CANNOT_BE_ASSEMBLED else DEAD
             kept = dict(values)
-            said = LateSentences(lambda: self._run_as_sweep(kept).said)
+            said = LateSentences(lambda: self._run_as_sweep(kept).remarks)
         position, wide = KeptPoints(found, self._index, 0), 2 * len(self.points)
         if not self.rates:
             return PreparedRun(position, None, None, status, said)
@@ -162,7 +162,7 @@ class PreparedSweep:
             found.velocity and _only_design(found.velocity),
             found.acceleration and _only_design(found.acceleration),
             np.asarray(found.status)[0],
-            LateSentences(lambda: found.said),
+            LateSentences(lambda: found.remarks),
         )
 
 

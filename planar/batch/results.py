@@ -101,7 +101,7 @@ class Sweep:
     __repr__ = short_repr
 
     @cached_property
-    def said(self) -> tuple[str, ...]:
+    def remarks(self) -> tuple[str, ...]:
         """What there is to say; made when it is first read."""
         return self.notes.sentences()
 

@@ -104,7 +104,7 @@ class Chain:
 def test_random_chains_of_dyads_have_the_circuits_and_branches_that_samples_join_into(seed):
     chain = Chain(seed, 1 + seed % 3)
     found = planar.circuits(chain.mechanism())
-    assert found.complete is CLAIMED, found.said
+    assert found.complete is CLAIMED, found.remarks
     assert sorted(len(each.branches) for each in found) == chain.sampled()
 
 
@@ -120,7 +120,7 @@ def test_branches_of_half_a_thousandth_of_a_radian_are_not_missed():
 def test_a_linkage_driven_through_a_larger_group_has_as_many_circuits_as_by_its_crank(seed, dyads, driven):
     chain = Chain(seed, dyads)
     found = planar.circuits(chain.mechanism(driven))
-    assert found.complete is CLAIMED, found.said
+    assert found.complete is CLAIMED, found.remarks
     assert len(found) == len(chain.sampled())
 
 
@@ -265,8 +265,8 @@ def test_what_is_not_known_is_not_claimed(name, why):
     mechanism = planar.load(name)
     found = planar.circuits(mechanism)
     assert found.complete is Completeness.NOT
-    assert "not claimed" in found.said[0]
-    assert why in found.said[0]
+    assert "not claimed" in found.remarks[0]
+    assert why in found.remarks[0]
     circuit, branch = found.of(planar.modes(mechanism, certify=False).nearest)
     assert branch in circuit.branches
     at = next(each.position for each in mechanism.inputs if each.pair == found.pair)
@@ -290,7 +290,7 @@ def test_circuits_that_come_back_from_infinity_are_not_counted():
     found = planar.circuits(planar.from_dict(random_linkage(39, 3).value))
     assert not any(each.closed for each in found)
     assert found.complete is Completeness.NOT
-    assert "without an end" in found.said[0]
+    assert "without an end" in found.remarks[0]
 
 
 def test_a_slide_without_end_is_followed_both_ways():

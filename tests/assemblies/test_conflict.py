@@ -136,7 +136,7 @@ def test_where_the_second_loop_never_closes_the_first_is_no_part_of_the_conflict
     mechanism = six_bar(30.0, 300.0)
     found = planar.conflict(mechanism)
     assert (set(found.pairs), found.inputs) == (set("CDFG"), ())
-    assert "moving the input at 'A' does not mend it" in found.said[1]
+    assert "moving the input at 'A' does not mend it" in found.remarks[1]
     assert found.positions == ()
     check_irreducible(mechanism, found)
     for turned in np.linspace(0.0, 2.0 * pi, 7):
@@ -225,7 +225,7 @@ def test_gears_in_a_ring_whose_ratios_disagree_hold_at_one_angle():
     assert (found.pairs, found.inputs) == (("ab", "bc", "ca"), ("O",))
     assert [(each.name, each.value) for each in found.positions] == [("O", pytest.approx(0.0, abs=1e-12))]
     assert found.complete is Completeness.NOT
-    assert "no proof" in found.said[1]
+    assert "no proof" in found.remarks[1]
 
 
 def broken(seed: int) -> planar.Mechanism:
@@ -294,4 +294,4 @@ def test_where_two_conflicts_stand_side_by_side_no_single_change_is_offered_and_
     found = planar.conflict(bar_linkage(frame, links, ("A", 1.7)))
     assert set(found.pairs) in ({"A", "B", "C", "D"}, {"A", "B", "E", "F"})
     assert (found.dimensions, found.positions) == ((), ())
-    assert "no change of one dimension" in found.said[-1]
+    assert "no change of one dimension" in found.remarks[-1]

@@ -19,7 +19,7 @@ def test_without_the_library_of_intervals_that_is_said(monkeypatch):
     monkeypatch.setattr("planar.assemblies.modes.find_spec", lambda name: None)
     modes = planar.modes(planar.load("four-bar"))
     assert modes.complete is Completeness.NUMERICALLY
-    assert any("planar-linkages[modes]" in sentence for sentence in modes.said)
+    assert any("planar-linkages[modes]" in sentence for sentence in modes.remarks)
 
 
 def test_a_dead_point_is_an_assembly_without_rates():

@@ -71,13 +71,13 @@ def test_a_ratio_that_is_no_float_is_counted_and_not_certified():
     modes = planar.modes(geared_five_bar({"chain": "w", "teeth": [40, 30]}, 100.0))
     assert [(group.expected, group.complete) for group in modes.groups] == [(8, Completeness.NUMERICALLY)]
     assert not any(mode.certified for mode in modes)
-    assert any("no float" in sentence for sentence in modes.said)
+    assert any("no float" in sentence for sentence in modes.remarks)
 
 
 def test_where_gears_make_the_count_huge_the_bound_is_said():
     (group,) = planar.modes(geared_five_bar({"gear": "w", "teeth": [31, 20]}, 100.0)).groups
     assert group.complete is Completeness.NOT
-    assert "up to 48620 complex ones" in group.said
+    assert "up to 48620 complex ones" in group.method
 
 
 def test_ratios_that_are_not_rational_are_searched_by_starts():

@@ -55,7 +55,7 @@ def test_whatever_the_number_of_workers_every_digit_is_the_same(backend):
     for workers in (3, None):
         found = swept(block=16, workers=workers, backend=backend)
         equal(found, alone)
-        assert (found.said, found.general) == (alone.said, alone.general)
+        assert (found.remarks, found.general) == (alone.remarks, alone.general)
 
 
 def test_mechanisms_of_any_structure_by_any_number_of_workers(monkeypatch):
@@ -66,7 +66,7 @@ def test_mechanisms_of_any_structure_by_any_number_of_workers(monkeypatch):
     mixed = [four_bar(*ROCKER, 0.8), MODELS["004-QR"], *pinned(3), MODELS["double-butterfly"], MODELS["slider-crank"]]
     for mechanisms in (mixed, pinned()):
         alone, found = (planar.sweep_each(mechanisms, STEPS, workers=workers) for workers in (1, 3))
-        assert found.said == alone.said
+        assert found.remarks == alone.remarks
         for one, other in zip(found, alone, strict=True):
             equal(one, other)
 
@@ -197,7 +197,7 @@ def test_reductions_are_what_numpy_makes_of_the_whole():
         np.testing.assert_array_equal(np.isnan(found[measure]).reshape(len(closed), -1).any(axis=1), ~closed)
     np.testing.assert_array_equal(found.status, whole.status[:, -1])
     np.testing.assert_array_equal(found.whole, closed)
-    assert (found.said, found.general) == (whole.said, whole.general)
+    assert (found.remarks, found.general) == (whole.remarks, whole.general)
 
 
 def test_the_area_is_that_within_the_closed_curve():
@@ -318,7 +318,7 @@ def test_mechanisms_are_taken_as_they_are_needed_and_only_reductions_are_kept(mo
         np.testing.assert_allclose(found["speed"][k], [np.nanmin(speed), np.nanmax(speed)], rtol=1e-9)
     np.testing.assert_array_equal(found["whole"], wanted.whole)
     np.testing.assert_array_equal(found.whole, wanted.whole)
-    assert found.said == wanted.said
+    assert found.remarks == wanted.remarks
     both = [planar.sweep_each(mechanisms(), STEPS, reduce=reduce, workers=workers)["box"] for workers in (1, 3)]
     np.testing.assert_array_equal(*both)
 

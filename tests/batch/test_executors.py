@@ -36,7 +36,7 @@ def agree(found, wanted):
     np.testing.assert_array_equal(found.input, wanted.input)
     # how many positions are left to the general path hangs on which designs run side by side
     assert (found.general > 0) is (wanted.general > 0)
-    mine, here = ([re.sub(r"\d+ positions", "positions", each) for each in of.said] for of in (found, wanted))
+    mine, here = ([re.sub(r"\d+ positions", "positions", each) for each in of.remarks] for of in (found, wanted))
     assert mine == here
 
 

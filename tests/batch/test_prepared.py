@@ -52,7 +52,7 @@ def test_a_design_that_stops_says_so():
     long = 3.0 * design_variables(mechanism)[crank].value
     found, swept = ready({crank: long}), planar.sweep(mechanism, {crank: [long]}, 60)
     assert found.status[-1] != 0
-    assert found.said == swept.said
+    assert found.remarks == swept.remarks
     agree(found, swept, ready.points)
 
 

@@ -94,8 +94,8 @@ def test_what_a_failing_design_says_is_what_a_sweep_says():
         values = {"AB.length": length}
         assert agree_with_general_path(ready, values)
         found, swept = ready(values), planar.sweep(mechanism, values, 60)
-        assert found.said == swept.said
-        assert pickle.loads(pickle.dumps(found)).said == swept.said
+        assert found.remarks == swept.remarks
+        assert pickle.loads(pickle.dumps(found)).remarks == swept.remarks
         np.testing.assert_array_equal(np.isnan(found.position["C"]), np.isnan(swept.position["C"][0]))
 
 

@@ -34,7 +34,7 @@ def same(found, wanted):
         np.testing.assert_array_equal(getattr(found, order)["E"][:], getattr(wanted, order)["E"])
     np.testing.assert_array_equal(found.status[:], wanted.status)
     np.testing.assert_array_equal(found.input, wanted.input)
-    assert (found.general, found.said) == (wanted.general, wanted.said)
+    assert (found.general, found.remarks) == (wanted.general, wanted.remarks)
 
 
 def test_a_store_has_what_memory_has(store):
@@ -71,9 +71,9 @@ def equal(found, wanted, again=None):
     for one, other in ((found.position["E"], wanted.position["E"]), (found.status, wanted.status)):
         np.testing.assert_array_equal(one[:], other)
     np.testing.assert_array_equal(found.input, wanted.input)
-    said = tuple(each for each in found.said if not each.endswith("not whole, and solved again"))
-    assert (found.general, said) == (wanted.general, wanted.said)
-    assert again is None or found.said[len(said) :] == again
+    said = tuple(each for each in found.remarks if not each.endswith("not whole, and solved again"))
+    assert (found.general, said) == (wanted.general, wanted.remarks)
+    assert again is None or found.remarks[len(said) :] == again
 
 
 def flip(path):

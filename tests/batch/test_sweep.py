@@ -87,7 +87,7 @@ def test_every_design_is_the_cycle_of_the_mechanism_so_changed(name):
     allowed = 1e-8 if name == "through change points" else 1e-10
     assert cycles(mechanism, designs, result, 48, mechanism.inputs[0].pair) < allowed
     assert general is None or result.general == general
-    assert (result.general > 0 or not result.whole.all()) == bool(result.said)
+    assert (result.general > 0 or not result.whole.all()) == bool(result.remarks)
 
 
 def test_one_of_several_inputs_runs_and_the_others_stand_where_each_design_has_them():
@@ -169,7 +169,7 @@ def test_designs_that_cannot_turn_are_refused_exactly_where_they_must_be():
     assert result.velocity is None
     assert result.acceleration is None
     assert 100 < result.whole.sum() < 400
-    assert any("dead point" in told for told in result.said)
+    assert any("dead point" in told for told in result.remarks)
     # the assembly nearest to the sketch
     sketch = np.array([each[1:] for each in four_bar(*ROCKER, first).sketch])[0]
     for k in np.flatnonzero(closes[:, 0])[:200]:
@@ -223,7 +223,7 @@ def test_what_a_backend_does_not_let_pass_is_solved_all_the_same_and_counted(mon
     monkeypatch.setattr("planar.batch.block.closed_form_designs", lambda *_: None)
     found = planar.sweep(mechanism, designs, 30, "E", rates=rates, backend="numpy")
     assert found.general == 24 + 30
-    assert found.said == ("2 of 6 designs went to the general path, which solved 54 positions",)
+    assert found.remarks == ("2 of 6 designs went to the general path, which solved 54 positions",)
     np.testing.assert_allclose(found.position["E"], wanted.position["E"], atol=1e-13)
     if rates:
         np.testing.assert_allclose(found.acceleration["E"], wanted.acceleration["E"], atol=1e-11)
@@ -266,7 +266,7 @@ def test_designs_in_blocks_are_the_designs_together():
     whole = planar.sweep(mechanism, designs, 20, "E")
     np.testing.assert_allclose(parts.acceleration["E"], whole.acceleration["E"], rtol=1e-9)
     np.testing.assert_array_equal(parts.status, whole.status)
-    assert parts.said == whole.said
+    assert parts.remarks == whole.remarks
     assert told == [(3, 7), (6, 7), (7, 7)]
     assert len(parts) == 7
 
@@ -321,7 +321,7 @@ def test_a_design_that_is_no_linkage_at_all_is_refused_and_the_others_are_not():
         Outcome.CANNOT_BE_ASSEMBLED,
         Outcome.SOLVED,
     ]
-    assert "does not close" in " ".join(result.said)
+    assert "does not close" in " ".join(result.remarks)
 
 
 def test_wheels_that_do_not_mesh_are_refused_design_by_design():

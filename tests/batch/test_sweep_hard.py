@@ -155,7 +155,7 @@ def test_a_block_that_comes_to_the_pole_of_its_arm_has_the_rates_of_a_cycle(left
     assert swept.velocity["E"][1] == pytest.approx(alone, rel=1e-6, nan_ok=True)
     assert np.isnan(alone[100]).all() == (left < 1e-4)
     told = "1 of 2 designs: rates are missing or have few digits (the first: 1 row without rates"
-    assert any(each.startswith(told) for each in swept.said) == (left < 1e-4)
+    assert any(each.startswith(told) for each in swept.remarks) == (left < 1e-4)
 
 
 def test_a_design_much_larger_than_the_base_is_judged_by_its_own_size():
@@ -171,7 +171,7 @@ def test_a_sweep_says_how_many_designs_have_few_digits(coupler, told):
     ends = {"start": np.pi / 3.0 - coupler / 10.0, "stop": np.pi / 3.0 + coupler / 10.0}
     designs = {"coupler.length": np.array([0.5, coupler, coupler])}
     swept = planar.sweep(bare_four_bar(1.0, 0.5, 1.0, 1.0, np.pi / 3.0), designs, 4, **ends)
-    found = [each for each in swept.said if each.startswith("2 of 3 designs: ")]
+    found = [each for each in swept.remarks if each.startswith("2 of 3 designs: ")]
     assert [told in each for each in found] == ([True] if told else [])
     assert swept.whole.tolist() == [True, *[told != "too inexact"] * 2]
     assert np.isnan(swept.position["C"][1:]).all() == (told == "too inexact")
@@ -181,7 +181,7 @@ def test_a_sweep_of_mechanisms_says_how_many_lack_rates():
     turned = [crank_and_slotted_arm(each).with_values({"O.position": -np.pi}) for each in (0.8, 1.0 - 1e-6)]
     found = planar.sweep_each(turned, 200)
     assert found[1].reason.startswith("1 row without rates")
-    assert any(each.startswith("1 mechanism: rates are missing or have few digits") for each in found.said)
+    assert any(each.startswith("1 mechanism: rates are missing or have few digits") for each in found.remarks)
 
 
 @pytest.mark.parametrize("far", [1e5, 1e9])

@@ -102,7 +102,7 @@ def test_mixed_mechanisms_are_the_cycles_of_each(backend):
     ]
     result = planar.sweep_each(mechanisms, 60, backend=backend)
     assert result.general == 0
-    assert result.said == ()
+    assert result.remarks == ()
     assert result.whole.all()
     for mechanism, found in zip(mechanisms, result, strict=True):
         as_cycle(mechanism, found, 60, result.outcomes)
@@ -301,7 +301,7 @@ def test_what_the_general_path_does_is_counted_and_said():
     result = planar.sweep_each(mechanisms, 12)
     assert [each.general for each in result] == [False, True, True, True, True]
     assert (result.general, result.sent) == (4 * 13, 4)
-    assert "4 of 5 mechanisms" in result.said[0]
+    assert "4 of 5 mechanisms" in result.remarks[0]
     for mechanism, found in zip(mechanisms, result, strict=True):
         as_cycle(mechanism, found, 12, result.outcomes)
 

@@ -124,11 +124,11 @@ def test_sentences_are_made_when_they_are_read(monkeypatch):
     monkeypatch.setattr("planar.batch.block.solve_design", counted)
     found = planar.sweep(four_bar(CRANK, COUPLER, ROCKER, GROUND, FIRST), random_four_bars(100)[1], 200, rates=False)
     assert not asked
-    dead, open_ = found.said[::-1]
+    dead, open_ = found.remarks[::-1]
     assert len(asked) == 2
     assert "dead point (the first: " in dead
     assert "cannot be assembled (the first: " in open_
-    assert found.said == (open_, dead)
+    assert found.remarks == (open_, dead)
     assert len(asked) == 2
 
 
@@ -140,4 +140,4 @@ def test_stores_tell_where_designs_end(tmp_path, ending, library):
     for _ in range(2):
         found = planar.sweep(mechanism, designs, 30, "E", rates=False, block=16, store=tmp_path / f"sweep.{ending}")
         np.testing.assert_array_equal(np.asarray(found.dead_point), wanted.dead_point)
-        assert found.said == wanted.said
+        assert found.remarks == wanted.remarks

@@ -149,7 +149,7 @@ def test_random_linkages_of_dyads_are_c_by_hand_and_numpys_closed_form(limit):
     for entry in mixed.entries()[:3]:
         told = entry.solve()
         for k in range(mixed.many):
-            exact = dyadic.closed(mixed.tape, mixed.turned, k, entry.rates)
+            exact = dyadic.closed_form(mixed.tape, mixed.turned, k, entry.rates)
             found = entry.read(told, k)
             assert np.array_equal(np.isnan(found[:, :2]), np.isnan(exact[:, :2]))
             gone = np.isnan(exact).any(axis=(0, 1))
@@ -162,10 +162,10 @@ def test_random_linkages_of_dyads_are_c_by_hand_and_numpys_closed_form(limit):
 
 
 def test_random_linkages_go_round_but_for_those_whose_last_dyad_stops():
-    tape = dyadic.drawn(40, True)
+    tape = dyadic.random_tape(40, True)
     counts = np.diff(tape.first)
     assert (counts.min(), counts.max()) >= (dyadic.FEWEST, 15) and counts.max() <= dyadic.MOST
-    gone = [np.isnan(dyadic.closed(tape, angles(400) - THETA, k, rates=False)).any(axis=(1, 2)) for k in range(40)]
+    gone = [np.isnan(dyadic.closed_form(tape, angles(400) - THETA, k, rates=False)).any(axis=(1, 2)) for k in range(40)]
     # only the last joint is not there
     assert not any(each[:-1].any() for each in gone)
     assert 0 < sum(each[-1] for each in gone) < 12
@@ -198,7 +198,7 @@ def test_long_linkages_go_round_in_c_by_hand(limit, make):
     linkage = make(40)
     assert linkage.links in (40, 41)
     turned = 2.0 * np.pi * np.linspace(0.0, 1.0, 61)
-    exact = dyadic.closed(linkage.tape, turned, 0, rates=True)
+    exact = dyadic.closed_form(linkage.tape, turned, 0, rates=True)
     assert np.isfinite(exact).all()
     np.testing.assert_allclose(exact[:, :2, 0], linkage.places, atol=1e-12)
     np.testing.assert_allclose(limit.tape(linkage.tape, turned, RATES)(), exact, atol=1e-9 * np.abs(exact).max())
@@ -235,7 +235,7 @@ def test_long_chains_of_triads_go_round():
 
 def test_code_is_printed_and_compiled_by_one_process_and_read_by_another():
     pytest.importorskip("llvmlite")
-    first = compiling._told("four-bar")
+    first = compiling._measure_structure("four-bar")
     assert min(first.printing, first.compiling, first.reading) > 0.0
     assert first.reading < first.compiling
 

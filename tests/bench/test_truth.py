@@ -2,8 +2,8 @@
 
 import pytest
 
-from benchmarks.truth.draws import KINDS, drawn
-from benchmarks.truth.judge import agrees, verdicts
+from benchmarks.truth.comparison import agrees, compare_case
+from benchmarks.truth.random_cases import KINDS, random_case
 
 SEEDS = {"four-bars": 3, "models": 11, "linkages": 1037}
 """Of 1037 the sketch does not tell the assemblies apart."""
@@ -11,7 +11,7 @@ SEEDS = {"four-bars": 3, "models": 11, "linkages": 1037}
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_all_ways_tell_the_same(kind):
-    found = verdicts(drawn(kind, SEEDS.get(kind, 2)))
+    found = compare_case(random_case(kind, SEEDS.get(kind, 2)))
     ways = {each.way for each in found}
     assert {"sweep, native", "sweep, numpy", "prepared", "sweep_each, native", "sweep_each, numpy"} <= ways
     assert [each for each in found if not agrees(each)] == []

@@ -80,7 +80,7 @@ class CircuitSearchResult(NamedTuple):
     critical: tuple[float, ...]
     intervals: tuple[InputInterval, ...]
     complete: Completeness
-    said: tuple[str, ...]
+    remarks: tuple[str, ...]
 
 
 def is_same_assembly(solver: PositionSolver, one: Array, others: Array) -> Array:

@@ -92,13 +92,13 @@ class Circuits(Displayable, Sequence[Circuit]):
 
     `critical`: positions of the input (rad from 0 to 2 pi, or m) at which assemblies meet: dead points, and where
     branches cross; `intervals`: the input's range cut there; `complete`: whether the number of circuits is claimed;
-    `said`: how they were found, and what is not claimed.
+    `remarks`: how they were found, and what is not claimed.
     """
 
     def __init__(self, mechanism: Mechanism, pair: str):
         found = CircuitSearch(mechanism, pair).find_circuits()
         self.mechanism, self.pair = mechanism, pair
-        self.critical, self.complete, self.said = found.critical, found.complete, found.said
+        self.critical, self.complete, self.remarks = found.critical, found.complete, found.remarks
         self.intervals: tuple[InputInterval, ...] = found.intervals
         self._found = tuple(self._circuit(number, *each) for number, each in enumerate(found.circuits, start=1))
 

@@ -23,7 +23,7 @@ class BlockRoots(NamedTuple):
     turns, the least; `double`: (roots,) where two meet, at a dead point; `certified`: (roots,) whether a box of its own
     is proved to hold each; `expected`: complex solutions at finite places that the structure has, None where no number
     is known; `found`: those that were found, as often as they count; `curve`: whether a whole curve of assemblies is
-    there, or several, of each of which `real` has one place at least; `said`: how it was solved.
+    there, or several, of each of which `real` has one place at least; `method`: how it was solved.
     """
 
     real: Array

@@ -161,14 +161,14 @@ class SweptList:
 class Each(Sequence[Swept]):
     """Every mechanism of a sweep, in the order in which they were given; one is read when it is asked for.
 
-    `general`: how many positions the general path solved, of how many mechanisms (`sent`). `said`: what there is to
+    `general`: how many positions the general path solved, of how many mechanisms (`sent`). `remarks`: what there is to
     say. `outcomes`: what the numbers of a status stand for.
     """
 
     _parts: tuple[SweptPart, ...]
     general: int
     sent: int
-    said: tuple[str, ...]
+    remarks: tuple[str, ...]
     outcomes: tuple[Outcome, ...] = tuple(Outcome)
 
     __repr__ = short_repr

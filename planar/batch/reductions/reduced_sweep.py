@@ -55,7 +55,7 @@ class ReducedSweep(Mapping[str, Array]):
     __repr__ = short_repr
 
     @cached_property
-    def said(self) -> tuple[str, ...]:
+    def remarks(self) -> tuple[str, ...]:
         """What there is to say; made when it is first read."""
         return self.notes.sentences() if isinstance(self.notes, SweepNotes) else self.notes
 

@@ -149,7 +149,7 @@ def _sheet_figure(
 def _caption_sentences(circuits: Circuits) -> list[str]:
     return [
         f"{count_phrase(len(circuits), 'circuit')}, {circuits.complete.value}.",
-        *(f"{each[:1].upper()}{each[1:]}." for each in circuits.said),
+        *(f"{each[:1].upper()}{each[1:]}." for each in circuits.remarks),
     ]
 
 

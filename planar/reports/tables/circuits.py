@@ -25,7 +25,7 @@ def table(circuits: Circuits, modes: Modes) -> RenderableType:
     """How many circuits there are, where each branch begins and ends, and where the assemblies at the input lie."""
     head = [Text(circuits.mechanism.name, style="bold"), Text(_running_text(circuits)), Text(count_text(circuits))]
     lying = locate_assemblies(circuits, modes)
-    told = list(circuits.said)
+    told = list(circuits.remarks)
     if len(lying) == MAX_LOCATED:
         told.append(f"of the assemblies here the first {MAX_LOCATED} are located")
     lost = [str(each.mode.number) for each in lying if each.circuit is None]
@@ -166,5 +166,5 @@ def record(circuits: Circuits, modes: Modes) -> dict[str, Any]:
             }
             for circuit in circuits
         ],
-        "remarks": [*circuits.said],
+        "remarks": [*circuits.remarks],
     }

@@ -24,7 +24,7 @@ def conflict_table(conflict: Conflict, runs: Sequence[Circuits]) -> RenderableTy
     head = [Text(conflict.mechanism.name, style="bold"), Text(), Text("Why it does not go together", style="bold")]
     parts: list[RenderableType] = [
         *head,
-        paragraphs((" -", each) for each in (*conflict.said, *map(_range_sentence, runs))),
+        paragraphs((" -", each) for each in (*conflict.remarks, *map(_range_sentence, runs))),
     ]
     changes = (*conflict.dimensions, *conflict.positions)
     if changes:
@@ -57,7 +57,7 @@ def conflict_record(conflict: Conflict, runs: Sequence[Circuits]) -> dict[str, A
             run.pair: {"intervals": [list(each) for each in run.assembles], "complete": run.complete.value}
             for run in runs
         },
-        "remarks": [*conflict.said],
+        "remarks": [*conflict.remarks],
     }
 
 

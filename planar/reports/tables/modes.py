@@ -35,7 +35,7 @@ def table(modes: Modes, limit: int, points: Sequence[str] = (), circuits: Circui
     shown = list(islice(modes, limit))
     head = [Text(mechanism.name, style="bold"), Text(_inputs_text(modes)), Text(count_text(modes, len(shown)))]
     names = _check_points(modes, points) if points else _distinguishing_points(modes, shown)
-    told = [*modes.said]
+    told = [*modes.remarks]
     rest = [name for name in _moving_points(modes) if name not in names]
     if rest and not points:
         more = [*rest[:MAX_LISTED_NAMES], "more"] if len(rest) > MAX_LISTED_NAMES else rest
@@ -217,5 +217,5 @@ def record(modes: Modes, limit: int, circuits: Circuits | None = None) -> dict[s
             }
             for mode in shown
         ],
-        "remarks": [*modes.said],
+        "remarks": [*modes.remarks],
     }

@@ -1,4 +1,4 @@
-"""Random cases: a mechanism, and designs of it whose dimensions are drawn widely, so that many do not go together."""
+"""Random cases: a mechanism, and designs of it whose dimensions are drawn widely; many do not go together."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from tests.linkages import random_linkage
 Array = np.ndarray
 
 DESIGNS = 8
-"""Of a case."""
+"""Of a case, unless asked otherwise."""
 WIDTHS = (0.01, 0.1, 0.3, 0.8)
 """The logarithm of a dimension's factor lies between minus this and this."""
 STEPS = (24, 60, 200)
@@ -48,8 +48,8 @@ class Case:
         return len(next(iter(self.designs.values())))
 
 
-def drawn(kind: str, seed: int) -> Case | None:
-    """The case of a kind and seed, always the same; None where what is drawn is no mechanism that runs."""
+def random_case(kind: str, seed: int, designs: int = DESIGNS) -> Case | None:
+    """The case of a kind, seed and count of designs, always the same; None where what is drawn does not run."""
     rng = np.random.default_rng([seed, *kind.encode()])
     try:
         mechanism = KINDS[kind](seed)
@@ -58,18 +58,22 @@ def drawn(kind: str, seed: int) -> Case | None:
     if not mechanism.inputs or not design_variables(mechanism):
         return None
     pair = mechanism.inputs[int(rng.integers(len(mechanism.inputs)))].pair
-    designs = _box(rng) if kind == "four-bars" else _scaled(rng, mechanism, float(rng.choice(WIDTHS)))
-    return Case(kind, seed, mechanism, pair, designs, int(rng.choice(STEPS)), bool(rng.random() < 0.7))
+    values = (
+        _draw_box(rng, designs)
+        if kind == "four-bars"
+        else _scale_dimensions(rng, mechanism, float(rng.choice(WIDTHS)), designs)
+    )
+    return Case(kind, seed, mechanism, pair, values, int(rng.choice(STEPS)), bool(rng.random() < 0.7))
 
 
-def _scaled(rng: np.random.Generator, mechanism: Mechanism, width: float) -> dict[str, Array]:
+def _scale_dimensions(rng: np.random.Generator, mechanism: Mechanism, width: float, designs: int) -> dict[str, Array]:
     """Every length in times of itself, coordinates moved too; in one case of four the inputs' positions as well."""
     known = design_variables(mechanism)
     size = max((abs(each.value) for each in known.values() if each.kind == "length"), default=1.0)
     turned, found = rng.random() < 0.25, {}
     for name, each in known.items():
-        factor = np.exp(rng.uniform(-width, width, DESIGNS))
-        off = width * rng.normal(size=DESIGNS)
+        factor = np.exp(rng.uniform(-width, width, designs))
+        off = width * rng.normal(size=designs)
         if each.kind == "length":
             shifted = 0.1 * size * off if name.endswith((".x", ".y")) else 0.0
             found[name] = each.value * factor + shifted
@@ -78,8 +82,8 @@ def _scaled(rng: np.random.Generator, mechanism: Mechanism, width: float) -> dic
     return found
 
 
-def _box(rng: np.random.Generator) -> dict[str, Array]:
-    lengths = rng.uniform(*BOX, (4, DESIGNS))
+def _draw_box(rng: np.random.Generator, designs: int) -> dict[str, Array]:
+    lengths = rng.uniform(*BOX, (4, designs))
     return dict(zip(("AB.length", "BC.length", "DC.length", "AD.D.x"), lengths, strict=True))
 
 

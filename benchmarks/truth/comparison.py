@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 import planar
-from benchmarks.truth.draws import Case
+from benchmarks.truth.random_cases import Case
 from planar.batch.design_arrays import design_variables, values_of_design, with_design_values
 from planar.batch.general_path import OUTCOMES, solve_design
 from planar.batch.reference_design import ReferenceDesign
@@ -28,14 +28,14 @@ ROUND_OFF = 1e-11
 """Or by this part of the greatest number of its order."""
 FAR = 1e-4
 """Positions that differ by this part of the size are another assembly, or another branch."""
-SECONDS = 30
-"""A way that takes longer over one case is given up, which is counted."""
-TRUE = "general path"
+SECONDS = 4
+"""Of processor time: a way that takes longer over a design, on average of its case, is given up, which is counted."""
+GENERAL_PATH = "general path"
 """The way that the others are compared with; its verdicts say how designs end."""
 SAME, UNDECIDED = "the same", "undecided"
 
 
-class Told(NamedTuple):
+class DesignResult(NamedTuple):
     """Of one design: numbers (steps + 1, x and y of points, then rates; m, s), and status (steps + 1,)."""
 
     out: Array
@@ -43,7 +43,7 @@ class Told(NamedTuple):
 
 
 class Verdict(NamedTuple):
-    """What a way told of one design of a case, in words, with what there is to say of it."""
+    """What a way gives for one design of a case, in words, with what there is to say of it."""
 
     kind: str
     seed: int
@@ -62,24 +62,24 @@ class Truth:
         self.mechanism = replace(case.mechanism, inputs=given)
         self.reference = ReferenceDesign(self.mechanism, case.pair)
         self.points = self.reference.select_points(None)
-        self.known: dict[int, Told] = {}
-        self.near: dict[int, list[Told]] = {}
+        self.results: dict[int, DesignResult] = {}
+        self.perturbed_results: dict[int, list[DesignResult]] = {}
 
-    def told(self, design: int) -> Told:
+    def result(self, design: int) -> DesignResult:
         """The design as it is."""
-        if design not in self.known:
-            self.known[design] = self._solved(values_of_design(self.case.designs, design))
-        return self.known[design]
+        if design not in self.results:
+            self.results[design] = self._solve(values_of_design(self.case.designs, design))
+        return self.results[design]
 
-    def perturbed(self, design: int) -> list[Told]:
+    def perturbed(self, design: int) -> list[DesignResult]:
         """The design with all of its dimensions a little changed, in different ways."""
-        if design not in self.near:
+        if design not in self.perturbed_results:
             own = {
                 name: each.value
                 for name, each in design_variables(self.reference.mechanism).items()
                 if each.kind == "length" or name.endswith(".position")
             } | values_of_design(self.case.designs, design)
-            rng, self.near[design] = np.random.default_rng(design), []
+            rng, self.perturbed_results[design] = np.random.default_rng(design), []
             size = max(map(abs, own.values()))
             for _ in range(TRIES):
                 # in coordinates that vanish as well
@@ -88,10 +88,10 @@ class Truth:
                     for name, value in own.items()
                     if not name.endswith(".position")
                 }
-                self.near[design].append(self._solved(own | changed))
-        return self.near[design]
+                self.perturbed_results[design].append(self._solve(own | changed))
+        return self.perturbed_results[design]
 
-    def _solved(self, values: dict[str, float]) -> Told:
+    def _solve(self, values: dict[str, float]) -> DesignResult:
         case, reference = self.case, self.reference
         mechanism = with_design_values(reference.mechanism, values)
         start = float(mechanism.inputs[reference.running_index].position)
@@ -100,16 +100,16 @@ class Truth:
             grid = start + 2.0 * np.pi * np.linspace(0.0, 1.0, case.steps + 1)
             ends = float(grid[0]), float(grid[-1])
         found = solve_design(mechanism, reference.pair, grid, case.steps, ends, self.points, case.rates)
-        return Told(found.out, found.status)
+        return DesignResult(found.out, found.status)
 
     @cached_property
-    def ways(self) -> dict[str, Callable[[], list[Told]]]:
+    def ways(self) -> dict[str, Callable[[], list[DesignResult]]]:
         """Every other way to solve the case."""
         backends = ["native", "numpy"] if find_spec("llvmlite") else ["numpy"]
         return {
             **{f"sweep, {backend}": lambda backend=backend: self._sweep(backend) for backend in backends},
             "prepared": self._prepared,
-            **{f"sweep_each, {backend}": lambda backend=backend: self._each(backend) for backend in backends},
+            **{f"sweep_each, {backend}": lambda backend=backend: self._sweep_each(backend) for backend in backends},
         }
 
     def order(self, column: int) -> str:
@@ -120,83 +120,84 @@ class Truth:
         """Of which point a column of the numbers is."""
         return self.points[column % (2 * len(self.points)) // 2]
 
-    def _sweep(self, backend: str) -> list[Told]:
+    def _sweep(self, backend: str) -> list[DesignResult]:
         case = self.case
         found = planar.sweep(
             self.mechanism, case.designs, case.steps, rates=case.rates, pair=case.pair, backend=backend
         )
-        return [self._told(found, np.asarray(found.status)[k], k) for k in range(len(case))]
+        return [self._result_of(found, np.asarray(found.status)[k], k) for k in range(len(case))]
 
-    def _prepared(self) -> list[Told]:
+    def _prepared(self) -> list[DesignResult]:
         case = self.case
         ready = planar.prepared(self.mechanism, case.steps, rates=case.rates, pair=case.pair)
         found = [ready(values_of_design(case.designs, k)) for k in range(len(case))]
-        return [self._told(each, each.status, None) for each in found]
+        return [self._result_of(each, each.status, None) for each in found]
 
-    def _each(self, backend: str) -> list[Told]:
+    def _sweep_each(self, backend: str) -> list[DesignResult]:
         case = self.case
         mechanisms = [with_design_values(self.mechanism, values_of_design(case.designs, k)) for k in range(len(case))]
         found = planar.sweep_each(mechanisms, case.steps, rates=case.rates, pair=case.pair, backend=backend)
-        return [self._told(each, each.status, None) for each in found]
+        return [self._result_of(each, each.status, None) for each in found]
 
-    def _told(self, found: Any, status: Array, design: int | None) -> Told:
+    def _result_of(self, found: Any, status: Array, design: int | None) -> DesignResult:
         orders = (found.position, found.velocity, found.acceleration)[: 3 if self.case.rates else 1]
         rows = [order[name] if design is None else order[name][design] for order in orders for name in self.points]
         out = np.hstack(rows) if rows else np.zeros((len(status), 0))
-        return Told(np.array(out), np.array(status))
+        return DesignResult(np.array(out), np.array(status))
 
 
 def agrees(verdict: Verdict) -> bool:
-    """Whether nothing is wrong with what was told."""
-    return verdict.way == TRUE or verdict.what in (SAME, UNDECIDED)
+    """Whether nothing is wrong with what a way gives."""
+    return verdict.way == GENERAL_PATH or verdict.what in (SAME, UNDECIDED)
 
 
-def verdicts(case: Case) -> list[Verdict]:
-    """What every way told of every design."""
+def compare_case(case: Case) -> list[Verdict]:
+    """The verdicts over every way and every design."""
+    seconds = SECONDS * len(case)
     try:
         truth = Truth(case)
-        with limited(SECONDS):
+        with time_limit(seconds):
             for design in range(len(case)):
-                truth.told(design)
+                truth.result(design)
     except planar.BadInput:
         return []
     except TimeoutError:
-        return [Verdict(case.kind, case.seed, 0, f"{TRUE}, too long", "given up", f"after {SECONDS} s")]
+        return [Verdict(case.kind, case.seed, 0, f"{GENERAL_PATH}, too long", "given up", f"after {seconds} s")]
     found = [
-        Verdict(case.kind, case.seed, design, TRUE, OUTCOMES[truth.told(design).status[-1]].value)
+        Verdict(case.kind, case.seed, design, GENERAL_PATH, OUTCOMES[truth.result(design).status[-1]].value)
         for design in range(len(case))
     ]
     for way, solve in truth.ways.items():
         try:
-            with limited(SECONDS):
-                told = solve()
+            with time_limit(seconds):
+                results = solve()
         except TimeoutError:
-            found.append(Verdict(case.kind, case.seed, 0, way, "given up", f"after {SECONDS} s"))
+            found.append(Verdict(case.kind, case.seed, 0, way, "given up", f"after {seconds} s"))
             continue
         except Exception as problem:
             what = f"raises {type(problem).__name__}"
             found.append(Verdict(case.kind, case.seed, 0, way, what, str(problem)[:200]))
             continue
-        for design, each in enumerate(told):
-            what, detail = judged(truth, design, each)
+        for design, each in enumerate(results):
+            what, detail = compare_design(truth, design, each)
             found.append(Verdict(case.kind, case.seed, design, way, what, detail))
     return found
 
 
-def judged(truth: Truth, design: int, told: Told) -> tuple[str, str]:
-    """What there is to say of what was told of a design, and where."""
-    true = truth.told(design)
-    what, detail = _difference(truth, true, told, None)
+def compare_design(truth: Truth, design: int, other: DesignResult) -> tuple[str, str]:
+    """How the result of a design differs from that of the general path, and where."""
+    true = truth.result(design)
+    what, detail = _difference(truth, true, other, None)
     if what == SAME:
         return what, detail
     near = truth.perturbed(design)
-    if any(_flips(truth, true, each) for each in near):
+    if any(_is_another(truth, true, each) for each in near):
         return UNDECIDED, f"{what}: {detail}"
     reach = np.max([np.abs(each.out - true.out) for each in near], axis=0)
-    return _difference(truth, true, told, reach * (ALLOWED / PERTURBED))
+    return _difference(truth, true, other, reach * (ALLOWED / PERTURBED))
 
 
-def _flips(truth: Truth, true: Told, other: Told) -> bool:
+def _is_another(truth: Truth, true: DesignResult, other: DesignResult) -> bool:
     """Whether a status, a missing number or an assembly is another one."""
     if not np.array_equal(true.status, other.status):
         return True
@@ -207,25 +208,25 @@ def _flips(truth: Truth, true: Told, other: Told) -> bool:
     return bool(np.any(off > FAR * truth.reference.unit))
 
 
-def _difference(truth: Truth, true: Told, told: Told, reach: Array | None) -> tuple[str, str]:
+def _difference(truth: Truth, true: DesignResult, other: DesignResult, reach: Array | None) -> tuple[str, str]:
     """The greatest difference in words; numbers may be off by round-off, and by `reach`."""
-    if told.out.shape != true.out.shape:
-        return "other shapes", f"{told.out.shape} for {true.out.shape}"
-    if not np.array_equal(told.status, true.status):
-        row = int(np.argmax(told.status != true.status))
-        is_, should = OUTCOMES[told.status[row]].value, OUTCOMES[true.status[row]].value
+    if other.out.shape != true.out.shape:
+        return "other shapes", f"{other.out.shape} for {true.out.shape}"
+    if not np.array_equal(other.status, true.status):
+        row = int(np.argmax(other.status != true.status))
+        is_, should = OUTCOMES[other.status[row]].value, OUTCOMES[true.status[row]].value
         return f"status {is_!r} for {should!r}", f"from row {row} of {len(true.status) - 1}"
-    gone, must = np.isnan(told.out), np.isnan(true.out)
+    gone, must = np.isnan(other.out), np.isnan(true.out)
     if not np.array_equal(gone, must):
         row, column = map(int, np.argwhere(gone != must)[0])
-        what = "missing" if gone[row, column] else "told though not determined"
+        what = "missing" if gone[row, column] else "given though not determined"
         return f"{truth.order(column)} {what}", f"row {row}, point {truth.point(column)}"
-    return _distance(truth, np.where(must, 0.0, true.out), np.where(must, 0.0, told.out), reach)
+    return _distance(truth, np.where(must, 0.0, true.out), np.where(must, 0.0, other.out), reach)
 
 
-def _distance(truth: Truth, true: Array, told: Array, reach: Array | None) -> tuple[str, str]:
+def _distance(truth: Truth, true: Array, other: Array, reach: Array | None) -> tuple[str, str]:
     """The greatest difference of numbers that both have."""
-    off, wide = np.abs(told - true), 2 * len(truth.points)
+    off, wide = np.abs(other - true), 2 * len(truth.points)
     if off.size == 0:
         return SAME, ""
     scale = np.empty_like(off)
@@ -239,7 +240,7 @@ def _distance(truth: Truth, true: Array, told: Array, reach: Array | None) -> tu
     if off[worst] <= allowed[worst]:
         return SAME, ""
     row, column = map(int, worst)
-    where = f"row {row}, point {truth.point(column)}: {told[worst]:.17g} for {true[worst]:.17g}"
+    where = f"row {row}, point {truth.point(column)}: {other[worst]:.17g} for {true[worst]:.17g}"
     far = np.any(off[:, :wide] > FAR * truth.reference.unit, axis=1)
     if far.any():
         first = int(np.argmax(far))
@@ -248,19 +249,19 @@ def _distance(truth: Truth, true: Array, told: Array, reach: Array | None) -> tu
 
 
 @contextmanager
-def limited(seconds: int) -> Iterator[None]:
-    """TimeoutError after so many seconds, where the system can interrupt."""
-    if not hasattr(signal, "SIGALRM"):
+def time_limit(seconds: int) -> Iterator[None]:
+    """TimeoutError after so many seconds of processor time, where the system can interrupt."""
+    if not hasattr(signal, "SIGPROF"):
         yield
         return
 
     def stop(*_: object) -> None:
         raise TimeoutError
 
-    before = signal.signal(signal.SIGALRM, stop)
-    signal.alarm(seconds)
+    before = signal.signal(signal.SIGPROF, stop)
+    signal.setitimer(signal.ITIMER_PROF, seconds)
     try:
         yield
     finally:
-        signal.alarm(0)
-        signal.signal(signal.SIGALRM, before)
+        signal.setitimer(signal.ITIMER_PROF, 0)
+        signal.signal(signal.SIGPROF, before)
