@@ -123,6 +123,8 @@ def dimensions(mechanism: Mechanism) -> dict[str, float]:
 def change_dimension(mechanism: Mechanism, dimension: Dimension, value: Any) -> Mechanism:
     """The mechanism with this number at another value (SI), or at an array or a symbol, unchecked."""
     where, index, *rest = dimension.address
+    if where == "stops" and rest == ["restitution"]:
+        return _with_restitution(mechanism, dimension, value)
     if where != "pairs" or not isinstance(index, int):
         alone: Mechanism = _with_value(mechanism, dimension.address, value)
         return alone
@@ -131,6 +133,17 @@ def change_dimension(mechanism: Mechanism, dimension: Dimension, value: Any) -> 
         _with_value(pair, tuple(rest), value) if pair.entry_name() == entry else pair for pair in mechanism.pairs
     )
     return replace(mechanism, pairs=tuple(changed))
+
+
+def _with_restitution(mechanism: Mechanism, dimension: Dimension, value: Any) -> Mechanism:
+    """The mechanism with another restitution at all stops of a pin, which one entry of the file says."""
+    motions = relative_motions(mechanism)
+    own = mechanism.stops[int(dimension.address[1])].pair
+    same = (motions[each.pair].entry_name() == motions[own].entry_name() for each in mechanism.stops)
+    changed = (
+        each._replace(restitution=value) if alike else each for each, alike in zip(mechanism.stops, same, strict=True)
+    )
+    return replace(mechanism, stops=tuple(changed))
 
 
 @takes_mechanism

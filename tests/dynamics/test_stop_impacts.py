@@ -69,6 +69,18 @@ def test_what_rests_on_a_stop_lifts_off_when_it_is_no_longer_pressed():
     assert found.impacts == ()
 
 
+def test_a_kink_of_a_load_is_no_impact_of_what_rests():
+    """A load that steps while the ball rests, below its weight: it stays where it is, and nothing strikes."""
+    steps = {
+        "point": "P",
+        "force": [0, 10.0],
+        "varies": {"at": [0, 0.2, 0.2, 0.4, 0.4, 1], "factors": [0, 0, 1, 1, -2, -2]},
+    }
+    found = planar.simulate(ball(0.5, loads=[steps], inputs=[{"pair": "s", "position": 0.0}]), 1.0, 20)
+    assert found.impacts == ()
+    np.testing.assert_allclose(found.motion.inputs["s"].position, 0.0, atol=1e-15)
+
+
 def linkage(**stops):
     """Two sliders at right angles joined by a rod of 1 m, on which gravity acts across: (cos, sin) of its angle."""
     slides = {

@@ -109,8 +109,7 @@ class ContactPhases:
             return y
         q, q1 = self.split(y)
         self.base.pieces = None
-        struck = contacts.rooms(q, q1)[[side in contacts.touching(q, q1) for side in contacts.sides], 1]
-        if np.any(struck < 0.0):
+        if contacts.is_struck(self.base, q, q1):
             hit = contacts.strike(self.base, time, q, q1)
             if hit is None or len(self.impacts) > MAX_IMPACTS:
                 raise self._refusal(time, q, q1, hit is None)

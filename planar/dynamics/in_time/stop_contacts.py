@@ -82,6 +82,11 @@ class StopContacts:
             each._replace(position=each.position - self.turns[k]) for each, (_, k) in zip(found, sides, strict=True)
         )
 
+    def is_struck(self, equations: EquationsOfMotion, q: Array, q1: Array) -> bool:
+        """Whether a pair moves on against a stop at which it is."""
+        rooms = self.rooms(q, q1)
+        return bool(np.any((rooms[:, 0] <= STOP_TOLERANCE) & (rooms[:, 1] < -still_rate(equations, q1))))
+
     def touching(self, q: Array, q1: Array) -> tuple[StopSide, ...]:
         """The sides at which pairs are."""
         return tuple(
@@ -90,11 +95,11 @@ class StopContacts:
 
     def resting(self, equations: EquationsOfMotion, time: float, q: Array, q1: Array) -> tuple[StopSide, ...]:
         """The sides on which pairs rest, pressed on them; `equations` are those without contacts."""
-        fastest = float(np.abs(q1 / equations.scale).max(initial=0.0))
+        still = still_rate(equations, q1)
         at = tuple(
             side
             for side, (room, rate) in zip(self.sides, self.rooms(q, q1), strict=True)
-            if room <= STOP_TOLERANCE and abs(rate) <= STILL_TOLERANCE * max(fastest, LEAST_SPEED)
+            if room <= STOP_TOLERANCE and abs(rate) <= still
         )
         if not at:
             return ()
@@ -185,3 +190,8 @@ class StopContacts:
     def _evaluate(self, q: Array, q1: Array) -> tuple[Array, Array, Array, Array]:
         positions, slope, rates, bend = self._motions(q, q1)
         return positions[0], slope.T, rates[0], bend[0]
+
+
+def still_rate(equations: EquationsOfMotion, q1: Array) -> float:
+    """A rate (rad or sizes a second) below which a pair stands still, beside the rates of all coordinates."""
+    return STILL_TOLERANCE * max(float(np.abs(q1 / equations.scale).max(initial=0.0)), LEAST_SPEED)
