@@ -29,7 +29,7 @@ class ContactEvent(NamedTuple):
 
 
 class ContactPhases:
-    """The phases of one motion. A state y is the coordinates, their rates, and more that is not looked at."""
+    """The phases of one motion. A state y is the coordinates, their rates, and the work that was put in (J)."""
 
     def __init__(
         self, base: EquationsOfMotion, stops: PairStops | None, q: Array, make: Callable[..., EquationsOfMotion]
