@@ -24,9 +24,11 @@ if TYPE_CHECKING:
     from planar.analysis.motion.harmonics import Harmonics, harmonics
     from planar.analysis.motion.mechanical_advantage import Advantage, advantage
     from planar.analysis.motion.mechanical_advantage_over_motion import AdvantageOver, advantage_over
+    from planar.analysis.motion.motor_duty import MotorDuty, motor_duty
     from planar.analysis.motion.output import Extreme
     from planar.analysis.motion.time_ratio import TimeRatio, time_ratio
     from planar.analysis.motion.transmission_angle import Transmission, transmission
+    from planar.analysis.motion.unknown_load import UnknownLoad, unknown_load
     from planar.assemblies.circuits.circuits import Circuit, Circuits, circuits
     from planar.assemblies.circuits.traced_circuit import Branch
     from planar.assemblies.conflict import Conflict, conflict
@@ -43,6 +45,7 @@ if TYPE_CHECKING:
     from planar.document.schema import schema
     from planar.dynamics.flywheel import Flywheel, flywheel
     from planar.dynamics.forces import Forces, forces
+    from planar.dynamics.in_time.stop_contacts import Impact
     from planar.dynamics.reactions import Reaction
     from planar.dynamics.simulation import Simulation, simulate
     from planar.foundation.errors import BadInput, NoAnswer, Outcome, PlanarError, Unknown
@@ -61,6 +64,7 @@ if TYPE_CHECKING:
     from planar.model.link_shapes import Along, At, Distances, Link, Point
     from planar.model.loads import Course, Load, Mass, Spring
     from planar.model.mechanism import Drive, Input, Mechanism
+    from planar.model.motors import Motor
     from planar.model.pairs.base import Pair
     from planar.model.pairs.belt import BeltPair, ChainPair
     from planar.model.pairs.gear import GearPair
@@ -71,6 +75,7 @@ if TYPE_CHECKING:
     from planar.model.pairs.turning import TurningPair
     from planar.model.pin_linkage import pinned
     from planar.model.pin_linkages import PinnedLinkages, pinned_linkages
+    from planar.model.stops import Stops
     from planar.pages.view import view
     from planar.reports.files.xarray_dataset import dataset
     from planar.results.motion import Motion, State
@@ -115,6 +120,7 @@ _ROOMS = {
     "GearPair": "model.pairs.gear",
     "HarmonicRise": "model.input_laws.cam_rises",
     "Harmonics": "analysis.motion.harmonics",
+    "Impact": "dynamics.in_time.stop_contacts",
     "Input": "model.mechanism",
     "InputLaw": "model.input_laws.input_law",
     "Inspection": "analysis.identity.inspection",
@@ -133,6 +139,8 @@ _ROOMS = {
     "Modes": "assemblies.modes",
     "ModifiedTrapezoidalRise": "model.input_laws.cam_rises",
     "Motion": "results.motion",
+    "Motor": "model.motors",
+    "MotorDuty": "analysis.motion.motor_duty",
     "NoAnswer": "foundation.errors",
     "Outcome": "foundation.errors",
     "Pair": "model.pairs.base",
@@ -154,6 +162,7 @@ _ROOMS = {
     "SlotPair": "model.pairs.slot",
     "Spring": "model.mechanism",
     "State": "results.motion",
+    "Stops": "model.stops",
     "Stroke": "analysis.motion.extremes",
     "StudentMarks": "analysis.classroom.marking",
     "Sweep": "batch.results",
@@ -165,6 +174,7 @@ _ROOMS = {
     "TrapezoidalRise": "model.input_laws.cam_rises",
     "TurningPair": "model.pairs.turning",
     "Unknown": "foundation.errors",
+    "UnknownLoad": "analysis.motion.unknown_load",
     "Variant": "analysis.classroom.variants",
     "advantage": "analysis.motion.mechanical_advantage",
     "advantage_over": "analysis.motion.mechanical_advantage_over_motion",
@@ -194,6 +204,7 @@ _ROOMS = {
     "mobility": "analysis.identity.mobility",
     "mark_answers": "analysis.classroom.marking",
     "modes": "assemblies.modes",
+    "motor_duty": "analysis.motion.motor_duty",
     "problem_variants": "analysis.classroom.variants",
     "pinned": "model.pin_linkage",
     "pinned_linkages": "model.pin_linkages",
@@ -211,6 +222,7 @@ _ROOMS = {
     "transmission": "analysis.motion.transmission_angle",
     "velocity_by_centres": "analysis.centres.velocities",
     "view": "pages.view",
+    "unknown_load": "analysis.motion.unknown_load",
 }
 """Where each public name lives: it is loaded when it is first used."""
 
@@ -249,6 +261,7 @@ __all__ = [
     "GearPair",
     "HarmonicRise",
     "Harmonics",
+    "Impact",
     "Input",
     "InputLaw",
     "Inspection",
@@ -267,6 +280,8 @@ __all__ = [
     "Modes",
     "ModifiedTrapezoidalRise",
     "Motion",
+    "Motor",
+    "MotorDuty",
     "NoAnswer",
     "Outcome",
     "Pair",
@@ -288,6 +303,7 @@ __all__ = [
     "SlotPair",
     "Spring",
     "State",
+    "Stops",
     "Stroke",
     "StudentMarks",
     "Sweep",
@@ -299,6 +315,7 @@ __all__ = [
     "TrapezoidalRise",
     "TurningPair",
     "Unknown",
+    "UnknownLoad",
     "Variant",
     "advantage",
     "advantage_over",
@@ -328,6 +345,7 @@ __all__ = [
     "mark_answers",
     "mobility",
     "modes",
+    "motor_duty",
     "pinned",
     "pinned_linkages",
     "plot",
@@ -343,6 +361,7 @@ __all__ = [
     "time_ratio",
     "to_dict",
     "transmission",
+    "unknown_load",
     "velocity_by_centres",
     "view",
 ]

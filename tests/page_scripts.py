@@ -19,7 +19,14 @@ from planar.pages.page import script_safe_json
 
 NODE = shutil.which("node") or shutil.which("nodejs")
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
-LOGIC = ("solve/singular.js", "solve/linkage.js", "page.js", "controls/dimensions.js", "controls/saving.js")
+LOGIC = (
+    "solve/singular.js",
+    "solve/stops.js",
+    "solve/linkage.js",
+    "page.js",
+    "controls/dimensions.js",
+    "controls/saving.js",
+)
 """The scripts of a page that need no document."""
 
 _carried = cache(page_data)

@@ -249,7 +249,7 @@ def _solve_some(mechanisms: Sequence[Mechanism], request: SweepRequest) -> Swept
     layouts = {
         k: each.layout
         for k, each in enumerate(mechanisms)
-        if request.pair is None and isinstance(each, PinnedMechanism) and each.layout is not None
+        if request.pair is None and isinstance(each, PinnedMechanism) and each.layout is not None and not each.stops
     }
     if not layouts:
         return SweptList(tuple(solve_by_blocks(mechanisms, request)))

@@ -43,17 +43,41 @@ ONE_DESTINATION = "results go to a file or are printed with --json; give one of 
 @mode_option
 @click.option("--static", is_flag=True, help="Leave the links' inertia out: at rest, or in slow motion.")
 @click.option("--cycle", "whole", is_flag=True, help="Over the whole motion, as `planar cycle` has it.")
+@click.option(
+    "--fluctuation",
+    type=float,
+    metavar="NUMBER",
+    help="With --cycle: the flywheel for this coefficient of fluctuation of speed, as 0.02.",
+)
+@click.option(
+    "--rim-radius", metavar="LENGTH", help="With --fluctuation: the mass of its rim at this radius, as 400mm."
+)
+@click.option(
+    "--solve-for",
+    metavar="LOAD",
+    help="Which size of this load, spring or mass holds it: loads.0, springs.0, masses.rod.",
+)
+@click.option(
+    "--effort",
+    type=float,
+    metavar="NUMBER",
+    help="With --solve-for: what the input is to supply, in N m (at a slide N), in place of nothing.",
+)
 @motion_options
 @output_option(
     "Write the tables to a .txt, .svg or .html file; with --cycle every position to .csv, .json, .npz or .parquet."
 )
-def forces(
+def forces(  # many: options of the command
     model: str,
     as_json: bool,
     at: tuple[str, ...],
     mode: int | None,
     static: bool,
     whole: bool,
+    fluctuation: float | None,
+    rim_radius: str | None,
+    solve_for: str | None,
+    effort: float | None,
     output: Path | None,
     **course: Any,
 ) -> None:
@@ -63,16 +87,21 @@ def forces(
     if whole and at:
         raise BadInput("--at", "the forces of a whole motion have no one position; say where it starts with --from")
     if not whole:
-        _refuse_motion_options(course)
+        _refuse_motion_options((*course, "fluctuation", "rim_radius"))
+    if rim_radius is not None and fluctuation is None:
+        raise BadInput("--rim-radius", "this is the radius of a flywheel; say for which --fluctuation")
+    if effort is not None and solve_for is None:
+        raise BadInput("--effort", "this goes with the load that is solved for; name it by --solve-for")
     from planar.dynamics.load_validation import require_loads
 
+    wanted = None if solve_for is None else (solve_for, effort or 0.0)
     mechanism = load_model(model, mode)
     refuse_overwriting(model, output)
     require_loads(mechanism)
     if whole:
-        _forces_over_motion(mechanism, not static, as_json, output, course)
+        _forces_over_motion(mechanism, not static, as_json, output, (fluctuation, rim_radius, wanted), course)
     else:
-        _forces_at_position(mechanism, at, not static, as_json, output)
+        _forces_at_position(mechanism, at, not static, as_json, output, wanted)
 
 
 def _refuse_motion_options(course: Iterable[str]) -> None:
@@ -84,10 +113,16 @@ def _refuse_motion_options(course: Iterable[str]) -> None:
 
 
 def _forces_at_position(
-    mechanism: Mechanism, at: tuple[str, ...], inertia: bool, as_json: bool, output: Path | None
+    mechanism: Mechanism,
+    at: tuple[str, ...],
+    inertia: bool,
+    as_json: bool,
+    output: Path | None,
+    wanted: tuple[str, float] | None,
 ) -> None:
-    """The forces at one position."""
+    """The forces at one position, and the load that is wanted for an effort."""
     from planar.analysis.motion.mechanical_advantage import advantages
+    from planar.analysis.motion.unknown_load import unknown_load
     from planar.analysis.worked.published import compare_published
     from planar.dynamics.forces import forces as at_state
     from planar.reports.tables.forces.position_forces import record, tables
@@ -97,21 +132,30 @@ def _forces_at_position(
     with show_status(mechanism.name):
         state = solve(mechanism, moved)
         found, ratios = at_state(state, inertia), advantages(state)
+        unknown = None if wanted is None else unknown_load(state, *wanted, inertia=inertia)
         printed = (
             [] if moved else [each for each in compare_published(state) if each.published.quantity == "input torque"]
         )
     if as_json:
-        print_json(record(found, ratios, printed), indent=1)
+        print_json(record(found, ratios, printed, unknown), indent=1)
         return
-    print_or_write(tables(found, ratios, printed), output)
+    print_or_write(tables(found, ratios, printed, unknown), output)
 
 
 def _forces_over_motion(
-    mechanism: Mechanism, inertia: bool, as_json: bool, output: Path | None, course: dict[str, Any]
+    mechanism: Mechanism,
+    inertia: bool,
+    as_json: bool,
+    output: Path | None,
+    asked: tuple[float | None, str | None, tuple[str, float] | None],
+    course: dict[str, Any],
 ) -> None:
-    """The forces over a whole motion."""
+    """The forces over a whole motion; and what is asked: a flywheel's fluctuation and radius, a load for an effort."""
+    from planar.analysis.motion.unknown_load import unknown_load
+    from planar.document import read_length
     from planar.dynamics.forces import forces as over_motion
     from planar.reports.files.run_formats import check_writable
+    from planar.reports.tables.forces.flywheels import wanted_flywheel
     from planar.reports.tables.forces.forces_over_motion import force_series, run_facts, tables
 
     if output is not None:
@@ -119,7 +163,12 @@ def _forces_over_motion(
     with show_status(f"{mechanism.name}: {course['steps']} steps"):
         motion = run_motion(mechanism, **course)
         found = over_motion(motion, inertia)
-    report_motion(motion, as_json, output, lambda: [tables(found)], force_series(found), run_facts(found))
+        fluctuation, radius, load = asked
+        length = None if radius is None else read_length(mechanism, radius, "--rim-radius")
+        wheel = wanted_flywheel(found, fluctuation, length)
+        unknown = None if load is None else unknown_load(motion, *load, inertia=inertia)
+    facts = run_facts(found, wheel, unknown)
+    report_motion(motion, as_json, output, lambda: [tables(found, wheel, unknown)], force_series(found), facts)
 
 
 @main.command()
@@ -133,7 +182,7 @@ def _forces_over_motion(
     "driven",
     multiple=True,
     metavar="PAIR",
-    help="An input that keeps to the file's velocity and acceleration; one with a law keeps to it anyway.",
+    help="An input that keeps to its law, or the file's velocity and acceleration, though it has a motor or no law.",
 )
 @click.option("--moving", is_flag=True, help="Start with the file's velocities, not from rest.")
 @output_option("Write positions, velocities, accelerations and energies to a .csv, .json, .npz or .parquet file.")

@@ -24,6 +24,15 @@ def read_drive(mechanism: Mechanism, pair: str, position: str) -> Drive:
     )
 
 
+def read_length(mechanism: Mechanism, text: str, place: str) -> float:
+    """A length (m) written as text: a number in the file's unit, or a quantity. Raises BadInput."""
+    try:
+        value: Any = float(text)
+    except ValueError:
+        value = text
+    return Cursor(value, place, FileContext(mechanism.units)).as_positive("length")
+
+
 def read_time(text: str, place: str) -> float:
     """A time (s) written as text: a number of seconds, or a quantity. Raises BadInput."""
     try:

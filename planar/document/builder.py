@@ -12,6 +12,7 @@ from planar.model.link_shapes import Link
 from planar.model.loads import Load, Mass, Spring
 from planar.model.mechanism import Input, Mechanism, check_mechanism
 from planar.model.pairs import Pair, joining_entry
+from planar.model.stops import Stops
 
 
 def build(  # many: one for each list of a file
@@ -26,6 +27,7 @@ def build(  # many: one for each list of a file
     springs: Sequence[Spring] = (),
     masses: Sequence[Mass] = (),
     gravity: tuple[float, float] = (0.0, 0.0),
+    stops: Sequence[Stops] = (),
     units: FileUnits | None = None,
 ) -> Mechanism:
     """A mechanism of these links and pairs (SI), checked as a file is.
@@ -67,6 +69,7 @@ def build(  # many: one for each list of a file
         springs=tuple(springs),
         masses=tuple(masses),
         gravity=gravity,
+        stops=tuple(stops),
         sketch=tuple((point, x, y) for point, (x, y) in (sketch or {}).items()),
     )
     check_mechanism(whole)

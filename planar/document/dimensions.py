@@ -24,6 +24,7 @@ from planar.document.cursor import Cursor, FileContext, suggest_spelling
 from planar.document.first_argument import takes_mechanism
 from planar.document.loads import write_load, write_mass, write_spring
 from planar.document.reader import read_mechanism
+from planar.document.stops import write_stops
 from planar.document.writer import write_input, write_link, write_mechanism
 from planar.foundation.errors import BadInput, join_names
 from planar.model.file_units import FileUnits
@@ -44,6 +45,7 @@ SPELLINGS: dict[tuple[str | int, int, str], str] = {
 }
 """Keys that a name spells otherwise than the file, by their list and depth there."""
 LAW_LISTS = frozenset(name for kind in SEGMENT_TYPES.values() for name, key in kind.keys.items() if key.is_list)
+MOTOR_LISTS = frozenset({"speeds", "torques", "forces"})
 VARIATION_LISTS = frozenset({"at", "factors"})
 """Keys whose numbers are counted; of other keys two numbers are x and y."""
 
@@ -116,6 +118,8 @@ def dimensions(mechanism: Mechanism) -> dict[str, float]:
 def change_dimension(mechanism: Mechanism, dimension: Dimension, value: Any) -> Mechanism:
     """The mechanism with this number at another value (SI), or at an array or a symbol, unchecked."""
     where, index, *rest = dimension.address
+    if where == "stops" and rest == ["restitution"]:
+        return _with_restitution(mechanism, dimension, value)
     if where != "pairs" or not isinstance(index, int):
         alone: Mechanism = _with_value(mechanism, dimension.address, value)
         return alone
@@ -124,6 +128,17 @@ def change_dimension(mechanism: Mechanism, dimension: Dimension, value: Any) -> 
         _with_value(pair, tuple(rest), value) if pair.entry_name() == entry else pair for pair in mechanism.pairs
     )
     return replace(mechanism, pairs=tuple(changed))
+
+
+def _with_restitution(mechanism: Mechanism, dimension: Dimension, value: Any) -> Mechanism:
+    """The mechanism with another restitution at all stops of a pin, which one entry of the file says."""
+    motions = relative_motions(mechanism)
+    own = mechanism.stops[int(dimension.address[1])].pair
+    same = (motions[each.pair].entry_name() == motions[own].entry_name() for each in mechanism.stops)
+    changed = (
+        each._replace(restitution=value) if alike else each for each, alike in zip(mechanism.stops, same, strict=True)
+    )
+    return replace(mechanism, stops=tuple(changed))
 
 
 @takes_mechanism
@@ -217,18 +232,22 @@ def _link_dimensions(mechanism: Mechanism, index: int) -> list[Dimension]:
 
 def _pair_dimensions(mechanism: Mechanism) -> Iterator[Dimension]:
     position = {id(pair): index for index, pair in enumerate(mechanism.pairs)}
+    stops = [_tagged(each, ("stops", index)) for index, each in enumerate(mechanism.stops)]
     for number, group in enumerate(pair_entries(mechanism)):
         tagged = [_tagged(pair, ("pairs", position[id(pair)])) for pair in group]
         kind: type[Pair] = type(group[0])
         lists = frozenset(key for key, schema in kind.entry_schemas.items() if schema.get("type") == "array")
         yield from _written_numbers(["pairs", number], kind.write(tagged, _mark), group[0].entry_name(), lists=lists)
+        named = frozenset(pair.name for pair in kind.relative_motions(group))
+        written = write_stops({}, stops, group, _mark)
+        yield from _written_numbers(["pairs", number], written, group[0].entry_name(), lists=named | {"stops"})
 
 
 def _input_dimensions(mechanism: Mechanism) -> Iterator[Dimension]:
     motions = relative_motions(mechanism)
     for index, given in enumerate(mechanism.inputs):
         written = write_input(_tagged(given, ("inputs", index)), motions, _mark)
-        yield from _written_numbers(["inputs", index], written, given.pair, lists=LAW_LISTS)
+        yield from _written_numbers(["inputs", index], written, given.pair, lists=LAW_LISTS | MOTOR_LISTS)
 
 
 def _load_dimensions(mechanism: Mechanism) -> Iterator[Dimension]:

@@ -8,6 +8,7 @@ from typing import Any
 
 from planar.document.cursor import Cursor, FileContext, describe_value, suggest_name, suggest_spelling
 from planar.document.loads import read_loads
+from planar.document.motors import read_motor
 from planar.document.names import find_motion, find_point, point_aliases
 from planar.document.schema import (
     ALONG_SCHEMA,
@@ -20,8 +21,10 @@ from planar.document.schema import (
     LINK_SCHEMA,
     PUBLISHED_SCHEMA,
     SENSE_WORDS,
+    STOP_SCHEMA,
     UNITS_SCHEMA,
 )
+from planar.document.stops import read_stops, without_stops
 from planar.foundation.units import UnitError, example_quantity
 from planar.model.file_units import FileUnits, OtherKind, parse_declared_unit
 from planar.model.link_shapes import Along, At, Distances, Link, Point, PointDefinition, PointPlacementError, link_shape
@@ -31,6 +34,7 @@ from planar.model.mechanism import (
     Input,
     Mechanism,
     PublishedValue,
+    pair_entries,
     pair_misfits,
     relative_motions,
 )
@@ -69,7 +73,8 @@ def read_mechanism(value: Any) -> Mechanism:
         remarks=_unpinned_link_remarks(full, pairs),
     )
     inputs = _read_inputs(full, relative_motions(bare))
-    driven = replace(bare, inputs=inputs)
+    entries = zip(full["pairs"].items(), pair_entries(bare), strict=True)
+    driven = replace(bare, inputs=inputs, stops=tuple(each for entry in entries for each in read_stops(*entry)))
     if any(given.law is not None for given in inputs):
         from planar.document.input_laws import speed_jump_remarks
 
@@ -106,7 +111,8 @@ def _expand_short_forms(top: Cursor) -> Cursor:
     entries = [dict(item.fields()) for item in top["pairs"].items()]
     for index, entry in enumerate(entries):
         cursor = Cursor(entry, f"$.pairs[{index}]", top.context)
-        whole = _pair_type(cursor).expand_short_form(cursor)
+        bare = without_stops(cursor)
+        whole = _pair_type(bare).expand_short_form(bare)
         if whole is None:
             continue
         for name, link in whole.links.items():
@@ -115,7 +121,7 @@ def _expand_short_forms(top: Cursor) -> Cursor:
                 told += "a link of its own, with 'links' and 'point'"
                 raise cursor.error_at(None, told)
             links[name] = _read_link(name, Cursor(link, cursor.path, top.context))
-        entries[index] = whole.entry
+        entries[index] = whole.entry | {key: entry[key] for key in STOP_SCHEMA if key in entry}
         _add_links_to_entry(whole.joining_entry, tuple(whole.links), entries)
     context = replace(top.context, links=links)
     return replace(top, value=dict(top.fields()) | {"pairs": entries}, context=context)
@@ -226,7 +232,8 @@ def _read_pairs(top: Cursor) -> tuple[Pair, ...]:
     named: dict[str, str] = {}
     placed: dict[tuple[str, str], str] = {}
     for entry in top["pairs"].items():
-        group = _pair_type(entry).read(entry)
+        bare = without_stops(entry)
+        group = _pair_type(bare).read(bare)
         name = group[0].entry_name()
         pinned = {member for pair in group for member in pair.coincident_points()}
         shared = [member for member in pinned if member in placed]
@@ -283,6 +290,8 @@ def _read_inputs(top: Cursor, known: Mapping[str, Pair]) -> tuple[Input, ...]:
             from planar.document.input_laws import read_law  # few mechanisms run by laws
 
             given = given._replace(law=read_law(cursor["law"], given, pair.input_quantity_kinds()))
+        if cursor.has("motor"):
+            given = given._replace(motor=read_motor(cursor["motor"], pair))
         found[pair.name] = given
     return tuple(found.values())
 

@@ -109,6 +109,15 @@ LINK_SCHEMA: Schema = {
         "two points whose direction is the link's angle, where coordinates were read off a drawing",
     ),
 }
+MOTOR_SCHEMA: Schema = {
+    "stall": described(schema_reference("quantity"), "what it supplies at rest: a torque, at a slide a force"),
+    "no_load": described(schema_reference("quantity"), "the speed at which it supplies nothing, as 3000 rpm"),
+    "speeds": described(
+        list_schema("quantity", 2, MAX_LAW_ITEMS), "in place of both: rising speeds, between which it is straight"
+    ),
+    "torques": described(list_schema("quantity", 2, MAX_LAW_ITEMS), "what it supplies at these speeds"),
+    "forces": described(list_schema("quantity", 2, MAX_LAW_ITEMS), "what it supplies at these speeds, at a slide"),
+}
 INPUT_SCHEMA: Schema = {
     "pair": described(_TEXT, "the pair that is driven; at a pin of several links as B:a,b, link b against a"),
     "position": described(
@@ -122,7 +131,36 @@ INPUT_SCHEMA: Schema = {
         {"anyOf": [schema_reference("piece"), list_schema("piece", 1, MAX_LAW_ITEMS)]},
         "its motion in time: one piece, or a list of pieces, one after the other",
     ),
+    "motor": described(
+        _object_schema(
+            MOTOR_SCHEMA,
+            oneOf=[
+                {"required": ["stall", "no_load"]},
+                {"required": ["speeds"], "oneOf": [{"required": ["torques"]}, {"required": ["forces"]}]},
+            ],
+        ),
+        "the motor that drives it: a simulation runs by it, and forces tell whether it is strong enough",
+    ),
 }
+_STOP_LIMITS: Schema = {
+    "type": "array",
+    "items": {"anyOf": [{"type": "null"}, schema_reference("quantity")]},
+    "minItems": 2,
+    "maxItems": 2,
+}
+STOP_SCHEMA: Schema = {
+    "stops": described(
+        {"anyOf": [_STOP_LIMITS, {"type": "object", "additionalProperties": _STOP_LIMITS, "minProperties": 1}]},
+        "between which positions its motion can go, as [10, 95], measured as an input there; null where it is open "
+        "(an angle: to the other stop's back, a turn on); "
+        'at a pin of several links by their names, as {"B:a,b": [10, 95]}',
+    ),
+    "restitution": described(
+        {"type": "number", "minimum": 0, "maximum": 1},
+        "the speed after an impact on a stop beside that before it; left out: 0",
+    ),
+}
+"""Keys that the entry of any pair may have."""
 DRIVE_SCHEMA: Schema = {key: INPUT_SCHEMA[key] for key in ("position", "velocity", "acceleration")}
 VARIATION_SCHEMA: Schema = {
     "with": described(_TEXT, "the input's pair whose position it varies with; left out: time"),
@@ -307,8 +345,9 @@ def schema() -> dict[str, Any]:
 
 
 def _pair_schema(kind: type[Pair]) -> Schema:
-    properties = {kind.keyword: described(schema_reference("name"), kind.entry_description), **kind.entry_schemas}
-    return _object_schema(properties, kind.keyword, *kind.required_keys) | dict(kind.entry_rule)
+    own = {kind.keyword: described(schema_reference("name"), kind.entry_description), **kind.entry_schemas}
+    dependent = {"dependentRequired": {"restitution": ["stops"]}}
+    return _object_schema({**own, **STOP_SCHEMA}, kind.keyword, *kind.required_keys) | dict(kind.entry_rule) | dependent
 
 
 def _segment_schema(kind: type[LawSegment]) -> Schema:

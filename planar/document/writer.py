@@ -8,7 +8,9 @@ from typing import Any
 
 from planar.document.input_laws import write_law
 from planar.document.loads import write_loads
+from planar.document.motors import write_motor
 from planar.document.schema import DRIVE_SCHEMA, FORMAT_VERSION
+from planar.document.stops import write_stops
 from planar.foundation.units import SI_UNITS, Unit, UnitError, parse_unit, shortest_number
 from planar.model.file_units import FileUnits, is_metric, takes_bare_number, unit_of_kind
 from planar.model.link_shapes import Along, At, Link, PointDefinition
@@ -38,7 +40,10 @@ def write_mechanism(mechanism: Mechanism) -> dict[str, Any]:
     value["units"] = {key: unit for key, unit in mechanism.units._asdict().items() if unit}
     value["frame"] = mechanism.frame
     value["links"] = {link.name: write_link(link, quantity) for link in mechanism.links}
-    value["pairs"] = [type(group[0]).write(group, quantity) for group in pair_entries(mechanism)]
+    value["pairs"] = [
+        write_stops(type(group[0]).write(group, quantity), mechanism.stops, group, quantity)
+        for group in pair_entries(mechanism)
+    ]
     value |= _nonempty_fields(
         inputs=[write_input(given, motions, quantity) for given in mechanism.inputs],
         **write_loads(mechanism, quantity),
@@ -119,7 +124,8 @@ def _write_point_definition(place: PointDefinition, quantity: QuantityWriter) ->
 def write_input(drive: Input, motions: Mapping[str, Pair], quantity: QuantityWriter) -> dict[str, Any]:
     """An input as a file has it."""
     law = None if drive.law is None else write_law(drive.law, motions[drive.pair].input_quantity_kinds(), quantity)
-    return {"pair": drive.pair} | _write_drive(drive, motions, quantity) | _nonempty_fields(law=law)
+    motor = None if drive.motor is None else write_motor(drive.motor, motions[drive.pair], quantity)
+    return {"pair": drive.pair} | _write_drive(drive, motions, quantity) | _nonempty_fields(law=law, motor=motor)
 
 
 def _write_drive(drive: Any, motions: Mapping[str, Pair], quantity: QuantityWriter) -> dict[str, Any]:

@@ -22,6 +22,7 @@ from planar.foundation.arrays import Array
 from planar.foundation.errors import NoAnswer, Outcome
 from planar.model.wording import quote_names
 from planar.solving.runs.time_run import input_law_rates
+from planar.solving.stops import MetStop
 
 RANK_TOLERANCE = 1e-9
 """A singular value below this part of the greatest is none."""
@@ -33,40 +34,64 @@ CLOSED_TOLERANCE, MAX_NEWTON_STEPS = 1e-14, 8
 """Sizes: what stays open of the constraints, and Newton's steps to there."""
 
 
+NO_EFFORTS = np.zeros(0)
+FORCE_OUTPUT = 4
+"""Of what is evaluated: the number of the forces on the coordinates."""
+
+
 class AccelerationResult(NamedTuple):
     """Accelerations of the coordinates, and the power (W) of what stores none: loads, dampers and driven inputs.
 
-    `firm` is the weakest constraint beside the strongest: nothing on a change point.
+    `regularity` is the weakest constraint beside the strongest: nothing on a change point. `efforts` (held,) are what
+    driven inputs and stops on which pairs rest supply, in the positive sense of their motions (N, N m).
     """
 
     q2: Array
     power: float
     regularity: float
+    efforts: Array = NO_EFFORTS
 
 
-class DrivenInputs:
-    """The inputs that keep to their laws while the others are free."""
+class HeldMotions:
+    """The inputs that keep to their laws while the others are free, and the pairs that rest on stops."""
 
-    def __init__(self, work: LagrangianFunctions, pairs: Sequence[str]):
+    def __init__(self, work: LagrangianFunctions, pairs: Sequence[str], resting: Sequence[MetStop] = ()):
+        self.resting = tuple(resting)
         names = [given.pair for given in work.mechanism.inputs]
         self.index = [names.index(pair) for pair in pairs]
         self.inputs = [work.mechanism.inputs[k] for k in self.index]
         self.let_go = tuple(name for name in names if name not in pairs)
+        self.motors = [
+            (k, given.motor)
+            for k, given in enumerate(work.mechanism.inputs)
+            if given.motor is not None and given.pair not in pairs
+        ]
+        self.count = len(self.index) + len(self.resting)
+        self._stops = [(each.position, 0.0, 0.0) for each in self.resting]
 
     def motion_at(self, time: float) -> Array:
-        """Position, velocity and acceleration (3, driven)."""
-        return np.array([input_law_rates(each, np.array([time]))[:3, 0] for each in self.inputs]).reshape(-1, 3).T
+        """Position, velocity and acceleration (3, held)."""
+        driven = [input_law_rates(each, np.array([time]))[:3, 0] for each in self.inputs]
+        return np.array([*driven, *self._stops]).reshape(-1, 3).T
 
 
 class EquationsOfMotion:
     """The equations of motion of one mechanism; lengths count in parts of its size `unit` (m)."""
 
-    def __init__(self, work: LagrangianFunctions, driven: Sequence[str], unit: float, wound: Array):
-        self.work, self.driven, self.spring_turns = work, DrivenInputs(work, driven), wound
+    def __init__(
+        self,
+        work: LagrangianFunctions,
+        driven: Sequence[str],
+        unit: float,
+        wound: Array,
+        resting: Sequence[MetStop] = (),
+    ):
+        self.work, self.driven, self.spring_turns = work, HeldMotions(work, driven, resting), wound
         q, q1 = work.q, work.q1
         self.scale = np.full(q.numel(), unit)
         self.scale[2 : work.link_coordinate_count : 3] = 1.0  # angles
         held = [work.input_positions[k] for k in self.driven.index]
+        held += work.relative_positions(each.pair for each in resting)
         rows = ca.vertcat(work.residuals, *held)
         slope = ca.jacobian(rows, q)
         loads, efforts = work.applied_forces
@@ -82,6 +107,9 @@ class EquationsOfMotion:
             work.input_positions,
             ca.vertcat(*work.energies[:2]),
         ]
+        outputs.append(
+            ca.jacobian(ca.vertcat(ca.SX(0, 1), *(work.input_positions[k] for k, _ in self.driven.motors)), q)
+        )
         given = [q, q1, work.factors, work.spring_turns]
         self._called = BufferedFunction(ca.Function("accelerations", given, [ca.densify(each) for each in outputs]))
         self._closing = BufferedFunction(ca.Function("closing", [q], [ca.densify(rows), ca.densify(slope)]))
@@ -116,11 +144,11 @@ class EquationsOfMotion:
 
     def regular_accelerations(self, time: float, q: Array, q1: Array) -> AccelerationResult:
         """As `accelerations_at`, in one solution where every constraint is needed and holds firmly."""
-        if self.rank is None or self.rank != self.work.residuals.numel() + len(self.driven.index):
+        if self.rank is None or self.rank != self.work.residuals.numel() + self.driven.count:
             return self.accelerations_at(time, q, q1)
         _, slope, bend, inertia, force, rest, *_ = self._evaluate(time, q, q1)
-        given = self.driven.motion_at(time) if self.driven.index else None
-        wanted, held, many, index = -bend[0], slope.T * self.scale, len(q), len(self.driven.index)
+        given = self.driven.motion_at(time) if self.driven.count else None
+        wanted, held, many, index = -bend[0], slope.T * self.scale, len(q), self.driven.count
         if given is not None:
             wanted[-index:] += given[2]
         mass = inertia.T * self.scale * self.scale[:, None]
@@ -132,16 +160,18 @@ class EquationsOfMotion:
         except np.linalg.LinAlgError:
             return self.accelerations_at(time, q, q1)
         power = float(force[0] @ q1)
+        efforts = np.zeros(0)
         if given is not None:
-            power -= size * float(found[-index:] @ given[1])
-        return AccelerationResult(found[:many] * self.scale, power, 1.0)
+            efforts = -size * found[-index:]
+            power += float(efforts @ given[1])
+        return AccelerationResult(found[:many] * self.scale, power, 1.0, efforts)
 
     def accelerations_at(self, time: float, q: Array, q1: Array) -> AccelerationResult:
         """The accelerations at a time, and the power that comes in."""
         _, slope, bend, inertia, force, rest, *_ = self._evaluate(time, q, q1)
         wanted = -bend[0]
-        if self.driven.index:
-            wanted[-len(self.driven.index) :] += self.driven.motion_at(time)[2]
+        if self.driven.count:
+            wanted[-self.driven.count :] += self.driven.motion_at(time)[2]
         held = slope.T * self.scale
         if not np.all(np.isfinite(held)):  # of a stage far out, which the integrator takes back
             return AccelerationResult(np.full(len(q), np.nan), np.nan, 1.0)
@@ -156,12 +186,13 @@ class EquationsOfMotion:
         if free.size and np.linalg.eigvalsh(free)[0] <= MASSLESS_TOLERANCE * max(float(np.abs(mass).max()), 1e-300):
             raise self._massless_error(ways, free)
         scaled = asked + ways @ np.linalg.solve(free, ways.T @ (push - mass @ asked)) if free.size else asked
-        power = float(force[0] @ q1)
-        if self.driven.index:
+        power, efforts = float(force[0] @ q1), np.zeros(0)
+        if self.driven.count:
             # what holds the links does no work, but for the inputs, which move
             carried = np.linalg.lstsq(held.T, mass @ scaled - push, rcond=RANK_TOLERANCE)[0]
-            power += float(carried[-len(self.driven.index) :] @ self.driven.motion_at(time)[1])
-        return AccelerationResult(scaled * self.scale, power, firm)
+            efforts = carried[-self.driven.count :]
+            power += float(efforts @ self.driven.motion_at(time)[1])
+        return AccelerationResult(scaled * self.scale, power, firm, efforts)
 
     def project(self, time: float, q: Array, q1: Array) -> tuple[Array, Array]:
         """The nearest coordinates and rates that the constraints allow."""
@@ -178,9 +209,19 @@ class EquationsOfMotion:
                 break
         left, slope = self._residuals_and_jacobian(q, given[0])
         wrong = slope @ q1
-        if self.driven.index:
-            wrong[-len(self.driven.index) :] -= given[1]
+        if self.driven.count:
+            wrong[-self.driven.count :] -= given[1]
         return q, (q1 - (ways @ (held @ wrong)) * self.scale if ways is not None and held is not None else q1)
+
+    def impulse_response(self, time: float, q: Array, q1: Array) -> Array:
+        """By how much rates change for impulses on the coordinates (coordinates, coordinates), all constraints held:
+        N (N^T M N)^-1 N^T."""
+        _, slope, _, inertia, *_ = self._evaluate(time, q, q1)
+        held, mass = slope.T * self.scale, inertia.T * self.scale * self.scale[:, None]
+        _, s, v = np.linalg.svd(held)
+        ways = v[self._constraint_rank(s) :].T
+        free = ways @ np.linalg.solve(ways.T @ mass @ ways, ways.T)
+        return np.asarray(free * self.scale * self.scale[:, None])
 
     def energies(self, time: float, q: Array, q1: Array) -> Array:
         """Kinetic energy, and potential of weights and springs (2,), J."""
@@ -189,8 +230,8 @@ class EquationsOfMotion:
     def _residuals_and_jacobian(self, q: Array, at: Array) -> tuple[Array, Array]:
         rows, slope = self._closing(q)
         left = rows[0]
-        if self.driven.index:
-            left[-len(self.driven.index) :] -= at
+        if self.driven.count:
+            left[-self.driven.count :] -= at
         return left, slope.T
 
     def _evaluate(self, time: float, q: Array, q1: Array) -> list[Array]:
@@ -207,7 +248,13 @@ class EquationsOfMotion:
                 if k is not None
             }
             by = load_factors(self.work.mechanism, inputs, np.array([time]), 1)[0]
-        return self._called(q, q1, by, self.spring_turns)
+        *found, slopes = self._called(q, q1, by, self.spring_turns)
+        if self.driven.motors:
+            efforts = [
+                float(motor.effort_at(rate)) for (_, motor), rate in zip(self.driven.motors, q1 @ slopes, strict=True)
+            ]
+            found[FORCE_OUTPUT] = found[FORCE_OUTPUT] + slopes @ np.array(efforts)
+        return found
 
     def _constraint_rank(self, values: Array) -> int:
         """How many constraints hold: at the start they are counted, and near a change point they stay as many."""

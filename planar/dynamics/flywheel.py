@@ -43,6 +43,15 @@ class Flywheel:
     speed: float | None
     inertia: float | None
 
+    def rim_mass(self, radius: float) -> float | None:
+        """The mass (kg) of a thin rim of this mean radius (m) that has the moment of inertia: m = I / r^2.
+
+        None without a steady speed. Raises BadInput for a radius that is none.
+        """
+        if not 0.0 < radius < np.inf:
+            raise BadInput("radius", f"a radius above zero (m) is wanted, not {radius!r:.40}")
+        return None if self.inertia is None else self.inertia / radius**2
+
 
 @takes_result("Forces")
 def flywheel(forces: Forces, of: str | None = None, fluctuation: float = DEFAULT_FLUCTUATION) -> Flywheel:

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planar.document.first_argument import takes_result
+from planar.dynamics.drives.stop_force import stop_forces
 from planar.dynamics.external_actions import (
     ActionVelocities,
     ExternalAction,
@@ -97,6 +98,13 @@ class Forces(Displayable):
         at = [each.at[..., 0] * each.force[..., 1] - each.at[..., 1] * each.force[..., 0] + each.couple for each in of]
         none = np.zeros(np.shape(next(iter(self.inputs.values()), 0.0)))
         return sum((each.force for each in of), np.stack([none, none], axis=-1)), sum(at, none)
+
+    @cached_property
+    def stops(self) -> Mapping[str, float]:
+        """What stops carry at which pairs stand, where the input is let go; see `drives.stop_force`. At a position."""
+        if not isinstance(self.moving, State):
+            return {}
+        return stop_forces(self.moving, {name: float(each) for name, each in self.inputs.items()})
 
     def is_force_input(self, name: str) -> bool:
         """Whether an input's effort is a force (N), not a torque (N m)."""

@@ -102,7 +102,7 @@ class LagrangianFunctions:
     @cached_property
     def input_positions(self) -> ca.SX:
         """The positions of the inputs (inputs,)."""
-        return ca.vertcat(ca.SX(0, 1), *self._relative_positions(given.pair for given in self.mechanism.inputs))
+        return ca.vertcat(ca.SX(0, 1), *self.relative_positions(given.pair for given in self.mechanism.inputs))
 
     @cached_property
     def momentum(self) -> ca.SX:
@@ -129,7 +129,7 @@ class LagrangianFunctions:
             loads, efforts = loads + at * self.factors[k], efforts + relative * self.factors[k]
         return loads, efforts
 
-    def _relative_positions(self, names: Iterable[str]) -> list[ca.SX]:
+    def relative_positions(self, names: Iterable[str]) -> list[ca.SX]:
         """The positions of relative motions."""
         motions = [self.relative_motions[name] for name in names]
         return input_positions(motions, self.frames, self.numbers, self.own)
@@ -226,7 +226,7 @@ class LagrangianFunctions:
         if load.link is not None and load.torque is not None and load.link in self.link_columns:
             found[self.link_columns[load.link] + 2] += load.torque
         if load.pair is not None and load.effort is not None:
-            (position,) = self._relative_positions([load.pair])
+            (position,) = self.relative_positions([load.pair])
             effort += load.effort * ca.gradient(position, q)
         return found, effort
 

@@ -11,23 +11,22 @@ import numpy as np
 
 from planar.document.first_argument import takes_mechanism
 from planar.dynamics.equations_of_motion import FULL_RANK_REGULARITY, EquationsOfMotion
-from planar.dynamics.external_actions import KinematicArrays
 from planar.dynamics.imbalance import explain_loose_links
+from planar.dynamics.in_time.contact_phases import ContactEvent, make_phases
+from planar.dynamics.in_time.simulated_motion import simulated_motion
+from planar.dynamics.in_time.stop_contacts import Impact
 from planar.dynamics.lagrangian import lagrangian_functions
 from planar.dynamics.load_validation import check_loads
 from planar.dynamics.load_variation import first_kink
 from planar.equations.mechanism_numbers import mechanism_size
 from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput, NoAnswer, Outcome
-from planar.foundation.geometry import Frame, frame_at
-from planar.foundation.jets import Jet
 from planar.foundation.short_repr import short_repr
 from planar.model.mechanism import Input, Mechanism
 from planar.model.run_arguments import check_steps
 from planar.model.wording import join_all_names, quote_names
 from planar.results.motion import Motion, State
-from planar.results.records import InputMotion
-from planar.solving.position import PositionSolver, solve
+from planar.solving.position import solve
 
 RELATIVE_TOLERANCE = 1e-12
 """What a step may be off, of sizes and turns and of the rates that are reached."""
@@ -51,15 +50,18 @@ ProgressCallback = Callable[[float], None]
 class Simulation:
     """A motion in time, and its energies at every row (n,), J.
 
-    `work` is what loads, dampers and driven inputs have put in since the start, so that kinetic + potential - work
-    stays what it was: `balance` is how far it does not, of the greatest of the three.
+    `work` is what loads, dampers and driven inputs have put in since the start, and `lost` what impacts on stops have
+    taken, so that kinetic + potential - work + lost stays what it was: `balance` is how far it does not, of the
+    greatest of these. `impacts` are those on stops, in their order.
     """
 
     motion: Motion
     kinetic: Array
     potential: Array
     work: Array
+    lost: Array
     driven: tuple[str, ...]
+    impacts: tuple[Impact, ...] = ()
 
     __repr__ = short_repr
 
@@ -69,9 +71,9 @@ class Simulation:
 
         Where nothing goes to and fro, beside the greatest of the energies.
         """
-        whole = self.kinetic + self.potential - self.work
-        swing = max(float(np.ptp(each)) for each in (self.kinetic, self.potential, self.work))
-        most = max(float(np.abs(each).max()) for each in (self.kinetic, self.potential, self.work))
+        whole = self.kinetic + self.potential - self.work + self.lost
+        swing = max(float(np.ptp(each)) for each in (self.kinetic, self.potential, self.work, self.lost))
+        most = max(float(np.abs(each).max()) for each in (self.kinetic, self.potential, self.work, self.lost))
         beside = swing if swing > CONSTANT_ENERGY_TOLERANCE * most else most
         return float(np.ptp(whole)) / beside if beside else 0.0
 
@@ -88,11 +90,14 @@ def simulate(
 ) -> Simulation:
     """The motion of a mechanism that is let go at the file's position, for a duration (s), in so many steps.
 
-    Inputs that have a law keep to it, the others only say where the motion starts; `driven` names others that are to
-    keep to their laws, or to the file's velocity and acceleration. From rest, or `moving` with the file's velocities.
+    An input that has a motor runs by it: by what that supplies at the input's speed. Of the others those that have a
+    law keep to it, and the rest only say where the motion starts; `driven` names inputs that are to keep to their laws,
+    or to the file's velocity and acceleration. From rest, or `moving` with the file's velocities.
     Accelerations come from masses, loads, weights, springs and dampers; they are integrated by the method of order 8 of
     Dormand and Prince (E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, 1993, II.5), and
-    after every step the position is brought back onto the constraints.
+    after every step the position is brought back onto the constraints. A pair that meets its stop strikes it, with the
+    restitution of the file (I. Newton's law; an impulse over all links, through what joins them), and rests on it while
+    it is pressed there.
 
     A motion that cannot go on says so in its `outcome` and `reason`. Raises BadInput for a duration or names that are
     none, NoAnswer where there is no position to start from, or something can move that has no mass.
@@ -110,7 +115,11 @@ def simulate(
             raise BadInput(
                 "driven", f"there is no input at {pair!r} to be driven; the inputs are at {', '.join(names)}"
             )
-    kept = [given.pair for given in mechanism.inputs if given.law is not None or given.pair in driven]
+    kept = [
+        given.pair
+        for given in mechanism.inputs
+        if (given.law is not None and given.motor is None) or given.pair in driven
+    ]
     check_loads(mechanism)
     started = (
         mechanism
@@ -142,7 +151,7 @@ class _SimulationRun:
         self.work = lagrangian_functions(self.mechanism)
         q, q1, _ = (each[0] for each in self.work.coordinates(start))
         unit = mechanism_size(self.mechanism, self.work.shapes)
-        self.equations = EquationsOfMotion(self.work, kept, unit, self.work.initial_spring_turns(q))
+        self.phases = make_phases(self.work, self.driven, unit, self.work.initial_spring_turns(q), q)
         self.coordinate_count = len(q)
         q, q1 = self.equations.project(0.0, q, q1)
         self.initial_state = np.concatenate([q, q1, [0.0]])
@@ -150,19 +159,26 @@ class _SimulationRun:
         "whether constraints are far from a change point"
         self.time = np.linspace(0.0, duration, steps + 1)
 
+    @property
+    def equations(self) -> EquationsOfMotion:
+        """Those of the phase in which it is."""
+        return self.phases.equations
+
     def run(self, tick: ProgressCallback | None) -> Simulation:
         rows, outcome, reason = self._integrate(tick)
-        self.equations.pieces = None
         time = self.time[: len(rows)]
         q, q1 = rows[:, : self.coordinate_count], rows[:, self.coordinate_count : 2 * self.coordinate_count]
         q2 = np.array([self._accelerations(*each) for each in zip(time, q, q1, strict=True)])
-        energies = np.array([self.equations.energies(*each) for each in zip(time, q, q1, strict=True)])
-        motion = replace(self._make_motion(time, q, q1, q2), outcome=outcome, reason=reason)
-        return Simulation(motion, energies[:, 0], energies[:, 1], rows[:, -1], self.driven)
+        base = self.phases.base
+        energies = np.array([base.energies(*each) for each in zip(time, q, q1, strict=True)])
+        made = simulated_motion(self.work, self.start, time, (q, q1, q2), tuple(self._freedom_remark()))
+        motion, lost = replace(made, outcome=outcome, reason=reason), self.phases.lost_at(time)
+        impacts = tuple(self.phases.impacts)
+        return Simulation(motion, energies[:, 0], energies[:, 1], rows[:, -1], lost, self.driven, impacts)
 
     def _freedom_remark(self) -> Iterator[str]:
         """That nothing moves freely, where that is so."""
-        if self.equations.rank != self.coordinate_count:
+        if self.phases.base.rank != self.coordinate_count:
             return
         if not self.driven:
             yield "nothing can move: the pairs hold every link"
@@ -178,14 +194,20 @@ class _SimulationRun:
 
     def _accelerations(self, time: float, q: Array, q1: Array) -> Array:
         """Those of a row; not a number where nothing tells them."""
+        equations = self.phases.equations_at(time)
+        equations.pieces = None
         try:
-            pushed = self.equations.accelerations_at(time, q, q1)
+            pushed = equations.accelerations_at(time, q, q1)
         except NoAnswer:
             return np.full(self.coordinate_count, np.nan)
         return pushed.q2 if pushed.regularity > LEAST_REGULARITY else np.full(self.coordinate_count, np.nan)
 
     def _integrate(self, tick: ProgressCallback | None) -> tuple[Array, Outcome, str]:
         """The rows at all times that were reached, and why not all of them were."""
+        try:
+            self.initial_state = self.phases.respond(0.0, self.initial_state)
+        except NoAnswer as driven_on:
+            return self.initial_state[None], driven_on.outcome, _end_sentence(0.0, f": {driven_on.reason}")
         rows = [self.initial_state]
         if not np.all(np.isfinite(self.equations.accelerations_at(0.0, *self._split_state(self.initial_state)).q2)):
             return (
@@ -217,7 +239,7 @@ class _SimulationRun:
             y = self._project(solver.t, solver.y)
             failed = failed or self._relative_change(solver.y, y) > PROJECTION_TOLERANCE
             length = solver.step_size or 0.0
-            kink = None if failed or solver.status == "failed" else self._first_kink(solver, before)
+            kink = None if failed or solver.status == "failed" else self._first_break(solver, before)
             done = length if kink is None else kink[0] - before[0]
             tiny = tiny + 1 if done < SHORTEST_STEP_RATIO * last else 0
             if failed or solver.status == "failed" or tiny > MAX_SHORT_STEPS:
@@ -234,8 +256,10 @@ class _SimulationRun:
             if len(rows) < len(self.time) and self.time[len(rows)] <= at:
                 self._add_rows_until(rows, at, solver.dense_output())
             if kink is not None:
-                y = self._project(*kink)
-                self._hold_pieces(at, y, solver.y if at == before[0] else None)
+                ahead = solver.y if at == before[0] and kink[2] is None else None
+                y = self.phases.respond(at, self._project(*kink[:2]), kink[2])
+                y, good = self._project(at, y), [] if kink[2] is not None else good
+                self._hold_pieces(at, y, ahead)
                 solver = self._integrator(at, y, length)
             else:
                 solver.y, solver.f = y, self._state_rate(solver.t, y)
@@ -252,6 +276,16 @@ class _SimulationRun:
             then = self.equations.course_places(time, *self._split_state(ahead))
             places = [(at, beyond - at) for (at, _), (beyond, _) in zip(places, then, strict=True)]
         self.equations.pieces = self.equations.course_pieces(places)
+
+    def _first_break(self, solver: Any, before: tuple[float, Array]) -> tuple[float, Array, ContactEvent | None] | None:
+        """Where in the last step something first happened that the next one has to start from: a load's kink, or a
+        contact."""
+        kink = self._first_kink(solver, before)
+        contact = self.phases.first_event(before, (solver.t, solver.y), solver.dense_output)
+        if contact is not None and (kink is None or contact.time <= kink[0]):
+            at = contact.time
+            return at, before[1] if at == before[0] else np.asarray(solver.dense_output()(at)), contact
+        return None if kink is None else (*kink, None)
 
     def _first_kink(self, solver: Any, before: tuple[float, Array]) -> tuple[float, Array] | None:
         """Where in the last step a load first left the piece of its course, so that the next one holds from there."""
@@ -358,39 +392,3 @@ class _SimulationRun:
     def _project(self, time: float, y: Array) -> Array:
         """The nearest position and rates that the constraints allow."""
         return np.concatenate([*self.equations.project(time, *self._split_state(y)), y[-1:]])
-
-    def _make_motion(self, time: Array, *orders: Array) -> Motion:
-        """The rows as a motion like any other."""
-        at = {
-            link: [Jet(*(order[:, k + j] for order in orders)) for j in range(3)]
-            for link, k in self.work.link_columns.items()
-        }
-        frames: dict[str, Frame] = {
-            name: frame_at(*at[name]) if name in at else frame for name, frame in self.start.frames.items()
-        }
-        own = {
-            name: tuple(Jet(*(order[:, k] for order in orders)) for k in range(part.start, part.stop))
-            for name, part in self.work.own_slices.items()
-        }
-        inputs = {}
-        for given in self.mechanism.inputs:
-            pair = self.work.relative_motions[given.pair]
-            inputs[given.pair] = InputMotion(*pair.input_position_at(self.work.shapes, frames, own).parts[:3])
-        motion = Motion(
-            mechanism=self.mechanism,
-            inputs=inputs,
-            outcome=Outcome.SOLVED,
-            reason="",
-            residual=0.0,
-            remarks=(*self.start.remarks, *self._freedom_remark()),
-            frames=frames,
-            own=own,
-            shapes=self.start.shapes,
-            time=time,
-        )
-        u = np.array([each.position for each in inputs.values()]).reshape(len(inputs), len(time))
-        still = {name: [each.parts[0] for each in values] for name, values in own.items()}
-        gaps = PositionSolver(self.mechanism).residual_check.residuals(
-            KinematicArrays(motion, self.work.shapes).frames, still, u
-        )
-        return replace(motion, residual=float(np.max(gaps, initial=0.0)))

@@ -24,6 +24,7 @@ class Outcome(StrEnum):
     INPUT_JAMMED = "input jammed"
     BRANCH_LOST = "branch lost"
     TOO_INEXACT = "too inexact"
+    STOP = "stop"
 
 
 class TrackingEnd(StrEnum):
@@ -34,6 +35,7 @@ class TrackingEnd(StrEnum):
     BRANCH_LOST = "lost"
     OUT_OF_RANGE = "far"
     WORK_LIMIT = "spent"
+    STOP = "stop"
 
 
 def join_names(names: Iterable[str], max_names: int | None = MAX_NAMES_LISTED, last_joiner: str = " and ") -> str:

@@ -1,12 +1,18 @@
-"""A zero of a function between two places."""
+"""A zero of a function between two places, and where it first falls below zero."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from math import ulp
 
+import numpy as np
+
 MAX_EVALUATIONS = 80
 """Bisection alone needs 52 for a root to round-off."""
+PARTS_LOOKED_AT = np.linspace(0.05, 0.95, 19)
+"""Parts of a way at which what has one sign at both ends may have the other."""
+TOUCH_TOLERANCE = 1e-12
+"""What would fall below zero by no more touches it, and goes on."""
 
 
 def find_root(function: Callable[[float], float], lower: float, upper: float) -> float:
@@ -39,3 +45,44 @@ def find_root(function: Callable[[float], float], lower: float, upper: float) ->
             part = fa / (fb - fa) * fc / (fb - fc) + (c - a) / (b - a) * fa / (fc - fa) * fb / (fc - fb)
         part = min(1.0 - least, max(least, part))
     return best
+
+
+def lowest_on_cubic(start: tuple[float, float], end: tuple[float, float]) -> tuple[float, float]:
+    """The lowest value of a cubic, known by value and slope at its start and end, at some places between; and where
+    that is, as a part of the way."""
+    (g0, s0), (g1, s1) = start, end
+    t = PARTS_LOOKED_AT
+    h = t**2 * (3.0 - 2.0 * t)
+    values = (1.0 - h) * g0 + t * (1.0 - t) ** 2 * s0 + h * g1 - t**2 * (1.0 - t) * s1
+    lowest = int(np.argmin(values))
+    return float(values[lowest]), float(t[lowest])
+
+
+def find_first_passage(
+    value: Callable[[float], float],
+    rate: Callable[[float], float],
+    ends: tuple[float, float],
+    known: tuple[tuple[float, float], tuple[float, float]],
+) -> float | None:
+    """Where on the way between two places a function that starts above zero first falls below it; None where nowhere.
+
+    `known` are its value and its rate along the way at both ends; rates of `rate` are along the way too. Between them
+    it falls at most once below zero and comes back: what a cubic of these values does is looked at.
+    """
+    (first, last), ((g0, s0), (g1, s1)) = ends, known
+    g0 = max(g0, TOUCH_TOLERANCE)  # what rounding leaves at the start has no sign
+
+    def zero(low: float, high: float) -> float:
+        return find_root(lambda x: max(value(x), g0) if x == first else value(x), low, high)
+
+    gone = abs(last - first)
+    lowest, part = lowest_on_cubic((g0, s0 * gone), (g1, s1 * gone))
+    middle = first + part * (last - first)
+    if g1 < -TOUCH_TOLERANCE:
+        # it may have been below, and above again in the meantime
+        return zero(first, middle if lowest < 0.0 and s1 > 0.0 > value(middle) else last)
+    if s0 < 0.0 < s1:
+        middle = find_root(rate, first, last)
+    elif not lowest < min(g0, g1):
+        return None
+    return zero(first, middle) if value(middle) < -TOUCH_TOLERANCE else None

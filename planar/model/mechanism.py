@@ -16,7 +16,9 @@ from planar.foundation.units import parse_unit
 from planar.model.file_units import FileUnits
 from planar.model.link_shapes import Along, At, Distances, Link, LinkShape, Point, PointDefinition
 from planar.model.loads import Course, Load, Mass, Spring
+from planar.model.motors import Motor
 from planar.model.pairs.base import Pair
+from planar.model.stops import Stops
 
 if TYPE_CHECKING:
     from planar.model.input_laws import InputLaw
@@ -38,6 +40,7 @@ __all__ = [
     "PointDefinition",
     "PublishedValue",
     "Spring",
+    "Stops",
     "check_mechanism",
     "find_law_problem",
     "links_counting_turns",
@@ -85,7 +88,8 @@ LARGEST_COUNTED_ANGLE = 1e12
 class Input(NamedTuple):
     """A relative motion that is given: at a turning pair an angle, at a sliding pair a distance (rad or m, per s).
 
-    With a law it moves in time: from `position` on, and where the law goes on at a speed, from `velocity`.
+    With a law it moves in time: from `position` on, and where the law goes on at a speed, from `velocity`. With a motor
+    a simulation moves it by what that supplies.
     """
 
     pair: str
@@ -93,6 +97,7 @@ class Input(NamedTuple):
     velocity: float = 0.0
     acceleration: float = 0.0
     law: InputLaw | None = None
+    motor: Motor | None = None
 
 
 class Drive(NamedTuple):
@@ -143,6 +148,7 @@ class Mechanism(Displayable, Revisable):
     springs: tuple[Spring, ...] = ()
     masses: tuple[Mass, ...] = ()
     gravity: tuple[float, float] = (0.0, 0.0)
+    stops: tuple[Stops, ...] = ()
     sketch: tuple[tuple[str, float, float], ...] = ()
     units: FileUnits = field(default_factory=FileUnits)
     ids: tuple[str, ...] = ()
@@ -246,9 +252,23 @@ def check_mechanism(mechanism: Mechanism) -> None:
     for given in mechanism.inputs:
         if given.pair not in named:
             raise BadInput(given.pair, f"there is no pair {given.pair!r} to be driven; pairs are {join_names(named)}")
+    _check_stops_and_motors(mechanism, named)
     wrong = find_law_problem(mechanism)
     if wrong:
         raise BadInput(*wrong)
+
+
+def _check_stops_and_motors(mechanism: Mechanism, named: Mapping[str, Pair]) -> None:
+    for given in mechanism.inputs:
+        unfit = given.motor and given.motor.find_problem()
+        if unfit:
+            raise BadInput(f"{given.pair}.motor.{unfit[0]}", unfit[1])
+    for each in mechanism.stops:
+        if each.pair not in named:
+            raise BadInput(each.pair, f"there is no pair {each.pair!r} to have stops; pairs are {join_names(named)}")
+        unfit = each.find_problem()
+        if unfit:
+            raise BadInput(f"{each.pair}.{unfit[0]}", unfit[1])
 
 
 def find_law_problem(mechanism: Mechanism) -> tuple[str, str] | None:

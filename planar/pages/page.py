@@ -37,6 +37,7 @@ STYLES = (
 SCRIPTS = (
     "uplot/uPlot.iife.min.js",
     "solve/singular.js",
+    "solve/stops.js",
     "solve/linkage.js",
     "page.js",
     "solve/course.js",

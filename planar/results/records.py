@@ -91,12 +91,13 @@ class InputMotion(NamedTuple):
 class Limit(NamedTuple):
     """Where a motion cannot go on as it came, or an output turns back: solved for, to round-off of the input.
 
-    `kind` is "input dead point" (the input turns back), "stroke end" (the output `of` turns back), "change point"
-    (branches of the motion cross), or "not followed further" where what lies beyond takes too much work. `of` is the
-    pair whose relative motion turns back: the input's own at the first, the output's at the second, the running input's
-    else. `input` is the position of the input that runs (rad or m), in a run in time the time (s). `value` is the
-    output's position there (rad or m), `end` for a slide's two ends "TDC" or "BDC" (farther from the driving crank's
-    fixed pin, and nearer), `told` what there is to say of it, as where the other branches lead.
+    `kind` is "input dead point" (the input turns back), "stroke end" (the output `of` turns back), "stop" (the pair
+    `of` meets its stop), "change point" (branches of the motion cross), or "not followed further" where what lies
+    beyond takes too much work. `of` is the pair whose relative motion turns back or stops: the input's own at the
+    first, the output's at the second, the running input's where branches cross. `input` is the position of the input
+    that runs (rad or m), in a run in time the time (s). `value` is the output's position there (rad or m), `end` for a
+    slide's two ends "TDC" or "BDC" (farther from the driving crank's fixed pin, and nearer), `told` what there is to
+    say of it, as where the other branches lead.
     """
 
     kind: str

@@ -30,6 +30,7 @@ from planar.solving.prepared_mechanism import PreparedMechanism
 if TYPE_CHECKING:
     from planar.solving.continuation.path_pieces import BranchRates
     from planar.solving.continuation.singular_rates import SingularRates
+    from planar.solving.continuation.solution_curve import CurvePoint
     from planar.solving.rates.sample_rates import InputRates
 
 
@@ -150,7 +151,20 @@ class PositionSolver(PreparedMechanism):
 
     def state(self, z: Array, remarks: tuple[str, ...] = ()) -> State:
         """The state at given unknowns, once they and their rates have passed the residual check. Raises NoAnswer."""
-        return self._fast_state(z, remarks) or self._examined_state(z, remarks)
+        found = self._fast_state(z, remarks) or self._examined_state(z, remarks)
+        self.refuse_outside_stops(z)
+        return found
+
+    def is_inside_stops(self, z: Array) -> bool:
+        """Whether no pair is beyond its stop."""
+        return self.stops is None or not self.stops.refusal_outside(self.stop_positions(z, self.inputs.u), "")
+
+    def refuse_outside_stops(self, z: Array) -> None:
+        """Raise NoAnswer where a pair is beyond its stop."""
+        if self.stops is not None:
+            wrong = self.stops.refusal_outside(self.stop_positions(z, self.inputs.u), self.describe_position())
+            if wrong is not None:
+                raise wrong
 
     def _examined_state(self, z: Array, remarks: tuple[str, ...]) -> State:
         """The state by the general checks, which say why where there is none."""
@@ -218,11 +232,15 @@ class PositionSolver(PreparedMechanism):
         mobility = len(self.inputs.u)
         return State(self.mechanism, mobility, found.residual, remarks, frames, own, self.shapes)
 
-    def end_refusal(self, u: Array, tangent: Array, ending: TrackingEnd) -> NoAnswer:
-        """What to say of a motion that ends at inputs u, towards which it went along a tangent."""
+    def end_refusal(self, u: Array, point: CurvePoint, ending: TrackingEnd) -> NoAnswer:
+        """What to say of a motion that ends at inputs u, and went as far as a point."""
         from planar.solving.diagnosis import refusals
         from planar.solving.rates.regularity import moved_links
 
+        tangent = point.tangent
+        if ending is TrackingEnd.STOP and self.stops is not None:
+            met = self.stops.describe_met(self.stop_positions(point.y[:-1], u))
+            return refusals.motion_stopped(self, met, self.describe_inputs(u))
         return refusals.motion_ended(self, moved_links(self, tangent[:-1]), self.describe_inputs(u), ending)
 
     def _singular_state(self, rates: SingularRates, remarks: tuple[str, ...]) -> State | None:
@@ -300,6 +318,7 @@ class SolvedMechanism:
         """The assembly nearest to the sketch. Raises NoAnswer."""
         found = self._start[1]
         if isinstance(found, Assembly):
+            self.solver.refuse_outside_stops(found.z)
             return found
         raise self._refusal.with_traceback(None)
 
@@ -324,6 +343,8 @@ class SolvedMechanism:
         if regular is not None:
             solver, found = regular[0], found._replace(z=regular[1])
         found.z.flags.writeable = False
+        if solver.stops is not None:
+            solver.stops.initial_turns = solver.stops.turns(solver.stop_positions(found.z, solver.inputs.u))
         return solver, found
 
     @cached_property

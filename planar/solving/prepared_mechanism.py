@@ -21,6 +21,7 @@ from planar.model.mechanism import LARGEST_NUMBER, SMALLEST_NUMBER, Mechanism, p
 from planar.model.pairs import MeasureKind
 from planar.model.wording import amount
 from planar.solving.checks.residual_check import ResidualCheck
+from planar.solving.stops import MetStop, PairStops
 from planar.solving.structure import mechanism_structure
 
 ZERO_POSITION = 1e-14
@@ -74,6 +75,7 @@ class PreparedMechanism:
         lawful = any(given.law is not None for given in mechanism.inputs)
         if lawful or not self.has_extent:
             there = type(self)(mechanism)
+            there.__dict__["stops"] = self.stops
             return there.with_functions(self.functions) if self.is_deflated else there
         there = object.__new__(type(self))
         there.__dict__.update(self.__dict__)
@@ -89,6 +91,23 @@ class PreparedMechanism:
             there.__dict__.pop(name, None)
         there.functions, there.equations = program, program.equations
         return there
+
+    @cached_property
+    def stops(self) -> PairStops | None:
+        """The stops of its pairs, if it has any."""
+        return PairStops(self.mechanism, self.unit) if self.mechanism.stops else None
+
+    def stop_positions(self, z: Array, u: Array) -> Array:
+        """The positions of the pairs that have stops (stops,), rad or m; of rows of unknowns (stops, rows)."""
+        if self.stops is None:
+            return np.zeros(0)
+        w = self.functions.coordinates(z, u, self.inputs.p) * self.scale
+        frames, own = frames_from_coordinates(list(w.T), self.column, self.shapes, self.pairs)
+        return self.stops.positions(self.shapes, frames, own)
+
+    def stops_at(self, z: Array, u: Array) -> tuple[MetStop, ...]:
+        """The stops that pairs meet at unknowns and inputs."""
+        return self.stops.met_at(self.stop_positions(z, u)) if self.stops else ()
 
     @property
     def is_deflated(self) -> bool:

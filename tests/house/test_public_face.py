@@ -76,6 +76,9 @@ def results():
         planar.sweep(bars, {"BC.length": [0.066]}, steps=6),
         planar.sweep(bars, {"BC.length": [0.066]}, steps=6, reduce={"path": "C.path_length"}),
     )
+    yield planar.simulate("tipper", 0.3, steps=4).impacts[0]
+    yield planar.unknown_load(planar.solve("balanced-lamp"), "springs.0")
+    yield planar.motor_duty(planar.forces(planar.solve("motor-press")))
     yield from (swept, swept[0], prepared, prepared())
     handed_in = AnswerList(7, (HandedInValue("Ann", 1, "velocity of C", 0.6, "m/s", 3),))
     marks = planar.mark_answers(bars, handed_in)

@@ -35,7 +35,7 @@ console.log(JSON.stringify(forces.at(state, inputs, linkage.d, forces.wound(stat
 def on_page(mechanism: Mechanism, **moved: list[float]) -> dict[str, Any]:
     """What the page's scripts find, with its inputs moved to `u` or its dimensions changed to `d` (SI)."""
     data, functions = page_data(mechanism)
-    scripts = read_asset("solve/singular.js") + read_asset("solve/linkage.js") + read_asset("solve/forces.js")
+    scripts = "".join(read_asset(f"solve/{name}.js") for name in ("singular", "stops", "linkage", "forces"))
     ran = subprocess.run(
         ["node", "-e", f"{scripts}\n{functions}\n{SCRIPT}"],
         input=json.dumps([data, moved]),

@@ -382,7 +382,7 @@ def test_a_simulation_that_stops_is_told_as_far_as_it_goes_and_ends_with_status_
     def stopping(*given, **more):
         whole = whole_way(*given, **more)
         motion = replace(whole.motion.up_to_row(4), outcome=Outcome.BRANCH_LOST, reason="told only to 0.08 s")
-        energies = {name: getattr(whole, name)[:5] for name in ("kinetic", "potential", "work")}
+        energies = {name: getattr(whole, name)[:5] for name in ("kinetic", "potential", "work", "lost")}
         return replace(whole, motion=motion, **energies)
 
     words = ("simulate", "physical-pendulum", "--duration", "0.2s", "--steps", "10", "-o", "p.csv")

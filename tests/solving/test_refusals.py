@@ -129,6 +129,10 @@ CASES = {
         ["A = 0 deg", "link 'BC' has an arm of 1e-13", "lengthen link 'BC'"],
     ),
     "input jammed": (beside(("U", 60)), ["'U'", "'f' and 'p' fast", "'AB', 'BC' and 'DC'", "drive 'A' or 'B'"]),
+    "stop": (
+        mm_four_bar() | {"pairs": [{"turning": "A", "stops": [70, 90]}, *pins("BCD")]},
+        ["A = 60 deg", "pair 'A' is at 60 deg", "its stops at 70 deg and 90 deg", "move the input"],
+    ),
 }
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from itertools import islice, pairwise
 from math import pi, remainder
 from typing import NamedTuple
@@ -15,6 +16,7 @@ from planar.assemblies.circuits.dead_points import (
     CriticalPositions,
     critical_positions,
 )
+from planar.assemblies.circuits.stop_positions import stop_positions
 from planar.assemblies.circuits.traced_circuit import TracedCircuit, trace_circuit
 from planar.assemblies.modes import Mode, Modes
 from planar.assemblies.polynomial.completeness import Completeness
@@ -105,7 +107,7 @@ class CircuitSearch:
         """All that are found, once circuits show no dead point that was not known."""
         known = critical_positions(self.solver, self.index)
         doubts = list(known.doubts)
-        cuts = self._distinct((*known.positions, *known.crossings))
+        cuts = self._distinct((*known.positions, *known.crossings, *self._stop_positions()))
         file = self.solver.mechanism.inputs[self.index].position
         low, high = known.span
         tried = (
@@ -123,7 +125,7 @@ class CircuitSearch:
             cuts = self._distinct((*cuts, *fresh))
             if not known.doubts:
                 doubts.append("circuits have dead points that were not found before")
-        met = [*known.crossings, *(at for each, _ in circuits for at in each.dead_points)]
+        met = [*known.crossings, *(at for each, _ in circuits for at in (*each.dead_points, *each.stops))]
         # where links that come first have a dead point, none of the whole linkage need be
         kept = [at for at in cuts if any(self._is_near(at, other) for other in met)]
         intervals = tuple(self._input_interval(low, high, places) for low, high in self._cut_range(known, kept))
@@ -131,6 +133,12 @@ class CircuitSearch:
             doubts.append("the number of assemblies changes where no dead point was found")
         doubts += differing + self._completeness_doubts(places, circuits)
         return CircuitSearchResult(tuple(circuits), tuple(kept), intervals, *self._completeness_claim(kept, doubts))
+
+    def _stop_positions(self) -> Iterator[float]:
+        """Where pairs pass their stops, along circuits that have none."""
+        if self.solver.stops is not None:
+            free = CircuitSearch(replace(self.mechanism, stops=()), self.pair).find_circuits()
+            yield from stop_positions([each for each, _ in free.circuits], self.solver.stops)
 
     def _input_interval(self, low: float, high: float, places: Sequence[ListedInterval]) -> InputInterval:
         """A part of the input's range, and how many assemblies there are all over it."""
@@ -153,7 +161,7 @@ class CircuitSearch:
         moved = (*self.standing_drives, Drive(self.pair, bare.position))
         solver = self.solver.with_inputs_of(replace_inputs(self.mechanism, moved))
         modes = Modes(solver, self.mechanism, moved, False)
-        listing = tuple(islice(modes, MAX_ASSEMBLIES + 1))
+        listing = tuple(islice((mode for mode in modes if solver.is_inside_stops(mode.z)), MAX_ASSEMBLIES + 1))
         whole = len(listing) <= MAX_ASSEMBLIES
         return ListedInterval(
             low, high, solver, listing[:MAX_ASSEMBLIES], whole, modes.complete is not Completeness.NOT
@@ -227,7 +235,7 @@ class CircuitSearch:
             doubts.append("lists of assemblies are not known to be complete")
         if any(each.has_change_point for each, _ in circuits):
             doubts.append(BRANCHES_CROSS)
-        if any(not each.closed and not each.lost_reason for each, _ in circuits):
+        if any(not each.closed and not each.lost_reason and not all(each.stop_names) for each, _ in circuits):
             doubts.append("slides run out without an end, and may come back from there")
         lost = dict.fromkeys(each.lost_reason for each, _ in circuits if each.lost_reason)
         return doubts + [f"one was lost: {why}" for why in lost][:1]
@@ -235,10 +243,7 @@ class CircuitSearch:
     def _completeness_claim(self, kept: Sequence[float], doubts: Sequence[str]) -> tuple[Completeness, tuple[str, ...]]:
         if doubts:
             return Completeness.NOT, (f"the number of circuits is not claimed: {'; '.join(dict.fromkeys(doubts))}",)
-        where = (
-            f"dead points at {count_phrase(len(kept), 'position', 'positions')} of the input"
-            if kept
-            else "no dead points"
-        )
+        what = "dead points and stops" if self.solver.stops else "dead points"
+        where = f"{what} at {count_phrase(len(kept), 'position', 'positions')} of the input" if kept else f"no {what}"
         told = f"{where}, found over its whole range as all zeros of a function that is known to rounding"
         return Completeness.NUMERICALLY, (told, "every assembly between them lies on one circuit, and on one only")

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planar.foundation.arrays import Array
-from planar.foundation.errors import NoAnswer
+from planar.foundation.errors import NoAnswer, TrackingEnd, join_names
 from planar.solving.continuation.path_pieces import PathPiece
 from planar.solving.continuation.period import MAX_PIECES
 from planar.solving.continuation.predictor_corrector import CurveTracker
@@ -25,7 +25,8 @@ class Branch(NamedTuple):
 
     `number`: within its circuit, from 1; `low`, `high`: where the input turns back (rad or m), low of an input that
     turns within one turn, high = low + 2 pi turns where it goes all round; `turns`: turns of the input after which the
-    linkage is back, 0 where the branch has ends; `ends`: what stands at low and at high.
+    linkage is back, 0 where the branch has ends; `ends`: what stands at low and at high, "dead point", "stop of D",
+    "without end" or "lost".
     """
 
     number: int
@@ -80,11 +81,20 @@ class TracedCircuit(NamedTuple):
     lost_reason: str
     is_turning: bool
     "whether the input comes back after a turn"
+    stopped_inputs: tuple[float, ...] = ()
+    "where the curve ends at a stop (rad, sizes)"
+    stop_names: tuple[str, str] = ("", "")
+    "the stops at which its first and its last branch end: stop of D"
 
     @property
     def scale(self) -> float:
         """What positions of the input on the curve are multiplied by: rad and m outside."""
         return 1.0 if self.is_turning else self.solver.unit
+
+    @property
+    def stops(self) -> tuple[float, ...]:
+        """The input's positions at the stops at which it ends (rad, m)."""
+        return tuple(each * self.scale for each in self.stopped_inputs)
 
     @property
     def dead_points(self) -> tuple[float, ...]:
@@ -110,7 +120,8 @@ class TracedCircuit(NamedTuple):
                 ends = ("dead point", "dead point") if self.resting_inputs else ("", "")
             else:
                 out = "lost" if self.lost_reason else "without end"
-                ends = (out if index == 0 else "dead point", out if index == last else "dead point")
+                first, final = (name or out for name in self.stop_names)
+                ends = (first if index == 0 else "dead point", final if index == last else "dead point")
             up = (index - self.home_branch) % 2 == 0
             turns = round(gone / TURN) if self.closed and not self.resting_inputs else 0
             if self.is_turning:
@@ -142,6 +153,8 @@ def _trace_open_circuit(solver: PositionSolver, index: int, z: Array, reason: st
     first = float(solver.inputs.u[index])
     sides: list[list[BranchLeg]] = []
     rests: list[float] = []
+    stopped: list[float] = []
+    names: list[str] = []
     lost, crossed = "", False
     for way in (-1.0, 1.0):
         walk = _curve_tracker(solver, index, z, way)
@@ -154,13 +167,20 @@ def _trace_open_circuit(solver: PositionSolver, index: int, z: Array, reason: st
                 break
         rests += [first + way * piece.stop for piece in found if piece.dead_point is not None]
         crossed |= bool(walk.passed)
-        if not (out or walk.limit is not None):
+        met = solver.stops_at(walk.point.y[:-1], walk.curve.inputs(walk.point.y)) if not out else ()
+        names.append(f"stop of {join_names(dict.fromkeys(each.pair for each in met))}" if met else "")
+        if walk.ending is TrackingEnd.STOP:
+            stopped.append(first + way * float(walk.point.y[-1]))
+        elif not (out or walk.limit is not None):
             lost = reason
         sides.append([BranchLeg(walk.curve, each.pieces, first, way) for each in split_at_dead_points(found)])
     back, ahead = sides
     home = (*back[:1], *ahead[:1])  # none where no way on is found at all
     branches = [*((leg,) for leg in back[:0:-1]), home, *((leg,) for leg in ahead[1:])] if home else []
-    return TracedCircuit(solver, tuple(branches), max(len(back) - 1, 0), tuple(rests), crossed, False, lost, turns)
+    home_number, both = max(len(back) - 1, 0), (names[0], names[1])
+    return TracedCircuit(
+        solver, tuple(branches), home_number, tuple(rests), crossed, False, lost, turns, tuple(stopped), both
+    )
 
 
 def _curve_tracker(solver: PositionSolver, index: int, z: Array, way: float) -> CurveTracker:

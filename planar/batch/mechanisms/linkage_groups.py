@@ -72,6 +72,8 @@ def _partition_linkage(
     """A mechanism parted into groups, with the names of its points and where it starts; None where it is for the
     general path."""
     running = running_input_index(mechanism, request.pair, "inputs")
+    if mechanism.stops:
+        return None
     try:
         own = partition_mechanism(mechanism)
     except (NotPartitionable, BadInput, PointPlacementError):

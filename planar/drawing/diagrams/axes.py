@@ -120,10 +120,14 @@ def format_number(value: float, digits: int = 6) -> str:
     return f"{value:.{digits}g}".replace("-", "−") if value else "0"
 
 
+MAX_OUTLIER_SHARE = 0.1
+"""Of the values: what grows over more of them is part of the motion, as the working stroke of a press."""
+
+
 def without_outliers(values: Array) -> Array:
     """The same, not a number where values grow beyond all the others, as beside a dead point (n,)."""
     size = np.abs(values[np.isfinite(values)])
     usual = float(np.quantile(size, USUAL_QUANTILE)) if len(size) else 0.0
-    if not usual or size.max() <= OUTLIER_RATIO * usual:
+    if not usual or size.max() <= OUTLIER_RATIO * usual or np.mean(size > SHOWN_RATIO * usual) > MAX_OUTLIER_SHARE:
         return values
     return np.where(np.abs(values) <= SHOWN_RATIO * usual, values, np.nan)

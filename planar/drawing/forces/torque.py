@@ -28,7 +28,7 @@ ROUND_OFF_RATIO = 1e-9
 """A part of the greatest below this is round-off."""
 
 
-def torque_picture(
+def torque_picture(  # long: one part of the diagram after the other
     source: Forces | Motion | Mechanism, of: str | None = None, fluctuation: float = DEFAULT_FLUCTUATION
 ) -> Picture:
     """The effort of an input (left out: of the one that runs) over a cycle.
@@ -55,6 +55,7 @@ def torque_picture(
     mean = even.mean if even is not None else None
     seen = axes.without_outliers(effort)
     parts = {label: np.where(np.isfinite(seen), part, np.nan) for label, part in _effort_parts(drawn, name).items()}
+    parts |= _motor_curve(drawn, name)
     across = axes.fit_axis(
         drawn.abscissa, DIAGRAM_WIDTH, drawn.axis_name, end_at_ticks=False, degrees=drawn.unit == "deg"
     )
@@ -113,6 +114,12 @@ def _notes(even: Flywheel | None, why: str, kind: str, drawn: ForceRun) -> Itera
             f"{told(even.speed, 'angular velocity')}: "
             f"I = ΔE / (C ω²) = {told(even.inertia, 'moment of inertia')}"
         )
+
+
+def _motor_curve(drawn: ForceRun, name: str) -> dict[str, Array]:
+    """What the motor of the input supplies at its speed, if it has one."""
+    motor = next(given.motor for given in drawn.motion.mechanism.inputs if given.pair == name)
+    return {} if motor is None else {"motor": drawn.in_order(motor.effort_at(drawn.motion.inputs[name].velocity))}
 
 
 def _effort_parts(drawn: ForceRun, name: str) -> dict[str, Array]:

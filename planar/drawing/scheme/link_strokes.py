@@ -21,6 +21,7 @@ from planar.drawing.scheme.placed_strokes import (
 )
 from planar.drawing.scheme.scene import GUIDE_OVERHANG, Cylinder, Scene, TravelRanges, greatest, least
 from planar.drawing.scheme.springs_masses import Coil, MassCentreMark, Spiral
+from planar.drawing.scheme.stops import stop_strokes
 from planar.foundation import jets
 from planar.foundation.geometry import Frame, Vector
 from planar.foundation.jets import Scalar
@@ -62,7 +63,7 @@ def moving_strokes(scene: Scene, pen: Pen = Pen.LINK) -> dict[str, Iterator[Plac
         "tubes": cylinder_strokes(scene, pen),
         "bars": bar_strokes(scene, pen),
         "springs": spring_strokes(scene),
-        "sliders": _slider_strokes(scene, pen),
+        "sliders": chain(stop_strokes(scene), _slider_strokes(scene, pen)),
         "pins": pin_strokes(scene),
     }
 

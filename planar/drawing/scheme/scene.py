@@ -144,7 +144,13 @@ class Scene:
 
     def knows_travel(self, name: str) -> bool:
         """Whether it is known from where to where the displacement of a slide goes."""
-        return name in self.travel
+        return name in self._known_travel
+
+    @cached_property
+    def _known_travel(self) -> TravelRanges:
+        """The ranges of slides, of those that nobody has measured what their stops say."""
+        stopped = {each.pair: (each.low, each.high) for each in self.mechanism.stops if None not in each[1:3]}
+        return stopped | dict(self.travel)  # type: ignore[return-value]  # both ends are numbers
 
     def pair_marks(self, pair: Pair) -> Sequence[DrawingMark]:
         """What one pair, or the motion of two of several links on one pin, says of how it is drawn."""
@@ -166,7 +172,7 @@ class Scene:
         if not self.knows_travel(name):
             return self.shown_range(name, link, foot, way)
         start = float((through - foot).dot(way))
-        low, high = sorted(start + value for value in self.travel[name])
+        low, high = sorted(start + value for value in self._known_travel[name])
         return low, high
 
     def drawn_range(self, name: str, link: str, through: Vector, foot: Vector, way: Vector) -> tuple[Scalar, Scalar]:

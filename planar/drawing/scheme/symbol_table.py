@@ -160,6 +160,13 @@ def _between(half: float) -> tuple[SymbolPoint, ...]:
     return (0.0, 0.0, -half), (1.0, 0.0, -half), (1.0, 0.0, half), (0.0, 0.0, half)
 
 
+def _stop(along: tuple[float, float], across: tuple[float, float]) -> SymbolStroke:
+    """A small black block between two places along a symbol's direction, and to its left (mm)."""
+    (near, far), (low, high) = along, across
+    corners = ((near, low), (far, low), (far, high), (near, high))
+    return SymbolStroke(Pen.PIN, tuple((0.0, x, y) for x, y in corners), True, Fill.SOLID)
+
+
 def _slot() -> SymbolStroke:
     half = SLOT_SIZE[1] / 2.0
     ends = (*_arc(1.0, half, -pi / 2.0, pi / 2.0), *_arc(0.0, half, pi / 2.0, 1.5 * pi))
@@ -243,6 +250,10 @@ SYMBOLS: dict[str, Sequence[SymbolStroke | SymbolCircle | TurnedStroke | Hatchin
         ),
         SymbolStroke(Pen.PITCH, ((0.0, -2.0, 0.0), (1.0, 2.0, 0.0))),
     ),
+    "block stop": (_stop((BLOCK_SIZE[0] / 2.0 + 0.2, BLOCK_SIZE[0] / 2.0 + 1.6), (-1.5, 1.5)),),
+    "piston stop": tuple(_stop((0.5, 1.7), (side * 0.9, side * (CYLINDER_WIDTH / 2.0 - 0.4))) for side in (-1.0, 1.0)),
+    "pin stop": (_stop((PIN_RADIUS + 0.2, PIN_RADIUS + 1.4), (-1.5, 1.5)),),
+    "bar stop": (_stop((5.0, 7.2), (0.6, 2.0)),),
     "wheel": (SymbolCircle(Pen.PITCH, 0.0, 1.0),),
     "rim": (SymbolCircle(Pen.LINK, RIM_WIDTH, 1.0),),
     "fixed rim": (SymbolCircle(Pen.GROUND, RIM_WIDTH, 1.0),),

@@ -29,6 +29,7 @@ from planar.pages.data.document_data import dimension_words, document_data, is_p
 from planar.pages.data.force_data import force_data
 from planar.pages.data.polygon_data import polygon_data
 from planar.pages.data.scheme_data import motion_positions, scheme_data
+from planar.pages.data.stop_data import stop_data, stop_position_function
 from planar.solving.position import PositionSolver, solved_mechanism
 from planar.solving.rest_position import rest_position
 
@@ -123,6 +124,7 @@ def page_data(mechanism: Mechanism, z: np.ndarray | None = None) -> tuple[dict[s
         "assemblies": _assembly_data(mechanism, solver),
         "z": z.tolist(),
         "tolerance": solver.tolerance,
+        "stops": stop_data(solver),
         "sizes": len(numbers.values),
     }
     acting = force_data(numbers.mechanism, numbers.d, state, solver.unit)
@@ -135,9 +137,10 @@ def page_data(mechanism: Mechanism, z: np.ndarray | None = None) -> tuple[dict[s
     ]
     functions += [write_javascript(f"closing{k}", program.block_function(stage)) for k, stage in enumerate(e.blocks)]
     functions.append(reported_function(mechanism, solver, numbers.d, numbers.shapes))
+    functions.append(stop_position_function(solver, numbers.d, numbers.shapes))
     stages = ",".join(f"closing{k}" for k in range(len(e.blocks)))
     functions.append(acting[1] if acting else "const balance=null;")
-    functions.append(f"const program={{sizes,drawn,positions,kinematics,reported,balance,stages:[{stages}]}};")
+    functions.append(f"const program={{sizes,drawn,positions,kinematics,reported,stopping,balance,stages:[{stages}]}};")
     return data, "\n".join(functions)
 
 

@@ -75,7 +75,7 @@ def _limits_table(motion: Motion) -> FittedTable:
     for limit in motion.limits:
         of = [name for name in (limit.of,) if name]
         kind = "length" if limit.of and motion.has_length_motion(limit.of) else "angle"
-        where = amount(limit.value, kind, units) if limit.kind == "stroke end" else ""
+        where = amount(limit.value, kind, units) if limit.kind in ("stroke end", "stop") else ""
         at_input = limit.input if driver is None else _to_file_unit(motion, driver, limit.input)
         name = f"{limit.kind}, {limit.end}" if limit.end else limit.kind
         table.add_row(name, join_all_names(of) if of else "", format_number(at_input), where)

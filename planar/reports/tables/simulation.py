@@ -16,21 +16,55 @@ from planar.reports.fitted_table import FittedTable, plain_table
 from planar.reports.number_format import column_heading, format_number, format_quantity, paragraphs
 from planar.reports.tables.motion import motion_tables
 
-ENERGIES = ("kinetic", "potential", "work")
+ENERGIES = ("kinetic", "potential", "work", "lost")
+MAX_IMPACTS_SHOWN = 12
+"""Impacts that a table lists; a file of the motion, and JSON, has all."""
+SPEED_KINDS = {True: "velocity", False: "angular velocity"}
 
 
 def tables(simulation: Simulation) -> RenderableType:
     """The run, which inputs were let go, how they moved, and what became of the energy."""
     motion = simulation.motion
-    kept = f"kinetic + potential − work stays what it was, but for {simulation.balance:.1e} of the energy that changes"
+    what = "kinetic + potential − work + lost" if simulation.impacts else "kinetic + potential − work"
+    kept = f"{what} stays what it was, but for {simulation.balance:.1e} of the energy that changes"
+    hits = [_impacts_table(simulation)] if simulation.impacts else []
     return Group(
-        motion_tables(motion), _inputs_table(simulation), _energies_table(simulation), paragraphs([("energy", kept)])
+        motion_tables(motion),
+        _inputs_table(simulation),
+        *hits,
+        _energies_table(simulation),
+        paragraphs([("energy", kept)]),
     )
+
+
+def _impacts_table(simulation: Simulation) -> FittedTable:
+    """The impacts on stops, the first of very many; then what is lost in all."""
+    motion, many = simulation.motion, len(simulation.impacts)
+    units = motion.mechanism.units
+    shown = simulation.impacts[:MAX_IMPACTS_SHOWN]
+    title = "Impacts on stops" if many == len(shown) else f"The first {len(shown)} of {many} impacts on stops"
+    headings = ("pair", "time, s", ("at", "unit"), ("speed before", "after", "unit"), "lost, J", "")
+    table = plain_table(title, *headings, left=(0, 3, 6, 8))
+    for each in shown:
+        length = motion.has_length_motion(each.pair)
+        own, rate = units.length if length else units.angle, display_unit(SPEED_KINDS[length], units)
+        table.add_row(
+            each.pair,
+            format_number(each.time),
+            format_number(parse_unit(own).from_si(each.position)),
+            own,
+            *(format_number(rate[1].from_si(speed)) for speed in (each.approach, each.rebound)),
+            rate[0],
+            format_number(each.lost),
+            "rests there" if each.rests else "",
+        )
+    return table
 
 
 def _inputs_table(simulation: Simulation) -> FittedTable:
     motion = simulation.motion
     units = motion.mechanism.units
+    motors = {given.pair for given in motion.mechanism.inputs if given.motor is not None}
     headings = ("input", "", ("unit", "start", "end", "least", "greatest"), ("greatest speed", "unit"))
     table = plain_table("Inputs, among these positions", *headings, left=(0, 1, 2, 8), keys=2)
     for name, each in motion.inputs.items():
@@ -40,7 +74,7 @@ def _inputs_table(simulation: Simulation) -> FittedTable:
         places = (each.position[0], each.position[-1], each.position.min(), each.position.max())
         table.add_row(
             name,
-            "driven" if name in simulation.driven else "let go",
+            "driven" if name in simulation.driven else "by its motor" if name in motors else "let go",
             own,
             *(format_number(of(float(place))) for place in places),
             format_number(rate.from_si(float(np.abs(each.velocity).max()))),
@@ -56,10 +90,12 @@ def _energies_table(simulation: Simulation) -> FittedTable:
         *(column_heading(each, "energy", units) for each in ("at the start", "at the end", "least", "greatest")),
     )
     table = plain_table("Energy", *headings)
-    names = ("kinetic energy", "potential energy", "work put in")
+    names = ("kinetic energy", "potential energy", "work put in", "lost in impacts")
     most = max(float(np.abs(getattr(simulation, what)).max()) for what in ENERGIES)
     for name, what in zip(names, ENERGIES, strict=True):
         values = getattr(simulation, what)
+        if what == "lost" and not simulation.impacts:
+            continue
         ends = (values[0], values[-1], values.min(), values.max())
         table.add_row(name, *(format_quantity(float(each), "energy", units, most) for each in ends))
     return table
@@ -67,11 +103,15 @@ def _energies_table(simulation: Simulation) -> FittedTable:
 
 def energy_series(simulation: Simulation) -> Iterable[ReportedSeries]:
     """The energies at every position, beside what a file of the motion has."""
+    told = ENERGIES if simulation.motion.mechanism.stops else ENERGIES[:3]
     yield ReportedSeries(
-        "energy", "", dict.fromkeys(ENERGIES, "energy"), {what: getattr(simulation, what) for what in ENERGIES}
+        "energy", "", dict.fromkeys(told, "energy"), {what: getattr(simulation, what) for what in told}
     )
 
 
 def simulation_facts(simulation: Simulation) -> dict[str, Any]:
     """What is said of the whole motion, as JSON values."""
-    return {"driven": list(simulation.driven), "energy_balance": simulation.balance}
+    found: dict[str, Any] = {"driven": list(simulation.driven), "energy_balance": simulation.balance}
+    if simulation.motion.mechanism.stops:
+        found["impacts"] = [each._asdict() for each in simulation.impacts]
+    return found

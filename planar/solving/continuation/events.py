@@ -11,11 +11,11 @@ import numpy as np
 from planar.equations.coordinates import frames_from_coordinates
 from planar.foundation.arrays import Array
 from planar.foundation.errors import TrackingEnd
-from planar.foundation.jets import Jet, value_and_rates
-from planar.foundation.root_finding import find_root
+from planar.foundation.root_finding import find_root, lowest_on_cubic
 from planar.model.pairs import MeasureKind, Pair
 from planar.results.records import Limit
 from planar.solving.continuation.change_point_remarks import change_point_remark
+from planar.solving.continuation.pair_motions import pair_motions_at
 from planar.solving.continuation.path_pieces import (
     END_TOLERANCE,
     PathBifurcation,
@@ -26,7 +26,7 @@ from planar.solving.continuation.path_pieces import (
 from planar.solving.continuation.period import PeriodSearch
 from planar.solving.continuation.predictor_corrector import CurveTracker
 from planar.solving.continuation.solution_curve import Arc, CurvePoint, SolutionCurve
-from planar.solving.continuation.turning_points import is_dead_point, lowest_on_cubic
+from planar.solving.continuation.turning_points import is_dead_point
 from planar.solving.prepared_mechanism import PreparedMechanism
 
 STANDING_RATE = 1e-9
@@ -53,17 +53,7 @@ class WatchedOutputs(NamedTuple):
 
     def rates_at(self, curve: SolutionCurve, point: CurvePoint) -> Array:
         """Position, first and second derivative by arc length of every output (outputs, 3), SI."""
-        setup = self.setup
-        if not self.pairs:
-            return np.zeros((0, 3))
-        rates, second = curve.widen_direction(point.tangent), curve.widen_direction(point.curvature)
-        moving = setup.functions.kinematics(curve.unknowns_and_inputs(point.y), rates, second, curve.p)
-        parts = np.stack([moving.w, moving.w1, moving.w2], axis=1) * setup.scale[:, None]
-        frames, own = frames_from_coordinates(
-            [Jet(*each) for each in parts.tolist()], setup.column, setup.shapes, setup.pairs
-        )
-        found = [value_and_rates(pair.input_position_at(setup.shapes, frames, own)) for pair in self.pairs]
-        return np.array(found, dtype=float)
+        return pair_motions_at(self.setup, self.pairs, curve, point)
 
     def piece_end(self, curve: SolutionCurve, point: CurvePoint) -> _PieceEnd:
         """An end of a piece, with how the outputs move there."""
@@ -201,7 +191,7 @@ def _is_same_limit(one: LocatedLimit, other: LocatedLimit) -> bool:
     )
 
 
-def limits_along(
+def limits_along(  # long: one kind of limit after the other
     setup: PreparedMechanism,
     pair: str,
     start: float,
@@ -256,6 +246,9 @@ def limits_along(
         if piece.dead_point is not None and piece.first != piece.last:
             yield noted("input dead point", pair, piece.dead_point)
         before = after
+    met = setup.stops_at(tracker.point.y[:-1], curve.inputs(tracker.point.y))
+    for stop in met if tracker.ending is TrackingEnd.STOP else ():
+        yield noted("stop", stop.pair, tracker.point, stop.position)
     if tracker.ending is TrackingEnd.WORK_LIMIT:
         told = "what lies beyond was not followed: it takes more work than one answer may; name a nearer range"
         yield noted("not followed further", pair, tracker.point, None, told)

@@ -14,6 +14,7 @@ from planar.solving.checks.branch_check import is_move_allowed
 from planar.solving.checks.residual_check import CONTACT_TOLERANCE, EPS, NEGLIGIBLE_ERROR
 from planar.solving.checks.singular_values import SINGULAR_DISTANCE_RATIO
 from planar.solving.prepared_mechanism import PositionInputs, PreparedMechanism
+from planar.solving.stops import MAX_SURE_MOVE, PairStops
 
 MIN_FAST_REGULARITY = 1e-3
 """Strength of a block from which on its rates are taken as they come; what is weaker is looked at in doubles' whole
@@ -105,6 +106,13 @@ class FastSolver(Protocol):
         """What judges positions in compiled functions."""
 
     @property
+    def stops(self) -> PairStops | None:
+        """The stops of its pairs, if it has any."""
+
+    def stop_positions(self, z: Array, u: Array) -> Array:
+        """The positions of the pairs that have stops (stops,), or (stops, rows)."""
+
+    @property
     def tolerance(self) -> float:
         """What the residual check lets pass."""
 
@@ -156,6 +164,9 @@ def fast_run(setup: FastSolver, z: Array, u: Array, u1: Array, u2: Array) -> Fas
     if z.size:
         with np.errstate(invalid="ignore", over="ignore"):
             fine[1:] &= _keeps_branch(judged.block_starts, settled, gone, ways[:, 0], distances[:, 0], square)
+    if setup.stops is not None:
+        fine &= setup.stops.sure_rows(setup.stop_positions(settled, u), settled)
+        fine[1:] &= sizes <= MAX_SURE_MOVE
     many = len(fine) if fine.all() else int(np.argmin(fine))
     return FastRun(settled[:many], parts[:many], float(told.residual[:many].max(initial=0.0)))
 
@@ -199,7 +210,7 @@ class StraightPathCache:
 
     def unknowns_at(self, stop: Array) -> Array | None:
         """The unknowns to which the straight way to other inputs leads; None where not all of it is surely sound."""
-        if self.setup.acceptance is None:
+        if self.setup.acceptance is None or self.setup.stops is not None:
             return None
         way = stop - self.start
         reach = max(map(abs, way.tolist()), default=0.0)

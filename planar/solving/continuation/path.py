@@ -32,11 +32,15 @@ MAX_SAMPLES_AHEAD = 1000
 """Samples that one trip is to come to at most."""
 
 
+STOP_ROUNDING = 1e-11
+"""rad or sizes: a place that is no farther beyond a stop is at it."""
+
+
 class PathSolver(CurveSolver, FastSolver, Protocol):
     """What following needs of a solver beyond that."""
 
-    def end_refusal(self, u: Array, tangent: Array, ending: TrackingEnd) -> NoAnswer:
-        """What to say of a motion that ends at inputs u, towards which it went along a tangent."""
+    def end_refusal(self, u: Array, point: CurvePoint, ending: TrackingEnd) -> NoAnswer:
+        """What to say of a motion that ends at inputs u, and went as far as a point."""
 
 
 class FollowedSamples(NamedTuple):
@@ -120,9 +124,13 @@ class PathFollower:
         while self._piece is None or not self.has_position(position):
             if self.dead_point is not None:
                 return None
-            self._piece = next(self._pieces, None)
+            before, self._piece = self._piece, next(self._pieces, None)
             if self._piece is None:
-                return None
+                at_stop = before is not None and self.tracker.ending is TrackingEnd.STOP
+                if not at_stop or before is None or position > before.stop + STOP_ROUNDING:
+                    return None
+                self._piece = before
+                break
             self.dead_point = self._piece.dead_point
             self.point = self.dead_point or self._piece.arc.after
             self._period = self._period_search.period_after(self._piece)
@@ -306,8 +314,8 @@ def _solve_compiled(
         told.parts[same], told.sure[same] = sure.coordinate_rates[beside:], True
         told.open = max(told.open, sure.residual)
         return first + through
-    if not solver.functions.is_square:
-        return first + 1
+    if not solver.functions.is_square or solver.stops is not None:
+        return first + 1  # between samples a stop may be met
     after = slice(first + 1, rest.stop)
     found[after] = solver.functions.run_samples(found[first], u[after], p)
     after = slice(first + 1, first + 1 + _count_accepted(solver, p, found[rest], u[rest]))
@@ -336,7 +344,7 @@ def _straight_follower(
 def path_end_refusal(solver: PathSolver, trip: PathFollower) -> NoAnswer:
     """Why a trip goes no further."""
     u, ending = trip.end_inputs
-    return solver.end_refusal(u, trip.point.tangent, ending)
+    return solver.end_refusal(u, trip.point, ending)
 
 
 def _count_accepted(solver: PathSolver, p: Array, z: Array, u: Array) -> int:

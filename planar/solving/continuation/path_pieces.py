@@ -8,10 +8,12 @@ from typing import NamedTuple
 import numpy as np
 
 from planar.foundation.arrays import Array
+from planar.foundation.errors import TrackingEnd
 from planar.foundation.root_finding import find_root
 from planar.solving.continuation.fast_path import STRAIGHT_TOLERANCE
 from planar.solving.continuation.predictor_corrector import CurveTracker, PassedBifurcation
 from planar.solving.continuation.solution_curve import Arc, CurvePoint, SolutionCurve
+from planar.solving.continuation.stop_search import stop_search
 from planar.solving.continuation.turning_points import find_turning_point, is_dead_point
 
 MAX_CORRECTION_RATIO = 0.1
@@ -78,6 +80,21 @@ class PathPiece(NamedTuple):
 
 
 def path_pieces(tracker: CurveTracker) -> Iterator[PathPiece]:
+    """A walk's arcs, parted at dead points, up to the first stop that a pair meets."""
+    search = stop_search(tracker.curve, tracker.point)
+    for piece in _pieces_by_dead_points(tracker):
+        met = None if search is None else search.first_on(piece.arc, piece.first, piece.last)
+        if met is None:
+            yield piece
+            continue
+        tracker.point = met.point
+        last = piece.start if met.x == piece.first else float(met.point.y[-1])
+        yield PathPiece(piece.arc._replace(after=met.point), piece.first, met.x, piece.start, last, None)
+        tracker.ending = TrackingEnd.STOP
+        return
+
+
+def _pieces_by_dead_points(tracker: CurveTracker) -> Iterator[PathPiece]:
     """A walk's arcs, parted at dead points."""
     curve = tracker.curve
     if is_dead_point(tracker.point) and tracker.point.curvature[-1] < 0.0:

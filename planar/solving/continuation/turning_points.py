@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from planar.foundation.arrays import Array
-from planar.foundation.root_finding import find_root
+from planar.foundation.root_finding import find_root, lowest_on_cubic
 from planar.solving.continuation.bifurcation import AT_BIFURCATION_DISTANCE
 from planar.solving.continuation.solution_curve import Arc, CurvePoint, SolutionCurve
 
@@ -14,8 +14,6 @@ DEAD_POINT_TOLERANCE = 1e-7
 point to rounding; also the least rate of the inputs along the curve from which one is left."""
 ZERO_INPUT_RATE = 1e-13
 """A rate of the inputs along the curve, for one of what is farthest out, that is rounding."""
-PARTS_LOOKED_AT = np.linspace(0.05, 0.95, 19)
-"""Parts of an arc at which a rate with one sign at both ends may have the other."""
 
 
 def is_dead_point(point: CurvePoint) -> bool:
@@ -72,14 +70,3 @@ def find_turning_point(
         last = x
     at = find_root(lambda x: sense * arc.point_at(curve, x).input_rate if x != first else g0, first, last)
     return arc.point_at(curve, at)
-
-
-def lowest_on_cubic(start: tuple[float, float], end: tuple[float, float]) -> tuple[float, float]:
-    """The lowest value of a cubic, known by value and slope at its start and end, at some places between; and where
-    that is, as a part of the way."""
-    (g0, s0), (g1, s1) = start, end
-    t = PARTS_LOOKED_AT
-    h = t**2 * (3.0 - 2.0 * t)
-    values = (1.0 - h) * g0 + t * (1.0 - t) ** 2 * s0 + h * g1 - t**2 * (1.0 - t) * s1
-    lowest = int(np.argmin(values))
-    return float(values[lowest]), float(t[lowest])

@@ -194,6 +194,13 @@ def motion_ended(setup: PreparedMechanism, links: Sequence[str], where: str, end
     )
 
 
+def motion_stopped(setup: PreparedMechanism, met: str, where: str) -> NoAnswer:
+    """Where a motion of the inputs ends since pairs meet their stops."""
+    return NoAnswer(
+        Outcome.STOP, f"{_inputs(setup)} cannot go beyond {where}: there {met}; stay short of it, or move the stop"
+    )
+
+
 def not_closed(setup: PreparedMechanism, pair: str, gap: float, at: str = "") -> NoAnswer:
     """A position that the residual check does not let pass; the file's own, or another in words."""
     return NoAnswer(

@@ -90,4 +90,4 @@ def follow_circuit(setup: PositionSolver, tracker: CurveTracker) -> ClosedCircui
             )
             raise NoAnswer(Outcome.BRANCH_LOST, f"{told}; name where the range starts and stops instead of the circuit")
     u, ending = tracker.end_inputs
-    raise setup.end_refusal(u, tracker.point.tangent, ending)
+    raise setup.end_refusal(u, tracker.point, ending)

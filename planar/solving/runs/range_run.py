@@ -214,6 +214,11 @@ class RangeRun(RunningInput):
             )
             if ending is TrackingEnd.DEAD_POINT:
                 reasons.append(f"the range of {self.pair!r} ends at {where}")
+            elif ending is TrackingEnd.STOP and self.solver.stops is not None:
+                for end in alike:
+                    where = self.solver.describe_input(self.pair, end.position)
+                    met = self.solver.stops.describe_met(self.solver.stop_positions(end.z, end.limit))
+                    reasons.append(f"the range of {self.pair!r} ends at {where}, where {met}")
             elif ending is not None:
                 links = list(dict.fromkeys(link for end in alike for link in end.links))
                 problem = refusals.motion_ended(self.solver, links, where, ending)

@@ -59,7 +59,7 @@ class TimeRun:
             told = told._replace(
                 z=np.vstack([told.z, found.last_position[0]]),
                 inputs=whole,
-                dead_points=(len(told.z),),
+                dead_points=(len(told.z),) if told.outcome is Outcome.DEAD_POINT else (),
                 fast_samples=sure,
             )
             time = np.append(time, last)
@@ -68,7 +68,15 @@ class TimeRun:
     def _dead_point_time(self, found: FollowedSamples, given: InputRates, time: Array) -> float | None:
         """When a run comes to its dead point (s). Of several inputs that move there at once no time is told: between
         samples they are followed along a straight way, which is not theirs."""
-        if found.last_position is None or found.stopped is None or found.stopped.outcome is not Outcome.DEAD_POINT:
+        if (
+            found.last_position is None
+            or found.stopped is None
+            or found.stopped.outcome
+            not in (
+                Outcome.DEAD_POINT,
+                Outcome.STOP,
+            )
+        ):
             return None
         row = len(found.z) - 1
         moving = np.flatnonzero(given.u[row + 1] != given.u[row])
@@ -119,6 +127,9 @@ class _TimeCourse:
             pair = solver.mechanism.inputs[moved].pair
             place = float(found.inputs.u[row, moved] * self.timed.scale[moved])
             told.append(Limit("input dead point", pair, float(self.time[row]), place))
+        if found.outcome is Outcome.STOP:
+            z, u, at = found.z[-1], found.inputs.u[-1], float(self.time[-1])
+            told += [Limit("stop", each.pair, at, each.position) for each in solver.stops_at(z, u)]
         return tuple(sorted(told, key=lambda each: each.input))
 
     def _change_point_times(self) -> Iterator[tuple[float, PathBifurcation]]:

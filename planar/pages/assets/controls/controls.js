@@ -124,9 +124,9 @@ class Controls {
   ends(k) {
     const { page } = this, { course } = page;
     if (course && course.input === k) {
-      const { inputs, count, whole, dead } = course, low = inputs[0], turn = 2 * Math.PI;
+      const { inputs, count, whole, dead, names } = course, low = inputs[0], turn = 2 * Math.PI;
       // where links count turns the slider still shows one
-      this.known.set(k, { low: whole ? low - turn * Math.floor(low / turn + 1e-9) : low, high: inputs[count - 1], whole, dead });
+      this.known.set(k, { low: whole ? low - turn * Math.floor(low / turn + 1e-9) : low, high: inputs[count - 1], whole, dead, names });
       if (whole) this.known.get(k).high = this.known.get(k).low + turn;
     }
     if (this.known.has(k)) return this.known.get(k);
@@ -139,7 +139,7 @@ class Controls {
       const ends = this.ends(k), { si } = inputUnit(this.page, k);
       [slider.min, slider.max] = [ends.low / si, ends.high / si];
       [[low, ends.low, 0], [high, ends.high, 1]].forEach(([place, value, side]) => {
-        place.textContent = ends.dead[side] ? `dead point ${amount(this.page, k, value)}` : amount(this.page, k, value);
+        place.textContent = ends.dead[side] ? `${ends.names[side]} ${amount(this.page, k, value)}` : amount(this.page, k, value);
         place.classList.toggle("dead", ends.dead[side]);
       });
     });

@@ -127,6 +127,11 @@ class Dragging {
 
 /** The sentence for an input that goes no farther. */
 function deadPoint(page, k) {
+  const { met } = page.linkage;
+  if (met.length) {
+    const stops = met.map(({ pair, kind, at }) => `${pair} is at its stop at ${readable(at / page.data.units[kind].si)} ${page.data.units[kind].name}`);
+    return `At ${page.data.inputs[k].pair} = ${amount(page, k)} ${stops.join(" and ")}: the input goes no farther this way.`;
+  }
   return `Dead point at ${page.data.inputs[k].pair} = ${amount(page, k)}: the input goes no farther this way.`;
 }
 

@@ -171,7 +171,9 @@ class Courses {
         yield;
       }
     }
-    return new Course(page, k, rows, turns, [ends[0].stopped, ends[1].stopped]);
+    const made = new Course(page, k, rows, turns, [ends[0].stopped, ends[1].stopped]);
+    made.names = ends.map((each) => (each.met ? "stop" : "dead point"));
+    return made;
   }
 
   /** Go with a linkage one way as far as it goes, to a place of the input at the most: {at, made, stopped}. */
@@ -182,7 +184,7 @@ class Courses {
       stopped = made.moveTo(made.u.map((each, j) => (j === k ? next : each))).reached < 1;
       yield;
     }
-    return { at: made.u[k], made, stopped };
+    return { at: made.u[k], made, stopped, met: stopped && made.met.length > 0 };
   }
 
   /** A position with the rates of the file, and with those of the running input alone, at unit speed. */

@@ -85,6 +85,7 @@ class Linkage {
     this.z = Float64Array.from(data.z);
     this.last = null; // the step that led here
     this.stop = null; // the way by which an exact dead point was come to
+    this.met = []; // the stops at which the last way ended
   }
 
   /** A linkage as this one, to go its own way. */
@@ -190,6 +191,7 @@ class Linkage {
       ends close to a dead point. */
   follow(count, at, near = false) {
     let reached = 0, step = 1 / Math.max(1, Math.ceil(count)), open = 0;
+    this.met = [];
     const whole = step;
     if (count === 0) return { reached: 1, open }; // nothing moves
     while (reached < 1) {
@@ -197,6 +199,10 @@ class Linkage {
       there.ready();
       const guess = this.foretold(there.u, next - reached), found = this.newton(there.u, guess);
       if (found.closed && this.continues(found, guess)) {
+        if (beyondStops(this, found.z, there.u).length) {
+          reached = goToStop(this, at, reached, next);
+          break;
+        }
         if (next === 1 && !near && singularity(this, this.closure(found.z, there.u).slope)) {
           if (this.arrive(count, at, reached)) { reached = 1; break; }
           there.ready();

@@ -6,12 +6,12 @@ const SLIDE_SEARCH = 3; // times its size: how far the limits of a slide are loo
 const FREE = 0.3; // of the mechanism's size: how far a slide without limits is shown
 
 /** Go through the motion of every input, the others where they are: {poses: the links' axes, spans: of every input from
-    where to where it went, {low, high, whole, dead}}. */
+    where to where it went, {low, high, whole, dead, names}}. */
 function motions(page) {
   const { data, linkage } = page, poses = [page.frames];
   const spans = data.inputs.map((given, k) => {
     const far = given.slides ? 1 : 2 * Math.PI, scale = linkage.scale[k], steps = given.slides ? SLIDE_SEARCH * POSES : POSES;
-    const span = { low: 0, high: 2 * Math.PI, whole: true, dead: [false, false] };
+    const span = { low: 0, high: 2 * Math.PI, whole: true, dead: [false, false], names: ["dead point", "dead point"] };
     for (const sign of [1, -1]) {
       const made = linkage.copy(), side = sign > 0 ? 1 : 0, seen = [];
       let end = made.u[k];
@@ -19,6 +19,7 @@ function motions(page) {
         const u = Array.from(linkage.u);
         u[k] += (sign * far * i) / POSES;
         span.dead[side] = made.moveTo(u).reached < 1;
+        if (made.met.length) span.names[side] = "stop";
         seen.push(page.framesOf(made.state()));
         if (i <= POSES || span.dead[side]) end = made.u[k];
       }

@@ -9,6 +9,7 @@ import numpy as np
 from rich.console import Group, RenderableType
 from rich.text import Text
 
+from planar.analysis.motion.unknown_load import UnknownLoad
 from planar.dynamics.forces import Forces
 from planar.dynamics.load_attachment import attachment_remarks
 from planar.dynamics.reactions import Reaction
@@ -19,14 +20,17 @@ from planar.model.wording import count_phrase, join_all_names
 from planar.reports.columns import ReportedSeries
 from planar.reports.fitted_table import FittedTable, plain_table
 from planar.reports.number_format import column_heading, format_or_zero, format_quantity, paragraphs
-from planar.reports.tables.forces import loads
+from planar.reports.tables.forces import flywheels, loads, motors, unknown_loads
 from planar.reports.tables.forces import position_forces as at_one
 from planar.reports.tables.motion import motion_heading, position_cell, position_heading, running_pair
 from planar.results.motion import Motion
 
 
-def tables(forces: Forces) -> RenderableType:
-    """Mean, least and greatest effort of every input, the greatest force and couple in every pair, each with where."""
+def tables(
+    forces: Forces, wanted: flywheels.WantedFlywheel | None = None, unknown: UnknownLoad | None = None
+) -> RenderableType:
+    """Mean, least and greatest effort of every input, the greatest force and couple in every pair, each with where; the
+    flywheel that is wanted, and the load that is solved for."""
     motion = _motion_of(forces)
     parts: list[RenderableType] = [
         *motion_heading(motion),
@@ -34,9 +38,21 @@ def tables(forces: Forces) -> RenderableType:
         Text(),
         _efforts_table(forces, motion),
     ]
+    duties = motors.motor_duties(forces)
+    if duties:
+        parts.append(motors.motors_table(forces, duties))
     facts = [*_shaking_facts(forces, motion), *at_one.proof_facts(forces)]
+    if wanted is not None:
+        facts = [*flywheels.flywheel_facts(forces, wanted), *facts]
+    if unknown is not None:
+        facts = [*unknown_loads.unknown_load_facts(forces, unknown), *facts]
     parts += [_reactions_table(forces, motion), paragraphs(facts)]
-    notes = (*_undetermined_sentences(forces, len(motion)), *attachment_remarks(forces.mechanism), *motion.remarks)
+    notes = (
+        *motors.motor_sentences(forces, duties),
+        *_undetermined_sentences(forces, len(motion)),
+        *attachment_remarks(forces.mechanism),
+        *motion.remarks,
+    )
     if notes:
         parts += [Text(), paragraphs(("-", sentence) for sentence in notes)]
     return Group(*parts)
@@ -148,14 +164,14 @@ def _undetermined_rows(each: Reaction) -> Array:
 
 def force_series(forces: Forces) -> Iterable[ReportedSeries]:
     """Efforts, reactions, shaking force and moment at every position, beside what a file of the motion has."""
+    available = {each.input: each.available for each in motors.motor_duties(forces)}
     for name, effort in forces.inputs.items():
         what, _, _ = at_one.effort_name_and_unit(forces, name)
-        yield ReportedSeries(
-            "inputs",
-            name,
-            {what: what, "power": "power"},
-            {what: np.asarray(effort), "power": np.asarray(forces.powers[name])},
-        )
+        kinds = {what: what, "power": "power"}
+        values = {what: np.asarray(effort), "power": np.asarray(forces.powers[name])}
+        if name in available:
+            kinds["available"], values["available"] = what, np.asarray(available[name])
+        yield ReportedSeries("inputs", name, kinds, values)
     for name, each in forces.reactions.items():
         values = _reaction_values(each)
         yield ReportedSeries("reactions", name, {what: _REACTION_KINDS.get(what, "torque") for what in values}, values)
@@ -175,8 +191,14 @@ def _reaction_values(each: Reaction) -> dict[str, Array]:
     return {"position": each.at, "force": each.force, "couple": np.asarray(each.couple)}
 
 
-def run_facts(forces: Forces) -> dict[str, Any]:
+def run_facts(
+    forces: Forces, wanted: flywheels.WantedFlywheel | None = None, unknown: UnknownLoad | None = None
+) -> dict[str, Any]:
     """What is said of the whole motion, as JSON values; forces in a pair are on the second of the links `between`."""
     between = {name: list(each.links) for name, each in forces.reactions.items()}
     remarks = [*attachment_remarks(forces.mechanism), *forces.moving.remarks]
-    return {"between": between, "remarks": remarks, **at_one.proof_record(forces)}
+    duties = motors.motor_duties(forces)
+    told = {"motors": motors.record(duties)} if duties else {}
+    told |= {} if wanted is None else {"flywheel": flywheels.record(wanted)}
+    told |= {} if unknown is None else {"solved_for": unknown_loads.record(unknown)}
+    return {"between": between, "remarks": remarks, **told, **at_one.proof_record(forces)}

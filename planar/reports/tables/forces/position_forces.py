@@ -9,6 +9,7 @@ import numpy as np
 from rich.console import Group, RenderableType
 from rich.text import Text
 
+from planar.analysis.motion.unknown_load import UnknownLoad
 from planar.analysis.worked.published import Comparison
 from planar.dynamics.forces import Forces
 from planar.dynamics.load_attachment import attachment_remarks
@@ -19,15 +20,28 @@ from planar.foundation.units import Unit
 from planar.model.file_units import display_unit
 from planar.model.link_graph import link_label, link_numbers
 from planar.model.mechanism import relative_motions
+from planar.model.pairs import MeasureKind
 from planar.model.wording import amount, join_all_names
 from planar.reports.fitted_table import FittedTable, plain_table
-from planar.reports.number_format import ROUNDING_RATIO, column_heading, format_quantity, paragraphs, precision_text
-from planar.reports.tables.forces import loads
+from planar.reports.number_format import (
+    ROUNDING_RATIO,
+    column_heading,
+    format_number,
+    format_quantity,
+    paragraphs,
+    precision_text,
+)
+from planar.reports.tables.forces import loads, motors, unknown_loads
 from planar.reports.tables.forces import mechanical_advantage as ratios
 from planar.reports.tables.position import published_table
 
 
-def tables(forces: Forces, advantages: ratios.Advantages, comparisons: Sequence[Comparison] = ()) -> RenderableType:
+def tables(
+    forces: Forces,
+    advantages: ratios.Advantages,
+    comparisons: Sequence[Comparison] = (),
+    unknown: UnknownLoad | None = None,
+) -> RenderableType:
     """Inputs, what acts, reactions, power, mechanical advantages, and the published torques beside the solved ones."""
     state, units = forces.moving, forces.mechanism.units
     head = [Text(forces.mechanism.name, style="bold")]
@@ -36,6 +50,9 @@ def tables(forces: Forces, advantages: ratios.Advantages, comparisons: Sequence[
     parts: list[RenderableType] = [Text(equilibrium_text(forces)), Text()]
     if forces.inputs:
         parts.append(_inputs_table(forces))
+    duties = motors.motor_duties(forces)
+    if duties:
+        parts.append(motors.motors_table(forces, duties))
     acting, inertia = loads.actions_with_motion(forces, inertia=False), loads.actions_with_motion(forces, inertia=True)
     if acting:
         parts.append(loads.actions_table("Loads", acting, units, greatest_moment_and_force(forces)[0]))
@@ -43,6 +60,8 @@ def tables(forces: Forces, advantages: ratios.Advantages, comparisons: Sequence[
         parts.append(loads.actions_table("Inertia", inertia, units, greatest_moment_and_force(forces)[0]))
     most = sum(each.max_power for each in (*acting, *inertia))
     parts += [_reactions_table(forces), paragraphs(_power_and_shaking(forces, most)), Text()]
+    if unknown is not None:
+        parts += [paragraphs(unknown_loads.unknown_load_facts(forces, unknown)), Text()]
     told = ratios.all_advantages(advantages)
     if told:
         parts.append(ratios.advantages_table(told, units))
@@ -57,7 +76,12 @@ def tables(forces: Forces, advantages: ratios.Advantages, comparisons: Sequence[
         *_time_remarks(forces),
         *dict.fromkeys(each.why for each in told if each.why),
     )
-    notes += (*attachment_remarks(forces.mechanism), *state.remarks)
+    notes += (
+        *motors.motor_sentences(forces, duties),
+        *stop_remarks(forces),
+        *attachment_remarks(forces.mechanism),
+        *state.remarks,
+    )
     if notes:
         parts += [Text(), paragraphs(("-", sentence) for sentence in notes)]
     return Group(*head, *parts)
@@ -199,6 +223,15 @@ def _balanced_links_text(forces: Forces) -> str:
     return f"as free bodies {told} of {moving} links balance, the others feel what is not determined"
 
 
+def stop_remarks(forces: Forces) -> Iterator[str]:
+    """What stops carry in place of the input."""
+    motions = relative_motions(forces.mechanism)
+    for name, force in forces.stops.items():
+        unit = "N" if motions[name].input_kind is MeasureKind.LENGTH else "N·m"
+        carried = f"let go, the input is held by it with {format_number(force)} {unit}"
+        yield f"pair {name!r} stands at its stop: {carried if force else 'let go, the mechanism leaves it'}"
+
+
 def undetermined_sentences(forces: Forces) -> tuple[str, ...]:
     """What equilibrium does not tell, with why; what has the same reason together."""
     by: dict[str, list[str]] = {}
@@ -212,7 +245,12 @@ def _time_remarks(forces: Forces) -> tuple[str, ...]:
     return ("loads that vary with time are those at 0 s",) if varying else ()
 
 
-def record(forces: Forces, advantages: ratios.Advantages, comparisons: Sequence[Comparison] = ()) -> dict[str, Any]:
+def record(
+    forces: Forces,
+    advantages: ratios.Advantages,
+    comparisons: Sequence[Comparison] = (),
+    unknown: UnknownLoad | None = None,
+) -> dict[str, Any]:
     """All of it as a JSON value (SI); null for what is not determined."""
     given = forces.moving.inputs
     force, moment = forces.shaking
@@ -229,6 +267,9 @@ def record(forces: Forces, advantages: ratios.Advantages, comparisons: Sequence[
         "loads": loads.record(loads.actions_with_motion(forces, inertia=False)),
         "inertia": loads.record(loads.actions_with_motion(forces, inertia=True)),
         "reactions": {name: _reaction_record(each) for name, each in forces.reactions.items()},
+        **({"motors": motors.record(duties)} if (duties := motors.motor_duties(forces)) else {}),
+        **({"stops": dict(forces.stops)} if forces.stops else {}),
+        **({"solved_for": unknown_loads.record(unknown)} if unknown is not None else {}),
         **({"shaking": {"force": force.tolist(), "moment": float(moment)}} if has_inertia(forces) else {}),
         "power": {"in": _finite_or_none(float(forces.power_in)), "out": forces.power_out},
         "advantage": ratios.record(advantages),

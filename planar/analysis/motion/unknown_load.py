@@ -1,0 +1,145 @@
+"""Which load, spring or counterweight holds a mechanism: the inverse of forces, which are linear in each of them."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from planar.document.first_argument import takes_result
+from planar.dynamics.forces import forces
+from planar.dynamics.virtual_velocities import has_length_motion
+from planar.foundation.arrays import Array
+from planar.foundation.errors import BadInput, Unknown, join_names
+from planar.foundation.short_repr import short_repr
+from planar.model.mechanism import Mechanism
+from planar.results.motion import Motion, State
+
+NO_INFLUENCE = 1e-12
+"""Of the greatest effort: a change that is smaller is none."""
+SAME_FACTOR_TOLERANCE = 1e-9
+"""Of the greatest: factors that differ by less over a motion are one."""
+
+
+class UnknownLoad(NamedTuple):
+    """What a load has to be multiplied by so that an input supplies `effort` (N m, at a slide N).
+
+    `factor` over the motion (n,), or at a position: of a force, torque or effort, a spring's stiffness, or a mass; NaN
+    where the load does nothing on the input. `best` is the one factor that comes nearest to that over the whole motion,
+    in the sense of least squares of the effort over its rows, and `left` the greatest effort that differs then;
+    `is_constant` whether it holds everywhere. `value` is what the file says, and `what` names it.
+    """
+
+    load: str
+    what: str
+    value: float
+    input: str
+    effort: float
+    factor: Array | float
+    best: float
+    left: float
+    is_constant: bool
+
+    def __repr__(self) -> str:
+        return short_repr(self)
+
+
+@takes_result("State", "Motion")
+def unknown_load(
+    moving: State | Motion, load: str, effort: float = 0.0, of: str | None = None, inertia: bool = True
+) -> UnknownLoad:
+    """Which size of a load, spring or mass lets an input (left out: the one that runs) supply so much: 0 holds it.
+
+    `load` by its name as in `planar.dimensions`: `loads.0`, `springs.0` (its stiffness), `masses.rod`. Efforts are
+    linear in each of these, whatever else acts, so that two solutions tell it exactly. Raises Unknown for a load that
+    is not there, BadInput for an input that is not, and a load that does nothing on the input anywhere.
+
+    >>> import planar
+    >>> lamp = planar.cycle(planar.load("balanced-lamp"), 12)
+    >>> planar.unknown_load(lamp, "springs.0", inertia=False).is_constant
+    True
+    """
+    mechanism = moving.mechanism
+    name = of or (moving.running_input if isinstance(moving, Motion) else next(iter(moving.inputs), ""))
+    if name not in moving.inputs:
+        raise BadInput(name or "inputs", f"there is no input of this name; inputs are at {', '.join(moving.inputs)}")
+    what, value = _describe_size(mechanism, load)
+    own, twice = (
+        np.atleast_1d(np.asarray(forces(_with_mechanism(moving, each), inertia).inputs[name], dtype=float))
+        for each in (mechanism, scale_load(mechanism, load, 2.0))
+    )
+    share = twice - own
+    known = np.isfinite(share)
+    scale = float(np.abs(np.concatenate([own[known], share[known]])).max(initial=0.0))
+    acts = known & (np.abs(share) > NO_INFLUENCE * scale)
+    if not acts.any():
+        raise BadInput(load, f"it does nothing on the input at {name!r} here, so that no size of it holds that")
+    factor = np.full(len(own), np.nan)
+    factor[acts] = 1.0 + (effort - own[acts]) / share[acts]
+    missing = effort - own[known]
+    best = 1.0 + float(missing @ share[known]) / float(share[known] @ share[known])
+    left = float(np.abs(missing - (best - 1.0) * share[known]).max())
+    same = left <= SAME_FACTOR_TOLERANCE * scale
+    found = factor if isinstance(moving, Motion) else float(factor[0])
+    return UnknownLoad(load, what, value, name, float(effort), found, best, left, same)
+
+
+def scale_load(mechanism: Mechanism, load: str, factor: float) -> Mechanism:
+    """The mechanism with a load, the stiffness of a spring, or a mass so many times as great. Raises Unknown."""
+    kind, index = _find_load(mechanism, load)
+    if kind == "loads":
+        each = mechanism.loads[index]
+        changed = each._replace(
+            force=None if each.force is None else (factor * each.force[0], factor * each.force[1]),
+            torque=None if each.torque is None else factor * each.torque,
+            effort=None if each.effort is None else factor * each.effort,
+        )
+        return replace(mechanism, loads=(*mechanism.loads[:index], changed, *mechanism.loads[index + 1 :]))
+    if kind == "springs":
+        spring = mechanism.springs[index]
+        stiffer = spring._replace(stiffness=factor * spring.stiffness)
+        return replace(mechanism, springs=(*mechanism.springs[:index], stiffer, *mechanism.springs[index + 1 :]))
+    mass = mechanism.masses[index]
+    heavier = mass._replace(mass=factor * mass.mass)
+    return replace(mechanism, masses=(*mechanism.masses[:index], heavier, *mechanism.masses[index + 1 :]))
+
+
+def _names(mechanism: Mechanism) -> dict[str, tuple[str, int]]:
+    """Every load, spring and mass by the name that its numbers begin with."""
+    found = {f"loads.{k}": ("loads", k) for k in range(len(mechanism.loads))}
+    found |= {f"springs.{k}": ("springs", k) for k in range(len(mechanism.springs))}
+    count, seen = Counter(mass.link for mass in mechanism.masses), Counter[str]()
+    for k, mass in enumerate(mechanism.masses):
+        own = f"masses.{mass.link}" if count[mass.link] == 1 else f"masses.{mass.link}.{seen[mass.link]}"
+        seen[mass.link] += 1
+        found[own] = ("masses", k)
+    return found
+
+
+def _find_load(mechanism: Mechanism, load: str) -> tuple[str, int]:
+    named = _names(mechanism)
+    if load not in named:
+        told = f"there are {join_names(named)}" if named else "nothing acts on this mechanism"
+        raise Unknown(f"there is no load, spring or mass {load!r}; {told}")
+    return named[load]
+
+
+def _describe_size(mechanism: Mechanism, load: str) -> tuple[str, float]:
+    """What the size of a load is, and that in the file (SI)."""
+    kind, index = _find_load(mechanism, load)
+    if kind == "springs":
+        return "stiffness", mechanism.springs[index].stiffness
+    if kind == "masses":
+        return "mass", mechanism.masses[index].mass
+    each = mechanism.loads[index]
+    if each.force is not None:
+        return "force", float(np.hypot(*each.force))
+    if each.torque is not None or each.pair is None:
+        return "torque", each.torque or 0.0
+    return "force" if has_length_motion(mechanism, each.pair) else "torque", each.effort or 0.0
+
+
+def _with_mechanism(moving: State | Motion, mechanism: Mechanism) -> State | Motion:
+    return replace(moving, mechanism=mechanism)

@@ -1,0 +1,85 @@
+"""Stops of pairs in a file: keys of a pair's entry to stops, and back."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+from planar.document.cursor import Cursor, suggest_name
+from planar.document.schema import STOP_SCHEMA
+from planar.model.mechanism import LARGEST_COUNTED_ANGLE
+from planar.model.pairs import MeasureKind, Pair, QuantityWriter
+from planar.model.stops import Stops
+
+
+def without_stops(entry: Cursor) -> Cursor:
+    """A pair's entry with the keys of its type alone."""
+    return replace(entry, value={key: value for key, value in entry.fields().items() if key not in STOP_SCHEMA})
+
+
+def read_stops(entry: Cursor, group: Sequence[Pair]) -> tuple[Stops, ...]:
+    """The stops in the entry of these pairs. Raises BadInput."""
+    if not entry.has("stops"):
+        if entry.has("restitution"):
+            raise entry.error_at("restitution", "a 'restitution' is that of 'stops', and there are none here")
+        return ()
+    motions = {pair.name: pair for pair in type(group[0]).relative_motions(group)}
+    restitution = entry["restitution"].as_number() if entry.has("restitution") else 0.0
+    cursor = entry["stops"]
+    if isinstance(cursor.value, dict):
+        for name, place in cursor.members():
+            if name not in motions:
+                raise place.error_at(
+                    None, f"{name!r} is none of its relative motions{suggest_name(name, motions, 'these')}"
+                )
+        given = [(motions[name], place) for name, place in cursor.members()]
+    elif len(motions) > 1:
+        such = f'{{"{next(iter(motions))}": [...]}}'
+        told = f"{group[0].entry_name()!r} joins {len(group) + 1} links; name the relative motion that stops, as {such}"
+        raise cursor.error_at(None, told)
+    else:
+        given = [(pair, cursor) for pair in motions.values()]
+    return tuple(_read_limits(place, pair, restitution, entry) for pair, place in given)
+
+
+def _read_limits(cursor: Cursor, pair: Pair, restitution: float, entry: Cursor) -> Stops:
+    items = tuple(cursor.items())
+    if len(items) != 2:
+        raise cursor.error_at(None, f"a lower and an upper stop are wanted here, not {len(items)} (null: open)")
+    low, high = (None if item.value is None else _read_position(item, pair) for item in items)
+    found = Stops(pair.name, low, high, restitution)
+    wrong = found.find_problem()
+    if wrong:
+        raise (cursor.error_at(None, wrong[1]) if wrong[0] == "stops" else entry.error_at(*wrong))
+    return found
+
+
+def _read_position(item: Cursor, pair: Pair) -> float:
+    kind = pair.input_quantity_kinds()[0]
+    if pair.input_kind is MeasureKind.LENGTH:
+        return item.as_quantity(kind)
+    found = item.as_quantity(kind)
+    if abs(found) > LARGEST_COUNTED_ANGLE:
+        raise item.error_at(None, f"an angle up to {LARGEST_COUNTED_ANGLE:g} rad is wanted here")
+    return found
+
+
+def write_stops(
+    entry: Mapping[str, Any], stops: Iterable[Stops], group: Sequence[Pair], quantity: QuantityWriter
+) -> dict[str, Any]:
+    """A pair's entry with the stops of its relative motions."""
+    motions = {pair.name: pair for pair in type(group[0]).relative_motions(group)}
+    own = [each for each in stops if each.pair in motions]
+    if not own:
+        return dict(entry)
+    limits = {each.pair: _write_limits(each, motions[each.pair], quantity) for each in own}
+    found = dict(entry) | {"stops": limits if len(motions) > 1 else limits[own[0].pair]}
+    if own[0].restitution != 0.0:
+        found["restitution"] = quantity(own[0].restitution, "number")
+    return found
+
+
+def _write_limits(stops: Stops, pair: Pair, quantity: QuantityWriter) -> list[Any]:
+    kind = pair.input_quantity_kinds()[0]
+    return [None if each is None else quantity(each, kind) for each in (stops.low, stops.high)]

@@ -1,0 +1,1 @@
+"""What drives and holds inputs: motors, and stops on which pairs are pressed."""
