@@ -11,8 +11,9 @@ from planar.foundation.arrays import Array, BoolArray
 from planar.foundation.errors import NoAnswer, Outcome, join_names
 from planar.foundation.geometry import Frame
 from planar.foundation.jets import value_and_rates
+from planar.model.file_units import FileUnits
 from planar.model.link_shapes import LinkShape
-from planar.model.mechanism import FileUnits, Mechanism, links_counting_turns, relative_motions
+from planar.model.mechanism import Mechanism, links_counting_turns, relative_motions
 from planar.model.pairs import MeasureKind, Pair
 from planar.model.wording import amount
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from planar.analysis.motion.motor_duty import MotorDuty, motor_duty
 from planar.dynamics.forces import Forces
-from planar.foundation.units import display_unit
+from planar.model.file_units import display_unit
 from planar.model.mechanism import relative_motions
 from planar.model.wording import amount, join_all_names
 from planar.reports.fitted_table import FittedTable, plain_table
