@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import ctypes
 
-TRIM, MAPPED = -1, -4
-"""M_TRIM_THRESHOLD and M_MMAP_MAX of the GNU C library's mallopt."""
+TRIM, MAPPED, ARENAS = -1, -4, -8
+"""M_TRIM_THRESHOLD, M_MMAP_MAX and M_ARENA_MAX of the GNU C library's mallopt; threads share one arena."""
 
 
 def hold() -> bool:
@@ -17,4 +17,4 @@ def hold() -> bool:
         tell = ctypes.CDLL(None).mallopt
     except (AttributeError, OSError, TypeError):
         return False
-    return bool(tell(TRIM, 2**31 - 1) and tell(MAPPED, 0))
+    return bool(tell(TRIM, 2**31 - 1) and tell(MAPPED, 0) and tell(ARENAS, 1))

@@ -174,7 +174,8 @@ class AcceptanceFunctions:
         for turn in turns:
             onwards = ca.fmin(onwards, turn + ca.sumsqr(du))
         safe = ca.SX(np.inf)
-        for each in ca.vertsplit(room + room_there) if e.blocks else []:
+        both = ca.if_else(room * room_there < 0.0, -1.0, ca.fabs(room) + ca.fabs(room_there))
+        for each in ca.vertsplit(both) if e.blocks else []:
             safe = ca.fmin(safe, each)
         whole = whole + ca.sum1(there) + ca.sum1(before)
         judged = stack_expressions([open_, whole, astray, onwards, safe, ca.fmin(clear, clear_there)])

@@ -9,9 +9,16 @@ from planar.equations.elimination import stack_expressions
 from planar.equations.rates import UnknownRates
 from planar.equations.symbolic_equations import slice_length
 
+MAX_SIGNED_SIZE = 4
+"""Unknowns of a block whose determinant is written in expressions."""
+
 
 def regular_distances(rates: UnknownRates, along: ca.SX) -> tuple[ca.SX, ca.SX]:
-    """The least singular value of any block, and how far along a direction of y each block is regular (blocks,)."""
+    """The least singular value of any block, and how far along a direction of y each block is regular (blocks,).
+
+    The distances have the sign of the block's determinant, where it is small enough to be written: on one branch it
+    stays the same, and of two assemblies that a dead point brings together one has the other.
+    """
     least, distances = ca.SX(1.0), []
     for block, jacobian in zip(rates.equations.blocks, rates.jacobians, strict=True):
         if not slice_length(block.unknowns):
@@ -60,4 +67,7 @@ def _regular_distance(block: ca.SX, y: ca.SX, direction: ca.SX) -> tuple[ca.SX, 
     sizes = ca.horzcat(*(ca.norm_2(block[:, k]) for k in range(block.size2())))
     whole = ca.repmat(sizes, block.size1(), 1)
     value = _singular_value_bounds(block / whole)[0]
-    return value, value / ca.fmax(ca.norm_fro(change / whole), 1e-300)
+    distance = value / ca.fmax(ca.norm_fro(change / whole), 1e-300)
+    if block.size1() > MAX_SIGNED_SIZE:
+        return value, distance
+    return value, ca.if_else(ca.det(block / whole) < 0.0, -distance, distance)

@@ -365,7 +365,7 @@ def test_a_run_that_starts_beside_a_limit_stays_on_its_branch(seed):
         assert np.all(np.abs(found - own) < np.abs(found - other))
 
 
-def test_the_branch_that_comes_back_from_a_limit_is_told_apart_by_its_way_only(monkeypatch):
+def test_the_branch_that_comes_back_from_a_limit_is_told_apart_by_its_way_and_its_determinant(monkeypatch):
     """Beside a limit, steps from one branch to the other: closed, and as the rates there allow."""
 
     def judged(seed):
@@ -386,8 +386,39 @@ def test_the_branch_that_comes_back_from_a_limit_is_told_apart_by_its_way_only(m
     own, other = np.transpose([list(judged(seed)) for seed in range(40)])
     assert own.sum() > 20
     assert not other.any()
-    monkeypatch.setattr(BranchCheck, "_keeps_direction", lambda self, before, after, way: np.ones(len(way), dtype=bool))
+    for name in ("_keeps_direction", "_keeps_signs"):
+        with monkeypatch.context() as without:
+            without.setattr(BranchCheck, name, lambda self, *given: True)
+            assert not any(list(judged(seed))[1] for seed in range(40))
+    monkeypatch.setattr(BranchCheck, "_keeps_direction", lambda self, *given: True)
+    monkeypatch.setattr(BranchCheck, "_keeps_signs", lambda self, *given: True)
     assert sum(list(judged(seed))[1] for seed in range(40))
+
+
+def test_near_a_parallelogram_no_step_leads_to_the_assembly_beside():
+    """Its two assemblies run along each other for a quarter of a turn, and meet in the dead point ahead."""
+    value = {
+        "planar": 1,
+        "name": "all but a parallelogram",
+        "frame": "base",
+        "links": {
+            "base": {"points": {"O": [-0.00030895, 0.00024396], "P": [-0.05030818, -0.00031008]}},
+            "arm": {"ends": ["O", "A"], "length": 0.39976116},
+            "stay": {"ends": ["P", "B"], "length": 0.4032915},
+            "head": {"ends": ["A", "B"], "length": 0.048882979},
+        },
+        "pairs": [{"turning": name} for name in "OPAB"],
+        "inputs": [{"pair": "O", "position": "50 deg", "velocity": "0.5 rad/s"}],
+        "sketch": {"B": [0.206165, 0.30427]},
+    }
+    mechanism = planar.from_dict(value)
+    start = mechanism.inputs[0].position
+    coarse, fine = (planar.cycle(mechanism, steps, start, start + TURN) for steps in (24, 240))
+    rows = len(coarse.inputs["O"].position) - 1  # the last one is the dead point
+    assert rows == 8
+    np.testing.assert_allclose(
+        coarse.point("B").position[:rows], fine.point("B").position[: 10 * rows : 10], atol=1e-12
+    )
 
 
 @pytest.mark.parametrize("inside", [1e-5, 1e-4, 1e-3])

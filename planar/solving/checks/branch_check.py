@@ -42,7 +42,21 @@ class BranchCheck:
         smooth &= self._keeps_direction(before, after, way)
         first = self._singular_distances(z[:-1], u[:-1], slopes[:-1], before, way)
         second = self._singular_distances(z[1:], u[1:], slopes[1:], after, way)
-        return smooth & np.all(first + second > SINGULAR_DISTANCE_RATIO, axis=1)
+        return smooth & self._keeps_signs(slopes) & np.all(first + second > SINGULAR_DISTANCE_RATIO, axis=1)
+
+    def _keeps_signs(self, slopes: Array) -> Array:
+        """For each step whether the determinant of every block keeps its sign (steps,).
+
+        Of two assemblies that come near to each other before a dead point each has another one, so that no step leads
+        from one to the other, however alike they are.
+        """
+        keeps = np.ones(len(slopes) - 1, dtype=bool)
+        for stage in self.functions.equations.blocks:
+            own = slopes[:, stage.rows, stage.unknowns]
+            if own.size and own.shape[1] == own.shape[2]:
+                signs = np.linalg.slogdet(own)[0]
+                keeps &= signs[:-1] * signs[1:] >= 0.0
+        return keeps
 
     def _keeps_direction(self, before: Array, after: Array, input_step: Array) -> Array:
         """For each step whether every block goes on as it came (steps,): less than a right angle between the tangents.

@@ -187,12 +187,14 @@ def _keeps_branch(starts: IntArray, z: Array, gone: Array, rates: Array, distanc
     """For each step of a run whether it keeps to its branch; see `branch`.
 
     Steps have `gone` (steps,) along the axis of the inputs; rates `ways` (rows, unknowns) and distances (rows, blocks)
-    are along it too.
+    are along it too, with the signs of the blocks' determinants.
     """
     step = gone[:, None]
     before, after = rates[:-1] * step, rates[1:] * step
     turns = np.add.reduceat(before * after, starts, axis=1).min(axis=1) + gone * gone * square
-    safe = (distances[:-1] + distances[1:]).min(axis=1) > SINGULAR_DISTANCE_RATIO * np.abs(gone)
+    far = np.abs(distances)
+    safe = (far[:-1] + far[1:]).min(axis=1) > SINGULAR_DISTANCE_RATIO * np.abs(gone)
+    safe &= (np.signbit(distances[:-1]) == np.signbit(distances[1:])).all(axis=1)
     return (turns >= 0.0) & safe & is_move_allowed(z[1:] - z[:-1], before, after).all(axis=1)
 
 

@@ -71,12 +71,24 @@ class PathPiece(NamedTuple):
         if (
             near is None
             or np.linalg.norm(near - rough) > MAX_CORRECTION_RATIO * abs(self.last - self.first)
+            or not self._holds(near)
             or not curve.is_closed(near)
         ):
             near = arc.curve_coordinates(
                 curve, find_root(lambda x: float(arc.curve_coordinates(curve, x)[-1]) - position, self.first, self.last)
             )
         return near[:-1], None
+
+    def _holds(self, y: Array) -> bool:
+        """Whether a point of the curve lies on this piece, and not beyond a dead point at its end, where the inputs
+        come to the same places once more."""
+        x, low, high = (
+            float(self.arc.axis @ (y - self.arc.origin)),
+            min(self.first, self.last),
+            max(self.first, self.last),
+        )
+        slack = STRAIGHT_TOLERANCE * (high - low)
+        return low - slack <= x <= high + slack
 
 
 def path_pieces(tracker: CurveTracker) -> Iterator[PathPiece]:
