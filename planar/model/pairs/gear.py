@@ -4,13 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from math import tan
+from math import pi, tan
 from typing import Any, ClassVar, Self
 
 from planar.foundation.geometry import Frame, Vector
 from planar.foundation.jets import Scalar, sqrt
 from planar.model.link_shapes import LinkShape
-from planar.model.pairs.base import EntryReader, LengthFormatter, Pair, PairSample, QuantityWriter, Schema, ToothContact
+from planar.model.pairs.base import (
+    EffortAction,
+    EntryReader,
+    LengthFormatter,
+    Pair,
+    PairSample,
+    QuantityWriter,
+    RubbingContact,
+    Schema,
+    ToothContact,
+)
+from planar.model.pairs.friction import FRICTION_SCHEMA, read_efficiency, read_friction, write_friction
+from planar.model.pairs.rubbing import ContactLoad, Friction, LoadLaw
 from planar.model.pairs.teeth import STANDARD_PRESSURE_ANGLE, TEETH_SCHEMA, read_pressure_angle, write_pressure_angle
 from planar.model.pairs.wheel_pairs import CENTRE_DISTANCE_TOLERANCE, WheelPair
 
@@ -23,7 +35,7 @@ class GearPair(WheelPair):
 
     keyword: ClassVar[str] = "gear"
     entry_description: ClassVar[str] = "a pair of gears: its name"
-    entry_schemas: ClassVar[Mapping[str, Schema]] = {**WheelPair.entry_schemas, **TEETH_SCHEMA}
+    entry_schemas: ClassVar[Mapping[str, Schema]] = {**WheelPair.entry_schemas, **TEETH_SCHEMA, **FRICTION_SCHEMA}
 
     def ratio(self) -> Scalar:
         return self.sizes[0] if self.size_kind == "ratio" else -self.sizes[0] / self.sizes[1]
@@ -53,11 +65,20 @@ class GearPair(WheelPair):
             raise entry.error_at(by, "both wheels are internal (negative); one at least has teeth on its outside")
         if by != "ratio" and min(sizes) < 0.0 <= sum(sizes):
             raise entry.error_at(by, "an internal wheel (negative) is larger than the wheel that runs in it")
-        return (cls(name, links, carrier, by, sizes, meet, read_pressure_angle(entry)),)
+        friction = read_friction(entry)
+        if friction is not None and by != "teeth":
+            raise entry.error_at(
+                "friction", "the friction of teeth follows their number; give 'teeth', or an 'efficiency' in its place"
+            )
+        if friction is not None and entry.has("efficiency"):
+            raise entry.error_at("efficiency", "give either 'friction' of the teeth or their 'efficiency', not both")
+        lossy = {"efficiency": read_efficiency(entry), "friction": friction}
+        return (cls(name, links, carrier, by, sizes, meet, read_pressure_angle(entry), **lossy),)
 
     @classmethod
     def write(cls, group: Sequence[Self], quantity: QuantityWriter) -> dict[str, Any]:
-        return super().write(group, quantity) | write_pressure_angle(group[0].pressure_angle, quantity)
+        found = super().write(group, quantity) | write_pressure_angle(group[0].pressure_angle, quantity)
+        return found | write_friction(group[0].friction, quantity)
 
     def tooth_contact(
         self, frames: Mapping[str, Frame], shapes: Mapping[str, LinkShape], all_pairs: Sequence[Pair]
@@ -85,6 +106,30 @@ class GearPair(WheelPair):
             tan(self.pressure_angle),
         )
 
+    def rubbing_contacts(
+        self, frames: Mapping[str, Frame], shapes: Mapping[str, LinkShape], all_pairs: Sequence[Pair], at_rest: bool
+    ) -> tuple[RubbingContact, ...]:
+        """The couple between the wheels by which rubbing teeth resist their turning, on average over a mesh.
+
+        Teeth rub before and behind the pitch point, to either side, at half the base pitch a quarter of it away on
+        average: mu F p_b / 4 of the force F = W / cos(pressure angle) on a tooth. With the pitch p of W's circle that
+        is mu W p / 4, a loss of mu (pi / 2)(1/z1 + 1/z2) of the power (G. Niemann, H. Winter, Maschinenelemente II,
+        2003, with a contact ratio of one).
+        """
+        found = super().rubbing_contacts(frames, shapes, all_pairs, at_rest)
+        contact = self.tooth_contact(frames, shapes, all_pairs)
+        if self.friction is None or contact is None:
+            return found
+        first, second = self.links
+        pins = [pin for wheel in self.links if (pin := self._centre_pin(wheel, all_pairs))]
+        centre = frames[second].to_world(shapes[second].position(pins[1][second]))
+        away = contact.pitch_point - centre
+        pitch = sqrt(away.dot(away)) * (2.0 * pi / abs(self.sizes[1]))
+        press = ContactLoad(second, self.friction.coefficient(at_rest) * pitch * 0.25, contact.drive_direction)
+        ratio = self.ratio()
+        sense = 1.0 if ratio < 0.0 or ratio > 1.0 else -1.0
+        return (*found, RubbingContact(EffortAction(second, first), (press,), LoadLaw.GREATEST, sense))
+
     @classmethod
     def samples(cls) -> tuple[PairSample, ...]:
         links = ("a", "b")
@@ -92,9 +137,13 @@ class GearPair(WheelPair):
             cls("mesh", links, "c", "ratio", (-2.122,), (1.3, 3.7))._make_sample(
                 0.0, 0.9, {"ratio": -2.122, "mesh": {"a": 1.3, "b": 3.7}}
             ),
-            cls("mesh", links, "c", "radii", (0.3, 0.5))._make_sample(-1.2, 7.4, {"radii": [0.3, 0.5]}, 0.8),
+            cls("mesh", links, "c", "radii", (0.3, 0.5), efficiency=0.97)._make_sample(
+                -1.2, 7.4, {"radii": [0.3, 0.5], "efficiency": 0.97}, 0.8
+            ),
             cls("mesh", links, "c", "radii", (-0.6, 0.2), pressure_angle=0.25)._make_sample(
                 0.8, -2.5, {"radii": [-0.6, 0.2], "pressure_angle": 0.25}, 0.4
             ),
-            cls("mesh", links, "c", "teeth", (20.0, 31.0))._make_sample(2.0, 0.3, {"teeth": [20, 31]}),
+            cls("mesh", links, "c", "teeth", (20.0, 31.0), friction=Friction(0.06))._make_sample(
+                2.0, 0.3, {"teeth": [20, 31], "friction": 0.06}
+            ),
         )

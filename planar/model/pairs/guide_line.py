@@ -132,6 +132,11 @@ class GuidedPair(Pair):
     def point_on_line(self) -> tuple[tuple[str, str], str] | None:
         return (self.links[1], self.point), self.links[0]
 
+    def _square_to_line(self, frames: Mapping[str, Frame], shapes: Mapping[str, LinkShape]) -> Vector:
+        """The unit vector to the left of the line, in the world's axes."""
+        way = frames[self.links[0]].rotate_to_world(self._line_in_link(shapes)[1])
+        return Vector(-way.y, way.x)
+
     def _line_in_link(self, shapes: Mapping[str, LinkShape]) -> tuple[Vector, Vector]:
         """A point of the line and its unit direction, in the axes of the first link."""
         x, y, *way = self.line.measure_line(shapes[self.links[0]])
