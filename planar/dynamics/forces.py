@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -19,14 +19,15 @@ from planar.dynamics.external_actions import (
     collect_actions,
 )
 from planar.dynamics.free_body_check import free_body_imbalance
+from planar.dynamics.friction.frictional_forces import pair_heat, solve_friction
 from planar.dynamics.imbalance import explain_imbalance, imbalance_refusal
 from planar.dynamics.load_validation import check_loads
 from planar.dynamics.load_variation import load_factors
-from planar.dynamics.reaction_solver import ReactionSolver
+from planar.dynamics.reaction_solver import ForceSolution, ReactionSolver
 from planar.dynamics.reactions import ZERO_COUPLE_TOLERANCE, Reaction, input_efforts, pair_reaction
 from planar.dynamics.virtual_velocities import has_length_motion, refuse_surplus_inputs, unit_rate_state
 from planar.dynamics.virtual_work import BalanceFunction, balance_function
-from planar.foundation.arrays import Array
+from planar.foundation.arrays import Array, IntArray
 from planar.foundation.errors import BadInput, NoAnswer, Outcome
 from planar.foundation.notebook_display import Displayable
 from planar.model.mechanism import Mechanism
@@ -55,7 +56,10 @@ class Forces(Displayable):
     `inputs["O"]` is what that input supplies: a torque (N m) at a pair whose motion is an angle, a force (N) at one
     whose motion is a length, positive in the positive sense of the motion, and `powers["O"]` its power (W).
     `reactions["B"]` see `Reaction`. `acting` are loads, weights, springs, efforts and inertia. `undetermined` names
-    what equilibrium does not tell, and why; `bodies` are the links whose balance was proved.
+    what equilibrium does not tell, and why; `bodies` are the links whose balance was proved. `heat["B"]` is what each
+    pair with friction takes of the power (W), `frictionless` the same forces without friction, `others` the further
+    solutions at a position, `solution_count` how many there are in all (of a motion (n,)), and `remarks` what there is
+    to say of friction.
     """
 
     moving: State | Motion
@@ -66,6 +70,11 @@ class Forces(Displayable):
     undetermined: Mapping[str, str]
     proof: ForceProof
     bodies: tuple[str, ...]
+    heat: Mapping[str, Array | float] = field(default_factory=dict)
+    frictionless: Forces | None = None
+    others: tuple[Forces, ...] = ()
+    solution_count: IntArray | int = 1
+    remarks: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
         return f"<Forces in {self.moving!r}: {len(self.reactions)} pairs, {len(self.acting)} acting>"
@@ -90,6 +99,27 @@ class Forces(Displayable):
         """What the mechanism does against its loads, W."""
         return 0.0 - sum((each.power for each in self.loads), 0.0)
 
+    @property
+    def solutions(self) -> tuple[Forces, ...]:
+        """All that friction leaves possible at a position: first the one that goes over into that without friction."""
+        return (self, *self.others)
+
+    @property
+    def heat_flow(self) -> Array | float:
+        """What friction in the pairs turns into heat, W."""
+        return sum(self.heat.values(), 0.0)
+
+    @property
+    def efficiency(self) -> Array | float:
+        """The part of the power that goes into the mechanism and comes out again; NaN where none goes in.
+
+        In goes whatever has positive power: inputs, loads, weights, springs and inertia that gives it.
+        """
+        supplied = sum((np.maximum(each.power, 0.0) for each in self.acting), np.zeros(()))
+        with np.errstate(invalid="ignore", divide="ignore"):
+            found = np.where(supplied > 0.0, 1.0 - self.heat_flow / supplied, np.nan)
+        return found if found.ndim else float(found)
+
     @cached_property
     def shaking(self) -> tuple[Array, Array | float]:
         """What the links' inertia puts on the frame: a force, N, and a moment about the frame's origin, N m."""
@@ -104,14 +134,15 @@ class Forces(Displayable):
 
 
 @takes_result("State", "Motion")
-def forces(moving: State | Motion, inertia: bool = True) -> Forces:
-    """What inputs and pairs must supply against loads, weights, springs and the links' inertia.
+def forces(moving: State | Motion, inertia: bool = True, friction: bool = True) -> Forces:
+    """What inputs and pairs must supply against loads, weights, springs, friction and the links' inertia.
 
     A position has its own rates, and of loads that vary with time those at t = 0. `inertia=False` leaves it out:
-    equilibrium at rest, or in slow motion. For any number of inputs; where the links are held more than once, what
-    rigid bodies do not tell is NaN and named. Raises BadInput where a load, spring or mass is none of this
-    mechanism's; NoAnswer where there are more inputs than freedoms, and where no forces in the pairs balance the
-    links, as at a dead point (of a motion such rows are NaN).
+    equilibrium at rest, or in slow motion; `friction=False` leaves out that of the pairs. For any number of inputs;
+    where the links are held more than once, what rigid bodies do not tell is NaN and named. Raises BadInput where a
+    load, spring or mass is none of this mechanism's; NoAnswer where there are more inputs than freedoms, where no
+    forces in the pairs balance the links, as at a dead point, and where friction jams it (of a motion such rows are
+    NaN).
 
     >>> import planar
     >>> list(planar.forces(planar.solve(planar.load("four-bar"))).reactions)
@@ -120,47 +151,80 @@ def forces(moving: State | Motion, inertia: bool = True) -> Forces:
     mechanism = moving.mechanism
     check_loads(mechanism)
     state = moving if isinstance(moving, State) else None
-    one = state is not None
     if state is not None:
         refuse_surplus_inputs(state)
     time = np.zeros(1) if isinstance(moving, State) else moving.time
     if time is None and any(load.varies is not None and load.varies.input is None for load in mechanism.loads):
         raise BadInput("loads", "a load varies with time, which this motion has not; give it a duration")
-    equations = balance_function(mechanism)
-    field = KinematicArrays(moving, equations.work.shapes)
-    reactions = _make_reaction_solver(equations, field, time, inertia)
+    balanced = _Balance(moving, time, inertia)
+    reactions = balanced.reactions
     solved = reactions.solve()
-    if one and not np.isfinite(reactions.balance.loads).all():
+    if state is not None and not np.isfinite(reactions.balance.loads).all():
         raise NoAnswer(
             Outcome.DEAD_POINT,
             "the ends of a spring or damper meet here, so that its force has no direction; move the input",
         )
     if not solved.is_balanced.all():
-        if one:
+        if state is not None:
             raise imbalance_refusal(reactions)
         solved = solved._replace(imbalance=explain_imbalance(reactions))
-    supplied, whys = input_efforts(solved)
-    all_of = collect_actions(field, time, supplied, inertia)
-    moved = action_velocities(field, all_of)
-    powers = action_powers(field, all_of, moved)
-    all_of = [each._replace(power=row) for each, row in zip(all_of, powers, strict=True)]
-    by_pair = {pair.name: pair_reaction(pair, field, reactions, solved) for pair in mechanism.pairs}
-    equilibrium, bodies = free_body_imbalance(field, all_of, by_pair, reactions.arm)
-    names = [given.pair for given in mechanism.inputs]
-    undetermined = {name: why for name, why in zip(names, whys, strict=True) if why}
-    undetermined |= {name: each.why for name, each in by_pair.items() if each.why}
-    routes = None if state is None else _second_route_error(state, field, all_of, supplied[0])
-    found = Forces(
-        moving,
-        dict(zip(names, supplied.T, strict=True)),
-        {name: sum(each.power for each in all_of if each[:2] == ("input", name)) for name in names},
-        by_pair,
-        tuple(all_of),
-        undetermined,
-        ForceProof(_power_imbalance(powers, all_of, moved), routes, equilibrium),
-        bodies,
+    found = balanced.forces(solved)
+    if friction and any(pair.has_friction for pair in mechanism.pairs):
+        found = _with_friction(balanced, solved, found)
+    return found if state is None else _single_position(found)
+
+
+class _Balance:
+    """What stands fast before the forces in pairs are known: the balance, and the way from its solution to a result."""
+
+    def __init__(self, moving: State | Motion, time: Array | None, inertia: bool):
+        self.moving, self.time, self.inertia = moving, time, inertia
+        equations = balance_function(moving.mechanism)
+        self.field = KinematicArrays(moving, equations.work.shapes)
+        self.reactions = _make_reaction_solver(equations, self.field, time, inertia)
+
+    def forces(self, solved: ForceSolution) -> Forces:
+        """The result, with an axis for its positions."""
+        mechanism, field = self.moving.mechanism, self.field
+        supplied, whys = input_efforts(solved)
+        all_of = collect_actions(field, self.time, supplied, self.inertia)
+        moved = action_velocities(field, all_of)
+        powers = action_powers(field, all_of, moved)
+        all_of = [each._replace(power=row) for each, row in zip(all_of, powers, strict=True)]
+        by_pair = {pair.name: pair_reaction(pair, field, self.reactions, solved) for pair in mechanism.pairs}
+        heat = {pair.name: pair_heat(field, by_pair[pair.name]) for pair in mechanism.pairs if pair.has_friction}
+        equilibrium, bodies = free_body_imbalance(field, all_of, by_pair, self.reactions.arm)
+        names = [given.pair for given in mechanism.inputs]
+        undetermined = {name: why for name, why in zip(names, whys, strict=True) if why}
+        undetermined |= {name: each.why for name, each in by_pair.items() if each.why}
+        routes = None
+        if isinstance(self.moving, State):
+            rubbing = {name: by_pair[name] for name in heat}
+            routes = _second_route_error(self.moving, all_of, supplied[0], rubbing)
+        lost = np.array([*powers, *(-each for each in heat.values())]).reshape(-1, field.position_count)
+        return Forces(
+            self.moving,
+            dict(zip(names, supplied.T, strict=True)),
+            {name: sum(each.power for each in all_of if each[:2] == ("input", name)) for name in names},
+            by_pair,
+            tuple(all_of),
+            undetermined,
+            ForceProof(_power_imbalance(lost, all_of, moved), routes, equilibrium),
+            bodies,
+            heat,
+        )
+
+
+def _with_friction(balanced: _Balance, solved: ForceSolution, without: Forces) -> Forces:
+    """The forces with friction, beside those without."""
+    result = solve_friction(balanced.reactions, balanced.field, solved)
+    if result.solution is None:
+        return replace(without, remarks=result.remarks)
+    first, *others = (
+        replace(balanced.forces(each), frictionless=without, remarks=result.remarks)
+        for each in (result.solution, *result.others)
     )
-    return _single_position(found) if one else found
+    return replace(first, others=tuple(others), solution_count=result.count)
 
 
 def _make_reaction_solver(
@@ -199,14 +263,18 @@ def _greatest_size(values: Iterable[Array | float]) -> float:
 
 
 def _second_route_error(
-    state: State, field: KinematicArrays, all_of: Sequence[ExternalAction], supplied: Array
+    state: State, all_of: Sequence[ExternalAction], supplied: Array, rubbing: Mapping[str, Reaction]
 ) -> float | None:
-    """How far the efforts are from those by virtual power, beside what each input would supply against every part."""
+    """How far the efforts are from those by virtual power, beside what each input would supply against every part.
+
+    Pairs that rub have a part of it, by their reactions.
+    """
     worst, others = None, [each for each in all_of if each.kind != "input"]
     for given, effort in zip(state.mechanism.inputs, supplied, strict=True):
-        unit = KinematicArrays(unit_rate_state(state, given.pair), field.shapes)
+        unit = KinematicArrays(unit_rate_state(state, given.pair), state.shapes)
         moved = action_velocities(unit, others)
-        parts = action_powers(unit, others, moved)
+        lost = [-pair_heat(unit, each) for each in rubbing.values()]
+        parts = np.concatenate([action_powers(unit, others, moved), np.array(lost).reshape(-1, 1)])
         whole = float(np.abs(parts).sum())
         could = _power_scale(others, moved)
         beside = whole if whole > ZERO_COUPLE_TOLERANCE * could else could
@@ -238,4 +306,9 @@ def _single_position(found: Forces) -> Forces:
         found.undetermined,
         found.proof,
         found.bodies,
+        {name: only(each) for name, each in found.heat.items()},
+        None if found.frictionless is None else _single_position(found.frictionless),
+        tuple(map(_single_position, found.others)),
+        int(np.ravel(found.solution_count)[0]),
+        found.remarks,
     )

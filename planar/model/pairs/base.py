@@ -80,6 +80,11 @@ class Pair(ABC):
         """The links whose frames its formulas need: the two that it joins, and those that they are seen from."""
         return self.links
 
+    @property
+    def has_friction(self) -> bool:
+        """Whether it loses power as it moves."""
+        return self.friction is not None
+
     @abstractmethod
     def measure(self, shapes: Sequence[LinkShape]) -> Sequence[Scalar]:
         """The numbers of the bodies that the residual needs (m, rad)."""

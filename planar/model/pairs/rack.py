@@ -87,6 +87,10 @@ class RackPair(GuidedPair):
         MeasureKind.TURNS,
     )
 
+    @property
+    def has_friction(self) -> bool:
+        return super().has_friction or has_loss(self.efficiency)
+
     def measure(self, shapes: Sequence[LinkShape]) -> Sequence[Scalar]:
         rack, pinion = shapes
         return (*self.line.measure_line(rack), *pinion.position(self.point), self.radius, *self.mesh_reference)

@@ -114,6 +114,10 @@ class WheelPair(Pair):
     def ratio(self) -> Scalar:
         """The angular velocity of the second wheel by that of the first, both against the carrier."""
 
+    @property
+    def has_friction(self) -> bool:
+        return super().has_friction or has_loss(self.efficiency)
+
     def measure(self, shapes: Sequence[LinkShape]) -> Sequence[Scalar]:
         return (self.ratio(), *self.mesh_reference)
 

@@ -1,0 +1,195 @@
+"""Every solution of contacts at one position, by bisecting boxes that an interval Newton method empties or proves.
+
+In homogeneous coordinates v = (w, y) on the faces of a cube, so that forces beyond all bounds are searched as well. On
+each box phi changes along slopes between known bounds: where Krawczyk's image of the box misses it there is no
+solution, where the image lies inside there is just one (R. Krawczyk, Computing 4, 1969; R. E. Moore, R. B. Kearfott,
+M. J. Cloud, Introduction to Interval Analysis, 2009, ch. 8).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from planar.dynamics.friction.contact_system import ContactSystem
+from planar.foundation.arrays import Array, BoolArray
+from planar.foundation.short_repr import short_repr
+
+MAX_BOXES = 120_000
+LEAST_RADIUS = 1e-9
+"""A box so small that is not decided holds solutions that lie together."""
+OVERLAP, ROUNDING = 1.05, 1e-14
+"""By how much boxes are taken larger than they are, so that a solution on an edge is inside of one."""
+INFINITE_SHARE = 1e-9
+"""A solution with less than this of w is at infinity: forces without a load."""
+SAME_SOLUTION_DISTANCE = 1e-7
+SOLVED_TOLERANCE = 1e-9
+"""Of the greatest part or contact."""
+
+
+class ContactSolutions(NamedTuple):
+    """The solutions y (solutions, m), and whether it is proved that there are no others."""
+
+    y: Array
+    is_complete: bool
+
+    def __repr__(self) -> str:
+        return short_repr(self)
+
+
+def find_all_solutions(system: ContactSystem) -> ContactSolutions:
+    """All solutions at the one position of a system."""
+    scale = np.maximum(np.abs(system.loads).max(axis=(0, 2)), 1e-300)
+    contacts = _HomogeneousContacts(system, float(scale.max()))
+    found, is_complete = [], True
+    for face in range(contacts.count + 1):
+        solutions, decided = _search_face(contacts, face)
+        is_complete &= decided
+        found += solutions
+    y = np.array([contacts.restore(each) for each in found]).reshape(-1, len(system.is_signed))
+    y = y[system.at(np.zeros(len(y), dtype=int)).errors(y) < SOLVED_TOLERANCE] if len(y) else y
+    return ContactSolutions(_distinct(y), is_complete)
+
+
+class _HomogeneousContacts:
+    """y_j = phi_j(G_j v), v = (w, y) up to a factor, contacts that are signed parts of others eliminated."""
+
+    def __init__(self, system: ContactSystem, unit: float):
+        signed = system.is_signed
+        self.kept, self.dropped, self.unit = ~signed, signed, unit
+        whole = np.concatenate([system.loads[0, :, :, None] / unit, -system.slopes[0]], axis=2)  # (m, k, 1 + m)
+        first = whole[signed, 0]
+        at = np.concatenate([[False], signed])
+        self.elimination = np.linalg.solve(np.eye(int(signed.sum())) - first[:, at], first[:, ~at])
+        self.forms = whole[self.kept][:, :, ~at] + whole[self.kept][:, :, at] @ self.elimination
+        self.is_resultant = system.is_resultant[self.kept]
+        self.count = int(self.kept.sum())
+        self.lengths = np.linalg.norm(self.forms, axis=1)  # (m, 1 + m)
+
+    def restore(self, v: Array) -> Array:
+        """All contacts (m,) at homogeneous coordinates."""
+        y = np.zeros(len(self.kept))
+        y[self.kept] = v[1:] / v[0] * self.unit
+        y[self.dropped] = self.elimination @ v / v[0] * self.unit
+        return y
+
+    def values(self, v: Array) -> Array:
+        """y - phi (boxes, m) at v (boxes, 1 + m)."""
+        parts = np.einsum("akc,nc->nak", self.forms, v)
+        sizes = np.where(self.is_resultant, np.linalg.norm(parts, axis=2), parts.max(axis=2))
+        found: Array = v[:, 1:] - sizes
+        return found
+
+    def slope_bounds(self, centre: Array, radius: Array) -> tuple[Array, Array]:
+        """The slopes of y - phi over boxes: their middle and how far they are off it (boxes, m, 1 + m)."""
+        parts, off = (
+            np.einsum("akc,nc->nak", forms, at) for forms, at in ((self.forms, centre), (np.abs(self.forms), radius))
+        )
+        long, wide = np.linalg.norm(parts, axis=2), np.linalg.norm(off, axis=2)
+        sine = np.minimum(wide / np.maximum(long, 1e-300), 1.0)
+        chord = np.where(sine < 1.0, 2.0 * np.sin(0.5 * np.arcsin(sine)), 1.0)
+        towards = np.where((sine < 1.0)[..., None], parts / np.maximum(long, 1e-300)[..., None], 0.0)
+        middle = np.einsum("nak,akc->nac", towards, self.forms)
+        spread = chord[..., None] * self.lengths
+        can_lead = parts + off >= (parts - off).max(axis=2, keepdims=True)
+        low = np.where(can_lead[..., None], self.forms, np.inf).min(axis=2)
+        high = np.where(can_lead[..., None], self.forms, -np.inf).max(axis=2)
+        resultant = self.is_resultant[:, None]
+        middle, spread = (
+            np.where(resultant, middle, 0.5 * (low + high)),
+            np.where(resultant, spread, 0.5 * (high - low)),
+        )
+        own = np.concatenate([np.zeros((self.count, 1)), np.eye(self.count)], axis=1)
+        return own - middle, spread
+
+
+def _search_face(contacts: _HomogeneousContacts, face: int) -> tuple[list[Array], bool]:
+    """The solutions whose greatest coordinate is this one, and whether all boxes were decided."""
+    free = np.arange(contacts.count + 1) != face
+    centre, radius = np.full((1, contacts.count + 1), 0.5), np.full((1, contacts.count + 1), 0.5)
+    centre[:, face], radius[:, face] = 1.0, 0.0
+    found: list[Array] = []
+    decided, searched = True, 0
+    while len(centre):
+        searched += len(centre)
+        if searched > MAX_BOXES:
+            return found, False
+        centre, radius, proved, tiny = _contract(contacts, free, centre, radius)
+        for v in centre[proved]:
+            solution = _refine(contacts, free, v)
+            if solution is not None and solution[0] > INFINITE_SHARE:
+                found.append(solution)
+        for v in centre[tiny & ~proved]:
+            solution = _refine(contacts, free, v)
+            beyond = solution is not None and solution[0] <= INFINITE_SHARE
+            decided &= beyond
+            if solution is not None and not beyond:
+                found.append(solution)
+        left = ~proved & ~tiny
+        centre, radius = _bisect(centre[left], radius[left])
+    return found, decided
+
+
+def _contract(
+    contacts: _HomogeneousContacts, free: BoolArray, centre: Array, radius: Array
+) -> tuple[Array, Array, BoolArray, BoolArray]:
+    """The boxes that may have solutions, as small as one step makes them; which have just one, and which are tiny."""
+    wide = radius * OVERLAP + ROUNDING * free
+    value = contacts.values(centre)
+    middle, spread = contacts.slope_bounds(centre, wide)
+    reach = np.einsum("nac,nc->na", np.abs(middle) + spread, wide)
+    may = (np.abs(value) <= reach + ROUNDING).all(axis=1)
+    centre, radius, wide, value, middle, spread = (each[may] for each in (centre, radius, wide, value, middle, spread))
+    square = middle[:, :, free]
+    regular = np.abs(np.linalg.det(square)) > 1e-12
+    square[~regular] = np.eye(contacts.count)
+    inverse = np.linalg.inv(square)
+    image = centre[:, free] - np.einsum("nab,nb->na", inverse, value)
+    off = np.einsum("nab,nbc,nc->na", np.abs(inverse), spread, wide) + ROUNDING
+    inside = (np.abs(image - centre[:, free]) + off < wide[:, free]).all(axis=1) & regular
+    low = np.maximum(image - off, (centre - wide)[:, free])
+    high = np.minimum(image + off, (centre + wide)[:, free])
+    empty = (low > high).any(axis=1) & regular
+    shrunk_centre, shrunk_radius = centre.copy(), radius.copy()
+    shrunk_centre[:, free], shrunk_radius[:, free] = 0.5 * (low + high), 0.5 * (high - low)
+    use = regular & ~empty
+    centre, radius = np.where(use[:, None], shrunk_centre, centre), np.where(use[:, None], shrunk_radius, radius)
+    tiny = radius.max(axis=1, initial=0.0) < LEAST_RADIUS
+    return centre[~empty], radius[~empty], inside[~empty], tiny[~empty]
+
+
+def _refine(contacts: _HomogeneousContacts, free: BoolArray, v: Array) -> Array | None:
+    """The solution near v by Newton's steps; None where there is none."""
+    none = np.zeros((1, len(v)))
+    for _ in range(30):
+        value = contacts.values(v[None])
+        slope = contacts.slope_bounds(v[None], none)[0][0][:, free]
+        step = np.linalg.lstsq(slope, value[0], rcond=None)[0]
+        v = v.copy()
+        v[free] -= step
+        if np.abs(step).max(initial=0.0) < ROUNDING:
+            break
+    return v if np.abs(contacts.values(v[None])).max(initial=0.0) < SOLVED_TOLERANCE else None
+
+
+def _bisect(centre: Array, radius: Array) -> tuple[Array, Array]:
+    """Each box as two halves across its longest side."""
+    if not len(centre):
+        return centre, radius
+    row, side = np.arange(len(centre)), np.argmax(radius, axis=1)
+    half = radius.copy()
+    half[row, side] *= 0.5
+    step = np.zeros_like(radius)
+    step[row, side] = half[row, side]
+    return np.concatenate([centre - step, centre + step]), np.concatenate([half, half])
+
+
+def _distinct(y: Array) -> Array:
+    """Each solution once."""
+    kept: list[Array] = []
+    for each in y:
+        near = max(np.abs(each).max(initial=0.0), 1e-300)
+        if all(np.abs(each - other).max() > SAME_SOLUTION_DISTANCE * near for other in kept):
+            kept.append(each)
+    return np.array(kept).reshape(-1, y.shape[1])
