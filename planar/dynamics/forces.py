@@ -19,6 +19,7 @@ from planar.dynamics.external_actions import (
     collect_actions,
 )
 from planar.dynamics.free_body_check import free_body_imbalance
+from planar.dynamics.friction.contact_rows import ContactState
 from planar.dynamics.friction.frictional_forces import pair_heat, solve_friction
 from planar.dynamics.imbalance import explain_imbalance, imbalance_refusal
 from planar.dynamics.load_validation import check_loads
@@ -30,6 +31,7 @@ from planar.dynamics.virtual_work import BalanceFunction, balance_function
 from planar.foundation.arrays import Array, IntArray
 from planar.foundation.errors import BadInput, NoAnswer, Outcome
 from planar.foundation.notebook_display import Displayable
+from planar.foundation.short_repr import short_repr
 from planar.model.mechanism import Mechanism
 from planar.results.motion import Motion, State
 
@@ -49,6 +51,23 @@ class ForceProof(NamedTuple):
     equilibrium: float | None
 
 
+class PairFriction(NamedTuple):
+    """How a pair rubs at a position; over a motion each an array or a tuple of its n positions.
+
+    `sense` (1, -1) of the rate of its input position, 0 where it does not rub; `effort` (N, N m) what friction does in
+    the positive sense of that position, of teeth with friction the couple between the wheels; `heat` (W) what it takes
+    of the power; `side` in words which side of a guide bears, or which wheel drives.
+    """
+
+    sense: Array | float
+    effort: Array | float
+    heat: Array | float
+    side: tuple[str, ...] | str
+
+    def __repr__(self) -> str:
+        return short_repr(self)
+
+
 @dataclass(frozen=True, eq=False)
 class Forces(Displayable):
     """The forces at a position, or over a motion (then every array has a first axis for its n positions).
@@ -56,8 +75,8 @@ class Forces(Displayable):
     `inputs["O"]` is what that input supplies: a torque (N m) at a pair whose motion is an angle, a force (N) at one
     whose motion is a length, positive in the positive sense of the motion, and `powers["O"]` its power (W).
     `reactions["B"]` see `Reaction`. `acting` are loads, weights, springs, efforts and inertia. `undetermined` names
-    what equilibrium does not tell, and why; `bodies` are the links whose balance was proved. `heat["B"]` is what each
-    pair with friction takes of the power (W), `frictionless` the same forces without friction, `others` the further
+    what equilibrium does not tell, and why; `bodies` are the links whose balance was proved. `friction["B"]` see
+    `PairFriction`, `frictionless` are the same forces without friction, `others` the further
     solutions at a position, `solution_count` how many there are in all (of a motion (n,)), and `remarks` what there is
     to say of friction.
     """
@@ -70,7 +89,7 @@ class Forces(Displayable):
     undetermined: Mapping[str, str]
     proof: ForceProof
     bodies: tuple[str, ...]
-    heat: Mapping[str, Array | float] = field(default_factory=dict)
+    friction: Mapping[str, PairFriction] = field(default_factory=dict)
     frictionless: Forces | None = None
     others: tuple[Forces, ...] = ()
     solution_count: IntArray | int = 1
@@ -103,6 +122,11 @@ class Forces(Displayable):
     def solutions(self) -> tuple[Forces, ...]:
         """All that friction leaves possible at a position: first the one that goes over into that without friction."""
         return (self, *self.others)
+
+    @property
+    def heat(self) -> Mapping[str, Array | float]:
+        """What each pair that rubs turns into heat, W."""
+        return {name: each.heat for name, each in self.friction.items()}
 
     @property
     def heat_flow(self) -> Array | float:
@@ -183,8 +207,8 @@ class _Balance:
         self.field = KinematicArrays(moving, equations.work.shapes)
         self.reactions = _make_reaction_solver(equations, self.field, time, inertia)
 
-    def forces(self, solved: ForceSolution) -> Forces:
-        """The result, with an axis for its positions."""
+    def forces(self, solved: ForceSolution, contacts: Mapping[str, ContactState] | None = None) -> Forces:
+        """The result, with an axis for its positions, and how pairs rub."""
         mechanism, field = self.moving.mechanism, self.field
         supplied, whys = input_efforts(solved)
         all_of = collect_actions(field, self.time, supplied, self.inertia)
@@ -192,16 +216,18 @@ class _Balance:
         powers = action_powers(field, all_of, moved)
         all_of = [each._replace(power=row) for each, row in zip(all_of, powers, strict=True)]
         by_pair = {pair.name: pair_reaction(pair, field, self.reactions, solved) for pair in mechanism.pairs}
-        heat = {pair.name: pair_heat(field, by_pair[pair.name]) for pair in mechanism.pairs if pair.has_friction}
+        rubbing = {
+            name: PairFriction(each.sense, each.effort, pair_heat(field, by_pair[name]), each.side)
+            for name, each in (contacts or {}).items()
+        }
         equilibrium, bodies = free_body_imbalance(field, all_of, by_pair, self.reactions.arm)
         names = [given.pair for given in mechanism.inputs]
         undetermined = {name: why for name, why in zip(names, whys, strict=True) if why}
         undetermined |= {name: each.why for name, each in by_pair.items() if each.why}
         routes = None
         if isinstance(self.moving, State):
-            rubbing = {name: by_pair[name] for name in heat}
-            routes = _second_route_error(self.moving, all_of, supplied[0], rubbing)
-        lost = np.array([*powers, *(-each for each in heat.values())]).reshape(-1, field.position_count)
+            routes = _second_route_error(self.moving, all_of, supplied[0], [by_pair[name] for name in rubbing])
+        lost = np.array([*powers, *(-each.heat for each in rubbing.values())]).reshape(-1, field.position_count)
         return Forces(
             self.moving,
             dict(zip(names, supplied.T, strict=True)),
@@ -211,7 +237,7 @@ class _Balance:
             undetermined,
             ForceProof(_power_imbalance(lost, all_of, moved), routes, equilibrium),
             bodies,
-            heat,
+            rubbing,
         )
 
 
@@ -221,10 +247,10 @@ def _with_friction(balanced: _Balance, solved: ForceSolution, without: Forces) -
     if result.solution is None:
         return replace(without, remarks=result.remarks)
     first, *others = (
-        replace(balanced.forces(each), frictionless=without, remarks=result.remarks)
+        replace(balanced.forces(*each), frictionless=without, remarks=result.remarks)
         for each in (result.solution, *result.others)
     )
-    return replace(first, others=tuple(others), solution_count=result.count)
+    return replace(first, others=tuple(others), solution_count=result.solution_count)
 
 
 def _make_reaction_solver(
@@ -263,7 +289,7 @@ def _greatest_size(values: Iterable[Array | float]) -> float:
 
 
 def _second_route_error(
-    state: State, all_of: Sequence[ExternalAction], supplied: Array, rubbing: Mapping[str, Reaction]
+    state: State, all_of: Sequence[ExternalAction], supplied: Array, rubbing: Sequence[Reaction]
 ) -> float | None:
     """How far the efforts are from those by virtual power, beside what each input would supply against every part.
 
@@ -273,7 +299,7 @@ def _second_route_error(
     for given, effort in zip(state.mechanism.inputs, supplied, strict=True):
         unit = KinematicArrays(unit_rate_state(state, given.pair), state.shapes)
         moved = action_velocities(unit, others)
-        lost = [-pair_heat(unit, each) for each in rubbing.values()]
+        lost = [-pair_heat(unit, each) for each in rubbing]
         parts = np.concatenate([action_powers(unit, others, moved), np.array(lost).reshape(-1, 1)])
         whole = float(np.abs(parts).sum())
         could = _power_scale(others, moved)
@@ -294,6 +320,9 @@ def _single_position(found: Forces) -> Forces:
         couples = {link: only(couple) for link, couple in each.couples.items()}
         return each._replace(at=at, force=each.force[0], couple=only(each.couple), couples=couples)
 
+    def rub(each: PairFriction) -> PairFriction:
+        return PairFriction(only(each.sense), only(each.effort), only(each.heat), each.side[0])
+
     def act(each: ExternalAction) -> ExternalAction:
         return each._replace(at=each.at[0], force=each.force[0], couple=only(each.couple), power=only(each.power))
 
@@ -306,7 +335,7 @@ def _single_position(found: Forces) -> Forces:
         found.undetermined,
         found.proof,
         found.bodies,
-        {name: only(each) for name, each in found.heat.items()},
+        {name: rub(each) for name, each in found.friction.items()},
         None if found.frictionless is None else _single_position(found.frictionless),
         tuple(map(_single_position, found.others)),
         int(np.ravel(found.solution_count)[0]),

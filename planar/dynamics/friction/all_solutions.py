@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planar.dynamics.friction.contact_system import ContactSystem
-from planar.foundation.arrays import Array, BoolArray
+from planar.foundation.arrays import Array, BoolArray, IntArray
 from planar.foundation.short_repr import short_repr
 
 MAX_BOXES = 120_000
@@ -24,6 +24,8 @@ OVERLAP, ROUNDING = 1.05, 1e-14
 INFINITE_SHARE = 1e-9
 """A solution with less than this of w is at infinity: forces without a load."""
 SAME_SOLUTION_DISTANCE = 1e-7
+SAME_LENGTH_TOLERANCE = 1e-12
+"""Of squares of coefficients."""
 SOLVED_TOLERANCE = 1e-9
 """Of the greatest part or contact."""
 
@@ -40,8 +42,7 @@ class ContactSolutions(NamedTuple):
 
 def find_all_solutions(system: ContactSystem) -> ContactSolutions:
     """All solutions at the one position of a system."""
-    scale = np.maximum(np.abs(system.loads).max(axis=(0, 2)), 1e-300)
-    contacts = _HomogeneousContacts(system, float(scale.max()))
+    contacts = _HomogeneousContacts(system)
     found, is_complete = [], True
     for face in range(contacts.count + 1):
         solutions, decided = _search_face(contacts, face)
@@ -53,26 +54,39 @@ def find_all_solutions(system: ContactSystem) -> ContactSolutions:
 
 
 class _HomogeneousContacts:
-    """y_j = phi_j(G_j v), v = (w, y) up to a factor, contacts that are signed parts of others eliminated."""
+    """y_j = phi_j(G_j v), v = (w, y) up to a factor, of those contacts alone that have to be searched for.
 
-    def __init__(self, system: ContactSystem, unit: float):
-        signed = system.is_signed
-        self.kept, self.dropped, self.unit = ~signed, signed, unit
-        whole = np.concatenate([system.loads[0, :, :, None] / unit, -system.slopes[0]], axis=2)  # (m, k, 1 + m)
+    Not those on which no other depends, signed parts of others, and vectors that are always some times as long as
+    another, as the forces at both ends of a link that nothing else loads.
+    """
+
+    def __init__(self, system: ContactSystem):
+        self.system = system
+        self.unit = max(float(np.abs(system.loads).max(initial=0.0)), 1e-300)
+        whole = np.concatenate([system.loads[0, :, :, None] / self.unit, -system.slopes[0]], axis=2)  # (m, k, 1 + m)
+        self.felt = np.abs(system.slopes[0]).max(axis=(0, 1), initial=0.0) > 0.0
+        signed = system.is_signed & self.felt
+        at, chosen = np.concatenate([[False], signed]), self.felt & ~signed
+        own = np.concatenate([[True], chosen])
         first = whole[signed, 0]
-        at = np.concatenate([[False], signed])
-        self.elimination = np.linalg.solve(np.eye(int(signed.sum())) - first[:, at], first[:, ~at])
-        self.forms = whole[self.kept][:, :, ~at] + whole[self.kept][:, :, at] @ self.elimination
-        self.is_resultant = system.is_resultant[self.kept]
-        self.count = int(self.kept.sum())
+        expansion = np.eye(len(at))[:, own]
+        expansion[at] = np.linalg.solve(np.eye(int(signed.sum())) - first[:, at], first[:, own])
+        forms = whole[chosen] @ expansion
+        follows, ratio = _lengths_that_follow(forms, system.is_resultant[chosen])
+        kept = follows == np.arange(len(follows))
+        merged = np.zeros((len(follows) + 1, int(kept.sum()) + 1))
+        merged[0, 0] = 1.0
+        merged[1 + np.arange(len(follows)), 1 + (np.cumsum(kept) - 1)[follows]] = ratio
+        self.expansion = expansion @ merged
+        self.forms = forms[kept] @ merged
+        self.is_resultant = system.is_resultant[chosen][kept]
+        self.count = int(kept.sum())
         self.lengths = np.linalg.norm(self.forms, axis=1)  # (m, 1 + m)
 
     def restore(self, v: Array) -> Array:
         """All contacts (m,) at homogeneous coordinates."""
-        y = np.zeros(len(self.kept))
-        y[self.kept] = v[1:] / v[0] * self.unit
-        y[self.dropped] = self.elimination @ v / v[0] * self.unit
-        return y
+        y: Array = (self.expansion @ v)[1:] / v[0] * self.unit
+        return np.where(self.felt, y, self.system.sizes(self.system.parts(y[None]))[0][0])
 
     def values(self, v: Array) -> Array:
         """y - phi (boxes, m) at v (boxes, 1 + m)."""
@@ -102,6 +116,23 @@ class _HomogeneousContacts:
         )
         own = np.concatenate([np.zeros((self.count, 1)), np.eye(self.count)], axis=1)
         return own - middle, spread
+
+
+def _lengths_that_follow(forms: Array, is_resultant: BoolArray) -> tuple[IntArray, Array]:
+    """Of every contact the first one of which it is always some times as great, itself if there is no other; and that
+    ratio. Vectors G v and G' v are so where G'^T G' is proportional to G^T G."""
+    count = len(forms)
+    follows, ratio = np.arange(count), np.ones(count)
+    gram = np.einsum("akc,akd->acd", forms, forms)
+    size = np.sqrt(np.einsum("acc->a", gram))
+    for k in range(count):
+        for j in range(k):
+            if follows[j] == j and is_resultant[j] and is_resultant[k] and size[j] > 0.0:
+                by = float(size[k] / size[j])
+                if np.abs(gram[k] - by**2 * gram[j]).max() <= SAME_LENGTH_TOLERANCE * size[k] ** 2:
+                    follows[k], ratio[k] = j, by
+                    break
+    return follows, ratio
 
 
 def _search_face(contacts: _HomogeneousContacts, face: int) -> tuple[list[Array], bool]:

@@ -22,13 +22,13 @@ class ContactChoice(NamedTuple):
 
     `first` (n, m): of all solutions the one that goes over into that without friction as coefficients go to nothing,
     and where there is none such the one with the least forces; NaN where there is no solution. `others` by position
-    (solutions, m). `count` (n,) of all, `is_complete` (n,): whether these are proved to be all, `part` (n,): how far
+    (solutions, m). `solution_count` (n,) of all, `is_complete` (n,): whether these are proved to be all, `part` (n,): how far
     coefficients can grow on the way from the one without friction (1: as far as they are).
     """
 
     first: Array
     others: dict[int, Array]
-    count: IntArray
+    solution_count: IntArray
     is_complete: BoolArray
     part: Array
 
@@ -59,7 +59,7 @@ def _search(system: ContactSystem, row: int, found: ContactChoice) -> None:
         size = max(float(np.abs(end.y).max(initial=0.0)), 1e-300)
         order = [y for y in order if np.abs(y - end.y).max() > SAME_SOLUTION_DISTANCE * size]
         order.insert(0, end.y)
-    found.count[row], found.is_complete[row], found.part[row] = len(order), every.is_complete, end.part
+    found.solution_count[row], found.is_complete[row], found.part[row] = len(order), every.is_complete, end.part
     if order:
         found.first[row] = order[0]
     if order[1:]:

@@ -39,6 +39,21 @@ class Contact(NamedTuple):
     law: LoadLaw
     is_friction: bool
     rate_sense: Array
+    sides: tuple[tuple[str, ...], tuple[str, ...]] = ((), ())
+    "what each part says of where the pair bears, or which side drives, at both senses"
+
+    def __repr__(self) -> str:
+        return short_repr(self)
+
+
+class ContactState(NamedTuple):
+    """How a pair rubs at n positions: the sense of its rate (1, -1, 0), friction in the positive sense of the effort
+    of its input (N or N m), of teeth the couple between the wheels, and what `side` it bears on, or drives, in words.
+    """
+
+    sense: Array
+    effort: Array
+    side: tuple[str, ...]
 
     def __repr__(self) -> str:
         return short_repr(self)
@@ -140,6 +155,23 @@ class ContactRows:
             found[each.pair] = found.get(each.pair, 0.0) + actions[:, :, index] * y[:, index, None]
         return found
 
+    def states(self, system: ContactSystem, senses: dict[str, Array], y: Array) -> dict[str, ContactState]:
+        """How every pair rubs with contacts y (n, m)."""
+        found: dict[str, ContactState] = {}
+        parts = system.parts(np.nan_to_num(y))
+        for index, each in enumerate(self.contacts):
+            if not each.is_friction or each.pair in found:
+                continue
+            sense, leading = senses[each.pair], np.argmax(parts[:, index], axis=1)
+            side = ("",) * self.count
+            if each.law is LoadLaw.GREATEST:
+                side = tuple(
+                    each.sides[int(s < 0.0)][k] if s and height > 0.0 else ""
+                    for s, k, height in zip(sense, leading, y[:, index], strict=True)
+                )
+            found[each.pair] = ContactState(sense, -sense * each.rate_sense * y[:, index], side)
+        return found
+
     @cached_property
     def _link_rates(self) -> Array:
         return self.reactions.work.coordinates(self.field.moving)[1][:, : self.reactions.work.link_coordinate_count]
@@ -150,7 +182,9 @@ class ContactRows:
     def _contact(self, pair: Pair, rubbing: RubbingContact) -> Contact:
         positive, negative = (self._parts(pair, rubbing, sense) for sense in (1.0, -1.0))
         sense = np.broadcast_to(np.asarray(rubbing.rate_sense, dtype=float), (self.count,))
-        return Contact(pair.name, self._action_on_links(rubbing.action), (positive, negative), rubbing.law, True, sense)
+        action = self._action_on_links(rubbing.action)
+        sides = _sides(rubbing, 1.0), _sides(rubbing, -1.0)
+        return Contact(pair.name, action, (positive, negative), rubbing.law, True, sense, sides)
 
     def _parts(self, pair: Pair, rubbing: RubbingContact, sense: float) -> Array:
         """What a contact follows of the constraint forces (n, k, forces), at a sense of the pair's rate."""
@@ -219,3 +253,14 @@ class ContactRows:
             part[:, 0, rows], part[:, 1, rows] = press, -press
             found.append(Contact(name, action, (part, part), LoadLaw.GREATEST, False, np.ones(self.count)))
         return found
+
+
+def _sides(rubbing: RubbingContact, sense: float) -> tuple[str, ...]:
+    """What each part of a contact says of its side, in the order of the parts."""
+    if rubbing.law is not LoadLaw.GREATEST:
+        return ("",) * len(rubbing.loads)
+    found: list[str] = []
+    for load in rubbing.loads:
+        is_turned = load.opposed is not None and sense < 0.0
+        found += reversed(load.sides) if is_turned else load.sides
+    return tuple(found)

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.foundation.arrays import Array, BoolArray
+from planar.foundation.arrays import Array, BoolArray, IntArray
 from planar.foundation.short_repr import short_repr
 
 ROUND_OFF = 1e-14
@@ -36,7 +36,7 @@ class ContactSystem(NamedTuple):
     def __repr__(self) -> str:
         return short_repr(self)
 
-    def at(self, rows: Array) -> ContactSystem:
+    def at(self, rows: IntArray) -> ContactSystem:
         """The same at some of the positions."""
         return self._replace(loads=self.loads[rows], slopes=self.slopes[rows])
 

@@ -9,26 +9,36 @@ import numpy as np
 
 from planar.dynamics.external_actions import KinematicArrays
 from planar.dynamics.friction.contact_choice import ContactChoice, solve_contacts
-from planar.dynamics.friction.contact_rows import ContactRows
+from planar.dynamics.friction.contact_rows import ContactRows, ContactState
 from planar.dynamics.reaction_solver import ForceSolution, ReactionSolver
 from planar.dynamics.reactions import Reaction
-from planar.foundation.arrays import Array, IntArray
+from planar.foundation.arrays import Array, BoolArray, IntArray
 from planar.foundation.errors import NoAnswer, Outcome
 from planar.foundation.short_repr import short_repr
 from planar.model.wording import count_phrase, join_all_names, quote_names
 from planar.results.motion import State
 
 
+class FrictionalSolution(NamedTuple):
+    """One way in which forces with friction can be, and how pairs rub in it."""
+
+    forces: ForceSolution
+    contacts: Mapping[str, ContactState]
+
+    def __repr__(self) -> str:
+        return short_repr(self)
+
+
 class FrictionalForces(NamedTuple):
-    """The solution that goes over into that without friction, `others` at a single position, `count` (n,) of all.
+    """The solution that goes over into that without friction, `others` at a single position, `solution_count` (n,) of all.
 
     No solution where nothing moves, so that friction has no sense, and where the forces that it follows are not
     determined. `remarks` are what there is to say.
     """
 
-    solution: ForceSolution | None
-    others: tuple[ForceSolution, ...]
-    count: IntArray
+    solution: FrictionalSolution | None
+    others: tuple[FrictionalSolution, ...]
+    solution_count: IntArray
     remarks: tuple[str, ...]
 
     def __repr__(self) -> str:
@@ -47,11 +57,11 @@ def solve_friction(reactions: ReactionSolver, field: KinematicArrays, without: F
         pairs = quote_names(rows.rubbing_pairs)
         told = f"the reactions that friction at {pairs} follows are not determined, and with them all forces"
         unknown = without._replace(is_balanced=np.zeros(many, dtype=bool), imbalance=told)
-        return FrictionalForces(unknown, (), np.zeros(many, dtype=int), (told,))
+        return FrictionalForces(FrictionalSolution(unknown, {}), (), np.zeros(many, dtype=int), (told,))
     system, actions = rows.system(senses)
     system = system._replace(loads=np.where(without.is_balanced[:, None, None], system.loads, 0.0))
     choice = solve_contacts(system)
-    jams = without.is_balanced & (choice.count == 0)
+    jams = without.is_balanced & (choice.solution_count == 0)
     if is_state and jams.any():
         raise NoAnswer(Outcome.INPUT_JAMMED, _jam_sentence(choice, rows.rubbing_pairs))
     solution = reactions.solve_beside(rows.pair_actions(actions, np.nan_to_num(choice.first)))
@@ -61,16 +71,32 @@ def solve_friction(reactions: ReactionSolver, field: KinematicArrays, without: F
         why = "; ".join(filter(None, (why, "friction jams it there: no forces in the pairs balance the links")))
     solution = solution._replace(is_balanced=without.is_balanced & ~lost, imbalance=why)
     others = tuple(
-        reactions.solve_beside(rows.pair_actions(actions, y[None])) for y in choice.others.get(0, ()) if is_state
+        FrictionalSolution(
+            reactions.solve_beside(rows.pair_actions(actions, y[None])), rows.states(system, senses, y[None])
+        )
+        for y in choice.others.get(0, ())
+        if is_state
     )
     remarks = (*_unrubbed_sentences(senses), *_choice_sentences(choice, jams, is_state))
-    return FrictionalForces(solution, others, np.where(without.is_balanced, choice.count, 0), remarks)
+    first = FrictionalSolution(solution, rows.states(system, senses, choice.first))
+    return FrictionalForces(first, others, np.where(without.is_balanced, choice.solution_count, 0), remarks)
+
+
+def solve_with_friction(reactions: ReactionSolver, field: KinematicArrays) -> ForceSolution:
+    """The forces at many positions, with friction where pairs have any and rub."""
+    without = reactions.solve()
+    if not any(pair.has_friction for pair in reactions.pairs.values()):
+        return without
+    result = solve_friction(reactions, field, without).solution
+    return without if result is None else result.forces
 
 
 def pair_heat(field: KinematicArrays, reaction: Reaction) -> Array:
     """What a pair takes of the power of its links (n,), W, from its reaction and how the links move."""
     if reaction.at is None:
-        return -sum(couple * field.angle_rates(link) for link, couple in reaction.couples.items())
+        power = [couple * field.angle_rates(link) for link, couple in reaction.couples.items()]
+        lost: Array = -np.sum(power, axis=0)
+        return lost
     first, second = reaction.links
     slip = field.velocity_at(second, reaction.at) - field.velocity_at(first, reaction.at)
     turning = field.angle_rates(second) - field.angle_rates(first)
@@ -97,14 +123,14 @@ def _unrubbed_sentences(senses: Mapping[str, Array]) -> Iterator[str]:
         yield f"nothing rubs at {quote_names(still)}, where friction is not determined and is left out"
 
 
-def _choice_sentences(choice: ContactChoice, jams: Array, is_state: bool) -> Iterator[str]:
+def _choice_sentences(choice: ContactChoice, jams: BoolArray, is_state: bool) -> Iterator[str]:
     """What there is to say of several solutions, or of none."""
-    several = choice.count > 1
+    several = choice.solution_count > 1
     folded = ~jams & (choice.part < 1.0)
     if is_state:
         if several.any():
             yield (
-                f"with friction there are {choice.count[0]} solutions: equilibrium does not tell which is there; "
+                f"with friction there are {choice.solution_count[0]} solutions: equilibrium does not tell which is there; "
                 "this is the "
                 + ("one with the least forces" if folded.any() else "one that goes over into that without friction")
             )

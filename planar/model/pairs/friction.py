@@ -36,7 +36,7 @@ def has_loss(efficiency: Scalar) -> bool:
 
 
 def mesh_loss(
-    action: EffortAction, torque: ContactLoad, efficiency: Scalar, rate_sense: Scalar = 1.0
+    wheels: tuple[str, str], action: EffortAction, torque: ContactLoad, efficiency: Scalar, rate_sense: Scalar = 1.0
 ) -> RubbingContact:
     """What a mesh or belt takes of the power through it, as a couple against `action`.
 
@@ -44,7 +44,10 @@ def mesh_loss(
     drives, 1 - efficiency of it is lost; where the second drives, it supplies what the first gets by the efficiency.
     """
     lost = 1.0 - efficiency
-    load = torque._replace(factor=torque.factor * lost, opposed=torque.factor * lost / efficiency)
+    drives = tuple(f"{link} drives" for link in wheels)
+    load = torque._replace(
+        sides=(drives[0], drives[1]), factor=torque.factor * lost, opposed=torque.factor * lost / efficiency
+    )
     return RubbingContact(action, (load,), LoadLaw.GREATEST, rate_sense)
 
 

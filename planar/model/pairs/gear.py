@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import pi, tan
 from typing import Any, ClassVar, Self
 
@@ -40,6 +40,13 @@ class GearPair(WheelPair):
     def ratio(self) -> Scalar:
         return self.sizes[0] if self.size_kind == "ratio" else -self.sizes[0] / self.sizes[1]
 
+    def find_misfit(
+        self, all_pairs: Sequence[Pair], shapes: Mapping[str, LinkShape], format_length: LengthFormatter
+    ) -> str | None:
+        if self.friction is not None and self._centre_pins(all_pairs) is None:
+            return "the friction of teeth follows their size; pin both wheels to their carrier, or give an 'efficiency'"
+        return super().find_misfit(all_pairs, shapes, format_length)
+
     def _find_distance_problem(self, centre_distance: float, format_length: LengthFormatter) -> str | None:
         wanted = abs(self.sizes[0] + self.sizes[1])
         if abs(centre_distance - wanted) <= CENTRE_DISTANCE_TOLERANCE * max(centre_distance, wanted):
@@ -72,8 +79,8 @@ class GearPair(WheelPair):
             )
         if friction is not None and entry.has("efficiency"):
             raise entry.error_at("efficiency", "give either 'friction' of the teeth or their 'efficiency', not both")
-        lossy = {"efficiency": read_efficiency(entry), "friction": friction}
-        return (cls(name, links, carrier, by, sizes, meet, read_pressure_angle(entry), **lossy),)
+        found = cls(name, links, carrier, by, sizes, meet, read_pressure_angle(entry), friction=friction)
+        return (replace(found, efficiency=read_efficiency(entry)),)
 
     @classmethod
     def write(cls, group: Sequence[Self], quantity: QuantityWriter) -> dict[str, Any]:
@@ -126,6 +133,7 @@ class GearPair(WheelPair):
         away = contact.pitch_point - centre
         pitch = sqrt(away.dot(away)) * (2.0 * pi / abs(self.sizes[1]))
         press = ContactLoad(second, self.friction.coefficient(at_rest) * pitch * 0.25, contact.drive_direction)
+        press = press._replace(opposed=press.factor, sides=(f"{first} drives", f"{second} drives"))
         ratio = self.ratio()
         sense = 1.0 if ratio < 0.0 or ratio > 1.0 else -1.0
         return (*found, RubbingContact(EffortAction(second, first), (press,), LoadLaw.GREATEST, sense))
@@ -144,6 +152,6 @@ class GearPair(WheelPair):
                 0.8, -2.5, {"radii": [-0.6, 0.2], "pressure_angle": 0.25}, 0.4
             ),
             cls("mesh", links, "c", "teeth", (20.0, 31.0), friction=Friction(0.06))._make_sample(
-                2.0, 0.3, {"teeth": [20, 31], "friction": 0.06}
+                2.0, 0.3, {"teeth": [20, 31], "friction": 0.06}, 0.7
             ),
         )

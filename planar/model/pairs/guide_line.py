@@ -34,6 +34,8 @@ LINE_SCHEMA: Schema = {
     "additionalProperties": False,
 }
 """What JSON Schema says of a line."""
+BEARING_SIDES = ("bears on the right of its line", "bears on the left of its line")
+"""Of a force on the second link to the left of the line, and to its right."""
 LINE_NUMBER_KINDS = (MeasureKind.LENGTH, MeasureKind.LENGTH, MeasureKind.PURE, MeasureKind.PURE)
 """What `measure_line` gives: a point of the line, and the line's direction."""
 

@@ -131,7 +131,7 @@ class RackPair(GuidedPair):
         # seen from the pinion's centre the rack runs back: it drives where it pushes the pinion that way
         torque = ContactLoad(pinion, abs(self.radius), way * -1.0)
         sense = -1.0 if self.radius > 0.0 else 1.0
-        return (mesh_loss(EffortAction(pinion, rack), torque, self.efficiency, sense),)
+        return (mesh_loss(self.links, EffortAction(pinion, rack), torque, self.efficiency, sense),)
 
     def drawing_marks(self, shapes: Mapping[str, LinkShape], all_pairs: Sequence[Pair]) -> tuple[DrawingMark, ...]:
         rack, pinion = self.links

@@ -37,7 +37,9 @@ class LoadLaw(Enum):
 class ContactLoad(NamedTuple):
     """A part of what a pair's constraints exert on a link, along a way or about a place, times a factor.
 
-    `opposed` is the factor where that part is against the rate of the pair's input position; None: the same.
+    `opposed` is the factor where that part is against the rate of the pair's input position; None: the same. `sides`
+    say in words where the pair bears with that part positive, and negative; with an `opposed` factor, which side drives
+    it with that part along the rate, and against.
     """
 
     link: str
@@ -45,6 +47,7 @@ class ContactLoad(NamedTuple):
     direction: Vector | None = None
     place: Vector | None = None
     opposed: Scalar | None = None
+    sides: tuple[str, str] = ("", "")
 
     def __repr__(self) -> str:
         return short_repr(self)

@@ -26,9 +26,19 @@ from planar.model.pairs.base import (
     schema_reference,
 )
 from planar.model.pairs.friction import FRICTION_SCHEMA, read_friction, write_friction
-from planar.model.pairs.guide_line import LINE_NUMBER_KINDS, LINE_SCHEMA, GuidedPair, LinkLine, point_along_line
+from planar.model.pairs.guide_line import (
+    BEARING_SIDES,
+    LINE_NUMBER_KINDS,
+    LINE_SCHEMA,
+    GuidedPair,
+    LinkLine,
+    point_along_line,
+)
 from planar.model.pairs.rubbing import ContactLoad, Friction, LoadLaw
 from planar.model.pairs.symbols import DrawingMark, GuideMark, SliderMark
+
+TILTED_SIDES = ("tilted clockwise, bears at both ends", "tilted anticlockwise, bears at both ends")
+"""Of a couple on the second link anticlockwise, and clockwise."""
 
 
 @dataclass(frozen=True)
@@ -114,9 +124,10 @@ class SlidingPair(GuidedPair):
             return ()
         coefficient, sliding = self.friction.coefficient(at_rest), self.effort_action(frames, shapes)
         square = self._square_to_line(frames, shapes)
-        loads = [ContactLoad(self.links[1], coefficient, square)]
+        loads = [ContactLoad(self.links[1], coefficient, square, sides=BEARING_SIDES)]
         if self.guide_length is not None:
-            loads.append(ContactLoad(self.links[1], coefficient * 2.0 / self.guide_length, None, sliding.point))
+            at_an_end = coefficient * 2.0 / self.guide_length
+            loads.append(ContactLoad(self.links[1], at_an_end, None, sliding.point, sides=TILTED_SIDES))
         found = [RubbingContact(sliding, tuple(loads), LoadLaw.GREATEST)]
         if self.guide_width is not None:
             off = ContactLoad(self.links[1], coefficient * self.guide_width * 0.5, square)

@@ -23,7 +23,14 @@ from planar.model.pairs.base import (
     schema_reference,
 )
 from planar.model.pairs.friction import FRICTION_SCHEMA, read_friction, write_friction
-from planar.model.pairs.guide_line import LINE_NUMBER_KINDS, LINE_SCHEMA, GuidedPair, LinkLine, point_along_line
+from planar.model.pairs.guide_line import (
+    BEARING_SIDES,
+    LINE_NUMBER_KINDS,
+    LINE_SCHEMA,
+    GuidedPair,
+    LinkLine,
+    point_along_line,
+)
 from planar.model.pairs.rubbing import ContactLoad, Friction, LoadLaw
 from planar.model.pairs.symbols import DrawingMark, SlotMark
 
@@ -62,7 +69,7 @@ class SlotPair(GuidedPair):
         if self.friction is None:
             return ()
         square = self._square_to_line(frames, shapes)
-        press = ContactLoad(self.links[1], self.friction.coefficient(at_rest), square)
+        press = ContactLoad(self.links[1], self.friction.coefficient(at_rest), square, sides=BEARING_SIDES)
         return (RubbingContact(self.effort_action(frames, shapes), (press,), LoadLaw.GREATEST),)
 
     def drawing_marks(self, shapes: Mapping[str, LinkShape], all_pairs: Sequence[Pair]) -> tuple[DrawingMark, ...]:

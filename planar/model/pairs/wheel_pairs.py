@@ -144,7 +144,7 @@ class WheelPair(Pair):
         if pins is not None:
             centre = frames[wheel].to_world(shapes[wheel].position(pins[1][wheel]))
         torque = ContactLoad(wheel, 1.0, None, centre)
-        return (mesh_loss(self.effort_action(frames, shapes), torque, self.efficiency),)
+        return (mesh_loss(self.links, self.effort_action(frames, shapes), torque, self.efficiency),)
 
     def results(self, position: Scalar, rate: Scalar, second: Scalar) -> dict[str, Scalar | None]:
         return dict(zip(self.result_kinds, (position, rate, second), strict=True))
