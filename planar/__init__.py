@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from planar.analysis.motion.mechanical_advantage import Advantage, advantage
     from planar.analysis.motion.mechanical_advantage_over_motion import AdvantageOver, advantage_over
     from planar.analysis.motion.output import Extreme
+    from planar.analysis.motion.self_locking import LockedInterval, self_locking
     from planar.analysis.motion.time_ratio import TimeRatio, time_ratio
     from planar.analysis.motion.transmission_angle import Transmission, transmission
     from planar.assemblies.circuits.circuits import Circuit, Circuits, circuits
@@ -42,7 +43,8 @@ if TYPE_CHECKING:
     from planar.document.files import dumps, from_dict, load, loads, to_dict
     from planar.document.schema import schema
     from planar.dynamics.flywheel import Flywheel, flywheel
-    from planar.dynamics.forces import Forces, forces
+    from planar.dynamics.forces import Forces, PairFriction, forces
+    from planar.dynamics.friction.holding import Holding, holding
     from planar.dynamics.reactions import Reaction
     from planar.dynamics.simulation import Simulation, simulate
     from planar.foundation.errors import BadInput, NoAnswer, Outcome, PlanarError, Unknown
@@ -65,6 +67,7 @@ if TYPE_CHECKING:
     from planar.model.pairs.gear import GearPair
     from planar.model.pairs.guide_line import LinkLine
     from planar.model.pairs.rack import RackPair
+    from planar.model.pairs.rubbing import Friction
     from planar.model.pairs.sliding import SlidingPair
     from planar.model.pairs.slot import SlotPair
     from planar.model.pairs.turning import TurningPair
@@ -111,9 +114,11 @@ _ROOMS = {
     "FileUnits": "model.mechanism",
     "Flywheel": "dynamics.flywheel",
     "Forces": "dynamics.forces",
+    "Friction": "model.pairs.rubbing",
     "GearPair": "model.pairs.gear",
     "HarmonicRise": "model.input_laws.cam_rises",
     "Harmonics": "analysis.motion.harmonics",
+    "Holding": "dynamics.friction.holding",
     "Input": "model.mechanism",
     "InputLaw": "model.input_laws.input_law",
     "Inspection": "analysis.identity.inspection",
@@ -123,6 +128,7 @@ _ROOMS = {
     "LinkMotion": "results.records",
     "LinkState": "results.records",
     "Load": "model.mechanism",
+    "LockedInterval": "analysis.motion.self_locking",
     "Mass": "model.mechanism",
     "Mechanism": "model.mechanism",
     "Mobility": "analysis.identity.mobility",
@@ -133,6 +139,7 @@ _ROOMS = {
     "NoAnswer": "foundation.errors",
     "Outcome": "foundation.errors",
     "Pair": "model.pairs.base",
+    "PairFriction": "dynamics.forces",
     "PinnedLinkages": "model.pin_linkages",
     "PlanarError": "foundation.errors",
     "Point": "model.mechanism",
@@ -183,18 +190,20 @@ _ROOMS = {
     "from_dict": "document.files",
     "greatest": "analysis.motion.extremes",
     "harmonics": "analysis.motion.harmonics",
+    "holding": "dynamics.friction.holding",
     "inspect": "analysis.identity.inspection",
     "load": "document.files",
     "loads": "document.files",
-    "mobility": "analysis.identity.mobility",
     "mark_answers": "analysis.classroom.marking",
+    "mobility": "analysis.identity.mobility",
     "modes": "assemblies.modes",
-    "problem_variants": "analysis.classroom.variants",
     "pinned": "model.pin_linkage",
     "pinned_linkages": "model.pin_linkages",
     "plot": "plot",
     "prepared": "batch.prepared",
+    "problem_variants": "analysis.classroom.variants",
     "schema": "document.schema",
+    "self_locking": "analysis.motion.self_locking",
     "simulate": "dynamics.simulation",
     "solve": "solving.position",
     "stroke": "analysis.motion.extremes",
@@ -241,9 +250,11 @@ __all__ = [
     "FileUnits",
     "Flywheel",
     "Forces",
+    "Friction",
     "GearPair",
     "HarmonicRise",
     "Harmonics",
+    "Holding",
     "Input",
     "InputLaw",
     "Inspection",
@@ -253,6 +264,7 @@ __all__ = [
     "LinkMotion",
     "LinkState",
     "Load",
+    "LockedInterval",
     "Mass",
     "Mechanism",
     "Mobility",
@@ -263,6 +275,7 @@ __all__ = [
     "NoAnswer",
     "Outcome",
     "Pair",
+    "PairFriction",
     "PinnedLinkages",
     "PlanarError",
     "Point",
@@ -313,6 +326,7 @@ __all__ = [
     "from_dict",
     "greatest",
     "harmonics",
+    "holding",
     "inspect",
     "load",
     "loads",
@@ -325,6 +339,7 @@ __all__ = [
     "prepared",
     "problem_variants",
     "schema",
+    "self_locking",
     "simulate",
     "solve",
     "stroke",

@@ -42,6 +42,7 @@ ONE_DESTINATION = "results go to a file or are printed with --json; give one of 
 @at_option
 @mode_option
 @click.option("--static", is_flag=True, help="Leave the links' inertia out: at rest, or in slow motion.")
+@click.option("--without-friction", "frictionless", is_flag=True, help="Leave the friction of the pairs out.")
 @click.option("--cycle", "whole", is_flag=True, help="Over the whole motion, as `planar cycle` has it.")
 @motion_options
 @output_option(
@@ -53,11 +54,12 @@ def forces(
     at: tuple[str, ...],
     mode: int | None,
     static: bool,
+    frictionless: bool,
     whole: bool,
     output: Path | None,
     **course: Any,
 ) -> None:
-    """What the inputs supply and the pairs carry against loads, weights, springs and inertia."""
+    """What the inputs supply and the pairs carry against loads, weights, springs, friction and inertia."""
     if as_json and output is not None:
         raise BadInput("-o", ONE_DESTINATION)
     if whole and at:
@@ -70,9 +72,9 @@ def forces(
     refuse_overwriting(model, output)
     require_loads(mechanism)
     if whole:
-        _forces_over_motion(mechanism, not static, as_json, output, course)
+        _forces_over_motion(mechanism, not static, not frictionless, as_json, output, course)
     else:
-        _forces_at_position(mechanism, at, not static, as_json, output)
+        _forces_at_position(mechanism, at, not static, not frictionless, as_json, output)
 
 
 def _refuse_motion_options(course: Iterable[str]) -> None:
@@ -84,7 +86,7 @@ def _refuse_motion_options(course: Iterable[str]) -> None:
 
 
 def _forces_at_position(
-    mechanism: Mechanism, at: tuple[str, ...], inertia: bool, as_json: bool, output: Path | None
+    mechanism: Mechanism, at: tuple[str, ...], inertia: bool, friction: bool, as_json: bool, output: Path | None
 ) -> None:
     """The forces at one position."""
     from planar.analysis.motion.mechanical_advantage import advantages
@@ -96,7 +98,7 @@ def _forces_at_position(
     moved = parse_drives(mechanism, at)
     with show_status(mechanism.name):
         state = solve(mechanism, moved)
-        found, ratios = at_state(state, inertia), advantages(state)
+        found, ratios = at_state(state, inertia, friction), advantages(state)
         printed = (
             [] if moved else [each for each in compare_published(state) if each.published.quantity == "input torque"]
         )
@@ -107,7 +109,7 @@ def _forces_at_position(
 
 
 def _forces_over_motion(
-    mechanism: Mechanism, inertia: bool, as_json: bool, output: Path | None, course: dict[str, Any]
+    mechanism: Mechanism, inertia: bool, friction: bool, as_json: bool, output: Path | None, course: dict[str, Any]
 ) -> None:
     """The forces over a whole motion."""
     from planar.dynamics.forces import forces as over_motion
@@ -118,7 +120,7 @@ def _forces_over_motion(
         check_writable(output.suffix)
     with show_status(f"{mechanism.name}: {course['steps']} steps"):
         motion = run_motion(mechanism, **course)
-        found = over_motion(motion, inertia)
+        found = over_motion(motion, inertia, friction)
     report_motion(motion, as_json, output, lambda: [tables(found)], force_series(found), run_facts(found))
 
 

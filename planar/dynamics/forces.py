@@ -23,11 +23,10 @@ from planar.dynamics.friction.contact_rows import ContactState
 from planar.dynamics.friction.frictional_forces import pair_heat, solve_friction
 from planar.dynamics.imbalance import explain_imbalance, imbalance_refusal
 from planar.dynamics.load_validation import check_loads
-from planar.dynamics.load_variation import load_factors
-from planar.dynamics.reaction_solver import ForceSolution, ReactionSolver
+from planar.dynamics.reaction_solver import ForceSolution, fill_balance
 from planar.dynamics.reactions import ZERO_COUPLE_TOLERANCE, Reaction, input_efforts, pair_reaction
 from planar.dynamics.virtual_velocities import has_length_motion, refuse_surplus_inputs, unit_rate_state
-from planar.dynamics.virtual_work import BalanceFunction, balance_function
+from planar.dynamics.virtual_work import balance_function
 from planar.foundation.arrays import Array, IntArray
 from planar.foundation.errors import BadInput, NoAnswer, Outcome
 from planar.foundation.notebook_display import Displayable
@@ -203,9 +202,8 @@ class _Balance:
 
     def __init__(self, moving: State | Motion, time: Array | None, inertia: bool):
         self.moving, self.time, self.inertia = moving, time, inertia
-        equations = balance_function(moving.mechanism)
-        self.field = KinematicArrays(moving, equations.work.shapes)
-        self.reactions = _make_reaction_solver(equations, self.field, time, inertia)
+        self.field = KinematicArrays(moving, balance_function(moving.mechanism).work.shapes)
+        self.reactions = fill_balance(self.field, time, inertia)
 
     def forces(self, solved: ForceSolution, contacts: Mapping[str, ContactState] | None = None) -> Forces:
         """The result, with an axis for its positions, and how pairs rub."""
@@ -217,7 +215,7 @@ class _Balance:
         all_of = [each._replace(power=row) for each, row in zip(all_of, powers, strict=True)]
         by_pair = {pair.name: pair_reaction(pair, field, self.reactions, solved) for pair in mechanism.pairs}
         rubbing = {
-            name: PairFriction(each.sense, each.effort, pair_heat(field, by_pair[name]), each.side)
+            name: PairFriction(*each._replace(heat=_first_finite(pair_heat(field, by_pair[name]), each.heat)))
             for name, each in (contacts or {}).items()
         }
         equilibrium, bodies = free_body_imbalance(field, all_of, by_pair, self.reactions.arm)
@@ -253,19 +251,8 @@ def _with_friction(balanced: _Balance, solved: ForceSolution, without: Forces) -
     return replace(first, others=tuple(others), solution_count=result.solution_count)
 
 
-def _make_reaction_solver(
-    equations: BalanceFunction, field: KinematicArrays, time: Array | None, inertia: bool
-) -> ReactionSolver:
-    """The balance of every position."""
-    body, moving = equations.work, field.moving
-    inputs = {name: np.broadcast_to(each.position, (field.position_count,)) for name, each in moving.inputs.items()}
-    q, q1, q2 = body.coordinates(moving)
-    balance = equations.evaluate(
-        q, q1, q2, load_factors(moving.mechanism, inputs, time, field.position_count), body.initial_spring_turns(q[0])
-    )
-    if not inertia:
-        balance = balance._replace(inertia=np.zeros_like(balance.inertia))
-    return ReactionSolver(equations, balance, field)
+def _first_finite(values: Array, others: Array) -> Array:
+    return np.where(np.isfinite(values), values, others)
 
 
 def _power_imbalance(powers: Array, all_of: Sequence[ExternalAction], moved: ActionVelocities) -> float | None:

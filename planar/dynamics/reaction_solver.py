@@ -14,7 +14,8 @@ from typing import NamedTuple
 import numpy as np
 
 from planar.dynamics.external_actions import KinematicArrays
-from planar.dynamics.virtual_work import BalanceFunction, VirtualWorkBalance
+from planar.dynamics.load_variation import load_factors
+from planar.dynamics.virtual_work import BalanceFunction, VirtualWorkBalance, balance_function
 from planar.foundation.arrays import Array, BoolArray
 from planar.foundation.geometry import Vector
 from planar.foundation.short_repr import short_repr
@@ -271,3 +272,19 @@ def _pseudo_inverse(held: Array) -> tuple[Array, Array]:
     spare = np.ones((len(held), back.shape[2]), dtype=bool)
     spare[:, :few] = ~strong
     return inverse @ u.transpose(0, 2, 1)[:, :few], (back * spare[:, None, :])[:, :, spare.any(axis=0)]
+
+
+def fill_balance(field: KinematicArrays, time: Array | None, inertia: bool, at_rest: bool = False) -> ReactionSolver:
+    """The balance of every position of a state or a motion, as it moves or as if it stood still there."""
+    moving = field.moving
+    equations = balance_function(moving.mechanism)
+    body = equations.work
+    inputs = {name: np.broadcast_to(each.position, (field.position_count,)) for name, each in moving.inputs.items()}
+    q, q1, q2 = body.coordinates(moving)
+    if at_rest:
+        q1, q2 = np.zeros_like(q1), np.zeros_like(q2)
+    factors = load_factors(moving.mechanism, inputs, time, field.position_count)
+    balance = equations.evaluate(q, q1, q2, factors, body.initial_spring_turns(q[0]))
+    if not inertia:
+        balance = balance._replace(inertia=np.zeros_like(balance.inertia))
+    return ReactionSolver(equations, balance, field)

@@ -22,8 +22,8 @@ class ContactChoice(NamedTuple):
 
     `first` (n, m): of all solutions the one that goes over into that without friction as coefficients go to nothing,
     and where there is none such the one with the least forces; NaN where there is no solution. `others` by position
-    (solutions, m). `solution_count` (n,) of all, `is_complete` (n,): whether these are proved to be all, `part` (n,): how far
-    coefficients can grow on the way from the one without friction (1: as far as they are).
+    (solutions, m). `solution_count` (n,) of all, `is_complete` (n,): whether these are proved to be all, `part` (n,):
+    how far coefficients can grow on the way from the one without friction (1: as far as they are).
     """
 
     first: Array

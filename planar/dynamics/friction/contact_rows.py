@@ -48,11 +48,13 @@ class Contact(NamedTuple):
 
 class ContactState(NamedTuple):
     """How a pair rubs at n positions: the sense of its rate (1, -1, 0), friction in the positive sense of the effort
-    of its input (N or N m), of teeth the couple between the wheels, and what `side` it bears on, or drives, in words.
+    of its input (N or N m), of teeth the couple between the wheels; what it takes of the power (W) by what it puts on
+    the links; and what `side` it bears on, or drives, in words.
     """
 
     sense: Array
     effort: Array
+    heat: Array
     side: tuple[str, ...]
 
     def __repr__(self) -> str:
@@ -98,7 +100,7 @@ class ContactRows:
         most = speed.max(axis=1, initial=0.0)
         for name, rate in self.drive_rates.items():
             pair = self.reactions.pairs[name]
-            unit = 1.0 if self._is_length(name) else 1.0 / arm
+            unit = 1.0 if self.is_length(name) else 1.0 / arm
             sense = np.where(np.abs(rate) > RATE_TOLERANCE * most * unit, np.sign(rate), 0.0)
             if not sense.all():
                 moving = self.field.moving
@@ -169,14 +171,16 @@ class ContactRows:
                     each.sides[int(s < 0.0)][k] if s and height > 0.0 else ""
                     for s, k, height in zip(sense, leading, y[:, index], strict=True)
                 )
-            found[each.pair] = ContactState(sense, -sense * each.rate_sense * y[:, index], side)
+            lost = np.einsum("nl,nl->n", each.action, self._link_rates) * sense * each.rate_sense * y[:, index]
+            found[each.pair] = ContactState(sense, -sense * each.rate_sense * y[:, index], lost, side)
         return found
 
     @cached_property
     def _link_rates(self) -> Array:
         return self.reactions.work.coordinates(self.field.moving)[1][:, : self.reactions.work.link_coordinate_count]
 
-    def _is_length(self, name: str) -> bool:
+    def is_length(self, name: str) -> bool:
+        """Whether the input position of a pair is a length."""
         return self.reactions.pairs[name].input_quantity_kinds()[0] == "length"
 
     def _contact(self, pair: Pair, rubbing: RubbingContact) -> Contact:

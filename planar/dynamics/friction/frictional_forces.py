@@ -30,10 +30,10 @@ class FrictionalSolution(NamedTuple):
 
 
 class FrictionalForces(NamedTuple):
-    """The solution that goes over into that without friction, `others` at a single position, `solution_count` (n,) of all.
+    """The solution that goes over into that without friction, and `others` at a single position.
 
-    No solution where nothing moves, so that friction has no sense, and where the forces that it follows are not
-    determined. `remarks` are what there is to say.
+    `solution_count` (n,) is of all. There is no solution where nothing moves, so that friction has no sense, and where
+    the forces that it follows are not determined. `remarks` are what there is to say.
     """
 
     solution: FrictionalSolution | None
@@ -130,8 +130,8 @@ def _choice_sentences(choice: ContactChoice, jams: BoolArray, is_state: bool) ->
     if is_state:
         if several.any():
             yield (
-                f"with friction there are {choice.solution_count[0]} solutions: equilibrium does not tell which is there; "
-                "this is the "
+                f"with friction there are {choice.solution_count[0]} solutions, and equilibrium does not tell which is "
+                "there; this is the "
                 + ("one with the least forces" if folded.any() else "one that goes over into that without friction")
             )
         if folded.any():

@@ -18,7 +18,7 @@ from planar.model.wording import count_phrase, join_all_names
 from planar.reports.columns import ReportedSeries
 from planar.reports.fitted_table import FittedTable, plain_table
 from planar.reports.number_format import format_or_zero, paragraphs
-from planar.reports.tables.forces import loads
+from planar.reports.tables.forces import friction, loads
 from planar.reports.tables.forces import position_forces as at_one
 from planar.reports.tables.motion import motion_heading, position_cell, position_heading, running_pair
 from planar.results.motion import Motion
@@ -33,9 +33,17 @@ def tables(forces: Forces) -> RenderableType:
         Text(),
         _efforts_table(forces, motion),
     ]
-    facts = [*_shaking_facts(forces, motion), *at_one.proof_facts(forces)]
-    parts += [_reactions_table(forces, motion), paragraphs(facts)]
-    notes = (*_undetermined_sentences(forces, len(motion)), *attachment_remarks(forces.mechanism), *motion.remarks)
+    facts = [*_shaking_facts(forces, motion), *friction.efficiency_facts(forces), *friction.holding_facts(forces)]
+    parts.append(_reactions_table(forces, motion))
+    if forces.friction:
+        parts.append(friction.friction_over_motion_table(forces))
+    parts.append(paragraphs([*facts, *at_one.proof_facts(forces)]))
+    notes = (
+        *_undetermined_sentences(forces, len(motion)),
+        *forces.remarks,
+        *attachment_remarks(forces.mechanism),
+        *motion.remarks,
+    )
     if notes:
         parts += [Text(), paragraphs(("-", sentence) for sentence in notes)]
     return Group(*parts)
@@ -155,6 +163,7 @@ def force_series(forces: Forces) -> Iterable[ReportedSeries]:
     for name, each in forces.reactions.items():
         values = _reaction_values(each)
         yield ReportedSeries("reactions", name, {what: _REACTION_KINDS.get(what, "torque") for what in values}, values)
+    yield from friction.friction_series(forces)
     if at_one.has_inertia(forces):
         force, moment = forces.shaking
         kinds = {"force": "force", "moment": "torque"}
@@ -175,4 +184,4 @@ def run_facts(forces: Forces) -> dict[str, Any]:
     """What is said of the whole motion, as JSON values; forces in a pair are on the second of the links `between`."""
     between = {name: list(each.links) for name, each in forces.reactions.items()}
     remarks = [*attachment_remarks(forces.mechanism), *forces.moving.remarks]
-    return {"between": between, "remarks": remarks, **at_one.proof_record(forces)}
+    return {"between": between, "remarks": remarks, **friction.motion_record(forces), **at_one.proof_record(forces)}

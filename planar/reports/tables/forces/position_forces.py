@@ -21,7 +21,7 @@ from planar.model.mechanism import relative_motions
 from planar.model.wording import amount, join_all_names
 from planar.reports.fitted_table import FittedTable, plain_table
 from planar.reports.number_format import ROUNDING_RATIO, format_or_zero, paragraphs, precision_text
-from planar.reports.tables.forces import loads
+from planar.reports.tables.forces import friction, loads
 from planar.reports.tables.forces import mechanical_advantage as ratios
 from planar.reports.tables.position import published_table
 
@@ -41,7 +41,11 @@ def tables(forces: Forces, advantages: ratios.Advantages, comparisons: Sequence[
     if inertia:
         parts.append(loads.actions_table("Inertia", inertia, units, greatest_moment_and_force(forces)[0]))
     most = sum(each.max_power for each in (*acting, *inertia))
-    parts += [_reactions_table(forces), paragraphs(_power_and_shaking(forces, most)), Text()]
+    parts.append(_reactions_table(forces))
+    if forces.friction:
+        parts.append(friction.friction_table(forces))
+    facts = (*_power_and_shaking(forces, most), *friction.efficiency_facts(forces), *friction.holding_facts(forces))
+    parts += [paragraphs(facts), Text()]
     told = ratios.all_advantages(advantages)
     if told:
         parts.append(ratios.advantages_table(told))
@@ -55,6 +59,7 @@ def tables(forces: Forces, advantages: ratios.Advantages, comparisons: Sequence[
         *undetermined_sentences(forces),
         *_time_remarks(forces),
         *dict.fromkeys(each.why for each in told if each.why),
+        *forces.remarks,
     )
     notes += (*attachment_remarks(forces.mechanism), *state.remarks)
     if notes:
@@ -64,8 +69,8 @@ def tables(forces: Forces, advantages: ratios.Advantages, comparisons: Sequence[
 
 def equilibrium_text(forces: Forces) -> str:
     """What the equilibrium takes account of, and what is left out."""
-    kinds = {each.kind for each in forces.acting}
-    there = [kind for kind in ("inertia", "weight") if kind in kinds]
+    kinds = {each.kind for each in forces.acting} | ({"friction"} if forces.friction else set())
+    there = [kind for kind in ("inertia", "weight", "friction") if kind in kinds]
     absent = [name for name in ("inertia", "weight", "friction") if name not in there]
     return f"in equilibrium {f'with {join_all_names(there)}, ' if there else ''}without {join_all_names(absent)}"
 
@@ -151,7 +156,9 @@ def _power_text(forces: Forces, most: float) -> str:
     if forces.proof.power is None:
         return "nothing that is loaded moves at the inputs' speeds, so that there is none"
     if has_inertia(forces):
-        parts = ((supplied, "from the inputs"), (-taken, "from the loads"), (stored, "from the links' inertia"))
+        parts = [(supplied, "from the inputs"), (-taken, "from the loads"), (stored, "from the links' inertia")]
+        if forces.friction:
+            parts.append((-float(forces.heat_flow), "from friction"))
         return ", ".join(f"{format_or_zero(value, most)} W {source}" for value, source in parts)
     if supplied < -ROUNDING_RATIO * most:
         given, absorbed = format_or_zero(-taken, most), format_or_zero(-supplied, most)
@@ -219,10 +226,26 @@ def record(forces: Forces, advantages: ratios.Advantages, comparisons: Sequence[
         **({"shaking": {"force": force.tolist(), "moment": float(moment)}} if has_inertia(forces) else {}),
         "power": {"in": _finite_or_none(float(forces.power_in)), "out": forces.power_out},
         "advantage": ratios.record(advantages),
+        **friction.record(forces),
         **proof_record(forces),
-        "remarks": [*attachment_remarks(forces.mechanism), *forces.moving.remarks],
+        "remarks": [*attachment_remarks(forces.mechanism), *forces.remarks, *forces.moving.remarks],
     }
+    if forces.others:
+        found["solutions"] = [_solution_record(each) for each in forces.solutions]
     return found | ({"published": [each.record() for each in comparisons]} if comparisons else {})
+
+
+def _solution_record(forces: Forces) -> dict[str, Any]:
+    """One of several solutions as a JSON value: what differs between them."""
+    return {
+        "inputs": {
+            name: {effort_name_and_unit(forces, name)[0]: _finite_or_none(float(effort))}
+            for name, effort in forces.inputs.items()
+        },
+        "reactions": {name: _reaction_record(each) for name, each in forces.reactions.items()},
+        **friction.record(forces),
+        **proof_record(forces),
+    }
 
 
 def proof_record(forces: Forces) -> dict[str, Any]:
