@@ -76,6 +76,8 @@ def results():
         planar.sweep(bars, {"BC.length": [0.066]}, steps=6, reduce={"path": "C.path_length"}),
     )
     yield from (swept, swept[0], prepared, prepared())
+    clamp = planar.cycle(planar.load("toggle-clamp"), steps=40)
+    yield from (planar.holding(clamp), planar.self_locking(clamp), planar.forces(clamp).friction["A"])
     yield from (planar.BadInput("here", "wrong"), planar.Unknown("no such point"), planar.Outcome.SOLVED)
     yield planar.NoAnswer(planar.Outcome.DEAD_POINT, "it stops", links=["a"])
 

@@ -45,7 +45,7 @@ def self_locking(motion: Motion) -> tuple[LockedInterval, ...]:
     >>> import planar
     >>> clamp = planar.cycle(planar.load("toggle-clamp"), 60)
     >>> [round(interval.stop - interval.start, 4) for interval in planar.self_locking(clamp)]
-    [0.222, 0.0742]
+    [0.2221, 0.0742]
     """
     run = InterpolatedRun(motion)
 
@@ -80,7 +80,7 @@ def self_locking(motion: Motion) -> tuple[LockedInterval, ...]:
 
 
 def _ends(start: tuple[float, bool], stop: tuple[float, bool]) -> tuple[float, float, bool, bool]:
-    return start[0], stop[0], start[1], stop[1]
+    return float(start[0]), float(stop[0]), start[1], stop[1]
 
 
 def _with_extremes(positions: Array, margins: Array, margin_at: Callable[[float], float]) -> tuple[Array, Array]:

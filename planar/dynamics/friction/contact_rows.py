@@ -11,7 +11,7 @@ import numpy as np
 from planar.dynamics.external_actions import KinematicArrays
 from planar.dynamics.friction.contact_system import ContactSystem
 from planar.dynamics.reaction_solver import ReactionSolver
-from planar.foundation.arrays import Array
+from planar.foundation.arrays import Array, BoolArray
 from planar.foundation.geometry import Vector
 from planar.foundation.jets import value_and_rates
 from planar.foundation.short_repr import short_repr
@@ -116,13 +116,13 @@ class ContactRows:
         way = self.reactions.pairs[name].effort_action(self.reactions.frames, self.reactions.shapes)
         return np.einsum("nl,nl->n", self._action_on_links(way), link_rates)
 
-    def is_determined(self) -> bool:
-        """Whether equilibrium tells all that friction follows."""
+    def is_determined(self) -> BoolArray:
+        """Where equilibrium tells all that friction follows (n,)."""
         ways = self.reactions.undetermined_forces
-        if not ways.shape[2]:
-            return True
-        rubbing = [part for each in self.contacts if each.is_friction for part in each.parts]
-        return all(np.abs(part @ ways).max(initial=0.0) <= DETERMINED_TOLERANCE for part in rubbing)
+        found = np.ones(self.count, dtype=bool)
+        for part in (part for each in self.contacts if each.is_friction for part in each.parts):
+            found &= np.abs(part @ ways).max(axis=(1, 2), initial=0.0) <= DETERMINED_TOLERANCE
+        return found
 
     def system(self, senses: dict[str, Array]) -> tuple[ContactSystem, Array]:
         """The equations of contacts at given senses of the pairs' rates (n,), and what each of them does to the links

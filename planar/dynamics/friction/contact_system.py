@@ -40,6 +40,13 @@ class ContactSystem(NamedTuple):
         """The same at some of the positions."""
         return self._replace(loads=self.loads[rows], slopes=self.slopes[rows])
 
+    def where(self, rows: BoolArray) -> ContactSystem:
+        """The same where positions are as wanted (n,), and no contacts at the others."""
+        chosen = rows[:, None, None]
+        return self._replace(
+            loads=np.where(chosen, self.loads, 0.0), slopes=np.where(chosen[..., None], self.slopes, 0.0)
+        )
+
     def scaled(self, part: float) -> ContactSystem:
         """With every coefficient of friction times a part."""
         by = np.where(self.grows, part, 1.0)

@@ -53,23 +53,21 @@ def solve_friction(reactions: ReactionSolver, field: KinematicArrays, without: F
     if not any(sense.any() for sense in senses.values()):
         told = "nothing moves that rubs, so that friction has no sense: these are the forces without it"
         return FrictionalForces(None, (), np.ones(many, dtype=int), (told,))
-    if not rows.is_determined():
-        pairs = quote_names(rows.rubbing_pairs)
-        told = f"the reactions that friction at {pairs} follows are not determined, and with them all forces"
-        unknown = without._replace(is_balanced=np.zeros(many, dtype=bool), imbalance=told)
-        return FrictionalForces(FrictionalSolution(unknown, {}), (), np.zeros(many, dtype=int), (told,))
+    unknown = without.is_balanced & ~rows.is_determined()
+    sound = without.is_balanced & ~unknown
     system, actions = rows.system(senses)
-    system = system._replace(loads=np.where(without.is_balanced[:, None, None], system.loads, 0.0))
-    choice = solve_contacts(system)
-    jams = without.is_balanced & (choice.solution_count == 0)
+    choice = solve_contacts(system.where(sound))
+    jams = sound & (choice.solution_count == 0)
     if is_state and jams.any():
         raise NoAnswer(Outcome.INPUT_JAMMED, _jam_sentence(choice, rows.rubbing_pairs))
     solution = reactions.solve_beside(rows.pair_actions(actions, np.nan_to_num(choice.first)))
-    lost = without.is_balanced & ~solution.is_balanced | jams
-    why = without.imbalance
+    whys = [without.imbalance]
     if jams.any():
-        why = "; ".join(filter(None, (why, "friction jams it there: no forces in the pairs balance the links")))
-    solution = solution._replace(is_balanced=without.is_balanced & ~lost, imbalance=why)
+        whys.append("friction jams it there: no forces in the pairs balance the links")
+    if unknown.any():
+        whys.append(f"what friction at {quote_names(rows.rubbing_pairs)} follows is not determined")
+    why = "; ".join(filter(None, whys))
+    solution = solution._replace(is_balanced=sound & solution.is_balanced & ~jams, imbalance=why)
     others = tuple(
         FrictionalSolution(
             reactions.solve_beside(rows.pair_actions(actions, y[None])), rows.states(system, senses, y[None])
@@ -79,7 +77,7 @@ def solve_friction(reactions: ReactionSolver, field: KinematicArrays, without: F
     )
     remarks = (*_unrubbed_sentences(senses), *_choice_sentences(choice, jams, is_state))
     first = FrictionalSolution(solution, rows.states(system, senses, choice.first))
-    return FrictionalForces(first, others, np.where(without.is_balanced, choice.solution_count, 0), remarks)
+    return FrictionalForces(first, others, np.where(sound, choice.solution_count, 0), remarks)
 
 
 def solve_with_friction(reactions: ReactionSolver, field: KinematicArrays) -> ForceSolution:

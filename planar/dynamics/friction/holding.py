@@ -95,18 +95,18 @@ class _HoldingEnds:
         self.effort_row = reactions.balance.constraints.shape[1]
         self.undetermined = ""
         without = reactions.solve()
-        sound = without.is_balanced
         nothing = np.full(many, np.nan)
         self.low, self.high, self.widest = nothing, nothing.copy(), np.full((many, 2), np.nan)
         self.is_proved = np.zeros(many, dtype=bool)
-        if not self.rows.is_determined():
-            self.undetermined = "the reactions that friction follows are not determined, and so is what it holds"
+        self.sound = without.is_balanced & self.rows.is_determined()
+        if not self.sound.any():
+            self.undetermined = "what it holds is not determined, as the reactions are not that friction follows"
             return
         senses = self._unit_senses()
         forward, ahead = self._effort(senses, 1.0)
         backward, back = self._effort({name: -sense for name, sense in senses.items()}, -1.0)
-        self.high, self.low = np.where(sound, forward, np.nan), np.where(sound, backward, np.nan)
-        self.is_proved = sound & ahead & back
+        self.high, self.low = np.where(self.sound, forward, np.nan), np.where(self.sound, backward, np.nan)
+        self.is_proved = self.sound & ahead & back
         self.widest = np.stack([np.fmin(self.low, self.high), np.fmax(self.low, self.high)], axis=1)
         self._widen(senses)
 
@@ -125,7 +125,7 @@ class _HoldingEnds:
     def _effort(self, senses: dict[str, Array], way: float) -> tuple[Array, BoolArray]:
         """The effort at which all slips in these senses (n,), infinite where none does; where it is the only one."""
         system, actions = self.rows.system(senses)
-        choice = solve_contacts(system)
+        choice = solve_contacts(system.where(self.sound))
         single = (choice.solution_count == 1) & choice.is_complete
         found = self._efforts(actions, np.nan_to_num(choice.first))
         none = choice.solution_count == 0
@@ -156,7 +156,7 @@ class _HoldingEnds:
             }
             for way in (1.0, -1.0):
                 system, actions = self.rows.system({name: way * sense for name, sense in mixed.items()})
-                single = has_single_solution(system)
+                single = has_single_solution(system.where(self.sound))
                 proved &= single
                 rows = np.flatnonzero(single)
                 y = np.zeros(system.loads.shape[:2])

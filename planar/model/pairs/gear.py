@@ -21,7 +21,7 @@ from planar.model.pairs.base import (
     Schema,
     ToothContact,
 )
-from planar.model.pairs.friction import FRICTION_SCHEMA, read_efficiency, read_friction, write_friction
+from planar.model.pairs.friction import FRICTION_SCHEMA, has_loss, read_efficiency, read_friction, write_friction
 from planar.model.pairs.rubbing import ContactLoad, Friction, LoadLaw
 from planar.model.pairs.teeth import STANDARD_PRESSURE_ANGLE, TEETH_SCHEMA, read_pressure_angle, write_pressure_angle
 from planar.model.pairs.wheel_pairs import CENTRE_DISTANCE_TOLERANCE, WheelPair
@@ -45,6 +45,11 @@ class GearPair(WheelPair):
     ) -> str | None:
         if self.friction is not None and self._centre_pins(all_pairs) is None:
             return "the friction of teeth follows their size; pin both wheels to their carrier, or give an 'efficiency'"
+        least = min(map(abs, self.sizes)) / max(map(abs, self.sizes))
+        if self.size_kind != "ratio" and min(self.sizes) < 0.0 and self.efficiency <= least:
+            return (
+                f"teeth inside a wheel lose less than that: their 'efficiency' is above {least:.4g}, that of the radii"
+            )
         return super().find_misfit(all_pairs, shapes, format_length)
 
     def _find_distance_problem(self, centre_distance: float, format_length: LengthFormatter) -> str | None:
@@ -121,22 +126,30 @@ class GearPair(WheelPair):
         Teeth rub before and behind the pitch point, to either side, at half the base pitch a quarter of it away on
         average: mu F p_b / 4 of the force F = W / cos(pressure angle) on a tooth. With the pitch p of W's circle that
         is mu W p / 4, a loss of mu (pi / 2)(1/z1 + 1/z2) of the power (G. Niemann, H. Winter, Maschinenelemente II,
-        2003, with a contact ratio of one).
+        2003, with a contact ratio of one). An efficiency is that of such a couple c, by radii r and s and the force W:
+        (W - c / s) / (W + c / r) where the first drives, the other way round where the second does.
         """
-        found = super().rubbing_contacts(frames, shapes, all_pairs, at_rest)
         contact = self.tooth_contact(frames, shapes, all_pairs)
-        if self.friction is None or contact is None:
-            return found
+        if contact is None or not self.has_friction:
+            return super().rubbing_contacts(frames, shapes, all_pairs, at_rest)
         first, second = self.links
-        pins = [pin for wheel in self.links if (pin := self._centre_pin(wheel, all_pairs))]
-        centre = frames[second].to_world(shapes[second].position(pins[1][second]))
-        away = contact.pitch_point - centre
-        pitch = sqrt(away.dot(away)) * (2.0 * pi / abs(self.sizes[1]))
-        press = ContactLoad(second, self.friction.coefficient(at_rest) * pitch * 0.25, contact.drive_direction)
-        press = press._replace(opposed=press.factor, sides=(f"{first} drives", f"{second} drives"))
+        centres = self._carrier_centres(shapes, all_pairs)
+        apart = centres[1] - centres[0]
+        own, other = self._pitch_radii(sqrt(apart.dot(apart)))
+        along = against = 0.0
+        if self.friction is not None:
+            along = against = self.friction.coefficient(at_rest) * abs(other) * (0.5 * pi / abs(self.sizes[1]))
+        elif has_loss(self.efficiency):
+            lost = 1.0 - self.efficiency
+            along = lost / (1.0 / other + self.efficiency / own)
+            against = lost / (1.0 / own + self.efficiency / other)
+        drives = f"{first} drives", f"{second} drives"
         ratio = self.ratio()
+        # on the second wheel a force that way at the pitch point turns clockwise, but inside a larger first one
+        turning = contact.drive_direction * (-1.0 if ratio < 1.0 else 1.0)
+        press = ContactLoad(second, along, turning, None, against, drives)
         sense = 1.0 if ratio < 0.0 or ratio > 1.0 else -1.0
-        return (*found, RubbingContact(EffortAction(second, first), (press,), LoadLaw.GREATEST, sense))
+        return (RubbingContact(EffortAction(second, first), (press,), LoadLaw.GREATEST, sense),)
 
     @classmethod
     def samples(cls) -> tuple[PairSample, ...]:
