@@ -12,6 +12,7 @@ import numpy as np
 from planar.document.first_argument import takes_mechanism
 from planar.dynamics.equations_of_motion import FULL_RANK_REGULARITY, EquationsOfMotion
 from planar.dynamics.external_actions import KinematicArrays
+from planar.dynamics.friction.remarks import frictionless_remarks
 from planar.dynamics.imbalance import explain_loose_links
 from planar.dynamics.lagrangian import lagrangian_functions
 from planar.dynamics.load_validation import check_loads
@@ -382,7 +383,7 @@ class _SimulationRun:
             outcome=Outcome.SOLVED,
             reason="",
             residual=0.0,
-            remarks=(*self.start.remarks, *self._freedom_remark()),
+            remarks=(*self.start.remarks, *self._freedom_remark(), *frictionless_remarks(self.mechanism)),
             frames=frames,
             own=own,
             shapes=self.start.shapes,

@@ -11,6 +11,7 @@ import casadi as ca
 from planar.codegen.javascript import write_javascript
 from planar.drawing.forces.action_arrows import ActionSymbol, action_symbols, reaction_symbols
 from planar.dynamics.forces import forces
+from planar.dynamics.friction.remarks import frictionless_remarks
 from planar.dynamics.lagrangian import LagrangianFunctions
 from planar.dynamics.load_attachment import attachment_remarks
 from planar.dynamics.reactions import bearing_point
@@ -97,7 +98,7 @@ def force_data(mechanism: Mechanism, d: ca.SX, state: State, unit: float) -> tup
         "massive": bool(mechanism.masses),
         "timed": any(load.varies is not None and load.varies.input is None for load in mechanism.loads),
         "untold": _undetermined_sentences(state),
-        "choices": list(attachment_remarks(mechanism)),
+        "choices": [*attachment_remarks(mechanism), *frictionless_remarks(mechanism)],
     }
     data["symbols"] = _symbol_data(mechanism, data)
     data["inertia"] = rows.add(work.inertia.T)[0]
@@ -238,6 +239,6 @@ def _spring_angle_data(work: LagrangianFunctions, spring: Spring) -> dict[str, A
 def _undetermined_sentences(state: State) -> list[str]:
     """What equilibrium does not tell as the file has it, in sentences."""
     try:
-        return list(undetermined_sentences(forces(state)))
+        return list(undetermined_sentences(forces(state, friction=False)))
     except NoAnswer as refused:
         return [str(refused)]
