@@ -31,7 +31,9 @@ from planar.cli.options import (
 from planar.foundation.errors import BadInput
 
 if TYPE_CHECKING:
+    from planar.dynamics.friction.holding import Holding
     from planar.model.mechanism import Mechanism
+    from planar.results.motion import State
 
 ONE_DESTINATION = "results go to a file or are printed with --json; give one of the two"
 
@@ -43,11 +45,17 @@ ONE_DESTINATION = "results go to a file or are printed with --json; give one of 
 @mode_option
 @click.option("--static", is_flag=True, help="Leave the links' inertia out: at rest, or in slow motion.")
 @click.option("--without-friction", "frictionless", is_flag=True, help="Leave the friction of the pairs out.")
+@click.option(
+    "--effort",
+    metavar="EFFORT",
+    help="At rest with friction: how much of each load is held with this effort of the input, as '5 N m'.",
+)
 @click.option("--cycle", "whole", is_flag=True, help="Over the whole motion, as `planar cycle` has it.")
 @motion_options
 @output_option(
     "Write the tables to a .txt, .svg or .html file; with --cycle every position to .csv, .json, .npz or .parquet."
 )
+# many: what callers may choose
 def forces(
     model: str,
     as_json: bool,
@@ -55,6 +63,7 @@ def forces(
     mode: int | None,
     static: bool,
     frictionless: bool,
+    effort: str | None,
     whole: bool,
     output: Path | None,
     **course: Any,
@@ -64,6 +73,8 @@ def forces(
         raise BadInput("-o", ONE_DESTINATION)
     if whole and at:
         raise BadInput("--at", "the forces of a whole motion have no one position; say where it starts with --from")
+    if whole and effort is not None:
+        raise BadInput("--effort", "how much of each load is held is told at one position; leave --cycle out")
     if not whole:
         _refuse_motion_options(course)
     from planar.dynamics.load_validation import require_loads
@@ -74,7 +85,7 @@ def forces(
     if whole:
         _forces_over_motion(mechanism, not static, not frictionless, as_json, output, course)
     else:
-        _forces_at_position(mechanism, at, not static, not frictionless, as_json, output)
+        _forces_at_position(mechanism, at, (not static, not frictionless), effort, as_json, output)
 
 
 def _refuse_motion_options(course: Iterable[str]) -> None:
@@ -86,26 +97,48 @@ def _refuse_motion_options(course: Iterable[str]) -> None:
 
 
 def _forces_at_position(
-    mechanism: Mechanism, at: tuple[str, ...], inertia: bool, friction: bool, as_json: bool, output: Path | None
+    mechanism: Mechanism,
+    at: tuple[str, ...],
+    taken: tuple[bool, bool],
+    effort: str | None,
+    as_json: bool,
+    output: Path | None,
 ) -> None:
-    """The forces at one position."""
+    """The forces at one position, inertia and friction `taken` into account or not."""
+    from rich.console import Group
+
     from planar.analysis.motion.mechanical_advantage import advantages
     from planar.analysis.worked.published import compare_published
     from planar.dynamics.forces import forces as at_state
+    from planar.reports.tables.forces.friction import held_loads_table, held_record
     from planar.reports.tables.forces.position_forces import record, tables
     from planar.solving.position import solve
 
     moved = parse_drives(mechanism, at)
     with show_status(mechanism.name):
         state = solve(mechanism, moved)
-        found, ratios = at_state(state, inertia, friction), advantages(state)
+        found, ratios = at_state(state, *taken), advantages(state)
+        held = () if effort is None else _held_loads(state, effort)
         printed = (
             [] if moved else [each for each in compare_published(state) if each.published.quantity == "input torque"]
         )
     if as_json:
-        click.echo(json.dumps(record(found, ratios, printed), ensure_ascii=False, indent=1, allow_nan=False))
+        value = record(found, ratios, printed) | ({"held_loads": held_record(held)} if held else {})
+        click.echo(json.dumps(value, ensure_ascii=False, indent=1, allow_nan=False))
         return
-    print_or_write(tables(found, ratios, printed), output)
+    shown = tables(found, ratios, printed)
+    print_or_write(Group(shown, held_loads_table(held)) if held else shown, output)
+
+
+def _held_loads(state: State, effort: str) -> tuple[Holding, ...]:
+    """How much of each load is held at rest with an effort of the input."""
+    from planar.document import read_effort
+    from planar.dynamics.friction.holding import holding, load_names
+
+    if len(state.mechanism.inputs) != 1:
+        raise BadInput("--effort", "this is the effort of the one input, and there are several")
+    given = read_effort(state.mechanism, state.mechanism.inputs[0].pair, effort, "--effort")
+    return tuple(holding(state, name, given) for name in load_names(state.mechanism))
 
 
 def _forces_over_motion(

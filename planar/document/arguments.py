@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from planar.document.cursor import Cursor, FileContext
+from planar.document.loads import EFFORT_KINDS
 from planar.foundation.errors import join_names
 from planar.model.mechanism import Drive, Mechanism, relative_motions
 
@@ -22,6 +23,15 @@ def read_drive(mechanism: Mechanism, pair: str, position: str) -> Drive:
     return Drive(
         pair, Cursor(value, pair, FileContext(mechanism.units)).as_quantity(known[pair].input_quantity_kinds()[0])
     )
+
+
+def read_effort(mechanism: Mechanism, pair: str, text: str, place: str) -> float:
+    """An effort at a pair written as text: a number of N or N m, or a quantity. Raises BadInput."""
+    try:
+        value: Any = float(text)
+    except ValueError:
+        value = text
+    return Cursor(value, place).as_quantity(EFFORT_KINDS.get(relative_motions(mechanism)[pair].input_kind, "torque"))
 
 
 def read_time(text: str, place: str) -> float:

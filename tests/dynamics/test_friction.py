@@ -152,6 +152,17 @@ def test_the_toggle_clamp_holds_itself_until_its_line_of_force_leaves_the_fricti
     assert all(each.start_is_solved and each.stop_is_solved for each in (first, second))
 
 
+def test_the_part_of_a_load_that_is_held_is_the_effort_by_what_the_whole_load_wants():
+    state = planar.solve(planar.load("toggle-clamp"))
+    held, part = planar.holding(state), planar.holding(state, "B", -55.0)
+    assert (part.low, part.high) == pytest.approx((-55.0 / held.low, -55.0 / held.high), rel=1e-9)
+    assert part.is_self_locking and part.is_proved and part.load == "B"
+    jack = planar.holding(planar.solve(planar.load("screw-jack")), "B", -1000.0)
+    assert (jack.low, jack.high) == (pytest.approx(1000.0 / (1e4 * tan(atan(8 / (40 * pi)) + atan(0.12)))), np.inf)
+    with pytest.raises(BadInput, match="no load on 'A'"):
+        planar.holding(state, "A")
+
+
 @pytest.mark.parametrize(("kind", "ratio"), [("gear", -0.4), ("belt", 0.4), ("inside", 0.4), ("round", 2.5)])
 @pytest.mark.parametrize(("velocity", "load"), [(2.0, 30.0), (2.0, -30.0), (-2.0, 30.0)])
 def test_the_efficiency_of_a_mesh_or_belt_is_of_the_power_from_whichever_side_drives(kind, ratio, velocity, load):

@@ -1,8 +1,8 @@
-"""What a mechanism holds at rest: the efforts of its input with which friction keeps it where it is."""
+"""What a mechanism holds at rest: the efforts of its input, or the loads, with which friction keeps it there."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
@@ -19,6 +19,8 @@ from planar.dynamics.virtual_work import balance_function
 from planar.foundation.arrays import Array, BoolArray
 from planar.foundation.errors import BadInput
 from planar.foundation.notebook_display import Displayable
+from planar.model.mechanism import Mechanism
+from planar.model.wording import quote_names
 from planar.results.motion import Motion, State
 
 MAX_MIXED_PAIRS = 10
@@ -35,6 +37,9 @@ class Holding(Displayable):
     the input moving on (`high`) or back (`low`). NaN where nothing balances the links, or friction is not determined;
     infinite where no effort, however great, starts it. `widest` (2,) or (n, 2): efforts beyond, up to those, may be
     held too, where pairs are braced against each other; `is_proved` where it is proved that these are the ends.
+
+    With a `load` (by what the file calls it) these are the parts of that load, 1 as it stands, that are held with the
+    `effort` of the input; past `high` it moves the way the load pushes, past `low` against it.
     """
 
     moving: State | Motion
@@ -44,24 +49,28 @@ class Holding(Displayable):
     widest: Array
     is_proved: BoolArray | bool
     undetermined: str = ""
+    load: str | None = None
+    effort: float = 0.0
 
     def __repr__(self) -> str:
-        return f"<Holding of {self.input!r} in {self.moving!r}>"
+        return f"<Holding of {self.load or self.input!r} in {self.moving!r}>"
 
     @property
     def is_self_locking(self) -> BoolArray | bool:
-        """Whether it stays without any effort of the input, whatever the loads are times a positive factor."""
-        found = (np.asarray(self.low) <= 0.0) & (np.asarray(self.high) >= 0.0)
+        """Whether it stays under its loads without an effort of the input; of a load whether that is held as it is."""
+        wanted = 0.0 if self.load is None else 1.0
+        found = (np.asarray(self.low) <= wanted) & (np.asarray(self.high) >= wanted)
         return found if found.ndim else bool(found)
 
 
 @takes_result("State", "Motion")
-def holding(moving: State | Motion) -> Holding:
+def holding(moving: State | Motion, load: str | None = None, effort: float = 0.0) -> Holding:
     """Between which efforts of its one input a mechanism with friction stays at rest under its loads and weights.
 
     With the coefficients at rest. Equilibrium does not tell how friction is shared there; at the ends of the interval
-    all pairs slip. Raises BadInput for several inputs and where no pair has friction, and what `planar.forces` raises
-    for loads.
+    all pairs slip. With a `load`, the point, link or pair that it acts on: between which parts of that load it stays
+    with this `effort` of the input (N m, or N). Raises BadInput for several inputs, where no pair has friction, for a
+    load that is not there once, and what `planar.forces` raises for loads.
 
     >>> import planar
     >>> jack = planar.load("screw-jack")
@@ -78,12 +87,45 @@ def holding(moving: State | Motion) -> Holding:
         refuse_surplus_inputs(moving)
     time = moving.time if isinstance(moving, Motion) else np.zeros(1)
     field = KinematicArrays(moving, balance_function(mechanism).work.shapes)
-    ends = _HoldingEnds(fill_balance(field, time, inertia=False, at_rest=True), field)
+    balanced = fill_balance(field, time, inertia=False, at_rest=True)
+    if load is not None:
+        balanced = _with_unknown_load(balanced, field, time, _load_index(mechanism, load), effort)
+    ends = _HoldingEnds(balanced, field)
+    told = ends.undetermined, load, float(effort)
     name = mechanism.inputs[0].pair
     low, high, widest, proved = ends.low, ends.high, ends.widest, ends.is_proved
     if isinstance(moving, State):
-        return Holding(moving, name, float(low[0]), float(high[0]), widest[0], bool(proved[0]), ends.undetermined)
-    return Holding(moving, name, low, high, widest, proved, ends.undetermined)
+        return Holding(moving, name, float(low[0]), float(high[0]), widest[0], bool(proved[0]), *told)
+    return Holding(moving, name, low, high, widest, proved, *told)
+
+
+def load_names(mechanism: Mechanism) -> tuple[str, ...]:
+    """What each load of a mechanism acts on."""
+    return tuple(load.point or load.link or load.pair or "" for load in mechanism.loads)
+
+
+def _load_index(mechanism: Mechanism, name: str) -> int:
+    """The one load on a point, link or pair. Raises BadInput."""
+    names = load_names(mechanism)
+    if names.count(name) != 1:
+        told = "there are several loads" if name in names else "there is no load"
+        raise BadInput("load", f"{told} on {name!r}; loads are on {quote_names(names) if names else 'nothing'}")
+    return names.index(name)
+
+
+def _with_unknown_load(
+    balanced: ReactionSolver, field: KinematicArrays, time: Array | None, index: int, effort: float
+) -> ReactionSolver:
+    """The balance with the part of a load as what is looked for, and the effort of the input as a load."""
+    moving = field.moving
+    assert isinstance(moving, State | Motion)
+    loads = moving.mechanism.loads
+    without = replace(moving, mechanism=replace(moving.mechanism, loads=loads[:index] + loads[index + 1 :]))
+    rest = fill_balance(KinematicArrays(without, field.shapes), time, inertia=False, at_rest=True).balance.loads
+    push = balanced.balance.loads - rest
+    driven = rest + balanced.balance.input_directions[:, 0] * effort
+    changed = balanced.balance._replace(loads=driven, input_directions=push[:, None])
+    return ReactionSolver(balance_function(moving.mechanism), changed, field)
 
 
 class _HoldingEnds:

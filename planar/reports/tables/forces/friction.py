@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -131,6 +131,35 @@ def holding_facts(forces: Forces) -> Iterator[tuple[str, str]]:
             yield "", f"braced against each other pairs may hold {pair} {unit}"
         if not held.is_proved:
             yield "", "that these are the only ends is not proved"
+
+
+def held_loads_table(held: Sequence[Holding]) -> FittedTable:
+    """How much of each load friction holds at rest with an effort of the input."""
+    first = held[0]
+    unit = _unit(first.moving.mechanism, first.input)
+    title = f"Loads that are held at rest with {format_or_zero(first.effort)} {unit} at {first.input}"
+    table = plain_table(title, "load", "from, times", "to, times", "held as it is", left=(0, 3))
+    for each in held:
+        ends = [
+            "not determined" if np.isnan(end) else "∞" if end == np.inf else "-∞" if end == -np.inf else f"{end:.6g}"
+            for end in (float(each.low), float(each.high))
+        ]
+        table.add_row(str(each.load), *ends, "yes" if each.is_self_locking else "no")
+    return table
+
+
+def held_record(held: Sequence[Holding]) -> dict[str, Any]:
+    """The same as JSON values, by what the loads act on."""
+    return {
+        str(each.load): {
+            "effort": each.effort,
+            "low": _number(each.low),
+            "high": _number(each.high),
+            "proved": bool(each.is_proved),
+            "held": bool(each.is_self_locking),
+        }
+        for each in held
+    }
 
 
 def locked_intervals(motion: Motion) -> tuple[LockedInterval, ...] | None:
