@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from planar.analysis.motion.mechanical_advantage import Advantage, advantage
     from planar.analysis.motion.mechanical_advantage_over_motion import AdvantageOver, advantage_over
     from planar.analysis.motion.output import Extreme
-    from planar.analysis.motion.self_locking import LockedInterval, self_locking
+    from planar.analysis.motion.self_locking import LockedInterval, jamming, self_locking
     from planar.analysis.motion.time_ratio import TimeRatio, time_ratio
     from planar.analysis.motion.transmission_angle import Transmission, transmission
     from planar.assemblies.circuits.circuits import Circuit, Circuits, circuits
@@ -192,6 +192,7 @@ _ROOMS = {
     "harmonics": "analysis.motion.harmonics",
     "holding": "dynamics.friction.holding",
     "inspect": "analysis.identity.inspection",
+    "jamming": "analysis.motion.self_locking",
     "load": "document.files",
     "loads": "document.files",
     "mark_answers": "analysis.classroom.marking",
@@ -328,6 +329,7 @@ __all__ = [
     "harmonics",
     "holding",
     "inspect",
+    "jamming",
     "load",
     "loads",
     "mark_answers",

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import cache
 from itertools import product
-from math import asin, atan, atan2, cos, hypot, pi, sin, sqrt, tan
+from math import acos, asin, atan, atan2, cos, hypot, pi, sin, sqrt, tan
 
 import numpy as np
 import pytest
@@ -365,6 +365,14 @@ def test_a_slider_jams_before_its_dead_point_and_says_how_much_friction_it_would
     jams = np.isnan(found.inputs["S"])
     assert 0 < jams.sum() < len(motion)
     assert "friction jams it" in found.remarks[0]
+    (interval,) = planar.jamming(motion)
+    x, circle = interval.start, 0.02 * sin(atan(0.3))
+    assert interval.start_is_solved and not interval.stop_is_solved
+    # there the rod's line of force, across between the circles at its pins, touches that of the crank's own pin
+    rod, crank = acos((x**2 + 0.15**2 - 0.05**2) / (0.3 * x)), acos((x**2 + 0.05**2 - 0.15**2) / (0.1 * x))
+    line = -rod + asin(2 * circle / 0.15)
+    passes = 0.05 * sin(line - crank) + circle
+    assert abs(passes) == pytest.approx(circle, abs=1e-9)
 
 
 def test_where_reactions_are_not_determined_friction_is_not_either():

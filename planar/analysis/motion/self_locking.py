@@ -1,4 +1,4 @@
-"""Where a mechanism locks itself: the positions of its input at which friction holds it under its loads alone."""
+"""Where a mechanism locks itself, held by friction under its loads alone, and where friction jams its motion."""
 
 from __future__ import annotations
 
@@ -9,9 +9,10 @@ import numpy as np
 
 from planar.analysis.interpolated_run import InterpolatedRun
 from planar.document.first_argument import takes_result
+from planar.dynamics.forces import forces
 from planar.dynamics.friction.holding import holding
 from planar.foundation.arrays import Array
-from planar.foundation.errors import NoAnswer
+from planar.foundation.errors import NoAnswer, Outcome
 from planar.foundation.root_finding import find_root
 from planar.foundation.short_repr import short_repr
 from planar.results.motion import Motion, State
@@ -20,7 +21,7 @@ GOLDEN_SECTION, MAX_SECTIONS = 0.5 * (3.0 - np.sqrt(5.0)), 60
 
 
 class LockedInterval(NamedTuple):
-    """Positions of an input (rad or m) between which a mechanism locks itself.
+    """Positions of an input (rad or m) between which a mechanism locks itself, or friction jams it.
 
     Where an end is one of the motion, or a position at which nothing balances the links, as at a dead point, its
     `start_is_solved` or `stop_is_solved` is False: it is that position then, or the last one known before.
@@ -47,12 +48,45 @@ def self_locking(motion: Motion) -> tuple[LockedInterval, ...]:
     >>> [round(interval.stop - interval.start, 4) for interval in planar.self_locking(clamp)]
     [0.2221, 0.0742]
     """
-    run = InterpolatedRun(motion)
 
     def margin(moving: State | Motion) -> Array:
         held = holding(moving)
         found: Array = np.minimum(np.asarray(held.high), -np.asarray(held.low))
         return found
+
+    return _intervals(motion, margin, has_extremes=True)
+
+
+@takes_result("Motion")
+def jamming(motion: Motion) -> tuple[LockedInterval, ...]:
+    """Where friction jams a motion: intervals of the input in which no forces balance it, ends found by bisection.
+
+    In the sense of the file's velocity (forward where it is none), with inertia at that steady rate. Raises what
+    `planar.forces` raises.
+
+    >>> import planar
+    >>> planar.jamming(planar.cycle(planar.load("toggle-clamp"), 60))
+    ()
+    """
+
+    def margin(moving: State | Motion) -> Array:
+        try:
+            found = forces(moving)
+        except NoAnswer as refused:
+            return np.array(1.0 if refused.outcome is Outcome.INPUT_JAMMED else np.nan)
+        if found.frictionless is None:
+            return np.where(np.isfinite(list(found.inputs.values())).all(axis=0), -1.0, np.nan)
+        sound = np.isfinite(list(found.frictionless.inputs.values())).all(axis=0)
+        return np.where(sound, np.where(np.asarray(found.solution_count) == 0, 1.0, -1.0), np.nan)
+
+    return _intervals(motion, margin, has_extremes=False)
+
+
+def _intervals(
+    motion: Motion, margin: Callable[[State | Motion], Array], has_extremes: bool
+) -> tuple[LockedInterval, ...]:
+    """Where a margin is not below zero over the input that runs; whether it may be so between samples as well."""
+    run = InterpolatedRun(motion)
 
     def margin_at(position: float) -> float:
         try:
@@ -61,7 +95,8 @@ def self_locking(motion: Motion) -> tuple[LockedInterval, ...]:
             return np.nan
 
     positions, margins = run.tabulate(margin)
-    positions, margins = _with_extremes(positions, margins, margin_at)
+    if has_extremes:
+        positions, margins = _with_extremes(positions, margins, margin_at)
     found: list[LockedInterval] = []
     start: tuple[float, bool] | None = None
     for k, (position, value) in enumerate(zip(positions.tolist(), margins.tolist(), strict=True)):

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from planar.analysis.motion.self_locking import LockedInterval, self_locking
+from planar.analysis.motion.self_locking import LockedInterval, jamming, self_locking
 from planar.dynamics.forces import Forces, PairFriction
 from planar.dynamics.friction.holding import Holding, holding
 from planar.foundation.arrays import Array
@@ -114,6 +114,9 @@ def holding_facts(forces: Forces) -> Iterator[tuple[str, str]]:
         return
     if isinstance(forces.moving, Motion):
         yield "self-locking", _locking_text(forces.moving, held)
+        jams = jammed_intervals(forces)
+        if jams:
+            yield "jams", f"at {held.input} from {_intervals_text(forces.moving, jams)}, in the sense of this motion"
         return
     low, high, unit = float(held.low), float(held.high), _unit(forces.mechanism, held.input)
     if held.undetermined:
@@ -179,11 +182,30 @@ def _locking_text(motion: Motion, held: Holding) -> str:
         return f"at {count} of these positions the loads alone do not move it"
     if not found:
         return "nowhere: the loads alone move it wherever they are not balanced"
+    return f"the loads alone do not move it at {held.input} from {_intervals_text(motion, found)}"
+
+
+def _intervals_text(motion: Motion, intervals: Sequence[LockedInterval]) -> str:
+    """Intervals of the input that runs, in the file's units."""
     units = motion.mechanism.units
-    unit = units.length if motion.has_length_motion(held.input) else units.angle
+    unit = units.length if motion.has_length_motion(motion.running_input) else units.angle
     measure = parse_unit(unit)
-    told = [" to ".join(f"{measure.from_si(each):.6g}" for each in interval[:2]) for interval in found]
-    return f"the loads alone do not move it at {held.input} from {join_all_names(told)} {unit}"
+    told = [" to ".join(f"{measure.from_si(each):.6g}" for each in interval[:2]) for interval in intervals]
+    return f"{join_all_names(told)} {unit}"
+
+
+def jammed_intervals(forces: Forces) -> tuple[LockedInterval, ...]:
+    """Where friction jams a motion, if it does so at any of its positions; nothing where that is not told."""
+    motion = forces.moving
+    if not isinstance(motion, Motion) or forces.frictionless is None:
+        return ()
+    sound = np.isfinite(list(forces.frictionless.inputs.values())).all(axis=0)
+    if not np.any(sound & (np.asarray(forces.solution_count) == 0)):
+        return ()
+    try:
+        return jamming(motion)
+    except BadInput:
+        return ()
 
 
 def record(forces: Forces) -> dict[str, Any]:
@@ -219,6 +241,7 @@ def motion_record(forces: Forces) -> dict[str, Any]:
         intervals = locked_intervals(motion)
         if intervals is not None:
             found["self_locking"] = [[each.start, each.stop] for each in intervals]
+        found["jams"] = [[each.start, each.stop] for each in jammed_intervals(forces)]
     return found
 
 
