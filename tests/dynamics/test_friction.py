@@ -11,12 +11,16 @@ import numpy as np
 import pytest
 
 import planar
+from planar.dynamics.external_actions import KinematicArrays
 from planar.dynamics.friction.all_solutions import find_all_solutions
+from planar.dynamics.friction.contact_rows import ContactRows
 from planar.dynamics.friction.contact_system import ContactSystem
 from planar.dynamics.friction.frictionless_path import follow_from_frictionless
 from planar.dynamics.friction.single_solution import has_single_solution, solve_contraction
+from planar.dynamics.reaction_solver import fill_balance
 from planar.foundation.errors import BadInput, NoAnswer, Outcome
 from planar.model.mechanism import Drive, replace_inputs
+from planar.model.pairs.rubbing import Friction
 from tests.draws import part
 from tests.rubbing import crank_and_slider, gear_train, incline, rubbing_linkage
 
@@ -296,30 +300,61 @@ def test_turned_and_mirrored_and_run_back_friction_is_the_same(seed):
         assert np.sign(given.velocity) * (found.inputs[given.pair] - other.inputs[given.pair]) > -1e-9
 
 
-@pytest.mark.parametrize("seed", range(12))
-def test_every_contact_case_solved_by_itself_gives_the_same_solutions(seed):
-    """Guides and slots alone: each sign and side is a linear system, of which those count that bear as they say."""
-    rng = np.random.default_rng(seed)
-    count = 2 + seed % 3
-    loads, slopes = rng.normal(size=(1, count, 2)), rng.normal(size=(1, count, 2, count)) * rng.uniform(0.1, 0.8)
-    system = ContactSystem(
-        np.concatenate([loads, -loads], axis=2),
-        np.concatenate([slopes, -slopes], axis=2),
-        np.zeros(count, dtype=bool),
-        np.zeros(count, dtype=bool),
-        np.ones(count, dtype=bool),
-    )
-    brute = []
-    for case in product(range(4), repeat=count):
+def brute_solutions(system):
+    """Each side and sense by itself is a linear system, of which those count that bear as they say; pins rub not."""
+    count, width = system.loads.shape[1:]
+    sides = [1 if signed else width for signed in system.is_signed]
+    found = []
+    for case in product(*map(range, sides)):
         rows = np.arange(count), np.array(case)
-        y = np.linalg.solve(np.eye(count) + system.slopes[0][rows], system.loads[0][rows])
-        if system.errors(y[None])[0] < 1e-10:
-            brute.append(y)
-    found = find_all_solutions(system)
+        matrix = np.eye(count) + system.slopes[0][rows]
+        if abs(np.linalg.det(matrix)) > 1e-12:
+            y = np.linalg.solve(matrix, system.loads[0][rows])
+            if system.errors(y[None])[0] < 1e-10 and not any(np.allclose(y, each, 1e-8) for each in found):
+                found.append(y)
+    return found
+
+
+def same_solutions(found, brute):
     assert found.is_complete
     assert len(found.y) == len(brute)
     for y in brute:
-        assert np.abs(found.y - y).max(axis=1).min() < 1e-8 * np.abs(y).max()
+        assert np.abs(found.y - y).max(axis=1).min() <= 1e-8 * np.abs(y).max()
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_every_contact_case_solved_by_itself_gives_the_same_solutions(seed):
+    rng = np.random.default_rng(seed)
+    count = 2 + seed % 3
+    loads, slopes = rng.normal(size=(1, count, 2)), rng.normal(size=(1, count, 2, count)) * rng.uniform(0.1, 0.8)
+    both = np.concatenate([loads, -loads], axis=2), np.concatenate([slopes, -slopes], axis=2)
+    none = np.zeros(count, dtype=bool)
+    system = ContactSystem(*both, none, none, ~none)
+    same_solutions(find_all_solutions(system), brute_solutions(system))
+
+
+@pytest.mark.parametrize("seed", part(range(80), 20))
+def test_so_it_does_for_the_guides_slots_and_meshes_of_random_linkages(seed):
+    """With much friction, so that there are several solutions and none: 0 to 3 among these."""
+    state = linkage(seed)
+    if state is None:
+        pytest.skip("it cannot be assembled")
+    rng = np.random.default_rng(seed)
+    pairs = tuple(
+        replace(pair, friction=None)
+        if isinstance(pair, planar.TurningPair)
+        else replace(pair, friction=Friction(float(rng.uniform(0.3, 2.0))))
+        if pair.friction is not None
+        else pair
+        for pair in state.mechanism.pairs
+    )
+    state = planar.solve(replace(state.mechanism, pairs=pairs))
+    field = KinematicArrays(state, state.shapes)
+    rows = ContactRows(fill_balance(field, np.zeros(1), True), field)
+    if not rows.rubbing_pairs or not rows.is_determined().all() or len(rows.contacts) > 7:
+        pytest.skip("nothing rubs, or it is not determined")
+    system, _ = rows.system(rows.senses())
+    same_solutions(find_all_solutions(system), brute_solutions(system))
 
 
 def one_pin(load, slope):

@@ -75,8 +75,8 @@ def jamming(motion: Motion) -> tuple[LockedInterval, ...]:
         except NoAnswer as refused:
             return np.array(1.0 if refused.outcome is Outcome.INPUT_JAMMED else np.nan)
         if found.frictionless is None:
-            return np.where(np.isfinite(list(found.inputs.values())).all(axis=0), -1.0, np.nan)
-        sound = np.isfinite(list(found.frictionless.inputs.values())).all(axis=0)
+            return np.where(np.isfinite([np.asarray(each) for each in found.inputs.values()]).all(axis=0), -1.0, np.nan)
+        sound = np.isfinite([np.asarray(each) for each in found.frictionless.inputs.values()]).all(axis=0)
         return np.where(sound, np.where(np.asarray(found.solution_count) == 0, 1.0, -1.0), np.nan)
 
     return _intervals(motion, margin, has_extremes=False)

@@ -8,6 +8,8 @@ M. J. Cloud, Introduction to Interval Analysis, 2009, ch. 8).
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -17,6 +19,8 @@ from planar.foundation.arrays import Array, BoolArray, IntArray
 from planar.foundation.short_repr import short_repr
 
 MAX_BOXES = 120_000
+MAX_CASES = 4096
+"""Of which part of a force each contact follows: of more not every one is tried by itself."""
 LEAST_RADIUS = 1e-9
 """A box so small that is not decided holds solutions that lie together."""
 OVERLAP, ROUNDING = 1.05, 1e-14
@@ -42,35 +46,57 @@ class ContactSolutions(NamedTuple):
 
 def find_all_solutions(system: ContactSystem) -> ContactSolutions:
     """All solutions at the one position of a system."""
-    contacts = _HomogeneousContacts(system)
-    found, is_complete = [], True
-    for face in range(contacts.count + 1):
-        solutions, decided = _search_face(contacts, face)
-        is_complete &= decided
-        found += solutions
-    y = np.array([contacts.restore(each) for each in found]).reshape(-1, len(system.is_signed))
+    found: list[Array] = []
+    is_complete, searched = True, 0
+    for sides in _contact_sides(system):
+        contacts = _HomogeneousContacts(system, sides)
+        for face in range(contacts.count + 1):
+            solutions, decided, count = _search_face(contacts, face, MAX_BOXES - searched)
+            searched += count
+            is_complete &= decided
+            found += [contacts.restore(each) for each in solutions]
+    y = np.array(found).reshape(-1, len(system.is_signed))
     y = y[system.at(np.zeros(len(y), dtype=int)).errors(y) < SOLVED_TOLERANCE] if len(y) else y
     return ContactSolutions(_distinct(y), is_complete)
+
+
+def _contact_sides(system: ContactSystem) -> Iterator[IntArray]:
+    """Every case of which part each contact is as great as (m,); -1 where that is not chosen.
+
+    It is the first of a signed one; of very many cases none is chosen.
+    """
+    felt = np.abs(system.slopes[0]).max(axis=(0, 1), initial=0.0) > 0.0
+    there = (system.loads[0] != 0.0) | (system.slopes[0] != 0.0).any(axis=2)
+    fixed = np.where(system.is_signed, 0, -1)
+    chosen = np.flatnonzero(felt & ~system.is_signed & ~system.is_resultant)
+    choices = [np.flatnonzero(there[index]).tolist() or [0] for index in chosen]
+    if np.prod([float(len(each)) for each in choices]) > MAX_CASES:
+        choices = [[-1] for _ in chosen]
+    for case in product(*choices):
+        sides = fixed.copy()
+        sides[chosen] = case
+        yield sides
 
 
 class _HomogeneousContacts:
     """y_j = phi_j(G_j v), v = (w, y) up to a factor, of those contacts alone that have to be searched for.
 
-    Not those on which no other depends, signed parts of others, and vectors that are always some times as long as
-    another, as the forces at both ends of a link that nothing else loads.
+    Not those on which no other depends, those of which a part is chosen, and vectors that are always some times as long
+    as another, as the forces at both ends of a link that nothing else loads. What the chosen parts are more than
+    others is `excess` v, not below zero.
     """
 
-    def __init__(self, system: ContactSystem):
+    def __init__(self, system: ContactSystem, sides: IntArray):
         self.system = system
         self.unit = max(float(np.abs(system.loads).max(initial=0.0)), 1e-300)
         whole = np.concatenate([system.loads[0, :, :, None] / self.unit, -system.slopes[0]], axis=2)  # (m, k, 1 + m)
         self.felt = np.abs(system.slopes[0]).max(axis=(0, 1), initial=0.0) > 0.0
-        signed = system.is_signed & self.felt
+        signed = (sides >= 0) & self.felt
         at, chosen = np.concatenate([[False], signed]), self.felt & ~signed
         own = np.concatenate([[True], chosen])
-        first = whole[signed, 0]
+        first = whole[signed, sides[signed]]
         expansion = np.eye(len(at))[:, own]
-        expansion[at] = np.linalg.solve(np.eye(int(signed.sum())) - first[:, at], first[:, own])
+        expansion[at] = _solve_regular(np.eye(int(signed.sum())) - first[:, at], first[:, own])
         forms = whole[chosen] @ expansion
         follows, ratio = _lengths_that_follow(forms, system.is_resultant[chosen])
         kept = follows == np.arange(len(follows))
@@ -82,6 +108,9 @@ class _HomogeneousContacts:
         self.is_resultant = system.is_resultant[chosen][kept]
         self.count = int(kept.sum())
         self.lengths = np.linalg.norm(self.forms, axis=1)  # (m, 1 + m)
+        leads = (sides >= 0) & self.felt & ~system.is_signed
+        more = whole[leads, sides[leads]][:, None] - whole[leads]
+        self.excess = more.reshape(-1, whole.shape[2]) @ self.expansion
 
     def restore(self, v: Array) -> Array:
         """All contacts (m,) at homogeneous coordinates."""
@@ -135,8 +164,18 @@ def _lengths_that_follow(forms: Array, is_resultant: BoolArray) -> tuple[IntArra
     return follows, ratio
 
 
-def _search_face(contacts: _HomogeneousContacts, face: int) -> tuple[list[Array], bool]:
-    """The solutions whose greatest coordinate is this one, and whether all boxes were decided."""
+def _solve_regular(matrix: Array, right: Array) -> Array:
+    """The solution; of a singular matrix, which none but special coefficients have, the least one."""
+    try:
+        return np.linalg.solve(matrix, right)
+    except np.linalg.LinAlgError:
+        return np.linalg.lstsq(matrix, right, rcond=None)[0]
+
+
+def _search_face(contacts: _HomogeneousContacts, face: int, most: int) -> tuple[list[Array], bool, int]:
+    """The solutions whose greatest coordinate is this one, whether all boxes were decided, and how many these were."""
+    if not contacts.count:
+        return [np.ones(1)], True, 1
     free = np.arange(contacts.count + 1) != face
     centre, radius = np.full((1, contacts.count + 1), 0.5), np.full((1, contacts.count + 1), 0.5)
     centre[:, face], radius[:, face] = 1.0, 0.0
@@ -144,8 +183,8 @@ def _search_face(contacts: _HomogeneousContacts, face: int) -> tuple[list[Array]
     decided, searched = True, 0
     while len(centre):
         searched += len(centre)
-        if searched > MAX_BOXES:
-            return found, False
+        if searched > most:
+            return found, False, searched
         centre, radius, proved, tiny = _contract(contacts, free, centre, radius)
         for v in centre[proved]:
             solution = _refine(contacts, free, v)
@@ -159,7 +198,7 @@ def _search_face(contacts: _HomogeneousContacts, face: int) -> tuple[list[Array]
                 found.append(solution)
         left = ~proved & ~tiny
         centre, radius = _bisect(centre[left], radius[left])
-    return found, decided
+    return found, decided, searched
 
 
 def _contract(
@@ -171,6 +210,7 @@ def _contract(
     middle, spread = contacts.slope_bounds(centre, wide)
     reach = np.einsum("nac,nc->na", np.abs(middle) + spread, wide)
     may = (np.abs(value) <= reach + ROUNDING).all(axis=1)
+    may &= (centre @ contacts.excess.T + wide @ np.abs(contacts.excess).T >= -ROUNDING).all(axis=1)
     centre, radius, wide, value, middle, spread = (each[may] for each in (centre, radius, wide, value, middle, spread))
     square = middle[:, :, free]
     regular = np.abs(np.linalg.det(square)) > 1e-12

@@ -199,7 +199,7 @@ def jammed_intervals(forces: Forces) -> tuple[LockedInterval, ...]:
     motion = forces.moving
     if not isinstance(motion, Motion) or forces.frictionless is None:
         return ()
-    sound = np.isfinite(list(forces.frictionless.inputs.values())).all(axis=0)
+    sound = np.isfinite([np.asarray(each) for each in forces.frictionless.inputs.values()]).all(axis=0)
     if not np.any(sound & (np.asarray(forces.solution_count) == 0)):
         return ()
     try:
