@@ -54,6 +54,17 @@ def test_at_rest_the_coefficient_at_rest_counts():
     assert not resting.friction
 
 
+def test_where_a_motion_dwells_friction_is_not_told():
+    mechanism = incline(0.3, 0.1, 0.0)
+    law = [{"motion": "constant speed", "by": 1.0, "in": 1.0}, {"motion": "dwell", "in": 1.0}]
+    value = planar.to_dict(mechanism)
+    value["inputs"][0] = {"pair": "S", "position": 0.0, "law": law}
+    found = planar.forces(planar.cycle(planar.from_dict(value), steps=8))
+    assert found.inputs["S"][:4] == pytest.approx(100 * (sin(0.3) + 0.1 * cos(0.3)))
+    assert np.isnan(found.inputs["S"][5:]).all()
+    assert "friction has no sense" in found.undetermined["S"]
+
+
 @pytest.mark.parametrize(("length", "jams"), [(0.30, True), (0.50, False)])
 def test_a_drawer_pulled_beside_its_middle_jams_where_it_is_shorter_than_two_mu_times_the_arm(length, jams):
     """A load F at an arm a presses F a / L on both ends: it pulls the drawer if F > 2 mu F a / L, or L > 2 mu a."""

@@ -46,15 +46,19 @@ class FrictionalForces(NamedTuple):
 
 
 def solve_friction(reactions: ReactionSolver, field: KinematicArrays, without: ForceSolution) -> FrictionalForces:
-    """The forces with friction beside those `without`. Raises NoAnswer where a position jams."""
+    """The forces with friction beside those `without`. Raises NoAnswer where a position jams.
+
+    Where a motion rests for a while they are not determined.
+    """
     rows = ContactRows(reactions, field)
     senses = rows.senses()
     is_state, many = isinstance(field.moving, State), rows.count
     if not any(sense.any() for sense in senses.values()):
         told = "nothing moves that rubs, so that friction has no sense: these are the forces without it"
         return FrictionalForces(None, (), np.ones(many, dtype=int), (told,))
-    unknown = without.is_balanced & ~rows.is_determined()
-    sound = without.is_balanced & ~unknown
+    moves = np.any([sense != 0.0 for sense in senses.values()], axis=0)
+    unknown = without.is_balanced & moves & ~rows.is_determined()
+    sound = without.is_balanced & moves & ~unknown
     system, actions = rows.system(senses)
     choice = solve_contacts(system.where(sound))
     jams = sound & (choice.solution_count == 0)
@@ -64,6 +68,8 @@ def solve_friction(reactions: ReactionSolver, field: KinematicArrays, without: F
     whys = [without.imbalance]
     if jams.any():
         whys.append("friction jams it there: no forces in the pairs balance the links")
+    if (without.is_balanced & ~moves).any():
+        whys.append("nothing moves there that rubs, so that friction has no sense")
     if unknown.any():
         whys.append(f"what friction at {quote_names(rows.rubbing_pairs)} follows is not determined")
     why = "; ".join(filter(None, whys))
