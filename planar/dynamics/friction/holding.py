@@ -36,7 +36,8 @@ class Holding(Displayable):
     From `low` to `high` friction at rest holds it: as the effort passes one of these everything slips at once, with
     the input moving on (`high`) or back (`low`). NaN where nothing balances the links, or friction is not determined;
     infinite where no effort, however great, starts it. `widest` (2,) or (n, 2): efforts beyond, up to those, may be
-    held too, where pairs are braced against each other; `is_proved` where it is proved that these are the ends.
+    held too, where pairs are braced against each other: the ends over every mixture of senses in which they can rub.
+    `is_proved` where it is proved that contacts have just one solution in each of these.
 
     With a `load` (by what the file calls it) these are the parts of that load, 1 as it stands, that are held with the
     `effort` of the input; past `high` it moves the way the load pushes, past `low` against it.

@@ -183,5 +183,5 @@ def _reaction_values(each: Reaction) -> dict[str, Array]:
 def run_facts(forces: Forces) -> dict[str, Any]:
     """What is said of the whole motion, as JSON values; forces in a pair are on the second of the links `between`."""
     between = {name: list(each.links) for name, each in forces.reactions.items()}
-    remarks = [*attachment_remarks(forces.mechanism), *forces.moving.remarks]
+    remarks = [*forces.remarks, *attachment_remarks(forces.mechanism), *forces.moving.remarks]
     return {"between": between, "remarks": remarks, **friction.motion_record(forces), **at_one.proof_record(forces)}

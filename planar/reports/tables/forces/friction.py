@@ -133,7 +133,7 @@ def holding_facts(forces: Forces) -> Iterator[tuple[str, str]]:
             pair = " to ".join(format_or_zero(float(each)) for each in wide)
             yield "", f"braced against each other pairs may hold {pair} {unit}"
         if not held.is_proved:
-            yield "", "that these are the only ends is not proved"
+            yield "", "that there are no other solutions at these ends is not proved"
 
 
 def held_loads_table(held: Sequence[Holding]) -> FittedTable:
@@ -235,7 +235,7 @@ def motion_record(forces: Forces) -> dict[str, Any]:
     motion = forces.moving
     if not any(pair.has_friction for pair in forces.mechanism.pairs) or not isinstance(motion, Motion):
         return {}
-    found: dict[str, Any] = {"efficiency": mean_efficiency(forces), "friction_remarks": list(forces.remarks)}
+    found: dict[str, Any] = {"efficiency": mean_efficiency(forces)}
     held = held_at_rest(forces)
     if held is not None and not held.undetermined:
         intervals = locked_intervals(motion)
