@@ -11,6 +11,8 @@ import numpy as np
 import pytest
 
 import planar
+from planar.drawing.forces.free_bodies import free_bodies
+from planar.drawing.paper.picture import Arrow, Circle
 from planar.dynamics.external_actions import KinematicArrays
 from planar.dynamics.friction.all_solutions import find_all_solutions
 from planar.dynamics.friction.contact_rows import ContactRows
@@ -292,7 +294,7 @@ def test_small_friction_is_nearly_none_and_no_friction_is_none(seed):
 
 
 @seeds
-def test_turned_and_mirrored_and_run_back_friction_is_the_same(seed):
+def test_run_back_friction_turns_round_and_wants_no_less(seed):
     state = linkage(seed)
     found = state and told(state)
     if not found or len(state.mechanism.inputs) != 1 or found.solution_count != 1:
@@ -419,6 +421,51 @@ def test_a_slider_jams_before_its_dead_point_and_says_how_much_friction_it_would
     line = -rod + asin(2 * circle / 0.15)
     passes = 0.05 * sin(line - crank) + circle
     assert abs(passes) == pytest.approx(circle, abs=1e-9)
+
+
+@pytest.mark.parametrize("turned", [0.7, 2.9])
+def test_turned_as_a_whole_friction_is_the_same(turned):
+    upright = crank_and_slider(0.01, 0.2, 1.0, 5.0, guide_length=0.02, guide_width=0.01)
+    value = planar.to_dict(upright)
+    c, s = cos(turned), sin(turned)
+    slide = next(pair for pair in value["pairs"] if "sliding" in pair)
+    slide["line"]["angle"] = f"{turned!r} rad"
+    value["inputs"][0]["position"] = f"{1.0 + turned!r} rad"
+    value["loads"] = [{"point": "B", "force": [-1000 * c, -1000 * s]}]
+    value["sketch"] = {"B": [0.15 * c, 0.15 * s]}
+    one, other = forces_of(upright), forces_of(planar.from_dict(value))
+    assert other.inputs["O"] == pytest.approx(one.inputs["O"], rel=1e-9)
+    assert other.heat == pytest.approx(one.heat, rel=1e-9)
+    assert {name: each.side for name, each in other.friction.items()} == {n: e.side for n, e in one.friction.items()}
+
+
+def test_sweeps_take_friction_as_motions_do():
+    mechanism = crank_and_slider(0.01, 0.2, 1.0, 5.0, guide_length=0.03)
+    designs = {"rod.length": [0.15, 0.2], "A.friction": [0.1, 0.3], "S.friction": [0.2, 0.05]}
+    swept = planar.sweep(mechanism, designs, steps=12, efforts=["O"], reactions=["A"])
+    for k in range(2):
+        own = mechanism.with_values({name: values[k] for name, values in designs.items()})
+        found = planar.forces(planar.cycle(own, steps=12))
+        assert swept.effort["O"][k] == pytest.approx(found.inputs["O"], rel=1e-9)
+        assert swept.reaction["A"][k] == pytest.approx(found.reactions["A"].force, rel=1e-9, abs=1e-6)
+
+
+def test_drawn_forces_at_pins_are_tangent_to_their_friction_circles():
+    found = forces_of(planar.load("toggle-clamp"))
+    pictures, _ = free_bodies(found)
+    checked = 0
+    for picture in pictures[1:]:
+        circles = [mark for mark in picture.marks if isinstance(mark, Circle) and "friction circle" in mark.about]
+        arrows = [mark for mark in picture.marks if isinstance(mark, Arrow) and mark.about.startswith("force F")]
+        for circle in circles:
+            off = []
+            for arrow in arrows:
+                way = np.subtract(arrow.head, arrow.tail) / np.hypot(*np.subtract(arrow.head, arrow.tail))
+                x, y = np.subtract(circle.centre, arrow.tail)
+                off.append(abs(way[0] * y - way[1] * x))
+            assert min(abs(each - circle.radius) for each in off) < 1e-9
+            checked += 1
+    assert checked == 5
 
 
 def test_where_reactions_are_not_determined_friction_is_not_either():
