@@ -478,6 +478,13 @@ def test_where_reactions_are_not_determined_friction_is_not_either():
     assert "friction" in found.undetermined["O"]
 
 
+def test_friction_of_a_pin_without_a_size_is_refused_where_a_mechanism_is_made_in_python():
+    bare = crank_and_slider(0.01, 0.2, 1.0, 1.0)
+    bare = replace(bare, pairs=(replace(bare.pairs[0], radius=None), *bare.pairs[1:]))
+    with pytest.raises(BadInput, match="radius of a pin"):
+        forces_of(bare)
+
+
 @pytest.mark.parametrize(
     ("pair", "where", "words"),
     [

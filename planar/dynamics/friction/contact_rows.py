@@ -12,6 +12,7 @@ from planar.dynamics.external_actions import KinematicArrays
 from planar.dynamics.friction.contact_system import ContactSystem
 from planar.dynamics.reaction_solver import ReactionSolver
 from planar.foundation.arrays import Array, BoolArray
+from planar.foundation.errors import BadInput
 from planar.foundation.geometry import Vector
 from planar.foundation.jets import value_and_rates
 from planar.foundation.short_repr import short_repr
@@ -72,11 +73,12 @@ class ContactRows:
     def contacts(self) -> tuple[Contact, ...]:
         """All contacts: friction pair by pair, then what pushes teeth apart."""
         pairs = tuple(self.reactions.pairs.values())
-        found = [
-            self._contact(pair, rubbing)
-            for pair in pairs
-            for rubbing in pair.rubbing_contacts(self.reactions.frames, self.reactions.shapes, pairs, self.at_rest)
-        ]
+        found: list[Contact] = []
+        for pair in pairs:
+            own = pair.rubbing_contacts(self.reactions.frames, self.reactions.shapes, pairs, self.at_rest)
+            if pair.has_friction and not own:
+                raise BadInput(pair.name, "its friction follows a size that is not given, as the radius of a pin")
+            found += [self._contact(pair, rubbing) for rubbing in own]
         return (*found, *self._separations())
 
     @cached_property
