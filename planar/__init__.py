@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from planar.analysis.motion.mechanical_advantage_over_motion import AdvantageOver, advantage_over
     from planar.analysis.motion.motor_duty import MotorDuty, motor_duty
     from planar.analysis.motion.output import Extreme
+    from planar.analysis.motion.self_locking import LockedInterval, jamming, self_locking
     from planar.analysis.motion.time_ratio import TimeRatio, time_ratio
     from planar.analysis.motion.transmission_angle import Transmission, transmission
     from planar.analysis.motion.unknown_load import UnknownLoad, unknown_load
@@ -44,7 +45,8 @@ if TYPE_CHECKING:
     from planar.document.files import dumps, from_dict, load, loads, to_dict
     from planar.document.schema import schema
     from planar.dynamics.flywheel import Flywheel, flywheel
-    from planar.dynamics.forces import Forces, forces
+    from planar.dynamics.forces import Forces, PairFriction, forces
+    from planar.dynamics.friction.holding import Holding, holding
     from planar.dynamics.in_time.stop_contacts import Impact
     from planar.dynamics.reactions import Reaction
     from planar.dynamics.simulation import Simulation, simulate
@@ -70,6 +72,7 @@ if TYPE_CHECKING:
     from planar.model.pairs.gear import GearPair
     from planar.model.pairs.guide_line import LinkLine
     from planar.model.pairs.rack import RackPair
+    from planar.model.pairs.rubbing import Friction
     from planar.model.pairs.sliding import SlidingPair
     from planar.model.pairs.slot import SlotPair
     from planar.model.pairs.turning import TurningPair
@@ -117,10 +120,12 @@ _ROOMS = {
     "FileUnits": "model.file_units",
     "Flywheel": "dynamics.flywheel",
     "Forces": "dynamics.forces",
+    "Friction": "model.pairs.rubbing",
     "GearPair": "model.pairs.gear",
     "HarmonicRise": "model.input_laws.cam_rises",
     "Harmonics": "analysis.motion.harmonics",
     "Impact": "dynamics.in_time.stop_contacts",
+    "Holding": "dynamics.friction.holding",
     "Input": "model.mechanism",
     "InputLaw": "model.input_laws.input_law",
     "Inspection": "analysis.identity.inspection",
@@ -132,6 +137,7 @@ _ROOMS = {
     "Load": "model.mechanism",
     "MarkedValue": "analysis.classroom.marking",
     "Marks": "analysis.classroom.marking",
+    "LockedInterval": "analysis.motion.self_locking",
     "Mass": "model.mechanism",
     "Mechanism": "model.mechanism",
     "Mobility": "analysis.identity.mobility",
@@ -144,6 +150,7 @@ _ROOMS = {
     "NoAnswer": "foundation.errors",
     "Outcome": "foundation.errors",
     "Pair": "model.pairs.base",
+    "PairFriction": "dynamics.forces",
     "PinnedLinkages": "model.pin_linkages",
     "PlanarError": "foundation.errors",
     "Point": "model.mechanism",
@@ -198,11 +205,13 @@ _ROOMS = {
     "from_dict": "document.files",
     "greatest": "analysis.motion.extremes",
     "harmonics": "analysis.motion.harmonics",
+    "holding": "dynamics.friction.holding",
     "inspect": "analysis.identity.inspection",
+    "jamming": "analysis.motion.self_locking",
     "load": "document.files",
     "loads": "document.files",
-    "mobility": "analysis.identity.mobility",
     "mark_answers": "analysis.classroom.marking",
+    "mobility": "analysis.identity.mobility",
     "modes": "assemblies.modes",
     "motor_duty": "analysis.motion.motor_duty",
     "problem_variants": "analysis.classroom.variants",
@@ -211,6 +220,7 @@ _ROOMS = {
     "plot": "plot",
     "prepared": "batch.prepared",
     "schema": "document.schema",
+    "self_locking": "analysis.motion.self_locking",
     "simulate": "dynamics.simulation",
     "solve": "solving.position",
     "stroke": "analysis.motion.extremes",
@@ -258,9 +268,11 @@ __all__ = [
     "FileUnits",
     "Flywheel",
     "Forces",
+    "Friction",
     "GearPair",
     "HarmonicRise",
     "Harmonics",
+    "Holding",
     "Impact",
     "Input",
     "InputLaw",
@@ -271,6 +283,7 @@ __all__ = [
     "LinkMotion",
     "LinkState",
     "Load",
+    "LockedInterval",
     "MarkedValue",
     "Marks",
     "Mass",
@@ -285,6 +298,7 @@ __all__ = [
     "NoAnswer",
     "Outcome",
     "Pair",
+    "PairFriction",
     "PinnedLinkages",
     "PlanarError",
     "Point",
@@ -339,7 +353,9 @@ __all__ = [
     "from_dict",
     "greatest",
     "harmonics",
+    "holding",
     "inspect",
+    "jamming",
     "load",
     "loads",
     "mark_answers",
@@ -352,6 +368,7 @@ __all__ = [
     "prepared",
     "problem_variants",
     "schema",
+    "self_locking",
     "simulate",
     "solve",
     "stroke",

@@ -127,6 +127,7 @@ PICTURES: dict[str, Callable[[], object]] = {
     "positions": lambda: plot.positions(planar.cycle("whitworth")),
     "diagrams": lambda: plot.diagrams(planar.cycle("slider-crank")),
     "bodies": lambda: plot.forces(planar.forces(planar.solve("two-stroke-engine"))),
+    "forces/friction": lambda: plot.forces(planar.forces(planar.solve(thick_clamp()))),
     "circuits": lambda: plot.circuits(planar.circuits("watt-six-bar")),
     **{f"keys/{each.example}": partial(example_figure, each.example) for each in key_sections() if each.example},
 }
@@ -156,6 +157,12 @@ PICTURES |= {
 }
 COLOURS = 48
 """Of a picture's palette, which makes its file a third as large."""
+
+
+def thick_clamp() -> planar.Mechanism:
+    """The toggle clamp with pins so thick that friction circles are seen."""
+    sizes = {f"{pin}.pin_radius": "14 mm" for pin in "OAB"} | {f"{pin}.friction": 0.25 for pin in "OAB"}
+    return planar.load("toggle-clamp").with_values(sizes)
 
 
 def write(folder: Path) -> None:

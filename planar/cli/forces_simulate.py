@@ -31,6 +31,7 @@ from planar.cli.streams import print_json
 from planar.foundation.errors import BadInput
 
 if TYPE_CHECKING:
+    from planar.dynamics.friction.holding import Holding
     from planar.model.mechanism import Mechanism
 
 ONE_DESTINATION = "results go to a file or are printed with --json; give one of the two"
@@ -42,6 +43,7 @@ ONE_DESTINATION = "results go to a file or are printed with --json; give one of 
 @at_option
 @mode_option
 @click.option("--static", is_flag=True, help="Leave the links' inertia out: at rest, or in slow motion.")
+@click.option("--without-friction", "frictionless", is_flag=True, help="Leave the friction of the pairs out.")
 @click.option("--cycle", "whole", is_flag=True, help="Over the whole motion, as `planar cycle` has it.")
 @click.option(
     "--fluctuation",
@@ -59,49 +61,52 @@ ONE_DESTINATION = "results go to a file or are printed with --json; give one of 
 )
 @click.option(
     "--effort",
-    type=float,
-    metavar="NUMBER",
-    help="With --solve-for: what the input is to supply, in N m (at a slide N), in place of nothing.",
+    metavar="EFFORT",
+    help="With --solve-for: what the input is to supply, as '5 N m', in place of nothing. Without, at rest with "
+    "friction: how much of each load is held with it.",
 )
 @motion_options
 @output_option(
     "Write the tables to a .txt, .svg or .html file; with --cycle every position to .csv, .json, .npz or .parquet."
 )
-def forces(  # many: options of the command
+# many: options of the command
+def forces(
     model: str,
     as_json: bool,
     at: tuple[str, ...],
     mode: int | None,
     static: bool,
+    frictionless: bool,
     whole: bool,
     fluctuation: float | None,
     rim_radius: str | None,
     solve_for: str | None,
-    effort: float | None,
+    effort: str | None,
     output: Path | None,
     **course: Any,
 ) -> None:
-    """What the inputs supply and the pairs carry against loads, weights, springs and inertia."""
+    """What the inputs supply and the pairs carry against loads, weights, springs, friction and inertia."""
     if as_json and output is not None:
         raise BadInput("-o", ONE_DESTINATION)
     if whole and at:
         raise BadInput("--at", "the forces of a whole motion have no one position; say where it starts with --from")
+    if whole and effort is not None and solve_for is None:
+        raise BadInput("--effort", "how much of each load is held is told at one position; leave --cycle out")
     if not whole:
         _refuse_motion_options((*course, "fluctuation", "rim_radius"))
     if rim_radius is not None and fluctuation is None:
         raise BadInput("--rim-radius", "this is the radius of a flywheel; say for which --fluctuation")
-    if effort is not None and solve_for is None:
-        raise BadInput("--effort", "this goes with the load that is solved for; name it by --solve-for")
     from planar.dynamics.load_validation import require_loads
 
-    wanted = None if solve_for is None else (solve_for, effort or 0.0)
     mechanism = load_model(model, mode)
     refuse_overwriting(model, output)
     require_loads(mechanism)
+    given = None if effort is None else _parse_effort(mechanism, effort)
+    taken = (not static, not frictionless)
     if whole:
-        _forces_over_motion(mechanism, not static, as_json, output, (fluctuation, rim_radius, wanted), course)
+        _forces_over_motion(mechanism, taken, as_json, output, (fluctuation, rim_radius, solve_for, given), course)
     else:
-        _forces_at_position(mechanism, at, not static, as_json, output, wanted)
+        _forces_at_position(mechanism, at, taken, as_json, output, (solve_for, given))
 
 
 def _refuse_motion_options(course: Iterable[str]) -> None:
@@ -112,42 +117,62 @@ def _refuse_motion_options(course: Iterable[str]) -> None:
             raise BadInput(option.opts[0], "this is for the forces of a whole motion, with --cycle")
 
 
+def _parse_effort(mechanism: Mechanism, text: str) -> float:
+    """An effort of the input (N m, at a slide N)."""
+    from planar.document import read_effort
+
+    if len(mechanism.inputs) != 1:
+        raise BadInput("--effort", "this is the effort of the one input, and there are several")
+    return read_effort(mechanism, mechanism.inputs[0].pair, text, "--effort")
+
+
 def _forces_at_position(
     mechanism: Mechanism,
     at: tuple[str, ...],
-    inertia: bool,
+    taken: tuple[bool, bool],
     as_json: bool,
     output: Path | None,
-    wanted: tuple[str, float] | None,
+    asked: tuple[str | None, float | None],
 ) -> None:
-    """The forces at one position, and the load that is wanted for an effort."""
+    """The forces at one position, inertia and friction `taken` into account or not; a load is `asked` for an effort."""
+    from rich.console import Group
+
     from planar.analysis.motion.mechanical_advantage import advantages
     from planar.analysis.motion.unknown_load import unknown_load
     from planar.analysis.worked.published import compare_published
     from planar.dynamics.forces import forces as at_state
+    from planar.dynamics.friction.holding import holding, load_names
+    from planar.reports.tables.forces.friction import held_loads_table, held_record
     from planar.reports.tables.forces.position_forces import record, tables
     from planar.solving.position import solve
 
     moved = parse_drives(mechanism, at)
+    load, effort = asked
     with show_status(mechanism.name):
         state = solve(mechanism, moved)
-        found, ratios = at_state(state, inertia), advantages(state)
-        unknown = None if wanted is None else unknown_load(state, *wanted, inertia=inertia)
+        found, ratios = at_state(state, *taken), advantages(state)
+        unknown = None if load is None else unknown_load(state, load, effort or 0.0, inertia=taken[0])
+        held: tuple[Holding, ...] = ()
+        if load is None and effort is not None:
+            held = tuple(holding(state, name, effort) for name in load_names(mechanism))
         printed = (
             [] if moved else [each for each in compare_published(state) if each.published.quantity == "input torque"]
         )
     if as_json:
-        print_json(record(found, ratios, printed, unknown), indent=1)
+        print_json(
+            record(found, ratios, printed, unknown) | ({"held_loads": held_record(held)} if held else {}), indent=1
+        )
         return
-    print_or_write(tables(found, ratios, printed, unknown), output)
+    shown = tables(found, ratios, printed, unknown)
+    print_or_write(Group(shown, held_loads_table(held)) if held else shown, output)
 
 
 def _forces_over_motion(
     mechanism: Mechanism,
-    inertia: bool,
+    taken: tuple[bool, bool],
     as_json: bool,
     output: Path | None,
-    asked: tuple[float | None, str | None, tuple[str, float] | None],
+    asked: tuple[float | None, str | None, str | None, float | None],
     course: dict[str, Any],
 ) -> None:
     """The forces over a whole motion; and what is asked: a flywheel's fluctuation and radius, a load for an effort."""
@@ -162,11 +187,11 @@ def _forces_over_motion(
         check_writable(output.suffix)
     with show_status(f"{mechanism.name}: {course['steps']} steps"):
         motion = run_motion(mechanism, **course)
-        found = over_motion(motion, inertia)
-        fluctuation, radius, load = asked
+        found = over_motion(motion, *taken)
+        fluctuation, radius, load, effort = asked
         length = None if radius is None else read_length(mechanism, radius, "--rim-radius")
         wheel = wanted_flywheel(found, fluctuation, length)
-        unknown = None if load is None else unknown_load(motion, *load, inertia=inertia)
+        unknown = None if load is None else unknown_load(motion, load, effort or 0.0, inertia=taken[0])
     facts = run_facts(found, wheel, unknown)
     report_motion(motion, as_json, output, lambda: [tables(found, wheel, unknown)], force_series(found), facts)
 

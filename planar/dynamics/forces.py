@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -20,16 +20,18 @@ from planar.dynamics.external_actions import (
     collect_actions,
 )
 from planar.dynamics.free_body_check import free_body_imbalance
+from planar.dynamics.friction.contact_rows import ContactState
+from planar.dynamics.friction.frictional_forces import pair_heat, solve_friction
 from planar.dynamics.imbalance import explain_imbalance, imbalance_refusal
 from planar.dynamics.load_validation import check_loads
-from planar.dynamics.load_variation import load_factors
-from planar.dynamics.reaction_solver import ReactionSolver
+from planar.dynamics.reaction_solver import ForceSolution, fill_balance
 from planar.dynamics.reactions import ZERO_COUPLE_TOLERANCE, Reaction, input_efforts, pair_reaction
 from planar.dynamics.virtual_velocities import has_length_motion, refuse_surplus_inputs, unit_rate_state
-from planar.dynamics.virtual_work import BalanceFunction, balance_function
-from planar.foundation.arrays import Array
+from planar.dynamics.virtual_work import balance_function
+from planar.foundation.arrays import Array, IntArray
 from planar.foundation.errors import BadInput, NoAnswer, Outcome
 from planar.foundation.notebook_display import Displayable
+from planar.foundation.short_repr import short_repr
 from planar.model.mechanism import Mechanism
 from planar.results.motion import Motion, State
 
@@ -49,6 +51,23 @@ class ForceProof(NamedTuple):
     equilibrium: float | None
 
 
+class PairFriction(NamedTuple):
+    """How a pair rubs at a position; over a motion each an array or a tuple of its n positions.
+
+    `sense` (1, -1) of the rate of its input position, 0 where it does not rub; `effort` (N, N m) what friction does in
+    the positive sense of that position, of teeth with friction the couple between the wheels; `heat` (W) what it takes
+    of the power; `side` in words which side of a guide bears, or which wheel drives.
+    """
+
+    sense: Array | float
+    effort: Array | float
+    heat: Array | float
+    side: tuple[str, ...] | str
+
+    def __repr__(self) -> str:
+        return short_repr(self)
+
+
 @dataclass(frozen=True, eq=False)
 class Forces(Displayable):
     """The forces at a position, or over a motion (then every array has a first axis for its n positions).
@@ -56,7 +75,10 @@ class Forces(Displayable):
     `inputs["O"]` is what that input supplies: a torque (N m) at a pair whose motion is an angle, a force (N) at one
     whose motion is a length, positive in the positive sense of the motion, and `powers["O"]` its power (W).
     `reactions["B"]` see `Reaction`. `acting` are loads, weights, springs, efforts and inertia. `undetermined` names
-    what equilibrium does not tell, and why; `bodies` are the links whose balance was proved.
+    what equilibrium does not tell, and why; `bodies` are the links whose balance was proved. `friction["B"]` see
+    `PairFriction`, `frictionless` are the same forces without friction, `others` the further
+    solutions at a position, `solution_count` how many there are in all (of a motion (n,)), and `remarks` what there is
+    to say of friction.
     """
 
     moving: State | Motion
@@ -67,6 +89,11 @@ class Forces(Displayable):
     undetermined: Mapping[str, str]
     proof: ForceProof
     bodies: tuple[str, ...]
+    friction: Mapping[str, PairFriction] = field(default_factory=dict)
+    frictionless: Forces | None = None
+    others: tuple[Forces, ...] = ()
+    solution_count: IntArray | int = 1
+    remarks: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
         return f"<Forces in {self.moving!r}: {len(self.reactions)} pairs, {len(self.acting)} acting>"
@@ -91,6 +118,32 @@ class Forces(Displayable):
         """What the mechanism does against its loads, W."""
         return 0.0 - sum((each.power for each in self.loads), 0.0)
 
+    @property
+    def solutions(self) -> tuple[Forces, ...]:
+        """All that friction leaves possible at a position: first the one that goes over into that without friction."""
+        return (self, *self.others)
+
+    @property
+    def heat(self) -> Mapping[str, Array | float]:
+        """What each pair that rubs turns into heat, W."""
+        return {name: each.heat for name, each in self.friction.items()}
+
+    @property
+    def heat_flow(self) -> Array | float:
+        """What friction in the pairs turns into heat, W."""
+        return sum(self.heat.values(), 0.0)
+
+    @property
+    def efficiency(self) -> Array | float:
+        """The part of the power that goes into the mechanism and comes out again; NaN where none goes in.
+
+        In goes whatever has positive power: inputs, loads, weights, springs and inertia that gives it.
+        """
+        supplied = sum((np.maximum(each.power, 0.0) for each in self.acting), np.zeros(()))
+        with np.errstate(invalid="ignore", divide="ignore"):
+            found = np.where(supplied > 0.0, 1.0 - self.heat_flow / supplied, np.nan)
+        return found if found.ndim else float(found)
+
     @cached_property
     def shaking(self) -> tuple[Array, Array | float]:
         """What the links' inertia puts on the frame: a force, N, and a moment about the frame's origin, N m."""
@@ -112,14 +165,15 @@ class Forces(Displayable):
 
 
 @takes_result("State", "Motion")
-def forces(moving: State | Motion, inertia: bool = True) -> Forces:
-    """What inputs and pairs must supply against loads, weights, springs and the links' inertia.
+def forces(moving: State | Motion, inertia: bool = True, friction: bool = True) -> Forces:
+    """What inputs and pairs must supply against loads, weights, springs, friction and the links' inertia.
 
     A position has its own rates, and of loads that vary with time those at t = 0. `inertia=False` leaves it out:
-    equilibrium at rest, or in slow motion. For any number of inputs; where the links are held more than once, what
-    rigid bodies do not tell is NaN and named. Raises BadInput where a load, spring or mass is none of this
-    mechanism's; NoAnswer where there are more inputs than freedoms, and where no forces in the pairs balance the
-    links, as at a dead point (of a motion such rows are NaN).
+    equilibrium at rest, or in slow motion; `friction=False` leaves out that of the pairs. For any number of inputs;
+    where the links are held more than once, what rigid bodies do not tell is NaN and named. Raises BadInput where a
+    load, spring or mass is none of this mechanism's; NoAnswer where there are more inputs than freedoms, where no
+    forces in the pairs balance the links, as at a dead point, and where friction jams it (of a motion such rows are
+    NaN).
 
     >>> import planar
     >>> list(planar.forces(planar.solve(planar.load("four-bar"))).reactions)
@@ -128,62 +182,85 @@ def forces(moving: State | Motion, inertia: bool = True) -> Forces:
     mechanism = moving.mechanism
     check_loads(mechanism)
     state = moving if isinstance(moving, State) else None
-    one = state is not None
     if state is not None:
         refuse_surplus_inputs(state)
     time = np.zeros(1) if isinstance(moving, State) else moving.time
     if time is None and any(load.varies is not None and load.varies.input is None for load in mechanism.loads):
         raise BadInput("loads", "a load varies with time, which this motion has not; give it a duration")
-    equations = balance_function(mechanism)
-    field = KinematicArrays(moving, equations.work.shapes)
-    reactions = _make_reaction_solver(equations, field, time, inertia)
+    balanced = _Balance(moving, time, inertia)
+    reactions = balanced.reactions
     solved = reactions.solve()
-    if one and not np.isfinite(reactions.balance.loads).all():
+    if state is not None and not np.isfinite(reactions.balance.loads).all():
         raise NoAnswer(
             Outcome.DEAD_POINT,
             "the ends of a spring or damper meet here, so that its force has no direction; move the input",
         )
     if not solved.is_balanced.all():
-        if one:
+        if state is not None:
             raise imbalance_refusal(reactions)
         solved = solved._replace(imbalance=explain_imbalance(reactions))
-    supplied, whys = input_efforts(solved)
-    all_of = collect_actions(field, time, supplied, inertia)
-    moved = action_velocities(field, all_of)
-    powers = action_powers(field, all_of, moved)
-    all_of = [each._replace(power=row) for each, row in zip(all_of, powers, strict=True)]
-    by_pair = {pair.name: pair_reaction(pair, field, reactions, solved) for pair in mechanism.pairs}
-    equilibrium, bodies = free_body_imbalance(field, all_of, by_pair, reactions.arm)
-    names = [given.pair for given in mechanism.inputs]
-    undetermined = {name: why for name, why in zip(names, whys, strict=True) if why}
-    undetermined |= {name: each.why for name, each in by_pair.items() if each.why}
-    routes = None if state is None else _second_route_error(state, field, all_of, supplied[0])
-    found = Forces(
-        moving,
-        dict(zip(names, supplied.T, strict=True)),
-        {name: sum(each.power for each in all_of if each[:2] == ("input", name)) for name in names},
-        by_pair,
-        tuple(all_of),
-        undetermined,
-        ForceProof(_power_imbalance(powers, all_of, moved), routes, equilibrium),
-        bodies,
-    )
-    return _single_position(found) if one else found
+    found = balanced.forces(solved)
+    if friction and any(pair.has_friction for pair in mechanism.pairs):
+        found = _with_friction(balanced, solved, found)
+    return found if state is None else _single_position(found)
 
 
-def _make_reaction_solver(
-    equations: BalanceFunction, field: KinematicArrays, time: Array | None, inertia: bool
-) -> ReactionSolver:
-    """The balance of every position."""
-    body, moving = equations.work, field.moving
-    inputs = {name: np.broadcast_to(each.position, (field.position_count,)) for name, each in moving.inputs.items()}
-    q, q1, q2 = body.coordinates(moving)
-    balance = equations.evaluate(
-        q, q1, q2, load_factors(moving.mechanism, inputs, time, field.position_count), body.initial_spring_turns(q[0])
+class _Balance:
+    """What stands fast before the forces in pairs are known: the balance, and the way from its solution to a result."""
+
+    def __init__(self, moving: State | Motion, time: Array | None, inertia: bool):
+        self.moving, self.time, self.inertia = moving, time, inertia
+        self.field = KinematicArrays(moving, balance_function(moving.mechanism).work.shapes)
+        self.reactions = fill_balance(self.field, time, inertia)
+
+    def forces(self, solved: ForceSolution, contacts: Mapping[str, ContactState] | None = None) -> Forces:
+        """The result, with an axis for its positions, and how pairs rub."""
+        mechanism, field = self.moving.mechanism, self.field
+        supplied, whys = input_efforts(solved)
+        all_of = collect_actions(field, self.time, supplied, self.inertia)
+        moved = action_velocities(field, all_of)
+        powers = action_powers(field, all_of, moved)
+        all_of = [each._replace(power=row) for each, row in zip(all_of, powers, strict=True)]
+        by_pair = {pair.name: pair_reaction(pair, field, self.reactions, solved) for pair in mechanism.pairs}
+        rubbing = {
+            name: PairFriction(*each._replace(heat=_first_finite(pair_heat(field, by_pair[name]), each.heat)))
+            for name, each in (contacts or {}).items()
+        }
+        equilibrium, bodies = free_body_imbalance(field, all_of, by_pair, self.reactions.arm)
+        names = [given.pair for given in mechanism.inputs]
+        undetermined = {name: why for name, why in zip(names, whys, strict=True) if why}
+        undetermined |= {name: each.why for name, each in by_pair.items() if each.why}
+        routes = None
+        if isinstance(self.moving, State):
+            routes = _second_route_error(self.moving, all_of, supplied[0], [by_pair[name] for name in rubbing])
+        lost = np.array([*powers, *(-each.heat for each in rubbing.values())]).reshape(-1, field.position_count)
+        return Forces(
+            self.moving,
+            dict(zip(names, supplied.T, strict=True)),
+            {name: sum(each.power for each in all_of if each[:2] == ("input", name)) for name in names},
+            by_pair,
+            tuple(all_of),
+            undetermined,
+            ForceProof(_power_imbalance(lost, all_of, moved), routes, equilibrium),
+            bodies,
+            rubbing,
+        )
+
+
+def _with_friction(balanced: _Balance, solved: ForceSolution, without: Forces) -> Forces:
+    """The forces with friction, beside those without."""
+    result = solve_friction(balanced.reactions, balanced.field, solved)
+    if result.solution is None:
+        return replace(without, remarks=result.remarks)
+    first, *others = (
+        replace(balanced.forces(*each), frictionless=without, remarks=result.remarks)
+        for each in (result.solution, *result.others)
     )
-    if not inertia:
-        balance = balance._replace(inertia=np.zeros_like(balance.inertia))
-    return ReactionSolver(equations, balance, field)
+    return replace(first, others=tuple(others), solution_count=result.solution_count)
+
+
+def _first_finite(values: Array, others: Array) -> Array:
+    return np.where(np.isfinite(values), values, others)
 
 
 def _power_imbalance(powers: Array, all_of: Sequence[ExternalAction], moved: ActionVelocities) -> float | None:
@@ -207,14 +284,18 @@ def _greatest_size(values: Iterable[Array | float]) -> float:
 
 
 def _second_route_error(
-    state: State, field: KinematicArrays, all_of: Sequence[ExternalAction], supplied: Array
+    state: State, all_of: Sequence[ExternalAction], supplied: Array, rubbing: Sequence[Reaction]
 ) -> float | None:
-    """How far the efforts are from those by virtual power, beside what each input would supply against every part."""
+    """How far the efforts are from those by virtual power, beside what each input would supply against every part.
+
+    Pairs that rub have a part of it, by their reactions.
+    """
     worst, others = None, [each for each in all_of if each.kind != "input"]
     for given, effort in zip(state.mechanism.inputs, supplied, strict=True):
-        unit = KinematicArrays(unit_rate_state(state, given.pair), field.shapes)
+        unit = KinematicArrays(unit_rate_state(state, given.pair), state.shapes)
         moved = action_velocities(unit, others)
-        parts = action_powers(unit, others, moved)
+        lost = [-pair_heat(unit, each) for each in rubbing]
+        parts = np.concatenate([action_powers(unit, others, moved), np.array(lost).reshape(-1, 1)])
         whole = float(np.abs(parts).sum())
         could = _power_scale(others, moved)
         beside = whole if whole > ZERO_COUPLE_TOLERANCE * could else could
@@ -234,6 +315,9 @@ def _single_position(found: Forces) -> Forces:
         couples = {link: only(couple) for link, couple in each.couples.items()}
         return each._replace(at=at, force=each.force[0], couple=only(each.couple), couples=couples)
 
+    def rub(each: PairFriction) -> PairFriction:
+        return PairFriction(only(each.sense), only(each.effort), only(each.heat), each.side[0])
+
     def act(each: ExternalAction) -> ExternalAction:
         return each._replace(at=each.at[0], force=each.force[0], couple=only(each.couple), power=only(each.power))
 
@@ -246,4 +330,9 @@ def _single_position(found: Forces) -> Forces:
         found.undetermined,
         found.proof,
         found.bodies,
+        {name: rub(each) for name, each in found.friction.items()},
+        None if found.frictionless is None else _single_position(found.frictionless),
+        tuple(map(_single_position, found.others)),
+        int(np.ravel(found.solution_count)[0]),
+        found.remarks,
     )

@@ -7,13 +7,15 @@ off: the other pairs carry that too.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
 from planar.dynamics.external_actions import KinematicArrays
-from planar.dynamics.virtual_work import BalanceFunction, VirtualWorkBalance
+from planar.dynamics.load_variation import load_factors
+from planar.dynamics.virtual_work import BalanceFunction, VirtualWorkBalance, balance_function
 from planar.foundation.arrays import Array, BoolArray
 from planar.foundation.geometry import Vector
 from planar.foundation.short_repr import short_repr
@@ -75,7 +77,7 @@ class ReactionSolver:
         self.coordinate_scale = np.tile([1.0, 1.0, 1.0 / self.arm], len(self.work.links))
         rows = balance.constraints.copy()
         for name, contact in self.contacts.items():
-            rows[:, self.pair_rows[name]] = self._unit_force_on_pair(self.pairs[name], contact, contact.drive_direction)
+            rows[:, self.pair_rows[name]] = self.unit_force_on_pair(self.pairs[name], contact, contact.drive_direction)
         held = np.concatenate([rows, balance.input_directions], axis=1) * self.coordinate_scale
         self.column_scale = np.maximum(np.linalg.norm(held, axis=2), 1e-300)  # (n, forces)
         self.equilibrium_matrix = (held / self.column_scale[:, :, None]).transpose(0, 2, 1)  # (n, links, forces)
@@ -93,21 +95,24 @@ class ReactionSolver:
         return tuple(name for name, pair in self.pairs.items() if pair.ties_angles and name not in self.contacts)
 
     def solve(self) -> ForceSolution:
-        """The efforts and reactions that balance loads and inertia."""
-        asked = (self.balance.inertia - self.balance.loads) * self.coordinate_scale
-        found, ways, balanced = self._solve_balance(asked[:, :, None])
+        """The efforts and reactions that balance loads and inertia, without friction."""
+        found, *_ = self._solve_balance(self.required_forces[:, :, None])
         pushed = {}
         for name, contact in self.contacts.items():
             pair, rows = self.pairs[name], self.pair_rows[name]
             press = np.abs(found[:, rows, 0] / self.column_scale[:, rows])
-            pushed[name] = (
-                self._unit_force_on_pair(pair, contact, contact.separation_direction)
-                * (contact.pressure_tangent * press)[:, :, None]
-            )
+            push = self.unit_force_on_pair(pair, contact, contact.separation_direction)[:, 0]
+            pushed[name] = push * (contact.pressure_tangent * press)
+        return self.solve_beside(pushed)
+
+    def solve_beside(self, pushed: Mapping[str, Array]) -> ForceSolution:
+        """The same where pairs by name do more than their constraints, known on the links' coordinates (n, links)."""
+        asked = self.required_forces
         if pushed:
-            off = sum(each[:, 0] for each in pushed.values()) * self.coordinate_scale
-            found, ways, balanced = self._solve_balance((asked - off)[:, :, None])
-        by_cause = {"": ways} | {name: self._unknown_wheel_forces(self.pairs[name]) for name in self.couple_only_pairs}
+            off = sum(pushed.values()) * self.coordinate_scale
+            asked = asked - off
+        found, ways, balanced = self._solve_balance(asked[:, :, None])
+        by_cause = {"": ways} | self._wheel_changes
         by_cause = {
             name: np.concatenate([each, *self._separation_changes(each)], axis=2) for name, each in by_cause.items()
         }
@@ -117,7 +122,7 @@ class ReactionSolver:
             name: self._pair_wrenches(pair, found[:, self.pair_rows[name]]) for name, pair in self.pairs.items()
         }
         for name, push in pushed.items():
-            also = self._wrenches_on_bodies(self.pairs[name], push[:, 0, :, None])
+            also = self._wrenches_on_bodies(self.pairs[name], push[:, :, None])
             wrenches[name] = {
                 link: Wrench(each.force + also[link].force, each.moment + also[link].moment)
                 for link, each in wrenches[name].items()
@@ -136,6 +141,25 @@ class ReactionSolver:
             because,
             balanced,
         )
+
+    @cached_property
+    def required_forces(self) -> Array:
+        """What pairs and inputs have to do together on the coordinates of the links (n, links), scaled as these are."""
+        return (self.balance.inertia - self.balance.loads) * self.coordinate_scale
+
+    @property
+    def inverse(self) -> Array:
+        """How forces (n, forces) follow from what they have to do together (n, forces, links)."""
+        return self._inverse_and_null_space[0]
+
+    @property
+    def undetermined_forces(self) -> Array:
+        """All ways in which equilibrium leaves open how forces are (n, forces, ways)."""
+        return np.concatenate([self._inverse_and_null_space[1], *self._wheel_changes.values()], axis=2)
+
+    @cached_property
+    def _wheel_changes(self) -> dict[str, Array]:
+        return {name: self._unknown_wheel_forces(self.pairs[name]) for name in self.couple_only_pairs}
 
     @cached_property
     def _inverse_and_null_space(self) -> tuple[Array, Array]:
@@ -165,7 +189,7 @@ class ReactionSolver:
         whole = np.maximum(np.abs(asked).max(axis=(1, 2), initial=0.0), np.abs(found).max(axis=(1, 2), initial=0.0))
         return found, ways, left <= BALANCE_TOLERANCE * whole
 
-    def _unit_force_on_pair(self, pair: Pair, contact: ToothContact, way: Vector) -> Array:
+    def unit_force_on_pair(self, pair: Pair, contact: ToothContact, way: Vector) -> Array:
         """A force of one along a way at a contact, on the second link, and its opposite on the first (n, 1, links)."""
         found = np.zeros((self.position_count, 1, self.work.link_coordinate_count))
         for link, sense in zip(pair.links, (-1.0, 1.0), strict=True):
@@ -212,7 +236,7 @@ class ReactionSolver:
             rows = self.pair_rows[name]
             press = np.linalg.norm(ways[:, rows] / self.column_scale[:, rows, None], axis=(1, 2))
             push = (
-                self._unit_force_on_pair(self.pairs[name], contact, contact.separation_direction)[:, 0]
+                self.unit_force_on_pair(self.pairs[name], contact, contact.separation_direction)[:, 0]
                 * (contact.pressure_tangent * press)[:, None]
             )
             found.append(-self._inverse_and_null_space[0] @ (push * self.coordinate_scale)[:, :, None])
@@ -248,3 +272,19 @@ def _pseudo_inverse(held: Array) -> tuple[Array, Array]:
     spare = np.ones((len(held), back.shape[2]), dtype=bool)
     spare[:, :few] = ~strong
     return inverse @ u.transpose(0, 2, 1)[:, :few], (back * spare[:, None, :])[:, :, spare.any(axis=0)]
+
+
+def fill_balance(field: KinematicArrays, time: Array | None, inertia: bool, at_rest: bool = False) -> ReactionSolver:
+    """The balance of every position of a state or a motion, as it moves or as if it stood still there."""
+    moving = field.moving
+    equations = balance_function(moving.mechanism)
+    body = equations.work
+    inputs = {name: np.broadcast_to(each.position, (field.position_count,)) for name, each in moving.inputs.items()}
+    q, q1, q2 = body.coordinates(moving)
+    if at_rest:
+        q1, q2 = np.zeros_like(q1), np.zeros_like(q2)
+    factors = load_factors(moving.mechanism, inputs, time, field.position_count)
+    balance = equations.evaluate(q, q1, q2, factors, body.initial_spring_turns(q[0]))
+    if not inertia:
+        balance = balance._replace(inertia=np.zeros_like(balance.inertia))
+    return ReactionSolver(equations, balance, field)

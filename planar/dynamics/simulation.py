@@ -11,6 +11,7 @@ import numpy as np
 
 from planar.document.first_argument import takes_mechanism
 from planar.dynamics.equations_of_motion import FULL_RANK_REGULARITY, EquationsOfMotion
+from planar.dynamics.friction.remarks import frictionless_remarks
 from planar.dynamics.imbalance import explain_loose_links
 from planar.dynamics.in_time.contact_phases import ContactEvent, make_phases
 from planar.dynamics.in_time.simulated_motion import simulated_motion
@@ -171,7 +172,9 @@ class _SimulationRun:
         q2 = np.array([self._accelerations(*each) for each in zip(time, q, q1, strict=True)])
         base = self.phases.base
         energies = np.array([base.energies(*each) for each in zip(time, q, q1, strict=True)])
-        made = simulated_motion(self.work, self.start, time, (q, q1, q2), tuple(self._freedom_remark()))
+        made = simulated_motion(
+            self.work, self.start, time, (q, q1, q2), (*self._freedom_remark(), *frictionless_remarks(self.mechanism))
+        )
         motion, lost = replace(made, outcome=outcome, reason=reason), self.phases.lost_at(time)
         impacts = tuple(self.phases.impacts)
         return Simulation(motion, energies[:, 0], energies[:, 1], rows[:, -1], lost, self.driven, impacts)

@@ -54,6 +54,7 @@ SCRIPTS = (
     "layers/polygons.js",
     "layers/centres.js",
     "layers/centrodes.js",
+    "solve/friction.js",
     "solve/forces.js",
     "layers/forces.js",
     "controls/forces_table.js",

@@ -83,6 +83,8 @@ def results():
     handed_in = AnswerList(7, (HandedInValue("Ann", 1, "velocity of C", 0.6, "m/s", 3),))
     marks = planar.mark_answers(bars, handed_in)
     yield from (marks, student := marks.students[0], student.values[0], planar.problem_variants(bars, 1)[0])
+    clamp = planar.cycle(planar.load("toggle-clamp"), steps=40)
+    yield from (planar.holding(clamp), planar.self_locking(clamp), planar.forces(clamp).friction["A"])
     yield from (planar.BadInput("here", "wrong"), planar.Unknown("no such point"), planar.Outcome.SOLVED)
     yield planar.NoAnswer(planar.Outcome.DEAD_POINT, "it stops", links=["a"])
 

@@ -9,6 +9,8 @@ from planar.foundation.geometry import Frame, Vector, frame_at
 from planar.foundation.jets import Jet
 from planar.model.mechanism import relative_motions
 from planar.model.pairs import MeasureKind, Pair, PairSample, pair_types
+from planar.model.pairs.rubbing import LoadLaw
+from planar.model.pairs.turning import TurningPair
 
 SAMPLES = [
     pytest.param(sample, id=f"{keyword}-{index}")
@@ -179,3 +181,35 @@ def test_a_pin_of_three_links_is_two_pairs_with_three_relative_motions():
     )
     assert [pair.links for pair in mechanism.pairs] == [("b", "a"), ("b", "c")]
     assert list(relative_motions(mechanism)) == ["P:b,a", "P:b,c", "P:a,c"]
+
+
+@every_sample
+def test_friction_acts_against_the_motion_that_the_pair_leaves(sample):
+    """What each contact is against has power in the sense that it says of the rate of the input position."""
+    names = "abc"[: len(sample.frames)]
+    frames, shapes = dict(zip(names, sample.frames, strict=True)), dict(zip(names, sample.shapes, strict=True))
+    pins = [TurningPair(p, ("c", w), (p, p), p) for p, w in ("Aa", "Bb")] if len(sample.other_entries) == 2 else []
+    contacts = sample.pair.rubbing_contacts(frames, shapes, [sample.pair, *pins], False)
+    assert bool(contacts) == sample.pair.has_friction or not sample.other_entries
+    at = coordinates(sample)
+    x = ca.SX.sym("x", at.size)
+    parts = ca.vertsplit(x)
+    both = ca.vertcat(*residual(sample, parts), drive(sample, parts))
+    slope = ca.Function("J", [x], [ca.jacobian(both, x)])(at).full()
+    moves = np.linalg.svd(slope[:-1])[2][len(sample.pair.residual_kinds) :]
+    rates = np.random.default_rng(3).normal(size=(20, len(moves))) @ moves
+    for contact in contacts:
+        assert all(load.factor > 0.0 for load in contact.loads)
+        if contact.law is LoadLaw.SIGNED:
+            continue
+        action, power = contact.action, np.zeros(20)
+        for link, sense in ((action.link, 1.0), (action.reaction_link, -1.0)):
+            vx, vy, turning = rates[:, 3 * names.index(link) : 3 * names.index(link) + 3].T
+            if action.point is None:
+                power += sense * turning
+                continue
+            arm = action.point - Vector(frames[link].x, frames[link].y)
+            speed = Vector(vx - turning * arm.y, vy + turning * arm.x)
+            power += sense * (speed.x * action.direction.x + speed.y * action.direction.y)
+        driven = rates @ slope[-1] * contact.rate_sense
+        assert (np.sign(power) == np.sign(driven)).all()

@@ -18,6 +18,7 @@ from planar.dynamics.load_attachment import attachments
 from planar.model.loads import Course, Load, Mass, Spring
 from planar.model.mechanism import Mechanism, relative_motions
 from planar.pages.data.page_data import page_data
+from tests.rubbing import with_friction
 
 pytestmark = pytest.mark.skipif(shutil.which("node") is None, reason="there is no node here to run a page's scripts")
 
@@ -35,7 +36,7 @@ console.log(JSON.stringify(forces.at(state, inputs, linkage.d, forces.wound(stat
 def on_page(mechanism: Mechanism, **moved: list[float]) -> dict[str, Any]:
     """What the page's scripts find, with its inputs moved to `u` or its dimensions changed to `d` (SI)."""
     data, functions = page_data(mechanism)
-    scripts = "".join(read_asset(f"solve/{name}.js") for name in ("singular", "stops", "linkage", "forces"))
+    scripts = "".join(read_asset(f"solve/{name}.js") for name in ("singular", "stops", "linkage", "friction", "forces"))
     ran = subprocess.run(
         ["node", "-e", f"{scripts}\n{functions}\n{SCRIPT}"],
         input=json.dumps([data, moved]),
@@ -104,7 +105,7 @@ def alike(found: dict[str, Any], mechanism: Mechanism) -> None:
         assert (np.abs(sums[0] - sums[1]) <= 2.0 * least).all()
 
 
-LOADED = ("000-P2", "two-stroke-engine", "physical-pendulum", "balanced-lamp", "gear-reducer")
+LOADED = ("toggle-clamp", "000-P2", "two-stroke-engine", "physical-pendulum", "balanced-lamp", "gear-reducer")
 
 
 @pytest.mark.parametrize("name", LOADED)
@@ -116,6 +117,24 @@ def test_the_forces_of_a_page_are_those_of_python(name):
 def test_masses_loads_and_springs_of_every_kind_act_on_a_page_as_in_python(name):
     mechanism = acted_on(planar.load(name))
     alike(on_page(mechanism), mechanism)
+
+
+@pytest.mark.parametrize(
+    "name", ["four-bar", "slider-crank", "whitworth", "gear-reducer", "rolling-wheel", "rack-steering"]
+)
+def test_friction_on_a_page_is_that_of_python(name):
+    mechanism = acted_on(with_friction(planar.load(name), np.random.default_rng(5), 0.1))
+    found = on_page(mechanism)
+    assert not found["why"] and planar.forces(planar.solve(mechanism)).friction
+    alike(found, mechanism)
+
+
+def test_much_friction_and_friction_of_unknown_forces_have_no_numbers_on_a_page():
+    belt = acted_on(with_friction(planar.load("belt-arm"), np.random.default_rng(5), 0.1))
+    assert "not determined: friction follows" in on_page(belt)["why"]
+    assert planar.forces(planar.solve(belt)).undetermined
+    jammed = planar.load("toggle-clamp").with_values({f"{pin}.pin_radius": 0.5 for pin in "OAB"})
+    assert "several solutions or none" in on_page(jammed)["why"]
 
 
 def test_forces_follow_the_input():

@@ -9,6 +9,7 @@ import numpy as np
 from planar.batch.named_results.design_forces import design_balance, position_chunks
 from planar.batch.named_results.design_frames import DesignFrames
 from planar.batch.named_results.result_rows import RequestedResults
+from planar.dynamics.friction.frictional_forces import solve_with_friction
 from planar.dynamics.reactions import input_efforts, pair_reaction
 from planar.model.mechanism import Mechanism
 
@@ -26,8 +27,8 @@ def find_forces(
 ) -> Found:
     """Efforts (N m, N) and reactions (N, with their couples, N m) of designs with `values` (designs,) by name.
 
-    `is_solved` (steps + 1, designs). NaN where positions or rates are not there, and for what equilibrium does not
-    tell.
+    `is_solved` (steps + 1, designs). NaN where positions or rates are not there, for what equilibrium does not tell,
+    and where friction jams.
     """
     shape, names = frames.design_shape, [given.pair for given in mechanism.inputs]
     found: Found = {("effort", name): np.full((1, *shape), np.nan) for name in results.efforts}
@@ -36,7 +37,7 @@ def find_forces(
     balance = design_balance(mechanism, tuple(values))
     for positions in position_chunks(mechanism, frames, values, is_solved):
         reactions, field = balance.solver(frames, positions, values)
-        solved = reactions.solve()
+        solved = solve_with_friction(reactions, field)
         at = slice(None), positions.steps, positions.designs
         supplied = input_efforts(solved)[0]
         for name in results.efforts:

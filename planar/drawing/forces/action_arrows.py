@@ -53,6 +53,14 @@ class ActionSymbol(NamedTuple):
         return f"{self.base}{'′' * self.primes}_{self.subscript}"
 
 
+class FrictionCircle(NamedTuple):
+    """The circle about a pin to which its force is tangent where it turns with friction: centre (2,), radius (m)."""
+
+    pair: str
+    centre: Array
+    radius: float
+
+
 class ActionArrow(NamedTuple):
     """A force (2,), N, at a place (2,), m, or a couple, N m, that a link feels; not a number where it is not told.
 
@@ -66,6 +74,8 @@ class ActionArrow(NamedTuple):
     couple: float | None = None
     at_mass_centre: bool = False
     "whether its place is a centre of mass"
+    friction_circle: FrictionCircle | None = None
+    "to which the force is tangent"
 
     @property
     def vector(self) -> Array:
@@ -120,8 +130,25 @@ def _reaction_arrows(forces: Forces, link: str, number: Mapping[str, str]) -> It
         first, second = pair.links
         sense, other = (1.0, first) if link == second else (-1.0, second)
         force, couple = reaction_symbols(number[link], number[other])
+        circle = _friction_circle(forces, name)
+        if circle is not None and np.isfinite([*pair.force, pair.couple]).all():
+            size = float(np.hypot(*pair.force))
+            off = float(pair.couple) / size * np.array([pair.force[1], -pair.force[0]]) / size
+            yield ActionArrow(
+                force, Pen.REACTION, pair.at + off, sense * np.asarray(pair.force), friction_circle=circle
+            )
+            continue
         yield ActionArrow(force, Pen.REACTION, pair.at, sense * np.asarray(pair.force))
         yield ActionArrow(couple, Pen.REACTION, pair.at, couple=sense * float(pair.couple))
+
+
+def _friction_circle(forces: Forces, name: str) -> FrictionCircle | None:
+    """The friction circle of a pair that turns with friction under a force."""
+    pair = next(each for each in forces.mechanism.pairs if each.name == name)
+    radius, rubbing, reaction = pair.friction_circle_radius(), forces.friction.get(name), forces.reactions[name]
+    if radius is None or rubbing is None or not rubbing.sense or reaction.at is None or not np.any(reaction.force):
+        return None
+    return FrictionCircle(name, reaction.at, float(np.asarray(radius)))
 
 
 def _load_arrows(forces: Forces, link: str, number: Mapping[str, str]) -> Iterator[ActionArrow]:

@@ -103,6 +103,7 @@ class _FreeBody:
             strokes.insert(0, self._line_of_action())
         for at in dict.fromkeys(self._action_point(each) for each in self.arrows if each.at_mass_centre):
             strokes += symbols.symbol_marks("mass centre", "centre of mass", Vector(*at))
+        strokes += self._friction_circles()
         clear, letters = Clearance.from_marks(strokes), list(_point_labels(self.scene, self.link))
         for each in self.arrows:
             arrow = self._force_arrow(each, clear)
@@ -136,6 +137,8 @@ class _FreeBody:
     def _notes(self) -> Iterator[str]:
         if self.is_two_force_member:
             yield "two-force member"
+        if any(each.friction_circle for each in self.arrows):
+            yield "forces at pins are tangent to the friction circles"
         if not self.arrows and not self.couples and not self.undetermined:
             yield "nothing acts on it"
         if self.arrows and self.is_too_small_for_polygon:
@@ -152,6 +155,15 @@ class _FreeBody:
         body = self.scene.bodies[self.link]
         places = (*body.joints, *(guide.foot for guide in body.guides), *body.dots, Vector(0.0, 0.0))
         return paper_point(self.scene.to_paper(self.link, places[0]))
+
+    def _friction_circles(self) -> list[Mark]:
+        """The circles to which forces are tangent, to the scale of lengths."""
+        circles = {each.friction_circle.pair: each.friction_circle for each in self.arrows if each.friction_circle}
+        per_mm = self.scene.scale.per_mm
+        return [
+            Circle(paper_point(each.centre / per_mm), each.radius / per_mm, Pen.PIN, f"friction circle {each.pair}")
+            for each in circles.values()
+        ]
 
     def _line_of_action(self) -> Polyline:
         ends = [Vector(*self._action_point(each)) for each in self.arrows]

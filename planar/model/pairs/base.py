@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
 from typing import Any, ClassVar, NamedTuple, Protocol, Self
 
 from planar.foundation.geometry import Frame, Vector
 from planar.foundation.jets import Scalar
 from planar.model.link_shapes import LinkShape
+from planar.model.pairs.rubbing import ContactLoad, Friction, LoadLaw
 from planar.model.pairs.symbols import DrawingMark
 
 LengthFormatter = Callable[[float], str]
@@ -40,6 +41,8 @@ class Pair(ABC):
     name: str
     links: tuple[str, str]
     """The two links that it joins."""
+    friction: Friction | None = field(default=None, kw_only=True)
+    """Coulomb's friction, of types that can have it."""
 
     keyword: ClassVar[str]
     """The key that marks the type in a mechanism file."""
@@ -76,6 +79,11 @@ class Pair(ABC):
     def bodies(self) -> tuple[str, ...]:
         """The links whose frames its formulas need: the two that it joins, and those that they are seen from."""
         return self.links
+
+    @property
+    def has_friction(self) -> bool:
+        """Whether it loses power as it moves."""
+        return self.friction is not None
 
     @abstractmethod
     def measure(self, shapes: Sequence[LinkShape]) -> Sequence[Scalar]:
@@ -116,6 +124,16 @@ class Pair(ABC):
         self, frames: Mapping[str, Frame], shapes: Mapping[str, LinkShape], all_pairs: Sequence[Pair]
     ) -> ToothContact | None:
         """Where its teeth touch, beside all pairs of its mechanism; None without teeth, or where that is not known."""
+        return None
+
+    def rubbing_contacts(
+        self, frames: Mapping[str, Frame], shapes: Mapping[str, LinkShape], all_pairs: Sequence[Pair], at_rest: bool
+    ) -> tuple[RubbingContact, ...]:
+        """How friction acts in it, in motion or with the coefficients at rest; nothing where it has none."""
+        return ()
+
+    def friction_circle_radius(self) -> Scalar | None:
+        """The radius (m) of the circle to which its force is tangent in motion; None where there is no such circle."""
         return None
 
     def drawing_marks(self, shapes: Mapping[str, LinkShape], all_pairs: Sequence[Pair]) -> tuple[DrawingMark, ...]:
@@ -211,6 +229,19 @@ class ToothContact(NamedTuple):
     drive_direction: Vector
     separation_direction: Vector
     pressure_tangent: float
+
+
+class RubbingContact(NamedTuple):
+    """How friction acts at a pair, in the world's axes.
+
+    It is against `action` (a force of one along a way, or a couple of one) where `rate_sense` times the rate of the
+    pair's input position is positive, for it where that is negative, and as great as `law` says of the `loads`.
+    """
+
+    action: EffortAction
+    loads: tuple[ContactLoad, ...]
+    law: LoadLaw
+    rate_sense: Scalar = 1.0
 
 
 class ExpandedEntry(NamedTuple):

@@ -19,6 +19,7 @@ from planar.model.pairs.base import (
     list_schema,
     schema_reference,
 )
+from planar.model.pairs.friction import read_efficiency
 from planar.model.pairs.symbols import BeltMark, DrawingMark, WheelMark
 from planar.model.pairs.wheel_pairs import WheelPair
 
@@ -91,7 +92,7 @@ class BeltPair(WheelPair):
             )
         if by != "ratio" and min(sizes) < 0.0:
             raise entry.error_at(by, "wheels that a loop runs round have sizes above zero")
-        return (cls(name, links, carrier, by, sizes, meet, crossed),)
+        return (cls(name, links, carrier, by, sizes, meet, crossed, efficiency=read_efficiency(entry)),)
 
     @classmethod
     def write(cls, group: Sequence[Self], quantity: QuantityWriter) -> dict[str, Any]:
@@ -105,7 +106,9 @@ class BeltPair(WheelPair):
             cls("loop", links, "c", "radii", (0.4, 0.1), (0.2, 0.6), True)._make_sample(
                 0.7, 2.5, {"radii": [0.4, 0.1], "mesh": {"a": 0.2, "b": 0.6}, "crossed": True}, 0.9
             ),
-            cls("loop", links, "c", "teeth", (20.0, 31.0))._make_sample(2.0, 0.3, {"teeth": [20, 31]}),
+            cls("loop", links, "c", "teeth", (20.0, 31.0), efficiency=0.95)._make_sample(
+                2.0, 0.3, {"teeth": [20, 31], "efficiency": 0.95}
+            ),
         )
 
 

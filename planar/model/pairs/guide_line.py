@@ -34,6 +34,8 @@ LINE_SCHEMA: Schema = {
     "additionalProperties": False,
 }
 """What JSON Schema says of a line."""
+BEARING_SIDES = ("bears on the right of its line", "bears on the left of its line")
+"""Of a force on the second link to the left of the line, and to its right."""
 LINE_NUMBER_KINDS = (MeasureKind.LENGTH, MeasureKind.LENGTH, MeasureKind.PURE, MeasureKind.PURE)
 """What `measure_line` gives: a point of the line, and the line's direction."""
 
@@ -131,6 +133,11 @@ class GuidedPair(Pair):
 
     def point_on_line(self) -> tuple[tuple[str, str], str] | None:
         return (self.links[1], self.point), self.links[0]
+
+    def _square_to_line(self, frames: Mapping[str, Frame], shapes: Mapping[str, LinkShape]) -> Vector:
+        """The unit vector to the left of the line, in the world's axes."""
+        way = frames[self.links[0]].rotate_to_world(self._line_in_link(shapes)[1])
+        return Vector(-way.y, way.x)
 
     def _line_in_link(self, shapes: Mapping[str, LinkShape]) -> tuple[Vector, Vector]:
         """A point of the line and its unit direction, in the axes of the first link."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import tan
 from typing import Any, ClassVar, Self
 
@@ -11,12 +11,14 @@ from planar.foundation.geometry import Frame, Vector, direction, frame_at
 from planar.foundation.jets import Scalar
 from planar.model.link_shapes import LinkShape
 from planar.model.pairs.base import (
+    EffortAction,
     EntryReader,
     LengthFormatter,
     MeasureKind,
     Pair,
     PairSample,
     QuantityWriter,
+    RubbingContact,
     Schema,
     ToothContact,
     described,
@@ -24,7 +26,9 @@ from planar.model.pairs.base import (
     sample_shape,
     schema_reference,
 )
+from planar.model.pairs.friction import EFFICIENCY_SCHEMA, has_loss, mesh_loss, read_efficiency, write_efficiency
 from planar.model.pairs.guide_line import LINE_NUMBER_KINDS, LINE_SCHEMA, GuidedPair, LinkLine, point_along_line
+from planar.model.pairs.rubbing import ContactLoad
 from planar.model.pairs.symbols import DrawingMark, PitchLineMark, WheelMark
 from planar.model.pairs.teeth import STANDARD_PRESSURE_ANGLE, TEETH_SCHEMA, read_pressure_angle, write_pressure_angle
 
@@ -41,6 +45,7 @@ class RackPair(GuidedPair):
     radius: float
     mesh_reference: tuple[float, float] = (0.0, 0.0)
     pressure_angle: float = STANDARD_PRESSURE_ANGLE
+    efficiency: float = 1.0
 
     keyword: ClassVar[str] = "rack"
     entry_description: ClassVar[str] = "a rack with its pinion: its name"
@@ -65,6 +70,7 @@ class RackPair(GuidedPair):
             "where the pinion stands along the line at one of its angles; left out: 0 meets 0",
         ),
         **TEETH_SCHEMA,
+        **EFFICIENCY_SCHEMA,
     }
     required_keys: ClassVar[tuple[str, ...]] = ("links", "line", "point", "radius")
     open_contact_hint: ClassVar[str] = "the centre lies left of the line for a radius above zero, right for one below"
@@ -80,6 +86,10 @@ class RackPair(GuidedPair):
         *(MeasureKind.LENGTH,) * 4,
         MeasureKind.TURNS,
     )
+
+    @property
+    def has_friction(self) -> bool:
+        return super().has_friction or has_loss(self.efficiency)
 
     def measure(self, shapes: Sequence[LinkShape]) -> Sequence[Scalar]:
         rack, pinion = shapes
@@ -110,6 +120,19 @@ class RackPair(GuidedPair):
         centre = frames[pinion].to_world(shapes[pinion].position(self.point))
         return ToothContact(centre - left * abs(self.radius), way, left, tan(self.pressure_angle))
 
+    def rubbing_contacts(
+        self, frames: Mapping[str, Frame], shapes: Mapping[str, LinkShape], all_pairs: Sequence[Pair], at_rest: bool
+    ) -> tuple[RubbingContact, ...]:
+        """The couple between rack and pinion that the teeth's efficiency asks for."""
+        if not has_loss(self.efficiency):
+            return ()
+        rack, pinion = self.links
+        way = frames[rack].rotate_to_world(self._line_in_link(shapes)[1])
+        # seen from the pinion's centre the rack runs back: it drives where it pushes the pinion that way
+        torque = ContactLoad(pinion, abs(self.radius), way * -1.0)
+        sense = -1.0 if self.radius > 0.0 else 1.0
+        return (mesh_loss(self.links, EffortAction(pinion, rack), torque, self.efficiency, sense),)
+
     def drawing_marks(self, shapes: Mapping[str, LinkShape], all_pairs: Sequence[Pair]) -> tuple[DrawingMark, ...]:
         rack, pinion = self.links
         wheel = WheelMark(self.name, pinion, shapes[pinion].position(self.point), abs(self.radius))
@@ -128,7 +151,7 @@ class RackPair(GuidedPair):
             mesh = entry.object_at("mesh")
             mesh.check_keys("displacement", "angle")
             meet = (mesh.quantity("displacement", "length"), mesh.counted_angle("angle"))
-        return (cls(name, links, line, point, radius, meet, read_pressure_angle(entry)),)
+        return (cls(name, links, line, point, radius, meet, read_pressure_angle(entry), read_efficiency(entry)),)
 
     @classmethod
     def write(cls, group: Sequence[Self], quantity: QuantityWriter) -> dict[str, Any]:
@@ -138,7 +161,8 @@ class RackPair(GuidedPair):
         if pair.mesh_reference != (0.0, 0.0):
             s0, a0 = pair.mesh_reference
             entry["mesh"] = {"displacement": quantity(s0, "length"), "angle": quantity(a0, "angle")}
-        return entry | write_pressure_angle(pair.pressure_angle, quantity)
+        entry |= write_pressure_angle(pair.pressure_angle, quantity)
+        return entry | write_efficiency(pair.efficiency, quantity)
 
     @classmethod
     def samples(cls) -> tuple[PairSample, ...]:
@@ -158,8 +182,11 @@ class RackPair(GuidedPair):
             }
             if meet != (0.0, 0.0):
                 entry["mesh"] = {"displacement": meet[0], "angle": meet[1]}
+            pair = cls("R", ("a", "b"), LinkLine("P", None, angle), "Q", radius, meet)
+            if radius < 0.0:
+                pair, entry["efficiency"] = replace(pair, efficiency=0.9), 0.9
             return PairSample(
-                cls("R", ("a", "b"), LinkLine("P", None, angle), "Q", radius, meet),
+                pair,
                 (sample_shape(P=through), sample_shape(Q=point)),
                 (rack, frame_at(at.x, at.y, pinion.angle)),
                 (slide, radius),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import pi
 from typing import Any, ClassVar, Self
 
@@ -11,30 +11,48 @@ from planar.foundation.geometry import Frame, Vector, direction, frame_at
 from planar.foundation.jets import Scalar
 from planar.model.link_shapes import LinkShape
 from planar.model.pairs.base import (
+    EffortAction,
     EntryReader,
     ExpandedEntry,
     MeasureKind,
     Pair,
     PairSample,
     QuantityWriter,
+    RubbingContact,
     Schema,
     described,
     list_schema,
     sample_shape,
     schema_reference,
 )
-from planar.model.pairs.guide_line import LINE_NUMBER_KINDS, LINE_SCHEMA, GuidedPair, LinkLine, point_along_line
+from planar.model.pairs.friction import FRICTION_SCHEMA, read_friction, write_friction
+from planar.model.pairs.guide_line import (
+    BEARING_SIDES,
+    LINE_NUMBER_KINDS,
+    LINE_SCHEMA,
+    GuidedPair,
+    LinkLine,
+    point_along_line,
+)
+from planar.model.pairs.rubbing import ContactLoad, Friction, LoadLaw
 from planar.model.pairs.symbols import DrawingMark, GuideMark, SliderMark
+
+TILTED_SIDES = ("tilted clockwise, bears at both ends", "tilted anticlockwise, bears at both ends")
+"""Of a couple on the second link anticlockwise, and clockwise."""
 
 
 @dataclass(frozen=True)
 class SlidingPair(GuidedPair):
     """A line of the first link, on which `point` of the second stays.
 
-    `turn` (rad) is the fixed angle from the line to the second link's x-axis.
+    `block_angle` (rad) is the fixed angle from the line to the second link's x-axis. The block is `guide_length` (m)
+    long, with the point in its middle, so that it bears at one end or both; `guide_width` (m) is how far its two faces
+    are apart, between which the line lies.
     """
 
     block_angle: float = 0.0
+    guide_length: float | None = None
+    guide_width: float | None = None
 
     keyword: ClassVar[str] = "sliding"
     entry_description: ClassVar[str] = "a sliding pair: its name"
@@ -53,6 +71,15 @@ class SlidingPair(GuidedPair):
         "turn": described(
             schema_reference("angle"),
             "the fixed angle, anticlockwise, from the line to the second link's x-axis; left out: 0",
+        ),
+        **FRICTION_SCHEMA,
+        "guide_length": described(
+            schema_reference("size"),
+            "how long the block is that slides, its point in the middle: tilted it bears at both ends; "
+            "left out: so long that tilting presses nothing",
+        ),
+        "guide_width": described(
+            schema_reference("size"), "how far the faces are apart between which it slides; left out: 0"
         ),
     }
     required_keys: ClassVar[tuple[str, ...]] = ("line",)
@@ -84,6 +111,29 @@ class SlidingPair(GuidedPair):
         off = second.to_world(Vector(*numbers[4:6])) - point_along_line(first, numbers, own[0])
         return (*off, second.angle - first.angle - numbers[6])
 
+    def rubbing_contacts(
+        self, frames: Mapping[str, Frame], shapes: Mapping[str, LinkShape], all_pairs: Sequence[Pair], at_rest: bool
+    ) -> tuple[RubbingContact, ...]:
+        """A force along the line, as both ends of the block press on the guide, and the couple of its two faces.
+
+        A force N square to the line and a couple M are N/2 - M/L and N/2 + M/L at the ends of a block of length L. The
+        sum of their sizes is that of N where the block bears on one side, of 2M/L where it bears on both, whichever is
+        greater. A face that presses by N lies half the width off the line: friction there has the couple mu N w/2.
+        """
+        if self.friction is None:
+            return ()
+        coefficient, sliding = self.friction.coefficient(at_rest), self.effort_action(frames, shapes)
+        square = self._square_to_line(frames, shapes)
+        loads = [ContactLoad(self.links[1], coefficient, square, sides=BEARING_SIDES)]
+        if self.guide_length is not None:
+            at_an_end = coefficient * 2.0 / self.guide_length
+            loads.append(ContactLoad(self.links[1], at_an_end, None, sliding.point, sides=TILTED_SIDES))
+        found = [RubbingContact(sliding, tuple(loads), LoadLaw.GREATEST)]
+        if self.guide_width is not None:
+            off = ContactLoad(self.links[1], coefficient * self.guide_width * 0.5, square)
+            found.append(RubbingContact(EffortAction(self.links[1], self.links[0]), (off,), LoadLaw.SIGNED))
+        return tuple(found)
+
     def drawing_marks(self, shapes: Mapping[str, LinkShape], all_pairs: Sequence[Pair]) -> tuple[DrawingMark, ...]:
         guide, block = self.links
         through, way = self._line_in_link(shapes)
@@ -100,7 +150,7 @@ class SlidingPair(GuidedPair):
             if entry.has("on"):
                 raise entry.error_at("on", "'on' goes with a 'block'; without one name two 'links' and a 'point'")
             return None
-        entry.check_keys("sliding", "on", "block", "line", "turn")
+        entry.check_keys(*(key for key in (cls.keyword, *cls.entry_schemas) if key not in ("links", "point")))
         on, point = entry.link("on"), entry.name("block")
         if not entry.links_with_point(point):
             raise entry.error_at("block", f"no link carries a point {point!r}, at which the block would be pinned")
@@ -114,7 +164,12 @@ class SlidingPair(GuidedPair):
         entry.check_keys(cls.keyword, *(key for key in cls.entry_schemas if key not in ("on", "block")))
         name, links = entry.name("sliding"), entry.two_links("links")
         line = LinkLine.read(entry, "line", links[0])
-        return (cls(name, links, line, entry.point("point", links[1]), entry.quantity("turn", "angle", 0.0)),)
+        turn, point = entry.quantity("turn", "angle", 0.0), entry.point("point", links[1])
+        sizes = {key: entry.quantity(key, "length") for key in ("guide_length", "guide_width") if entry.has(key)}
+        for key, size in sizes.items():
+            if size <= 0.0:
+                raise entry.error_at(key, "a guide must have a size above zero")
+        return (cls(name, links, line, point, turn, **sizes, friction=read_friction(entry)),)
 
     @classmethod
     def write(cls, group: Sequence[Self], quantity: QuantityWriter) -> dict[str, Any]:
@@ -123,14 +178,16 @@ class SlidingPair(GuidedPair):
         entry["point"] = pair.point
         if pair.block_angle != 0.0:
             entry["turn"] = quantity(pair.block_angle, "angle")
-        return entry
+        entry |= write_friction(pair.friction, quantity)
+        sizes = {"guide_length": pair.guide_length, "guide_width": pair.guide_width}
+        return entry | {key: quantity(size, "length") for key, size in sizes.items() if size is not None}
 
     @classmethod
     def samples(cls) -> tuple[PairSample, ...]:
         def sample(angle: float, turn: float, slide: float, first: Frame) -> PairSample:
             through, point = Vector(0.2, 0.5), Vector(-0.3, 0.1)
             pair = cls("slide", ("a", "b"), LinkLine("P", None, angle), "Q", turn)
-            entry = {
+            entry: dict[str, Any] = {
                 "sliding": "slide",
                 "links": ["a", "b"],
                 "line": {"through": "P", "angle": angle},
@@ -140,6 +197,9 @@ class SlidingPair(GuidedPair):
             second = frame_at(0.0, 0.0, first.angle + angle + turn)
             meet = first.to_world(through + direction(angle) * slide) - second.rotate_to_world(point)
             shapes = sample_shape(P=through), sample_shape(Q=point)
+            if turn == 0.0:
+                pair = replace(pair, guide_length=0.3, guide_width=0.1, friction=Friction(0.1))
+                entry |= {"friction": 0.1, "guide_length": 0.3, "guide_width": 0.1}
             return PairSample(pair, shapes, (first, frame_at(meet.x, meet.y, second.angle)), (slide,), entry)
 
         return (

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import Any, ClassVar, Self
 
@@ -17,12 +17,15 @@ from planar.model.pairs.base import (
     Pair,
     PairSample,
     QuantityWriter,
+    RubbingContact,
     Schema,
     described,
     list_schema,
     sample_shape,
     schema_reference,
 )
+from planar.model.pairs.friction import FRICTION_SCHEMA, read_friction, write_friction
+from planar.model.pairs.rubbing import ContactLoad, Friction, LoadLaw
 from planar.model.pairs.symbols import DrawingMark, PinMark
 
 
@@ -46,8 +49,9 @@ class TurningPair(Pair):
         "points": described(
             list_schema("name", 2), "the pin's point on each of the links, where they have other names for it"
         ),
-        "pin_radius": described(schema_reference("size"), "the pin's radius, for rubbing speeds"),
+        "pin_radius": described(schema_reference("size"), "the pin's radius, for rubbing speeds and friction"),
         "pin_diameter": described(schema_reference("size"), "the pin's diameter, in place of pin_radius"),
+        **FRICTION_SCHEMA,
     }
     entry_rule: ClassVar[Schema] = {"not": {"required": ["pin_radius", "pin_diameter"]}}
     is_lower_pair: ClassVar[bool] = True
@@ -81,6 +85,25 @@ class TurningPair(Pair):
     def results(self, position: Scalar, rate: Scalar, second: Scalar) -> dict[str, Scalar | None]:
         rubbing = None if self.radius is None else abs(rate) * self.radius
         return dict(zip(self.result_kinds, (position, rate, second, rubbing), strict=True))
+
+    def rubbing_contacts(
+        self, frames: Mapping[str, Frame], shapes: Mapping[str, LinkShape], all_pairs: Sequence[Pair], at_rest: bool
+    ) -> tuple[RubbingContact, ...]:
+        """A couple, as great as the force at the radius of the friction circle.
+
+        The force is tangent to that circle, of r sin(arctan mu). Of a pin of several links every other turns in the
+        first.
+        """
+        if self.friction is None or self.radius is None:
+            return ()
+        arm = self.radius * self.friction.angle_sine(at_rest)
+        loads = tuple(ContactLoad(self.links[1], arm, way) for way in (Vector(1.0, 0.0), Vector(0.0, 1.0)))
+        return (RubbingContact(self.effort_action(frames, shapes), loads, LoadLaw.RESULTANT),)
+
+    def friction_circle_radius(self) -> Scalar | None:
+        if self.friction is None or self.radius is None:
+            return None
+        return self.radius * self.friction.angle_sine(at_rest=False)
 
     def coincident_points(self) -> tuple[tuple[str, str], ...]:
         return tuple(zip(self.links, self.points, strict=True))
@@ -147,8 +170,12 @@ class TurningPair(Pair):
             raise entry.error_at(
                 "pin_radius" if entry.has("pin_radius") else "pin_diameter", "a pin must have a size above zero"
             )
+        friction = read_friction(entry)
+        if friction is not None and radius is None:
+            raise entry.error_at("friction", "the friction of a pin follows its size; give its 'pin_radius' too")
         ends = list(zip(links, points, strict=True))
-        return cls._pairs_between(pin, ends, [(0, k) for k in range(1, len(ends))], radius)
+        found = cls._pairs_between(pin, ends, [(0, k) for k in range(1, len(ends))], radius)
+        return tuple(replace(pair, friction=friction) for pair in found)
 
     @classmethod
     def write(cls, group: Sequence[Self], quantity: QuantityWriter) -> dict[str, Any]:
@@ -158,16 +185,18 @@ class TurningPair(Pair):
             entry["points"] = [point for _, point in ends]
         if group[0].radius is not None:
             entry["pin_radius"] = quantity(group[0].radius, "length")
-        return entry
+        return entry | write_friction(group[0].friction, quantity)
 
     @classmethod
     def samples(cls) -> tuple[PairSample, ...]:
         def sample(first: Vector, second: Vector, frames: tuple[Frame, Frame], radius: float | None) -> PairSample:
             shapes = sample_shape(P=first), sample_shape(P=second)
             pair = cls("P", ("a", "b"), ("P", "P"), "P", radius)
+            if radius is not None:
+                pair = replace(pair, friction=Friction(0.15, 0.2))
             entry: dict[str, Any] = {"turning": "P", "links": ["a", "b"]}
             if radius is not None:
-                entry["pin_radius"] = radius
+                entry |= {"pin_radius": radius, "friction": 0.15, "static_friction": 0.2}
             meet = frames[0].to_world(first) - frames[1].rotate_to_world(second)
             return PairSample(pair, shapes, (frames[0], frame_at(meet.x, meet.y, frames[1].angle)), (), entry)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import hypot
 from typing import Any, ClassVar, Self
 
@@ -19,12 +19,20 @@ from planar.model.pairs.base import (
     Pair,
     PairSample,
     QuantityWriter,
+    RubbingContact,
     Schema,
     described,
     list_schema,
     sample_shape,
     schema_reference,
 )
+from planar.model.pairs.friction import (
+    EFFICIENCY_SCHEMA,
+    has_loss,
+    mesh_loss,
+    write_efficiency,
+)
+from planar.model.pairs.rubbing import ContactLoad
 from planar.model.pairs.symbols import DrawingMark, WheelMark
 
 LARGEST_RATIO = 1e6
@@ -45,6 +53,7 @@ class WheelPair(Pair):
     size_kind: str
     sizes: tuple[float, ...]
     mesh_reference: tuple[float, float] = (0.0, 0.0)
+    efficiency: float = field(default=1.0, kw_only=True)
 
     entry_schemas: ClassVar[Mapping[str, Schema]] = {
         "links": described(list_schema("name", 2, 2) | {"uniqueItems": True}, "the first and the second wheel"),
@@ -81,6 +90,7 @@ class WheelPair(Pair):
             },
             "an angle of each wheel against the carrier, by the links' names, at which they meet; left out: 0 meets 0",
         ),
+        **EFFICIENCY_SCHEMA,
     }
     required_keys: ClassVar[tuple[str, ...]] = ("links",)
     entry_rule: ClassVar[Schema] = {"oneOf": [{"required": [key]} for key in SIZE_KEYS]}
@@ -104,6 +114,10 @@ class WheelPair(Pair):
     def ratio(self) -> Scalar:
         """The angular velocity of the second wheel by that of the first, both against the carrier."""
 
+    @property
+    def has_friction(self) -> bool:
+        return super().has_friction or has_loss(self.efficiency)
+
     def measure(self, shapes: Sequence[LinkShape]) -> Sequence[Scalar]:
         return (self.ratio(), *self.mesh_reference)
 
@@ -118,6 +132,19 @@ class WheelPair(Pair):
 
     def effort_action(self, frames: Mapping[str, Frame], shapes: Mapping[str, LinkShape]) -> EffortAction:
         return EffortAction(self.links[1], self.carrier)
+
+    def rubbing_contacts(
+        self, frames: Mapping[str, Frame], shapes: Mapping[str, LinkShape], all_pairs: Sequence[Pair], at_rest: bool
+    ) -> tuple[RubbingContact, ...]:
+        """What is lost of the power between the wheels, seen from the carrier."""
+        if not has_loss(self.efficiency):
+            return ()
+        wheel, pins = self.links[1], self._centre_pins(all_pairs)
+        centre = Vector(frames[wheel].x, frames[wheel].y)
+        if pins is not None:
+            centre = frames[wheel].to_world(shapes[wheel].position(pins[1][wheel]))
+        torque = ContactLoad(wheel, 1.0, None, centre)
+        return (mesh_loss(self.links, self.effort_action(frames, shapes), torque, self.efficiency),)
 
     def results(self, position: Scalar, rate: Scalar, second: Scalar) -> dict[str, Scalar | None]:
         return dict(zip(self.result_kinds, (position, rate, second), strict=True))
@@ -239,7 +266,7 @@ class WheelPair(Pair):
         if pair.mesh_reference != (0.0, 0.0):
             both = zip(pair.links, pair.mesh_reference, strict=True)
             entry["mesh"] = {link: quantity(angle, "angle") for link, angle in both}
-        return entry
+        return entry | write_efficiency(pair.efficiency, quantity)
 
     def _make_sample(
         self, carrier: float, first: float, more: Mapping[str, Any], apart: float | None = None

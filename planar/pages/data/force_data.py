@@ -16,52 +16,14 @@ from planar.dynamics.load_attachment import attachment_remarks
 from planar.dynamics.reactions import bearing_point
 from planar.dynamics.virtual_velocities import has_length_motion
 from planar.foundation.errors import NoAnswer
-from planar.foundation.geometry import Vector
 from planar.model.link_graph import link_numbers
 from planar.model.loads import Course, Load, Spring
 from planar.model.mechanism import Mechanism, relative_motions
 from planar.model.pairs import Pair
-from planar.model.pairs.base import ToothContact
+from planar.pages.data.balance_rows import BalanceRows
+from planar.pages.data.friction_data import contact_data
 from planar.reports.tables.forces.position_forces import undetermined_sentences
 from planar.results.motion import State
-
-
-class BalanceRows:
-    """Rows over the coordinates q, and places in the world, that the page's function `balance` gives."""
-
-    def __init__(self, work: LagrangianFunctions):
-        self.work, self.mechanism = work, work.mechanism
-        self.rows: list[ca.SX] = []
-        self.places: list[ca.SX] = []
-
-    def add(self, rows: ca.SX) -> list[int]:
-        """From which row on, and to which one."""
-        first = self.count
-        self.rows.append(rows)
-        return [first, self.count]
-
-    @property
-    def count(self) -> int:
-        """How many rows there are."""
-        return sum(each.size1() for each in self.rows)
-
-    def add_place(self, at: Vector) -> int:
-        """The number of a place."""
-        self.places.append(ca.vertcat(ca.SX(at.x), ca.SX(at.y)))
-        return len(self.places) - 1
-
-    def add_origin(self, link: str) -> int:
-        """The number of the place where a link's axes start."""
-        return self.add_place(self.work.frames[link].to_world(Vector(0.0, 0.0)))
-
-    def point_in_world(self, link: str, point: str) -> Vector:
-        """Where a point of a link is."""
-        return self.work.frames[link].to_world(self.work.shapes[link].position(point))
-
-    def add_contact_force(self, pair: Pair, contact: ToothContact, direction: Vector) -> int:
-        """The row of a force of one along a way at a contact, on the second link, and its opposite on the first."""
-        senses = dict(zip(pair.links, (-1.0, 1.0), strict=True))
-        return self.add(self.work.unit_action_on_links(senses, contact.pitch_point, direction).T)[0]
 
 
 def force_data(mechanism: Mechanism, d: ca.SX, state: State, unit: float) -> tuple[dict[str, Any], str] | None:
@@ -93,6 +55,7 @@ def force_data(mechanism: Mechanism, d: ca.SX, state: State, unit: float) -> tup
             for given in mechanism.inputs
         ],
         "acting": list(_action_data(rows)),
+        "contacts": list(contact_data(rows, state)),
         "springs": [_spring_angle_data(work, spring) for spring in mechanism.springs],
         "massive": bool(mechanism.masses),
         "timed": any(load.varies is not None and load.varies.input is None for load in mechanism.loads),
@@ -238,6 +201,6 @@ def _spring_angle_data(work: LagrangianFunctions, spring: Spring) -> dict[str, A
 def _undetermined_sentences(state: State) -> list[str]:
     """What equilibrium does not tell as the file has it, in sentences."""
     try:
-        return list(undetermined_sentences(forces(state)))
+        return list(undetermined_sentences(forces(state, friction=False)))
     except NoAnswer as refused:
         return [str(refused)]

@@ -121,7 +121,16 @@ class Forces {
     const solved = (right) => factors?.solve(right.map((each, k) => each * arms[k]))?.map((each, k) => each / norms[k]) ?? null;
     let found = solved(asked);
     const pushedOff = data.pairs.map(() => null);
-    if (found !== null && data.pairs.some(({ contact }) => contact)) {
+    const friction = found !== null && data.contacts.length ? solveFriction(this, (k) => this.links(k), w1.slice(0, many), asked, solved) : null;
+    if (friction?.why) return { why: friction.why };
+    if (friction) {
+      const left = Float64Array.from(asked);
+      for (const { pair, on } of friction.contacts) {
+        pushedOff[pair] ??= new Float64Array(many);
+        on.forEach((each, i) => { left[i] -= each; pushedOff[pair][i] += each; });
+      }
+      found = solved(left);
+    } else if (found !== null && data.pairs.some(({ contact }) => contact)) {
       const left = Float64Array.from(asked);
       let at = 0;
       data.pairs.forEach(({ contact }, k) => {

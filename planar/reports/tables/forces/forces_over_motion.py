@@ -20,7 +20,7 @@ from planar.model.wording import count_phrase, join_all_names
 from planar.reports.columns import ReportedSeries
 from planar.reports.fitted_table import FittedTable, plain_table
 from planar.reports.number_format import column_heading, format_or_zero, format_quantity, paragraphs
-from planar.reports.tables.forces import flywheels, loads, motors, unknown_loads
+from planar.reports.tables.forces import flywheels, friction, loads, motors, unknown_loads
 from planar.reports.tables.forces import position_forces as at_one
 from planar.reports.tables.motion import motion_heading, position_cell, position_heading, running_pair
 from planar.results.motion import Motion
@@ -41,15 +41,20 @@ def tables(
     duties = motors.motor_duties(forces)
     if duties:
         parts.append(motors.motors_table(forces, duties))
-    facts = [*_shaking_facts(forces, motion), *at_one.proof_facts(forces)]
+    facts = [*_shaking_facts(forces, motion), *friction.efficiency_facts(forces), *friction.holding_facts(forces)]
+    facts += at_one.proof_facts(forces)
     if wanted is not None:
         facts = [*flywheels.flywheel_facts(forces, wanted), *facts]
     if unknown is not None:
         facts = [*unknown_loads.unknown_load_facts(forces, unknown), *facts]
-    parts += [_reactions_table(forces, motion), paragraphs(facts)]
+    parts.append(_reactions_table(forces, motion))
+    if forces.friction:
+        parts.append(friction.friction_over_motion_table(forces))
+    parts.append(paragraphs(facts))
     notes = (
         *motors.motor_sentences(forces, duties),
         *_undetermined_sentences(forces, len(motion)),
+        *forces.remarks,
         *attachment_remarks(forces.mechanism),
         *motion.remarks,
     )
@@ -175,6 +180,7 @@ def force_series(forces: Forces) -> Iterable[ReportedSeries]:
     for name, each in forces.reactions.items():
         values = _reaction_values(each)
         yield ReportedSeries("reactions", name, {what: _REACTION_KINDS.get(what, "torque") for what in values}, values)
+    yield from friction.friction_series(forces)
     if at_one.has_inertia(forces):
         force, moment = forces.shaking
         kinds = {"force": "force", "moment": "torque"}
@@ -196,9 +202,10 @@ def run_facts(
 ) -> dict[str, Any]:
     """What is said of the whole motion, as JSON values; forces in a pair are on the second of the links `between`."""
     between = {name: list(each.links) for name, each in forces.reactions.items()}
-    remarks = [*attachment_remarks(forces.mechanism), *forces.moving.remarks]
+    remarks = [*forces.remarks, *attachment_remarks(forces.mechanism), *forces.moving.remarks]
     duties = motors.motor_duties(forces)
     told = {"motors": motors.record(duties)} if duties else {}
     told |= {} if wanted is None else {"flywheel": flywheels.record(wanted)}
     told |= {} if unknown is None else {"solved_for": unknown_loads.record(unknown)}
+    told |= friction.motion_record(forces)
     return {"between": between, "remarks": remarks, **told, **at_one.proof_record(forces)}

@@ -31,7 +31,7 @@ from planar.reports.number_format import (
     paragraphs,
     precision_text,
 )
-from planar.reports.tables.forces import loads, motors, unknown_loads
+from planar.reports.tables.forces import friction, loads, motors, unknown_loads
 from planar.reports.tables.forces import mechanical_advantage as ratios
 from planar.reports.tables.position import published_table
 
@@ -59,7 +59,11 @@ def tables(
     if inertia:
         parts.append(loads.actions_table("Inertia", inertia, units, greatest_moment_and_force(forces)[0]))
     most = sum(each.max_power for each in (*acting, *inertia))
-    parts += [_reactions_table(forces), paragraphs(_power_and_shaking(forces, most)), Text()]
+    parts.append(_reactions_table(forces))
+    if forces.friction:
+        parts.append(friction.friction_table(forces))
+    facts = (*_power_and_shaking(forces, most), *friction.efficiency_facts(forces), *friction.holding_facts(forces))
+    parts += [paragraphs(facts), Text()]
     if unknown is not None:
         parts += [paragraphs(unknown_loads.unknown_load_facts(forces, unknown)), Text()]
     told = ratios.all_advantages(advantages)
@@ -75,6 +79,7 @@ def tables(
         *undetermined_sentences(forces),
         *_time_remarks(forces),
         *dict.fromkeys(each.why for each in told if each.why),
+        *forces.remarks,
     )
     notes += (
         *motors.motor_sentences(forces, duties),
@@ -89,8 +94,8 @@ def tables(
 
 def equilibrium_text(forces: Forces) -> str:
     """What the equilibrium takes account of, and what is left out."""
-    kinds = {each.kind for each in forces.acting}
-    there = [kind for kind in ("inertia", "weight") if kind in kinds]
+    kinds = {each.kind for each in forces.acting} | ({"friction"} if forces.friction else set())
+    there = [kind for kind in ("inertia", "weight", "friction") if kind in kinds]
     absent = [name for name in ("inertia", "weight", "friction") if name not in there]
     return f"in equilibrium {f'with {join_all_names(there)}, ' if there else ''}without {join_all_names(absent)}"
 
@@ -192,7 +197,9 @@ def _power_text(forces: Forces, most: float) -> str:
     if forces.proof.power is None:
         return "nothing that is loaded moves at the inputs' speeds, so that there is none"
     if has_inertia(forces):
-        parts = ((supplied, "from the inputs"), (-taken, "from the loads"), (stored, "from the links' inertia"))
+        parts = [(supplied, "from the inputs"), (-taken, "from the loads"), (stored, "from the links' inertia")]
+        if forces.friction:
+            parts.append((-float(forces.heat_flow), "from friction"))
         return ", ".join(f"{told(value)} {source}" for value, source in parts)
     if supplied < -ROUNDING_RATIO * most:
         return f"the loads drive: {told(-taken)} from the loads, {told(-supplied)} taken up by the inputs"
@@ -273,10 +280,26 @@ def record(
         **({"shaking": {"force": force.tolist(), "moment": float(moment)}} if has_inertia(forces) else {}),
         "power": {"in": _finite_or_none(float(forces.power_in)), "out": forces.power_out},
         "advantage": ratios.record(advantages),
+        **friction.record(forces),
         **proof_record(forces),
-        "remarks": [*attachment_remarks(forces.mechanism), *forces.moving.remarks],
+        "remarks": [*attachment_remarks(forces.mechanism), *forces.remarks, *forces.moving.remarks],
     }
+    if forces.others:
+        found["solutions"] = [_solution_record(each) for each in forces.solutions]
     return found | ({"published": [each.record() for each in comparisons]} if comparisons else {})
+
+
+def _solution_record(forces: Forces) -> dict[str, Any]:
+    """One of several solutions as a JSON value: what differs between them."""
+    return {
+        "inputs": {
+            name: {effort_name_and_unit(forces, name)[0]: _finite_or_none(float(effort))}
+            for name, effort in forces.inputs.items()
+        },
+        "reactions": {name: _reaction_record(each) for name, each in forces.reactions.items()},
+        **friction.record(forces),
+        **proof_record(forces),
+    }
 
 
 def proof_record(forces: Forces) -> dict[str, Any]:

@@ -1,0 +1,1 @@
+"""Forces with Coulomb's friction: what it depends on, every solution, and what it holds at rest."""
