@@ -102,15 +102,9 @@ def forces(
     refuse_overwriting(model, output)
     require_loads(mechanism)
     given = None if effort is None else _parse_effort(mechanism, effort)
-    if (
-        given is not None
-        and solve_for is None
-        and not (any(p.has_friction for p in mechanism.pairs) and mechanism.loads)
-    ):
-        raise BadInput(
-            "--effort",
-            "this goes with the load that is solved for, by --solve-for, or with loads at rest held by friction",
-        )
+    held = mechanism.loads and any(pair.has_friction for pair in mechanism.pairs)
+    if given is not None and solve_for is None and not held:
+        raise BadInput("--effort", "this goes with --solve-for, or with loads that friction holds, and there are none")
     taken = (not static, not frictionless)
     if whole:
         _forces_over_motion(mechanism, taken, as_json, output, (fluctuation, rim_radius, solve_for, given), course)
