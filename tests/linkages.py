@@ -13,9 +13,11 @@ from hypothesis import strategies as st
 from planar.document import files
 from planar.foundation.errors import NoAnswer, Outcome
 from planar.foundation.geometry import Frame, Vector, direction, frame_at
+from planar.model.input_laws import HarmonicRise, Polynomial345Rise
 from planar.model.link_shapes import link_shape
 from planar.model.mechanism import Mechanism
 from planar.model.pairs import Pair, pair_types
+from planar.model.pairs.lift_law import LiftLaw
 from planar.results.motion import State
 from planar.solving.position import PositionSolver
 from planar.solving.rates.regularity import regularity
@@ -117,6 +119,22 @@ class Builder:
 
     def chain(self, first: str, second: str) -> str:
         return self._wheels("chain", first, second)
+
+    def cam(self, first: str, second: str) -> str:
+        """A law of lift between a link and one that swings, both seen from a third."""
+        name, carrier = (
+            f"K{len(self.pairs)}",
+            str(self.rng.choice([k for k in self.frames if k not in (first, second)])),
+        )
+        way, part = float(self.rng.uniform(-0.6, 0.6)), float(self.rng.uniform(1.0, 3.0))
+        law = LiftLaw((Polynomial345Rise(part, abs(way)), HarmonicRise(2.0 * np.pi - part, -abs(way))))
+        start = float(self.rng.uniform(-np.pi, np.pi))
+        angle = {link: self.frames[link].angle for link in (first, second, carrier)}
+        rest = angle[second] - angle[carrier] - law.lift(angle[first] - angle[carrier] - start, law.measure())
+        pieces = [{"motion": each.motion, "by": each.by, "in": each.duration} for each in law.pieces]
+        entry = {"cam": name, "links": [first, second], "carrier": carrier, "law": pieces, "start": start, "rest": rest}
+        self.pairs.append(entry)
+        return name
 
     def higher(self, first: str, second: str) -> int:
         """Any pair that prevents one motion only, with what it needs beside it; how many motions they prevent."""

@@ -107,7 +107,8 @@ class Jet:
     def _cos_sin_derivatives(self) -> tuple[list[Scalar], list[Scalar]]:
         """Derivatives of cos and sin: c' = -s a', s' = c a', expanded by Leibniz."""
         a = self.parts
-        c, s = [np.cos(a[0])], [np.sin(a[0])]
+        is_symbol = hasattr(a[0], "is_symbolic")
+        c, s = ([a[0].cos()], [a[0].sin()]) if is_symbol else ([np.cos(a[0])], [np.sin(a[0])])
         for n in range(1, len(a)):
             terms = [(comb(n - 1, k) * a[n - k], k) for k in range(n)]
             c.append(-sum(w * s[k] for w, k in terms))
@@ -141,6 +142,15 @@ class TermSizes(Jet):
     def __mul__(self, other: Scalar) -> TermSizes:
         return TermSizes(*super().__mul__(other if isinstance(other, TermSizes) else abs(other)).parts)
 
+    def cos(self) -> TermSizes:
+        """1, and the sizes of the derivatives: those of c' = -s a', s' = c a' are the same."""
+        a = self.parts
+        found: list[Scalar] = [1.0]
+        for n in range(1, len(a)):
+            found.append(sum(comb(n - 1, k) * a[n - k] * found[k] for k in range(n)))
+        return TermSizes(*found)
+
+    sin = cos
     __sub__ = __radd__ = __rsub__ = __add__
     __rmul__ = __mul__
 

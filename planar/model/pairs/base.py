@@ -339,5 +339,11 @@ class EntryReader(Protocol):
     def object_at(self, key: str) -> EntryReader:
         """The object under this key."""
 
+    def list_items(self, key: str) -> Sequence[EntryReader]:
+        """The items of the list under this key; none where it is left out."""
+
+    def choice(self, key: str, words: tuple[str, ...]) -> str | None:
+        """One of some words; None where the key is left out."""
+
     def error_at(self, key: str | None, sentence: str) -> Exception:
         """The error that says this of the place."""

@@ -75,4 +75,21 @@ class BeltMark(NamedTuple):
     crossed: bool
 
 
-DrawingMark = PinMark | GuideMark | SliderMark | SlotMark | WheelMark | PitchLineMark | BeltMark
+class CamMark(NamedTuple):
+    """A cam: its profile, points of `link`, about its `centre`; and the face of its follower `follower_link`.
+
+    A roller of this radius about `middle`, else a flat face through there whose normal, away from the cam, is
+    `face_normal`, else a point.
+    """
+
+    name: str
+    link: str
+    centre: Vector
+    profile: tuple[Vector, ...]
+    follower_link: str
+    middle: Vector
+    roller_radius: float
+    face_normal: Vector | None
+
+
+DrawingMark = PinMark | GuideMark | SliderMark | SlotMark | WheelMark | PitchLineMark | BeltMark | CamMark
