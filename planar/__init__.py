@@ -8,6 +8,8 @@ from planar.foundation.revision import Revisable
 
 if TYPE_CHECKING:
     from planar import plot
+    from planar.analysis.cams.base_circle import BaseCircle, least_base_circle
+    from planar.analysis.cams.cam_profile import CamProfile, cam_profile
     from planar.analysis.centres.centres import Centre, Centres, centres
     from planar.analysis.centres.centrodes import Centrodes, centrodes
     from planar.analysis.centres.curvature import Curvature, curvature
@@ -50,6 +52,7 @@ if TYPE_CHECKING:
         CycloidalRise,
         HarmonicRise,
         ModifiedTrapezoidalRise,
+        ParabolicRise,
         Polynomial345Rise,
         Polynomial4567Rise,
         TrapezoidalRise,
@@ -62,8 +65,11 @@ if TYPE_CHECKING:
     from planar.model.mechanism import Drive, FileUnits, Input, Mechanism
     from planar.model.pairs.base import Pair
     from planar.model.pairs.belt import BeltPair, ChainPair
+    from planar.model.pairs.cam import CamPair
     from planar.model.pairs.gear import GearPair
     from planar.model.pairs.guide_line import LinkLine
+    from planar.model.pairs.lift_law import LiftLaw
+    from planar.model.pairs.profiled import CamShape
     from planar.model.pairs.rack import RackPair
     from planar.model.pairs.sliding import SlidingPair
     from planar.model.pairs.slot import SlotPair
@@ -87,8 +93,12 @@ _ROOMS = {
     "Area": "analysis.motion.coupler_area",
     "At": "model.mechanism",
     "BadInput": "foundation.errors",
+    "BaseCircle": "analysis.cams.base_circle",
     "BeltPair": "model.pairs.belt",
     "Branch": "assemblies.circuits.circuits",
+    "CamPair": "model.pairs.cam",
+    "CamProfile": "analysis.cams.cam_profile",
+    "CamShape": "model.pairs.profiled",
     "Centre": "analysis.centres.centres",
     "Centres": "analysis.centres.centres",
     "Centrodes": "analysis.centres.centrodes",
@@ -117,6 +127,7 @@ _ROOMS = {
     "Input": "model.mechanism",
     "InputLaw": "model.input_laws.input_law",
     "Inspection": "analysis.identity.inspection",
+    "LiftLaw": "model.pairs.lift_law",
     "Limit": "results.records",
     "Link": "model.mechanism",
     "LinkLine": "model.pairs.guide_line",
@@ -133,6 +144,7 @@ _ROOMS = {
     "NoAnswer": "foundation.errors",
     "Outcome": "foundation.errors",
     "Pair": "model.pairs.base",
+    "ParabolicRise": "model.input_laws.cam_rises",
     "PinnedLinkages": "model.pin_linkages",
     "PlanarError": "foundation.errors",
     "Point": "model.mechanism",
@@ -166,6 +178,7 @@ _ROOMS = {
     "answers": "analysis.motion.answers",
     "area": "analysis.motion.coupler_area",
     "build": "document.builder",
+    "cam_profile": "analysis.cams.cam_profile",
     "centre_of": "analysis.centres.two_directions",
     "centres": "analysis.centres.centres",
     "centrodes": "analysis.centres.centrodes",
@@ -184,16 +197,17 @@ _ROOMS = {
     "greatest": "analysis.motion.extremes",
     "harmonics": "analysis.motion.harmonics",
     "inspect": "analysis.identity.inspection",
+    "least_base_circle": "analysis.cams.base_circle",
     "load": "document.files",
     "loads": "document.files",
-    "mobility": "analysis.identity.mobility",
     "mark_answers": "analysis.classroom.marking",
+    "mobility": "analysis.identity.mobility",
     "modes": "assemblies.modes",
-    "problem_variants": "analysis.classroom.variants",
     "pinned": "model.pin_linkage",
     "pinned_linkages": "model.pin_linkages",
     "plot": "plot",
     "prepared": "batch.prepared",
+    "problem_variants": "analysis.classroom.variants",
     "schema": "document.schema",
     "simulate": "dynamics.simulation",
     "solve": "solving.position",
@@ -217,8 +231,12 @@ __all__ = [
     "Area",
     "At",
     "BadInput",
+    "BaseCircle",
     "BeltPair",
     "Branch",
+    "CamPair",
+    "CamProfile",
+    "CamShape",
     "Centre",
     "Centres",
     "Centrodes",
@@ -247,6 +265,7 @@ __all__ = [
     "Input",
     "InputLaw",
     "Inspection",
+    "LiftLaw",
     "Limit",
     "Link",
     "LinkLine",
@@ -263,6 +282,7 @@ __all__ = [
     "NoAnswer",
     "Outcome",
     "Pair",
+    "ParabolicRise",
     "PinnedLinkages",
     "PlanarError",
     "Point",
@@ -296,6 +316,7 @@ __all__ = [
     "answers",
     "area",
     "build",
+    "cam_profile",
     "centre_of",
     "centres",
     "centrodes",
@@ -314,6 +335,7 @@ __all__ = [
     "greatest",
     "harmonics",
     "inspect",
+    "least_base_circle",
     "load",
     "loads",
     "mark_answers",

@@ -17,8 +17,7 @@ from typing import NamedTuple
 import casadi as ca
 import numpy as np
 
-from planar.equations.piecewise_rows import is_piecewise_in
-from planar.equations.symbolic_equations import Block, ConstraintEquations
+from planar.equations.symbolic_equations import Block, ConstraintEquations, is_piecewise_in
 from planar.foundation.arrays import Array
 from planar.foundation.generic_numbers import generic_numbers
 from planar.model.pairs import MeasureKind

@@ -29,8 +29,7 @@ import numpy as np
 
 from planar.assemblies.polynomial.gear_powers import AngleArguments, GearPowers, angle_arguments, gear_powers
 from planar.equations.casadi_call import BufferedFunction
-from planar.equations.piecewise_rows import is_piecewise_in
-from planar.equations.symbolic_equations import Block, ConstraintEquations
+from planar.equations.symbolic_equations import Block, ConstraintEquations, is_piecewise_in
 from planar.foundation.angles import wrap_angle
 from planar.foundation.arrays import Array, ComplexArray, IntArray
 from planar.model.pairs import MeasureKind

@@ -16,8 +16,7 @@ import numpy as np
 from numpy.polynomial import Polynomial
 
 from planar.foundation.arrays import Array, BoolArray
-from planar.foundation.jets import Scalar, sin
-from planar.foundation.piecewise import value_between
+from planar.foundation.jets import Scalar, sin, value_between
 from planar.model.input_laws.segment import LawSegment, SegmentKey
 
 
@@ -30,6 +29,7 @@ class CamRise(LawSegment):
 
     duration: float
     by: float
+    is_lift: ClassVar[bool] = True
     keys: ClassVar[Mapping[str, SegmentKey]] = {
         "by": SegmentKey("by", "position", "how far the input goes, from rest to rest"),
         "in": SegmentKey("duration", "time", "how long it takes"),

@@ -6,14 +6,13 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import pi
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from planar.foundation.jets import Jet, Scalar
-from planar.foundation.piecewise import part_of_piece, value_between, within_turn
-from planar.model.input_laws import SEGMENT_TYPES, ConstantSpeedSegment, DwellSegment, LawSegment
-from planar.model.input_laws.cam_rises import CamRise
-from planar.model.loads import MAX_LAW_ITEMS
+from planar.foundation.jets import Jet, Scalar, part_of_piece, value_between, within_turn
 from planar.model.pairs.base import EntryReader, MeasureKind, QuantityWriter, Schema, described, schema_reference
+
+if TYPE_CHECKING:
+    from planar.model.input_laws import LawSegment
 
 CLOSED_TOLERANCE = 1e-9
 """Of a turn, and of the greatest rise: what rounding leaves of them where a law closes."""
@@ -21,16 +20,21 @@ MAX_LIFT_PIECES = 100
 """Each is a part of every formula."""
 LEFT_OUT_KEYS = frozenset({"speed"})
 """Of motions in time: a lift goes by its way."""
-LIFT_MOTIONS = {
-    motion: kind
-    for motion, kind in SEGMENT_TYPES.items()
-    if issubclass(kind, CamRise | DwellSegment | ConstantSpeedSegment)
-}
-"""The motions of which a lift is made, by their names in files; what takes time there takes an angle here."""
 
 
-def _piece_schema(motion: str) -> Schema:
-    kind = LIFT_MOTIONS[motion]
+def lift_motions() -> dict[str, type[LawSegment]]:
+    """The motions of which a lift is made, by their names in files; what takes time there takes an angle here."""
+    from planar.model.input_laws import SEGMENT_TYPES  # which few files have
+
+    return {motion: kind for motion, kind in SEGMENT_TYPES.items() if kind.is_lift}
+
+
+def lift_schema() -> Schema:
+    """What JSON Schema says of a piece of lift."""
+    return {"oneOf": [_piece_schema(motion, kind) for motion, kind in lift_motions().items()]}
+
+
+def _piece_schema(motion: str, kind: type[LawSegment]) -> Schema:
     properties: Schema = {"motion": described({"const": motion}, kind.description.replace("the input", "the follower"))}
     words = {
         "in": ("angle", "the angle by which the cam turns meanwhile"),
@@ -49,7 +53,7 @@ def _piece_keys(kind: type[LawSegment]) -> list[str]:
 
 LIFT_SCHEMA: Schema = {
     "type": "array",
-    "items": {"oneOf": [_piece_schema(motion) for motion in LIFT_MOTIONS]},
+    "items": schema_reference("lift"),
     "minItems": 1,
     "maxItems": MAX_LIFT_PIECES,
 }
@@ -109,7 +113,7 @@ class LiftLaw:
         total: Scalar = 0.0
         for k, ((piece, start, inverse, before, way, own), end) in enumerate(zip(rows, starts, strict=True)):
             value = before
-            if not isinstance(piece, DwellSegment):
+            if hasattr(piece, "by"):
                 part = part_of_piece((at - start) * inverse)
                 value = _fraction(piece, own, part) * way + before
             total = value_between(at, start if k else None, end, value) + total
@@ -154,16 +158,17 @@ def _fields(piece: LawSegment) -> tuple[str, ...]:
 
 def _fraction(piece: LawSegment, own: Sequence[Scalar], x: Scalar) -> Scalar:
     """The part of its way that a piece has gone after the part x of its angle."""
-    if not isinstance(piece, CamRise):
+    if not hasattr(piece, "fraction"):  # constant speed
         return x
     changed: Mapping[str, Any] = dict(zip(_fields(piece), own, strict=True))
-    return (replace(piece, **changed) if changed else piece).fraction(x)
+    changed_piece: Any = replace(piece, **changed) if changed else piece  # type: ignore[type-var]
+    return changed_piece.fraction(x)
 
 
 def read_lift(entry: EntryReader, key: str, kind: str) -> LiftLaw:
     """The lift under a key of an entry, lengths or angles as `kind` says."""
     places = entry.list_items(key)
-    if len(places) > MAX_LAW_ITEMS:
+    if len(places) > MAX_LIFT_PIECES:
         raise entry.error_at(key, f"a lift has at most {MAX_LIFT_PIECES} pieces")
     law = LiftLaw(tuple(_read_piece(place, kind) for place in places))
     wrong = law.find_problem()
@@ -173,10 +178,11 @@ def read_lift(entry: EntryReader, key: str, kind: str) -> LiftLaw:
 
 
 def _read_piece(place: EntryReader, kind: str) -> LawSegment:
-    motion = place.choice("motion", tuple(LIFT_MOTIONS))
+    known = lift_motions()
+    motion = place.choice("motion", tuple(known))
     if motion is None:
-        raise place.error_at(None, f"the key 'motion' is missing; there are {', '.join(LIFT_MOTIONS)}")
-    found = LIFT_MOTIONS[motion]
+        raise place.error_at(None, f"the key 'motion' is missing; there are {', '.join(known)}")
+    found = known[motion]
     place.check_keys("motion", *_piece_keys(found))
     values: dict[str, float] = {"duration": place.quantity("in", "angle")}
     if "by" in found.keys:  # keys of a file, by the class
