@@ -15,7 +15,8 @@ FOLLOWERS = ("roller", "point", "flat", "swinging roller", "swinging flat")
 def cam_document(follower: str, *, clockwise: bool = False, **more: Any) -> dict[str, Any]:
     """A cam about the origin that turns at 10 rad/s, base circle 40 mm; `more` changes its pair's entry."""
     swings, flat = follower.startswith("swinging"), follower.endswith("flat")
-    law = LAW if not swings else [piece | {"by": piece["by"] * 1.0} if "by" in piece else piece for piece in LAW]
+    part = 0.5 if swings and flat else 1.0
+    law = [piece | {"by": piece["by"] * part} if "by" in piece else piece for piece in LAW]
     entry: dict[str, Any] = {"cam": "K", "links": ["cam", "follower"], "law": law, "start": 25}
     entry |= {"point": "P", "centre": "O", "base_radius": 40}
     if clockwise:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from math import pi
 from typing import Any, NamedTuple
 
-from planar.foundation.geometry import Frame, Vector, direction
+from planar.foundation.geometry import Frame, Vector, direction, frame_at
 from planar.foundation.jets import Scalar
 from planar.model.link_shapes import LinkShape
 from planar.model.pairs.base import EntryReader, LengthFormatter, MeasureKind, Pair, QuantityWriter, ToothContact
@@ -18,13 +18,16 @@ from planar.model.pairs.cam_follower import (
     find_contact,
     rest_position,
     rest_problem,
+    turn_left,
 )
 from planar.model.pairs.guide_line import LinkLine
 from planar.model.pairs.lift_law import LiftLaw
 from planar.model.pairs.symbols import CamMark, DrawingMark
 
-DRAWN_POINTS = 361
+DRAWN_POINTS = 121
 """Of a profile, in drawings."""
+DRAWN_FACE_RATIO = 1.15
+"""How long a flat face is drawn, of how far the contact goes along it."""
 SIDES = ("left", "right")
 SHAPE_KEYS = ("centre", "base_radius", "roller_radius", "flat", "pivot", "side", "grooved")
 
@@ -156,18 +159,41 @@ class ProfiledPair(Pair):
         """The profile, and the follower's face, where there is a shape."""
         if self.shape is None:
             return ()
-        own, cam, follower = [shapes[body] for body in self.bodies], *self.links
-        at_centre = shapes[cam].position(self.shape.centre)
-        profile = []
+        assert self.point is not None
+        own, (cam, follower) = [shapes[body] for body in self.bodies], self.links
+        at_centre, middle = shapes[cam].position(self.shape.centre), shapes[follower].position(self.point)
+        along_face = self._along_face(shapes, all_pairs)
+        profile, face = [], [middle]
         for k in range(DRAWN_POINTS):
             angle = 2.0 * pi * k / (DRAWN_POINTS - 1)
             touching = self.contact(own, angle)
             assert touching is not None
             profile.append(at_centre + touching.point.rotate(direction(-(self.start + self.sense * angle))))
-        assert self.point is not None
-        normal = None if self.shape.flat is None else direction(self.shape.flat)
-        middle = shapes[follower].position(self.point)
-        return (CamMark(self.name, cam, at_centre, tuple(profile), follower, middle, self.shape.roller_radius, normal),)
+            if along_face is not None:
+                reach = turn_left(touching.normal).dot(touching.point - touching.middle)
+                face.append(middle + along_face * (DRAWN_FACE_RATIO * reach))
+        radius = self.shape.roller_radius
+        return (CamMark(self.name, cam, at_centre, tuple(profile), follower, middle, radius, tuple(face[1:] and face)),)
+
+    def _along_face(self, shapes: Mapping[str, LinkShape], all_pairs: Sequence[Pair]) -> Vector | None:
+        """The direction of a flat face, to the left of its normal, in the follower's axes; None where it is not."""
+        assert self.shape is not None
+        if self.shape.flat is None:
+            return None
+        along = turn_left(direction(self.shape.flat))
+        if self.line is None:
+            return along
+        line = Vector(*self.line.measure_line(shapes[self.carrier])[2:])
+        return along.rotate(line).rotate(direction(-1.0 * self._follower_turn(shapes, all_pairs)))
+
+    def _follower_turn(self, shapes: Mapping[str, LinkShape], all_pairs: Sequence[Pair]) -> Scalar:
+        """The fixed angle of a sliding follower against the carrier (rad), as the pair that guides it has it."""
+        guide = next(pair for pair in all_pairs if _slides(pair, self.links[1], self.carrier))
+        still = frame_at(0.0, 0.0, 0.0)
+        numbers = guide.measure([shapes[body] for body in guide.bodies])
+        open_by = guide.residual([still] * len(guide.bodies), numbers, [0.0] * len(guide.coordinate_kinds))
+        turned = -1.0 * open_by[guide.residual_kinds.index(MeasureKind.ANGLE)]
+        return turned if guide.links[0] == self.carrier else -1.0 * turned
 
 
 def _is_pinned(pairs: Sequence[Pair], link: str, other: str, point: str) -> bool:

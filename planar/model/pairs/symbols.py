@@ -78,8 +78,7 @@ class BeltMark(NamedTuple):
 class CamMark(NamedTuple):
     """A cam: its profile, points of `link`, about its `centre`; and the face of its follower `follower_link`.
 
-    A roller of this radius about `middle`, else a flat face through there whose normal, away from the cam, is
-    `face_normal`, else a point.
+    A roller of this radius about `middle`, or a flat face along the points `face` of a line (else empty), or a point.
     """
 
     name: str
@@ -89,7 +88,7 @@ class CamMark(NamedTuple):
     follower_link: str
     middle: Vector
     roller_radius: float
-    face_normal: Vector | None
+    face: tuple[Vector, ...]
 
 
 DrawingMark = PinMark | GuideMark | SliderMark | SlotMark | WheelMark | PitchLineMark | BeltMark | CamMark
