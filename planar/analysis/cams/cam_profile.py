@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
 from math import degrees, pi
@@ -56,6 +56,10 @@ class CamProfile:
     angle: Array = field(repr=False)
 
     __repr__ = short_repr
+
+    def at(self, angle: Array) -> CamProfile:
+        """The same cam at other angles of the law (rad), whose extremes are those of these samples alone."""
+        return replace(self, angle=angle)
 
     @cached_property
     def lift(self) -> Array:

@@ -69,6 +69,8 @@ class Pair(ABC):
     """The names of its results, in order, and the kind of quantity that each is."""
     input_kind: ClassVar[MeasureKind]
     """Whether its input is an angle or a length."""
+    has_profile: ClassVar[bool] = False
+    """Whether a profile follows from it, which is drawn under its keyword."""
     ties_angles: ClassVar[bool] = False
     """Whether it ties angles alone: what holds it are couples, whatever forces they come from (see `tooth_contact`)."""
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import pi
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 from planar.foundation.geometry import Frame, Vector, direction, frame_at
 from planar.foundation.jets import Scalar
@@ -60,6 +60,8 @@ class ProfiledPair(Pair):
     displacement, or angle against the carrier, is `rest` (m or rad): then what the links do to each other is a law
     alone, and no profile is known.
     """
+
+    has_profile: ClassVar[bool] = True
 
     carrier: str
     law: LiftLaw
