@@ -10,6 +10,7 @@ if TYPE_CHECKING:
     from planar import plot
     from planar.analysis.cams.base_circle import BaseCircle, least_base_circle
     from planar.analysis.cams.cam_profile import CamProfile, cam_profile
+    from planar.analysis.cams.contact_force import ContactForce, contact_forces
     from planar.analysis.centres.centres import Centre, Centres, centres
     from planar.analysis.centres.centrodes import Centrodes, centrodes
     from planar.analysis.centres.curvature import Curvature, curvature
@@ -108,6 +109,7 @@ _ROOMS = {
     "Conflict": "assemblies.conflict",
     "ConstantAccelerationSegment": "model.input_laws.constant_rates",
     "ConstantSpeedSegment": "model.input_laws.constant_rates",
+    "ContactForce": "analysis.cams.contact_force",
     "Course": "model.mechanism",
     "Curvature": "analysis.centres.curvature",
     "CycloidalRise": "model.input_laws.cam_rises",
@@ -184,6 +186,7 @@ _ROOMS = {
     "centrodes": "analysis.centres.centrodes",
     "circuits": "assemblies.circuits.circuits",
     "conflict": "assemblies.conflict",
+    "contact_forces": "analysis.cams.contact_force",
     "curvature": "analysis.centres.curvature",
     "cycle": "solving.cycle",
     "dataset": "reports.files.xarray_dataset",
@@ -246,6 +249,7 @@ __all__ = [
     "Conflict",
     "ConstantAccelerationSegment",
     "ConstantSpeedSegment",
+    "ContactForce",
     "Course",
     "Curvature",
     "CycloidalRise",
@@ -322,6 +326,7 @@ __all__ = [
     "centrodes",
     "circuits",
     "conflict",
+    "contact_forces",
     "curvature",
     "cycle",
     "dataset",

@@ -56,6 +56,8 @@ PICTURES: dict[str, Callable[[], object]] = {
     "sliding": scheme_of("slider-crank"),
     "slot": scheme_of("slotted-lever"),
     "gear": scheme_of("planetary-gear-set"),
+    "cams/roller": scheme_of("valve-cam"),
+    "cams/profile": lambda: plot.cam_profile(planar.load("valve-cam")),
     "spring": scheme_of("door-closer"),
     "assemblies": lambda: plot.modes(planar.modes("four-bar")),
     "polygons": lambda: plot.acceleration(planar.solve("four-bar")),

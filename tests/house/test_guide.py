@@ -132,7 +132,11 @@ def test_the_site_is_made_without_a_warning_and_holds_all(tmp_path):
 
 def test_every_picture_is_shown_and_one_is_what_the_tool_makes_now(tmp_path):
     shown = {target for page in PAGES.values() for target in re.findall(r"\]\((?:\.\./)*pictures/(\S+)\.png\)", page)}
-    assert shown == {*PICTURES, *TIMES} == {path.stem for path in (FOLDER / "pictures").iterdir()}
+    assert (
+        shown
+        == {*PICTURES, *TIMES}
+        == {path.relative_to(FOLDER / "pictures").with_suffix("").as_posix() for path in FOLDER.rglob("*.png")}
+    )
     plot.save(PICTURES["sliding"](), tmp_path / "now.png")
     now, kept = (Image.open(path).convert("L") for path in (tmp_path / "now.png", FOLDER / "pictures" / "sliding.png"))
     apart = ImageChops.difference(now.resize(kept.size), kept)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import pairwise
 from math import degrees, hypot, pi
 from typing import NamedTuple
 
@@ -46,7 +47,7 @@ def least_base_circle(mechanism: Mechanism, pressure_angle: float = pi / 6.0, pa
     >>> from math import radians
     >>> found = planar.least_base_circle("valve-cam", radians(30))
     >>> round(found.pressure, 6)  # m
-    0.065711
+    0.097288
     """
     if not 0.0 < pressure_angle < 0.5 * pi:
         raise BadInput(
@@ -54,14 +55,14 @@ def least_base_circle(mechanism: Mechanism, pressure_angle: float = pi / 6.0, pa
         )
     found = cam_profile(mechanism, pair)
 
-    def pressed(radius: float) -> float:
-        return pressure_angle - _with_base(found, radius).greatest_pressure_angle.value
+    def pressed(cam: CamProfile) -> float:
+        return pressure_angle - cam.greatest_pressure_angle.value
 
-    def curved(radius: float) -> float:
-        other = _with_base(found, radius)
-        return other.curvature_limit - other.greatest_curvature.value
+    def curved(cam: CamProfile) -> float:
+        return cam.curvature_limit - cam.greatest_curvature.value
 
-    one, other = _least_radius(found, pressed), _least_radius(found, curved)
+    one = _least_radius(found, pressed, lambda cam: pressure_angle - float(np.abs(cam.pressure_angle).max()))
+    other = _least_radius(found, curved, lambda cam: cam.curvature_limit - cam.sampled_curvature)
     return BaseCircle(pressure_angle, one, other, None if one is None or other is None else max(one, other))
 
 
@@ -72,8 +73,13 @@ def _with_base(profile: CamProfile, radius: float) -> CamProfile:
     return CamProfile(profile.mechanism, profile.pair, cam, profile.shapes, profile.angle)
 
 
-def _least_radius(profile: CamProfile, margin: Callable[[float], float]) -> float | None:
-    """The radius above which a margin stays above zero, as far as the follower reaches; 0 where any will do."""
+def _least_radius(
+    profile: CamProfile, margin: Callable[[CamProfile], float], sampled_margin: Callable[[CamProfile], float]
+) -> float | None:
+    """The radius above which a margin stays above zero, as far as the follower reaches; 0 where any will do.
+
+    The margin at the samples of the profile, which is never less, tells about where that is.
+    """
     axes, face = profile.cam.follower_axes(profile.shapes), profile.cam.follower_face(profile.shapes)
     apart = axes.centre - axes.origin
     sizes = [profile.base_radius, profile.roller_radius, float(hypot(apart.x, apart.y)), float(hypot(*axes.arm))]
@@ -82,13 +88,12 @@ def _least_radius(profile: CamProfile, margin: Callable[[float], float]) -> floa
     size = max(sizes)
     every = np.geomspace(size / SEARCHED_RATIO, size * SEARCHED_RATIO, SEARCH_STEPS).tolist()
     tried = [radius for radius in every if not rest_problem(axes, face, radius)]
-    bad = None
-    for radius in reversed(tried):
-        value = margin(radius)
-        if not value > 0.0:
-            bad = radius
-            break
-    if bad is None:
-        return None if not tried else tried[0] if tried[0] > every[0] else 0.0
-    above = [radius for radius in tried if radius > bad]
-    return find_root(margin, bad, above[0]) if above else None
+    last_bad = len(tried) - 1
+    while last_bad >= 0 and sampled_margin(_with_base(profile, tried[last_bad])) > 0.0:
+        last_bad -= 1
+    for bad, good in pairwise(tried[max(last_bad, 0) :]):
+        if margin(_with_base(profile, good)) > 0.0:
+            if last_bad < 0 and margin(_with_base(profile, bad)) > 0.0:
+                return bad if bad > every[0] else 0.0
+            return find_root(lambda radius: margin(_with_base(profile, radius)), bad, good)
+    return None

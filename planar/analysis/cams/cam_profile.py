@@ -146,6 +146,11 @@ class CamProfile:
         radius of curvature as a negative number (m); and the angle of the law where it is."""
         return self._greatest(self._curvature)
 
+    @property
+    def sampled_curvature(self) -> float:
+        """The same, of the samples alone."""
+        return float(self._curvature(self.angle).max())
+
     @cached_property
     def least_curvature_radius(self) -> Extreme:
         """The least radius of curvature of the convex profile (m), and the angle of the law where it is.
@@ -275,7 +280,7 @@ def cam_profile(mechanism: Mechanism, pair: str | None = None) -> CamProfile:
     >>> import planar
     >>> found = planar.cam_profile("valve-cam")
     >>> round(found.least_curvature_radius.value, 6)  # m
-    0.011327
+    0.013306
     """
     cam = find_cam(mechanism, pair)
     shapes = shapes_of_links(mechanism)

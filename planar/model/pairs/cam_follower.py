@@ -7,7 +7,10 @@ Industrial Press 2009, ch. 7.
 
 from __future__ import annotations
 
+from math import nan
 from typing import NamedTuple
+
+import numpy as np
 
 from planar.foundation.geometry import Vector, direction
 from planar.foundation.jets import Scalar, atan2, hypot, sqrt
@@ -62,14 +65,15 @@ def turn_left(vector: Vector) -> Vector:
 def rest_position(axes: FollowerAxes, face: FollowerFace, base_radius: Scalar) -> Scalar:
     """The follower's displacement along its line (m), or its angle (rad), where it rests on the base circle.
 
-    NaN, or an error of the square root, where it cannot.
+    NaN where it cannot.
     """
     if axes.line is not None:
         to_centre = axes.centre - axes.origin
         if face.normal is not None:
             return (base_radius + face.normal.dot(to_centre - axes.arm)) / face.normal.dot(axes.line)
         reach = base_radius + face.roller_radius
-        return axes.line.dot(to_centre) + sqrt(reach * reach - axes.line.cross(to_centre) * axes.line.cross(to_centre))
+        offset = axes.line.cross(to_centre)
+        return axes.line.dot(to_centre) + _root(reach * reach - offset * offset)
     apart = axes.centre - axes.origin
     distance = hypot(apart.x, apart.y)
     if face.normal is not None:
@@ -79,7 +83,7 @@ def rest_position(axes: FollowerAxes, face: FollowerFace, base_radius: Scalar) -
         length, reach = hypot(axes.arm.x, axes.arm.y), base_radius + face.roller_radius
         cosine = (length * length + distance * distance - reach * reach) / (2.0 * length * distance)
         turned = axes.arm
-    opening = atan2(sqrt(1.0 - cosine * cosine), cosine)
+    opening = atan2(_root(1.0 - cosine * cosine), cosine)
     return atan2(apart.y, apart.x) + axes.side * opening - atan2(turned.y, turned.x)
 
 
@@ -159,6 +163,16 @@ def _flat_contact(
         along = turn_left(point + axes.centre - axes.origin) * axes.side
     assert along is not None
     return CamContact(point, normal, along, middle, radius, radius)
+
+
+def _root(square: Scalar) -> Scalar:
+    """A square root; NaN of a number below zero."""
+    if isinstance(square, float):
+        return sqrt(square) if square >= 0.0 else nan
+    if not isinstance(square, np.ndarray):
+        return sqrt(square)
+    with np.errstate(invalid="ignore"):
+        return np.sqrt(square)
 
 
 def _ratio(above: Scalar, below: Scalar) -> Scalar:

@@ -9,6 +9,7 @@ import numpy as np
 from rich.console import Group, RenderableType
 from rich.text import Text
 
+from planar.analysis.cams.contact_force import lift_off_remarks
 from planar.dynamics.forces import Forces
 from planar.dynamics.load_attachment import attachment_remarks
 from planar.dynamics.reactions import Reaction
@@ -35,7 +36,8 @@ def tables(forces: Forces) -> RenderableType:
     ]
     facts = [*_shaking_facts(forces, motion), *at_one.proof_facts(forces)]
     parts += [_reactions_table(forces, motion), paragraphs(facts)]
-    notes = (*_undetermined_sentences(forces, len(motion)), *attachment_remarks(forces.mechanism), *motion.remarks)
+    said = (*_undetermined_sentences(forces, len(motion)), *lift_off_remarks(forces))
+    notes = (*said, *attachment_remarks(forces.mechanism), *motion.remarks)
     if notes:
         parts += [Text(), paragraphs(("-", sentence) for sentence in notes)]
     return Group(*parts)
@@ -174,5 +176,5 @@ def _reaction_values(each: Reaction) -> dict[str, Array]:
 def run_facts(forces: Forces) -> dict[str, Any]:
     """What is said of the whole motion, as JSON values; forces in a pair are on the second of the links `between`."""
     between = {name: list(each.links) for name, each in forces.reactions.items()}
-    remarks = [*attachment_remarks(forces.mechanism), *forces.moving.remarks]
+    remarks = [*lift_off_remarks(forces), *attachment_remarks(forces.mechanism), *forces.moving.remarks]
     return {"between": between, "remarks": remarks, **at_one.proof_record(forces)}

@@ -9,6 +9,7 @@ import numpy as np
 from rich.console import Group, RenderableType
 from rich.text import Text
 
+from planar.analysis.cams.contact_force import lift_off_remarks
 from planar.analysis.worked.published import Comparison
 from planar.dynamics.forces import Forces
 from planar.dynamics.load_attachment import attachment_remarks
@@ -56,7 +57,7 @@ def tables(forces: Forces, advantages: ratios.Advantages, comparisons: Sequence[
         *_time_remarks(forces),
         *dict.fromkeys(each.why for each in told if each.why),
     )
-    notes += (*attachment_remarks(forces.mechanism), *state.remarks)
+    notes += (*lift_off_remarks(forces), *attachment_remarks(forces.mechanism), *state.remarks)
     if notes:
         parts += [Text(), paragraphs(("-", sentence) for sentence in notes)]
     return Group(*head, *parts)
@@ -220,7 +221,7 @@ def record(forces: Forces, advantages: ratios.Advantages, comparisons: Sequence[
         "power": {"in": _finite_or_none(float(forces.power_in)), "out": forces.power_out},
         "advantage": ratios.record(advantages),
         **proof_record(forces),
-        "remarks": [*attachment_remarks(forces.mechanism), *forces.moving.remarks],
+        "remarks": [*lift_off_remarks(forces), *attachment_remarks(forces.mechanism), *forces.moving.remarks],
     }
     return found | ({"published": [each.record() for each in comparisons]} if comparisons else {})
 
