@@ -67,10 +67,10 @@ if TYPE_CHECKING:
     from planar.model.pairs.base import Pair
     from planar.model.pairs.belt import BeltPair, ChainPair
     from planar.model.pairs.cam import CamPair
+    from planar.model.pairs.cams.lift_law import LiftLaw
+    from planar.model.pairs.cams.profiled import CamShape
     from planar.model.pairs.gear import GearPair
     from planar.model.pairs.guide_line import LinkLine
-    from planar.model.pairs.lift_law import LiftLaw
-    from planar.model.pairs.profiled import CamShape
     from planar.model.pairs.rack import RackPair
     from planar.model.pairs.sliding import SlidingPair
     from planar.model.pairs.slot import SlotPair
@@ -99,7 +99,7 @@ _ROOMS = {
     "Branch": "assemblies.circuits.circuits",
     "CamPair": "model.pairs.cam",
     "CamProfile": "analysis.cams.cam_profile",
-    "CamShape": "model.pairs.profiled",
+    "CamShape": "model.pairs.cams.profiled",
     "Centre": "analysis.centres.centres",
     "Centres": "analysis.centres.centres",
     "Centrodes": "analysis.centres.centrodes",
@@ -129,7 +129,7 @@ _ROOMS = {
     "Input": "model.mechanism",
     "InputLaw": "model.input_laws.input_law",
     "Inspection": "analysis.identity.inspection",
-    "LiftLaw": "model.pairs.lift_law",
+    "LiftLaw": "model.pairs.cams.lift_law",
     "Limit": "results.records",
     "Link": "model.mechanism",
     "LinkLine": "model.pairs.guide_line",

@@ -17,7 +17,7 @@ from planar.model.input_laws import HarmonicRise, Polynomial345Rise
 from planar.model.link_shapes import link_shape
 from planar.model.mechanism import Mechanism
 from planar.model.pairs import Pair, pair_types
-from planar.model.pairs.lift_law import LiftLaw
+from planar.model.pairs.cams.lift_law import LiftLaw
 from planar.results.motion import State
 from planar.solving.position import PositionSolver
 from planar.solving.rates.regularity import regularity

@@ -107,6 +107,38 @@ class Jet:
     __radd__ = __add__
     __rmul__ = __mul__
 
+    def __truediv__(self, other: Scalar) -> Jet:
+        """By Leibniz: (q b)^(n) = a^(n), solved for q^(n)."""
+        a, b = self.parts, self._derivatives_of(other)
+        parts: list[Scalar] = []
+        for n in range(len(a)):
+            known = sum((comb(n, k) * parts[k] * b[n - k] for k in range(n)), 0.0)
+            parts.append((a[n] - known) / b[0])
+        return Jet(*parts)
+
+    def __rtruediv__(self, other: Scalar) -> Jet:
+        return Jet(*self._derivatives_of(other)) / self
+
+    def sqrt(self) -> Jet:
+        """By Leibniz: (r r)^(n) = a^(n), solved for r^(n)."""
+        a = self.parts
+        parts = [sqrt(a[0])]
+        for n in range(1, len(a)):
+            known = sum((comb(n, k) * parts[k] * parts[n - k] for k in range(1, n)), 0.0)
+            parts.append((a[n] - known) / (2.0 * parts[0]))
+        return Jet(*parts)
+
+    def arctan2(self, x: Scalar) -> Jet:
+        """The angle of (x, self): its derivative is (x y' - y x') / (x^2 + y^2)."""
+        other = Jet(*self._derivatives_of(x))
+        y0, x0 = Jet(*self.parts[:-1]), Jet(*other.parts[:-1])
+        y1, x1 = Jet(*self.parts[1:]), Jet(*other.parts[1:])
+        rate = (x0 * y1 - y0 * x1) / (x0 * x0 + y0 * y0)
+        return Jet(atan2(self.parts[0], other.parts[0]), *rate.parts)
+
+    def __rarctan2__(self, y: Scalar) -> Jet:
+        return Jet(*self._derivatives_of(y)).arctan2(self)
+
     def _cos_sin_derivatives(self) -> tuple[list[Scalar], list[Scalar]]:
         """Derivatives of cos and sin: c' = -s a', s' = c a', expanded by Leibniz."""
         a = self.parts

@@ -25,6 +25,7 @@ KIND_WORDS = {
     "place": "where a point is",
     "piece": "a piece of a law",
     "lift": "a piece of lift",
+    "nose": "a circle",
     "varies": "a variation",
     "drives": "inputs by their pairs",
 }
@@ -52,6 +53,7 @@ def keys_page() -> str:
     parts += _section("A point of a link", *(each for each in kinds["place"]["anyOf"] if "properties" in each))
     parts += [part for pair in kinds["pair"]["oneOf"] for part in _section(_title(pair), pair)]
     parts += _section("A piece of a cam's lift", *kinds["lift"]["oneOf"])
+    parts += _section("A circle of a cam", kinds["nose"])
     parts += _section("An input", whole["properties"]["inputs"]["items"])
     parts += _section("A piece of an input's law", *kinds["piece"]["oneOf"])
     parts += _section("A load", *whole["properties"]["loads"]["items"]["anyOf"])

@@ -15,7 +15,7 @@ from planar.document.first_argument import takes_mechanism
 from planar.foundation.errors import BadInput
 from planar.foundation.root_finding import find_root
 from planar.model.mechanism import Mechanism
-from planar.model.pairs.cam_follower import rest_problem
+from planar.model.pairs.cams.cam_follower import rest_problem
 
 SEARCHED_RATIO = 1e4
 """Base circles are looked for from this part of the follower's own sizes up to so many times these."""
@@ -54,6 +54,8 @@ def least_base_circle(mechanism: Mechanism, pressure_angle: float = pi / 6.0, pa
             "pressure_angle", f"an angle between 0 and a right one is wanted, not {degrees(pressure_angle):g} deg"
         )
     found = cam_profile(mechanism, pair)
+    if found.cam.is_of_circles:
+        return BaseCircle(pressure_angle, None, None, None)
 
     def pressed(cam: CamProfile) -> float:
         return pressure_angle - cam.greatest_pressure_angle.value
@@ -84,7 +86,7 @@ def _least_radius(
     apart = axes.centre - axes.origin
     sizes = [profile.base_radius, profile.roller_radius, float(hypot(apart.x, apart.y)), float(hypot(*axes.arm))]
     if axes.line is not None:
-        sizes.append(profile.cam.law.greatest_lift())
+        sizes.append(float(profile.lift[0].max()))
     size = max(sizes)
     every = np.geomspace(size / SEARCHED_RATIO, size * SEARCHED_RATIO, SEARCH_STEPS).tolist()
     tried = [radius for radius in every if not rest_problem(axes, face, radius)]

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from itertools import pairwise
-from math import degrees, pi
+from math import degrees
 
 import numpy as np
 
@@ -20,8 +19,8 @@ from planar.foundation.root_finding import find_root
 from planar.foundation.short_repr import short_repr
 from planar.model.link_shapes import LinkShape
 from planar.model.mechanism import Mechanism
-from planar.model.pairs.cam_follower import CamContact
-from planar.model.pairs.profiled import ProfiledPair
+from planar.model.pairs.cams.cam_follower import CamContact
+from planar.model.pairs.cams.profiled import ProfiledPair
 
 PIECE_SAMPLES = 121
 """Of every piece of the law, both its ends among them."""
@@ -64,7 +63,7 @@ class CamProfile:
     @cached_property
     def lift(self) -> Array:
         """(4, n)."""
-        rates = self.cam.law.lift_rates(self.angle, self.cam.law.measure())
+        rates = self.cam.lift_rates(self.angle, self.shapes)
         return np.stack(np.broadcast_arrays(*rates))
 
     @cached_property
@@ -185,14 +184,14 @@ class CamProfile:
         cannot follow the law."""
         if not np.isfinite(self.curvature_limit):
             return ()
-        slack = CURVATURE_SLACK * abs(float(self._curvature(np.zeros(1))[0]))
+        slack = CURVATURE_SLACK * abs(float(self._curvature(self.angle[:1])[0]))
         below = self._curvature(self.angle) > self.curvature_limit + slack
         edges = np.flatnonzero(np.diff(below.astype(int)))
         ends = [self._edge(float(self.angle[k]), float(self.angle[k + 1])) for k in edges]
         if below[0]:
-            ends.insert(0, 0.0)
+            ends.insert(0, float(self.angle[0]))
         if below[-1]:
-            ends.append(2.0 * pi)
+            ends.append(float(self.angle[-1]))
         return tuple(zip(ends[::2], ends[1::2], strict=True))
 
     def _edge(self, low: float, high: float) -> float:
@@ -283,10 +282,13 @@ def cam_profile(mechanism: Mechanism, pair: str | None = None) -> CamProfile:
     0.013306
     """
     cam = find_cam(mechanism, pair)
-    shapes = shapes_of_links(mechanism)
-    ends = [*cam.law.joint_angles, 2.0 * pi]
-    angle = [np.linspace(low, np.nextafter(high, low), PIECE_SAMPLES) for low, high in pairwise(ends)]
-    return CamProfile(mechanism.name, cam.name, cam, tuple(shapes[body] for body in cam.bodies), np.concatenate(angle))
+    every = shapes_of_links(mechanism)
+    shapes = tuple(every[body] for body in cam.bodies)
+    angle = [
+        np.linspace(piece.start, np.nextafter(piece.stop, piece.start), PIECE_SAMPLES)
+        for piece in cam.lift_pieces(shapes)
+    ]
+    return CamProfile(mechanism.name, cam.name, cam, shapes, np.concatenate(angle))
 
 
 def find_cam(mechanism: Mechanism, pair: str | None = None) -> ProfiledPair:

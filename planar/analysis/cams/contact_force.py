@@ -13,7 +13,7 @@ from planar.dynamics.external_actions import KinematicArrays
 from planar.dynamics.forces import Forces
 from planar.foundation.arrays import Array
 from planar.foundation.short_repr import short_repr
-from planar.model.pairs.profiled import ProfiledPair
+from planar.model.pairs.cams.profiled import ProfiledPair
 
 NO_FORCE_RATIO = 1e-9
 """Of the greatest force: what is less is none."""

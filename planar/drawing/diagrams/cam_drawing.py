@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from itertools import pairwise
 from math import ceil, degrees, hypot, pi
 
 import numpy as np
@@ -16,7 +15,7 @@ from planar.foundation.arrays import Array
 from planar.foundation.geometry import Vector, direction
 from planar.foundation.units import parse_unit
 from planar.model.mechanism import FileUnits
-from planar.model.pairs.cam_follower import turn_left
+from planar.model.pairs.cams.cam_follower import turn_left
 
 PARTS = 6
 """Of every rise and fall, between its stations."""
@@ -41,10 +40,10 @@ def cam_pictures(found: CamProfile, units: FileUnits, scale: Scale | None = None
 
 def station_angles(found: CamProfile) -> Array:
     """The angles of the law (rad) at which the follower is drawn: six parts of every rise and fall, dwells whole."""
-    ends = [*found.cam.law.joint_angles, 2.0 * pi]
-    parts = [PARTS if way else 1 for way in found.cam.law.ways()]
-    stations = [np.linspace(low, high, part + 1)[:-1] for (low, high), part in zip(pairwise(ends), parts, strict=True)]
-    return np.concatenate(stations)
+    pieces = found.cam.lift_pieces(found.shapes)
+    return np.concatenate(
+        [np.linspace(each.start, each.stop, (PARTS if each.moves else 1) + 1)[:-1] for each in pieces]
+    )
 
 
 def _construction(found: CamProfile, units: FileUnits, scale: Scale | None) -> Picture:
@@ -134,12 +133,13 @@ def _displacement_diagram(found: CamProfile, units: FileUnits) -> Picture:
     slides = found.cam.line is not None
     written = units.length if slides else units.angle
     lift = found.lift[0] * parse_unit(written).from_si(1.0)
-    turned = np.degrees(found.angle)
+    first = float(found.angle[0])
+    turned = np.degrees(found.angle - first)
     across = axes.fit_axis(np.array([0.0, 360.0]), DIAGRAM_WIDTH, "angle of the law (deg)", degrees=True)
     up = axes.fit_axis(np.append(lift, 0.0), DIAGRAM_HEIGHT, f"{'s' if slides else 'φ'} ({written})", 8.0)
     marks: list[Mark] = [*axes.axes_frame(across, up)]
-    stations = station_angles(found)
-    heights = np.interp(stations, found.angle, lift)
+    stations = station_angles(found) - first
+    heights = np.interp(stations, found.angle - first, lift)
     # of stations that lie close every second, third, ... bears its number
     least = float(np.diff(np.append(stations, 2.0 * pi)).min())
     every = ceil(3.2 / max(float(across.on_paper(degrees(least))), 0.1))
@@ -151,4 +151,7 @@ def _displacement_diagram(found: CamProfile, units: FileUnits) -> Picture:
         if number % every == 0:
             marks.append(Label(str(number), top, f"station {number}", NUMBER_SIZE, 0.8, side=(0, 1)))
     marks += axes.curve_strokes(turned, lift, across, up, Pen.CURVE, "lift")
-    return Picture(tuple(marks), "Displacement diagram", (f"greatest lift {lift.max():.6g} {written}",))
+    notes = [f"greatest lift {lift.max():.6g} {written}"]
+    if first:
+        notes.append(f"from where the cam stands at {degrees(first):.6g} deg")
+    return Picture(tuple(marks), "Displacement diagram", tuple(notes))

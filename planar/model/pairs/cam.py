@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import pi
-from typing import Any, ClassVar, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 from planar.foundation.geometry import Frame, Vector, direction, frame_at
 from planar.foundation.jets import Scalar
@@ -23,9 +23,12 @@ from planar.model.pairs.base import (
     sample_shape,
     schema_reference,
 )
+from planar.model.pairs.cams.lift_law import LIFT_SCHEMA, NOSES_SCHEMA, LiftLaw, read_lift, write_lift
+from planar.model.pairs.cams.profiled import SHAPE_KEYS, SIDES, CamShape, ProfiledPair, read_shape, write_shape
 from planar.model.pairs.guide_line import LINE_NUMBER_KINDS, LINE_SCHEMA, LinkLine
-from planar.model.pairs.lift_law import LIFT_SCHEMA, LiftLaw, read_lift, write_lift
-from planar.model.pairs.profiled import SHAPE_KEYS, SIDES, ProfiledPair, read_shape, write_shape
+
+if TYPE_CHECKING:
+    from planar.model.pairs.cams.arc_lift import ArcLift
 
 
 @dataclass(frozen=True)
@@ -40,6 +43,13 @@ class CamPair(ProfiledPair):
             schema_reference("name"), "the link on which cam and follower are guided; left out: the frame"
         ),
         "law": described(LIFT_SCHEMA, "the lift over a turn of the cam: rises, falls (negative) and dwells"),
+        "noses": described(
+            NOSES_SCHEMA,
+            "in place of a law: circles that tangents join, anticlockwise from the base circle",
+        ),
+        "flank_radius": described(
+            schema_reference("size"), "the radius of arcs that join the circles, in place of straight tangents"
+        ),
         "line": described(
             LINE_SCHEMA, "of a sliding follower: the line in the carrier along which its point is lifted"
         ),
@@ -69,14 +79,20 @@ class CamPair(ProfiledPair):
             {"type": "boolean"}, "true where the cam holds the follower both ways: a groove, or conjugate cams"
         ),
     }
-    required_keys: ClassVar[tuple[str, ...]] = ("links", "law")
+    required_keys: ClassVar[tuple[str, ...]] = ("links",)
     entry_rule: ClassVar[Schema] = {
         "dependentRequired": {
             "line": ["point"],
             "base_radius": ["centre", "point"],
+            "noses": ["base_radius"],
+            "flank_radius": ["noses"],
             **{key: ["base_radius"] for key in SHAPE_KEYS if key != "base_radius"},
         },
         "not": {"required": ["roller_radius", "flat"]},
+        "oneOf": [
+            {"required": ["law"]},
+            {"required": ["noses"], "not": {"anyOf": [{"required": ["start"]}, {"required": ["clockwise"]}]}},
+        ],
     }
     is_lower_pair: ClassVar[bool] = False
     result_kinds: ClassVar[Mapping[str, str]] = {
@@ -112,18 +128,18 @@ class CamPair(ProfiledPair):
         line: tuple[Scalar, ...] = ()
         if self.line is not None and self.point is not None:
             line = (*self.line.measure_line(carrier), *follower.position(self.point))
-        return (*line, self.rest_position(shapes), self.start, *self.law.measure())
+        return (*line, self.rest_position(shapes), self.start, *self.law_numbers(shapes))
 
     def residual(self, frames: Sequence[Frame], numbers: Sequence[Scalar], own: Sequence[Scalar]) -> Sequence[Scalar]:
         cam, follower, carrier = frames
         if self.line is None:
             rest, start, *law = numbers
-            lift = self.law.lift((cam.angle - carrier.angle - start) * self.sense, law)
+            lift = self.lift((cam.angle - carrier.angle - start) * self.sense, law)
             return (follower.angle - carrier.angle - rest - lift * self.side,)
         x, y, along, across, px, py, rest, start, *law = numbers
         way = carrier.rotate_to_world(Vector(along, across))
         went = (follower.to_world(Vector(px, py)) - carrier.to_world(Vector(x, y))).dot(way)
-        return (went - rest - self.law.lift((cam.angle - carrier.angle - start) * self.sense, law),)
+        return (went - rest - self.lift((cam.angle - carrier.angle - start) * self.sense, law),)
 
     def input_position(self, frames: Sequence[Frame], numbers: Sequence[Scalar], own: Sequence[Scalar]) -> Scalar:
         """The angle of the cam against the carrier."""
@@ -164,7 +180,7 @@ class CamPair(ProfiledPair):
             )
         if shape is not None and point is None:
             raise entry.error_at(None, "a profile needs the follower's 'point' that touches it")
-        law = read_lift(entry, "law", kind)
+        law = _read_law(entry, kind, shape)
         start, rest = entry.quantity("start", "angle", 0.0), entry.quantity("rest", kind, 0.0)
         return (cls(name, links, carrier, law, line, point, start, entry.flag("clockwise"), rest, shape),)
 
@@ -177,7 +193,12 @@ class CamPair(ProfiledPair):
             entry["line"] = pair.line.write(quantity)
         if pair.point is not None:
             entry["point"] = pair.point
-        entry["law"] = write_lift(pair.law, kind, quantity)
+        if isinstance(pair.law, LiftLaw):
+            entry["law"] = write_lift(pair.law, kind, quantity)
+        else:
+            from planar.model.pairs.cams.arc_lift import write_noses  # which few files have
+
+            entry |= write_noses(pair.law, quantity)
         if pair.start != 0.0:
             entry["start"] = quantity(pair.start, "angle")
         if pair.clockwise:
@@ -223,3 +244,25 @@ class CamPair(ProfiledPair):
                 entry | {"line": {"through": "T", "angle": 0.4}, "point": "P", "clockwise": True, "rest": 0.25},
             ),
         )
+
+
+def _read_law(entry: EntryReader, kind: str, shape: CamShape | None) -> LiftLaw | ArcLift:
+    """The law of an entry, or the circles of its profile."""
+    if entry.has("law") == entry.has("noses"):
+        raise entry.error_at(None, "a cam is given by the 'law' of its lift or by the 'noses' of its profile: by one")
+    if entry.has("law"):
+        if entry.has("flank_radius"):
+            raise entry.error_at("flank_radius", "flanks are between 'noses'; the profile of a 'law' follows from it")
+        return read_lift(entry, "law", kind)
+    for key in ("start", "clockwise"):
+        if entry.has(key):
+            raise entry.error_at(key, f"the circles of a cam stand in its own axes; leave {key!r} out")
+    if shape is None:
+        raise entry.error_at(None, "noses are joined with the base circle; here 'base_radius' is missing")
+    from planar.model.pairs.cams.arc_lift import read_noses  # which few files have
+
+    found = read_noses(entry)
+    wrong = found.find_problem(shape.base_radius, shape.flat is not None)
+    if wrong is not None:
+        raise entry.error_at(*wrong)
+    return found

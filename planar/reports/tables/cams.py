@@ -48,6 +48,8 @@ def _facts(found: CamProfile, least: BaseCircle, units: FileUnits) -> Iterator[t
         low, high = (_length(value, units) for value in found.face_reach)
         yield "contact on the face", f"from {low} to {high}, to the left of its normal from the follower's point"
     yield "can it be made", found.problem() or "yes: nothing of the profile is undercut or cut off"
+    if found.cam.is_of_circles:
+        return
     wanted = f"{degrees(least.pressure_angle):.6g} deg"
     for about, value in (
         (f"least base circle for {wanted}", least.pressure),
@@ -63,16 +65,12 @@ def _law_table(found: CamProfile, units: FileUnits) -> FittedTable:
     title = "Law of lift, and the greatest rates by the cam's angle"
     heads = ("motion", ("from, deg", "to, deg"), (f"by, {unit}", "s'", "s''", "s'''"))
     table = plain_table(title, *heads, left=(0,), keys=1)
-    ends = np.degrees([*found.cam.law.joint_angles, 2.0 * np.pi])
-    rows = zip(found.cam.law.pieces, found.cam.law.ways(), np.split(found.lift, len(ends) - 1, axis=1), strict=True)
-    for k, (piece, way, lift) in enumerate(rows):
+    pieces = found.cam.lift_pieces(found.shapes)
+    for piece, lift in zip(pieces, np.split(found.lift, len(pieces), axis=1), strict=True):
         rates = [format_number(float(np.abs(rate).max()) * per) for rate in lift[1:]]
-        table.add_row(piece.motion, *(format_number(float(end)) for end in ends[k : k + 2]), _way(way * per), *rates)
+        way = format_number(float(lift[0, -1] - lift[0, 0]) * per)
+        table.add_row(piece.name, format_number(degrees(piece.start)), format_number(degrees(piece.stop)), way, *rates)
     return table
-
-
-def _way(value: float) -> str:
-    return format_number(value) if value else "0"
 
 
 def record(found: CamProfile, least: BaseCircle) -> dict[str, Any]:

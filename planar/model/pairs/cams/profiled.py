@@ -5,24 +5,28 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import pi
-from typing import Any, ClassVar, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 from planar.foundation.geometry import Frame, Vector, direction, frame_at
 from planar.foundation.jets import Scalar
 from planar.model.link_shapes import LinkShape
 from planar.model.pairs.base import EntryReader, LengthFormatter, MeasureKind, Pair, QuantityWriter, ToothContact
-from planar.model.pairs.cam_follower import (
+from planar.model.pairs.cams.cam_follower import (
     CamContact,
     FollowerAxes,
     FollowerFace,
+    FollowerRest,
     find_contact,
     rest_position,
     rest_problem,
     turn_left,
 )
+from planar.model.pairs.cams.lift_law import LiftLaw, LiftPiece
 from planar.model.pairs.guide_line import LinkLine
-from planar.model.pairs.lift_law import LiftLaw
 from planar.model.pairs.symbols import CamMark, DrawingMark
+
+if TYPE_CHECKING:
+    from planar.model.pairs.cams.arc_lift import ArcLift
 
 DRAWN_POINTS = 121
 """Of a profile, in drawings."""
@@ -64,13 +68,18 @@ class ProfiledPair(Pair):
     has_profile: ClassVar[bool] = True
 
     carrier: str
-    law: LiftLaw
+    law: LiftLaw | ArcLift
     line: LinkLine | None = None
     point: str | None = None
     start: float = 0.0
     clockwise: bool = False
     rest: float = 0.0
     shape: CamShape | None = None
+
+    @property
+    def is_of_circles(self) -> bool:
+        """Whether circles make the profile, and not a law."""
+        return not isinstance(self.law, LiftLaw)
 
     @property
     def lift_kind(self) -> MeasureKind:
@@ -116,11 +125,47 @@ class ProfiledPair(Pair):
             return self.rest
         return rest_position(self.follower_axes(shapes), self.follower_face(shapes), self.shape.base_radius)
 
+    def law_numbers(self, shapes: Sequence[LinkShape]) -> tuple[Scalar, ...]:
+        """The numbers of the law of lift."""
+        if isinstance(self.law, LiftLaw):
+            return self.law.measure()
+        assert self.shape is not None
+        return self.law.measure(
+            FollowerRest(self.follower_axes(shapes), self.follower_face(shapes), self.shape.base_radius)
+        )
+
+    def lift(self, law_angle: Scalar, numbers: Sequence[Scalar]) -> Scalar:
+        """The lift (m or rad) at an angle of the law (rad), from its numbers."""
+        if isinstance(self.law, LiftLaw):
+            return self.law.lift(law_angle, numbers)
+        return self.law.lift(law_angle, numbers, *self._follower_kind)
+
+    def lift_rates(self, law_angle: Scalar, shapes: Sequence[LinkShape]) -> tuple[Scalar, ...]:
+        """The lift and its first three derivatives by the law's angle."""
+        numbers = self.law_numbers(shapes)
+        if isinstance(self.law, LiftLaw):
+            return self.law.lift_rates(law_angle, numbers)
+        return self.law.lift_rates(law_angle, numbers, *self._follower_kind)
+
+    @property
+    def _follower_kind(self) -> tuple[FollowerAxes, bool]:
+        """Whether the follower slides, on which side it lies, and whether its face is flat."""
+        none = Vector(0.0, 0.0)
+        assert self.shape is not None
+        line = None if self.line is None else none
+        return FollowerAxes(none, none, line, none, self.side), self.shape.flat is not None
+
+    def lift_pieces(self, shapes: Sequence[LinkShape]) -> list[LiftPiece]:
+        """The pieces of lift over a turn of the cam."""
+        if isinstance(self.law, LiftLaw):
+            return self.law.lift_pieces()
+        return self.law.lift_pieces(self.law_numbers(shapes))
+
     def contact(self, shapes: Sequence[LinkShape], law_angle: Scalar) -> CamContact | None:
         """Where cam and follower touch at an angle of the law (rad), seen from the carrier; None without a shape."""
         if self.shape is None:
             return None
-        rates = self.law.lift_rates(law_angle, self.law.measure())
+        rates = self.lift_rates(law_angle, shapes)
         axes, face = self.follower_axes(shapes), self.follower_face(shapes)
         return find_contact(axes, face, self.shape.base_radius, rates, self.sense)
 
@@ -155,7 +200,26 @@ class ProfiledPair(Pair):
             return f"the follower is lifted along a line of {self.carrier!r}, but does not slide on that link"
         own = [shapes[body] for body in self.bodies]
         wrong = rest_problem(self.follower_axes(own), self.follower_face(own), self.shape.base_radius)
-        return f"the follower cannot rest on the base circle: {wrong}" if wrong else None
+        if wrong:
+            return f"the follower cannot rest on the base circle: {wrong}"
+        return self._find_lift_problem(own)
+
+    def _find_lift_problem(self, shapes: Sequence[LinkShape]) -> str | None:
+        """Why the follower cannot go round a cam of circles; None where it can, and where the lift is a law."""
+        if isinstance(self.law, LiftLaw):
+            return None
+        from planar.model.pairs.cams.arc_lift import find_lift_problem  # which few files have
+
+        pieces = self.lift_pieces(shapes)
+        wrong = find_lift_problem(pieces)
+        if wrong:
+            return wrong
+        at = [angle for piece in pieces for angle in (piece.start + 1e-9, piece.stop - 1e-9)]
+        ends = [self.lift_rates(angle, shapes)[0] for angle in at]
+        apart = [abs(after - before) for before, after in zip(ends[1::2], [*ends[2::2], ends[0]], strict=True)]
+        if not max(apart) < 1e-6 * (max(map(abs, ends)) or 1.0):
+            return "the follower cannot go round the cam without losing it"
+        return None
 
     def drawing_marks(self, shapes: Mapping[str, LinkShape], all_pairs: Sequence[Pair]) -> tuple[DrawingMark, ...]:
         """The profile, and the follower's face, where there is a shape."""

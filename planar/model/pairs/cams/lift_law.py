@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise
 from math import pi
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from planar.foundation.jets import Jet, Scalar, part_of_piece, value_between, within_turn
 from planar.model.pairs.base import EntryReader, MeasureKind, QuantityWriter, Schema, described, schema_reference
@@ -16,6 +17,8 @@ if TYPE_CHECKING:
 
 CLOSED_TOLERANCE = 1e-9
 """Of a turn, and of the greatest rise: what rounding leaves of them where a law closes."""
+MAX_NOSES = 20
+"""Circles of a cam beside its base circle."""
 MAX_LIFT_PIECES = 100
 """Each is a part of every formula."""
 LEFT_OUT_KEYS = frozenset({"speed"})
@@ -58,6 +61,22 @@ LIFT_SCHEMA: Schema = {
     "maxItems": MAX_LIFT_PIECES,
 }
 """What JSON Schema says of a lift."""
+NOSES_SCHEMA: Schema = {
+    "type": "array",
+    "items": schema_reference("nose"),
+    "minItems": 1,
+    "maxItems": MAX_NOSES,
+}
+"""What JSON Schema says of the circles of a cam."""
+
+
+class LiftPiece(NamedTuple):
+    """A piece of lift: its name, from where to where the law's angle goes (rad), and whether the follower moves."""
+
+    name: str
+    start: float
+    stop: float
+    moves: bool
 
 
 @dataclass(frozen=True)
@@ -75,9 +94,11 @@ class LiftLaw:
         """Where each piece starts, from 0 (rad)."""
         return tuple(self._sums([piece.duration for piece in self.pieces]))
 
-    def greatest_lift(self) -> float:
-        """The greatest lift at a joint of two pieces (m or rad)."""
-        return float(max(self._sums(self.ways())))
+    def lift_pieces(self) -> list[LiftPiece]:
+        """The pieces over a turn, in plain numbers."""
+        ends = [*self.joint_angles, 2.0 * pi]
+        rows = zip(self.pieces, self.ways(), pairwise(ends), strict=True)
+        return [LiftPiece(piece.motion, start, stop, way != 0.0) for piece, way, (start, stop) in rows]
 
     @staticmethod
     def _sums(values: Sequence[Scalar]) -> Iterator[Scalar]:

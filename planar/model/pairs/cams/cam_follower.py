@@ -40,6 +40,14 @@ class FollowerFace(NamedTuple):
     normal: Vector | None
 
 
+class FollowerRest(NamedTuple):
+    """How a follower rests on the base circle, whose radius is the last (m)."""
+
+    axes: FollowerAxes
+    face: FollowerFace
+    base_radius: Scalar
+
+
 class CamContact(NamedTuple):
     """Where a cam and its follower touch, in the carrier's axes from the cam's centre (m).
 
@@ -83,8 +91,12 @@ def rest_position(axes: FollowerAxes, face: FollowerFace, base_radius: Scalar) -
         length, reach = hypot(axes.arm.x, axes.arm.y), base_radius + face.roller_radius
         cosine = (length * length + distance * distance - reach * reach) / (2.0 * length * distance)
         turned = axes.arm
-    opening = atan2(_root(1.0 - cosine * cosine), cosine)
-    return atan2(apart.y, apart.x) + axes.side * opening - atan2(turned.y, turned.x)
+    return atan2(apart.y, apart.x) + arc_opening(cosine) * axes.side - atan2(turned.y, turned.x)
+
+
+def arc_opening(cosine: Scalar) -> Scalar:
+    """The angle from 0 to pi of this cosine; NaN where there is none."""
+    return atan2(_root(1.0 - cosine * cosine), cosine)
 
 
 def rest_problem(axes: FollowerAxes, face: FollowerFace, base_radius: float) -> str:
@@ -176,7 +188,10 @@ def _root(square: Scalar) -> Scalar:
 
 
 def _ratio(above: Scalar, below: Scalar) -> Scalar:
-    """A quotient; infinite where a float is divided by zero."""
+    """A quotient; infinite where a number is divided by zero."""
     if isinstance(below, float) and below == 0.0:
         return float("inf")
-    return above / below
+    if not isinstance(below, np.ndarray):
+        return above / below
+    with np.errstate(divide="ignore"):
+        return above / below

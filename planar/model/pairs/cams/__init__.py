@@ -1,0 +1,1 @@
+"""What cams are made of: laws of lift, followers, and where the two touch."""
