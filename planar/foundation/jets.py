@@ -59,7 +59,12 @@ def atan2(y: Scalar, x: Scalar) -> Scalar:
     if method is not None:
         return method(x)
     turned = getattr(x, "__rarctan2__", None)  # of a symbol beside a number
-    return np.arctan2(y, x) if turned is None else turned(y)
+    if turned is not None:
+        return turned(y)
+    if np.iscomplexobj(y) or np.iscomplexobj(x):  # beside a real place, to first order
+        a, b = np.real(x), np.real(y)
+        return np.arctan2(b, a) + 1j * (a * np.imag(y) - b * np.imag(x)) / (a * a + b * b)
+    return np.arctan2(y, x)
 
 
 class Jet:

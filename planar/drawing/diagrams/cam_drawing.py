@@ -73,7 +73,9 @@ def _construction(found: CamProfile, units: FileUnits, scale: Scale | None) -> P
     named = f"base circle of radius {_told(base, units)}"
     notes = [str(used), f"{named}, roller of radius {_told(roller, units)}" if roller else named]
     most = found.greatest_pressure_angle
-    notes.append(f"greatest pressure angle {degrees(most.value):.4g} deg at {degrees(most.input):.4g} deg of the law")
+    notes.append(
+        f"greatest pressure angle {degrees(most.value):.4g} deg at {degrees(most.input) % 360.0:.4g} deg of the law"
+    )
     if found.problem():
         notes.append(found.problem())
     return Picture(tuple(marks), f"Profile of {found.pair} by inversion", tuple(notes))

@@ -209,6 +209,39 @@ class CamPair(ProfiledPair):
 
     @classmethod
     def samples(cls) -> tuple[PairSample, ...]:
+        return (
+            *cls._samples_by_law(),
+            *(
+                cls._sample_of_circles(face, flank)
+                for face, flank in (("roller", None), ("roller", 0.9), ("flat", 0.9))
+            ),
+        )
+
+    @classmethod
+    def _sample_of_circles(cls, face: str, flank: float | None) -> PairSample:
+        """A swinging follower on two circles, all pinned to the carrier."""
+        from planar.model.pairs.cams.arc_lift import ArcLift, CamCircle  # which few files have
+
+        carrier, cam = frame_at(0.3, -0.4, 0.7), frame_at(0.2, 0.5, 2.4)
+        flat, roller = (1.7, 0.0) if face == "flat" else (None, 0.07)
+        shape = CamShape("O", 0.3, roller, flat, "C")
+        pair = cls("K", ("a", "b"), "c", ArcLift((CamCircle(0.1, 0.25, 0.2),), flank), None, "P", shape=shape)
+        shapes = (
+            sample_shape(O=Vector(0.0, 0.0)),
+            sample_shape(C=Vector(0.1, 0.0), P=Vector(0.9, 0.3)),
+            sample_shape(O=Vector(0.0, 0.0), C=Vector(-0.8, 0.1)),
+        )
+        lift = pair.lift(cam.angle - carrier.angle, pair.law_numbers(shapes))
+        follower = frame_at(-0.7, 0.1, carrier.angle + pair.rest_position(shapes) + lift)
+        entry: dict[str, Any] = {"cam": "K", "links": ["a", "b"], "carrier": "c", "point": "P", "centre": "O"}
+        entry |= {"base_radius": 0.3, "pivot": "C", "noses": [{"at": [0.1, 0.25], "radius": 0.2}]}
+        entry |= {"roller_radius": roller} if flat is None else {"flat": flat}
+        entry |= {} if flank is None else {"flank_radius": flank}
+        pins = {"turning": "O", "links": ["c", "a"]}, {"turning": "C", "links": ["c", "b"]}
+        return PairSample(pair, shapes, (cam, follower, carrier), (), entry, pins)
+
+    @classmethod
+    def _samples_by_law(cls) -> tuple[PairSample, ...]:
         from planar.model.input_laws import CycloidalRise, DwellSegment, HarmonicRise  # which few files have
 
         law = LiftLaw((CycloidalRise(2.0, 0.5), DwellSegment(1.0), HarmonicRise(2.0 * pi - 3.0, -0.5)))

@@ -32,6 +32,10 @@ def _length(value: float, units: FileUnits) -> str:
     return f"{format_number(parse_unit(units.length).from_si(value))} {units.length}"
 
 
+def _angle(value: float) -> str:
+    return f"{degrees(value) % 360.0:.6g}"
+
+
 def _facts(found: CamProfile, least: BaseCircle, units: FileUnits) -> Iterator[tuple[str, str]]:
     face = "a flat face" if found.is_flat else "a point"
     if found.roller_radius:
@@ -40,10 +44,13 @@ def _facts(found: CamProfile, least: BaseCircle, units: FileUnits) -> Iterator[t
     yield "follower", f"{guided}, with {face}"
     yield "base circle", f"radius {_length(found.base_radius, units)}"
     most = found.greatest_pressure_angle
-    yield "pressure angle", f"{degrees(most.value):.6g} deg at most, at {degrees(most.input):.6g} deg of the law"
+    yield (
+        "pressure angle",
+        f"{degrees(most.value):.6g} deg at most, at {_angle(most.input)} deg of the law",
+    )
     radius = found.least_curvature_radius
     told = "nowhere convex" if np.isinf(radius.value) else _length(radius.value, units)
-    yield "least radius of curvature", f"{told}, at {degrees(radius.input):.6g} deg of the law"
+    yield "least radius of curvature", f"{told}, at {_angle(radius.input)} deg of the law"
     if found.face_reach is not None:
         low, high = (_length(value, units) for value in found.face_reach)
         yield "contact on the face", f"from {low} to {high}, to the left of its normal from the follower's point"
