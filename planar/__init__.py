@@ -70,6 +70,7 @@ if TYPE_CHECKING:
     from planar.model.pairs.cams.lift_law import LiftLaw
     from planar.model.pairs.cams.profiled import CamShape
     from planar.model.pairs.gear import GearPair
+    from planar.model.pairs.geneva import GenevaPair
     from planar.model.pairs.guide_line import LinkLine
     from planar.model.pairs.rack import RackPair
     from planar.model.pairs.sliding import SlidingPair
@@ -124,6 +125,7 @@ _ROOMS = {
     "Flywheel": "dynamics.flywheel",
     "Forces": "dynamics.forces",
     "GearPair": "model.pairs.gear",
+    "GenevaPair": "model.pairs.geneva",
     "HarmonicRise": "model.input_laws.cam_rises",
     "Harmonics": "analysis.motion.harmonics",
     "Input": "model.mechanism",
@@ -264,6 +266,7 @@ __all__ = [
     "Flywheel",
     "Forces",
     "GearPair",
+    "GenevaPair",
     "HarmonicRise",
     "Harmonics",
     "Input",

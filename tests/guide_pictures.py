@@ -57,6 +57,7 @@ PICTURES: dict[str, Callable[[], object]] = {
     "slot": scheme_of("slotted-lever"),
     "gear": scheme_of("planetary-gear-set"),
     "cams/roller": scheme_of("valve-cam"),
+    "cams/geneva": scheme_of("geneva-wheel"),
     "cams/profile": lambda: plot.cam_profile(planar.load("valve-cam")),
     "spring": scheme_of("door-closer"),
     "assemblies": lambda: plot.modes(planar.modes("four-bar")),

@@ -136,6 +136,15 @@ class Builder:
         self.pairs.append(entry)
         return name
 
+    def geneva(self, first: str, second: str) -> str:
+        """A crank that drives a wheel of five slots, both seen from a third link."""
+        name, others = f"N{len(self.pairs)}", [each for each in self.frames if each not in (first, second)]
+        carrier = str(self.rng.choice(others))
+        angle = {link: self.frames[link].angle for link in (first, second, carrier)}
+        meet = {first: angle[first] - angle[carrier], second: angle[second] - angle[carrier]}
+        self.pairs.append({"geneva": name, "links": [first, second], "carrier": carrier, "slots": 5, "mesh": meet})
+        return name
+
     def higher(self, first: str, second: str) -> int:
         """Any pair that prevents one motion only, with what it needs beside it; how many motions they prevent."""
         kinds = [keyword for keyword, kind in pair_types().items() if kind.prevented_motion_count() == 1]

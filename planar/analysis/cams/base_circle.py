@@ -15,7 +15,7 @@ from planar.document.first_argument import takes_mechanism
 from planar.foundation.errors import BadInput
 from planar.foundation.root_finding import find_root
 from planar.model.mechanism import Mechanism
-from planar.model.pairs.cams.cam_follower import rest_problem
+from planar.model.pairs.cams import rest_problem
 
 SEARCHED_RATIO = 1e4
 """Base circles are looked for from this part of the follower's own sizes up to so many times these."""

@@ -19,7 +19,7 @@ from planar.foundation.root_finding import find_root
 from planar.foundation.short_repr import short_repr
 from planar.model.link_shapes import LinkShape
 from planar.model.mechanism import Mechanism
-from planar.model.pairs.cams.cam_follower import CamContact
+from planar.model.pairs.cams import CamContact
 from planar.model.pairs.cams.profiled import ProfiledPair
 
 PIECE_SAMPLES = 121

@@ -15,7 +15,7 @@ from planar.foundation.arrays import Array
 from planar.foundation.geometry import Vector, direction
 from planar.foundation.units import parse_unit
 from planar.model.mechanism import FileUnits
-from planar.model.pairs.cams.cam_follower import turn_left
+from planar.model.pairs.cams import turn_left
 
 PARTS = 6
 """Of every rise and fall, between its stations."""

@@ -30,6 +30,7 @@ from planar.model.pairs.symbols import (
     BeltMark,
     CamMark,
     GuideMark,
+    OutlineMark,
     PinMark,
     PitchLineMark,
     SliderMark,
@@ -184,8 +185,10 @@ def rack_strokes(scene: Scene) -> Iterator[PlacedSymbol]:
 
 
 def cam_strokes(scene: Scene) -> Iterator[PlacedLine]:
-    """Profiles of cams that move or stand, and what of their followers touches them."""
+    """Profiles of cams that move or stand, and what of their followers touches them; other outlines."""
     for mark in scene.marks:
+        if isinstance(mark, OutlineMark):
+            yield PlacedLine(f"link {mark.link}", mark.link, Pen.LINK, mark.points, mark.closed)
         if not isinstance(mark, CamMark):
             continue
         yield PlacedLine(f"profile {mark.name}", mark.link, Pen.LINK, mark.profile, True)

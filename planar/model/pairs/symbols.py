@@ -91,4 +91,13 @@ class CamMark(NamedTuple):
     face: tuple[Vector, ...]
 
 
-DrawingMark = PinMark | GuideMark | SliderMark | SlotMark | WheelMark | PitchLineMark | BeltMark | CamMark
+class OutlineMark(NamedTuple):
+    """The outline of a body that is part of a link."""
+
+    name: str
+    link: str
+    points: tuple[Vector, ...]
+    closed: bool
+
+
+DrawingMark = PinMark | GuideMark | SliderMark | SlotMark | WheelMark | PitchLineMark | BeltMark | CamMark | OutlineMark

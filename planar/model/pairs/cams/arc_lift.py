@@ -23,7 +23,7 @@ from planar.model.pairs.base import (
     list_schema,
     schema_reference,
 )
-from planar.model.pairs.cams.cam_follower import (
+from planar.model.pairs.cams import (
     FollowerAxes,
     FollowerFace,
     FollowerRest,

@@ -11,7 +11,7 @@ from planar.foundation.geometry import Frame, Vector, direction, frame_at
 from planar.foundation.jets import Scalar
 from planar.model.link_shapes import LinkShape
 from planar.model.pairs.base import EntryReader, LengthFormatter, MeasureKind, Pair, QuantityWriter, ToothContact
-from planar.model.pairs.cams.cam_follower import (
+from planar.model.pairs.cams import (
     CamContact,
     FollowerAxes,
     FollowerFace,
