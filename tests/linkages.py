@@ -13,14 +13,16 @@ from hypothesis import strategies as st
 from planar.document import files
 from planar.foundation.errors import NoAnswer, Outcome
 from planar.foundation.geometry import Frame, Vector, direction, frame_at
-from planar.model.input_laws import HarmonicRise, Polynomial345Rise
 from planar.model.link_shapes import link_shape
 from planar.model.mechanism import Mechanism
 from planar.model.pairs import Pair, pair_types
-from planar.model.pairs.cams.lift_law import LiftLaw
 from planar.results.motion import State
 from planar.solving.position import PositionSolver
 from planar.solving.rates.regularity import regularity
+
+LIFTING = ("cam", "geneva")
+"""Pairs whose formulas are put together of pieces, of which a search from starts in a loop may miss solutions: these
+have tests of their own."""
 
 
 @dataclass(frozen=True)
@@ -120,34 +122,10 @@ class Builder:
     def chain(self, first: str, second: str) -> str:
         return self._wheels("chain", first, second)
 
-    def cam(self, first: str, second: str) -> str:
-        """A law of lift between a link and one that swings, both seen from a third."""
-        name, carrier = (
-            f"K{len(self.pairs)}",
-            str(self.rng.choice([k for k in self.frames if k not in (first, second)])),
-        )
-        way, part = float(self.rng.uniform(-0.6, 0.6)), float(self.rng.uniform(1.0, 3.0))
-        law = LiftLaw((Polynomial345Rise(part, abs(way)), HarmonicRise(2.0 * np.pi - part, -abs(way))))
-        start = float(self.rng.uniform(-np.pi, np.pi))
-        angle = {link: self.frames[link].angle for link in (first, second, carrier)}
-        rest = angle[second] - angle[carrier] - law.lift(angle[first] - angle[carrier] - start, law.measure())
-        pieces = [{"motion": each.motion, "by": each.by, "in": each.duration} for each in law.pieces]
-        entry = {"cam": name, "links": [first, second], "carrier": carrier, "law": pieces, "start": start, "rest": rest}
-        self.pairs.append(entry)
-        return name
-
-    def geneva(self, first: str, second: str) -> str:
-        """A crank that drives a wheel of five slots, both seen from a third link."""
-        name, others = f"N{len(self.pairs)}", [each for each in self.frames if each not in (first, second)]
-        carrier = str(self.rng.choice(others))
-        angle = {link: self.frames[link].angle for link in (first, second, carrier)}
-        meet = {first: angle[first] - angle[carrier], second: angle[second] - angle[carrier]}
-        self.pairs.append({"geneva": name, "links": [first, second], "carrier": carrier, "slots": 5, "mesh": meet})
-        return name
-
     def higher(self, first: str, second: str) -> int:
         """Any pair that prevents one motion only, with what it needs beside it; how many motions they prevent."""
         kinds = [keyword for keyword, kind in pair_types().items() if kind.prevented_motion_count() == 1]
+        kinds = [keyword for keyword in kinds if keyword not in LIFTING]
         if len(self.frames) < 3:
             kinds = [keyword for keyword in kinds if len(pair_types()[keyword].samples()[0].frames) == 2]
         before = len(self.pairs)

@@ -191,7 +191,7 @@ def cam_strokes(scene: Scene) -> Iterator[PlacedLine]:
             yield PlacedLine(f"link {mark.link}", mark.link, Pen.LINK, mark.points, mark.closed)
         if not isinstance(mark, CamMark):
             continue
-        yield PlacedLine(f"profile {mark.name}", mark.link, Pen.LINK, mark.profile, True)
+        yield PlacedLine(f"link {mark.link}", mark.link, Pen.LINK, mark.profile, True)
         about = f"link {mark.follower_link}"
         if mark.face:
             yield PlacedLine(about, mark.follower_link, Pen.LINK, mark.face)

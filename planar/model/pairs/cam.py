@@ -181,7 +181,8 @@ class CamPair(ProfiledPair):
         if shape is not None and point is None:
             raise entry.error_at(None, "a profile needs the follower's 'point' that touches it")
         law = _read_law(entry, kind, shape)
-        start, rest = entry.quantity("start", "angle", 0.0), entry.quantity("rest", kind, 0.0)
+        start = entry.quantity("start", "angle", 0.0)
+        rest = None if shape is not None else entry.quantity("rest", kind, 0.0)
         return (cls(name, links, carrier, law, line, point, start, entry.flag("clockwise"), rest, shape),)
 
     @classmethod
@@ -204,7 +205,7 @@ class CamPair(ProfiledPair):
         if pair.clockwise:
             entry["clockwise"] = True
         if pair.shape is None:
-            return entry | ({"rest": quantity(pair.rest, kind)} if pair.rest != 0.0 else {})
+            return entry | ({"rest": quantity(pair.rest, kind)} if pair.rest is not None and pair.rest != 0.0 else {})
         return entry | write_shape(pair.shape, quantity)
 
     @classmethod
@@ -225,7 +226,9 @@ class CamPair(ProfiledPair):
         carrier, cam = frame_at(0.3, -0.4, 0.7), frame_at(0.2, 0.5, 2.4)
         flat, roller = (1.7, 0.0) if face == "flat" else (None, 0.07)
         shape = CamShape("O", 0.3, roller, flat, "C")
-        pair = cls("K", ("a", "b"), "c", ArcLift((CamCircle(0.1, 0.25, 0.2),), flank), None, "P", shape=shape)
+        pair = cls(
+            "K", ("a", "b"), "c", ArcLift((CamCircle(0.1, 0.25, 0.2),), flank), None, "P", rest=None, shape=shape
+        )
         shapes = (
             sample_shape(O=Vector(0.0, 0.0)),
             sample_shape(C=Vector(0.1, 0.0), P=Vector(0.9, 0.3)),

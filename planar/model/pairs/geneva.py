@@ -187,7 +187,12 @@ class GenevaPair(Pair):
             frames = frame_at(0.2, 0.5, crank), frame_at(-0.7, 0.1, wheel), frame_at(0.3, -0.4, carrier)
             return PairSample(cls("K", ("a", "b"), "c", slots, meet), (bare, bare, bare), frames, (), entry)
 
-        return sample(6, 6.6, (0.0, 0.0)), sample(4, -0.35, (0.4, -2.0))
+        pinned = sample(5, 0.2, (0.3, 1.0))
+        a, b = Vector(0.0, 0.0), Vector(1.0, 0.0)
+        shapes = sample_shape(A=a), sample_shape(B=a), sample_shape(A=a, B=b)
+        pins = {"turning": "A", "links": ["c", "a"]}, {"turning": "B", "links": ["c", "b"]}
+        pinned = pinned._replace(shapes=shapes, other_entries=pins)
+        return sample(6, 6.6, (0.0, 0.0)), sample(4, -0.35, (0.4, -2.0)), pinned
 
 
 def _wheel_turn(angle: Scalar, part: Scalar, slots: int) -> Scalar:

@@ -73,7 +73,7 @@ class ProfiledPair(Pair):
     point: str | None = None
     start: float = 0.0
     clockwise: bool = False
-    rest: float = 0.0
+    rest: float | None = 0.0
     shape: CamShape | None = None
 
     @property
