@@ -8,6 +8,9 @@ from planar.foundation.revision import Revisable
 
 if TYPE_CHECKING:
     from planar import plot
+    from planar.analysis.cams.base_circle import BaseCircle, least_base_circle
+    from planar.analysis.cams.cam_profile import CamProfile, cam_profile
+    from planar.analysis.cams.contact_force import ContactForce, contact_forces
     from planar.analysis.centres.centres import Centre, Centres, centres
     from planar.analysis.centres.centrodes import Centrodes, centrodes
     from planar.analysis.centres.curvature import Curvature, curvature
@@ -56,6 +59,7 @@ if TYPE_CHECKING:
         CycloidalRise,
         HarmonicRise,
         ModifiedTrapezoidalRise,
+        ParabolicRise,
         Polynomial345Rise,
         Polynomial4567Rise,
         TrapezoidalRise,
@@ -69,7 +73,11 @@ if TYPE_CHECKING:
     from planar.model.motors import Motor
     from planar.model.pairs.base import Pair
     from planar.model.pairs.belt import BeltPair, ChainPair
+    from planar.model.pairs.cam import CamPair
+    from planar.model.pairs.cams.lift_law import LiftLaw
+    from planar.model.pairs.cams.profiled import CamShape
     from planar.model.pairs.gear import GearPair
+    from planar.model.pairs.geneva import GenevaPair
     from planar.model.pairs.guide_line import LinkLine
     from planar.model.pairs.rack import RackPair
     from planar.model.pairs.rubbing import Friction
@@ -96,8 +104,12 @@ _ROOMS = {
     "Area": "analysis.motion.coupler_area",
     "At": "model.mechanism",
     "BadInput": "foundation.errors",
+    "BaseCircle": "analysis.cams.base_circle",
     "BeltPair": "model.pairs.belt",
     "Branch": "assemblies.circuits.circuits",
+    "CamPair": "model.pairs.cam",
+    "CamProfile": "analysis.cams.cam_profile",
+    "CamShape": "model.pairs.cams.profiled",
     "Centre": "analysis.centres.centres",
     "Centres": "analysis.centres.centres",
     "Centrodes": "analysis.centres.centrodes",
@@ -107,6 +119,7 @@ _ROOMS = {
     "Conflict": "assemblies.conflict",
     "ConstantAccelerationSegment": "model.input_laws.constant_rates",
     "ConstantSpeedSegment": "model.input_laws.constant_rates",
+    "ContactForce": "analysis.cams.contact_force",
     "Course": "model.mechanism",
     "Curvature": "analysis.centres.curvature",
     "CycloidalRise": "model.input_laws.cam_rises",
@@ -122,6 +135,7 @@ _ROOMS = {
     "Forces": "dynamics.forces",
     "Friction": "model.pairs.rubbing",
     "GearPair": "model.pairs.gear",
+    "GenevaPair": "model.pairs.geneva",
     "HarmonicRise": "model.input_laws.cam_rises",
     "Harmonics": "analysis.motion.harmonics",
     "Impact": "dynamics.in_time.stop_contacts",
@@ -129,6 +143,7 @@ _ROOMS = {
     "Input": "model.mechanism",
     "InputLaw": "model.input_laws.input_law",
     "Inspection": "analysis.identity.inspection",
+    "LiftLaw": "model.pairs.cams.lift_law",
     "Limit": "results.records",
     "Link": "model.mechanism",
     "LinkLine": "model.pairs.guide_line",
@@ -151,6 +166,7 @@ _ROOMS = {
     "Outcome": "foundation.errors",
     "Pair": "model.pairs.base",
     "PairFriction": "dynamics.forces",
+    "ParabolicRise": "model.input_laws.cam_rises",
     "PinnedLinkages": "model.pin_linkages",
     "PlanarError": "foundation.errors",
     "Point": "model.mechanism",
@@ -188,11 +204,13 @@ _ROOMS = {
     "answers": "analysis.motion.answers",
     "area": "analysis.motion.coupler_area",
     "build": "document.builder",
+    "cam_profile": "analysis.cams.cam_profile",
     "centre_of": "analysis.centres.two_directions",
     "centres": "analysis.centres.centres",
     "centrodes": "analysis.centres.centrodes",
     "circuits": "assemblies.circuits.circuits",
     "conflict": "assemblies.conflict",
+    "contact_forces": "analysis.cams.contact_force",
     "curvature": "analysis.centres.curvature",
     "cycle": "solving.cycle",
     "dataset": "reports.files.xarray_dataset",
@@ -208,17 +226,18 @@ _ROOMS = {
     "holding": "dynamics.friction.holding",
     "inspect": "analysis.identity.inspection",
     "jamming": "analysis.motion.self_locking",
+    "least_base_circle": "analysis.cams.base_circle",
     "load": "document.files",
     "loads": "document.files",
     "mark_answers": "analysis.classroom.marking",
     "mobility": "analysis.identity.mobility",
     "modes": "assemblies.modes",
     "motor_duty": "analysis.motion.motor_duty",
-    "problem_variants": "analysis.classroom.variants",
     "pinned": "model.pin_linkage",
     "pinned_linkages": "model.pin_linkages",
     "plot": "plot",
     "prepared": "batch.prepared",
+    "problem_variants": "analysis.classroom.variants",
     "schema": "document.schema",
     "self_locking": "analysis.motion.self_locking",
     "simulate": "dynamics.simulation",
@@ -244,8 +263,12 @@ __all__ = [
     "Area",
     "At",
     "BadInput",
+    "BaseCircle",
     "BeltPair",
     "Branch",
+    "CamPair",
+    "CamProfile",
+    "CamShape",
     "Centre",
     "Centres",
     "Centrodes",
@@ -255,6 +278,7 @@ __all__ = [
     "Conflict",
     "ConstantAccelerationSegment",
     "ConstantSpeedSegment",
+    "ContactForce",
     "Course",
     "Curvature",
     "CycloidalRise",
@@ -270,6 +294,7 @@ __all__ = [
     "Forces",
     "Friction",
     "GearPair",
+    "GenevaPair",
     "HarmonicRise",
     "Harmonics",
     "Holding",
@@ -277,6 +302,7 @@ __all__ = [
     "Input",
     "InputLaw",
     "Inspection",
+    "LiftLaw",
     "Limit",
     "Link",
     "LinkLine",
@@ -299,6 +325,7 @@ __all__ = [
     "Outcome",
     "Pair",
     "PairFriction",
+    "ParabolicRise",
     "PinnedLinkages",
     "PlanarError",
     "Point",
@@ -336,11 +363,13 @@ __all__ = [
     "answers",
     "area",
     "build",
+    "cam_profile",
     "centre_of",
     "centres",
     "centrodes",
     "circuits",
     "conflict",
+    "contact_forces",
     "curvature",
     "cycle",
     "dataset",
@@ -356,6 +385,7 @@ __all__ = [
     "holding",
     "inspect",
     "jamming",
+    "least_base_circle",
     "load",
     "loads",
     "mark_answers",

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from planar.document.first_argument import takes_result
+from planar.document.first_argument import takes_mechanism, takes_result
 from planar.drawing.output.matplotlib_figure import draw_on_sheets, draw_pictures, encode_figure
 from planar.drawing.paper.scales import Scale, parse_scales
 from planar.foundation.safe_files import save_file as write
@@ -29,6 +29,7 @@ __all__ = [
     "acceleration",
     "animate",
     "bearings",
+    "cam_profile",
     "centres",
     "centrodes",
     "circuits",
@@ -101,6 +102,21 @@ def centres(
         circle_picture(found, shown),
     ]
     return draw_pictures(pictures, state.mechanism.name)
+
+
+@takes_mechanism
+def cam_profile(mechanism: Mechanism, pair: str | None = None, scale: ScaleTexts = None) -> Figure:
+    """A cam's profile by inversion, with pitch curve and base circle, and its displacement diagram.
+
+    `pair` names the cam where there are several. Raises BadInput where there is none with a profile, and for a scale
+    that is none.
+    """
+    from planar.analysis.cams.cam_profile import cam_profile as profile_of
+    from planar.drawing.diagrams.cam_drawing import cam_pictures
+
+    found = profile_of(mechanism, pair)
+    pictures = cam_pictures(found, mechanism.units, parse_scales(scale, ["length"]).get("length"))
+    return draw_pictures(pictures, mechanism.name)
 
 
 @takes_result("Motion", "Mechanism")

@@ -71,6 +71,8 @@ def example_figure(name: str) -> object:
             return variation_figure(name)
         case "load":
             return plot.forces(planar.forces(planar.solve(mechanism)))
+        case "lift":
+            return plot.cam_profile(mechanism)
         case "input":
             return plot.scheme(planar.solve(mechanism), "1:2")
     return plot.scheme(planar.solve(mechanism))
@@ -119,6 +121,9 @@ PICTURES: dict[str, Callable[[], object]] = {
     "sliding": scheme_of("slider-crank"),
     "slot": scheme_of("slotted-lever"),
     "gear": scheme_of("planetary-gear-set"),
+    "cams/roller": scheme_of("valve-cam"),
+    "cams/geneva": scheme_of("geneva-wheel"),
+    "cams/profile": lambda: plot.cam_profile(planar.load("valve-cam")),
     "spring": scheme_of("door-closer"),
     "assemblies": lambda: plot.modes(planar.modes("four-bar")),
     "polygons": lambda: plot.acceleration(planar.solve("four-bar")),

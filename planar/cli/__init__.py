@@ -5,6 +5,7 @@ from planar.cli.options import main
 main.modules = {
     "animate": "planar.cli.plot_animate",
     "bench": "planar.cli.inspect_models_schema_bench",
+    "cams": "planar.cli.cams",
     "centres": "planar.cli.centres_harmonics",
     "circuits": "planar.cli.circuits",
     "cycle": "planar.cli.solve_cycle_explain",

@@ -25,6 +25,7 @@ from planar.cli.options import (
     show_status,
 )
 from planar.foundation.errors import BadInput
+from planar.model.pairs import pair_types
 
 if TYPE_CHECKING:
     from planar.model.mechanism import Mechanism
@@ -34,7 +35,9 @@ if TYPE_CHECKING:
 POSITION_DRAWINGS = ("scheme", "velocity", "acceleration", "centres", "forces")
 ASSEMBLY_DRAWINGS = ("modes",)
 CIRCUIT_DRAWINGS = ("circuits",)
+PROFILE_DRAWINGS = tuple(keyword for keyword, kind in pair_types().items() if kind.has_profile)
 MOTION_DRAWINGS = ("positions", "loci", "centrodes", "diagrams", "torque", "bearings")
+SCALED_DRAWINGS = (*POSITION_DRAWINGS, "positions", "loci", "centrodes", *PROFILE_DRAWINGS, *ASSEMBLY_DRAWINGS)
 DRAWN_STEPS = 360
 """Steps of a run that is drawn."""
 
@@ -42,7 +45,8 @@ DRAWN_STEPS = 360
 @main.command()
 @model_argument()
 @click.argument(
-    "what", type=click.Choice((*POSITION_DRAWINGS, *MOTION_DRAWINGS, *ASSEMBLY_DRAWINGS, *CIRCUIT_DRAWINGS))
+    "what",
+    type=click.Choice((*POSITION_DRAWINGS, *MOTION_DRAWINGS, *PROFILE_DRAWINGS, *ASSEMBLY_DRAWINGS, *CIRCUIT_DRAWINGS)),
 )
 @output_option("Write the drawing to a .png, .svg or .pdf file.", required=True)
 @scale_option
@@ -60,7 +64,7 @@ DRAWN_STEPS = 360
     metavar="NAME",
     help="Centres of this link, of several those between them; centrodes of the first in the axes of the second.",
 )
-@click.option("--pair", "pairs", multiple=True, metavar="NAME", help="A pair whose bearing load is drawn.")
+@click.option("--pair", "pairs", multiple=True, metavar="NAME", help="A pair whose bearing load, or profile, is drawn.")
 @click.option(
     "--fluctuation",
     type=float,
@@ -97,12 +101,16 @@ def plot(  # many: options of a command; # long: each has its line
     for option, told, kinds in (
         ("--point", points, ("positions", "loci")),
         ("--of", of, ("diagrams", "torque", *CIRCUIT_DRAWINGS)),
-        ("--pair", pairs, ("bearings",)),
+        ("--pair", pairs, ("bearings", *PROFILE_DRAWINGS)),
         ("--fluctuation", fluctuation is not None, ("torque",)),
         ("--link", links, ("centres", "centrodes")),
         ("--chords", chords, ("diagrams",)),
         ("--steps", steps_told, ("positions", "diagrams") if chords else ("positions",)),
-        ("--scale", scales, (*POSITION_DRAWINGS, "positions", "loci", "centrodes", *ASSEMBLY_DRAWINGS)),
+        (
+            "--scale",
+            scales,
+            (*POSITION_DRAWINGS, "positions", "loci", "centrodes", *PROFILE_DRAWINGS, *ASSEMBLY_DRAWINGS),
+        ),
         ("--mode", mode is not None, (*POSITION_DRAWINGS, *MOTION_DRAWINGS)),
     ):
         if told and what not in kinds:
@@ -111,6 +119,11 @@ def plot(  # many: options of a command; # long: each has its line
     refuse_overwriting(model, output)
     with show_status(f"{mechanism.name}: {what}"):
         _refuse_range(what, pair, start, stop)
+        if what in PROFILE_DRAWINGS:
+            if at or len(pairs) > 1:
+                raise BadInput("--at" if at else "--pair", f"a profile of one {what} is drawn, over its whole turn")
+            drawn.save(drawn.cam_profile(mechanism, pairs[0] if pairs else None, scales), output)
+            return
         if what in (*ASSEMBLY_DRAWINGS, *CIRCUIT_DRAWINGS):
             from planar.assemblies.circuits.circuits import circuits
             from planar.assemblies.modes import modes
@@ -148,7 +161,7 @@ def _refuse_range(what: str, pair: str | None, start: str | None, stop: str | No
     """Raise BadInput for a range that a drawing would not heed."""
     if what in CIRCUIT_DRAWINGS and (start or stop):
         raise BadInput("--from", f"{what} are of the whole range of an input")
-    if (pair or start or stop) and what in (*POSITION_DRAWINGS, *ASSEMBLY_DRAWINGS):
+    if (pair or start or stop) and what in (*POSITION_DRAWINGS, *PROFILE_DRAWINGS, *ASSEMBLY_DRAWINGS):
         told = f"{what} are" if what in ASSEMBLY_DRAWINGS else f"a {what} is"
         raise BadInput("--input", f"{told} of one position; move an input there with --at")
 

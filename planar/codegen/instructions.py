@@ -17,6 +17,7 @@ UNARY_OPERATIONS = {
     ca.OP_COS: "cos",
     ca.OP_SIN: "sin",
     ca.OP_FABS: "abs",
+    ca.OP_FLOOR: "floor",
 }
 FOLDABLE_OPERATIONS: dict[str, Callable[..., float]] = {
     "neg": operator.neg,
@@ -36,6 +37,8 @@ BINARY_OPERATIONS = {
     ca.OP_ATAN2: "atan2",
     ca.OP_FMIN: "minnum",
     ca.OP_FMAX: "maxnum",
+    ca.OP_LT: "less",
+    ca.OP_LE: "most",
 }
 
 

@@ -8,7 +8,7 @@ import casadi as ca
 
 from planar.codegen.instructions import InstructionList, required_values
 
-CASE_OPERATIONS = {ca.OP_LT: "less", ca.OP_LE: "most", ca.OP_NOT: "not", ca.OP_IF_ELSE_ZERO: "where"}
+CASE_OPERATIONS = {ca.OP_NOT: "not", ca.OP_IF_ELSE_ZERO: "where"}
 """What machine code is not asked for."""
 
 JS_OPERATORS = {"add": "+", "sub": "-", "mul": "*", "div": "/", "less": "<", "most": "<="}
@@ -20,6 +20,7 @@ JS_FUNCTIONS = {
     "atan2": "Math.atan2",
     "minnum": "Math.min",
     "maxnum": "Math.max",
+    "floor": "Math.floor",
 }
 
 

@@ -9,7 +9,9 @@ from typing import Any
 from planar.codegen.instructions import InstructionList, UnsupportedOperation
 
 LLVM_OPERATIONS = {"add": "fadd", "sub": "fsub", "mul": "fmul", "div": "fdiv"}
-LLVM_INTRINSICS = {"sqrt": "sqrt", "abs": "fabs"}
+LLVM_INTRINSICS = {"sqrt": "sqrt", "abs": "fabs", "floor": "floor"}
+LLVM_COMPARISONS = {"less": "olt", "most": "ole"}
+"""What gives 1 where it is true, else 0."""
 LIBRARY_ARGUMENT_COUNTS = {"cos": 1, "sin": 1, "atan": 1, "atan2": 2}
 """What is called lane by lane, and how many arguments it has."""
 STACK_ALIGNMENT = 64
@@ -181,7 +183,7 @@ class IRWriter:
         }
         for lanes in {each.lanes for each in (self, *others)}:
             v, of = f"<{lanes} x double>", f"v{lanes}f64"
-            calls |= {f"declare {v} @llvm.{name}.{of}({v})" for name in ("sqrt", "fabs")}
+            calls |= {f"declare {v} @llvm.{name}.{of}({v})" for name in ("sqrt", "fabs", "floor")}
             calls |= {f"declare {v} @llvm.{name}.{of}({v}, {v})" for name in ("minnum", "maxnum", "copysign")}
             calls |= {f"declare double @llvm.vector.reduce.{name}.{of}({v})" for name in ("fmin", "fmax")}
             calls.add(f"declare double @llvm.vector.reduce.fadd.{of}(double, {v})")
@@ -233,6 +235,9 @@ class IRWriter:
                 names[each] = self.call_intrinsic(value.operation, *of)
             elif value.operation in LIBRARY_ARGUMENT_COUNTS:
                 names[each] = self.call_per_lane(value.operation, *of)
+            elif value.operation in LLVM_COMPARISONS:
+                is_true = self.compare(LLVM_COMPARISONS[value.operation], *of)
+                names[each] = self.select(is_true, self.constant(1.0), self.constant(0.0))
             elif value.operation in LLVM_INTRINSICS:
                 names[each] = self.call_intrinsic(LLVM_INTRINSICS[value.operation], *of)
             else:

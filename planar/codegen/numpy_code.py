@@ -10,6 +10,8 @@ import numpy as np
 from planar.codegen.instructions import InstructionList, UnsupportedOperation, required_values
 
 NUMPY_OPERATORS = {"add": "+", "sub": "-", "mul": "*", "div": "/"}
+NUMPY_COMPARISONS = {"less": "<", "most": "<="}
+"""What gives 1 where it is true, else 0."""
 NUMPY_FUNCTIONS = {
     "sqrt": np.sqrt,
     "abs": np.abs,
@@ -18,6 +20,7 @@ NUMPY_FUNCTIONS = {
     "atan2": np.arctan2,
     "minnum": np.fmin,
     "maxnum": np.fmax,
+    "floor": np.floor,
 }
 NumpyFunction = Callable[..., tuple[Any, ...]]
 """Arrays, or numbers, of the operands in their order, to the values that are wanted."""
@@ -63,6 +66,8 @@ def compile_numpy(instructions: InstructionList[Any], wanted: Sequence[int], ope
 def _expression(operation: str, of: list[str]) -> str:
     if operation in NUMPY_OPERATORS:
         return f"{of[0]} {NUMPY_OPERATORS[operation]} {of[1]}"
+    if operation in NUMPY_COMPARISONS:
+        return f"1.0 * ({of[0]} {NUMPY_COMPARISONS[operation]} {of[1]})"
     if operation == "neg":
         return f"-{of[0]}"
     if operation in NUMPY_FUNCTIONS:

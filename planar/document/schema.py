@@ -298,6 +298,8 @@ def schema() -> dict[str, Any]:
     'object'
     """
     from planar.model.input_laws import SEGMENT_TYPES  # which few files have
+    from planar.model.pairs.cams.arc_lift import nose_schema
+    from planar.model.pairs.cams.lift_law import lift_schema
 
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
@@ -338,6 +340,8 @@ def schema() -> dict[str, Any]:
             "varies": _object_schema(VARIATION_SCHEMA, "at", "factors"),
             "time": _quantity_schema(_ABOVE_ZERO, "[+]?", "0.5 s"),
             "piece": {"oneOf": [_segment_schema(kind) for kind in SEGMENT_TYPES.values()]},
+            "lift": lift_schema(),
+            "nose": nose_schema(),
             "drives": {"type": "object", "additionalProperties": _object_schema(DRIVE_SCHEMA)},
             "pair": {"oneOf": [_pair_schema(kind) for kind in pair_types().values()]},
         },

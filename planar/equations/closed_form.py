@@ -17,7 +17,7 @@ from typing import NamedTuple
 import casadi as ca
 import numpy as np
 
-from planar.equations.symbolic_equations import Block, ConstraintEquations
+from planar.equations.symbolic_equations import Block, ConstraintEquations, is_piecewise_in
 from planar.foundation.arrays import Array
 from planar.foundation.generic_numbers import generic_numbers
 from planar.model.pairs import MeasureKind
@@ -89,6 +89,8 @@ def find_closed_form(e: ConstraintEquations, stage: Block) -> ClosedForm | None:
     if not any(angles) or any(
         e.rows[row].kind is MeasureKind.ANGLE for row in range(stage.rows.start, stage.rows.stop)
     ):
+        return None
+    if is_piecewise_in(e.F[stage.rows], e.z[stage.unknowns]):
         return None
     first = 0 if angles[0] else 1
     unknowns = [e.z[stage.unknowns.start + k] for k in (first, 1 - first)]

@@ -29,6 +29,9 @@ from planar.foundation.geometry import GROUND, Frame, frame_at
 from planar.model.mechanism import Mechanism, relative_motions
 from planar.model.pairs import MeasureKind
 
+PIECEWISE_OPERATIONS = frozenset((ca.OP_FLOOR, ca.OP_LT, ca.OP_LE))
+"""What formulas that are put together of pieces have in them."""
+
 
 class Block(NamedTuple):
     """A block after elimination: which entries of z and of F it has, and the links and pairs that it is about."""
@@ -281,3 +284,21 @@ def _make_coordinates(mechanism: Mechanism, given: Mapping[str, ca.SX]) -> _Mech
         frames[link.name] = Frame(x, y, *both, angle)
     own = {pair.name: [add(pair.name, *each, False) for each in pair.coordinate_kinds] for pair in mechanism.pairs}
     return _MechanismCoordinates(coordinates, CoordinateSymbols(values, turned), frames, own)
+
+
+def is_piecewise_in(expression: ca.SX, symbols: ca.SX) -> bool:
+    """Whether an expression changes its formula as these symbols change."""
+    others = [each for each in ca.symvar(expression) if not ca.depends_on(symbols, each)]
+    function = ca.Function("pieces", [symbols, ca.vertcat(ca.SX(0, 1), *others)], [expression])
+    depends: dict[int, bool] = {}
+    for k in range(function.n_instructions()):
+        code, out, of = function.instruction_id(k), function.instruction_output(k), function.instruction_input(k)
+        if code == ca.OP_INPUT:
+            depends[out[0]] = of[0] == 0
+        elif code == ca.OP_CONST:
+            depends[out[0]] = False
+        elif code != ca.OP_OUTPUT:
+            depends[out[0]] = any(depends[each] for each in of)
+            if depends[out[0]] and code in PIECEWISE_OPERATIONS:
+                return True
+    return False

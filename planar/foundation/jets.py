@@ -17,6 +17,9 @@ Scalar = Any
 """A float, a numpy array, a casadi SX or a Jet: whatever has + - *."""
 
 
+TURN = 2.0 * math.pi
+
+
 def _apply_function(name: str, x: Scalar) -> Scalar:
     if type(x) is float:
         return getattr(math, name)(x)
@@ -56,7 +59,12 @@ def atan2(y: Scalar, x: Scalar) -> Scalar:
     if method is not None:
         return method(x)
     turned = getattr(x, "__rarctan2__", None)  # of a symbol beside a number
-    return np.arctan2(y, x) if turned is None else turned(y)
+    if turned is not None:
+        return turned(y)
+    if np.iscomplexobj(y) or np.iscomplexobj(x):  # beside a real place, to first order
+        a, b = np.real(x), np.real(y)
+        return np.arctan2(b, a) + 1j * (a * np.imag(y) - b * np.imag(x)) / (a * a + b * b)
+    return np.arctan2(y, x)
 
 
 class Jet:
@@ -104,10 +112,43 @@ class Jet:
     __radd__ = __add__
     __rmul__ = __mul__
 
+    def __truediv__(self, other: Scalar) -> Jet:
+        """By Leibniz: (q b)^(n) = a^(n), solved for q^(n)."""
+        a, b = self.parts, self._derivatives_of(other)
+        parts: list[Scalar] = []
+        for n in range(len(a)):
+            known = sum((comb(n, k) * parts[k] * b[n - k] for k in range(n)), 0.0)
+            parts.append((a[n] - known) / b[0])
+        return Jet(*parts)
+
+    def __rtruediv__(self, other: Scalar) -> Jet:
+        return Jet(*self._derivatives_of(other)) / self
+
+    def sqrt(self) -> Jet:
+        """By Leibniz: (r r)^(n) = a^(n), solved for r^(n)."""
+        a = self.parts
+        parts = [sqrt(a[0])]
+        for n in range(1, len(a)):
+            known = sum((comb(n, k) * parts[k] * parts[n - k] for k in range(1, n)), 0.0)
+            parts.append((a[n] - known) / (2.0 * parts[0]))
+        return Jet(*parts)
+
+    def arctan2(self, x: Scalar) -> Jet:
+        """The angle of (x, self): its derivative is (x y' - y x') / (x^2 + y^2)."""
+        other = Jet(*self._derivatives_of(x))
+        y0, x0 = Jet(*self.parts[:-1]), Jet(*other.parts[:-1])
+        y1, x1 = Jet(*self.parts[1:]), Jet(*other.parts[1:])
+        rate = (x0 * y1 - y0 * x1) / (x0 * x0 + y0 * y0)
+        return Jet(atan2(self.parts[0], other.parts[0]), *rate.parts)
+
+    def __rarctan2__(self, y: Scalar) -> Jet:
+        return Jet(*self._derivatives_of(y)).arctan2(self)
+
     def _cos_sin_derivatives(self) -> tuple[list[Scalar], list[Scalar]]:
         """Derivatives of cos and sin: c' = -s a', s' = c a', expanded by Leibniz."""
         a = self.parts
-        c, s = [np.cos(a[0])], [np.sin(a[0])]
+        is_symbol = hasattr(a[0], "is_symbolic")
+        c, s = ([a[0].cos()], [a[0].sin()]) if is_symbol else ([np.cos(a[0])], [np.sin(a[0])])
         for n in range(1, len(a)):
             terms = [(comb(n - 1, k) * a[n - k], k) for k in range(n)]
             c.append(-sum(w * s[k] for w, k in terms))
@@ -141,6 +182,15 @@ class TermSizes(Jet):
     def __mul__(self, other: Scalar) -> TermSizes:
         return TermSizes(*super().__mul__(other if isinstance(other, TermSizes) else abs(other)).parts)
 
+    def cos(self) -> TermSizes:
+        """1, and the sizes of the derivatives: those of c' = -s a', s' = c a' are the same."""
+        a = self.parts
+        found: list[Scalar] = [1.0]
+        for n in range(1, len(a)):
+            found.append(sum(comb(n - 1, k) * a[n - k] * found[k] for k in range(n)))
+        return TermSizes(*found)
+
+    sin = cos
     __sub__ = __radd__ = __rsub__ = __add__
     __rmul__ = __mul__
 
@@ -153,3 +203,51 @@ def term_sizes(value: Jet) -> TermSizes:
 def value_and_rates(value: Scalar) -> tuple[Scalar, ...]:
     """Value, rate, second rate (and more, if a jet has them); a plain number is at rest."""
     return value.parts if isinstance(value, Jet) else (value, 0.0, 0.0)
+
+
+# functions that are put together of pieces: derivatives at a joint are those of the piece that starts there
+
+
+def within_turn(angle: Scalar) -> Scalar:
+    """An angle (rad) less the whole turns in it: from 0 up to a turn."""
+    if isinstance(angle, TermSizes):
+        return angle
+    if isinstance(angle, Jet):
+        return Jet(within_turn(angle.parts[0]), *angle.parts[1:])
+    if type(angle) is float:
+        return angle - TURN * math.floor(angle / TURN)
+    if _is_symbol(angle):
+        return angle - TURN * (angle / TURN).floor()
+    return angle - TURN * np.floor(np.real(angle) / TURN)
+
+
+def value_between(x: Scalar, low: Scalar | None, high: Scalar | None, value: Scalar) -> Scalar:
+    """A value where low <= x < high, else nothing; an end that is None is none."""
+    if isinstance(x, TermSizes) or isinstance(value, TermSizes):
+        return value
+    if isinstance(value, Jet):
+        return Jet(*(value_between(x, low, high, part) for part in value.parts))
+    x, low, high = (each.parts[0] if isinstance(each, Jet) else each for each in (x, low, high))
+    if any(map(_is_symbol, (x, low, high, value))):
+        # flags are numbers, 0 or 1, whose derivative is none
+        is_below = 1.0 if high is None else x < high
+        return is_below * value if low is None else (low <= x) * (is_below * value)
+    is_inside = np.asarray(True)
+    if low is not None:
+        is_inside = is_inside & (np.real(low) <= np.real(x))
+    if high is not None:
+        is_inside = is_inside & (np.real(x) < np.real(high))
+    if is_inside.ndim == 0:
+        return value if is_inside else value * 0.0
+    return np.where(is_inside, value, 0.0)
+
+
+def part_of_piece(x: Scalar) -> Scalar:
+    """A number that lies between 0 and 1 wherever it counts: sizes of its terms say no more."""
+    if not isinstance(x, TermSizes):
+        return x
+    return TermSizes(1.0, *x.parts[1:])
+
+
+def _is_symbol(value: Scalar) -> bool:
+    return hasattr(value, "is_symbolic")

@@ -27,6 +27,8 @@ KIND_WORDS = {
     "pair": "a pair",
     "place": "where a point is",
     "piece": "a piece of a law",
+    "lift": "a piece of lift",
+    "nose": "a circle",
     "varies": "a variation",
     "drives": "inputs by their pairs",
 }
@@ -80,6 +82,8 @@ def key_sections() -> tuple[KeySection, ...]:
         KeySection("A link", (kinds["link"],), "link"),
         KeySection("A point of a link", places, ""),
         *(KeySection(_title(pair), (pair,), next(iter(pair["properties"]))) for pair in kinds["pair"]["oneOf"]),
+        KeySection("A piece of a cam's lift", tuple(kinds["lift"]["oneOf"]), "lift"),
+        KeySection("A circle of a cam", (kinds["nose"],), "nose"),
         KeySection("An input", (lists["inputs"],), "input"),
         KeySection("A piece of an input's law", tuple(kinds["piece"]["oneOf"]), "law"),
         KeySection("A load", tuple(lists["loads"]["anyOf"]), "load"),

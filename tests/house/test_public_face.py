@@ -79,6 +79,8 @@ def results():
     yield planar.simulate("tipper", 0.3, steps=4).impacts[0]
     yield planar.unknown_load(planar.solve("balanced-lamp"), "springs.0")
     yield planar.motor_duty(planar.forces(planar.solve("motor-press")))
+    yield from (planar.cam_profile("valve-cam"), planar.least_base_circle("valve-cam"))
+    yield planar.contact_forces(planar.forces(planar.solve("cam-with-spring")))["lift"]
     yield from (swept, swept[0], prepared, prepared())
     handed_in = AnswerList(7, (HandedInValue("Ann", 1, "velocity of C", 0.6, "m/s", 3),))
     marks = planar.mark_answers(bars, handed_in)
@@ -161,14 +163,20 @@ def of_mechanism():
             yield name
 
 
+def function_of_cams(name):
+    """Whether a function is of mechanisms with a cam."""
+    return FUNCTIONS[name].__module__.startswith("planar.analysis.cams")
+
+
 @pytest.mark.parametrize("name", sorted(of_mechanism()))
 def test_a_path_or_a_models_name_is_a_mechanism(name, tmp_path):
     path = tmp_path / "m.json"
-    path.write_text(json.dumps(write_mechanism(planar.load("four-bar"))))
+    model = "valve-cam" if function_of_cams(name) else "four-bar"
+    path.write_text(json.dumps(write_mechanism(planar.load(model))))
     function = FUNCTIONS[name]
     first = next(iter(inspect.signature(function).parameters))
     assert repr(function(planar.load(path))) == repr(function(str(path))) == repr(function(**{first: path}))
-    function("four-bar")
+    function(model)
 
 
 def test_names_that_are_not_there_are_unknown():
@@ -194,10 +202,15 @@ def test_every_command_of_a_model_takes_set_and_what_is_piped_in(name, tmp_path,
         "mark": ["answers.csv"],
     }
     (tmp_path / "answers.csv").write_text("seed 1\nstudent,variant,quantity,value\nAnn,1,velocity of B,1\n")
-    model = {"forces": "two-stroke-engine", "simulate": "physical-pendulum", "animate": "slider-crank"}
+    model = {
+        "forces": "two-stroke-engine",
+        "simulate": "physical-pendulum",
+        "animate": "slider-crank",
+        "cams": "valve-cam",
+    }
     monkeypatch.chdir(tmp_path)
     piped = json.dumps(write_mechanism(planar.load(model.get(name, "slider-crank")))).encode()
-    changed = {"simulate": "O.velocity=2rad/s"}.get(name, "crank.length=25mm")
+    changed = {"simulate": "O.velocity=2rad/s", "cams": "lift.base_radius=30mm"}.get(name, "crank.length=25mm")
     for value, status in ((changed, 0), ("nothing=3", 2)):
         monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(piped)))
         with pytest.raises(SystemExit) as ended:

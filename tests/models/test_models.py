@@ -89,3 +89,15 @@ def test_structures_are_what_their_names_say():
         mechanism = planar.load(model)
         assert (len(mechanism.links), len(mechanism.pairs)) == (8, 10)
     assert len(planar.load("chain-42").links) == 42
+
+
+def test_the_valve_of_the_tangent_cam_rises_by_the_lift_of_its_nose():
+    motion = planar.cycle("tangent-cam", steps=72)
+    height = motion.point("P").position[:, 1]
+    assert height.max() - height.min() == pytest.approx(0.0175, abs=1e-12)
+
+
+def test_the_geneva_wheel_goes_on_by_a_quarter_with_every_turn_of_its_crank():
+    angles = [state_turned_by("geneva-wheel", "O", turned).link("wheel").angle for turned in (0, 360, 720)]
+    assert np.diff(angles) == pytest.approx([-np.pi / 2, -np.pi / 2], abs=1e-12)
+    assert state_turned_by("geneva-wheel", "O", 110).link("wheel").angular_velocity == 0.0

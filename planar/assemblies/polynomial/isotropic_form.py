@@ -29,7 +29,7 @@ import numpy as np
 
 from planar.assemblies.polynomial.gear_powers import AngleArguments, GearPowers, angle_arguments, gear_powers
 from planar.equations.casadi_call import BufferedFunction
-from planar.equations.symbolic_equations import Block, ConstraintEquations
+from planar.equations.symbolic_equations import Block, ConstraintEquations, is_piecewise_in
 from planar.foundation.angles import wrap_angle
 from planar.foundation.arrays import Array, ComplexArray, IntArray
 from planar.model.pairs import MeasureKind
@@ -162,7 +162,9 @@ def isotropic_form(e: ConstraintEquations, stage: Block, p: Array | None = None)
     if stage.is_free or rows < unknowns or not unknowns:
         return None
     written = (MeasureKind.LENGTH,) if p is None else (MeasureKind.LENGTH, MeasureKind.TURNS)
-    if any(row.kind not in written for row in e.rows[stage.rows]):
+    if any(row.kind not in written for row in e.rows[stage.rows]) or is_piecewise_in(
+        e.F[stage.rows], e.z[stage.unknowns]
+    ):
         return None
     own = [e.coordinates[column].kind for column in e.unknowns[stage.unknowns]]
     angles = tuple(k for k, kind in enumerate(own) if kind is MeasureKind.ANGLE)

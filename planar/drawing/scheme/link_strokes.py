@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from itertools import chain
-from math import hypot
+from math import hypot, pi
 from typing import Any
 
 from planar.drawing.paper.picture import Fill, Outline, Pen
@@ -23,11 +23,24 @@ from planar.drawing.scheme.scene import GUIDE_OVERHANG, Cylinder, Scene, TravelR
 from planar.drawing.scheme.springs_masses import Coil, MassCentreMark, Spiral
 from planar.drawing.scheme.stops import stop_strokes
 from planar.foundation import jets
-from planar.foundation.geometry import Frame, Vector
+from planar.foundation.geometry import Frame, Vector, direction
 from planar.foundation.jets import Scalar
 from planar.model.link_shapes import LinkShape
 from planar.model.mechanism import Mechanism
-from planar.model.pairs.symbols import BeltMark, GuideMark, PinMark, PitchLineMark, SliderMark, SlotMark, WheelMark
+from planar.model.pairs.symbols import (
+    BeltMark,
+    CamMark,
+    GuideMark,
+    OutlineMark,
+    PinMark,
+    PitchLineMark,
+    SliderMark,
+    SlotMark,
+    WheelMark,
+)
+
+ROLLER_POINTS = 48
+"""Corners of the line that is drawn for the rim of a roller."""
 
 
 # many: what a scene is made of, and how it is drawn
@@ -59,7 +72,7 @@ def moving_strokes(scene: Scene, pen: Pen = Pen.LINK) -> dict[str, Iterator[Plac
     """The same as strokes of links by their level; each level hides those before it."""
     return {
         "plates": _plate_strokes(scene, pen),
-        "wheels": chain(_wheel_strokes(scene), rack_strokes(scene)),
+        "wheels": chain(_wheel_strokes(scene), rack_strokes(scene), cam_strokes(scene)),
         "tubes": cylinder_strokes(scene, pen),
         "bars": bar_strokes(scene, pen),
         "springs": spring_strokes(scene),
@@ -170,6 +183,23 @@ def rack_strokes(scene: Scene) -> Iterator[PlacedSymbol]:
                 foot + way * high,
                 side,
             )
+
+
+def cam_strokes(scene: Scene) -> Iterator[PlacedLine]:
+    """Profiles of cams that move or stand, and what of their followers touches them; other outlines."""
+    for mark in scene.marks:
+        if isinstance(mark, OutlineMark):
+            yield PlacedLine(f"link {mark.link}", mark.link, Pen.LINK, mark.points, mark.closed)
+        if not isinstance(mark, CamMark):
+            continue
+        yield PlacedLine(f"link {mark.link}", mark.link, Pen.LINK, mark.profile, True)
+        about = f"link {mark.follower_link}"
+        if mark.face:
+            yield PlacedLine(about, mark.follower_link, Pen.LINK, mark.face)
+        elif mark.roller_radius:
+            turned = (direction(2.0 * pi * k / ROLLER_POINTS) for k in range(ROLLER_POINTS))
+            rim = tuple(mark.middle + each * mark.roller_radius for each in turned)
+            yield PlacedLine(about, mark.follower_link, Pen.PIN, rim, True)
 
 
 def rack_half_length(scene: Scene, mark: PitchLineMark) -> Scalar:

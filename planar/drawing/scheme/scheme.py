@@ -25,7 +25,7 @@ from planar.foundation.jets import Scalar
 from planar.model.link_graph import link_numbers
 from planar.model.link_shapes import LinkShape
 from planar.model.mechanism import Mechanism, named_points
-from planar.model.pairs.symbols import DrawingMark, PinMark, SliderMark, WheelMark
+from planar.model.pairs.symbols import CamMark, DrawingMark, OutlineMark, PinMark, SliderMark, WheelMark
 from planar.results.motion import State
 
 __all__ = ["body_marks", "ground_marks", "plain_frames", "point_labels", "scheme", "scheme_scale", "space_scale"]
@@ -109,6 +109,11 @@ def extent_places(
     for mark in marks:
         if isinstance(mark, WheelMark):
             places.append(ExtentPlace(mark.link, mark.centre, abs(mark.radius)))
+        elif isinstance(mark, OutlineMark):
+            places += [ExtentPlace(mark.link, at) for at in mark.points]
+        elif isinstance(mark, CamMark):
+            places += [ExtentPlace(mark.link, at) for at in mark.profile]
+            places += [ExtentPlace(mark.follower_link, at) for at in (mark.middle, *mark.face)]
         elif isinstance(mark, MassCentreMark):
             places.append(ExtentPlace(mark.link, mark.at))
     return places

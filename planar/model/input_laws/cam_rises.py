@@ -16,6 +16,7 @@ import numpy as np
 from numpy.polynomial import Polynomial
 
 from planar.foundation.arrays import Array, BoolArray
+from planar.foundation.jets import Scalar, sin, value_between
 from planar.model.input_laws.segment import LawSegment, SegmentKey
 
 
@@ -28,6 +29,7 @@ class CamRise(LawSegment):
 
     duration: float
     by: float
+    is_lift: ClassVar[bool] = True
     keys: ClassVar[Mapping[str, SegmentKey]] = {
         "by": SegmentKey("by", "position", "how far the input goes, from rest to rest"),
         "in": SegmentKey("duration", "time", "how long it takes"),
@@ -39,6 +41,10 @@ class CamRise(LawSegment):
 
         Where a derivative jumps, it is what follows; what went before where `back` says so.
         """
+
+    @abstractmethod
+    def fraction(self, x: Scalar) -> Scalar:
+        """The part of the way after the part x of the time, 0 to 1, in any arithmetic."""
 
     def evaluate(self, t: Array, velocity: float) -> Array:
         x = t / self.duration
@@ -63,6 +69,12 @@ class PolynomialRise(CamRise):
     def first_half(self, x: Array, is_mirrored: BoolArray) -> Array:
         s = Polynomial(self.coefficients)
         return np.stack([s.deriv(k)(x) for k in range(4)])
+
+    def fraction(self, x: Scalar) -> Scalar:
+        found: Scalar = float(self.coefficients[-1])
+        for coefficient in reversed(self.coefficients[:-1]):
+            found = x * found + float(coefficient)
+        return found
 
 
 class Polynomial345Rise(PolynomialRise):
@@ -92,6 +104,9 @@ class CycloidalRise(CamRise):
         c, s = np.cos(turn * x), np.sin(turn * x)
         return np.stack([x - s / turn, 2.0 * np.sin(pi * x) ** 2, turn * s, turn**2 * c])
 
+    def fraction(self, x: Scalar) -> Scalar:
+        return x - sin(x * (2.0 * pi)) * (0.5 / pi)
+
 
 class HarmonicRise(CamRise):
     """Simple harmonic: half a cosine, so acceleration jumps at both ends. Greatest pi/2, pi^2/2, pi^3/2."""
@@ -102,6 +117,24 @@ class HarmonicRise(CamRise):
     def first_half(self, x: Array, is_mirrored: BoolArray) -> Array:
         c, s = np.cos(pi * x), np.sin(pi * x)
         return np.stack([np.sin(0.5 * pi * x) ** 2, 0.5 * pi * s, 0.5 * pi**2 * c, -0.5 * pi**3 * s])
+
+    def fraction(self, x: Scalar) -> Scalar:
+        half = sin(x * (0.5 * pi))
+        return half * half
+
+
+class ParabolicRise(CamRise):
+    """Parabolic: constant acceleration, then as much retardation. Greatest 2, 4 times by / duration^k."""
+
+    motion = "parabolic"
+    description = "a parabolic rise: constant acceleration for the first half, as much retardation for the second"
+
+    def first_half(self, x: Array, is_mirrored: BoolArray) -> Array:
+        return np.stack([2.0 * x**2, 4.0 * x, np.full_like(x, 4.0), np.zeros_like(x)])
+
+    def fraction(self, x: Scalar) -> Scalar:
+        rest = 1.0 + x * -1.0
+        return value_between(x, None, 0.5, x * x * 2.0) + value_between(x, 0.5, None, rest * rest * -2.0 + 1.0)
 
 
 @dataclass(frozen=True)
@@ -129,10 +162,35 @@ class RampedRise(CamRise):
     def ramp_integrals(self, x: Array) -> Array:
         """(4, n): what acceleration sums to within a ramp, of height and length one: s, v, a, j over x (n,)."""
 
+    @abstractmethod
+    def ramp_way(self, x: Scalar) -> Scalar:
+        """The first of these, s, in any arithmetic."""
+
+    @property
+    def greatest_acceleration(self) -> Scalar:
+        """Of a way and a time of one: v(1/2) = a (1/2 - 2 b + 2 b mean), and s(1/2) = v(1/2) / 4 = 1/2."""
+        return 2.0 / (0.5 - 2.0 * self.ramp + 2.0 * self.ramp * self.ramp_mean)
+
+    def fraction(self, x: Scalar) -> Scalar:
+        rest = 1.0 + x * -1.0
+        second_half = value_between(x, 0.5, None, self._half_fraction(rest) * -1.0 + 1.0)
+        return value_between(x, None, 0.5, self._half_fraction(x)) + second_half
+
+    def _half_fraction(self, x: Scalar) -> Scalar:
+        """The same for x up to 1/2."""
+        a, b = self.greatest_acceleration, self.ramp
+        height, start_speed = a * b * b, a * b * self.ramp_mean
+        u, y = x + -b, 0.5 + x * -1.0
+        start = self.ramp_way(1.0) * height
+        rising = self.ramp_way(x * (1.0 / b)) * height
+        flat = u * start_speed + u * u * (0.5 * a) + start
+        falling = self.ramp_way(y * (1.0 / b)) * height + y * -2.0 + 0.5
+        pieces = ((None, b, rising), (b, 0.5 - b, flat), (0.5 - b, None, falling))
+        low, middle, high = (value_between(x, start, end, value) for start, end, value in pieces)
+        return low + middle + high
+
     def first_half(self, x: Array, is_mirrored: BoolArray) -> Array:
-        b = self.ramp
-        # v(1/2) = a (1/2 - 2 b + 2 b filling), and s(1/2) = v(1/2) / 4 = 1/2
-        a = 2.0 / (0.5 - 2.0 * b + 2.0 * b * self.ramp_mean)
+        b, a = self.ramp, self.greatest_acceleration
         scale = (a * b ** np.array([2.0, 1.0, 0.0, -1.0]))[:, None]
         flat_from, flat_to = b, 0.5 - b
 
@@ -170,6 +228,9 @@ class TrapezoidalRise(RampedRise):
     def ramp_integrals(self, x: Array) -> Array:
         return np.stack([x**3 / 6.0, x**2 / 2.0, x, np.ones_like(x)])
 
+    def ramp_way(self, x: Scalar) -> Scalar:
+        return x * x * x * (1.0 / 6.0)
+
 
 class ModifiedTrapezoidalRise(RampedRise):
     """Modified trapezoid: ramps are quarters of a sine (C. N. Neklutin, 1952); with ramps of 1/4 it is cycloidal.
@@ -185,3 +246,7 @@ class ModifiedTrapezoidalRise(RampedRise):
         w = 0.5 * pi
         c, s = np.cos(w * x), np.sin(w * x)
         return np.stack([x / w - s / w**2, 2.0 * np.sin(0.5 * w * x) ** 2 / w, s, w * c])
+
+    def ramp_way(self, x: Scalar) -> Scalar:
+        w = 0.5 * pi
+        return x * (1.0 / w) + sin(x * w) * (-1.0 / w**2)

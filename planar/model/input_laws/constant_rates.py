@@ -18,6 +18,7 @@ class DwellSegment(LawSegment):
 
     duration: float
     motion: ClassVar[str] = "dwell"
+    is_lift: ClassVar[bool] = True
     description: ClassVar[str] = "the input rests"
     keys: ClassVar[Mapping[str, SegmentKey]] = {"in": SegmentKey("duration", "time", "how long it takes")}
 
@@ -39,6 +40,7 @@ class ConstantSpeedSegment(LawSegment):
     by: float | None = None
     speed: float | None = None
     motion: ClassVar[str] = "constant speed"
+    is_lift: ClassVar[bool] = True
     description: ClassVar[str] = "the input goes on at constant speed"
     keys: ClassVar[Mapping[str, SegmentKey]] = {
         "by": SegmentKey("by", "position", "how far the input goes, in place of speed", is_required=False),

@@ -39,6 +39,8 @@ class LawSegment(ABC):
     description: ClassVar[str]
     "what it does, for who writes a file"
     keys: ClassVar[Mapping[str, SegmentKey]]
+    is_lift: ClassVar[bool] = False
+    "whether a cam can lift its follower so: by a way of its own, whatever went before"
 
     if TYPE_CHECKING:  # a field, or made of the fields
 

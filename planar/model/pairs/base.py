@@ -72,6 +72,8 @@ class Pair(ABC):
     """The names of its results, in order, and the kind of quantity that each is."""
     input_kind: ClassVar[MeasureKind]
     """Whether its input is an angle or a length."""
+    has_profile: ClassVar[bool] = False
+    """Whether a profile follows from it, which is drawn under its keyword."""
     ties_angles: ClassVar[bool] = False
     """Whether it ties angles alone: what holds it are couples, whatever forces they come from (see `tooth_contact`)."""
 
@@ -369,6 +371,12 @@ class EntryReader(Protocol):
 
     def object_at(self, key: str) -> EntryReader:
         """The object under this key."""
+
+    def list_items(self, key: str) -> Sequence[EntryReader]:
+        """The items of the list under this key; none where it is left out."""
+
+    def choice(self, key: str, words: tuple[str, ...]) -> str | None:
+        """One of some words; None where the key is left out."""
 
     def error_at(self, key: str | None, sentence: str) -> Exception:
         """The error that says this of the place."""

@@ -75,4 +75,29 @@ class BeltMark(NamedTuple):
     crossed: bool
 
 
-DrawingMark = PinMark | GuideMark | SliderMark | SlotMark | WheelMark | PitchLineMark | BeltMark
+class CamMark(NamedTuple):
+    """A cam: its profile, points of `link`, about its `centre`; and the face of its follower `follower_link`.
+
+    A roller of this radius about `middle`, or a flat face along the points `face` of a line (else empty), or a point.
+    """
+
+    name: str
+    link: str
+    centre: Vector
+    profile: tuple[Vector, ...]
+    follower_link: str
+    middle: Vector
+    roller_radius: float
+    face: tuple[Vector, ...]
+
+
+class OutlineMark(NamedTuple):
+    """The outline of a body that is part of a link."""
+
+    name: str
+    link: str
+    points: tuple[Vector, ...]
+    closed: bool
+
+
+DrawingMark = PinMark | GuideMark | SliderMark | SlotMark | WheelMark | PitchLineMark | BeltMark | CamMark | OutlineMark

@@ -9,6 +9,7 @@ import numpy as np
 from rich.console import Group, RenderableType
 from rich.text import Text
 
+from planar.analysis.cams.contact_force import lift_off_remarks
 from planar.analysis.motion.unknown_load import UnknownLoad
 from planar.dynamics.forces import Forces
 from planar.dynamics.load_attachment import attachment_remarks
@@ -54,6 +55,7 @@ def tables(
     notes = (
         *motors.motor_sentences(forces, duties),
         *_undetermined_sentences(forces, len(motion)),
+        *lift_off_remarks(forces),
         *forces.remarks,
         *attachment_remarks(forces.mechanism),
         *motion.remarks,
@@ -202,7 +204,12 @@ def run_facts(
 ) -> dict[str, Any]:
     """What is said of the whole motion, as JSON values; forces in a pair are on the second of the links `between`."""
     between = {name: list(each.links) for name, each in forces.reactions.items()}
-    remarks = [*forces.remarks, *attachment_remarks(forces.mechanism), *forces.moving.remarks]
+    remarks = [
+        *forces.remarks,
+        *lift_off_remarks(forces),
+        *attachment_remarks(forces.mechanism),
+        *forces.moving.remarks,
+    ]
     duties = motors.motor_duties(forces)
     told = {"motors": motors.record(duties)} if duties else {}
     told |= {} if wanted is None else {"flywheel": flywheels.record(wanted)}

@@ -9,6 +9,7 @@ import numpy as np
 from rich.console import Group, RenderableType
 from rich.text import Text
 
+from planar.analysis.cams.contact_force import lift_off_remarks
 from planar.analysis.motion.unknown_load import UnknownLoad
 from planar.analysis.worked.published import Comparison
 from planar.dynamics.forces import Forces
@@ -84,6 +85,7 @@ def tables(
     notes += (
         *motors.motor_sentences(forces, duties),
         *stop_remarks(forces),
+        *lift_off_remarks(forces),
         *attachment_remarks(forces.mechanism),
         *state.remarks,
     )
@@ -282,7 +284,12 @@ def record(
         "advantage": ratios.record(advantages),
         **friction.record(forces),
         **proof_record(forces),
-        "remarks": [*attachment_remarks(forces.mechanism), *forces.remarks, *forces.moving.remarks],
+        "remarks": [
+            *forces.remarks,
+            *lift_off_remarks(forces),
+            *attachment_remarks(forces.mechanism),
+            *forces.moving.remarks,
+        ],
     }
     if forces.others:
         found["solutions"] = [_solution_record(each) for each in forces.solutions]
