@@ -29,7 +29,10 @@ both_kinds = pytest.mark.parametrize("kind", KINDS)
 
 @cache
 def drawn(stem: str, kind: str) -> Polygon:
-    return KINDS[kind](state_of(stem))
+    state = state_of(stem)
+    if kind == "acceleration" and all(np.hypot(*each.acceleration) == 0.0 for each in state.points.values()):
+        pytest.skip("nothing is accelerated")
+    return KINDS[kind](state)
 
 
 @cache
