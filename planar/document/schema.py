@@ -71,6 +71,7 @@ UNITS_SCHEMA: Schema = {
     "torsional_stiffness": described(_TEXT, "of bare stiffnesses of torsional springs, as lbf in/rad"),
     "damping": described(_TEXT, "of bare dampings, as lbf s/in"),
     "torsional_damping": described(_TEXT, "of bare dampings of torsional springs, as lbf in s/rad"),
+    "stress": described(_TEXT, "of bare moduli of elasticity, and of stresses in results, as psi"),
     "power": described(_TEXT, "in which powers are shown, as hp or kW"),
     "energy": described(_TEXT, "in which energies are shown, as ft lbf or J"),
 }

@@ -34,6 +34,7 @@ SI_UNITS = {
     "damping": "N s/m",
     "torsional damping": "N m s/rad",
     "power": "W",
+    "stress": "Pa",
 }
 """Every kind of quantity that units tell from others, and its SI unit."""
 
@@ -102,6 +103,11 @@ UNIT_TABLE: dict[str, tuple[str, float, float]] = {
     "lbf ft/s": ("power", POUND_FORCE * 0.3048, 1.0),
     "ft lbf/s": ("power", POUND_FORCE * 0.3048, 1.0),
     "hp": ("power", 550.0 * POUND_FORCE * 0.3048, 1.0),
+    "Pa": ("stress", 1.0, 1.0),
+    "MPa": ("stress", 1e6, 1.0),
+    "GPa": ("stress", 1e9, 1.0),
+    "psi": ("stress", POUND_FORCE, 0.0254**2),
+    "ksi": ("stress", 1e3 * POUND_FORCE, 0.0254**2),
 }
 """unit: (kind, numerator, denominator) of its size in SI."""
 

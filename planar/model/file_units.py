@@ -45,7 +45,7 @@ class FileUnits(NamedTuple):
 
     Of every quantity one: `length`, `angle`; `velocity`, `acceleration`, `jerk`; `angular_velocity`,
     `angular_acceleration`, `angular_jerk`; `force`, `torque`, `power`, `energy`; `mass`, `moment_of_inertia`;
-    `stiffness`, `damping`, `torsional_stiffness`, `torsional_damping`.
+    `stiffness`, `damping`, `torsional_stiffness`, `torsional_damping`; `stress`.
 
     >>> FileUnits("in", "deg", force="lbf").force
     'lbf'
@@ -69,6 +69,7 @@ class FileUnits(NamedTuple):
     torsional_damping: str = ""
     power: str = ""
     energy: str = ""
+    stress: str = ""
 
     def declared(self, kind: str) -> str:
         """The unit that the file declares for a kind of quantity, as it is written there; else nothing."""
@@ -116,10 +117,10 @@ def unit_of_kind(kind: str, units: FileUnits) -> tuple[str, Unit]:
         factors, behind, divisor = _MADE_OF[kind]
         over = [_factor(each, kind, units) for each in factors]
         return _compose(kind, over, behind, _factor(divisor, kind, units) if divisor else None)
-    name = {"force": "lbf", "mass": "lb"}.get(kind, "")
+    name = {"force": "lbf", "mass": "lb", "stress": "psi"}.get(kind, "")
     if name and (is_customary(units.length) or is_customary(units.force)):
         return name, parse_unit(name)
-    return RESULT_SI_UNITS[kind], Unit(kind, 1.0, 1.0)
+    return ("MPa", parse_unit("MPa")) if kind == "stress" else (RESULT_SI_UNITS[kind], Unit(kind, 1.0, 1.0))
 
 
 def _factor(name: str, kind: str, units: FileUnits) -> tuple[str, Unit]:

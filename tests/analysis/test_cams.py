@@ -233,3 +233,24 @@ def test_the_commands_file_and_record_say_the_same(tmp_path):
     near = min(rows, key=lambda row: abs(float(row.split(",")[0]) - 60.0)).split(",")
     at, normal = np.array(near[1:3], float), np.array(near[3:5], float)
     assert at + 10.0 * normal == pytest.approx(middle, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("face", "radius"),
+    [({"roller_radius": 10}, lambda rho: 1.0 / (1.0 / rho + 1.0 / 0.010)), ({"flat": 0}, lambda rho: rho)],
+)
+def test_the_stress_of_steel_on_steel_is_the_books(face, radius):
+    """0.418 sqrt(F E / (b R)) (S. P. Timoshenko, J. N. Goodier, Theory of Elasticity, for Poisson's ratio 0.3), and by
+    the half width of the contact, 2 F / (pi a b) (J. E. Shigley, J. J. Uicker)."""
+    law = [{"motion": "cycloidal", "by": 10, "in": 180}, {"motion": "cycloidal", "by": -10, "in": 180}]
+    contact = {"width": 12, "modulus": "206 GPa", "poisson_ratio": 0.3}
+    bare = planar.to_dict(radial_cam(law, contact=contact, base_radius=60, **face))
+    cam = planar.from_dict(bare | {"loads": [{"point": "P", "force": [0, -400]}]})
+    assert planar.from_dict(planar.to_dict(cam)) == cam
+    motion = planar.cycle(cam, steps=24)
+    found = planar.contact_forces(planar.forces(motion))["K"]
+    profile = planar.cam_profile(cam).at(motion.inputs["O"].position)
+    equivalent = radius(profile.curvature_radius)
+    assert found.stress == pytest.approx(0.418 * np.sqrt(found.force * 206e9 / (0.012 * equivalent)), rel=1e-3)
+    half = np.sqrt(4.0 * found.force * equivalent / (pi * 0.012) * 2.0 * (1.0 - 0.09) / 206e9)
+    assert found.stress == pytest.approx(2.0 * found.force / (pi * half * 0.012), rel=1e-12)

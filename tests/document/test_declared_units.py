@@ -50,6 +50,7 @@ EVERYTHING = {
     "damping": "lbf*s/in",
     "torsional_stiffness": "lbf*in/rad",
     "torsional_damping": "lbf*in*s/rad",
+    "stress": "ksi",
     "power": "hp",
     "energy": "ft*lbf",
 }

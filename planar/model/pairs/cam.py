@@ -23,6 +23,7 @@ from planar.model.pairs.base import (
     sample_shape,
     schema_reference,
 )
+from planar.model.pairs.cams.contact_material import contact_schema
 from planar.model.pairs.cams.lift_law import LIFT_SCHEMA, NOSES_SCHEMA, LiftLaw, read_lift, write_lift
 from planar.model.pairs.cams.profiled import SHAPE_KEYS, SIDES, CamShape, ProfiledPair, read_shape, write_shape
 from planar.model.pairs.guide_line import LINE_NUMBER_KINDS, LINE_SCHEMA, LinkLine
@@ -77,6 +78,9 @@ class CamPair(ProfiledPair):
         ),
         "grooved": described(
             {"type": "boolean"}, "true where the cam holds the follower both ways: a groove, or conjugate cams"
+        ),
+        "contact": described(
+            contact_schema(), "of a roller or a flat face, what the two are made of: for the stress where they touch"
         ),
     }
     required_keys: ClassVar[tuple[str, ...]] = ("links",)

@@ -21,6 +21,7 @@ from planar.model.pairs.cams import (
     rest_problem,
     turn_left,
 )
+from planar.model.pairs.cams.contact_material import ContactMaterial, read_contact, write_contact
 from planar.model.pairs.cams.lift_law import LiftLaw, LiftPiece
 from planar.model.pairs.guide_line import LinkLine
 from planar.model.pairs.symbols import CamMark, DrawingMark
@@ -33,7 +34,7 @@ DRAWN_POINTS = 361
 DRAWN_FACE_RATIO = 1.15
 """How long a flat face is drawn, of how far the contact goes along it."""
 SIDES = ("left", "right")
-SHAPE_KEYS = ("centre", "base_radius", "roller_radius", "flat", "pivot", "side", "grooved")
+SHAPE_KEYS = ("centre", "base_radius", "roller_radius", "flat", "pivot", "side", "grooved", "contact")
 
 
 class CamShape(NamedTuple):
@@ -43,6 +44,7 @@ class CamShape(NamedTuple):
 
     A swinging follower turns about `pivot`, a point of it and of the carrier, and lies to the left or right (`side`)
     of the way from there to the cam's centre. A `grooved` cam, as a pair of conjugate ones, holds it both ways.
+    `contact` is what the two are made of.
     """
 
     centre: str
@@ -52,6 +54,7 @@ class CamShape(NamedTuple):
     pivot: str | None = None
     side: str = "left"
     grooved: bool = False
+    contact: ContactMaterial | None = None
 
 
 @dataclass(frozen=True)
@@ -301,7 +304,11 @@ def read_shape(entry: EntryReader, links: tuple[str, str], carrier: str, slides:
         if entry.has(key) and not size > 0.0:
             raise entry.error_at(key, "a radius above zero is wanted here")
     flat = entry.quantity("flat", "angle") if entry.has("flat") else None
-    return CamShape(centre, base, roller, flat, pivot, entry.choice("side", SIDES) or "left", entry.flag("grooved"))
+    side = entry.choice("side", SIDES) or "left"
+    contact = read_contact(entry, "contact") if entry.has("contact") else None
+    if contact is not None and flat is None and not roller:
+        raise entry.error_at("contact", "a point has no contact stress; give the follower a roller or a flat face")
+    return CamShape(centre, base, roller, flat, pivot, side, entry.flag("grooved"), contact)
 
 
 def write_shape(shape: CamShape, quantity: QuantityWriter) -> dict[str, Any]:
@@ -312,4 +319,6 @@ def write_shape(shape: CamShape, quantity: QuantityWriter) -> dict[str, Any]:
         entry["roller_radius"] = quantity(shape.roller_radius, "length")
     if shape.pivot is not None:
         entry |= {"pivot": shape.pivot, "side": shape.side}
+    if shape.contact is not None:
+        entry["contact"] = write_contact(shape.contact, quantity)
     return entry | ({"grooved": True} if shape.grooved else {})

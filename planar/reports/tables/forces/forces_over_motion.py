@@ -9,7 +9,6 @@ import numpy as np
 from rich.console import Group, RenderableType
 from rich.text import Text
 
-from planar.analysis.cams.contact_force import lift_off_remarks
 from planar.analysis.motion.unknown_load import UnknownLoad
 from planar.dynamics.forces import Forces
 from planar.dynamics.load_attachment import attachment_remarks
@@ -21,7 +20,7 @@ from planar.model.wording import count_phrase, join_all_names
 from planar.reports.columns import ReportedSeries
 from planar.reports.fitted_table import FittedTable, plain_table
 from planar.reports.number_format import column_heading, format_or_zero, format_quantity, paragraphs
-from planar.reports.tables.forces import flywheels, friction, loads, motors, unknown_loads
+from planar.reports.tables.forces import cam_contacts, flywheels, friction, loads, motors, unknown_loads
 from planar.reports.tables.forces import position_forces as at_one
 from planar.reports.tables.motion import motion_heading, position_cell, position_heading, running_pair
 from planar.results.motion import Motion
@@ -49,13 +48,16 @@ def tables(
     if unknown is not None:
         facts = [*unknown_loads.unknown_load_facts(forces, unknown), *facts]
     parts.append(_reactions_table(forces, motion))
+    contacts = cam_contacts.contacts_table(forces)
+    if contacts is not None:
+        parts.append(contacts)
     if forces.friction:
         parts.append(friction.friction_over_motion_table(forces))
     parts.append(paragraphs(facts))
     notes = (
         *motors.motor_sentences(forces, duties),
         *_undetermined_sentences(forces, len(motion)),
-        *lift_off_remarks(forces),
+        *cam_contacts.lift_off_remarks(forces),
         *forces.remarks,
         *attachment_remarks(forces.mechanism),
         *motion.remarks,
@@ -183,6 +185,7 @@ def force_series(forces: Forces) -> Iterable[ReportedSeries]:
         values = _reaction_values(each)
         yield ReportedSeries("reactions", name, {what: _REACTION_KINDS.get(what, "torque") for what in values}, values)
     yield from friction.friction_series(forces)
+    yield from cam_contacts.contact_series(forces)
     if at_one.has_inertia(forces):
         force, moment = forces.shaking
         kinds = {"force": "force", "moment": "torque"}
@@ -206,7 +209,7 @@ def run_facts(
     between = {name: list(each.links) for name, each in forces.reactions.items()}
     remarks = [
         *forces.remarks,
-        *lift_off_remarks(forces),
+        *cam_contacts.lift_off_remarks(forces),
         *attachment_remarks(forces.mechanism),
         *forces.moving.remarks,
     ]
@@ -214,5 +217,5 @@ def run_facts(
     told = {"motors": motors.record(duties)} if duties else {}
     told |= {} if wanted is None else {"flywheel": flywheels.record(wanted)}
     told |= {} if unknown is None else {"solved_for": unknown_loads.record(unknown)}
-    told |= friction.motion_record(forces)
+    told |= friction.motion_record(forces) | cam_contacts.record(forces)
     return {"between": between, "remarks": remarks, **told, **at_one.proof_record(forces)}

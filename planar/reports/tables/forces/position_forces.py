@@ -9,7 +9,6 @@ import numpy as np
 from rich.console import Group, RenderableType
 from rich.text import Text
 
-from planar.analysis.cams.contact_force import lift_off_remarks
 from planar.analysis.motion.unknown_load import UnknownLoad
 from planar.analysis.worked.published import Comparison
 from planar.dynamics.forces import Forces
@@ -32,7 +31,7 @@ from planar.reports.number_format import (
     paragraphs,
     precision_text,
 )
-from planar.reports.tables.forces import friction, loads, motors, unknown_loads
+from planar.reports.tables.forces import cam_contacts, friction, loads, motors, unknown_loads
 from planar.reports.tables.forces import mechanical_advantage as ratios
 from planar.reports.tables.position import published_table
 
@@ -61,6 +60,9 @@ def tables(
         parts.append(loads.actions_table("Inertia", inertia, units, greatest_moment_and_force(forces)[0]))
     most = sum(each.max_power for each in (*acting, *inertia))
     parts.append(_reactions_table(forces))
+    contacts = cam_contacts.contacts_table(forces)
+    if contacts is not None:
+        parts.append(contacts)
     if forces.friction:
         parts.append(friction.friction_table(forces))
     facts = (*_power_and_shaking(forces, most), *friction.efficiency_facts(forces), *friction.holding_facts(forces))
@@ -85,7 +87,7 @@ def tables(
     notes += (
         *motors.motor_sentences(forces, duties),
         *stop_remarks(forces),
-        *lift_off_remarks(forces),
+        *cam_contacts.lift_off_remarks(forces),
         *attachment_remarks(forces.mechanism),
         *state.remarks,
     )
@@ -283,10 +285,11 @@ def record(
         "power": {"in": _finite_or_none(float(forces.power_in)), "out": forces.power_out},
         "advantage": ratios.record(advantages),
         **friction.record(forces),
+        **cam_contacts.record(forces),
         **proof_record(forces),
         "remarks": [
             *forces.remarks,
-            *lift_off_remarks(forces),
+            *cam_contacts.lift_off_remarks(forces),
             *attachment_remarks(forces.mechanism),
             *forces.moving.remarks,
         ],
