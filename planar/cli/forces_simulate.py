@@ -137,8 +137,8 @@ def _forces_at_position(
     """The forces at one position, inertia and friction `taken` into account or not; a load is `asked` for an effort."""
     from rich.console import Group
 
+    from planar.analysis.efforts.unknown_load import unknown_load
     from planar.analysis.motion.mechanical_advantage import advantages
-    from planar.analysis.motion.unknown_load import unknown_load
     from planar.analysis.worked.published import compare_published
     from planar.dynamics.forces import forces as at_state
     from planar.dynamics.friction.holding import holding, load_names
@@ -176,7 +176,7 @@ def _forces_over_motion(
     course: dict[str, Any],
 ) -> None:
     """The forces over a whole motion; and what is asked: a flywheel's fluctuation and radius, a load for an effort."""
-    from planar.analysis.motion.unknown_load import unknown_load
+    from planar.analysis.efforts.unknown_load import unknown_load
     from planar.document import read_length
     from planar.dynamics.forces import forces as over_motion
     from planar.reports.files.run_formats import check_writable

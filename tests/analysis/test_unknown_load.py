@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import planar
-from planar.analysis.motion.unknown_load import scale_load
+from planar.analysis.efforts.unknown_load import scale_load
 from tests.command import run
 
 

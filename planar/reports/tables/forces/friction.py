@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from planar.analysis.motion.self_locking import LockedInterval, jamming, self_locking
+from planar.analysis.efforts.self_locking import LockedInterval, jamming, self_locking
 from planar.dynamics.forces import Forces, PairFriction
 from planar.dynamics.friction.holding import Holding, holding
 from planar.foundation.arrays import Array

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from planar.analysis.motion.motor_duty import MotorDuty, motor_duty
+from planar.analysis.efforts.motor_duty import MotorDuty, motor_duty
 from planar.dynamics.forces import Forces
 from planar.model.file_units import display_unit
 from planar.model.mechanism import relative_motions

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from planar.analysis.motion.unknown_load import UnknownLoad
+from planar.analysis.efforts.unknown_load import UnknownLoad
 from planar.dynamics.forces import Forces
 from planar.reports.number_format import format_number
 
