@@ -9,19 +9,17 @@ import numpy as np
 
 from planar.analysis.efforts.unknown_load import UnknownLoad
 from planar.dynamics.forces import Forces
-from planar.reports.number_format import format_number
-
-UNITS = {"stiffness": ("N/m", "N·m/rad"), "mass": ("kg", "kg"), "force": ("N", "N"), "torque": ("N·m", "N·m")}
-"""Of sizes of loads; of a spring between points, and of one between links."""
+from planar.reports.number_format import format_number, format_quantity, quantity_text
 
 
 def unknown_load_facts(forces: Forces, found: UnknownLoad) -> Iterator[tuple[str, str]]:
     """What the load has to be, at the position or over the motion."""
-    unit, effort = _unit(forces, found), "N" if forces.is_force_input(found.input) else "N·m"
-    holds = f"{found.input!r} supplies {format_number(found.effort)} {effort}"
+    units, kind = forces.mechanism.units, _size_kind(forces, found)
+    effort = "force" if forces.is_force_input(found.input) else "torque"
+    holds = f"{found.input!r} supplies {quantity_text(found.effort, effort, units)}"
     factor = np.atleast_1d(np.asarray(found.factor))
     known = factor[np.isfinite(factor)]
-    one = f"a {found.what} of {format_number(found.best * found.value)} {unit}"
+    one = f"a {found.what} of {quantity_text(found.best * found.value, kind, units)}"
     times = f"{format_number(found.best)} times what the file says"
     if len(factor) == 1:
         yield found.load, f"{holds} with {one}, {times}"
@@ -29,15 +27,17 @@ def unknown_load_facts(forces: Forces, found: UnknownLoad) -> Iterator[tuple[str
     if found.is_constant:
         yield found.load, f"{holds} all over the motion with {one}, {times}"
         return
-    low, high = (format_number(float(each) * found.value) for each in (known.min(), known.max()))
-    yield found.load, f"{holds} with a {found.what} from {low} to {high} {unit} over the motion"
-    yield "", f"{one}, {times}, comes nearest: it leaves up to {format_number(found.left)} {effort}"
+    low = format_quantity(float(known.min()) * found.value, kind, units)
+    high = quantity_text(float(known.max()) * found.value, kind, units)
+    yield found.load, f"{holds} with a {found.what} from {low} to {high} over the motion"
+    yield "", f"{one}, {times}, comes nearest: it leaves up to {quantity_text(found.left, effort, units)}"
 
 
-def _unit(forces: Forces, found: UnknownLoad) -> str:
-    mechanism = forces.mechanism
-    torsional = found.what == "stiffness" and mechanism.springs[int(found.load.rpartition(".")[2])].is_torsional
-    return UNITS[found.what][torsional]
+def _size_kind(forces: Forces, found: UnknownLoad) -> str:
+    """Which kind of quantity the size of the load is."""
+    springs = forces.mechanism.springs
+    is_torsional = found.what == "stiffness" and springs[int(found.load.rpartition(".")[2])].is_torsional
+    return "torsional stiffness" if is_torsional else found.what
 
 
 def record(found: UnknownLoad) -> dict[str, Any]:
