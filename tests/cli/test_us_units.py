@@ -175,7 +175,17 @@ OF_A_MOTION = ("positions", "loci", "diagrams", "centrodes", "circuits", "torque
 
 @pytest.mark.parametrize("what", [*OF_A_POSITION, *OF_A_MOTION])
 def test_drawings_have_no_metric_unit(what: str) -> None:
-    mechanism = planar.from_dict(INCHES)
+    check_drawing(planar.from_dict(INCHES), what)
+
+
+@pytest.mark.parametrize(
+    ("model", "what"), [("motor-press", "torque"), ("toggle-clamp", "forces"), ("tipper", "scheme")]
+)
+def test_drawings_of_motors_friction_and_stops_have_none(model: str, what: str) -> None:
+    check_drawing(replace(MODELS[model], units=MODEL_IN_FEET), what)
+
+
+def check_drawing(mechanism: planar.Mechanism, what: str) -> None:
     source = planar.solve(mechanism) if what in OF_A_POSITION else mechanism
     found = getattr(planar.plot, what)(source)
     figures = found if isinstance(found, list) else [found]
@@ -205,6 +215,12 @@ def test_problem_sheets_and_answers_have_no_metric_unit() -> None:
     ]
     assert any("in/s" in text for text in texts)
     assert not [text for text in texts if metric_words(text)]
+
+
+@pytest.mark.parametrize("model", ["motor-press", "toggle-clamp", "tipper"])
+def test_pages_of_motors_friction_and_stops_have_no_metric_unit(model: str) -> None:
+    data, _ = page_data(replace(MODELS[model], units=MODEL_IN_FEET, about=None, notes=(), source=None))
+    assert not [text for text in strings({**data, "document": {}}) if metric_words(text)]
 
 
 def test_pages_take_every_unit_from_their_data() -> None:

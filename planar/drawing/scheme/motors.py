@@ -34,7 +34,8 @@ def motor_strokes(scene: Scene, clear: Clearance) -> Iterator[PlacedStroke]:
         centre = at + own * (MOTOR_DISTANCE * scene.per_mm)
         rim = at + own * ((MOTOR_DISTANCE - MOTOR_RADIUS) * scene.per_mm)
         yield PlacedLine(about, link, Pen.PIN, (at + own * (start * scene.per_mm), rim))
-        yield PlacedSymbol(about, link, "motor", centre, None)
+        upright = direction(-float(frame.angle)) if scene.is_moving else None
+        yield PlacedSymbol(about, link, "motor", centre, upright)
 
 
 def _shaft_place(scene: Scene, pair: Pair) -> tuple[str, Vector, float] | None:
