@@ -164,6 +164,11 @@ def test_lists_have_no_metric_unit_in_their_heads_and_json_is_si(inches: str, tm
         heads = (tmp_path / "list.csv").read_text().splitlines()[0]
         assert "[in/s^2]" in heads
         assert not metric_words(heads)
+    clamp = written(tmp_path, planar.to_dict(replace(MODELS["toggle-clamp"], units=MODEL_IN_FEET)), "clamp.json")
+    run(tmp_path, "forces", clamp, "--cycle", "--steps", "4", "-o", "clamp.csv").done()
+    heads = (tmp_path / "clamp.csv").read_text().splitlines()[0]
+    assert "friction plunger heat [hp],without friction input O torque [ft lbf]" in heads
+    assert not metric_words(heads)
     found = json.loads(run(tmp_path, "solve", inches, "--json").done())
     state = planar.solve(planar.from_dict(INCHES))
     assert found["points"]["B"]["velocity"] == pytest.approx(state.point("B").velocity.tolist())
