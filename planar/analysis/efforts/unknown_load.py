@@ -52,7 +52,7 @@ class UnknownLoad(NamedTuple):
 
 
 @takes_result("State", "Motion")
-def unknown_load(  # many: what is asked, and what is taken into account
+def unknown_load(
     moving: State | Motion,
     load: str,
     effort: float = 0.0,
@@ -88,12 +88,12 @@ def unknown_load(  # many: what is asked, and what is taken into account
         raise BadInput(load, f"it does nothing on the input at {name!r} here, so that no size of it holds that")
     factor, best, left = line.factors(effort), *line.best_factor(effort)
     remarks: tuple[str, ...] = ()
-    has_friction = friction and any(pair.has_friction for pair in mechanism.pairs)
-    if has_friction:
+    has_friction = False
+    if friction and any(pair.has_friction for pair in mechanism.pairs):
         column = [given.pair for given in mechanism.inputs].index(name)
         rubbing = LoadWithFriction(moving, doubled, column, inertia)
         told = rubbing.factors(effort)
-        factor, remarks = np.where(line.acts, told.values, np.nan), told.remarks
+        factor, has_friction, remarks = np.where(line.acts, told.values, np.nan), told.rubs, told.remarks
         best, left = (float(factor[0]), 0.0) if len(factor) == 1 else _best_with_friction(rubbing, effort, best)
     same = left <= SAME_FACTOR_TOLERANCE * line.scale
     found = factor if isinstance(moving, Motion) else float(factor[0])

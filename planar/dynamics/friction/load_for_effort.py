@@ -23,9 +23,10 @@ from planar.results.motion import Motion, State
 
 
 class EffortBesideFriction(NamedTuple):
-    """Numbers of positions (n,), NaN where they are not determined, and what there is to say of friction there."""
+    """Numbers of positions (n,), NaN where they are not determined, whether anything rubs, and what to say of that."""
 
     values: Array
+    rubs: bool
     remarks: tuple[str, ...]
 
     def __repr__(self) -> str:
@@ -73,4 +74,5 @@ class LoadWithFriction:
         without = reactions.solve()
         result = solve_friction(reactions, self.field, without)
         solved = without if result.solution is None else result.solution.forces
-        return EffortBesideFriction(input_efforts(solved)[0][:, self.column], result.remarks)
+        rubs = result.solution is not None
+        return EffortBesideFriction(input_efforts(solved)[0][:, self.column], rubs, result.remarks)
