@@ -135,12 +135,13 @@ def _best_with_friction(rubbing: LoadWithFriction, effort: float, start: float) 
             break
         more = float(missing[known] @ slope[known]) / float(slope[known] @ slope[known])
         tried = effort - rubbing.efforts(best + more).values
-        if not np.nansum(tried**2) < np.nansum(missing**2):
+        known = np.isfinite(tried) & np.isfinite(missing)  # where it jams nothing is told
+        if not np.sum(tried[known] ** 2) < np.sum(missing[known] ** 2):
             break
         best, missing = best + more, tried
         if abs(more) <= SAME_FACTOR_TOLERANCE * abs(best):
             break
-    return best, float(np.nanmax(np.abs(missing))) if np.isfinite(missing).any() else np.nan
+    return (best, float(np.nanmax(np.abs(missing)))) if np.isfinite(missing).any() else (np.nan, np.nan)
 
 
 def scale_load(mechanism: Mechanism, load: str, factor: float) -> Mechanism:
