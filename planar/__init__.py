@@ -4,7 +4,8 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from planar.foundation.notebook_display import Displayable
-from planar.foundation.revision import Revisable
+from planar.foundation.public_names import MODULES
+from planar.model.revision import Revisable
 
 if TYPE_CHECKING:
     from planar import plot
@@ -18,6 +19,9 @@ if TYPE_CHECKING:
     from planar.analysis.centres.velocities import velocity_by_centres
     from planar.analysis.classroom.marking import MarkedValue, Marks, StudentMarks, mark_answers
     from planar.analysis.classroom.variants import Variant, problem_variants
+    from planar.analysis.efforts.motor_duty import MotorDuty, motor_duty
+    from planar.analysis.efforts.self_locking import LockedInterval, jamming, self_locking
+    from planar.analysis.efforts.unknown_load import UnknownLoad, unknown_load
     from planar.analysis.identity.inspection import Inspection, inspect
     from planar.analysis.identity.mobility import Mobility, mobility
     from planar.analysis.motion.answers import Answers, answers
@@ -27,12 +31,9 @@ if TYPE_CHECKING:
     from planar.analysis.motion.harmonics import Harmonics, harmonics
     from planar.analysis.motion.mechanical_advantage import Advantage, advantage
     from planar.analysis.motion.mechanical_advantage_over_motion import AdvantageOver, advantage_over
-    from planar.analysis.motion.motor_duty import MotorDuty, motor_duty
     from planar.analysis.motion.output import Extreme
-    from planar.analysis.motion.self_locking import LockedInterval, jamming, self_locking
     from planar.analysis.motion.time_ratio import TimeRatio, time_ratio
     from planar.analysis.motion.transmission_angle import Transmission, transmission
-    from planar.analysis.motion.unknown_load import UnknownLoad, unknown_load
     from planar.assemblies.circuits.circuits import Circuit, Circuits, circuits
     from planar.assemblies.circuits.traced_circuit import Branch
     from planar.assemblies.conflict import Conflict, conflict
@@ -94,166 +95,7 @@ if TYPE_CHECKING:
     from planar.solving.cycle import cycle
     from planar.solving.position import solve
 
-__version__ = "0.11.0"
-
-_ROOMS = {
-    "Advantage": "analysis.motion.mechanical_advantage",
-    "AdvantageOver": "analysis.motion.mechanical_advantage_over_motion",
-    "Along": "model.mechanism",
-    "Answers": "analysis.motion.answers",
-    "Area": "analysis.motion.coupler_area",
-    "At": "model.mechanism",
-    "BadInput": "foundation.errors",
-    "BaseCircle": "analysis.cams.base_circle",
-    "BeltPair": "model.pairs.belt",
-    "Branch": "assemblies.circuits.circuits",
-    "CamPair": "model.pairs.cam",
-    "CamProfile": "analysis.cams.cam_profile",
-    "CamShape": "model.pairs.cams.profiled",
-    "Centre": "analysis.centres.centres",
-    "Centres": "analysis.centres.centres",
-    "Centrodes": "analysis.centres.centrodes",
-    "ChainPair": "model.pairs.belt",
-    "Circuit": "assemblies.circuits.circuits",
-    "Circuits": "assemblies.circuits.circuits",
-    "Conflict": "assemblies.conflict",
-    "ConstantAccelerationSegment": "model.input_laws.constant_rates",
-    "ConstantSpeedSegment": "model.input_laws.constant_rates",
-    "ContactForce": "analysis.cams.contact_force",
-    "Course": "model.mechanism",
-    "Curvature": "analysis.centres.curvature",
-    "CycloidalRise": "model.input_laws.cam_rises",
-    "Distances": "model.mechanism",
-    "Drive": "model.mechanism",
-    "Dwell": "analysis.motion.dwells",
-    "DwellSegment": "model.input_laws.constant_rates",
-    "Each": "batch.mechanisms.results",
-    "Extreme": "analysis.motion.output",
-    "Extremes": "analysis.motion.extremes",
-    "FileUnits": "model.file_units",
-    "Flywheel": "dynamics.flywheel",
-    "Forces": "dynamics.forces",
-    "Friction": "model.pairs.rubbing",
-    "GearPair": "model.pairs.gear",
-    "GenevaPair": "model.pairs.geneva",
-    "HarmonicRise": "model.input_laws.cam_rises",
-    "Harmonics": "analysis.motion.harmonics",
-    "Impact": "dynamics.in_time.stop_contacts",
-    "Holding": "dynamics.friction.holding",
-    "Input": "model.mechanism",
-    "InputLaw": "model.input_laws.input_law",
-    "Inspection": "analysis.identity.inspection",
-    "LiftLaw": "model.pairs.cams.lift_law",
-    "Limit": "results.records",
-    "Link": "model.mechanism",
-    "LinkLine": "model.pairs.guide_line",
-    "LinkMotion": "results.records",
-    "LinkState": "results.records",
-    "Load": "model.mechanism",
-    "MarkedValue": "analysis.classroom.marking",
-    "Marks": "analysis.classroom.marking",
-    "LockedInterval": "analysis.motion.self_locking",
-    "Mass": "model.mechanism",
-    "Mechanism": "model.mechanism",
-    "Mobility": "analysis.identity.mobility",
-    "Mode": "assemblies.modes",
-    "Modes": "assemblies.modes",
-    "ModifiedTrapezoidalRise": "model.input_laws.cam_rises",
-    "Motion": "results.motion",
-    "Motor": "model.motors",
-    "MotorDuty": "analysis.motion.motor_duty",
-    "NoAnswer": "foundation.errors",
-    "Outcome": "foundation.errors",
-    "Pair": "model.pairs.base",
-    "PairFriction": "dynamics.forces",
-    "ParabolicRise": "model.input_laws.cam_rises",
-    "PinnedLinkages": "model.pin_linkages",
-    "PlanarError": "foundation.errors",
-    "Point": "model.mechanism",
-    "PointMotion": "results.records",
-    "PointState": "results.records",
-    "Polynomial345Rise": "model.input_laws.cam_rises",
-    "Polynomial4567Rise": "model.input_laws.cam_rises",
-    "PreparedRun": "batch.prepared",
-    "PreparedSweep": "batch.prepared",
-    "RackPair": "model.pairs.rack",
-    "Reaction": "dynamics.reactions",
-    "ReducedSweep": "batch.reductions.reduced_sweep",
-    "RelativeState": "results.records",
-    "Simulation": "dynamics.simulation",
-    "SlidingPair": "model.pairs.sliding",
-    "SlotPair": "model.pairs.slot",
-    "Spring": "model.mechanism",
-    "State": "results.motion",
-    "Stops": "model.stops",
-    "Stroke": "analysis.motion.extremes",
-    "StudentMarks": "analysis.classroom.marking",
-    "Sweep": "batch.results",
-    "Swept": "batch.mechanisms.results",
-    "Swing": "analysis.motion.extremes",
-    "TableSegment": "model.input_laws.spline_table",
-    "TimeRatio": "analysis.motion.time_ratio",
-    "Transmission": "analysis.motion.transmission_angle",
-    "TrapezoidalRise": "model.input_laws.cam_rises",
-    "TurningPair": "model.pairs.turning",
-    "Unknown": "foundation.errors",
-    "UnknownLoad": "analysis.motion.unknown_load",
-    "Variant": "analysis.classroom.variants",
-    "advantage": "analysis.motion.mechanical_advantage",
-    "advantage_over": "analysis.motion.mechanical_advantage_over_motion",
-    "answers": "analysis.motion.answers",
-    "area": "analysis.motion.coupler_area",
-    "build": "document.builder",
-    "cam_profile": "analysis.cams.cam_profile",
-    "centre_of": "analysis.centres.two_directions",
-    "centres": "analysis.centres.centres",
-    "centrodes": "analysis.centres.centrodes",
-    "circuits": "assemblies.circuits.circuits",
-    "conflict": "assemblies.conflict",
-    "contact_forces": "analysis.cams.contact_force",
-    "curvature": "analysis.centres.curvature",
-    "cycle": "solving.cycle",
-    "dataset": "reports.files.xarray_dataset",
-    "dimensions": "document.dimensions",
-    "dumps": "document.files",
-    "dwells": "analysis.motion.dwells",
-    "extremes": "analysis.motion.extremes",
-    "flywheel": "dynamics.flywheel",
-    "forces": "dynamics.forces",
-    "from_dict": "document.files",
-    "greatest": "analysis.motion.extremes",
-    "harmonics": "analysis.motion.harmonics",
-    "holding": "dynamics.friction.holding",
-    "inspect": "analysis.identity.inspection",
-    "jamming": "analysis.motion.self_locking",
-    "least_base_circle": "analysis.cams.base_circle",
-    "load": "document.files",
-    "loads": "document.files",
-    "mark_answers": "analysis.classroom.marking",
-    "mobility": "analysis.identity.mobility",
-    "modes": "assemblies.modes",
-    "motor_duty": "analysis.motion.motor_duty",
-    "pinned": "model.pin_linkage",
-    "pinned_linkages": "model.pin_linkages",
-    "plot": "plot",
-    "prepared": "batch.prepared",
-    "problem_variants": "analysis.classroom.variants",
-    "schema": "document.schema",
-    "self_locking": "analysis.motion.self_locking",
-    "simulate": "dynamics.simulation",
-    "solve": "solving.position",
-    "stroke": "analysis.motion.extremes",
-    "sweep": "batch.sweep",
-    "sweep_each": "batch.sweep_mechanisms",
-    "swing": "analysis.motion.extremes",
-    "time_ratio": "analysis.motion.time_ratio",
-    "to_dict": "document.files",
-    "transmission": "analysis.motion.transmission_angle",
-    "velocity_by_centres": "analysis.centres.velocities",
-    "view": "pages.view",
-    "unknown_load": "analysis.motion.unknown_load",
-}
-"""Where each public name lives: it is loaded when it is first used."""
+__version__ = "0.12.0"
 
 __all__ = [
     "Advantage",
@@ -429,10 +271,10 @@ Displayable.presenter, Revisable.reviser = _present, _revise
 
 
 def __getattr__(name: str) -> Any:
-    if name not in _ROOMS:
+    if name not in MODULES:
         raise AttributeError(f"module 'planar' has no attribute {name!r}")
-    room = import_module(f"planar.{_ROOMS[name]}")
-    return room if _ROOMS[name] == name else getattr(room, name)
+    module = import_module(f"planar.{MODULES[name]}")
+    return module if MODULES[name] == name else getattr(module, name)
 
 
 def __dir__() -> list[str]:

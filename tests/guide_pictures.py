@@ -71,7 +71,7 @@ def example_figure(name: str) -> object:
             return variation_figure(name)
         case "load":
             return plot.forces(planar.forces(planar.solve(mechanism)))
-        case "lift":
+        case "pairs/lift":
             return plot.cam_profile(mechanism)
         case "input":
             return plot.scheme(planar.solve(mechanism), "1:2")

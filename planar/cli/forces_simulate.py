@@ -106,6 +106,8 @@ def forces(
     if given is not None and solve_for is None and not held:
         raise BadInput("--effort", "this goes with --solve-for, or with loads that friction holds, and there are none")
     taken = (not static, not frictionless)
+    if effort is not None and solve_for is None:
+        _require_held_loads(mechanism)
     if whole:
         _forces_over_motion(mechanism, taken, as_json, output, (fluctuation, rim_radius, solve_for, given), course)
     else:
@@ -118,6 +120,15 @@ def _refuse_motion_options(course: Iterable[str]) -> None:
     for option in context.command.params:
         if option.name in course and context.get_parameter_source(option.name) is ParameterSource.COMMANDLINE:
             raise BadInput(option.opts[0], "this is for the forces of a whole motion, with --cycle")
+
+
+def _require_held_loads(mechanism: Mechanism) -> None:
+    """Refuse an effort where no friction holds anything."""
+    if not any(pair.has_friction for pair in mechanism.pairs):
+        told = "no pair has friction, so that nothing is held at rest; name the load that is wanted by --solve-for"
+        raise BadInput("--effort", told)
+    if not mechanism.loads:
+        raise BadInput("--effort", "there is no load that friction could hold; name what is wanted by --solve-for")
 
 
 def _parse_effort(mechanism: Mechanism, text: str) -> float:
@@ -140,8 +151,8 @@ def _forces_at_position(
     """The forces at one position, inertia and friction `taken` into account or not; a load is `asked` for an effort."""
     from rich.console import Group
 
+    from planar.analysis.efforts.unknown_load import unknown_load
     from planar.analysis.motion.mechanical_advantage import advantages
-    from planar.analysis.motion.unknown_load import unknown_load
     from planar.analysis.worked.published import compare_published
     from planar.dynamics.forces import forces as at_state
     from planar.dynamics.friction.holding import holding, load_names
@@ -154,7 +165,7 @@ def _forces_at_position(
     with show_status(mechanism.name):
         state = solve(mechanism, moved)
         found, ratios = at_state(state, *taken), advantages(state)
-        unknown = None if load is None else unknown_load(state, load, effort or 0.0, inertia=taken[0])
+        unknown = None if load is None else unknown_load(state, load, effort or 0.0, None, *taken)
         held: tuple[Holding, ...] = ()
         if load is None and effort is not None:
             held = tuple(holding(state, name, effort) for name in load_names(mechanism))
@@ -179,7 +190,7 @@ def _forces_over_motion(
     course: dict[str, Any],
 ) -> None:
     """The forces over a whole motion; and what is asked: a flywheel's fluctuation and radius, a load for an effort."""
-    from planar.analysis.motion.unknown_load import unknown_load
+    from planar.analysis.efforts.unknown_load import unknown_load
     from planar.document import read_length
     from planar.dynamics.forces import forces as over_motion
     from planar.reports.files.run_formats import check_writable
@@ -194,7 +205,7 @@ def _forces_over_motion(
         fluctuation, radius, load, effort = asked
         length = None if radius is None else read_length(mechanism, radius, "--rim-radius")
         wheel = wanted_flywheel(found, fluctuation, length)
-        unknown = None if load is None else unknown_load(motion, load, effort or 0.0, inertia=taken[0])
+        unknown = None if load is None else unknown_load(motion, load, effort or 0.0, None, *taken)
     facts = run_facts(found, wheel, unknown)
     report_motion(motion, as_json, output, lambda: [tables(found, wheel, unknown)], force_series(found), facts)
 

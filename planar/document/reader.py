@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from planar.document.cursor import Cursor, FileContext, describe_value, suggest_name, suggest_spelling
 from planar.document.loads import read_loads
-from planar.document.motors import read_motor
 from planar.document.names import find_motion, find_point, point_aliases
 from planar.document.schema import (
     ALONG_SCHEMA,
@@ -24,7 +23,6 @@ from planar.document.schema import (
     STOP_SCHEMA,
     UNITS_SCHEMA,
 )
-from planar.document.stops import read_stops, without_stops
 from planar.foundation.units import UnitError, example_quantity
 from planar.model.file_units import FileUnits, OtherKind, parse_declared_unit
 from planar.model.link_shapes import Along, At, Distances, Link, Point, PointDefinition, PointPlacementError, link_shape
@@ -39,6 +37,9 @@ from planar.model.mechanism import (
     relative_motions,
 )
 from planar.model.pairs import MeasureKind, Pair, pair_types
+
+if TYPE_CHECKING:
+    from planar.model.stops import Stops
 
 
 def read_mechanism(value: Any) -> Mechanism:
@@ -74,7 +75,7 @@ def read_mechanism(value: Any) -> Mechanism:
     )
     inputs = _read_inputs(full, relative_motions(bare))
     entries = zip(full["pairs"].items(), pair_entries(bare), strict=True)
-    driven = replace(bare, inputs=inputs, stops=tuple(each for entry in entries for each in read_stops(*entry)))
+    driven = replace(bare, inputs=inputs, stops=tuple(each for entry in entries for each in _read_stops(*entry)))
     if any(given.law is not None for given in inputs):
         from planar.document.input_laws import speed_jump_remarks
 
@@ -111,7 +112,7 @@ def _expand_short_forms(top: Cursor) -> Cursor:
     entries = [dict(item.fields()) for item in top["pairs"].items()]
     for index, entry in enumerate(entries):
         cursor = Cursor(entry, f"$.pairs[{index}]", top.context)
-        bare = without_stops(cursor)
+        bare = _without_stops(cursor)
         whole = _pair_type(bare).expand_short_form(bare)
         if whole is None:
             continue
@@ -227,12 +228,25 @@ def _read_point_definition(cursor: Cursor) -> PointDefinition:
     return Distances(first, second, distances[first], distances[second], side == "left_of")
 
 
+def _without_stops(entry: Cursor) -> Cursor:
+    """A pair's entry with the keys of its type alone."""
+    return replace(entry, value={key: value for key, value in entry.fields().items() if key not in STOP_SCHEMA})
+
+
+def _read_stops(entry: Cursor, group: Sequence[Pair]) -> tuple[Stops, ...]:
+    if not any(map(entry.has, STOP_SCHEMA)):
+        return ()
+    from planar.document.stops import read_stops  # few pairs have stops
+
+    return read_stops(entry, group)
+
+
 def _read_pairs(top: Cursor) -> tuple[Pair, ...]:
     found: list[Pair] = []
     named: dict[str, str] = {}
     placed: dict[tuple[str, str], str] = {}
     for entry in top["pairs"].items():
-        bare = without_stops(entry)
+        bare = _without_stops(entry)
         group = _pair_type(bare).read(bare)
         name = group[0].entry_name()
         pinned = {member for pair in group for member in pair.coincident_points()}
@@ -291,6 +305,8 @@ def _read_inputs(top: Cursor, known: Mapping[str, Pair]) -> tuple[Input, ...]:
 
             given = given._replace(law=read_law(cursor["law"], given, pair.input_quantity_kinds()))
         if cursor.has("motor"):
+            from planar.document.motors import read_motor  # nor have many a motor
+
             given = given._replace(motor=read_motor(cursor["motor"], pair))
         found[pair.name] = given
     return tuple(found.values())

@@ -3,19 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import replace
 from typing import Any
 
 from planar.document.cursor import Cursor, suggest_name
-from planar.document.schema import STOP_SCHEMA
 from planar.model.mechanism import LARGEST_COUNTED_ANGLE
 from planar.model.pairs import MeasureKind, Pair, QuantityWriter
 from planar.model.stops import Stops
-
-
-def without_stops(entry: Cursor) -> Cursor:
-    """A pair's entry with the keys of its type alone."""
-    return replace(entry, value={key: value for key, value in entry.fields().items() if key not in STOP_SCHEMA})
 
 
 def read_stops(entry: Cursor, group: Sequence[Pair]) -> tuple[Stops, ...]:

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from typing import Any
 
 from planar.document.input_laws import write_law
 from planar.document.loads import write_loads
-from planar.document.motors import write_motor
 from planar.document.schema import DRIVE_SCHEMA, FORMAT_VERSION
-from planar.document.stops import write_stops
 from planar.foundation.units import SI_UNITS, Unit, UnitError, parse_unit, shortest_number
 from planar.model.file_units import FileUnits, is_metric, takes_bare_number, unit_of_kind
 from planar.model.link_shapes import Along, At, Link, PointDefinition
@@ -40,10 +38,7 @@ def write_mechanism(mechanism: Mechanism) -> dict[str, Any]:
     value["units"] = {key: unit for key, unit in mechanism.units._asdict().items() if unit}
     value["frame"] = mechanism.frame
     value["links"] = {link.name: write_link(link, quantity) for link in mechanism.links}
-    value["pairs"] = [
-        write_stops(type(group[0]).write(group, quantity), mechanism.stops, group, quantity)
-        for group in pair_entries(mechanism)
-    ]
+    value["pairs"] = [_write_pair(group, mechanism, quantity) for group in pair_entries(mechanism)]
     value |= _nonempty_fields(
         inputs=[write_input(given, motions, quantity) for given in mechanism.inputs],
         **write_loads(mechanism, quantity),
@@ -121,10 +116,23 @@ def _write_point_definition(place: PointDefinition, quantity: QuantityWriter) ->
     }
 
 
+def _write_pair(group: Sequence[Pair], mechanism: Mechanism, quantity: QuantityWriter) -> dict[str, Any]:
+    entry = type(group[0]).write(group, quantity)
+    if not mechanism.stops:
+        return entry
+    from planar.document.stops import write_stops  # few pairs have any
+
+    return write_stops(entry, mechanism.stops, group, quantity)
+
+
 def write_input(drive: Input, motions: Mapping[str, Pair], quantity: QuantityWriter) -> dict[str, Any]:
     """An input as a file has it."""
     law = None if drive.law is None else write_law(drive.law, motions[drive.pair].input_quantity_kinds(), quantity)
-    motor = None if drive.motor is None else write_motor(drive.motor, motions[drive.pair], quantity)
+    motor = None
+    if drive.motor is not None:
+        from planar.document.motors import write_motor  # few inputs have one
+
+        motor = write_motor(drive.motor, motions[drive.pair], quantity)
     return {"pair": drive.pair} | _write_drive(drive, motions, quantity) | _nonempty_fields(law=law, motor=motor)
 
 

@@ -59,6 +59,7 @@ SHOWN_KEYS = {
     "mass": ("masses", "gravity"),
 }
 """What a page shows of the example of a section; of that of a pair the entry with its keyword."""
+PARTS_OF_CAMS = ("pairs/lift", "pairs/nose")
 JSON_WIDTH = 74
 """Characters of a line, which a terminal need not break."""
 
@@ -81,9 +82,9 @@ def key_sections() -> tuple[KeySection, ...]:
         KeySection("The file", (whole,), "file"),
         KeySection("A link", (kinds["link"],), "link"),
         KeySection("A point of a link", places, ""),
-        *(KeySection(_title(pair), (pair,), next(iter(pair["properties"]))) for pair in kinds["pair"]["oneOf"]),
-        KeySection("A piece of a cam's lift", tuple(kinds["lift"]["oneOf"]), "lift"),
-        KeySection("A circle of a cam", (kinds["nose"],), "nose"),
+        *(KeySection(_title(pair), (pair,), f"pairs/{_keyword(pair)}") for pair in kinds["pair"]["oneOf"]),
+        KeySection("A piece of a cam's lift", tuple(kinds["lift"]["oneOf"]), "pairs/lift"),
+        KeySection("A circle of a cam", (kinds["nose"],), "pairs/nose"),
         KeySection("An input", (lists["inputs"],), "input"),
         KeySection("A piece of an input's law", tuple(kinds["piece"]["oneOf"]), "law"),
         KeySection("A load", tuple(lists["loads"]["anyOf"]), "load"),
@@ -106,9 +107,13 @@ def read_example(name: str) -> dict[str, Any]:
     return found
 
 
+def _keyword(pair: Schema) -> str:
+    return str(next(iter(pair["properties"])))
+
+
 def _title(pair: Schema) -> str:
     """The heading of a pair: what its keyword says it is."""
-    keyword = next(iter(pair["properties"]))
+    keyword = _keyword(pair)
     return f"`{keyword}`: {pair['properties'][keyword]['description'].partition(':')[0]}"
 
 
@@ -133,7 +138,8 @@ def _example_lines(name: str) -> Iterator[str]:
     for key in SHOWN_KEYS.get(name, ()):
         yield f'"{key}": {_json_lines(example[key], JSON_WIDTH - len(key))}'
     if name not in SHOWN_KEYS:
-        yield from (_json_lines(pair, JSON_WIDTH) for pair in example["pairs"] if name in pair)
+        keyword = "cam" if name in PARTS_OF_CAMS else name.rpartition("/")[2]
+        yield from (_json_lines(pair, JSON_WIDTH) for pair in example["pairs"] if keyword in pair)
     yield "```"
 
 

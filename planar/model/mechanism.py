@@ -11,17 +11,17 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from planar.foundation.errors import BadInput, first_unprintable, join_names
 from planar.foundation.notebook_display import Displayable
-from planar.foundation.revision import Revisable
 from planar.foundation.units import parse_unit
 from planar.model.file_units import FileUnits
 from planar.model.link_shapes import Along, At, Distances, Link, LinkShape, Point, PointDefinition
 from planar.model.loads import Course, Load, Mass, Spring
-from planar.model.motors import Motor
 from planar.model.pairs.base import Pair
-from planar.model.stops import Stops
+from planar.model.revision import Revisable
 
 if TYPE_CHECKING:
     from planar.model.input_laws import InputLaw
+    from planar.model.motors import Motor
+    from planar.model.stops import Stops
 
 __all__ = [
     "PUBLISHED_QUANTITIES",
@@ -135,8 +135,8 @@ class PublishedValue(NamedTuple):
 class Mechanism(Displayable, Revisable):
     """Links joined by pairs, one of them the frame.
 
-    `pairs` are binary: a pin of n links is n - 1 of them. `gravity` is an acceleration (m/s^2). `remarks` are what the
-    reader of the file has to say.
+    `pairs` are binary: a pin of n links is n - 1 of them. `gravity` is an acceleration (m/s^2), `stops` are those of
+    pairs. `remarks` are what the reader of the file has to say.
     """
 
     name: str

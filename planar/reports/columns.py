@@ -15,7 +15,8 @@ POINT_KINDS = {"position": "length", "velocity": "velocity", "acceleration": "ac
 _VECTOR_LETTERS = {"position": "", "velocity": "v", "acceleration": "a", "jerk": "j", "force": "F"}
 
 
-_GROUP_PREFIXES = {"inputs": "input ", "pairs": "pair ", "reactions": "reaction "}
+_GROUP_PREFIXES = {"inputs": "input ", "pairs": "pair ", "reactions": "reaction ", "friction": "friction "}
+_GROUP_PREFIXES |= {"without friction": "without friction input "}
 
 
 class ReportedSeries(NamedTuple):

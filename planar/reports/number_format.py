@@ -75,6 +75,11 @@ def format_quantity(value: float | None, kind: str, units: FileUnits, beside: fl
     return format_or_zero(None if value is None else of.from_si(value), of.from_si(beside))
 
 
+def quantity_text(value: float | None, kind: str, units: FileUnits, beside: float = 0.0) -> str:
+    """The same with its unit behind it."""
+    return f"{format_quantity(value, kind, units, beside)} {display_unit(kind, units)[0]}"
+
+
 def format_or_zero(value: float | None, beside: float = 0.0) -> str:
     """A number, nothing where it is only what rounding leaves of another beside it; a dash where there is none."""
     if value is None or not np.isfinite(value):

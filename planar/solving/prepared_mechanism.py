@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import cached_property
-from typing import NamedTuple, Self
+from typing import TYPE_CHECKING, NamedTuple, Self
 
 import numpy as np
 
@@ -21,8 +21,10 @@ from planar.model.mechanism import LARGEST_NUMBER, SMALLEST_NUMBER, Mechanism, p
 from planar.model.pairs import MeasureKind
 from planar.model.wording import amount
 from planar.solving.checks.residual_check import ResidualCheck
-from planar.solving.stops import MetStop, PairStops
 from planar.solving.structure import mechanism_structure
+
+if TYPE_CHECKING:
+    from planar.solving.stops import MetStop, PairStops
 
 ZERO_POSITION = 1e-14
 """rad or sizes: a position of an input that was solved for and is nearer to zero is there."""
@@ -95,7 +97,11 @@ class PreparedMechanism:
     @cached_property
     def stops(self) -> PairStops | None:
         """The stops of its pairs, if it has any."""
-        return PairStops(self.mechanism, self.unit) if self.mechanism.stops else None
+        if not self.mechanism.stops:
+            return None
+        from planar.solving.stops import PairStops  # few mechanisms have stops
+
+        return PairStops(self.mechanism, self.unit)
 
     def stop_positions(self, z: Array, u: Array) -> Array:
         """The positions of the pairs that have stops (stops,), rad or m; of rows of unknowns (stops, rows)."""

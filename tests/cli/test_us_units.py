@@ -68,6 +68,22 @@ def inches(tmp_path: Path) -> str:
     return written(tmp_path, INCHES)
 
 
+MODEL_IN_FEET = FileUnits(**FEET["units"])
+AS_BUILT = {
+    "forces press --fluctuation 0.05 --rim-radius 2ft --cycle --steps 12": "motor-press",
+    "forces press --at O=230deg": "motor-press",
+    "forces press --solve-for loads.0 --effort 90lbf*ft --at O=230deg": "motor-press",
+    "forces clamp": "toggle-clamp",
+    "forces clamp --cycle --steps 12": "toggle-clamp",
+    "forces clamp --effort -40lbf*ft": "toggle-clamp",
+    "forces jack": "screw-jack",
+    "forces truck --at stroke=700mm": "tipper",
+    "forces truck --solve-for masses.body --effort 5000lbf": "tipper",
+    "simulate truck --duration 2s --steps 4": "tipper",
+    "simulate press --duration 100ms --steps 4": "motor-press",
+    "forces lamp --solve-for springs.0 --cycle --steps 4": "balanced-lamp",
+}
+"""Commands on models with motors, friction and stops, which are shown in feet and pounds."""
 TABLES = [
     "solve --relative B,A",
     "cycle --steps 12 --of G",
@@ -85,16 +101,19 @@ TABLES = [
 ]
 
 
-@pytest.mark.parametrize("words", TABLES, ids=lambda words: words.split(" -")[0])
+@pytest.mark.parametrize("words", [*TABLES, *AS_BUILT], ids=lambda words: words.split(" -")[0])
 def test_tables_say_in_feet_and_inches_what_they_say_in_si(
     words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     command, *options = words.split()
-    inches = written(tmp_path, FEET)
+    whole = FEET
+    if words in AS_BUILT:
+        whole, options = planar.to_dict(replace(MODELS[AS_BUILT[words]], units=MODEL_IN_FEET, source=None)), options[1:]
+    inches = written(tmp_path, whole)
     seen: list[FittedTable] = []
     draw = FittedTable.__rich_console__
     monkeypatch.setattr(FittedTable, "__rich_console__", lambda self, *more: (seen.append(self), draw(self, *more))[1])
-    si = planar.to_dict(replace(planar.from_dict(FEET), units=FileUnits("m", "deg")))
+    si = planar.to_dict(replace(planar.from_dict(whole), units=FileUnits("m", "deg")))
     found = []
     for name in (inches, written(tmp_path, si, "si.json")):
         seen.clear()
@@ -145,6 +164,11 @@ def test_lists_have_no_metric_unit_in_their_heads_and_json_is_si(inches: str, tm
         heads = (tmp_path / "list.csv").read_text().splitlines()[0]
         assert "[in/s^2]" in heads
         assert not metric_words(heads)
+    clamp = written(tmp_path, planar.to_dict(replace(MODELS["toggle-clamp"], units=MODEL_IN_FEET)), "clamp.json")
+    run(tmp_path, "forces", clamp, "--cycle", "--steps", "4", "-o", "clamp.csv").done()
+    heads = (tmp_path / "clamp.csv").read_text().splitlines()[0]
+    assert "friction plunger heat [hp],without friction input O torque [ft lbf]" in heads
+    assert not metric_words(heads)
     found = json.loads(run(tmp_path, "solve", inches, "--json").done())
     state = planar.solve(planar.from_dict(INCHES))
     assert found["points"]["B"]["velocity"] == pytest.approx(state.point("B").velocity.tolist())
@@ -156,7 +180,17 @@ OF_A_MOTION = ("positions", "loci", "diagrams", "centrodes", "circuits", "torque
 
 @pytest.mark.parametrize("what", [*OF_A_POSITION, *OF_A_MOTION])
 def test_drawings_have_no_metric_unit(what: str) -> None:
-    mechanism = planar.from_dict(INCHES)
+    check_drawing(planar.from_dict(INCHES), what)
+
+
+@pytest.mark.parametrize(
+    ("model", "what"), [("motor-press", "torque"), ("toggle-clamp", "forces"), ("tipper", "scheme")]
+)
+def test_drawings_of_motors_friction_and_stops_have_none(model: str, what: str) -> None:
+    check_drawing(replace(MODELS[model], units=MODEL_IN_FEET), what)
+
+
+def check_drawing(mechanism: planar.Mechanism, what: str) -> None:
     source = planar.solve(mechanism) if what in OF_A_POSITION else mechanism
     found = getattr(planar.plot, what)(source)
     figures = found if isinstance(found, list) else [found]
@@ -186,6 +220,12 @@ def test_problem_sheets_and_answers_have_no_metric_unit() -> None:
     ]
     assert any("in/s" in text for text in texts)
     assert not [text for text in texts if metric_words(text)]
+
+
+@pytest.mark.parametrize("model", ["motor-press", "toggle-clamp", "tipper"])
+def test_pages_of_motors_friction_and_stops_have_no_metric_unit(model: str) -> None:
+    data, _ = page_data(replace(MODELS[model], units=MODEL_IN_FEET, about=None, notes=(), source=None))
+    assert not [text for text in strings({**data, "document": {}}) if metric_words(text)]
 
 
 def test_pages_take_every_unit_from_their_data() -> None:

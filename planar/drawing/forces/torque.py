@@ -64,7 +64,8 @@ def torque_picture(  # long: one part of the diagram after the other
     strokes += axes.axes_frame(across, up)
     for label, part in parts.items():
         strokes += axes.curve_strokes(drawn.abscissa, part, across, up, Pen.SHARE, f"part {label}")
-        row = int(np.nanargmax(np.abs(part)))
+        flat = np.ptp(part[np.isfinite(part)]) <= ROUND_OFF_RATIO * np.nanmax(np.abs(part))
+        row = len(part) // 4 if flat else int(np.nanargmax(np.abs(part)))
         strokes.append(
             Label(label, axes.point_on_paper(drawn.abscissa[row], part[row], across, up), f"part {label}", 7.5, 0.8)
         )
@@ -123,7 +124,7 @@ def _motor_curve(drawn: ForceRun, name: str) -> dict[str, Array]:
 
 
 def _effort_parts(drawn: ForceRun, name: str) -> dict[str, Array]:
-    """What the input supplies against loads, weights, springs and inertia each, where it is the only one that moves.
+    """What the input supplies against loads, weights, springs, friction and inertia, where it alone moves.
 
     By power: at every position that of a part and that of its share are opposite.
     """
@@ -136,6 +137,8 @@ def _effort_parts(drawn: ForceRun, name: str) -> dict[str, Array]:
         if each.kind in PART_NAMES:
             share = drawn.in_order(-each.power / rates[name])
             found[PART_NAMES[each.kind]] = found.get(PART_NAMES[each.kind], 0.0) + share
+    if drawn.forces.friction:
+        found["friction"] = drawn.in_order(np.asarray(drawn.forces.heat_flow) / rates[name])
     most = max((float(np.nanmax(np.abs(part))) for part in found.values()), default=0.0)
     seen = {label: part for label, part in found.items() if np.nanmax(np.abs(part)) > ROUND_OFF_RATIO * most}
     return seen if len(seen) > 1 else {}

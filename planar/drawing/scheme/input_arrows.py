@@ -52,7 +52,7 @@ class DrivenPlace(NamedTuple):
 def moving_input_arrow(scene: Scene, given: Input, sense: float, clear: Clearance) -> PlacedSymbol | None:
     """The arrow at its link where the input grows (`sense` 1) or shrinks (-1); None where there is no place for it."""
     pair = relative_motions(scene.mechanism)[given.pair]
-    found, about = _driven_place(scene, pair), f"input {given.pair}"
+    found, about = driven_place(scene, pair), f"input {given.pair}"
     if found is None:
         return None
     sense *= found.sense
@@ -69,7 +69,7 @@ def moving_input_arrow(scene: Scene, given: Input, sense: float, clear: Clearanc
 def input_arrow_marks(scene: Scene, given: Input, clear: Clearance) -> Iterator[Mark]:
     """The arrow of an input with its rates, in the sense in which the driven link moves, or begins to; none at rest."""
     rate, pair = given.velocity or given.acceleration, relative_motions(scene.mechanism)[given.pair]
-    found = _driven_place(scene, pair) if rate else None
+    found = driven_place(scene, pair) if rate else None
     if found is None:
         return
     sense = found.sense if rate > 0.0 else -found.sense
@@ -90,7 +90,7 @@ def input_arrow_marks(scene: Scene, given: Input, clear: Clearance) -> Iterator[
     yield from _rate_labels(scene, given, rates, kinds, named)
 
 
-def _driven_place(scene: Scene, pair: Pair) -> DrivenPlace | None:
+def driven_place(scene: Scene, pair: Pair) -> DrivenPlace | None:
     """Where the arrow of an input belongs, if anywhere."""
     return (_slid_place if pair.input_kind is MeasureKind.LENGTH else _turned_place)(scene, pair)
 

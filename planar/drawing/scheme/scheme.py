@@ -16,6 +16,7 @@ from planar.drawing.scheme.ground import fixed_marks, fixed_point_strokes, groun
 from planar.drawing.scheme.input_arrows import input_arrow_marks
 from planar.drawing.scheme.link_bodies import LinkBody, all_marks, link_bodies
 from planar.drawing.scheme.link_strokes import body_marks, moving_marks
+from planar.drawing.scheme.motors import motor_strokes
 from planar.drawing.scheme.placed_strokes import stroke_marks
 from planar.drawing.scheme.scene import Scene, TravelRanges, plain_frames
 from planar.drawing.scheme.springs_masses import MassCentreMark, SpringMassMark
@@ -60,6 +61,9 @@ def scheme(
     spots = stroke_marks(fixed_point_strokes(scene), frames, scale.per_mm)
     strokes: list[Mark] = [*fixed_marks(scene), *moving_marks(scene), *spots]
     clear = Clearance.from_marks(strokes)
+    motors = tuple(stroke_marks(motor_strokes(scene, clear), frames, scale.per_mm))
+    strokes += motors
+    clear = clear.with_marks(motors)
     for given in mechanism.inputs:
         arrow = tuple(input_arrow_marks(scene, given, clear))
         strokes += arrow

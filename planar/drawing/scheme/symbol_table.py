@@ -50,6 +50,9 @@ INPUT_ARROW_LENGTH = 10.0
 INPUT_ARROW_OFFSET = 4.5
 """mm: how far it is from the line of the slide."""
 
+MOTOR_RADIUS, MOTOR_DISTANCE = 2.7, 8.5
+"""mm: of the circle of a motor, and how far its middle is from what it drives."""
+
 SymbolPoint = tuple[float, float, float]
 """A point of a symbol: the part of the way to its second place, and so far along its direction and to the left (mm)."""
 TurnedPoint = tuple[float, float, float, float]
@@ -167,6 +170,11 @@ def _stop(along: tuple[float, float], across: tuple[float, float]) -> SymbolStro
     return SymbolStroke(Pen.PIN, tuple((0.0, x, y) for x, y in corners), True, Fill.SOLID)
 
 
+def _letter_m() -> SymbolStroke:
+    corners = ((-1.1, -1.3), (-1.1, 1.3), (0.0, -0.3), (1.1, 1.3), (1.1, -1.3))
+    return SymbolStroke(Pen.PIN, tuple((0.0, *corner) for corner in corners))
+
+
 def _slot() -> SymbolStroke:
     half = SLOT_SIZE[1] / 2.0
     ends = (*_arc(1.0, half, -pi / 2.0, pi / 2.0), *_arc(0.0, half, pi / 2.0, 1.5 * pi))
@@ -254,6 +262,7 @@ SYMBOLS: dict[str, Sequence[SymbolStroke | SymbolCircle | TurnedStroke | Hatchin
     "piston stop": tuple(_stop((0.5, 1.7), (side * 0.9, side * (CYLINDER_WIDTH / 2.0 - 0.4))) for side in (-1.0, 1.0)),
     "pin stop": (_stop((PIN_RADIUS + 0.2, PIN_RADIUS + 1.4), (-1.5, 1.5)),),
     "bar stop": (_stop((5.0, 7.2), (0.6, 2.0)),),
+    "motor": (SymbolCircle(Pen.PIN, MOTOR_RADIUS, fill=Fill.PAPER), _letter_m()),
     "wheel": (SymbolCircle(Pen.PITCH, 0.0, 1.0),),
     "rim": (SymbolCircle(Pen.LINK, RIM_WIDTH, 1.0),),
     "fixed rim": (SymbolCircle(Pen.GROUND, RIM_WIDTH, 1.0),),

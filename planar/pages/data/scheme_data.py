@@ -20,6 +20,7 @@ from planar.drawing.scheme.ground import fixed_pins, fixed_point_strokes, fixed_
 from planar.drawing.scheme.input_arrows import moving_input_arrow
 from planar.drawing.scheme.link_bodies import RELATIVE_TOLERANCE, LinkBody, all_marks, bodies_of_points, largest_span
 from planar.drawing.scheme.link_strokes import moving_strokes
+from planar.drawing.scheme.motors import motor_strokes
 from planar.drawing.scheme.placed_strokes import PlacedSpring, PlacedStroke, PlacedTorsionSpring, stroke_marks
 from planar.drawing.scheme.scene import Scene, plain_frames
 from planar.drawing.scheme.scheme import extent_corners, extent_places, mass_centre_names, point_names
@@ -186,6 +187,9 @@ def scheme_data(
         clear = clear.with_marks(stroke_marks(moving, frames, per_mm), weight / len(seen))
     levels = {"ground": fixed_strokes(scene, clear)} | levels
     clear = clear.with_marks(stroke_marks(levels["ground"], scene.frames, per_mm), weight)
+    motors = tuple(motor_strokes(scene, clear))
+    levels["pins"] += motors
+    clear = clear.with_marks(stroke_marks(motors, scene.frames, per_mm), weight)
     arrows = [[moving_input_arrow(scene, given, sense, clear) for sense in (1.0, -1.0)] for given in mechanism.inputs]
     points, bodies = scene.own_places, scene.bodies
     data = {

@@ -13,7 +13,7 @@ from planar.foundation.units import parse_unit
 from planar.model.file_units import display_unit
 from planar.reports.columns import ReportedSeries
 from planar.reports.fitted_table import FittedTable, plain_table
-from planar.reports.number_format import column_heading, format_number, format_quantity, paragraphs
+from planar.reports.number_format import column_heading, format_number, format_quantity, paragraphs, quantity_text
 from planar.reports.tables.motion import motion_tables
 
 ENERGIES = ("kinetic", "potential", "work", "lost")
@@ -43,19 +43,19 @@ def _impacts_table(simulation: Simulation) -> FittedTable:
     units = motion.mechanism.units
     shown = simulation.impacts[:MAX_IMPACTS_SHOWN]
     title = "Impacts on stops" if many == len(shown) else f"The first {len(shown)} of {many} impacts on stops"
-    headings = ("pair", "time, s", ("at", "unit"), ("speed before", "after", "unit"), "lost, J", "")
-    table = plain_table(title, *headings, left=(0, 3, 6, 8))
+    lost = column_heading("lost", "energy", units)
+    headings = ("pair", "time, s", ("at", "unit"), ("speed before", "after"), lost, "")
+    table = plain_table(title, *headings, left=(0, 3, 7))
     for each in shown:
         length = motion.has_length_motion(each.pair)
-        own, rate = units.length if length else units.angle, display_unit(SPEED_KINDS[length], units)
+        own = units.length if length else units.angle
         table.add_row(
             each.pair,
             format_number(each.time),
             format_number(parse_unit(own).from_si(each.position)),
             own,
-            *(format_number(rate[1].from_si(speed)) for speed in (each.approach, each.rebound)),
-            rate[0],
-            format_number(each.lost),
+            *(quantity_text(speed, SPEED_KINDS[length], units) for speed in (each.approach, each.rebound)),
+            format_quantity(each.lost, "energy", units, float(np.abs(simulation.lost).max(initial=0.0))),
             "rests there" if each.rests else "",
         )
     return table

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from math import isfinite
-from typing import NamedTuple, Protocol
+from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
 
@@ -14,7 +14,9 @@ from planar.solving.checks.branch_check import is_move_allowed
 from planar.solving.checks.residual_check import CONTACT_TOLERANCE, EPS, NEGLIGIBLE_ERROR
 from planar.solving.checks.singular_values import SINGULAR_DISTANCE_RATIO
 from planar.solving.prepared_mechanism import PositionInputs, PreparedMechanism
-from planar.solving.stops import MAX_SURE_MOVE, PairStops
+
+if TYPE_CHECKING:
+    from planar.solving.stops import PairStops
 
 MIN_FAST_REGULARITY = 1e-3
 """Strength of a block from which on its rates are taken as they come; what is weaker is looked at in doubles' whole
@@ -165,6 +167,8 @@ def fast_run(setup: FastSolver, z: Array, u: Array, u1: Array, u2: Array) -> Fas
         with np.errstate(invalid="ignore", over="ignore"):
             fine[1:] &= _keeps_branch(judged.block_starts, settled, gone, ways[:, 0], distances[:, 0], square)
     if setup.stops is not None:
+        from planar.solving.stops import MAX_SURE_MOVE  # few mechanisms have stops
+
         fine &= setup.stops.sure_rows(setup.stop_positions(settled, u), settled)
         fine[1:] &= sizes <= MAX_SURE_MOVE
     many = len(fine) if fine.all() else int(np.argmin(fine))

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 from planar.dynamics.flywheel import Flywheel, flywheel
 from planar.dynamics.forces import Forces
 from planar.model.wording import amount
-from planar.reports.number_format import format_number
+from planar.reports.number_format import quantity_text
 
 
 class WantedFlywheel(NamedTuple):
@@ -34,10 +34,10 @@ def flywheel_facts(forces: Forces, wanted: WantedFlywheel) -> Iterator[tuple[str
     """The steady torque, the fluctuation of energy, and the flywheel, with the mass of its rim."""
     found, units = wanted.flywheel, forces.mechanism.units
     fast, slow = (amount(each, "angle", units) for each in (found.fastest, found.slowest))
-    mean, energy = format_number(found.mean), format_number(found.energy)
+    mean, energy = quantity_text(found.mean, "torque", units), quantity_text(found.energy, "energy", units)
     yield (
         "flywheel",
-        f"driven by the steady torque {mean} N·m, {found.input!r} has {energy} J "
+        f"driven by the steady torque {mean}, {found.input!r} has {energy} "
         f"too much and too little by turns: fastest at {fast}, slowest at {slow}",
     )
     if found.inertia is None or found.speed is None:
@@ -45,11 +45,12 @@ def flywheel_facts(forces: Forces, wanted: WantedFlywheel) -> Iterator[tuple[str
         return
     rim = ""
     if wanted.rim_mass is not None and wanted.radius is not None:
-        rim = f", a rim of {format_number(wanted.rim_mass)} kg at {amount(wanted.radius, 'length', units)}"
+        rim = f", a rim of {quantity_text(wanted.rim_mass, 'mass', units)} at {amount(wanted.radius, 'length', units)}"
     yield (
         "",
-        f"for a coefficient of fluctuation {found.fluctuation:g} at {format_number(found.speed)} rad/s: "
-        f"I = ΔE / (C ω²) = {format_number(found.inertia)} kg·m²{rim}",
+        f"for a coefficient of fluctuation {found.fluctuation:g} at "
+        f"{quantity_text(found.speed, 'angular velocity', units)}: "
+        f"I = ΔE / (C ω²) = {quantity_text(found.inertia, 'moment of inertia', units)}{rim}",
     )
 
 

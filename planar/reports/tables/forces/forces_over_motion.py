@@ -9,7 +9,7 @@ import numpy as np
 from rich.console import Group, RenderableType
 from rich.text import Text
 
-from planar.analysis.motion.unknown_load import UnknownLoad
+from planar.analysis.efforts.unknown_load import UnknownLoad
 from planar.dynamics.forces import Forces
 from planar.dynamics.load_attachment import attachment_remarks
 from planar.dynamics.reactions import Reaction

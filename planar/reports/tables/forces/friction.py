@@ -7,35 +7,33 @@ from typing import Any
 
 import numpy as np
 
-from planar.analysis.motion.self_locking import LockedInterval, jamming, self_locking
+from planar.analysis.efforts.self_locking import LockedInterval, jamming, self_locking
 from planar.dynamics.forces import Forces, PairFriction
 from planar.dynamics.friction.holding import Holding, holding
 from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput, NoAnswer
-from planar.foundation.units import parse_unit
+from planar.model.file_units import display_unit
 from planar.model.mechanism import Mechanism, relative_motions
 from planar.model.wording import join_all_names
 from planar.reports.columns import ReportedSeries
 from planar.reports.fitted_table import FittedTable, plain_table
-from planar.reports.number_format import format_or_zero
+from planar.reports.number_format import column_heading, format_quantity, quantity_text
 from planar.results.motion import Motion
-
-UNBOUNDED_TEXT = "any effort, however great,"
 
 
 def friction_table(forces: Forces) -> FittedTable:
     """How every pair rubs at a position, with what friction does in the positive sense of its motion."""
     most = max((abs(float(each.heat)) for each in forces.friction.values()), default=0.0)
-    headings = ("pair", "rubs", ("friction", "unit"), "heat, W", "contact")
+    units = forces.mechanism.units
+    headings = ("pair", "rubs", ("friction", "unit"), column_heading("heat", "power", units), "contact")
     table = plain_table("Friction", *headings, left=(0, 1, 3, 5))
     for name, each in forces.friction.items():
         rubs = {1.0: "forward", -1.0: "back"}.get(float(each.sense), "not")
         table.add_row(
             name,
             rubs,
-            format_or_zero(float(each.effort)),
-            _unit(forces.mechanism, name),
-            format_or_zero(float(each.heat), most),
+            *_effort_cells(forces.mechanism, name, float(each.effort)),
+            format_quantity(float(each.heat), "power", units, most),
             str(each.side),
         )
     return table
@@ -43,15 +41,16 @@ def friction_table(forces: Forces) -> FittedTable:
 
 def friction_over_motion_table(forces: Forces) -> FittedTable:
     """The greatest friction in every pair, and its heat on average over the positions."""
-    table = plain_table(
-        "Friction, among these positions", "pair", ("greatest", "unit"), "mean heat, W", "contacts", left=(0, 2, 4)
-    )
+    units = forces.mechanism.units
+    headings = ("pair", ("greatest", "unit"), column_heading("mean heat", "power", units), "contacts")
+    table = plain_table("Friction, among these positions", *headings, left=(0, 2, 4))
     for name, each in forces.friction.items():
         sides = "; ".join(sorted({side for side in each.side if side}))
         efforts = np.abs(np.asarray(each.effort))
         mean = float(np.mean(_finite(each.heat))) if len(_finite(each.heat)) else np.nan
         most = float(_finite(efforts).max(initial=0.0))
-        table.add_row(name, format_or_zero(most), _unit(forces.mechanism, name), format_or_zero(mean), sides)
+        heat = format_quantity(mean, "power", units)
+        table.add_row(name, *_effort_cells(forces.mechanism, name, most), heat, sides)
     return table
 
 
@@ -60,8 +59,15 @@ def _finite(values: Array | float) -> Array:
     return flat[np.isfinite(flat)]
 
 
-def _unit(mechanism: Mechanism, name: str) -> str:
-    return "N" if relative_motions(mechanism)[name].input_quantity_kinds()[0] == "length" else "N·m"
+def _effort_kind(mechanism: Mechanism, name: str) -> str:
+    """Which kind of quantity acts along a pair's motion."""
+    return "force" if relative_motions(mechanism)[name].input_quantity_kinds()[0] == "length" else "torque"
+
+
+def _effort_cells(mechanism: Mechanism, name: str, effort: float) -> tuple[str, str]:
+    """An effort at a pair, and its unit."""
+    kind, units = _effort_kind(mechanism, name), mechanism.units
+    return format_quantity(effort, kind, units), display_unit(kind, units)[0]
 
 
 def efficiency_facts(forces: Forces) -> Iterator[tuple[str, str]]:
@@ -75,9 +81,9 @@ def efficiency_facts(forces: Forces) -> Iterator[tuple[str, str]]:
         return
     heat, efficiency = float(forces.heat_flow), float(forces.efficiency)
     if np.isfinite(efficiency):
-        yield "efficiency", f"{efficiency:.4g}: {format_or_zero(heat)} W turn into heat"
+        yield "efficiency", f"{efficiency:.4g}: {quantity_text(heat, 'power', forces.mechanism.units)} turn into heat"
     parts = [
-        f"{format_or_zero(float(effort))} {_unit(forces.mechanism, name)} at {name}"
+        f"{' '.join(_effort_cells(forces.mechanism, name, float(effort)))} at {name}"
         for name, effort in forces.frictionless.inputs.items()
     ]
     yield "without friction", f"the inputs would supply {join_all_names(parts)}"
@@ -118,19 +124,19 @@ def holding_facts(forces: Forces) -> Iterator[tuple[str, str]]:
         if jams:
             yield "jams", f"at {held.input} from {_intervals_text(forces.moving, jams)}, in the sense of this motion"
         return
-    low, high, unit = float(held.low), float(held.high), _unit(forces.mechanism, held.input)
+    low, high = float(held.low), float(held.high)
     if held.undetermined:
         yield "at rest", held.undetermined
     elif np.isnan([low, high]).any():
         return
     else:
-        ends = [format_or_zero(each) if np.isfinite(each) else "∞" for each in (low, high)]
-        ends[0] = f"-{ends[0]}" if low == -np.inf else ends[0]
+        (start, unit), (stop, _) = (_effort_cells(forces.mechanism, held.input, each) for each in (low, high))
+        ends = ("-∞" if low == -np.inf else start, "∞" if high == np.inf else stop)
         locks = "; it locks itself under these loads" if held.is_self_locking else "; without it the loads move it"
         yield "at rest", f"friction holds it with {ends[0]} to {ends[1]} {unit} at {held.input}{locks}"
         wide = np.asarray(held.widest)
         if wide[0] < low or wide[1] > high:
-            pair = " to ".join(format_or_zero(float(each)) for each in wide)
+            pair = " to ".join(_effort_cells(forces.mechanism, held.input, float(each))[0] for each in wide)
             yield "", f"braced against each other pairs may hold {pair} {unit}"
         if not held.is_proved:
             yield "", "that there are no other solutions at these ends is not proved"
@@ -139,8 +145,8 @@ def holding_facts(forces: Forces) -> Iterator[tuple[str, str]]:
 def held_loads_table(held: Sequence[Holding]) -> FittedTable:
     """How much of each load friction holds at rest with an effort of the input."""
     first = held[0]
-    unit = _unit(first.moving.mechanism, first.input)
-    title = f"Loads that are held at rest with {format_or_zero(first.effort)} {unit} at {first.input}"
+    effort = " ".join(_effort_cells(first.moving.mechanism, first.input, first.effort))
+    title = f"Loads that are held at rest, with {effort} at {first.input}"
     table = plain_table(title, "load", "from, times", "to, times", "held as it is", left=(0, 3))
     for each in held:
         ends = [
@@ -187,9 +193,8 @@ def _locking_text(motion: Motion, held: Holding) -> str:
 
 def _intervals_text(motion: Motion, intervals: Sequence[LockedInterval]) -> str:
     """Intervals of the input that runs, in the file's units."""
-    units = motion.mechanism.units
-    unit = units.length if motion.has_length_motion(motion.running_input) else units.angle
-    measure = parse_unit(unit)
+    kind = "length" if motion.has_length_motion(motion.running_input) else "angle"
+    unit, measure = display_unit(kind, motion.mechanism.units)
     told = [" to ".join(f"{measure.from_si(each):.6g}" for each in interval[:2]) for interval in intervals]
     return f"{join_all_names(told)} {unit}"
 
@@ -248,12 +253,12 @@ def motion_record(forces: Forces) -> dict[str, Any]:
 def friction_series(forces: Forces) -> Iterator[ReportedSeries]:
     """Friction and its heat at every position, and the efforts without it."""
     for name, each in forces.friction.items():
-        what, kind = ("force", "force") if _unit(forces.mechanism, name) == "N" else ("torque", "torque")
-        values = {what: np.asarray(each.effort), "heat": np.asarray(each.heat)}
-        yield ReportedSeries("friction", name, {what: kind, "heat": "power"}, values)
+        kind = _effort_kind(forces.mechanism, name)
+        values = {kind: np.asarray(each.effort), "heat": np.asarray(each.heat)}
+        yield ReportedSeries("friction", name, {kind: kind, "heat": "power"}, values)
     if forces.frictionless is not None and forces.friction:
         for name, effort in forces.frictionless.inputs.items():
-            kind = "force" if _unit(forces.mechanism, name) == "N" else "torque"
+            kind = _effort_kind(forces.mechanism, name)
             yield ReportedSeries("without friction", name, {kind: kind}, {kind: np.asarray(effort)})
 
 

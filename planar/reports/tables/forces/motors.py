@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from planar.analysis.motion.motor_duty import MotorDuty, motor_duty
+from planar.analysis.efforts.motor_duty import MotorDuty, motor_duty
 from planar.dynamics.forces import Forces
 from planar.model.file_units import display_unit
 from planar.model.mechanism import relative_motions
 from planar.model.wording import amount, join_all_names
 from planar.reports.fitted_table import FittedTable, plain_table
-from planar.reports.number_format import format_number
+from planar.reports.number_format import column_heading, format_number, format_quantity, quantity_text
 from planar.results.motion import Motion
 
 
@@ -26,25 +26,26 @@ def motors_table(forces: Forces, duties: tuple[MotorDuty, ...]) -> FittedTable:
     """What motors supply at the speeds that there are, and what is needed; over a motion where the margin is least."""
     moving = forces.moving
     title = "Motors, where the margin is least" if isinstance(moving, Motion) else "Motors"
-    effort = ("supplies", "needs", "margin", "unit")
-    table = plain_table(title, "input", "at", "speed", effort, "power needed, W", "at most, W", left=(0, 1, 2, 6))
+    units = forces.mechanism.units
+    powers = (column_heading(each, "power", units) for each in ("power needed", "at most"))
+    efforts = ("supplies", "needs", "margin", "unit")
+    table = plain_table(title, "input", "at", "speed", efforts, *powers, left=(0, 1, 2, 6))
     for each in duties:
         velocity, row = np.atleast_1d(np.asarray(moving.inputs[each.input].velocity)), 0
         margins = np.atleast_1d(np.asarray(each.margin))
         if np.isfinite(margins).any():
             row = int(np.nanargmin(margins))
-        rate, of = display_unit(
-            relative_motions(forces.mechanism)[each.input].input_quantity_kinds()[1], forces.mechanism.units
-        )
+        rate_kind = relative_motions(forces.mechanism)[each.input].input_quantity_kinds()[1]
+        kind = "force" if forces.is_force_input(each.input) else "torque"
         values = (np.atleast_1d(np.asarray(part))[row] for part in (each.available, each.needed, each.margin))
         table.add_row(
             each.input,
             _place(forces, each.least_at),
-            f"{format_number(of.from_si(float(velocity[row])))} {rate}",
-            *(format_number(float(value)) for value in values),
-            "N" if forces.is_force_input(each.input) else "N·m",
-            format_number(float(np.nanmax(np.atleast_1d(np.asarray(each.power))))),
-            format_number(each.greatest_power),
+            quantity_text(float(velocity[row]), rate_kind, units),
+            *(format_quantity(float(value), kind, units) for value in values),
+            display_unit(kind, units)[0],
+            format_quantity(float(np.nanmax(np.atleast_1d(np.asarray(each.power)))), "power", units),
+            format_quantity(each.greatest_power, "power", units),
         )
     return table
 

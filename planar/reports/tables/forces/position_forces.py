@@ -9,7 +9,7 @@ import numpy as np
 from rich.console import Group, RenderableType
 from rich.text import Text
 
-from planar.analysis.motion.unknown_load import UnknownLoad
+from planar.analysis.efforts.unknown_load import UnknownLoad
 from planar.analysis.worked.published import Comparison
 from planar.dynamics.forces import Forces
 from planar.dynamics.load_attachment import attachment_remarks
@@ -26,10 +26,10 @@ from planar.reports.fitted_table import FittedTable, plain_table
 from planar.reports.number_format import (
     ROUNDING_RATIO,
     column_heading,
-    format_number,
     format_quantity,
     paragraphs,
     precision_text,
+    quantity_text,
 )
 from planar.reports.tables.forces import cam_contacts, friction, loads, motors, unknown_loads
 from planar.reports.tables.forces import mechanical_advantage as ratios
@@ -238,8 +238,8 @@ def stop_remarks(forces: Forces) -> Iterator[str]:
     """What stops carry in place of the input."""
     motions = relative_motions(forces.mechanism)
     for name, force in forces.stops.items():
-        unit = "N" if motions[name].input_kind is MeasureKind.LENGTH else "N·m"
-        carried = f"let go, the input is held by it with {format_number(force)} {unit}"
+        kind = "force" if motions[name].input_kind is MeasureKind.LENGTH else "torque"
+        carried = f"let go, the input is held by it with {quantity_text(force, kind, forces.mechanism.units)}"
         yield f"pair {name!r} stands at its stop: {carried if force else 'let go, the mechanism leaves it'}"
 
 

@@ -1,4 +1,4 @@
-"""Which load, spring or counterweight holds a mechanism: the inverse of forces, which are linear in each of them."""
+"""Which load, spring or counterweight holds a mechanism: the inverse of forces."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import numpy as np
 
 from planar.document.first_argument import takes_result
 from planar.dynamics.forces import forces
+from planar.dynamics.friction.load_for_effort import LoadWithFriction
 from planar.dynamics.virtual_velocities import has_length_motion
 from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput, Unknown, join_names
@@ -21,15 +22,17 @@ NO_INFLUENCE = 1e-12
 """Of the greatest effort: a change that is smaller is none."""
 SAME_FACTOR_TOLERANCE = 1e-9
 """Of the greatest: factors that differ by less over a motion are one."""
+MAX_GAUSS_NEWTON_STEPS, DIFFERENCE_STEP = 30, 1e-6
 
 
 class UnknownLoad(NamedTuple):
     """What a load has to be multiplied by so that an input supplies `effort` (N m, at a slide N).
 
     `factor` over the motion (n,), or at a position: of a force, torque or effort, a spring's stiffness, or a mass; NaN
-    where the load does nothing on the input. `best` is the one factor that comes nearest to that over the whole motion,
-    in the sense of least squares of the effort over its rows, and `left` the greatest effort that differs then;
-    `is_constant` whether it holds everywhere. `value` is what the file says, and `what` names it.
+    where the load does nothing on the input, or friction jams. `best` is the one factor that comes nearest to that over
+    the whole motion, in the sense of least squares of the effort over its rows, and `left` the greatest effort that
+    differs then; `is_constant` whether it holds everywhere. `value` is what the file says, and `what` names it.
+    `has_friction` where friction has its part, in the sense of the motion; `remarks` are what there is to say of it.
     """
 
     load: str
@@ -41,6 +44,8 @@ class UnknownLoad(NamedTuple):
     best: float
     left: float
     is_constant: bool
+    has_friction: bool = False
+    remarks: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
         return short_repr(self)
@@ -48,13 +53,20 @@ class UnknownLoad(NamedTuple):
 
 @takes_result("State", "Motion")
 def unknown_load(
-    moving: State | Motion, load: str, effort: float = 0.0, of: str | None = None, inertia: bool = True
+    moving: State | Motion,
+    load: str,
+    effort: float = 0.0,
+    of: str | None = None,
+    inertia: bool = True,
+    friction: bool = True,
 ) -> UnknownLoad:
     """Which size of a load, spring or mass lets an input (left out: the one that runs) supply so much: 0 holds it.
 
     `load` by its name as in `planar.dimensions`: `loads.0`, `springs.0` (its stiffness), `masses.rod`. Efforts are
-    linear in each of these, whatever else acts, so that two solutions tell it exactly. Raises Unknown for a load that
-    is not there, BadInput for an input that is not, and a load that does nothing on the input anywhere.
+    linear in each of these, whatever else acts, so that two solutions tell it exactly. With friction, in the sense of
+    the motion, its size is solved for beside the reactions that friction follows; what is held at rest `holding` tells.
+    Raises Unknown for a load that is not there, BadInput for an input that is not, and a load that does nothing on the
+    input anywhere, and NoAnswer as `planar.forces` does.
 
     >>> import planar
     >>> lamp = planar.cycle(planar.load("balanced-lamp"), 12)
@@ -66,24 +78,70 @@ def unknown_load(
     if name not in moving.inputs:
         raise BadInput(name or "inputs", f"there is no input of this name; inputs are at {', '.join(moving.inputs)}")
     what, value = _describe_size(mechanism, load)
+    doubled = scale_load(mechanism, load, 2.0)
     own, twice = (
-        np.atleast_1d(np.asarray(forces(_with_mechanism(moving, each), inertia).inputs[name], dtype=float))
-        for each in (mechanism, scale_load(mechanism, load, 2.0))
+        np.atleast_1d(np.asarray(forces(_with_mechanism(moving, each), inertia, False).inputs[name], dtype=float))
+        for each in (mechanism, doubled)
     )
-    share = twice - own
-    known = np.isfinite(share)
-    scale = float(np.abs(np.concatenate([own[known], share[known]])).max(initial=0.0))
-    acts = known & (np.abs(share) > NO_INFLUENCE * scale)
-    if not acts.any():
+    line = _EffortLine(own, twice - own)
+    if not line.acts.any():
         raise BadInput(load, f"it does nothing on the input at {name!r} here, so that no size of it holds that")
-    factor = np.full(len(own), np.nan)
-    factor[acts] = 1.0 + (effort - own[acts]) / share[acts]
-    missing = effort - own[known]
-    best = 1.0 + float(missing @ share[known]) / float(share[known] @ share[known])
-    left = float(np.abs(missing - (best - 1.0) * share[known]).max())
-    same = left <= SAME_FACTOR_TOLERANCE * scale
+    factor, best, left = line.factors(effort), *line.best_factor(effort)
+    remarks: tuple[str, ...] = ()
+    has_friction = False
+    if friction and any(pair.has_friction for pair in mechanism.pairs):
+        column = [given.pair for given in mechanism.inputs].index(name)
+        rubbing = LoadWithFriction(moving, doubled, column, inertia)
+        told = rubbing.factors(effort)
+        factor, has_friction, remarks = np.where(line.acts, told.values, np.nan), told.rubs, told.remarks
+        best, left = (float(factor[0]), 0.0) if len(factor) == 1 else _best_with_friction(rubbing, effort, best)
+    same = left <= SAME_FACTOR_TOLERANCE * line.scale
     found = factor if isinstance(moving, Motion) else float(factor[0])
-    return UnknownLoad(load, what, value, name, float(effort), found, best, left, same)
+    return UnknownLoad(
+        load, what, value, name, float(effort), found, best, left, same, has_friction=has_friction, remarks=remarks
+    )
+
+
+class _EffortLine:
+    """Efforts (n,) with a load as it is, and their shares that grow with it."""
+
+    def __init__(self, own: Array, share: Array):
+        self.own, self.share = own, share
+        self.known = np.isfinite(share)
+        self.scale = float(np.abs(np.concatenate([own[self.known], share[self.known]])).max(initial=0.0))
+        self.acts = self.known & (np.abs(share) > NO_INFLUENCE * self.scale)
+
+    def factors(self, effort: float) -> Array:
+        """The factor at each position (n,)."""
+        found = np.full(len(self.own), np.nan)
+        found[self.acts] = 1.0 + (effort - self.own[self.acts]) / self.share[self.acts]
+        return found
+
+    def best_factor(self, effort: float) -> tuple[float, float]:
+        """The one of least squares, and the greatest effort that differs then."""
+        missing, share = effort - self.own[self.known], self.share[self.known]
+        more = float(missing @ share) / float(share @ share)
+        return 1.0 + more, float(np.abs(missing - more * share).max())
+
+
+def _best_with_friction(rubbing: LoadWithFriction, effort: float, start: float) -> tuple[float, float]:
+    """The same with friction, by Gauss' and Newton's steps over the positions that are told."""
+    best, missing = start, effort - rubbing.efforts(start).values
+    for _ in range(MAX_GAUSS_NEWTON_STEPS):
+        step = DIFFERENCE_STEP * max(abs(best), 1.0)
+        slope = (effort - rubbing.efforts(best + step).values - missing) / -step
+        known = np.isfinite(slope) & np.isfinite(missing)
+        if not slope[known].any():
+            break
+        more = float(missing[known] @ slope[known]) / float(slope[known] @ slope[known])
+        tried = effort - rubbing.efforts(best + more).values
+        known = np.isfinite(tried) & np.isfinite(missing)  # where it jams nothing is told
+        if not np.sum(tried[known] ** 2) < np.sum(missing[known] ** 2):
+            break
+        best, missing = best + more, tried
+        if abs(more) <= SAME_FACTOR_TOLERANCE * abs(best):
+            break
+    return (best, float(np.nanmax(np.abs(missing)))) if np.isfinite(missing).any() else (np.nan, np.nan)
 
 
 def scale_load(mechanism: Mechanism, load: str, factor: float) -> Mechanism:
