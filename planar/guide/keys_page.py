@@ -59,7 +59,8 @@ SHOWN_KEYS = {
     "mass": ("masses", "gravity"),
 }
 """What a page shows of the example of a section; of that of a pair the entry with its keyword."""
-PARTS_OF_CAMS = ("pairs/lift", "pairs/nose")
+KEYS_OF_PARTS = {"pairs/lift": "law", "pairs/nose": "noses"}
+"""The key of a pair under which the parts of an example stand."""
 JSON_WIDTH = 74
 """Characters of a line, which a terminal need not break."""
 
@@ -138,7 +139,7 @@ def _example_lines(name: str) -> Iterator[str]:
     for key in SHOWN_KEYS.get(name, ()):
         yield f'"{key}": {_json_lines(example[key], JSON_WIDTH - len(key))}'
     if name not in SHOWN_KEYS:
-        keyword = "cam" if name in PARTS_OF_CAMS else name.rpartition("/")[2]
+        keyword = KEYS_OF_PARTS.get(name, name.rpartition("/")[2])
         yield from (_json_lines(pair, JSON_WIDTH) for pair in example["pairs"] if keyword in pair)
     yield "```"
 

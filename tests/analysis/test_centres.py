@@ -209,7 +209,8 @@ class Again:
         """Against the carrier c the wheels obey w_b = n w_a: w_b - n w_a + (n - 1) w_c = 0 whoever looks on."""
         pair = self.entries[name]
         a, b = pair.links
-        weights = {b: 1.0, a: -pair.ratio(), pair.carrier: pair.ratio() - 1.0}
+        ratio = pair.ratio() if hasattr(pair, "ratio") else self.ratio_of_rates(a, b, pair.carrier)
+        weights = {b: 1.0, a: -ratio, pair.carrier: ratio - 1.0}
         p, q = sorted(two)
         (third,) = set(weights) - two
         points = {}
@@ -218,6 +219,11 @@ class Again:
             points[link] = np.array([x / w, y / w, 1.0])
         # p and q turn against the third as weights[q] and -weights[p], and in the centre they are as fast
         return one(weights[q] * points[p] + weights[p] * points[q])
+
+    def ratio_of_rates(self, first: str, second: str, carrier: str) -> float:
+        """How fast one link turns beside another, of which a law says so."""
+        rates = {name: self.state.links[name].angular_velocity for name in (first, second, carrier)}
+        return (rates[second] - rates[carrier]) / (rates[first] - rates[carrier])
 
     def direction(self, name: str) -> np.ndarray:
         """Of the line at a pair, in the frame's axes."""

@@ -31,7 +31,7 @@ def contacts_table(forces: Forces) -> FittedTable | None:
     if has_stress:
         columns.append((column_heading(f"{most}stress", "stress", units), *at))
     title = "Contact of cams, among these positions" if at else "Contact of cams"
-    table = plain_table(title, "cam", *columns, left=(0,))
+    table = plain_table(title, "pair", *columns, left=(0,))
     for name, each in contacts.items():
         cells = _cells(forces, each.force, "force")
         if has_stress:
