@@ -727,7 +727,7 @@ def test_a_whole_drag_and_a_whole_play_are_one_step_each(shown):
     start = window.evaluate("page.input(0)")
     window.get_by_role("button", name="Play").click()
     window.wait_for_function("([start]) => Math.abs(page.input(0) - start) > 0.1", arg=[start])
-    window.get_by_role("button", name="Undo").click()  # it stops, and goes back
+    window.get_by_role("button", name="Undo").click(delay=100)  # ms, in which it plays on; it stops, and goes back
     settled(window)
     assert window.evaluate("[controls.playing, page.input(0)]") == [False, start]
     assert window.get_by_role("button", name="Undo").is_disabled()
