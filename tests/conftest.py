@@ -1,8 +1,12 @@
 """How the tests are run."""
 
 import atexit
+import gc
 import os
+import sys
 from tempfile import TemporaryDirectory
+
+import pytest
 
 from tests.draws import load_profile
 
@@ -13,5 +17,20 @@ if "PLANAR_CACHE" not in os.environ:
     _code = TemporaryDirectory()
     atexit.register(_code.cleanup)
     os.environ["PLANAR_CACHE"] = _code.name
+# workers and the processes that tests start read the modules that one of them has compiled, beside the sources
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+sys.dont_write_bytecode = False
 
 load_profile()
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_collection(session):
+    """Tests are collected without looking for garbage, and what was made then is not looked through again."""
+    gc.disable()
+    try:
+        return (yield)
+    finally:
+        gc.freeze()
+        gc.set_threshold(10_000, 20, 20)
+        gc.enable()

@@ -72,18 +72,47 @@ def browser():
     from playwright.sync_api import sync_playwright
 
     with sync_playwright() as playwright:
-        running = playwright.chromium.launch(executable_path=program, args=["--no-sandbox"])
+        running = playwright.chromium.launch(executable_path=program, args=["--no-sandbox", "--disable-gpu"])
         try:
             yield running
         finally:
             running.close()
 
 
-def opened(context: Any, path: Path) -> tuple[Any, list[str]]:
-    """A page in a window, and a list that takes what goes wrong in it."""
+def watched_window(context: Any) -> tuple[Any, list[str]]:
+    """A window, and a list that takes what goes wrong in it."""
     window, wrong = context.new_page(), []
     window.on("console", lambda message: wrong.append(message.text) if message.type == "error" else None)
     window.on("pageerror", lambda problem: wrong.append(str(problem)))
     window.on("request", lambda request: wrong.append(request.url) if request.url.startswith("http") else None)
+    return window, wrong
+
+
+def opened(context: Any, path: Path) -> tuple[Any, list[str]]:
+    """A page in a window, and a list that takes what goes wrong in it."""
+    window, wrong = watched_window(context)
     window.goto(path.as_uri())
     return window, wrong
+
+
+class Windows:
+    """Windows that show one page after the other: to open one costs several times what it takes to show a page."""
+
+    def __init__(self, running: Any):
+        self._running = running
+        self._free: dict[bool, list[tuple[Any, list[str]]]] = {False: [], True: []}
+
+    def take(self, has_touch: bool) -> tuple[Any, list[str]]:
+        """A window that nobody looks at, and a list that takes what goes wrong in it."""
+        if self._free[has_touch]:
+            return self._free[has_touch].pop()
+        context = self._running.new_context(has_touch=has_touch)
+        context.set_default_timeout(10_000)
+        return watched_window(context)
+
+    def give_back(self, has_touch: bool, window: Any, wrong: list[str]) -> None:
+        """What it shows ends, what was pressed is let go, and what went wrong is forgotten."""
+        window.mouse.up()
+        window.goto("about:blank")
+        wrong.clear()
+        self._free[has_touch].append((window, wrong))

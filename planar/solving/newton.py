@@ -15,7 +15,7 @@ from planar.equations.casadi_call import BufferedFunction
 from planar.equations.functions import EquationFunctions
 from planar.equations.linear import solve_vectors
 from planar.equations.symbolic_equations import slice_length
-from planar.foundation.arrays import Array
+from planar.foundation.arrays import Array, greatest_size
 
 ResidualFunction = Callable[[Array], tuple[Array, Array]]
 """Unknowns (starts, n) -> what is left open (starts, m), and its Jacobian (starts, m, n)."""
@@ -119,13 +119,13 @@ def _damped_step(residuals: Array, jacobian: Array, damping: Array) -> Array:
 def correct(residual_function: SystemFunction, solve_step: StepSolver, y: Array, max_steps: int) -> tuple[Array, float]:
     """Undamped steps from y (n,), as long as each leaves less open: the best place (n,), and what is open there."""
     left, slope = residual_function(y)
-    gap = float(np.max(np.abs(left), initial=0.0))
+    gap = greatest_size(left)
     if not gap < np.inf:
         return y, np.inf
     for _ in range(max_steps):
         tried = y + solve_step(slope, left)
         new_left, new_slope = residual_function(tried)
-        new_gap = float(np.max(np.abs(new_left), initial=0.0))
+        new_gap = greatest_size(new_left)
         if not new_gap < gap:
             break
         y, left, slope, gap = tried, new_left, new_slope, new_gap
@@ -242,10 +242,10 @@ def settle(
     for _ in range(max_steps):
         left, slope = residual_function(y)
         step = solve_step(slope, left)
-        if not np.all(np.isfinite(step)) or np.max(np.abs(step), initial=0.0) > longest_step:
+        if not np.all(np.isfinite(step)) or greatest_size(step) > longest_step:
             return y, False
         y = y + step
-        if np.max(np.abs(step[:leading]), initial=0.0) < settled_step:
+        if greatest_size(step[:leading]) < settled_step:
             return y, True
     return y, False
 

@@ -246,7 +246,7 @@ class PositionSolver(PreparedMechanism):
     def _singular_state(self, rates: SingularRates, remarks: tuple[str, ...]) -> State | None:
         """The state where more than the inputs could move to first order, but only one motion goes on."""
         s = self.inputs
-        residual = float(self.max_residuals(rates.z[None], s.u[None])[0])
+        residual = self.max_residual(rates.z, s.u)
         if residual > self.tolerance:
             return None
         y, y1, y2 = (np.concatenate(both) for both in ((rates.z, s.u), (rates.z1, s.u1), (rates.z2, s.u2)))
@@ -261,7 +261,7 @@ class PositionSolver(PreparedMechanism):
         """
         from planar.solving.rates.sample_rates import sample_rates
 
-        residual = float(self.max_residuals(z[None], self.inputs.u[None])[0])
+        residual = self.max_residual(z, self.inputs.u)
         found = sample_rates(self, z[None], self._one_sample(), {0: local}, False)
         rates = [part[0] for part in found.coordinate_rates]
         if residual > self.tolerance or not np.isfinite(rates[1]).all():

@@ -169,13 +169,17 @@ class PreparedMechanism:
         """What the residual check lets pass: round-off of the residual, in lengths of the size."""
         return self.residual_check.tolerance
 
+    @cached_property
+    def _input_scale(self) -> Array:
+        """What inputs are in units of (inputs,): m for one of the size, rad."""
+        return np.array([self.unit if self.is_sliding(given.pair) else 1.0 for given in self.mechanism.inputs])
+
     def residuals(self, z: Array, u: Array) -> Array:
         """What every constraint leaves open (constraints, samples); z (samples, unknowns), u (samples, inputs)."""
         w = self.functions.coordinates(z, u, self.inputs.p).T
-        scale = np.array([self.unit if self.is_sliding(given.pair) else 1.0 for given in self.mechanism.inputs])
         with np.errstate(invalid="ignore"):  # what is not a number counts as open, and is refused as such
             frames, own = frames_from_coordinates(w * self.scale[:, None], self.column, self.shapes, self.pairs)
-            return self.residual_check.residuals(frames, own, u.T * scale[:, None]).reshape(-1, len(z))
+            return self.residual_check.residuals(frames, own, u.T * self._input_scale[:, None]).reshape(-1, len(z))
 
     def coordinates(self, frames: Mapping[str, Frame], own: Mapping[str, Sequence[Scalar]]) -> Array:
         """w (coordinates,) where the links' frames and the pairs' own coordinates are, jets or numbers (m, rad)."""
@@ -190,6 +194,15 @@ class PreparedMechanism:
     def max_residuals(self, z: Array, u: Array) -> Array:
         """What the worst constraint leaves open at every sample (samples,)."""
         return self.residuals(z, u).max(axis=0, initial=0.0)
+
+    def max_residual(self, z: Array, u: Array) -> float:
+        """The same at one position, z (unknowns,) and u (inputs,)."""
+        w = (self.functions.coordinates(z, u, self.inputs.p) * self.scale).tolist()
+        try:
+            frames, own = frames_from_coordinates(w, self.column, self.shapes, self.pairs)
+            return self.residual_check.greatest_residual(frames, own, (u * self._input_scale).tolist())
+        except (ValueError, OverflowError, ZeroDivisionError):  # numpy has numbers for more
+            return float(self.max_residuals(z[None], u[None])[0])
 
     def describe_position(self) -> str:
         """The file's own position in words: at A = 60 deg."""

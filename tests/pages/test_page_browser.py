@@ -25,7 +25,7 @@ from planar.pages.view import view
 from tests.builders import triangle
 from tests.hostile import harmful_mechanism
 from tests.known import MODELS
-from tests.page_scripts import browser, opened
+from tests.page_scripts import Windows, browser, opened
 
 CLOSE = 1e-12
 STEMS = ("crank-rocker", "slider-crank", "scotch-yoke", "watt-six-bar", "whitworth", "planetary-gear-set", "open-arm")
@@ -40,25 +40,29 @@ def chromium():
         yield running
 
 
+@pytest.fixture(scope="module")
+def windows(chromium):
+    return Windows(chromium)
+
+
 @pytest.fixture
-def shown(chromium, tmp_path):
-    """Opens the page of a mechanism: its window, and what goes wrong there, of which there must be nothing."""
-    contexts, wrong = [], []
+def shown(windows, tmp_path):
+    """Shows the page of a mechanism: its window, in which nothing must go wrong."""
+    taken = []
 
     def show(mechanism, screen="desk", scheme="light"):
         width, height = SCREENS[screen]
-        context = chromium.new_context(
-            viewport={"width": width, "height": height}, color_scheme=scheme, has_touch=screen == "phone"
-        )
-        contexts.append(context)
-        context.set_default_timeout(10_000)
-        window, problems = opened(context, view(mechanism, tmp_path / "page.html"))
-        wrong.append(problems)
+        window, problems = windows.take(has_touch=screen == "phone")
+        taken.append((screen == "phone", window, problems))
+        window.set_viewport_size({"width": width, "height": height})
+        window.emulate_media(media="screen", color_scheme=scheme)
+        window.goto(view(mechanism, tmp_path / "page.html").as_uri())
         return window
 
     yield show
-    for context in contexts:
-        context.close()
+    wrong = [list(problems) for *_, problems in taken]
+    for each in taken:
+        windows.give_back(*each)
     assert not any(wrong), wrong
 
 
@@ -723,7 +727,7 @@ def test_a_whole_drag_and_a_whole_play_are_one_step_each(shown):
     start = window.evaluate("page.input(0)")
     window.get_by_role("button", name="Play").click()
     window.wait_for_function("([start]) => Math.abs(page.input(0) - start) > 0.1", arg=[start])
-    window.get_by_role("button", name="Undo").click()  # it stops, and goes back
+    window.get_by_role("button", name="Undo").click(delay=100)  # ms, in which it plays on; it stops, and goes back
     settled(window)
     assert window.evaluate("[controls.playing, page.input(0)]") == [False, start]
     assert window.get_by_role("button", name="Undo").is_disabled()

@@ -7,6 +7,7 @@ since the residual of a flipped linkage is zero too, is `branch`.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from math import inf, isfinite, pi
 
 import numpy as np
 
@@ -98,6 +99,22 @@ class ResidualCheck:
         many = np.fmax.reduce(np.broadcast_arrays(2.0 * np.pi, *counted)) / (2.0 * np.pi)
         many = np.where(np.isfinite(many), many, 1.0)
         return np.nan_to_num(np.array(np.broadcast_arrays(*gaps)) / many, nan=np.inf, posinf=np.inf)
+
+    def greatest_residual(
+        self, frames: Mapping[str, Frame], own: Mapping[str, Sequence[float]], u: Sequence[float]
+    ) -> float:
+        """How far the worst constraint is open at one position, in plain floats: arrays of one take five times as long.
+
+        Raises ValueError, OverflowError or ZeroDivisionError where Python, other than numpy, has no number.
+        """
+        gaps = [
+            abs(closing_error(left, kind)) / self._unit_of(kind) for (_, kind), left in self._residuals(frames, own, u)
+        ]
+        if not all(isfinite(gap) for gap in gaps):
+            return inf
+        counted = [abs(frame.angle) for frame in frames.values()]
+        counted += [abs(length) / self.unit for lengths in own.values() for length in lengths]
+        return max(gaps, default=0.0) / max(1.0, max(counted, default=0.0) / (2.0 * pi))
 
     def find_open_contact(
         self, frames: Mapping[str, Frame], own: Mapping[str, Sequence[Jet]]

@@ -43,7 +43,7 @@ def _count_nonzero(values: Array, tolerance: float, unit: float) -> int:
 
 def column_norms(jacobians: Array, least: float | Array) -> Array:
     """The sizes of columns (..., columns), by which they are judged so that a small link counts as much as a large."""
-    return np.maximum(np.linalg.norm(jacobians, axis=-2), least)
+    return np.maximum(np.sqrt(np.add.reduce(jacobians * jacobians, axis=-2)), least)
 
 
 def least_singular_values(jacobians: Array) -> Array:

@@ -59,7 +59,7 @@ class PathPiece(NamedTuple):
         arc = self.arc
         if self.dead_point is not None and position == self.stop:
             return self.dead_point.y[:-1], None
-        x = find_root(lambda x: float(arc.polynomial(x)[-1]) - position, self.first, self.last)
+        x = find_root(lambda x: arc.input_position(x) - position, self.first, self.last)
         rough = arc.polynomial(x)
         rough[-1] = position
         if arc.is_exact:

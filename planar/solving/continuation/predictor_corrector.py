@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from math import cos
 from typing import NamedTuple
 
 import numpy as np
 
-from planar.foundation.arrays import Array
+from planar.foundation.arrays import Array, greatest_size, length_of
 from planar.foundation.errors import TrackingEnd
 from planar.foundation.root_finding import find_root
 from planar.model.pairs import MeasureKind
@@ -35,6 +36,7 @@ FIRST_STEP, LONGEST_STEP, SHORTEST_STEP = 0.05, 0.25, 1e-9
 """Steps of arc length (rad, lengths of the size): the first, the longest, and one at which the curve ends."""
 MAX_TANGENT_TURN = 0.4
 """rad by which the tangent may turn in a step."""
+MIN_TANGENT_COSINE = cos(MAX_TANGENT_TURN)
 FIRST_TURN_RATIO, FIRST_DISTANCE_RATIO = 0.8, 1.2
 """Steps that are tried first: by what they turn of that, and as parts of the distance from singular positions."""
 MAX_CORRECTED_RATIO, STEP_GROWTH = 2.0, 1.6
@@ -104,14 +106,14 @@ def next_point(curve: ImplicitCurve, here: CurvePoint, longest: float) -> tuple[
     A predictor of second order, Newton's corrector; a step that turns the tangent, or that could pass a singular
     position, is halved.
     """
-    bent = max(float(np.linalg.norm(here.curvature)), 1e-300)
+    bent = max(length_of(here.curvature), 1e-300)
     step = min(longest, FIRST_DISTANCE_RATIO * here.regular_distance, FIRST_TURN_RATIO * MAX_TANGENT_TURN / bent)
     while step > SHORTEST_STEP:
         y = curve.correct(here.y + step * here.tangent + 0.5 * step**2 * here.curvature, here.tangent)
         if y is not None:
             after = curve.point_at(y, here.tangent)
-            gone = float(np.linalg.norm(y - here.y))
-            onwards = after.tangent @ here.tangent > np.cos(MAX_TANGENT_TURN)
+            gone = length_of(y - here.y)
+            onwards = after.tangent @ here.tangent > MIN_TANGENT_COSINE
             is_regular = SINGULAR_DISTANCE_RATIO * gone < here.regular_distance + after.regular_distance
             if onwards and is_regular and gone < MAX_CORRECTED_RATIO * step:
                 return after, step
@@ -172,7 +174,7 @@ class CurveTracker:
 
     def arcs(self) -> Iterator[Arc]:
         """The arcs of the curve; they end where it cannot be followed further, `ending` and `limit` say why."""
-        shown = SHOWN_SLIDE_EXTENT * max(1.0, float(np.max(np.abs(self.curve.p), initial=0.0)))
+        shown = SHOWN_SLIDE_EXTENT * max(1.0, greatest_size(self.curve.p))
         farthest = max(MAX_SLIDE_EXTENT, 2.0 * self._slide_extent(self.point.y))
         if self._start_crossing is not None:
             self.point = self._start_crossing.after
@@ -243,14 +245,14 @@ class CurveTracker:
 
     def _slide_extent(self, y: Array) -> float:
         """How far the farthest slide is out (sizes)."""
-        return float(np.max(np.abs(y[:-1][self._is_length]), initial=0.0))
+        return greatest_size(y[:-1][self._is_length])
 
     def _next_point(self) -> CurvePoint | None:
         """The next point, as far ahead as the curve and slides that are far out allow."""
         here, curve = self.point, self.curve
         # far out a step of a slide may be longer, but not that of an angle
         out = max(self._slide_extent(here.y), 0.0 if self.is_periodic[-1] else abs(float(here.y[-1])))
-        turning = float(np.max(np.abs(here.tangent[self.is_periodic]), initial=0.0))
+        turning = greatest_size(here.tangent[self.is_periodic])
         longest = LONGEST_STEP / max(turning, min(1.0, NEAR_SLIDE_EXTENT / max(out, 1.0)))
         step = min(self.step, longest)
         after, taken = next_point(curve, here, step)

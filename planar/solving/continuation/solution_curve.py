@@ -8,7 +8,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from planar.equations.functions import EquationFunctions
-from planar.foundation.arrays import Array
+from planar.foundation.arrays import Array, append_number, greatest_size, length_of, stack_row
 from planar.solving.checks.singular_values import DIFFERENCE_STEP, column_norms, singular_distance
 from planar.solving.newton import SystemFunction, correct, correct_at_rank
 
@@ -38,6 +38,9 @@ class CurveSolver(Protocol):
 
     def max_residuals(self, z: Array, u: Array) -> Array:
         """What the worst constraint leaves open at every sample; z (samples, unknowns), u (samples, inputs)."""
+
+    def max_residual(self, z: Array, u: Array) -> float:
+        """The same at one position, z (unknowns,) and u (inputs,)."""
 
     @property
     def tolerance(self) -> float:
@@ -96,13 +99,13 @@ class ImplicitCurve:
         least = self._least_singular_value(slope)
         many = len(y) - 1
         if len(slope) == many and least > REGULAR_SINGULAR_VALUE:
-            system = np.vstack([slope, towards])
-            tangent = _solve_regular(system, np.append(np.zeros(many), 1.0))
-            size = np.inf if tangent is None else float(np.linalg.norm(tangent))
-            if tangent is not None and size * float(np.linalg.norm(towards)) < MAX_TANGENT_RATIO:
+            system = stack_row(slope, towards)
+            tangent = _solve_regular(system, append_number(np.zeros(many), 1.0))
+            size = np.inf if tangent is None else length_of(tangent)
+            if tangent is not None and size * length_of(towards) < MAX_TANGENT_RATIO:
                 tangent /= size
                 system[many] = tangent
-                bend = _solve_shortest(system, np.append(-self.second_derivative(y, tangent), 0.0))
+                bend = _solve_shortest(system, append_number(-self.second_derivative(y, tangent), 0.0))
                 return CurvePoint(y, tangent, bend, self._regular_distance(y, tangent, slope, least))
         u, s, vt = np.linalg.svd(slope)
         tangent = vt[many] if vt[many] @ towards >= 0.0 else -vt[many]
@@ -126,10 +129,10 @@ class ImplicitCurve:
         """The point of the curve near y in the plane through y with this normal; None where Newton finds none."""
 
         def step(slope: Array, left: Array) -> Array:
-            return _solve_shortest(np.vstack([slope, normal]), np.append(-left, 0.0))
+            return _solve_shortest(stack_row(slope, normal), append_number(-left, 0.0))
 
         y, gap = correct(self.residuals_and_jacobian, step, y, MAX_CORRECTIONS)
-        return y if gap <= CLOSED_TOLERANCE * max(1.0, float(np.max(np.abs(y)))) else None
+        return y if gap <= CLOSED_TOLERANCE * max(1.0, greatest_size(y)) else None
 
 
 class SolutionCurve(ImplicitCurve):
@@ -174,7 +177,7 @@ class SolutionCurve(ImplicitCurve):
 
     def is_closed(self, y: Array) -> bool:
         """Whether a point passes the residual check."""
-        return bool(self.solver.max_residuals(y[None, :-1], self.inputs(y)[None])[0] <= self.solver.tolerance)
+        return self.solver.max_residual(y[:-1], self.inputs(y)) <= self.solver.tolerance
 
     def _regular_distance(self, y: Array, tangent: Array, slope: Array, least: float) -> float:
         """How far along the curve J keeps its rank: until it has changed by its least singular value (Weyl).
@@ -207,7 +210,7 @@ def _solve_shortest(system: Array, known: Array) -> Array:
     """The shortest solution in the sense of least squares; straight away where the system is square and regular."""
     if system.shape[0] == system.shape[1]:
         found = _solve_regular(system, known)
-        if found is not None and np.max(np.abs(found), initial=0.0) < MAX_SOLVED_STEP:
+        if found is not None and greatest_size(found) < MAX_SOLVED_STEP:
             return found
     return np.linalg.lstsq(system, known, rcond=1e-14)[0]
 
@@ -250,10 +253,20 @@ class Arc(NamedTuple):
 
     def polynomial(self, x: float, order: int = 0) -> Array:
         """The polynomial, or a derivative of it (n + 1,), so far along the axis."""
-        powers, shape = np.arange(len(self.coefficients)), self.coefficients
+        shape = self.coefficients
+        if not order:
+            return ((x / self.unit_length) ** np.arange(len(shape))) @ shape
+        powers = np.arange(len(shape))
         for _ in range(order):
             shape, powers = shape[1:] * powers[1 : len(shape), None] / self.unit_length, powers[: len(shape) - 1]
         return ((x / self.unit_length) ** np.arange(len(shape))) @ shape
+
+    def input_position(self, x: float) -> float:
+        """How far the inputs are on their way so far along the axis, by the polynomial."""
+        part, found = x / self.unit_length, 0.0
+        for coefficient in reversed(self.coefficients[:, -1].tolist()):
+            found = found * part + coefficient
+        return found
 
     def curve_coordinates(self, curve: SolutionCurve, x: float) -> Array:
         """The point of the curve so far along the axis (n + 1,)."""
@@ -279,7 +292,7 @@ class Arc(NamedTuple):
 def arc_between(before: CurvePoint, after: CurvePoint) -> Arc:
     """The arc between two points: the polynomial of fifth degree with their tangents and second derivatives."""
     chord = after.y - before.y
-    length = float(np.linalg.norm(chord))
+    length = length_of(chord)
     axis = chord / length
     shape = fit_polynomial((before, after), axis, (0.0, 1.0), length)
     return Arc(before, after, before.y, axis, length, shape, 0)

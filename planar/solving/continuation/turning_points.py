@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from planar.foundation.arrays import Array
+from planar.foundation.arrays import Array, greatest_size
 from planar.foundation.root_finding import find_root, lowest_on_cubic
 from planar.solving.continuation.bifurcation import AT_BIFURCATION_DISTANCE
 from planar.solving.continuation.solution_curve import Arc, CurvePoint, SolutionCurve
@@ -23,9 +23,7 @@ def is_dead_point(point: CurvePoint) -> bool:
     rate alone does not tell: it is small as well where slides go far out for little of the inputs.
     """
     g, b = float(point.tangent[-1]), float(point.curvature[-1])
-    return (
-        g * g <= DEAD_POINT_TOLERANCE**2 * abs(b) or abs(g) * max(1.0, float(np.max(np.abs(point.y)))) < ZERO_INPUT_RATE
-    )
+    return g * g <= DEAD_POINT_TOLERANCE**2 * abs(b) or abs(g) * max(1.0, greatest_size(point.y)) < ZERO_INPUT_RATE
 
 
 def start_point(curve: SolutionCurve, y: Array, branches: list[int]) -> CurvePoint:

@@ -10,9 +10,11 @@ class UndoHistory {
     this.stood = page.snapshot();
     this.undoButton = this.button(bar, "Undo", "Control+Z", () => this.undo());
     this.redoButton = this.button(bar, "Redo", "Control+Shift+Z Control+Y", () => this.redo());
-    for (const event of ["pointerdown", "click", "change"]) document.addEventListener(event, () => this.begin(), true);
+    // what plays on while a button of these is pressed belongs to the step that it takes back
+    const own = ({ target }) => target === this.undoButton || target === this.redoButton;
+    for (const name of ["pointerdown", "click", "change"]) document.addEventListener(name, (event) => { if (!own(event)) this.begin(); }, true);
     document.addEventListener("keydown", (event) => {
-      if (!event.repeat) this.begin();
+      if (!event.repeat && !own(event)) this.begin();
       if (event.key === "Enter") this.changed.delete(event.target);
     }, true);
     document.addEventListener("keydown", (event) => this.key(event));
