@@ -57,6 +57,7 @@ def test_metric_files_show_si_but_for_lengths_and_angles() -> None:
             "length": length,
             "angle": "deg",
             "area": f"{length}²",
+            "stress": "MPa",
         }
 
 
