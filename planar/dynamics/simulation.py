@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from numbers import Real
 from typing import Any
 
@@ -11,9 +11,9 @@ import numpy as np
 
 from planar.document.first_argument import takes_mechanism
 from planar.dynamics.equations_of_motion import FULL_RANK_REGULARITY, EquationsOfMotion
-from planar.dynamics.friction.remarks import frictionless_remarks
 from planar.dynamics.imbalance import explain_loose_links
 from planar.dynamics.in_time.contact_phases import ContactEvent, make_phases
+from planar.dynamics.in_time.friction_record import FrictionEvent, RubbingPair
 from planar.dynamics.in_time.simulated_motion import simulated_motion
 from planar.dynamics.in_time.stop_contacts import Impact
 from planar.dynamics.lagrangian import lagrangian_functions
@@ -52,8 +52,9 @@ class Simulation:
     """A motion in time, and its energies at every row (n,), J.
 
     `work` is what loads, dampers and driven inputs have put in since the start, and `lost` what impacts on stops have
-    taken, so that kinetic + potential - work + lost stays what it was: `balance` is how far it does not, of the
-    greatest of these. `impacts` are those on stops, in their order.
+    taken, and `heat` what friction has, so that kinetic + potential - work + lost + heat stays what it was: `balance`
+    is how far it does not, of the greatest of these. `impacts` are those on stops, in their order. `rubbing` has by
+    pair what sticks and slips at every row, with its own heat, and `friction_events` when that changed.
     """
 
     motion: Motion
@@ -63,8 +64,15 @@ class Simulation:
     lost: Array
     driven: tuple[str, ...]
     impacts: tuple[Impact, ...] = ()
+    rubbing: Mapping[str, RubbingPair] = field(default_factory=dict)
+    friction_events: tuple[FrictionEvent, ...] = ()
 
     __repr__ = short_repr
+
+    @property
+    def heat(self) -> Array:
+        """What friction has taken since the start, at every row (n,), J."""
+        return sum((each.heat for each in self.rubbing.values()), np.zeros(len(self.kinetic)))
 
     @property
     def balance(self) -> float:
@@ -72,9 +80,10 @@ class Simulation:
 
         Where nothing goes to and fro, beside the greatest of the energies.
         """
-        whole = self.kinetic + self.potential - self.work + self.lost
-        swing = max(float(np.ptp(each)) for each in (self.kinetic, self.potential, self.work, self.lost))
-        most = max(float(np.abs(each).max()) for each in (self.kinetic, self.potential, self.work, self.lost))
+        parts = (self.kinetic, self.potential, self.work, self.lost, self.heat)
+        whole = self.kinetic + self.potential - self.work + self.lost + self.heat
+        swing = max(float(np.ptp(each)) for each in parts)
+        most = max(float(np.abs(each).max()) for each in parts)
         beside = swing if swing > CONSTANT_ENERGY_TOLERANCE * most else most
         return float(np.ptp(whole)) / beside if beside else 0.0
 
@@ -155,7 +164,7 @@ class _SimulationRun:
         self.phases = make_phases(self.work, self.driven, unit, self.work.initial_spring_turns(q), q)
         self.coordinate_count = len(q)
         q, q1 = self.equations.project(0.0, q, q1)
-        self.initial_state = np.concatenate([q, q1, [0.0]])
+        self.initial_state = np.concatenate([q, q1, np.zeros(1 + len(self.phases.record.pairs))])
         self.is_firm = False
         "whether constraints are far from a change point"
         self.time = np.linspace(0.0, duration, steps + 1)
@@ -172,12 +181,13 @@ class _SimulationRun:
         q2 = np.array([self._accelerations(*each) for each in zip(time, q, q1, strict=True)])
         base = self.phases.base
         energies = np.array([base.energies(*each) for each in zip(time, q, q1, strict=True)])
-        made = simulated_motion(
-            self.work, self.start, time, (q, q1, q2), (*self._freedom_remark(), *frictionless_remarks(self.mechanism))
-        )
+        made = simulated_motion(self.work, self.start, time, (q, q1, q2), tuple(self._freedom_remark()))
         motion, lost = replace(made, outcome=outcome, reason=reason), self.phases.lost_at(time)
-        impacts = tuple(self.phases.impacts)
-        return Simulation(motion, energies[:, 0], energies[:, 1], rows[:, -1], lost, self.driven, impacts)
+        work, heats = rows[:, 2 * self.coordinate_count], rows[:, 2 * self.coordinate_count + 1 :]
+        record = self.phases.record
+        rubbing, events = record.rubbing(time, heats) if record.pairs else {}, tuple(record.events)
+        told = motion, energies[:, 0], energies[:, 1], work, lost, self.driven
+        return Simulation(*told, tuple(self.phases.impacts), rubbing, events)
 
     def _freedom_remark(self) -> Iterator[str]:
         """That nothing moves freely, where that is so."""
@@ -317,24 +327,25 @@ class _SimulationRun:
 
     def _relative_change(self, y: Array, back: Array) -> float:
         """How far coordinates and rates are moved, of sizes and turns and of the rates."""
-        scale = np.concatenate(
-            [self.equations.scale, np.maximum(np.abs(y[self.coordinate_count : -1]), self.equations.scale)]
-        )
-        return float(np.abs((back - y)[:-1] / scale).max(initial=0.0))
+        q1 = self._split_state(y)[1]
+        scale = np.concatenate([self.equations.scale, np.maximum(np.abs(q1), self.equations.scale)])
+        return float(np.abs((back - y)[: len(scale)] / scale).max(initial=0.0))
 
     def _integrator(self, time: float, y: Array, step: float | None = None) -> Any:
         from scipy.integrate import DOP853  # slow to load, and only needed here
 
         last, n = float(self.time[-1]), self.coordinate_count
-        scales = np.concatenate([self.equations.scale, self.equations.scale / last, [1.0]])
+        scales = np.concatenate([self.equations.scale, self.equations.scale / last, np.ones(len(y) - 2 * n)])
         fastest = max(float(np.abs(self.initial_state[n : 2 * n] / self.equations.scale).max(initial=0.0)) * last, 1.0)
         scales[n : 2 * n] *= fastest
-        scales[-1] = max(
+        scales[2 * n :] = max(
             float(np.abs(self.equations.energies(0.0, *self._split_state(self.initial_state))).max()), 1e-9
         )
         first = None if step is None or time >= last else min(step, last - time)
-        tolerances = {"rtol": RELATIVE_TOLERANCE, "atol": RELATIVE_TOLERANCE * scales}
-        return DOP853(self._state_rate, time, y, last, first_step=first, **tolerances)
+        options = {"rtol": RELATIVE_TOLERANCE, "atol": RELATIVE_TOLERANCE * scales}
+        if self.phases.is_sticking:  # what is released between two steps and caught again is not seen
+            options["max_step"] = self.time[1]
+        return DOP853(self._state_rate, time, y, last, first_step=first, **options)
 
     def _explain_failure(self, time: float, y: Array) -> str:
         loose = explain_loose_links(self.mechanism)
@@ -382,7 +393,7 @@ class _SimulationRun:
         )
 
     def _split_state(self, y: Array) -> tuple[Array, Array]:
-        return y[: self.coordinate_count], y[self.coordinate_count : -1]
+        return y[: self.coordinate_count], y[self.coordinate_count : 2 * self.coordinate_count]
 
     def _state_rate(self, time: float, y: Array) -> Array:
         q, q1 = self._split_state(y)
@@ -390,8 +401,9 @@ class _SimulationRun:
         found = way(time, q, q1)
         if not np.all(np.isfinite(found.q2)):
             raise FloatingPointError  # with no number the integrator would never end
-        return np.concatenate([q1, found.q2, [found.power]])
+        heat = found.heat if found.heat.size else np.zeros(len(y) - 2 * len(q) - 1)
+        return np.concatenate([q1, found.q2, [found.power], heat])
 
     def _project(self, time: float, y: Array) -> Array:
         """The nearest position and rates that the constraints allow."""
-        return np.concatenate([*self.equations.project(time, *self._split_state(y)), y[-1:]])
+        return np.concatenate([*self.equations.project(time, *self._split_state(y)), y[2 * self.coordinate_count :]])
