@@ -185,7 +185,7 @@ class _SimulationRun:
         motion, lost = replace(made, outcome=outcome, reason=reason), self.phases.lost_at(time)
         work, heats = rows[:, 2 * self.coordinate_count], rows[:, 2 * self.coordinate_count + 1 :]
         record = self.phases.record
-        rubbing, events = record.rubbing(time, heats) if record.pairs else {}, tuple(record.events)
+        rubbing, events = record.rubbing(time, heats), tuple(record.events)
         told = motion, energies[:, 0], energies[:, 1], work, lost, self.driven
         return Simulation(*told, tuple(self.phases.impacts), rubbing, events)
 
@@ -207,6 +207,8 @@ class _SimulationRun:
 
     def _accelerations(self, time: float, q: Array, q1: Array) -> Array:
         """Those of a row; not a number where nothing tells them."""
+        if not self.phases.is_begun:
+            return np.full(self.coordinate_count, np.nan)
         equations = self.phases.equations_at(time)
         equations.pieces = None
         try:
@@ -217,6 +219,7 @@ class _SimulationRun:
 
     def _integrate(self, tick: ProgressCallback | None) -> tuple[Array, Outcome, str]:
         """The rows at all times that were reached, and why not all of them were."""
+        self.phases.base.accelerations_at(0.0, *self._split_state(self.initial_state))
         try:
             self.initial_state = self.phases.respond(0.0, self.initial_state)
         except NoAnswer as driven_on:

@@ -62,8 +62,9 @@ class ContactDynamics(NamedTuple):
 def contact_dynamics(
     functions: ContactFunctions, values: ContactValues, motion: ConstrainedMotion, senses: Array, at_rest: BoolArray
 ) -> ContactDynamics:
-    """The equations at senses of the rubbing pairs' rates (pairs,), 0 where one does not rub, some with the coefficients
-    at rest (pairs,)."""
+    """The equations at senses of the rubbing pairs' rates (pairs,), 0 where one does not rub.
+
+    `at_rest` (pairs,): which have the coefficients of rest."""
     index = [functions.pairs.index(name) if rubs else -1 for name, rubs in _contacts_of(functions)]
     sense = np.array([1.0 if k < 0 else senses[k] for k in index])
     still = np.array([k >= 0 and bool(at_rest[k]) for k in index], dtype=bool)

@@ -1,4 +1,4 @@
-"""The phases of a simulation between its events: which pairs rest on stops, stick and slip, and the equations of each."""
+"""The phases of a simulation between its events: which pairs rest on stops, stick and slip, and their equations."""
 
 from __future__ import annotations
 
@@ -58,6 +58,11 @@ class ContactPhases:
         self.stick_slip = None if functions is None else StickSlip(functions, self._cached, unit)
         self.rubbing: StickSlipPhase | None = None
         self.record = FrictionRecord(functions)
+
+    @property
+    def is_begun(self) -> bool:
+        """Whether a phase was found to begin with."""
+        return self.stick_slip is None or self.rubbing is not None
 
     @property
     def is_sticking(self) -> bool:

@@ -72,6 +72,8 @@ class FrictionRecord:
 
     def rubbing(self, times: Array, heats: Array) -> dict[str, RubbingPair]:
         """Every pair at times (n,), with heats (n, pairs); where two phases meet as in the one before."""
+        if not self._entries:
+            return {}
         begun = np.array([each.time for each in self._entries])
         at = np.maximum(np.searchsorted(begun, times, side="left") - 1, 0)
         if begun.size:  # of those that begin at the start at once the last

@@ -340,7 +340,7 @@ class StickSlip:
     def _new_leads(
         self, phase: StickSlipPhase, ends: tuple[float, float], state: Callable[[float], tuple[Array, Array]]
     ) -> Iterator[FrictionBreak]:
-        """Where another part of a contact gets greater than the leading one, as where a guide bears on its other side."""
+        """Where another part of a contact leads from then on, as where a guide bears on its other side."""
         friction = phase.equations.friction
         assert friction is not None
         none = np.zeros(len(phase.state.senses), dtype=bool)
