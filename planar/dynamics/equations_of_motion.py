@@ -259,6 +259,11 @@ class EquationsOfMotion:
         _, s, v = np.linalg.svd(slope.T * self.scale)
         return np.asarray(v[self._constraint_rank(s) :].T * self.scale[:, None])
 
+    def stays_at_rest(self, time: float, q: Array, q1: Array) -> bool:
+        """Whether nothing can move, nor anything that acts change with the time."""
+        changes = self.driven.index or any(course.input is None for _, course, _ in self.varying)
+        return not changes and not self.free_directions(time, q, q1).size
+
     def energies(self, time: float, q: Array, q1: Array) -> Array:
         """Kinetic energy, and potential of weights and springs (2,), J."""
         return self._evaluate(time, q, q1)[-1][0]

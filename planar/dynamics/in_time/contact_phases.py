@@ -66,8 +66,8 @@ class ContactPhases:
 
     @property
     def is_sticking(self) -> bool:
-        """Whether friction holds a pair."""
-        return self.rubbing is not None and bool(self.rubbing.state.sticks.any())
+        """Whether friction holds a pair that it may yet release."""
+        return self.rubbing is not None and bool(self.rubbing.releases)
 
     def split(self, y: Array) -> tuple[Array, Array]:
         """Coordinates and rates."""

@@ -23,7 +23,7 @@ from planar.dynamics.friction.contact_functions import ContactFunctions, Contact
 from planar.dynamics.in_time.sign_patterns import Signs, cocircuits, sign_patterns
 from planar.dynamics.in_time.stop_contacts import StopSide
 from planar.dynamics.load_variation import CoursePiece
-from planar.foundation.arrays import Array, BoolArray
+from planar.foundation.arrays import Array, BoolArray, IntArray
 from planar.foundation.errors import NoAnswer, Outcome
 from planar.foundation.root_finding import find_first_passage, find_root
 from planar.foundation.short_repr import short_repr
@@ -137,6 +137,8 @@ class StickSlip:
         if event is not None and event.lead is not None:
             contacts.lead_by(*event.lead)
         equations = chosen.equations
+        if equations.stays_at_rest(time, *y):
+            releases = ()
         equations.friction = SlidingFriction(self.functions, chosen.senses, contacts)
         state = RubbingState(chosen.senses, chosen.sticks)
         return StickSlipPhase(equations, sides, state, values.positions, releases, standing.least)
@@ -345,19 +347,25 @@ class StickSlip:
         assert friction is not None
         none = np.zeros(len(phase.state.senses), dtype=bool)
 
-        def leads(time: float) -> tuple[Array, Array]:
+        def leads(time: float) -> tuple[Array, IntArray]:
             dynamics = phase.equations.contact_dynamics(self.functions, time, *state(time), friction.senses, none)
             y = friction.contacts.solve(dynamics.system)
             if y is None:
-                return np.full(len(self.functions.contact_pairs), np.nan), np.zeros(0)
+                many = len(self.functions.contact_pairs)
+                return np.full(many, np.nan), np.zeros(many, dtype=int)
             return friction.contacts.leads(dynamics.system, y)
 
         dynamics = phase.equations.contact_dynamics(self.functions, ends[1], *state(ends[1]), friction.senses, none)
-        gaps, others = leads(ends[1])
+        gaps = leads(ends[1])[0]
         passed = np.flatnonzero(gaps < -SIDE_TOLERANCE)
         for k in passed:
-            at = find_root(lambda time, k=k: float(leads(time)[0][k]), ends[0], ends[1])
-            yield FrictionBreak(at, lead=(int(k), int(others[k])))
+
+            def gap(time: float, k: int = int(k)) -> float:
+                found = float(leads(time)[0][k])
+                return max(found, SIDE_TOLERANCE) if time == ends[0] else found  # there rounding tells no sign
+
+            at = find_root(gap, ends[0], ends[1])
+            yield FrictionBreak(at, lead=(int(k), int(leads(at)[1][k])))
         if not passed.size and not is_single(dynamics.system):
             self._refuse_several(solve_all(dynamics.system))
 
