@@ -47,6 +47,7 @@ if TYPE_CHECKING:
     from planar.dynamics.flywheel import Flywheel, flywheel
     from planar.dynamics.forces import Forces, PairFriction, forces
     from planar.dynamics.friction.holding import Holding, holding
+    from planar.dynamics.in_time.friction_record import FrictionEvent, RubbingPair
     from planar.dynamics.in_time.stop_contacts import Impact
     from planar.dynamics.reactions import Reaction
     from planar.dynamics.simulation import Simulation, simulate
@@ -121,6 +122,7 @@ _ROOMS = {
     "Flywheel": "dynamics.flywheel",
     "Forces": "dynamics.forces",
     "Friction": "model.pairs.rubbing",
+    "FrictionEvent": "dynamics.in_time.friction_record",
     "GearPair": "model.pairs.gear",
     "HarmonicRise": "model.input_laws.cam_rises",
     "Harmonics": "analysis.motion.harmonics",
@@ -164,6 +166,7 @@ _ROOMS = {
     "Reaction": "dynamics.reactions",
     "ReducedSweep": "batch.reductions.reduced_sweep",
     "RelativeState": "results.records",
+    "RubbingPair": "dynamics.in_time.friction_record",
     "Simulation": "dynamics.simulation",
     "SlidingPair": "model.pairs.sliding",
     "SlotPair": "model.pairs.slot",
@@ -269,6 +272,7 @@ __all__ = [
     "Flywheel",
     "Forces",
     "Friction",
+    "FrictionEvent",
     "GearPair",
     "HarmonicRise",
     "Harmonics",
@@ -312,6 +316,7 @@ __all__ = [
     "Reaction",
     "ReducedSweep",
     "RelativeState",
+    "RubbingPair",
     "Simulation",
     "SlidingPair",
     "SlotPair",

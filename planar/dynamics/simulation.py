@@ -12,6 +12,7 @@ import numpy as np
 from planar.document.first_argument import takes_mechanism
 from planar.dynamics.equations_of_motion import FULL_RANK_REGULARITY, EquationsOfMotion
 from planar.dynamics.imbalance import explain_loose_links
+from planar.dynamics.friction.determined_friction import check_determined_friction
 from planar.dynamics.in_time.contact_phases import ContactEvent, make_phases
 from planar.dynamics.in_time.friction_record import FrictionEvent, RubbingPair
 from planar.dynamics.in_time.simulated_motion import simulated_motion
@@ -158,6 +159,7 @@ class _SimulationRun:
 
     def __init__(self, start: State, kept: Sequence[str], duration: float, steps: int):
         self.start, self.mechanism, self.driven = start, start.mechanism, tuple(kept)
+        check_determined_friction(start)
         self.work = lagrangian_functions(self.mechanism)
         q, q1, _ = (each[0] for each in self.work.coordinates(start))
         unit = mechanism_size(self.mechanism, self.work.shapes)

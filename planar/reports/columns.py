@@ -15,7 +15,7 @@ POINT_KINDS = {"position": "length", "velocity": "velocity", "acceleration": "ac
 _VECTOR_LETTERS = {"position": "", "velocity": "v", "acceleration": "a", "jerk": "j", "force": "F"}
 
 
-_GROUP_PREFIXES = {"inputs": "input ", "pairs": "pair ", "reactions": "reaction "}
+_GROUP_PREFIXES = {"inputs": "input ", "pairs": "pair ", "reactions": "reaction ", "rubbing": "rubbing "}
 
 
 class ReportedSeries(NamedTuple):

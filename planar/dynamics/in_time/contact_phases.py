@@ -174,6 +174,8 @@ class ContactPhases:
         if event is not None and event.lifts_off:
             at = tuple(side for side in at if side != event.side)
         change = None if event is None else event.friction
+        if change is not None:  # what turns back near a stop does not rest on it
+            at = tuple(side for side in at if side in self.resting)
         refused: NoAnswer | None = None
         for sides in chain.from_iterable(combinations(at, size) for size in range(len(at) + 1)):
             try:
