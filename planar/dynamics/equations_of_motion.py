@@ -296,7 +296,7 @@ class EquationsOfMotion:
     ) -> ConstrainedMotion:
         slope, wanted, mass = rows
         at = [functions.effort_pairs.index(name) for name in self.driven.held_pairs]
-        push = values.push
+        push: Array = values.push
         for k, motor in self.driven.motors:
             number = functions.effort_pairs.index(self.work.mechanism.inputs[k].pair)
             way = values.efforts[:, number]
@@ -317,10 +317,9 @@ class EquationsOfMotion:
         y = friction.contacts.solve(found.system)
         if y is None:
             return np.full(len(q), np.nan), np.full(len(friction.senses), np.nan)
-        heat = np.zeros(len(friction.senses))
-        for k, name in enumerate(friction.functions.contact_pairs):
-            if friction.functions.is_friction[k]:
-                heat[friction.functions.pairs.index(name)] -= float(found.actions[:, k] @ q1) * y[k]
+        heat: Array = np.zeros(len(friction.senses))
+        rubs = friction.functions.is_friction
+        np.subtract.at(heat, friction.functions.pair_index[rubs], (q1 @ found.actions * y)[rubs])
         return found.actions @ y, heat
 
     def _residuals_and_jacobian(self, q: Array, at: Array) -> tuple[Array, Array]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from numbers import Real
 from typing import Any
@@ -11,9 +11,10 @@ import numpy as np
 
 from planar.document.first_argument import takes_mechanism
 from planar.dynamics.equations_of_motion import FULL_RANK_REGULARITY, EquationsOfMotion
-from planar.dynamics.imbalance import explain_loose_links
 from planar.dynamics.friction.determined_friction import check_determined_friction
+from planar.dynamics.imbalance import explain_loose_links
 from planar.dynamics.in_time.contact_phases import ContactEvent, make_phases
+from planar.dynamics.in_time.freedom_remark import freedom_remarks
 from planar.dynamics.in_time.friction_record import FrictionEvent, RubbingPair
 from planar.dynamics.in_time.simulated_motion import simulated_motion
 from planar.dynamics.in_time.stop_contacts import Impact
@@ -26,7 +27,7 @@ from planar.foundation.errors import BadInput, NoAnswer, Outcome
 from planar.foundation.short_repr import short_repr
 from planar.model.mechanism import Input, Mechanism
 from planar.model.run_arguments import check_steps
-from planar.model.wording import join_all_names, quote_names
+from planar.model.wording import join_all_names
 from planar.results.motion import Motion, State
 from planar.solving.position import solve
 
@@ -183,29 +184,13 @@ class _SimulationRun:
         q2 = np.array([self._accelerations(*each) for each in zip(time, q, q1, strict=True)])
         base = self.phases.base
         energies = np.array([base.energies(*each) for each in zip(time, q, q1, strict=True)])
-        made = simulated_motion(self.work, self.start, time, (q, q1, q2), tuple(self._freedom_remark()))
+        is_held = base.rank == self.coordinate_count
+        remarks = freedom_remarks(self.mechanism, self.driven) if is_held else ()
+        made = simulated_motion(self.work, self.start, time, (q, q1, q2), tuple(remarks))
         motion, lost = replace(made, outcome=outcome, reason=reason), self.phases.lost_at(time)
         work, heats = rows[:, 2 * self.coordinate_count], rows[:, 2 * self.coordinate_count + 1 :]
-        record = self.phases.record
-        rubbing, events = record.rubbing(time, heats), tuple(record.events)
-        told = motion, energies[:, 0], energies[:, 1], work, lost, self.driven
-        return Simulation(*told, tuple(self.phases.impacts), rubbing, events)
-
-    def _freedom_remark(self) -> Iterator[str]:
-        """That nothing moves freely, where that is so."""
-        if self.phases.base.rank != self.coordinate_count:
-            return
-        if not self.driven:
-            yield "nothing can move: the pairs hold every link"
-            return
-        by_law = [given.pair for given in self.mechanism.inputs if given.law is not None]
-        options = [f"--drive {name}" for name in self.driven if name not in by_law]
-        ways = [f"leave out {' or '.join(options)}"] if options else []
-        ways += [f"take the law of {quote_names(by_law)} out of the file"] if by_law else []
-        yield (
-            f"nothing moves freely: the driven inputs at {quote_names(self.driven)} determine the whole motion, and "
-            f"loads, weights and springs only what these supply; to let it go {', or '.join(ways)}"
-        )
+        told = motion, energies[:, 0], energies[:, 1], work, lost, self.driven, tuple(self.phases.impacts)
+        return Simulation(*told, self.phases.record.rubbing(time, heats), tuple(self.phases.record.events))
 
     def _accelerations(self, time: float, q: Array, q1: Array) -> Array:
         """Those of a row; not a number where nothing tells them."""

@@ -65,10 +65,9 @@ def contact_dynamics(
     """The equations at senses of the rubbing pairs' rates (pairs,), 0 where one does not rub.
 
     `at_rest` (pairs,): which have the coefficients of rest."""
-    index = [functions.pairs.index(name) if rubs else -1 for name, rubs in _contacts_of(functions)]
-    sense = np.array([1.0 if k < 0 else senses[k] for k in index])
-    still = np.array([k >= 0 and bool(at_rest[k]) for k in index], dtype=bool)
-    rubs = np.array([k >= 0 for k in index], dtype=bool)
+    index, rubs = functions.pair_index, functions.is_friction
+    sense = np.where(rubs, senses[index], 1.0)
+    still = rubs & at_rest[index]
     actions = values.actions * np.where(rubs, -sense * values.rate_senses, 1.0)
     rows = np.arange(len(index))
     parts = values.parts[still.astype(int), (sense < 0.0).astype(int), rows] * (sense != 0.0)[:, None, None]
@@ -94,10 +93,6 @@ def contact_dynamics(
     return ContactDynamics(rates[:, 0], rates[:, 1:], efforts[:, 0], efforts[:, 1:], actions, system)
 
 
-def _contacts_of(functions: ContactFunctions) -> list[tuple[str, bool]]:
-    return list(zip(functions.contact_pairs, functions.is_friction.tolist(), strict=True))
-
-
 def _solve(whole: Array, right: Array, is_firm: bool) -> Array:
     if is_firm and whole.shape[0] == whole.shape[1]:
         try:
@@ -107,19 +102,19 @@ def _solve(whole: Array, right: Array, is_firm: bool) -> Array:
     return np.linalg.lstsq(whole, right, rcond=SINGULAR_TOLERANCE)[0]
 
 
-class ContactSolutionCount(NamedTuple):
+class CountedContacts(NamedTuple):
     """The solution y (m,) that goes over into that without friction, how many there are, and how far coefficients can
     grow on the way from none."""
 
     y: Array
-    count: int
+    solution_count: int
     part: float
 
 
-def solve_all(system: ContactSystem) -> ContactSolutionCount:
+def solve_all(system: ContactSystem) -> CountedContacts:
     """The contacts at the one position of a system, all solutions counted."""
     found = solve_contacts(system)
-    return ContactSolutionCount(found.first[0], int(found.solution_count[0]), float(found.part[0]))
+    return CountedContacts(found.first[0], int(found.solution_count[0]), float(found.part[0]))
 
 
 def is_single(system: ContactSystem) -> bool:
@@ -145,13 +140,15 @@ class HeldContacts:
         """The solution near the last one (m,); None where there is none."""
         held = self._held_system(system)
         y = self.y[None]
+        is_linear = not system.is_resultant.any()
         for _ in range(MAX_NEWTON_STEPS):
-            y = held.newton_step(y)[0]
-            if not np.isfinite(y).all():
+            y, before = held.newton_step(y)[0], y
+            size = float(np.abs(y).max(initial=0.0))
+            if not np.isfinite(size):
                 return None
-            if held.errors(y)[0] < SOLVED_TOLERANCE:
+            if is_linear or float(np.abs(y - before).max(initial=0.0)) <= SOLVED_TOLERANCE * size:
                 self.y = y[0]
-                return y[0]
+                return self.y
         return None
 
     def leads(self, system: ContactSystem, y: Array) -> tuple[Array, IntArray]:

@@ -12,6 +12,7 @@ from typing import NamedTuple
 import casadi as ca
 import numpy as np
 
+from planar.dynamics.friction.contact_rows import side_words
 from planar.dynamics.lagrangian import LagrangianFunctions
 from planar.equations.casadi_call import BufferedFunction
 from planar.foundation.arrays import Array, BoolArray
@@ -70,11 +71,15 @@ class ContactFunctions:
         self.effort_pairs = effort_pairs(mechanism, self.pairs)
         apart = [each for each in self._teeth if found]
         self.contact_pairs = (*(pair.name for pair, *_ in found), *apart)
-        self.is_friction: BoolArray = np.arange(len(self.contact_pairs)) < len(found)
+        self.pair_index = np.array(
+            [self.pairs.index(name) if k < len(found) else -1 for k, name in enumerate(self.contact_pairs)], dtype=int
+        )
+        "of each contact: its pair among those that rub, -1 of teeth"
+        self.is_friction: BoolArray = self.pair_index >= 0
         laws = [each.law for _, each, _ in found] + [LoadLaw.GREATEST] * len(apart)
         self.is_resultant: BoolArray = np.array([law is LoadLaw.RESULTANT for law in laws], dtype=bool)
         self.is_signed: BoolArray = np.array([law is LoadLaw.SIGNED for law in laws], dtype=bool)
-        self.sides = tuple((_side_words(each, 1.0), _side_words(each, -1.0)) for _, each, _ in found)
+        self.sides = tuple((side_words(each, 1.0), side_words(each, -1.0)) for _, each, _ in found)
         self._called = BufferedFunction(self._function(found, apart))
 
     def evaluate(self, q: Array, q1: Array, factors: Array, wound: Array) -> ContactValues:
@@ -94,9 +99,9 @@ class ContactFunctions:
         q, q1, many = work.q, work.q1, work.q.numel()
         actions = [_effort_on_links(work, each.action) for _, each, _ in found]
         cases = []
-        for rest in (1, 2):
+        for rest in (0, 1):
             for sense in (1.0, -1.0):
-                rows = [self._parts(each[0], each[rest], sense) for each in found]
+                rows = [self._parts(each[0], (each[1], each[2])[rest], sense) for each in found]
                 cases.append(rows + [self._separation_parts(name) for name in apart])
         width = max((len(rows) for rows in cases[0]), default=1)
         count = sum(each.shape[1] for each in self._columns.values())
@@ -206,14 +211,3 @@ def _tooth_contacts(work: LagrangianFunctions, every: Sequence[Pair]) -> Mapping
 
 def _effort_on_links(work: LagrangianFunctions, way: EffortAction) -> ca.SX:
     return work.unit_action_on_links({way.link: 1.0, way.reaction_link: -1.0}, way.point, way.direction)
-
-
-def _side_words(rubbing: RubbingContact, sense: float) -> tuple[str, ...]:
-    """What each part of a contact says of its side, in the order of the parts."""
-    if rubbing.law is not LoadLaw.GREATEST:
-        return ("",) * len(rubbing.loads)
-    found: list[str] = []
-    for load in rubbing.loads:
-        is_turned = load.opposed is not None and sense < 0.0
-        found += reversed(load.sides) if is_turned else load.sides
-    return tuple(found)

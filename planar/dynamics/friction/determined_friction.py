@@ -23,5 +23,5 @@ def check_determined_friction(state: State) -> None:
         raise BadInput(
             "pairs",
             f"what friction at {quote_names(rows.rubbing_pairs)} follows is not determined, as links are held more "
-            "than once there; leave out what holds them twice, or the friction",
+            "than once, or only couples of wheels are known; leave out what holds them twice, or the friction",
         )

@@ -10,6 +10,7 @@ import numpy as np
 
 from planar.dynamics.equations_of_motion import EquationsOfMotion
 from planar.dynamics.friction.contact_functions import ContactFunctions
+from planar.dynamics.in_time.friction_breaks import FrictionBreaks
 from planar.dynamics.in_time.friction_record import FrictionRecord
 from planar.dynamics.in_time.stick_slip import FrictionBreak, StickSlip, StickSlipPhase
 from planar.dynamics.in_time.stop_contacts import Impact, StopContacts, StopSide
@@ -97,7 +98,7 @@ class ContactPhases:
         found: list[ContactEvent] = []
         if self.stick_slip is not None and self.rubbing is not None:
             self.stick_slip.note_speed(self.base, self.split(y1)[1])
-            change = self.stick_slip.first_break(self.rubbing, (first, last), state)
+            change = FrictionBreaks(self.stick_slip).first_break(self.rubbing, (first, last), state)
             found += [] if change is None else [ContactEvent(change.time, friction=change)]
         contacts = self.contacts
         if contacts is None:

@@ -1,4 +1,4 @@
-"""Which pairs stick and which slip, and in which sense, from a position with rates on: found, and followed to its end.
+"""Which pairs stick and which slip, and in which sense, from a position with rates on.
 
 Pairs that stand still stick while friction at rest can hold them: unless released in some sense, with as much friction
 as there can be, they would accelerate in it. Pairs whose rates are proportional stick and slip together.
@@ -6,7 +6,7 @@ as there can be, they would accelerate in it. Pairs whose rates are proportional
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -14,18 +14,16 @@ import numpy as np
 from planar.dynamics.equations_of_motion import EquationsOfMotion, SlidingFriction
 from planar.dynamics.friction.contact_dynamics import (
     ContactDynamics,
-    ContactSolutionCount,
+    CountedContacts,
     HeldContacts,
-    is_single,
     solve_all,
 )
 from planar.dynamics.friction.contact_functions import ContactFunctions, ContactValues
 from planar.dynamics.in_time.sign_patterns import Signs, cocircuits, sign_patterns
 from planar.dynamics.in_time.stop_contacts import StopSide
 from planar.dynamics.load_variation import CoursePiece
-from planar.foundation.arrays import Array, BoolArray, IntArray
+from planar.foundation.arrays import Array, BoolArray
 from planar.foundation.errors import NoAnswer, Outcome
-from planar.foundation.root_finding import find_first_passage, find_root
 from planar.foundation.short_repr import short_repr
 from planar.model.pairs import MeasureKind
 from planar.model.wording import quote_names
@@ -37,8 +35,6 @@ HELD_TOLERANCE = 1e-9
 PARALLEL_TOLERANCE = 1e-9
 ACCELERATION_TOLERANCE = 1e-10
 """Of the greatest acceleration without friction: less is none."""
-SIDE_TOLERANCE = 1e-12
-"""Of the greatest part of a contact: what another is above the leading one by less is not."""
 
 
 class RubbingState(NamedTuple):
@@ -99,7 +95,7 @@ class _Tried(NamedTuple):
     senses: Array
     sticks: BoolArray
     dynamics: ContactDynamics
-    solution: ContactSolutionCount
+    solution: CountedContacts
     second: Array
 
 
@@ -131,8 +127,8 @@ class StickSlip:
         standing = self._standing(base, values, time, y)
         release = event.release if event is not None else None
         chosen, releases = self._choose(time, y, sides, values, standing, release)
-        if chosen.solution.count > 1:
-            raise NoAnswer(Outcome.BRANCH_LOST, self._several_sentence(chosen.solution.count))
+        if chosen.solution.solution_count > 1:
+            raise NoAnswer(Outcome.BRANCH_LOST, self.several_sentence(chosen.solution.solution_count))
         contacts = HeldContacts(chosen.dynamics.system, chosen.solution.y)
         if event is not None and event.lead is not None:
             contacts.lead_by(*event.lead)
@@ -146,17 +142,6 @@ class StickSlip:
     def note_speed(self, equations: EquationsOfMotion, q1: Array) -> None:
         """Speeds that are reached tell what stands still."""
         self.fastest = max(self.fastest, float(np.abs(q1 / equations.scale).max(initial=0.0)))
-
-    def first_break(
-        self,
-        phase: StickSlipPhase,
-        ends: tuple[float, float],
-        state: Callable[[float], tuple[Array, Array]],
-    ) -> FrictionBreak | None:
-        """The first end of a phase between two times. Raises NoAnswer where contacts get several solutions."""
-        found = [*self._zero_rates(phase, ends, state), *self._new_leads(phase, ends, state)]
-        found += self._releases(phase, ends, state)
-        return min(found, key=lambda each: each.time, default=None)
 
     def side(self, phase: StickSlipPhase, name: str) -> str:
         """Where a pair bears, or which wheel drives, in words."""
@@ -231,7 +216,7 @@ class StickSlip:
                 Release(self._of_pairs(standing, each), self._representatives(standing, whole))
                 for each, whole in zip(releases, freed, strict=True)
             )
-        raise NoAnswer(Outcome.INPUT_JAMMED, self._jam_sentence(none))
+        raise NoAnswer(Outcome.INPUT_JAMMED, self.jam_sentence(none))
 
     def _possible_releases(self, standing: _Standing, signs: Signs) -> list[Signs]:
         """The ways in which what sticks can slip with one freedom more, of classes."""
@@ -287,16 +272,16 @@ class StickSlip:
         for k, members in enumerate(standing.classes):
             which = [pair for pair, _ in members]
             sticks[which], static[which] = not signs[k], k in at_rest
-        equations = self._equations(sides, self._representatives(standing, signs), values.positions)
+        equations = self.equations(sides, self._representatives(standing, signs), values.positions)
         dynamics = equations.contact_dynamics(self.functions, time, *y, senses, static)
         solution = solve_all(dynamics.system)
-        if not solution.count:
+        if not solution.solution_count:
             return None
         pushed = dynamics.accelerations + dynamics.changes @ solution.y
         second = (values.slopes @ pushed + values.bends) / self.units
         return _Tried(equations, senses, sticks, dynamics, solution, second)
 
-    def _equations(self, sides: tuple[StopSide, ...], sticking: tuple[str, ...], positions: Array) -> EquationsOfMotion:
+    def equations(self, sides: tuple[StopSide, ...], sticking: tuple[str, ...], positions: Array) -> EquationsOfMotion:
         """Those of pairs that stick at positions of all rubbing pairs (pairs,)."""
         found = self._make(sides, sticking).in_phase(positions[[self.functions.pairs.index(name) for name in sticking]])
         found.pieces = self._pieces
@@ -310,103 +295,14 @@ class StickSlip:
                 kept.append(k)
         return tuple(self.functions.pairs[standing.classes[k][0][0]] for k in kept)
 
-    def _zero_rates(
-        self, phase: StickSlipPhase, ends: tuple[float, float], state: Callable[[float], tuple[Array, Array]]
-    ) -> Iterator[FrictionBreak]:
-        """Where pairs that slip come to rest, and where such as stood still move."""
-
-        def motion(time: float) -> tuple[Array, Array]:
-            values = phase.equations.contact_values(self.functions, time, *state(time))
-            second = values.slopes @ phase.equations.accelerations_at(time, *state(time)).q2 + values.bends
-            by = self.units * self.fastest
-            return values.rates / by, second / by
-
-        first, last = motion(ends[0]), motion(ends[1])
-        for k, sense in enumerate(phase.state.senses):
-            if sense:
-                known = (sense * first[0][k], sense * first[1][k]), (sense * last[0][k], sense * last[1][k])
-                at = find_first_passage(
-                    lambda time, k=k, sense=sense: float(sense * motion(time)[0][k]),
-                    lambda time, k=k, sense=sense: float(sense * motion(time)[1][k]),
-                    ends,
-                    known,
-                )
-                if at is not None:
-                    yield FrictionBreak(at)
-            elif abs(last[0][k]) > 2.0 * STILL_TOLERANCE:
-                moved = find_root(
-                    lambda time, k=k: abs(float(motion(time)[0][k])) - 1.5 * STILL_TOLERANCE, ends[0], ends[1]
-                )
-                yield FrictionBreak(moved)
-
-    def _new_leads(
-        self, phase: StickSlipPhase, ends: tuple[float, float], state: Callable[[float], tuple[Array, Array]]
-    ) -> Iterator[FrictionBreak]:
-        """Where another part of a contact leads from then on, as where a guide bears on its other side."""
-        friction = phase.equations.friction
-        assert friction is not None
-        none = np.zeros(len(phase.state.senses), dtype=bool)
-
-        def leads(time: float) -> tuple[Array, IntArray]:
-            dynamics = phase.equations.contact_dynamics(self.functions, time, *state(time), friction.senses, none)
-            y = friction.contacts.solve(dynamics.system)
-            if y is None:
-                many = len(self.functions.contact_pairs)
-                return np.full(many, np.nan), np.zeros(many, dtype=int)
-            return friction.contacts.leads(dynamics.system, y)
-
-        dynamics = phase.equations.contact_dynamics(self.functions, ends[1], *state(ends[1]), friction.senses, none)
-        gaps = leads(ends[1])[0]
-        passed = np.flatnonzero(gaps < -SIDE_TOLERANCE)
-        for k in passed:
-
-            def gap(time: float, k: int = int(k)) -> float:
-                found = float(leads(time)[0][k])
-                return max(found, SIDE_TOLERANCE) if time == ends[0] else found  # there rounding tells no sign
-
-            at = find_root(gap, ends[0], ends[1])
-            yield FrictionBreak(at, lead=(int(k), int(leads(at)[1][k])))
-        if not passed.size and not is_single(dynamics.system):
-            self._refuse_several(solve_all(dynamics.system))
-
-    def _releases(
-        self, phase: StickSlipPhase, ends: tuple[float, float], state: Callable[[float], tuple[Array, Array]]
-    ) -> Iterator[FrictionBreak]:
-        """Where what sticks slips."""
-        for release in phase.releases:
-            if self._margin(phase, release, ends[1], state(ends[1])) > 0.0:
-                at = ends[0]
-                if self._margin(phase, release, at, state(at)) <= 0.0:
-                    at = find_root(lambda time, each=release: self._margin(phase, each, time, state(time)), *ends)
-                yield FrictionBreak(at, release.signs)
-
-    def _margin(self, phase: StickSlipPhase, release: Release, time: float, y: tuple[Array, Array]) -> float:
-        """By how much what sticks would accelerate if it slipped with friction at rest against it."""
-        signs = np.array(release.signs)
-        freed = self._equations(phase.sides, release.sticking, phase.positions)
-        freed.pieces = phase.equations.pieces
-        senses = np.where(signs != 0, signs, phase.state.senses).astype(float)
-        dynamics = freed.contact_dynamics(self.functions, time, *y, senses, signs != 0)
-        solution = solve_all(dynamics.system)
-        if not solution.count:
-            return -phase.least
-        values = freed.contact_values(self.functions, time, *y)
-        pushed = dynamics.accelerations + dynamics.changes @ solution.y
-        second = (values.slopes @ pushed + values.bends) / self.units
-        return float((signs * second)[signs != 0].min()) - phase.least
-
-    def _refuse_several(self, solution: ContactSolutionCount) -> None:
-        if solution.count > 1:
-            raise NoAnswer(Outcome.BRANCH_LOST, self._several_sentence(solution.count))
-        if not solution.count:
-            raise NoAnswer(Outcome.INPUT_JAMMED, self._jam_sentence(True))
-
-    def _several_sentence(self, count: int) -> str:
+    def several_sentence(self, count: int) -> str:
+        """That nothing tells which of several solutions is there."""
         return (
             f"with the friction at {quote_names(self.functions.pairs)} there are {count} solutions for the forces and "
             "accelerations, and nothing tells which is there; with less friction there is one"
         )
 
-    def _jam_sentence(self, no_forces: bool) -> str:
+    def jam_sentence(self, no_forces: bool) -> str:
+        """That no solution goes with the motion."""
         told = "no forces and accelerations" if no_forces else "no way to stick or slip"
         return f"with the friction at {quote_names(self.functions.pairs)} {told} agree with the motion: it jams"
