@@ -89,7 +89,7 @@ class HeldMotions:
         ]
         self.held_pairs = (*pairs, *self.sticking, *(each.pair for each in self.resting))
         self.count = len(self.held_pairs)
-        self.places = np.zeros(len(self.sticking))
+        self.places: Array = np.zeros(len(self.sticking))
         "where pairs stick"
 
     def motion_at(self, time: float) -> Array:

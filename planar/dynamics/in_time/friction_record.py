@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -40,6 +41,28 @@ class RubbingPair(NamedTuple):
 
     def __repr__(self) -> str:
         return short_repr(self)
+
+
+class SlipPhase(NamedTuple):
+    """A stretch of time (s) in which a pair slips in a sense (1, -1), or friction holds it."""
+
+    start: float
+    end: float
+    sense: int
+    sticks: bool
+
+    def __repr__(self) -> str:
+        return short_repr(self)
+
+
+def slip_phases(events: Sequence[FrictionEvent], pair: str, end: float) -> list[SlipPhase]:
+    """The phases of a pair up to an end (s), by what changed."""
+    own = [each for each in events if each.pair == pair]
+    ends = [each.time for each in own[1:]] + [end]
+    return [
+        SlipPhase(each.time, max(until, each.time), each.sense, each.change == "sticks")
+        for each, until in zip(own, ends, strict=True)
+    ]
 
 
 class _PhaseEntry(NamedTuple):

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from planar.dynamics.in_time.friction_record import FrictionEvent
+from planar.dynamics.in_time.friction_record import FrictionEvent, slip_phases
 from planar.dynamics.simulation import Simulation
 from planar.model.file_units import display_unit
 from planar.reports.columns import ReportedSeries
@@ -56,14 +56,9 @@ def phase_durations(simulation: Simulation, name: str) -> tuple[float, float]:
     """How long a pair slipped, and how long friction held it (s)."""
     motion = simulation.motion
     assert motion.time is not None
-    slips = sticks = 0.0
-    events = [each for each in simulation.friction_events if each.pair == name]
-    ends = [each.time for each in events[1:]] + [float(motion.time[-1])]
-    for each, end in zip(events, ends, strict=True):
-        length = max(end - each.time, 0.0)
-        slips += length * (each.sense != 0)
-        sticks += length * (each.change == "sticks")
-    return slips, sticks
+    phases = slip_phases(simulation.friction_events, name, float(motion.time[-1]))
+    lengths = [(each.end - each.start, each) for each in phases]
+    return sum(t for t, each in lengths if each.sense), sum(t for t, each in lengths if each.sticks)
 
 
 def friction_series(simulation: Simulation) -> Iterator[ReportedSeries]:
