@@ -32,8 +32,8 @@ class FrictionEvent(NamedTuple):
 
 
 class RubbingPair(NamedTuple):
-    """How a pair rubbed at every row of a simulation (n,): the sense of its rate (1, -1, 0 at rest), whether friction
-    held it there, and the heat since the start (J)."""
+    """How a pair rubbed at every row of a simulation (n,): the `sense` of its rate (1, -1, 0 at rest), where it `sticks`,
+    held by friction, and its `heat` since the start (J)."""
 
     sense: Array
     sticks: BoolArray
