@@ -32,8 +32,10 @@ class FrictionEvent(NamedTuple):
 
 
 class RubbingPair(NamedTuple):
-    """How a pair rubbed at every row of a simulation (n,): the `sense` of its rate (1, -1, 0 at rest), where it `sticks`,
-    held by friction, and its `heat` since the start (J)."""
+    """How a pair rubbed at every row of a simulation (n,).
+
+    The `sense` of its rate (1, -1, 0 at rest), where it `sticks`, held by friction, and its `heat` since the start (J).
+    """
 
     sense: Array
     sticks: BoolArray
