@@ -88,6 +88,10 @@ class RackPair(GuidedPair):
         **EFFICIENCY_SCHEMA,
     }
     required_keys: ClassVar[tuple[str, ...]] = ("links", "line", "point", "radius")
+    entry_rule: ClassVar[Schema] = {
+        "dependentRequired": {"friction": ["teeth"]},
+        "not": {"required": ["friction", "efficiency"]},
+    }
     open_contact_hint: ClassVar[str] = "the centre lies left of the line for a radius above zero, right for one below"
     is_lower_pair: ClassVar[bool] = False
     counts_turns: ClassVar[bool] = True
