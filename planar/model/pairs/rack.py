@@ -89,8 +89,10 @@ class RackPair(GuidedPair):
     }
     required_keys: ClassVar[tuple[str, ...]] = ("links", "line", "point", "radius")
     entry_rule: ClassVar[Schema] = {
-        "dependentRequired": {"friction": ["teeth"]},
-        "not": {"required": ["friction", "efficiency"]},
+        "anyOf": [
+            {"not": {"required": ["friction"]}},
+            {"required": ["teeth"], "not": {"required": ["efficiency"]}},
+        ]
     }
     open_contact_hint: ClassVar[str] = "the centre lies left of the line for a radius above zero, right for one below"
     is_lower_pair: ClassVar[bool] = False
