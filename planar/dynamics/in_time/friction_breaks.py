@@ -47,6 +47,10 @@ class FrictionBreaks:
             by = self.units * self.stick_slip.fastest
             return values.rates / by, second / by
 
+        if not phase.state.senses.any():
+            still = phase.equations.contact_values(self.functions, ends[1], *state(ends[1])).rates
+            if np.abs(still / self.units).max(initial=0.0) <= 2.0 * STILL_TOLERANCE * self.stick_slip.fastest:
+                return
         first, last = motion(ends[0]), motion(ends[1])
         for k, sense in enumerate(phase.state.senses.tolist()):
             if sense:
@@ -57,7 +61,7 @@ class FrictionBreaks:
 
                 at = find_first_passage(partial(along, order=0), partial(along, order=1), ends, known)
                 if at is not None:
-                    yield FrictionBreak(at)
+                    yield FrictionBreak(at, stopped=k)
             elif abs(last[0][k]) > 2.0 * STILL_TOLERANCE:
 
                 def moved(time: float, k: int = k) -> float:
@@ -71,6 +75,8 @@ class FrictionBreaks:
         """Where another part of a contact leads from then on, as where a guide bears on its other side."""
         friction = phase.equations.friction
         assert friction is not None
+        if not phase.state.senses.any() and self.functions.is_friction.all():
+            return  # nothing rubs, and no teeth press
         none = np.zeros(len(phase.state.senses), dtype=bool)
 
         def leads(time: float) -> tuple[Array, IntArray]:
@@ -108,7 +114,7 @@ class FrictionBreaks:
                         return self._margin(phase, release, time, state(time))
 
                     at = find_root(margin, *ends)
-                yield FrictionBreak(at, release.signs)
+                yield FrictionBreak(at, release=release.signs)
 
     def _margin(self, phase: StickSlipPhase, release: Release, time: float, y: tuple[Array, Array]) -> float:
         """By how much what sticks would accelerate if it slipped with friction at rest against it."""

@@ -56,9 +56,11 @@ class Release(NamedTuple):
 
 
 class FrictionBreak(NamedTuple):
-    """Where a phase ends (s): a pair comes to rest, a `release` (pairs,) slips from it, or a contact's part leads."""
+    """Where a phase ends (s): the pair of number `stopped` comes to rest, a `release` (pairs,) slips from it, or a
+    contact's part leads."""
 
     time: float
+    stopped: int | None = None
     release: Signs | None = None
     lead: tuple[int, int] | None = None
 
@@ -124,7 +126,7 @@ class StickSlip:
         base.pieces = self._pieces = base.course_pieces(base.course_places(time, *y))
         self.note_speed(base, y[1])
         values = base.contact_values(self.functions, time, *y)
-        standing = self._standing(base, values, time, y)
+        standing = self._standing(base, values, time, y, None if event is None else event.stopped)
         release = event.release if event is not None else None
         chosen, releases = self._choose(time, y, sides, values, standing, release)
         if chosen.solution.solution_count > 1:
@@ -153,11 +155,10 @@ class StickSlip:
         return ""
 
     def _standing(
-        self, base: EquationsOfMotion, values: ContactValues, time: float, y: tuple[Array, Array]
+        self, base: EquationsOfMotion, values: ContactValues, time: float, y: tuple[Array, Array], stopped: int | None
     ) -> _Standing:
         rates = values.rates / self.units
         moving = np.abs(rates) > STILL_TOLERANCE * self.fastest
-        senses = np.where(moving, np.sign(rates), 0.0)
         pushed = base.accelerations_at(time, *y).q2
         second = (values.slopes @ pushed + values.bends) / self.units
         most = max(float(np.abs(second).max(initial=0.0)), float(np.abs(pushed / base.scale).max(initial=0.0)))
@@ -165,6 +166,11 @@ class StickSlip:
         ways = base.free_directions(time, *y)
         rows = values.slopes @ ways / self.units[:, None]
         long = np.linalg.norm(rows, axis=1)
+        if stopped is not None:  # and what moves with it, as far as rounding tells
+            along = np.abs(rows @ rows[stopped]) >= (1.0 - PARALLEL_TOLERANCE) * long * long[stopped]
+            moving &= ~(along & (np.abs(rates) * long[stopped] <= 2.0 * np.abs(rates[stopped]) * long))
+            moving[stopped] = False
+        senses = np.where(moving, np.sign(rates), 0.0)
         classes: list[list[tuple[int, int]]] = []
         kept: list[Array] = []
         for k in np.flatnonzero(~moving):
