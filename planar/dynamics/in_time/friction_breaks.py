@@ -93,7 +93,7 @@ class FrictionBreaks:
         for k in passed:
 
             def gap(time: float, k: int = int(k)) -> float:
-                found = float(leads(time)[0][k])
+                found = float(leads(time)[0][k]) + SIDE_TOLERANCE
                 return max(found, SIDE_TOLERANCE) if time == ends[0] else found  # there rounding tells no sign
 
             at = find_root(gap, ends[0], ends[1])

@@ -30,6 +30,8 @@ from planar.model.wording import quote_names
 
 STILL_TOLERANCE, LEAST_SPEED = 1e-10, 1e-6
 """Of the greatest speed so far, or of so many rad or sizes a second: a pair with less stands still."""
+STOPPED_TOLERANCE = 1e-7
+"""Of the greatest speed so far: what moves with a pair that comes to rest, and has less, rests with it."""
 HELD_TOLERANCE = 1e-9
 """Of a free motion: a pair moved by less in it is held by others."""
 PARALLEL_TOLERANCE = 1e-9
@@ -168,7 +170,7 @@ class StickSlip:
         long = np.linalg.norm(rows, axis=1)
         if stopped is not None:  # and what moves with it, as far as rounding tells
             along = np.abs(rows @ rows[stopped]) >= (1.0 - PARALLEL_TOLERANCE) * long * long[stopped]
-            moving &= ~(along & (np.abs(rates) * long[stopped] <= 2.0 * np.abs(rates[stopped]) * long))
+            moving &= ~(along & (np.abs(rates) <= STOPPED_TOLERANCE * self.fastest))
             moving[stopped] = False
         senses = np.where(moving, np.sign(rates), 0.0)
         classes: list[list[tuple[int, int]]] = []
