@@ -51,6 +51,7 @@ if TYPE_CHECKING:
     from planar.dynamics.flywheel import Flywheel, flywheel
     from planar.dynamics.forces import Forces, PairFriction, forces
     from planar.dynamics.friction.holding import Holding, holding
+    from planar.dynamics.in_time.friction_record import FrictionEvent, RubbingPair
     from planar.dynamics.in_time.stop_contacts import Impact
     from planar.dynamics.reactions import Reaction
     from planar.dynamics.simulation import Simulation, simulate
@@ -135,6 +136,7 @@ __all__ = [
     "Flywheel",
     "Forces",
     "Friction",
+    "FrictionEvent",
     "GearPair",
     "GenevaPair",
     "HarmonicRise",
@@ -181,6 +183,7 @@ __all__ = [
     "Reaction",
     "ReducedSweep",
     "RelativeState",
+    "RubbingPair",
     "Simulation",
     "SlidingPair",
     "SlotPair",

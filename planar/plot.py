@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from planar.assemblies.modes import Modes
     from planar.drawing.polygons.panels import ScaleTexts
     from planar.dynamics.forces import Forces
+    from planar.dynamics.simulation import Simulation
     from planar.model.mechanism import Mechanism
     from planar.results.motion import Motion, State
 
@@ -225,9 +226,9 @@ def bearings(found: Forces | Motion | Mechanism, pairs: Sequence[str] | None = N
     return draw_on_sheets(bearing_pictures(found, pairs), f"{mechanism.name}: loads of the pairs")
 
 
-@takes_result("Motion", "Mechanism")
+@takes_result("Motion", "Simulation", "Mechanism")
 def diagrams(
-    motion: Motion | Mechanism, of: str | None = None, chords: int | None = None, width: float = 120.0
+    motion: Motion | Simulation | Mechanism, of: str | None = None, chords: int | None = None, width: float = 120.0
 ) -> Figure:
     """S-t, V-t and a-t diagrams of a slide, point or link over a motion in time, or a run at the input's steady speed.
 
@@ -235,6 +236,7 @@ def diagrams(
     that is farthest along. A slide on the frame is measured from its top dead centre, where the run starts. `width`
     is the length of the time axis in mm on paper; `chords` adds graphical differentiation over so many intervals
     (Machine Elements, 1.3.6 (iii)). Where the file gives no speed, rates are per radian (or metre) of the input.
+    Of a simulation the intervals are shaded in which friction holds the pair that is drawn, or else any.
     Raises BadInput for a name that is not there, NoAnswer where there is no motion.
     """
     from planar.drawing.diagrams.kinematic_diagrams import diagrams as drawn

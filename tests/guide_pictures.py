@@ -132,6 +132,7 @@ PICTURES: dict[str, Callable[[], object]] = {
     "positions": lambda: plot.positions(planar.cycle("whitworth")),
     "diagrams": lambda: plot.diagrams(planar.cycle("slider-crank")),
     "bodies": lambda: plot.forces(planar.forces(planar.solve("two-stroke-engine"))),
+    "forces/stick-slip": lambda: plot.diagrams(planar.simulate("stick-slip", 5.0), "block"),
     "forces/friction": lambda: plot.forces(planar.forces(planar.solve(thick_clamp()))),
     "circuits": lambda: plot.circuits(planar.circuits("watt-six-bar")),
     **{f"keys/{each.example}": partial(example_figure, each.example) for each in key_sections() if each.example},

@@ -224,7 +224,15 @@ def _forces_over_motion(
     help="An input that keeps to its law, or the file's velocity and acceleration, though it has a motor or no law.",
 )
 @click.option("--moving", is_flag=True, help="Start with the file's velocities, not from rest.")
+@click.option(
+    "--diagrams",
+    type=click.Path(dir_okay=False, path_type=Path),
+    metavar="FILE",
+    help="Draw displacement, velocity and acceleration over time, what friction holds shaded.",
+)
+@click.option("--of", metavar="NAME", help="With --diagrams: the slide, link, point or pair that is drawn.")
 @output_option("Write positions, velocities, accelerations and energies to a .csv, .json, .npz or .parquet file.")
+# many: options of the command
 def simulate(
     model: str,
     as_json: bool,
@@ -233,9 +241,11 @@ def simulate(
     mode: int | None,
     driven: tuple[str, ...],
     moving: bool,
+    diagrams: Path | None,
+    of: str | None,
     output: Path | None,
 ) -> None:
-    """The mechanism let go: its motion in time under loads, weights and springs."""
+    """The mechanism let go: its motion in time under loads, weights, springs and friction."""
     from planar.document import read_time
     from planar.dynamics.simulation import simulate as let_go
     from planar.reports.files.run_formats import check_writable
@@ -245,6 +255,9 @@ def simulate(
         raise BadInput("-o", ONE_DESTINATION)
     mechanism = load_model(model, mode)
     refuse_overwriting(model, output)
+    refuse_overwriting(model, diagrams)
+    if of is not None and diagrams is None:
+        raise BadInput("--of", "this says what diagrams are of; say where to with --diagrams")
     if output is not None:
         check_writable(output.suffix)
     with show_progress(mechanism.name) as progress:
@@ -253,4 +266,8 @@ def simulate(
             found = let_go(mechanism, read_time(duration, "--duration"), steps, driven, moving=moving, tick=tick)
         except BadInput as problem:
             raise (BadInput("--drive", problem.sentence) if problem.place == "driven" else problem) from None
+    if diagrams is not None:
+        from planar import plot as drawn
+
+        drawn.save(drawn.diagrams(found, of), diagrams)
     report_motion(found.motion, as_json, output, lambda: [tables(found)], energy_series(found), simulation_facts(found))

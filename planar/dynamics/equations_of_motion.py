@@ -10,15 +10,23 @@ so that constraints may hold twice (null space method; R. Featherstone, Rigid Bo
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
 
+from planar.dynamics.friction.contact_dynamics import (
+    ConstrainedMotion,
+    ContactDynamics,
+    HeldContacts,
+    contact_dynamics,
+)
+from planar.dynamics.friction.contact_functions import ContactFunctions, ContactValues
 from planar.dynamics.lagrangian import LagrangianFunctions
 from planar.dynamics.load_variation import CoursePiece, course_piece, load_factors
 from planar.equations.casadi_call import BufferedFunction
-from planar.foundation.arrays import Array
+from planar.foundation.arrays import Array, BoolArray
 from planar.foundation.errors import NoAnswer, Outcome
 from planar.model.wording import quote_names
 from planar.solving.runs.time_run import input_law_rates
@@ -43,20 +51,33 @@ class AccelerationResult(NamedTuple):
     """Accelerations of the coordinates, and the power (W) of what stores none: loads, dampers and driven inputs.
 
     `regularity` is the weakest constraint beside the strongest: nothing on a change point. `efforts` (held,) are what
-    driven inputs and stops on which pairs rest supply, in the positive sense of their motions (N, N m).
+    driven inputs, pairs that stick and stops on which pairs rest supply, in the positive sense of their motions (N,
+    N m), and `heat` (rubbing pairs,) what friction takes (W).
     """
 
     q2: Array
     power: float
     regularity: float
     efforts: Array = NO_EFFORTS
+    heat: Array = NO_EFFORTS
+
+
+class SlidingFriction(NamedTuple):
+    """How pairs rub in a phase of a motion: the senses of their rates (pairs,), 0 where one does not, and contacts."""
+
+    functions: ContactFunctions
+    senses: Array
+    contacts: HeldContacts
 
 
 class HeldMotions:
-    """The inputs that keep to their laws while the others are free, and the pairs that rest on stops."""
+    """The inputs that keep to their laws while the others are free, the pairs that stick, and those that rest on
+    stops."""
 
-    def __init__(self, work: LagrangianFunctions, pairs: Sequence[str], resting: Sequence[MetStop] = ()):
-        self.resting = tuple(resting)
+    def __init__(
+        self, work: LagrangianFunctions, pairs: Sequence[str], resting: Sequence[MetStop], sticking: Sequence[str]
+    ):
+        self.resting, self.sticking = tuple(resting), tuple(sticking)
         names = [given.pair for given in work.mechanism.inputs]
         self.index = [names.index(pair) for pair in pairs]
         self.inputs = [work.mechanism.inputs[k] for k in self.index]
@@ -66,13 +87,16 @@ class HeldMotions:
             for k, given in enumerate(work.mechanism.inputs)
             if given.motor is not None and given.pair not in pairs
         ]
-        self.count = len(self.index) + len(self.resting)
-        self._stops = [(each.position, 0.0, 0.0) for each in self.resting]
+        self.held_pairs = (*pairs, *self.sticking, *(each.pair for each in self.resting))
+        self.count = len(self.held_pairs)
+        self.places: Array = np.zeros(len(self.sticking))
+        "where pairs stick"
 
     def motion_at(self, time: float) -> Array:
         """Position, velocity and acceleration (3, held)."""
         driven = [input_law_rates(each, np.array([time]))[:3, 0] for each in self.inputs]
-        return np.array([*driven, *self._stops]).reshape(-1, 3).T
+        still = [(each, 0.0, 0.0) for each in (*self.places, *(stop.position for stop in self.resting))]
+        return np.array([*driven, *still]).reshape(-1, 3).T
 
 
 class EquationsOfMotion:
@@ -85,13 +109,15 @@ class EquationsOfMotion:
         unit: float,
         wound: Array,
         resting: Sequence[MetStop] = (),
+        sticking: Sequence[str] = (),
     ):
-        self.work, self.driven, self.spring_turns = work, HeldMotions(work, driven, resting), wound
+        self.work, self.driven, self.spring_turns = work, HeldMotions(work, driven, resting, sticking), wound
+        self.friction: SlidingFriction | None = None
         q, q1 = work.q, work.q1
         self.scale = np.full(q.numel(), unit)
         self.scale[2 : work.link_coordinate_count : 3] = 1.0  # angles
         held = [work.input_positions[k] for k in self.driven.index]
-        held += work.relative_positions(each.pair for each in resting)
+        held += work.relative_positions((*sticking, *(each.pair for each in resting)))
         rows = ca.vertcat(work.residuals, *held)
         slope = ca.jacobian(rows, q)
         loads, efforts = work.applied_forces
@@ -151,12 +177,14 @@ class EquationsOfMotion:
         wanted, held, many, index = -bend[0], slope.T * self.scale, len(q), self.driven.count
         if given is not None:
             wanted[-index:] += given[2]
+        rubbed = self._friction(time, q, q1, (slope.T, wanted, inertia.T))
         mass = inertia.T * self.scale * self.scale[:, None]
         size = float(np.abs(mass).max()) or 1.0
         whole = np.zeros((many + self.rank, many + self.rank))
         whole[:many, :many], whole[many:, :many], whole[:many, many:] = mass / size, held, held.T
         try:
-            found = np.linalg.solve(whole, np.concatenate([(force[0] + rest[0]) * self.scale / size, wanted]))
+            push = (force[0] + rest[0] + rubbed[0]) * self.scale
+            found = np.linalg.solve(whole, np.concatenate([push / size, wanted]))
         except np.linalg.LinAlgError:
             return self.accelerations_at(time, q, q1)
         power = float(force[0] @ q1)
@@ -164,7 +192,7 @@ class EquationsOfMotion:
         if given is not None:
             efforts = -size * found[-index:]
             power += float(efforts @ given[1])
-        return AccelerationResult(found[:many] * self.scale, power, 1.0, efforts)
+        return AccelerationResult(found[:many] * self.scale, power, 1.0, efforts, rubbed[1])
 
     def accelerations_at(self, time: float, q: Array, q1: Array) -> AccelerationResult:
         """The accelerations at a time, and the power that comes in."""
@@ -181,7 +209,8 @@ class EquationsOfMotion:
         ways = v[many:].T
         asked = v[:many].T @ ((u[:, :many].T @ wanted) / s[:many])
         mass = inertia.T * self.scale * self.scale[:, None]
-        push = (force[0] + rest[0]) * self.scale
+        rubbed = self._friction(time, q, q1, (slope.T, wanted, inertia.T))
+        push = (force[0] + rest[0] + rubbed[0]) * self.scale
         free = ways.T @ mass @ ways
         if free.size and np.linalg.eigvalsh(free)[0] <= MASSLESS_TOLERANCE * max(float(np.abs(mass).max()), 1e-300):
             raise self._massless_error(ways, free)
@@ -192,7 +221,7 @@ class EquationsOfMotion:
             carried = np.linalg.lstsq(held.T, mass @ scaled - push, rcond=RANK_TOLERANCE)[0]
             efforts = carried[-self.driven.count :]
             power += float(efforts @ self.driven.motion_at(time)[1])
-        return AccelerationResult(scaled * self.scale, power, firm, efforts)
+        return AccelerationResult(scaled * self.scale, power, firm, efforts, rubbed[1])
 
     def project(self, time: float, q: Array, q1: Array) -> tuple[Array, Array]:
         """The nearest coordinates and rates that the constraints allow."""
@@ -223,9 +252,75 @@ class EquationsOfMotion:
         free = ways @ np.linalg.solve(ways.T @ mass @ ways, ways.T)
         return np.asarray(free * self.scale * self.scale[:, None])
 
+    def free_directions(self, time: float, q: Array, q1: Array) -> Array:
+        """The motions that all constraints leave (coordinates, freedoms), square to one another in parts of sizes and
+        turns."""
+        slope = self._evaluate(time, q, q1)[1]
+        _, s, v = np.linalg.svd(slope.T * self.scale)
+        return np.asarray(v[self._constraint_rank(s) :].T * self.scale[:, None])
+
+    def stays_at_rest(self, time: float, q: Array, q1: Array) -> bool:
+        """Whether nothing can move, nor anything that acts change with the time."""
+        changes = self.driven.index or any(course.input is None for _, course, _ in self.varying)
+        return not changes and not self.free_directions(time, q, q1).size
+
     def energies(self, time: float, q: Array, q1: Array) -> Array:
         """Kinetic energy, and potential of weights and springs (2,), J."""
         return self._evaluate(time, q, q1)[-1][0]
+
+    def in_phase(self, places: Array, friction: SlidingFriction | None = None) -> EquationsOfMotion:
+        """The same where pairs stick at places (sticking,), and others rub."""
+        found = copy(self)
+        found.driven = copy(self.driven)
+        found.driven.places, found.friction = places, friction
+        return found
+
+    def contact_values(self, functions: ContactFunctions, time: float, q: Array, q1: Array) -> ContactValues:
+        """What contacts do at a time, and follow."""
+        return functions.evaluate(q, q1, self._load_factors(time, q, q1), self.spring_turns)
+
+    def contact_dynamics(
+        self, functions: ContactFunctions, time: float, q: Array, q1: Array, senses: Array, at_rest: BoolArray
+    ) -> ContactDynamics:
+        """The equations of contacts at a time, with senses and coefficients at rest of the rubbing pairs (pairs,)."""
+        _, slope, bend, inertia, *_ = self._evaluate(time, q, q1)
+        wanted = -bend[0]
+        if self.driven.count:
+            wanted[-self.driven.count :] += self.driven.motion_at(time)[2]
+        values = self.contact_values(functions, time, q, q1)
+        motion = self._constrained_motion(functions, values, (slope.T, wanted, inertia.T), q1)
+        return contact_dynamics(functions, values, motion, senses, at_rest)
+
+    def _constrained_motion(
+        self, functions: ContactFunctions, values: ContactValues, rows: tuple[Array, Array, Array], q1: Array
+    ) -> ConstrainedMotion:
+        slope, wanted, mass = rows
+        at = [functions.effort_pairs.index(name) for name in self.driven.held_pairs]
+        push: Array = values.push
+        for k, motor in self.driven.motors:
+            number = functions.effort_pairs.index(self.work.mechanism.inputs[k].pair)
+            way = values.efforts[:, number]
+            push = push + way * float(motor.effort_at(float(way @ q1)))
+        is_firm = self.rank == len(wanted)
+        return ConstrainedMotion(mass, slope, wanted, values.efforts[:, at], push, self.scale, is_firm)
+
+    def _friction(self, time: float, q: Array, q1: Array, rows: tuple[Array, Array, Array]) -> tuple[Array, Array]:
+        """What friction puts on the coordinates, and takes at every rubbing pair (W); not a number where its equations
+        have no solution."""
+        friction = self.friction
+        if friction is None:
+            return np.zeros(len(q)), NO_EFFORTS
+        values = self.contact_values(friction.functions, time, q, q1)
+        motion = self._constrained_motion(friction.functions, values, rows, q1)
+        none = np.zeros(len(friction.senses), dtype=bool)
+        found = contact_dynamics(friction.functions, values, motion, friction.senses, none)
+        y = friction.contacts.solve(found.system)
+        if y is None:
+            return np.full(len(q), np.nan), np.full(len(friction.senses), np.nan)
+        heat: Array = np.zeros(len(friction.senses))
+        rubs = friction.functions.is_friction
+        np.subtract.at(heat, friction.functions.pair_index[rubs], (q1 @ found.actions * y)[rubs])
+        return found.actions @ y, heat
 
     def _residuals_and_jacobian(self, q: Array, at: Array) -> tuple[Array, Array]:
         rows, slope = self._closing(q)
@@ -234,7 +329,8 @@ class EquationsOfMotion:
             left[-self.driven.count :] -= at
         return left, slope.T
 
-    def _evaluate(self, time: float, q: Array, q1: Array) -> list[Array]:
+    def _load_factors(self, time: float, q: Array, q1: Array) -> Array:
+        """By what loads are multiplied at a time (loads,)."""
         by = np.ones(len(self.work.mechanism.loads))
         places = self.course_places(time, q, q1)
         if self.pieces is not None:
@@ -248,7 +344,10 @@ class EquationsOfMotion:
                 if k is not None
             }
             by = load_factors(self.work.mechanism, inputs, np.array([time]), 1)[0]
-        *found, slopes = self._called(q, q1, by, self.spring_turns)
+        return by
+
+    def _evaluate(self, time: float, q: Array, q1: Array) -> list[Array]:
+        *found, slopes = self._called(q, q1, self._load_factors(time, q, q1), self.spring_turns)
         if self.driven.motors:
             efforts = [
                 float(motor.effort_at(rate)) for (_, motor), rate in zip(self.driven.motors, q1 @ slopes, strict=True)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from numbers import Real
 from typing import Any
 
@@ -11,9 +11,11 @@ import numpy as np
 
 from planar.document.first_argument import takes_mechanism
 from planar.dynamics.equations_of_motion import FULL_RANK_REGULARITY, EquationsOfMotion
-from planar.dynamics.friction.remarks import frictionless_remarks
+from planar.dynamics.friction.determined_friction import check_determined_friction
 from planar.dynamics.imbalance import explain_loose_links
 from planar.dynamics.in_time.contact_phases import ContactEvent, make_phases
+from planar.dynamics.in_time.freedom_remark import freedom_remarks
+from planar.dynamics.in_time.friction_record import FrictionEvent, RubbingPair
 from planar.dynamics.in_time.simulated_motion import simulated_motion
 from planar.dynamics.in_time.stop_contacts import Impact
 from planar.dynamics.lagrangian import lagrangian_functions
@@ -25,7 +27,7 @@ from planar.foundation.errors import BadInput, NoAnswer, Outcome
 from planar.foundation.short_repr import short_repr
 from planar.model.mechanism import Input, Mechanism
 from planar.model.run_arguments import check_steps
-from planar.model.wording import join_all_names, quote_names
+from planar.model.wording import join_all_names
 from planar.results.motion import Motion, State
 from planar.solving.position import solve
 
@@ -43,6 +45,8 @@ PROJECTION_TOLERANCE = 1e-8
 """What is brought back onto the constraints by more than this is bent: near a change point these are weak."""
 LEAST_REGULARITY = 1e-5
 """Nearer to a change point accelerations are no more told by the constraints."""
+LEAST_STICKING_STEPS = 100
+"""Steps of a whole motion at which it is seen whether what sticks is released."""
 ProgressCallback = Callable[[float], None]
 """Told how much of the time is done, from 0 to 1."""
 
@@ -52,8 +56,9 @@ class Simulation:
     """A motion in time, and its energies at every row (n,), J.
 
     `work` is what loads, dampers and driven inputs have put in since the start, and `lost` what impacts on stops have
-    taken, so that kinetic + potential - work + lost stays what it was: `balance` is how far it does not, of the
-    greatest of these. `impacts` are those on stops, in their order.
+    taken, and `heat` what friction has, so that kinetic + potential - work + lost + heat stays what it was: `balance`
+    is how far it does not, of the greatest of these. `impacts` are those on stops, in their order. `rubbing` has by
+    pair what sticks and slips at every row, with its own heat, and `friction_events` when that changed.
     """
 
     motion: Motion
@@ -63,8 +68,15 @@ class Simulation:
     lost: Array
     driven: tuple[str, ...]
     impacts: tuple[Impact, ...] = ()
+    rubbing: Mapping[str, RubbingPair] = field(default_factory=dict)
+    friction_events: tuple[FrictionEvent, ...] = ()
 
     __repr__ = short_repr
+
+    @property
+    def heat(self) -> Array:
+        """What friction has taken since the start, at every row (n,), J."""
+        return sum((each.heat for each in self.rubbing.values()), np.zeros(len(self.kinetic)))
 
     @property
     def balance(self) -> float:
@@ -72,9 +84,10 @@ class Simulation:
 
         Where nothing goes to and fro, beside the greatest of the energies.
         """
-        whole = self.kinetic + self.potential - self.work + self.lost
-        swing = max(float(np.ptp(each)) for each in (self.kinetic, self.potential, self.work, self.lost))
-        most = max(float(np.abs(each).max()) for each in (self.kinetic, self.potential, self.work, self.lost))
+        parts = (self.kinetic, self.potential, self.work, self.lost, self.heat)
+        whole = self.kinetic + self.potential - self.work + self.lost + self.heat
+        swing = max(float(np.ptp(each)) for each in parts)
+        most = max(float(np.abs(each).max()) for each in parts)
         beside = swing if swing > CONSTANT_ENERGY_TOLERANCE * most else most
         return float(np.ptp(whole)) / beside if beside else 0.0
 
@@ -98,10 +111,12 @@ def simulate(
     Dormand and Prince (E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, 1993, II.5), and
     after every step the position is brought back onto the constraints. A pair that meets its stop strikes it, with the
     restitution of the file (I. Newton's law; an impulse over all links, through what joins them), and rests on it while
-    it is pressed there.
+    it is pressed there. Pairs with friction stick and slip: what friction follows and the accelerations are found
+    together, and sticking, slipping and turning back are events (J. P. Den Hartog; F. Pfeiffer, C. Glocker).
 
-    A motion that cannot go on says so in its `outcome` and `reason`. Raises BadInput for a duration or names that are
-    none, NoAnswer where there is no position to start from, or something can move that has no mass.
+    A motion that cannot go on says so in its `outcome` and `reason`, as where friction leaves no solution or several.
+    Raises BadInput for a duration or names that are none, and where what friction follows is not determined, NoAnswer
+    where there is no position to start from, or something can move that has no mass.
 
     >>> import planar
     >>> planar.simulate(planar.load("door-closer"), 0.1, 10).motion.outcome.value
@@ -113,9 +128,8 @@ def simulate(
     names = [given.pair for given in mechanism.inputs]
     for pair in driven:
         if pair not in names:
-            raise BadInput(
-                "driven", f"there is no input at {pair!r} to be driven; the inputs are at {', '.join(names)}"
-            )
+            told = f"there is no input at {pair!r} to be driven; the inputs are at {', '.join(names)}"
+            raise BadInput("driven", told)
     kept = [
         given.pair
         for given in mechanism.inputs
@@ -149,13 +163,14 @@ class _SimulationRun:
 
     def __init__(self, start: State, kept: Sequence[str], duration: float, steps: int):
         self.start, self.mechanism, self.driven = start, start.mechanism, tuple(kept)
+        check_determined_friction(start)
         self.work = lagrangian_functions(self.mechanism)
         q, q1, _ = (each[0] for each in self.work.coordinates(start))
         unit = mechanism_size(self.mechanism, self.work.shapes)
         self.phases = make_phases(self.work, self.driven, unit, self.work.initial_spring_turns(q), q)
         self.coordinate_count = len(q)
         q, q1 = self.equations.project(0.0, q, q1)
-        self.initial_state = np.concatenate([q, q1, [0.0]])
+        self.initial_state = np.concatenate([q, q1, np.zeros(1 + len(self.phases.record.pairs))])
         self.is_firm = False
         "whether constraints are far from a change point"
         self.time = np.linspace(0.0, duration, steps + 1)
@@ -172,31 +187,18 @@ class _SimulationRun:
         q2 = np.array([self._accelerations(*each) for each in zip(time, q, q1, strict=True)])
         base = self.phases.base
         energies = np.array([base.energies(*each) for each in zip(time, q, q1, strict=True)])
-        made = simulated_motion(
-            self.work, self.start, time, (q, q1, q2), (*self._freedom_remark(), *frictionless_remarks(self.mechanism))
-        )
+        is_held = base.rank == self.coordinate_count
+        remarks = freedom_remarks(self.mechanism, self.driven) if is_held else ()
+        made = simulated_motion(self.work, self.start, time, (q, q1, q2), tuple(remarks))
         motion, lost = replace(made, outcome=outcome, reason=reason), self.phases.lost_at(time)
-        impacts = tuple(self.phases.impacts)
-        return Simulation(motion, energies[:, 0], energies[:, 1], rows[:, -1], lost, self.driven, impacts)
-
-    def _freedom_remark(self) -> Iterator[str]:
-        """That nothing moves freely, where that is so."""
-        if self.phases.base.rank != self.coordinate_count:
-            return
-        if not self.driven:
-            yield "nothing can move: the pairs hold every link"
-            return
-        by_law = [given.pair for given in self.mechanism.inputs if given.law is not None]
-        options = [f"--drive {name}" for name in self.driven if name not in by_law]
-        ways = [f"leave out {' or '.join(options)}"] if options else []
-        ways += [f"take the law of {quote_names(by_law)} out of the file"] if by_law else []
-        yield (
-            f"nothing moves freely: the driven inputs at {quote_names(self.driven)} determine the whole motion, and "
-            f"loads, weights and springs only what these supply; to let it go {', or '.join(ways)}"
-        )
+        work, heats = rows[:, 2 * self.coordinate_count], rows[:, 2 * self.coordinate_count + 1 :]
+        told = motion, energies[:, 0], energies[:, 1], work, lost, self.driven, tuple(self.phases.impacts)
+        return Simulation(*told, self.phases.record.rubbing(time, heats), tuple(self.phases.record.events))
 
     def _accelerations(self, time: float, q: Array, q1: Array) -> Array:
         """Those of a row; not a number where nothing tells them."""
+        if not self.phases.is_begun:
+            return np.full(self.coordinate_count, np.nan)
         equations = self.phases.equations_at(time)
         equations.pieces = None
         try:
@@ -207,17 +209,15 @@ class _SimulationRun:
 
     def _integrate(self, tick: ProgressCallback | None) -> tuple[Array, Outcome, str]:
         """The rows at all times that were reached, and why not all of them were."""
+        self.phases.base.accelerations_at(0.0, *self._split_state(self.initial_state))
         try:
             self.initial_state = self.phases.respond(0.0, self.initial_state)
         except NoAnswer as driven_on:
             return self.initial_state[None], driven_on.outcome, _end_sentence(0.0, f": {driven_on.reason}")
         rows = [self.initial_state]
         if not np.all(np.isfinite(self.equations.accelerations_at(0.0, *self._split_state(self.initial_state)).q2)):
-            return (
-                np.array(rows),
-                Outcome.BRANCH_LOST,
-                _end_sentence(0.0, self._explain_failure(0.0, self.initial_state)),
-            )
+            why = self._explain_failure(0.0, self.initial_state)
+            return np.array(rows), Outcome.BRANCH_LOST, _end_sentence(0.0, why)
         try:
             stopped = self._add_rows(rows, tick)
         except NoAnswer as massless:
@@ -317,24 +317,25 @@ class _SimulationRun:
 
     def _relative_change(self, y: Array, back: Array) -> float:
         """How far coordinates and rates are moved, of sizes and turns and of the rates."""
-        scale = np.concatenate(
-            [self.equations.scale, np.maximum(np.abs(y[self.coordinate_count : -1]), self.equations.scale)]
-        )
-        return float(np.abs((back - y)[:-1] / scale).max(initial=0.0))
+        q1 = self._split_state(y)[1]
+        scale = np.concatenate([self.equations.scale, np.maximum(np.abs(q1), self.equations.scale)])
+        return float(np.abs((back - y)[: len(scale)] / scale).max(initial=0.0))
 
     def _integrator(self, time: float, y: Array, step: float | None = None) -> Any:
         from scipy.integrate import DOP853  # slow to load, and only needed here
 
         last, n = float(self.time[-1]), self.coordinate_count
-        scales = np.concatenate([self.equations.scale, self.equations.scale / last, [1.0]])
+        scales = np.concatenate([self.equations.scale, self.equations.scale / last, np.ones(len(y) - 2 * n)])
         fastest = max(float(np.abs(self.initial_state[n : 2 * n] / self.equations.scale).max(initial=0.0)) * last, 1.0)
         scales[n : 2 * n] *= fastest
-        scales[-1] = max(
+        scales[2 * n :] = max(
             float(np.abs(self.equations.energies(0.0, *self._split_state(self.initial_state))).max()), 1e-9
         )
         first = None if step is None or time >= last else min(step, last - time)
-        tolerances = {"rtol": RELATIVE_TOLERANCE, "atol": RELATIVE_TOLERANCE * scales}
-        return DOP853(self._state_rate, time, y, last, first_step=first, **tolerances)
+        options = {"rtol": RELATIVE_TOLERANCE, "atol": RELATIVE_TOLERANCE * scales}
+        if self.phases.is_sticking:  # what is released between two steps and caught again is not seen
+            options["max_step"] = min(self.time[1], last / LEAST_STICKING_STEPS)
+        return DOP853(self._state_rate, time, y, last, first_step=first, **options)
 
     def _explain_failure(self, time: float, y: Array) -> str:
         loose = explain_loose_links(self.mechanism)
@@ -382,7 +383,7 @@ class _SimulationRun:
         )
 
     def _split_state(self, y: Array) -> tuple[Array, Array]:
-        return y[: self.coordinate_count], y[self.coordinate_count : -1]
+        return y[: self.coordinate_count], y[self.coordinate_count : 2 * self.coordinate_count]
 
     def _state_rate(self, time: float, y: Array) -> Array:
         q, q1 = self._split_state(y)
@@ -390,8 +391,9 @@ class _SimulationRun:
         found = way(time, q, q1)
         if not np.all(np.isfinite(found.q2)):
             raise FloatingPointError  # with no number the integrator would never end
-        return np.concatenate([q1, found.q2, [found.power]])
+        heat = found.heat if found.heat.size else np.zeros(len(y) - 2 * len(q) - 1)
+        return np.concatenate([q1, found.q2, [found.power], heat])
 
     def _project(self, time: float, y: Array) -> Array:
         """The nearest position and rates that the constraints allow."""
-        return np.concatenate([*self.equations.project(time, *self._split_state(y)), y[-1:]])
+        return np.concatenate([*self.equations.project(time, *self._split_state(y)), y[2 * self.coordinate_count :]])

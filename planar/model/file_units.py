@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from planar.foundation.units import SI_UNITS, Unit, UnitError, format_unit, parse_unit, spell_unit
 
-RESULT_SI_UNITS = SI_UNITS | {"energy": "J", "area": "m^2"}
+RESULT_SI_UNITS = SI_UNITS | {"energy": "J", "area": "m^2", "number": "1"}
 """The SI unit of every kind of quantity that files or results have."""
 
 _CUSTOMARY = re.compile(

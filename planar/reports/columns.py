@@ -16,7 +16,7 @@ _VECTOR_LETTERS = {"position": "", "velocity": "v", "acceleration": "a", "jerk":
 
 
 _GROUP_PREFIXES = {"inputs": "input ", "pairs": "pair ", "reactions": "reaction ", "friction": "friction "}
-_GROUP_PREFIXES |= {"without friction": "without friction input "}
+_GROUP_PREFIXES |= {"without friction": "without friction input ", "rubbing": "rubbing ", "contacts": "contact "}
 
 
 class ReportedSeries(NamedTuple):

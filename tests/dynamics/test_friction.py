@@ -203,11 +203,9 @@ def test_rubbing_teeth_lose_what_niemann_says(velocity):
     assert found.proof.equilibrium < EXACT
 
 
-@pytest.mark.parametrize(("velocity", "load"), [(1.0, 50.0), (1.0, -50.0), (-1.0, 50.0)])
-def test_a_rack_has_its_efficiency_either_way(velocity, load):
-    rack = planar.load("rack-steering")
-    assert any(isinstance(pair, planar.RackPair) for pair in rack.pairs)
-    mechanism = planar.from_dict(
+def pinion_and_rack(velocity, load, **mesh):
+    """A pinion of 100 mm that draws a rack against a force (N)."""
+    return planar.from_dict(
         {
             "planar": 1,
             "frame": "f",
@@ -225,19 +223,31 @@ def test_a_rack_has_its_efficiency_either_way(velocity, load):
                     "line": {"through": "P"},
                     "point": "O",
                     "radius": 0.1,
-                    "efficiency": 0.9,
+                    **mesh,
                 },
             ],
             "inputs": [{"pair": "O", "position": 0, "velocity": velocity}],
             "loads": [{"point": "P", "force": [load, 0]}],
         }
     )
-    found = forces_of(mechanism)
+
+
+@pytest.mark.parametrize(("velocity", "load"), [(1.0, 50.0), (1.0, -50.0), (-1.0, 50.0)])
+def test_a_rack_has_its_efficiency_either_way(velocity, load):
+    found = forces_of(pinion_and_rack(velocity, load, efficiency=0.9))
     without = found.frictionless.inputs["O"]
     assert abs(without) == pytest.approx(abs(load) * 0.1)
     drives = without * velocity > 0.0
     assert found.inputs["O"] == pytest.approx(without / 0.9 if drives else without * 0.9, rel=1e-12)
     assert found.friction["R"].side == ("w drives" if drives else "r drives")
+
+
+@pytest.mark.parametrize(("velocity", "load"), [(1.0, 50.0), (-1.0, 50.0)])
+def test_teeth_on_a_rack_lose_what_those_on_a_wheel_beyond_all_bounds_do(velocity, load):
+    """mu (pi / 2) / z of the power F v of the teeth, the second wheel's 1 / z being none."""
+    found = forces_of(pinion_and_rack(velocity, load, teeth=20, friction=0.08))
+    assert found.heat["R"] == pytest.approx(0.08 * pi / 2 / 20 * 50.0 * 0.1, rel=1e-12)
+    assert found.proof.equilibrium < EXACT
 
 
 @cache

@@ -77,6 +77,7 @@ def results():
         planar.sweep(bars, {"BC.length": [0.066]}, steps=6, reduce={"path": "C.path_length"}),
     )
     yield planar.simulate("tipper", 0.3, steps=4).impacts[0]
+    yield from ((rubbed := planar.simulate("stick-slip", 0.1, steps=1)).friction_events[0], rubbed.rubbing["block"])
     yield planar.unknown_load(planar.solve("balanced-lamp"), "springs.0")
     yield planar.motor_duty(planar.forces(planar.solve("motor-press")))
     yield from (planar.cam_profile("valve-cam"), planar.least_base_circle("valve-cam"))

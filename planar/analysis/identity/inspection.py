@@ -137,7 +137,7 @@ def _shown_units(mechanism: Mechanism) -> dict[str, str]:
     units = mechanism.units
     if not units.declares_more and not is_customary(units.length):
         return {}
-    return {kind: display_unit(kind, units)[0] for kind in RESULT_SI_UNITS if kind != "time"}
+    return {kind: display_unit(kind, units)[0] for kind in RESULT_SI_UNITS if kind not in ("time", "number")}
 
 
 def _describe_number(mechanism: Mechanism, number: Dimension) -> NumberDescription:

@@ -12,6 +12,7 @@ from planar.drawing.diagrams.motion_curves import ChordRates, DiagramSubject, Mo
 from planar.drawing.labels.text_metrics import text_size, wrap_text
 from planar.drawing.paper.scales import Scale, format_calculating_scale, paper_length
 from planar.foundation.arrays import Array
+from planar.foundation.errors import join_names
 from planar.foundation.units import format_unit, parse_unit
 from planar.model.file_units import FileUnits, coherent_unit, display_unit, rate_length
 from planar.model.wording import amount
@@ -34,6 +35,13 @@ class Ordinate(NamedTuple):
     "how many of the unit `si` are one in SI, which it is but for inches and the like"
 
 
+class HeldIntervals(NamedTuple):
+    """The intervals of time (s) in which friction holds pairs."""
+
+    pairs: tuple[str, ...]
+    intervals: tuple[tuple[float, float], ...]
+
+
 class DiagramSheet(NamedTuple):
     """Everything that the diagrams of one run show."""
 
@@ -43,6 +51,7 @@ class DiagramSheet(NamedTuple):
     width: float
     interval_count: int
     chords: int | None
+    held: HeldIntervals | None = None
 
     @property
     def span(self) -> float:
@@ -72,6 +81,9 @@ def caption_lines(sheet: DiagramSheet, ordinates: list[Ordinate], points: float,
     """The lines below the diagrams, at most `room` mm long; each with whether it is mathtext."""
     lines = [(line, False) for line in wrap_text(_start_sentence(sheet), points, room)]
     lines += [(line, True) for line in _fill_lines(_scale_phrases(sheet, ordinates), points, room)]
+    if sheet.held is not None and sheet.held.intervals:
+        shaded = f"Shaded: friction holds {join_names(sheet.held.pairs, last_joiner=' or ')}."
+        lines += [(line, False) for line in wrap_text(shaded, points, room)]
     if has_unbounded_end(sheet):
         ends = "At an end of the range, a dead or change point, no rates exist; what grows without bound is cut off."
         lines += [(line, False) for line in wrap_text(ends, points, room)]

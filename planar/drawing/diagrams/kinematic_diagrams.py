@@ -10,6 +10,7 @@ import numpy as np
 
 from planar.drawing.diagrams.captions import DiagramSheet, Ordinate, bounded_values, caption_lines
 from planar.drawing.diagrams.drawn_run import steady_run
+from planar.drawing.diagrams.held_intervals import held_intervals
 from planar.drawing.diagrams.motion_curves import (
     ChordRates,
     MotionCurve,
@@ -22,6 +23,7 @@ from planar.drawing.labels.fonts import DRAWING_FAMILY, font_families
 from planar.drawing.labels.text_metrics import clip_text, format_tick, text_size
 from planar.drawing.paper.pens import MM_PER_POINT, require_matplotlib
 from planar.drawing.paper.scales import DECIMAL_STEPS, DEGREE_STEPS, round_scale, round_step, tick_spacing
+from planar.dynamics.simulation import Simulation
 from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput
 from planar.foundation.units import SI_UNITS, format_unit, parse_unit
@@ -46,13 +48,13 @@ MAX_CHORDS = 180
 SMALL_TEXT, NORMAL_TEXT, LARGE_TEXT = 7.0, 8.0, 10.0
 """points"""
 CURVE_DASHES = ("-", (0, (5.0, 2.0)))
-CURVE_COLOUR, POSITION_GREY, GRID_GREY, CHORD_COLOUR = "black", "0.72", "0.88", "tab:blue"
+CURVE_COLOUR, POSITION_GREY, GRID_GREY, HELD_GREY, CHORD_COLOUR = "black", "0.72", "0.88", "0.92", "tab:blue"
 ORDINATE_SYMBOLS = {False: ("S", "V", "a"), True: ("φ", "ω", "ε")}
 """Of a slide or a point, and of a link; the chapter's α is the angle of the crank."""
 
 
 def diagrams(
-    motion: Motion | Mechanism, of: str | None = None, chords: int | None = None, width: float = 120.0
+    source: Motion | Simulation | Mechanism, of: str | None = None, chords: int | None = None, width: float = 120.0
 ) -> Figure:
     """S-t, V-t and a-t diagrams, as `planar.plot.diagrams` has them. Raises BadInput, NoAnswer."""
     if isinstance(width, bool) or not isinstance(width, Real) or not MIN_WIDTH <= width <= MAX_WIDTH:
@@ -61,6 +63,7 @@ def diagrams(
         isinstance(chords, bool) or not isinstance(chords, Integral) or not 2 <= chords <= MAX_CHORDS
     ):
         raise BadInput("chords", f"a whole number of chords from 2 to {MAX_CHORDS} is wanted, not {chords!r:.40}")
+    motion = source.motion if isinstance(source, Simulation) else source
     mechanism = motion.mechanism if isinstance(motion, Motion) else motion
     of = default_subject(mechanism) if of is None else of
     slide = find_slide(mechanism, of)
@@ -68,7 +71,8 @@ def diagrams(
         slide = None
     count = chords or 12
     run = steady_run(motion, slide, count=count)
-    return _draw_figure(DiagramSheet(run, diagram_subject(run, of), mechanism.units, float(width), count, chords))
+    held = held_intervals(source, of) if isinstance(source, Simulation) else None
+    return _draw_figure(DiagramSheet(run, diagram_subject(run, of), mechanism.units, float(width), count, chords, held))
 
 
 def _draw_figure(sheet: DiagramSheet) -> Figure:
@@ -172,6 +176,8 @@ def _draw_diagram(axes: Axes, sheet: DiagramSheet, ordinate: Ordinate, index: in
         axes.axvline(mark, color=POSITION_GREY, lw=0.4, zorder=1, gid="position")
     for tick in ticks:
         axes.axhline(tick * per_mm, color=GRID_GREY, lw=0.4, zorder=0.5, gid="grid")
+    for start, end in sheet.held.intervals if sheet.held is not None else ():
+        axes.axvspan(start, end, color=HELD_GREY, lw=0.0, zorder=0.2, gid="held")
     axes.axhline(0.0, color=CURVE_COLOUR, lw=0.7, zorder=2, gid="zero")
     for curve, dash in zip(sheet.subject.curves, CURVE_DASHES, strict=False):
         values = _in_written_unit(curve.derivatives[index], ordinate)

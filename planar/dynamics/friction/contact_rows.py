@@ -189,7 +189,7 @@ class ContactRows:
         positive, negative = (self._parts(pair, rubbing, sense) for sense in (1.0, -1.0))
         sense = np.broadcast_to(np.asarray(rubbing.rate_sense, dtype=float), (self.count,))
         action = self._action_on_links(rubbing.action)
-        sides = _sides(rubbing, 1.0), _sides(rubbing, -1.0)
+        sides = side_words(rubbing, 1.0), side_words(rubbing, -1.0)
         return Contact(pair.name, action, (positive, negative), rubbing.law, True, sense, sides)
 
     def _parts(self, pair: Pair, rubbing: RubbingContact, sense: float) -> Array:
@@ -261,7 +261,7 @@ class ContactRows:
         return found
 
 
-def _sides(rubbing: RubbingContact, sense: float) -> tuple[str, ...]:
+def side_words(rubbing: RubbingContact, sense: float) -> tuple[str, ...]:
     """What each part of a contact says of its side, in the order of the parts."""
     if rubbing.law is not LoadLaw.GREATEST:
         return ("",) * len(rubbing.loads)

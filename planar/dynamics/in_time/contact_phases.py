@@ -1,47 +1,74 @@
-"""The phases of a simulation between its impacts: which pairs rest on stops, and the equations of motion of each."""
+"""The phases of a simulation between its events: which pairs rest on stops, stick and slip, and their equations."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
+from itertools import chain, combinations
 from typing import NamedTuple
 
 import numpy as np
 
 from planar.dynamics.equations_of_motion import EquationsOfMotion
+from planar.dynamics.friction.contact_functions import ContactFunctions
+from planar.dynamics.in_time.friction_breaks import FrictionBreaks
+from planar.dynamics.in_time.friction_record import FrictionRecord
+from planar.dynamics.in_time.stick_slip import FrictionBreak, StickSlip, StickSlipPhase
 from planar.dynamics.in_time.stop_contacts import Impact, StopContacts, StopSide
 from planar.dynamics.lagrangian import LagrangianFunctions
 from planar.foundation.arrays import Array
 from planar.foundation.errors import NoAnswer, Outcome
 from planar.foundation.root_finding import find_first_passage, find_root
-from planar.solving.stops import MetStop, PairStops
+from planar.solving.stops import PairStops
 
 MAX_IMPACTS = 20_000
 """Impacts that are followed."""
+PRESSED_TOLERANCE = 1e-10
+"""Of the greatest acceleration: what goes on against a stop by less does not."""
 Interpolant = Callable[[float], Array]
 
 
 class ContactEvent(NamedTuple):
-    """When a pair meets a stop, or is no longer pressed on one (s)."""
+    """When a pair meets a stop, or is no longer pressed on one (s); or when friction changes."""
 
     time: float
-    side: StopSide
-    lifts_off: bool
+    side: StopSide | None = None
+    lifts_off: bool = False
+    friction: FrictionBreak | None = None
 
 
 class ContactPhases:
-    """The phases of one motion. A state y is the coordinates, their rates, and the work that was put in (J)."""
+    """The phases of one motion. A state y is the coordinates, their rates, the work that was put in, and the heat of
+    every pair that rubs (J)."""
 
     def __init__(
-        self, base: EquationsOfMotion, stops: PairStops | None, q: Array, make: Callable[..., EquationsOfMotion]
+        self,
+        make: Callable[[tuple[StopSide, ...], tuple[str, ...]], EquationsOfMotion],
+        contacts: StopContacts | None,
+        functions: ContactFunctions | None,
+        unit: float,
     ):
-        """`base`: the equations without contacts; `make(resting)` makes those with pairs that rest on stops."""
-        self.base, self.equations, self._make = base, base, make
-        self.coordinate_count = len(q)
-        self.contacts = None if stops is None else StopContacts(base.work, stops, q)
+        """`make(sides, pairs)` makes equations with pairs that rest on stops, and pairs that stick."""
+        self._make = make
+        self._made: dict[tuple[tuple[StopSide, ...], tuple[str, ...]], EquationsOfMotion] = {}
+        self.base = self.equations = self._cached((), ())
+        self.coordinate_count = self.base.work.q.numel()
+        self.contacts = contacts
         self.resting: tuple[StopSide, ...] = ()
         self.impacts: list[Impact] = []
-        self._made: dict[tuple[StopSide, ...], EquationsOfMotion] = {(): base}
-        self._begun: list[tuple[float, EquationsOfMotion]] = [(-np.inf, base)]
+        self._begun: list[tuple[float, EquationsOfMotion]] = [(-np.inf, self.base)]
+        self.stick_slip = None if functions is None else StickSlip(functions, self._cached, unit)
+        self.rubbing: StickSlipPhase | None = None
+        self.record = FrictionRecord(functions)
+
+    @property
+    def is_begun(self) -> bool:
+        """Whether a phase was found to begin with."""
+        return self.stick_slip is None or self.rubbing is not None
+
+    @property
+    def is_sticking(self) -> bool:
+        """Whether friction holds a pair that it may yet release."""
+        return self.rubbing is not None and bool(self.rubbing.releases)
 
     def split(self, y: Array) -> tuple[Array, Array]:
         """Coordinates and rates."""
@@ -61,9 +88,6 @@ class ContactPhases:
         self, before: tuple[float, Array], after: tuple[float, Array], interpolant: Callable[[], Interpolant]
     ) -> ContactEvent | None:
         """The first that happens between two states at their times; `interpolant()` gives the states between them."""
-        contacts = self.contacts
-        if contacts is None:
-            return None
         made: list[Interpolant] = []
 
         def state(time: float) -> tuple[Array, Array]:
@@ -71,8 +95,15 @@ class ContactPhases:
             return self.split(before[1] if time == before[0] else np.asarray(made[0](time)))
 
         (first, y0), (last, y1) = before, after
-        rooms0, rooms1 = contacts.rooms(*self.split(y0)), contacts.rooms(*self.split(y1))
         found: list[ContactEvent] = []
+        if self.stick_slip is not None and self.rubbing is not None:
+            self.stick_slip.note_speed(self.base, self.split(y1)[1])
+            change = FrictionBreaks(self.stick_slip).first_break(self.rubbing, (first, last), state)
+            found += [] if change is None else [ContactEvent(change.time, friction=change)]
+        contacts = self.contacts
+        if contacts is None:
+            return found[0] if found else None
+        rooms0, rooms1 = contacts.rooms(*self.split(y0)), contacts.rooms(*self.split(y1))
         for k, side in enumerate(contacts.sides):
             if side in self.resting:
                 continue
@@ -106,6 +137,7 @@ class ContactPhases:
         is driven on against a stop."""
         contacts, y = self.contacts, y.copy()
         if contacts is None:
+            self._begin(time, y, event)
             return y
         q, q1 = self.split(y)
         self.base.pieces = None
@@ -115,20 +147,71 @@ class ContactPhases:
                 raise self._refusal(time, q, q1, hit is None)
             hit = contacts.settle(self.base, time, q, hit)
             y[self.coordinate_count : 2 * self.coordinate_count] = hit.q1
-            y[-1] += hit.work
+            y[2 * self.coordinate_count] += hit.work
             q, q1 = self.split(y)
             resting = contacts.resting(self.base, time, q, q1)
             held = {contacts.stops.pairs[k].name for _, k in resting}
             self.impacts += (each._replace(rests=each.pair in held) for each in hit.impacts)
-        resting = contacts.resting(self.base, time, q, q1)
-        if event is not None and event.lifts_off:
-            resting = tuple(side for side in resting if side != event.side)
-        self.resting = resting
-        if resting not in self._made:
-            self._made[resting] = self._make(contacts.met_stops(resting))
-        self.equations = self._made[resting]
-        self._begun.append((time, self.equations))
+        self._begin(time, y, event)
         return y
+
+    def _begin(self, time: float, y: Array, event: ContactEvent | None) -> None:
+        """Begin the phase that follows at a state."""
+        q, q1 = self.split(y)
+        if self.stick_slip is not None:
+            self._begin_with_friction(time, (q, q1), event)
+        elif self.contacts is not None:
+            resting = self.contacts.resting(self.base, time, q, q1)
+            if event is not None and event.lifts_off:
+                resting = tuple(side for side in resting if side != event.side)
+            self.resting, self.equations = resting, self._cached(resting, ())
+        self._begun.append((time, self.equations))
+
+    def _begin_with_friction(self, time: float, y: tuple[Array, Array], event: ContactEvent | None) -> None:
+        """Begin a phase in which pairs rub or stick, and the fewest rest on stops that push them."""
+        assert self.stick_slip is not None
+        contacts = self.contacts
+        at = () if contacts is None else contacts.still_sides(self.base, *y)
+        if event is not None and event.lifts_off:
+            at = tuple(side for side in at if side != event.side)
+        change = None if event is None else event.friction
+        if change is not None:  # what turns back near a stop does not rest on it
+            at = tuple(side for side in at if side in self.resting)
+        refused: NoAnswer | None = None
+        for sides in chain.from_iterable(combinations(at, size) for size in range(len(at) + 1)):
+            try:
+                phase = self.stick_slip.find_phase(time, y, sides, change)
+            except NoAnswer as jammed:
+                refused = jammed
+                continue
+            if contacts is None or self._is_held(contacts, phase, time, y, at):
+                self.resting, self.rubbing, self.equations = sides, phase, phase.equations
+                self.record.begin(time, self.stick_slip, phase)
+                return
+        raise refused or NoAnswer(Outcome.INPUT_JAMMED, "no pair rests on its stop or leaves it as its friction allows")
+
+    def _is_held(
+        self,
+        contacts: StopContacts,
+        phase: StickSlipPhase,
+        time: float,
+        y: tuple[Array, Array],
+        at: tuple[StopSide, ...],
+    ) -> bool:
+        """Whether the stops on which pairs rest push them, and no other pair goes on against its stop."""
+        pushed = phase.equations.accelerations_at(time, *y)
+        sense = np.array([-1.0 if upper else 1.0 for upper, _ in phase.sides])
+        force = pushed.efforts[len(pushed.efforts) - len(sense) :] * sense
+        free = tuple(side for side in at if side not in phase.sides)
+        leaving = contacts.leaving_accelerations(*y, pushed.q2, free)
+        least = PRESSED_TOLERANCE * float(np.abs(pushed.q2 / self.base.scale).max(initial=0.0))
+        return bool((force > 0.0).all() and (leaving >= -least * self.base.scale.max()).all())
+
+    def _cached(self, sides: tuple[StopSide, ...], sticking: tuple[str, ...]) -> EquationsOfMotion:
+        key = sides, sticking
+        if key not in self._made:
+            self._made[key] = self._make(sides, sticking)
+        return self._made[key]
 
     def _refusal(self, time: float, q: Array, q1: Array, is_driven: bool) -> NoAnswer:
         contacts = self.contacts
@@ -145,9 +228,12 @@ def make_phases(
     work: LagrangianFunctions, driven: tuple[str, ...], unit: float, wound: Array, q: Array
 ) -> ContactPhases:
     """The phases of a motion from coordinates q, before which nothing rests."""
+    mechanism = work.mechanism
+    contacts = StopContacts(work, PairStops(mechanism, unit), q) if mechanism.stops else None
+    functions = ContactFunctions(work) if any(pair.has_friction for pair in mechanism.pairs) else None
 
-    def make(resting: Sequence[MetStop] = ()) -> EquationsOfMotion:
-        return EquationsOfMotion(work, driven, unit, wound, resting)
+    def make(sides: tuple[StopSide, ...], sticking: tuple[str, ...]) -> EquationsOfMotion:
+        resting = () if contacts is None else contacts.met_stops(sides)
+        return EquationsOfMotion(work, driven, unit, wound, resting, sticking)
 
-    stops = PairStops(work.mechanism, unit) if work.mechanism.stops else None
-    return ContactPhases(make(), stops, q, make)
+    return ContactPhases(make, contacts, functions, unit)

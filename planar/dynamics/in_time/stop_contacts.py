@@ -95,12 +95,7 @@ class StopContacts:
 
     def resting(self, equations: EquationsOfMotion, time: float, q: Array, q1: Array) -> tuple[StopSide, ...]:
         """The sides on which pairs rest, pressed on them; `equations` are those without contacts."""
-        still = still_rate(equations, q1)
-        at = tuple(
-            side
-            for side, (room, rate) in zip(self.sides, self.rooms(q, q1), strict=True)
-            if room <= STOP_TOLERANCE and abs(rate) <= still
-        )
+        at = self.still_sides(equations, q, q1)
         if not at:
             return ()
         normal, bend = self._normals(q, q1, at)
@@ -109,6 +104,20 @@ class StopContacts:
             normal @ equations.impulse_response(time, q, q1) @ normal.T, normal @ pushed + bend
         )
         return () if force is None else tuple(side for side, each in zip(at, force, strict=True) if each > 0.0)
+
+    def still_sides(self, equations: EquationsOfMotion, q: Array, q1: Array) -> tuple[StopSide, ...]:
+        """The sides at which pairs are and stand still."""
+        still = still_rate(equations, q1)
+        return tuple(
+            side
+            for side, (room, rate) in zip(self.sides, self.rooms(q, q1), strict=True)
+            if room <= STOP_TOLERANCE and abs(rate) <= still
+        )
+
+    def leaving_accelerations(self, q: Array, q1: Array, q2: Array, at: tuple[StopSide, ...]) -> Array:
+        """The second rates of how far sides are (sides,), SI."""
+        normal, bend = self._normals(q, q1, at)
+        return normal @ q2 + bend
 
     def strike(self, equations: EquationsOfMotion, time: float, q: Array, q1: Array) -> ImpactResult | None:
         """The rates after the impacts at all stops that are touched, by Newton's law; None where no impulse can hold

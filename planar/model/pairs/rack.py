@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from math import tan
+from math import pi, tan
 from typing import Any, ClassVar, Self
 
 from planar.foundation.geometry import Frame, Vector, direction, frame_at
@@ -26,9 +26,18 @@ from planar.model.pairs.base import (
     sample_shape,
     schema_reference,
 )
-from planar.model.pairs.friction import EFFICIENCY_SCHEMA, has_loss, mesh_loss, read_efficiency, write_efficiency
+from planar.model.pairs.friction import (
+    EFFICIENCY_SCHEMA,
+    FRICTION_SCHEMA,
+    has_loss,
+    mesh_loss,
+    read_efficiency,
+    read_friction,
+    write_efficiency,
+    write_friction,
+)
 from planar.model.pairs.guide_line import LINE_NUMBER_KINDS, LINE_SCHEMA, GuidedPair, LinkLine, point_along_line
-from planar.model.pairs.rubbing import ContactLoad
+from planar.model.pairs.rubbing import ContactLoad, Friction, LoadLaw
 from planar.model.pairs.symbols import DrawingMark, PitchLineMark, WheelMark
 from planar.model.pairs.teeth import STANDARD_PRESSURE_ANGLE, TEETH_SCHEMA, read_pressure_angle, write_pressure_angle
 
@@ -46,6 +55,8 @@ class RackPair(GuidedPair):
     mesh_reference: tuple[float, float] = (0.0, 0.0)
     pressure_angle: float = STANDARD_PRESSURE_ANGLE
     efficiency: float = 1.0
+    pinion_teeth: float | None = None
+    """How many the pinion has, which friction follows."""
 
     keyword: ClassVar[str] = "rack"
     entry_description: ClassVar[str] = "a rack with its pinion: its name"
@@ -70,9 +81,19 @@ class RackPair(GuidedPair):
             "where the pinion stands along the line at one of its angles; left out: 0 meets 0",
         ),
         **TEETH_SCHEMA,
+        "teeth": described(
+            {"type": "integer", "minimum": 1}, "the pinion's number of teeth, which their friction follows"
+        ),
+        **FRICTION_SCHEMA,
         **EFFICIENCY_SCHEMA,
     }
     required_keys: ClassVar[tuple[str, ...]] = ("links", "line", "point", "radius")
+    entry_rule: ClassVar[Schema] = {
+        "anyOf": [
+            {"not": {"required": ["friction"]}},
+            {"required": ["teeth"], "not": {"required": ["efficiency"]}},
+        ]
+    }
     open_contact_hint: ClassVar[str] = "the centre lies left of the line for a radius above zero, right for one below"
     is_lower_pair: ClassVar[bool] = False
     counts_turns: ClassVar[bool] = True
@@ -123,14 +144,21 @@ class RackPair(GuidedPair):
     def rubbing_contacts(
         self, frames: Mapping[str, Frame], shapes: Mapping[str, LinkShape], all_pairs: Sequence[Pair], at_rest: bool
     ) -> tuple[RubbingContact, ...]:
-        """The couple between rack and pinion that the teeth's efficiency asks for."""
-        if not has_loss(self.efficiency):
-            return ()
+        """The couple between rack and pinion that the teeth's efficiency asks for, or their friction.
+
+        That is a gear pair's with a wheel beyond all bounds: mu (pi / 2) / z of the power of z teeth of the pinion.
+        """
         rack, pinion = self.links
         way = frames[rack].rotate_to_world(self._line_in_link(shapes)[1])
+        sense = -1.0 if self.radius > 0.0 else 1.0
         # seen from the pinion's centre the rack runs back: it drives where it pushes the pinion that way
         torque = ContactLoad(pinion, abs(self.radius), way * -1.0)
-        sense = -1.0 if self.radius > 0.0 else 1.0
+        if self.friction is not None and self.pinion_teeth is not None:
+            arm = self.friction.coefficient(at_rest) * abs(self.radius) * (0.5 * pi / self.pinion_teeth)
+            rubbing = torque._replace(factor=arm, opposed=arm, sides=(f"{rack} drives", f"{pinion} drives"))
+            return (RubbingContact(EffortAction(pinion, rack), (rubbing,), LoadLaw.GREATEST, sense),)
+        if not has_loss(self.efficiency):
+            return ()
         return (mesh_loss(self.links, EffortAction(pinion, rack), torque, self.efficiency, sense),)
 
     def drawing_marks(self, shapes: Mapping[str, LinkShape], all_pairs: Sequence[Pair]) -> tuple[DrawingMark, ...]:
@@ -151,7 +179,19 @@ class RackPair(GuidedPair):
             mesh = entry.object_at("mesh")
             mesh.check_keys("displacement", "angle")
             meet = (mesh.quantity("displacement", "length"), mesh.counted_angle("angle"))
-        return (cls(name, links, line, point, radius, meet, read_pressure_angle(entry), read_efficiency(entry)),)
+        friction, teeth = read_friction(entry), None
+        if entry.has("teeth"):
+            teeth = entry.number("teeth")
+            if teeth < 1.0 or not teeth.is_integer():
+                raise entry.error_at("teeth", "a whole number of teeth is wanted, one at least")
+        if friction is not None and teeth is None:
+            raise entry.error_at(
+                "friction", "the friction of teeth follows their number; give 'teeth', or an 'efficiency' in its place"
+            )
+        if friction is not None and entry.has("efficiency"):
+            raise entry.error_at("efficiency", "give either 'friction' of the teeth or their 'efficiency', not both")
+        angle, efficiency = read_pressure_angle(entry), read_efficiency(entry)
+        return (cls(name, links, line, point, radius, meet, angle, efficiency, teeth, friction=friction),)
 
     @classmethod
     def write(cls, group: Sequence[Self], quantity: QuantityWriter) -> dict[str, Any]:
@@ -162,7 +202,9 @@ class RackPair(GuidedPair):
             s0, a0 = pair.mesh_reference
             entry["mesh"] = {"displacement": quantity(s0, "length"), "angle": quantity(a0, "angle")}
         entry |= write_pressure_angle(pair.pressure_angle, quantity)
-        return entry | write_efficiency(pair.efficiency, quantity)
+        if pair.pinion_teeth is not None:
+            entry["teeth"] = quantity(pair.pinion_teeth, "count")
+        return entry | write_friction(pair.friction, quantity) | write_efficiency(pair.efficiency, quantity)
 
     @classmethod
     def samples(cls) -> tuple[PairSample, ...]:
@@ -185,6 +227,9 @@ class RackPair(GuidedPair):
             pair = cls("R", ("a", "b"), LinkLine("P", None, angle), "Q", radius, meet)
             if radius < 0.0:
                 pair, entry["efficiency"] = replace(pair, efficiency=0.9), 0.9
+            else:
+                pair = replace(pair, pinion_teeth=24.0, friction=Friction(0.06))
+                entry |= {"teeth": 24, "friction": 0.06}
             return PairSample(
                 pair,
                 (sample_shape(P=through), sample_shape(Q=point)),

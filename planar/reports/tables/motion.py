@@ -13,6 +13,7 @@ from planar.model.file_units import display_unit
 from planar.model.wording import amount, count_phrase, join_all_names
 from planar.reports.fitted_table import FittedTable, plain_table
 from planar.reports.number_format import (
+    ROUNDING_RATIO,
     SIZE_PHRASE,
     column_heading,
     format_number,
@@ -52,7 +53,8 @@ def _range_text(motion: Motion, name: str) -> str:
     """Where an input went: A from 0 deg to 90 deg and to 0 deg."""
     units, kind = motion.mechanism.units, "length" if motion.has_length_motion(name) else "angle"
     position = motion.inputs[name].position
-    way = np.sign(np.diff(position))
+    change = np.diff(position)
+    way = np.sign(np.where(np.abs(change) > ROUNDING_RATIO * np.abs(position).max(), change, 0.0))
     moved = np.flatnonzero(way)
     turns = [int(after) for before, after in pairwise(moved) if way[before] != way[after]]
     ends = [amount(float(position[k]), kind, units) for k in (0, *turns, len(position) - 1)]

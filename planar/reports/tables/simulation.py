@@ -15,8 +15,21 @@ from planar.reports.columns import ReportedSeries
 from planar.reports.fitted_table import FittedTable, plain_table
 from planar.reports.number_format import column_heading, format_number, format_quantity, paragraphs, quantity_text
 from planar.reports.tables.motion import motion_tables
+from planar.reports.tables.rubbing import (
+    friction_events_table,
+    friction_facts,
+    friction_heat_table,
+    friction_series,
+)
 
-ENERGIES = ("kinetic", "potential", "work", "lost")
+ENERGIES = {
+    "kinetic": "kinetic energy",
+    "potential": "potential energy",
+    "work": "work put in",
+    "lost": "lost in impacts",
+    "heat": "heat of friction",
+}
+"""What a simulation has of them, in words."""
 MAX_IMPACTS_SHOWN = 12
 """Impacts that a table lists; a file of the motion, and JSON, has all."""
 SPEED_KINDS = {True: "velocity", False: "angular velocity"}
@@ -25,13 +38,16 @@ SPEED_KINDS = {True: "velocity", False: "angular velocity"}
 def tables(simulation: Simulation) -> RenderableType:
     """The run, which inputs were let go, how they moved, and what became of the energy."""
     motion = simulation.motion
-    what = "kinetic + potential − work + lost" if simulation.impacts else "kinetic + potential − work"
+    also = " + lost" * bool(simulation.impacts) + " + heat" * bool(simulation.rubbing)
+    what = f"kinetic + potential − work{also}"
     kept = f"{what} stays what it was, but for {simulation.balance:.1e} of the energy that changes"
     hits = [_impacts_table(simulation)] if simulation.impacts else []
+    rubs = [friction_events_table(simulation), friction_heat_table(simulation)] if simulation.rubbing else []
     return Group(
         motion_tables(motion),
         _inputs_table(simulation),
         *hits,
+        *rubs,
         _energies_table(simulation),
         paragraphs([("energy", kept)]),
     )
@@ -90,11 +106,11 @@ def _energies_table(simulation: Simulation) -> FittedTable:
         *(column_heading(each, "energy", units) for each in ("at the start", "at the end", "least", "greatest")),
     )
     table = plain_table("Energy", *headings)
-    names = ("kinetic energy", "potential energy", "work put in", "lost in impacts")
     most = max(float(np.abs(getattr(simulation, what)).max()) for what in ENERGIES)
-    for name, what in zip(names, ENERGIES, strict=True):
+    there = {"lost": bool(simulation.impacts), "heat": bool(simulation.rubbing)}
+    for what, name in ENERGIES.items():
         values = getattr(simulation, what)
-        if what == "lost" and not simulation.impacts:
+        if not there.get(what, True):
             continue
         ends = (values[0], values[-1], values.min(), values.max())
         table.add_row(name, *(format_quantity(float(each), "energy", units, most) for each in ends))
@@ -103,10 +119,12 @@ def _energies_table(simulation: Simulation) -> FittedTable:
 
 def energy_series(simulation: Simulation) -> Iterable[ReportedSeries]:
     """The energies at every position, beside what a file of the motion has."""
-    told = ENERGIES if simulation.motion.mechanism.stops else ENERGIES[:3]
+    there = {"lost": bool(simulation.motion.mechanism.stops), "heat": bool(simulation.rubbing)}
+    told = [what for what in ENERGIES if there.get(what, True)]
     yield ReportedSeries(
         "energy", "", dict.fromkeys(told, "energy"), {what: getattr(simulation, what) for what in told}
     )
+    yield from friction_series(simulation)
 
 
 def simulation_facts(simulation: Simulation) -> dict[str, Any]:
@@ -114,4 +132,4 @@ def simulation_facts(simulation: Simulation) -> dict[str, Any]:
     found: dict[str, Any] = {"driven": list(simulation.driven), "energy_balance": simulation.balance}
     if simulation.motion.mechanism.stops:
         found["impacts"] = [each._asdict() for each in simulation.impacts]
-    return found
+    return found | friction_facts(simulation)
