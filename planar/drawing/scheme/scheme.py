@@ -20,6 +20,7 @@ from planar.drawing.scheme.motors import motor_strokes
 from planar.drawing.scheme.placed_strokes import stroke_marks
 from planar.drawing.scheme.scene import Scene, TravelRanges, plain_frames
 from planar.drawing.scheme.springs_masses import MassCentreMark, SpringMassMark
+from planar.drawing.scheme.stops import slide_stop_places
 from planar.foundation.errors import BadInput
 from planar.foundation.geometry import Frame, Vector
 from planar.foundation.jets import Scalar
@@ -83,7 +84,9 @@ def space_scale(
 ) -> Scale:
     """The round scale at which all points, bodies and wheels of a mechanism in a position fit a room (mm)."""
     points = {link: shape.points for link, shape in shapes.items()}
-    places = extent_places(points, link_bodies(mechanism, shapes), all_marks(mechanism, shapes))
+    marks = list(all_marks(mechanism, shapes))
+    places = extent_places(points, link_bodies(mechanism, shapes), marks)
+    places += [ExtentPlace(link, at) for link, at in slide_stop_places(mechanism, marks)]
     low, high = extent_corners(places, [frames])
     width, height = high.x - low.x, high.y - low.y
     fits = round_scale("length", mechanism.units.length, width, height, room)

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from math import cos, sin
 
 from planar.drawing.scheme.link_bodies import unit_vector
 from planar.drawing.scheme.placed_strokes import PlacedSymbol
 from planar.drawing.scheme.scene import Scene
+from planar.drawing.scheme.springs_masses import SpringMassMark
 from planar.foundation.geometry import Vector
-from planar.model.mechanism import relative_motions
+from planar.model.mechanism import Mechanism, relative_motions
 from planar.model.pairs import MeasureKind, Pair
-from planar.model.pairs.symbols import GuideMark, SlotMark
+from planar.model.pairs.symbols import DrawingMark, GuideMark, SlotMark
 from planar.model.stops import Stops
 
 
@@ -25,6 +26,17 @@ def stop_strokes(scene: Scene) -> Iterator[PlacedSymbol]:
             yield from _slide_stops(scene, stops, guides[stops.pair])
         elif pair.input_kind is MeasureKind.ANGLE and pair.coincident_points():
             yield from _pin_stops(scene, stops, pair)
+
+
+def slide_stop_places(
+    mechanism: Mechanism, marks: Iterable[DrawingMark | SpringMassMark]
+) -> Iterator[tuple[str, Vector]]:
+    """Where the stops of slides are: their link, and the place in its axes."""
+    guides = {mark.name: mark for mark in marks if isinstance(mark, GuideMark | SlotMark)}
+    for stops in mechanism.stops:
+        guide = guides.get(stops.pair)
+        for at, _ in _ends(stops) if guide is not None else ():
+            yield guide.link, guide.through + guide.direction * at
 
 
 def _ends(stops: Stops) -> Iterator[tuple[float, float]]:
