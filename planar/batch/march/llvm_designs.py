@@ -84,7 +84,7 @@ class _DesignsKernelWriter(KernelWriter):
         carried: frozenset[Operand],
         start: KernelStart,
     ):
-        super().__init__(equations, links, rates, lanes, frozenset({"p", "q", "u1", "u2", "scale"}), carried)
+        super().__init__(equations, links, rates, lanes, frozenset({"p", "q", "u1", "u2", "scale", "stop"}), carried)
         self.point_blocks = levels
         self.other_points: dict[int, list[str]] = {}
         self.apart_here: list[str] = []  # flags of blocks in closed form: their assemblies are apart at a step
@@ -114,7 +114,8 @@ class _DesignsKernelWriter(KernelWriter):
         self.block_correction_slots = {
             part.block.block_index: t.allocate() for part in self.equations.blocks if part.closed_form is None
         }
-        self.bend_slots = [[t.allocate() for _ in range(2)] for _ in self.equations.closed_forms]
+        watched = (*self.equations.closed_forms, *self.equations.stop_pairs)
+        self.bend_slots = [[t.allocate() for _ in range(2)] for _ in watched]
         self.regularity_slot, self.good_count_slot, self.candidate_count_slot = (t.allocate() for _ in range(3))
         self.passed_slot, self.candidate_slot = (t.allocate_flags() for _ in range(2))
         self.counted_angle_slots = [t.allocate() for _ in range(self.counted_angles().numel())]
@@ -131,6 +132,7 @@ class _DesignsKernelWriter(KernelWriter):
                 self._write_newton_block(part, have)
             else:
                 flags += self._write_closed_form_block(part, have)
+        flags += self._write_stops(have)
         t.write_line("br label %told")
         t.write_label("told")
         self._write_step_end(have, flags)
@@ -163,6 +165,7 @@ class _DesignsKernelWriter(KernelWriter):
         t.write_line("%b = phi i64 [0, %entry], [%bnext, %blockend]")
         self.lane = t.add_instruction(f"mul i64 %b, {t.lanes}")
         have: OperandNames = {("p", k): t.load(self._row_pointer("%p", k)) for k in range(self.symbols["p"].numel())}
+        have |= self.stop_number_names(lambda k: t.load(self._row_pointer("%p", k)))
         have |= {("q", k): t.load(self._row_pointer("%q", k)) for k in range(2 * len(self.links))}
         if self.rates:
             have |= {(f"u{1 + k // count}", k % count): t.load(self._row_pointer("%rate", k)) for k in range(2 * count)}
@@ -219,11 +222,7 @@ class _DesignsKernelWriter(KernelWriter):
         ]
 
     def _write_closed_form_block(self, part: KernelBlock, have: OperandNames) -> list[str]:
-        """A block in closed form; flags that say where its two assemblies keep apart.
-
-        Between steps too: the bend does not reach one, by as much as it bends over the last three steps. So it may be
-        the step before at which a block had come too near.
-        """
+        """A block in closed form; flags that say where its two assemblies keep apart."""
         t = self.ir
         if self.point_blocks is not None:
             self._write_other_assembly(part, have)
@@ -231,14 +230,28 @@ class _DesignsKernelWriter(KernelWriter):
         for k in part.unknowns:
             if self.is_carried(("z", k)):
                 self._write_carried_angle(k, have)
-        slots = self.bend_slots[self.sign_index[part.block.block_index]]
-        before, earlier = (t.load(slot) for slot in slots)
-        for slot, value in zip(slots, (bend, before), strict=True):
-            t.store(value, slot)
-        apart = write_keeps_apart(t, earlier, before, bend, t.broadcast_counter_test("%k", "sgt", 1))
         if self.counts_candidates:
             self.apart_here.append(self.write_apart_here(part, bend, have))
-        return [apart]
+        return [self._write_keeps_below(bend, self.bend_slots[self.sign_index[part.block.block_index]])]
+
+    def _write_keeps_below(self, value: str, slots: Sequence[str]) -> str:
+        """A flag: what reaches one at a dead point or a stop keeps below it, between steps too.
+
+        By as much as it bends over the last three steps. So it may be the step before at which it had come too near.
+        """
+        t = self.ir
+        before, earlier = (t.load(slot) for slot in slots)
+        for slot, new in zip(slots, (value, before), strict=True):
+            t.store(new, slot)
+        return write_keeps_apart(t, earlier, before, value, t.broadcast_counter_test("%k", "sgt", 1))
+
+    def _write_stops(self, have: OperandNames) -> list[str]:
+        """Flags that say which pairs keep off their stops."""
+        t, values = self.ir, self.write_stops(have)
+        if self.counts_candidates:
+            self.apart_here += [t.compare("ole", value, t.constant(1.0)) for value in values]
+        slots = self.bend_slots[len(self.equations.closed_forms) :]
+        return [self._write_keeps_below(*both) for both in zip(values, slots, strict=True)]
 
     def _write_other_assembly(self, part: KernelBlock, have: OperandNames) -> None:
         """Where the block places its points in its other assembly."""

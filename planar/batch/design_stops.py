@@ -1,0 +1,89 @@
+"""The stops of a block's designs where they start: of which designs a march can watch them, and which are outside."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from planar.batch.march.backend import DesignBatch
+from planar.batch.march.checks import pair_positions
+from planar.batch.march.stops import (
+    LEAST_RANGES,
+    SAME_END,
+    SURE_DISTANCE,
+    TURN,
+    StopLimits,
+    are_periodic,
+    stop_limits,
+)
+from planar.batch.reference_design import ReferenceDesign, stack_rows
+from planar.foundation.arrays import Array, BoolArray
+from planar.model.mechanism import Mechanism
+from planar.model.pairs import MeasureKind
+from planar.solving.stops import STOP_TOLERANCE
+
+
+class DesignStops:
+    """The stops of designs at their own inputs u (inputs, designs).
+
+    `limits`: those of pairs that are no inputs, and of the input that runs, inside of which it is. `is_fit` (designs,):
+    whose stops a march can watch; `is_outside` (designs,): of which a pair surely is beyond its stop.
+    """
+
+    def __init__(self, reference: ReferenceDesign, designs: Mechanism, u: Array):
+        self.reference, many = reference, u.shape[1]
+        inputs = [given.pair for given in reference.mechanism.inputs]
+        low, high = (
+            stack_rows([open_ if end is None else end for end in ends], many)
+            for ends, open_ in (
+                ([each.low for each in designs.stops], -np.inf),
+                ([each.high for each in designs.stops], np.inf),
+            )
+        )
+        pairs = [reference.motions[each.pair] for each in designs.stops]
+        periodic = np.array(are_periodic(pairs, reference.mechanism), dtype=bool)
+        scale = np.array([reference.unit if pair.input_kind is MeasureKind.LENGTH else 1.0 for pair in pairs])
+        low, high = low / scale[:, None], high / scale[:, None]
+        low, high = (
+            np.where(periodic[:, None] & np.isinf(low), high - TURN, low),
+            np.where(periodic[:, None] & np.isinf(high), low + TURN, high),
+        )
+        self.is_outside, self.is_fit = np.zeros(many, dtype=bool), np.all(low < high, axis=0)
+        ends = np.full(many, -np.inf), np.full(many, np.inf)
+        for k, pair in enumerate(pairs):
+            if pair.name in inputs:
+                index = inputs.index(pair.name)
+                own = self._watch_input(u[index], low[k], high[k], bool(periodic[k]))
+                ends = own if index == reference.running_index else ends
+        own = [k for k, pair in enumerate(pairs) if pair.name not in inputs]
+        for k in own:
+            least = LEAST_RANGES[0 if periodic[k] else 1]
+            self.is_fit &= high[k] - low[k] >= least
+            # farther it is to be known how many turns there were
+            self.is_fit &= (high[k] - low[k] <= TURN + SURE_DISTANCE) if periodic[k] else True
+        self.limits = stop_limits([pairs[k] for k in own], periodic[own].tolist(), low[own], high[own], ends)
+
+    def _watch_input(self, u: Array, low: Array, high: Array, is_periodic: bool) -> tuple[Array, Array]:
+        """Between which positions an input can go (designs,) from where it is, as `PairStops.turns` has it."""
+        if is_periodic:
+            below, above = np.ceil((low - STOP_TOLERANCE - u) / TURN), np.ceil((u - high - STOP_TOLERANCE) / TURN)
+            turns = TURN * np.where(below > 0.0, below, np.where(above > 0.0, -above, 0.0))
+            low, high = low - turns, high - turns
+        room = np.minimum(u - low, high - u)
+        self.is_outside |= self.is_fit & (room < -SURE_DISTANCE)
+        self.is_fit &= room >= -SAME_END
+        return low, high
+
+    def watch_start(self, batch: DesignBatch, u: Array) -> None:
+        """Look at where other pairs are in the assemblies z0 of a batch at inputs u (inputs, designs)."""
+        if not self.limits.pairs:
+            return
+        some = np.flatnonzero(np.isfinite(batch.z0).all(axis=0) & np.isfinite(u).all(axis=0))
+        own = batch._replace(stops=self.limits).select(some)
+        rooms = self.limits.select(some).find_rooms(pair_positions(own, own.z0, u[:, some])).min(axis=0)
+        self.is_outside[some] |= self.is_fit[some] & (rooms < -SURE_DISTANCE)
+        self.is_fit[some] &= rooms > SURE_DISTANCE
+
+    def have_room(self, u: Array, lengths: Array) -> BoolArray:
+        """Whether the input that runs, at u (designs,), has room for the way that it is to go (designs,)."""
+        rooms = self.limits.input_rooms(u, lengths)
+        return np.asarray((rooms > SURE_DISTANCE) & (self.limits.input_rooms(u, -lengths) >= -SAME_END))
