@@ -111,8 +111,8 @@ def _six_bars(seed: int) -> Mechanism:
 def _with_stops(seed: int) -> Mechanism:
     """A mechanism of another kind, one or two of whose pairs have stops, mostly about where they are."""
     rng = np.random.default_rng([seed, 7])
-    kinds = [_model, _linkage, lambda _: refusals.base(), lambda _: planar.from_dict(SliderCrank().document()), _six_bars]
-    mechanism = kinds[seed % len(kinds)](seed // len(kinds))
+    others = [make for kind, make in KINDS.items() if kind != "stops"]
+    mechanism = others[seed % len(others)](seed // len(others))
     motions = relative_motions(mechanism)
     try:
         solved = planar.solve(mechanism)

@@ -22,7 +22,7 @@ from planar.batch.march.backend import (
     erase_from_steps,
 )
 from planar.batch.march.choice import find_runner
-from planar.batch.march.numpy_backend import NumpyRunner
+from planar.batch.march.numpy.runner import NumpyRunner
 from planar.batch.march.stops import SAME_END
 from planar.batch.reference_design import ReferenceDesign, reference_design
 from planar.codegen.aligned_arrays import allocate_aligned
@@ -222,7 +222,7 @@ class _DesignBlockSolver:
                 out = self._run_own_ranges(march, fit, start.signs, runner)
                 return None if out is None else (self._with_frame_points(out, told, shapes), np.zeros(len(fit), int))
             march, fit = self._lead_to_start(march, fit, start.signs, runner)
-            fit = self._have_room(march, fit)
+            fit = fit if self.stops is None else fit & self.stops.have_room(march, self.range_length)
             out, good, candidates = self._run_fit_designs(runner, march, fit)
             self._end_at_input_stops(march, good, candidates)
         except UnsupportedStructure:
@@ -232,8 +232,7 @@ class _DesignBlockSolver:
         return self._with_frame_points(out, told, shapes), good
 
     def _watch_stops(self, march: DesignBatch, fit: Array) -> DesignBatch:
-        """The march with the stops of its pairs; designs that start outside of them end there, and unclear ones are not
-        fit."""
+        """The march with the stops of its pairs; designs that start outside of them end there, others may be unfit."""
         self.stops = DesignStops(self.reference, self.all_designs, self.u)
         self.stops.watch_start(march, self.u)
         outside = fit & self.stops.is_outside
@@ -241,39 +240,22 @@ class _DesignBlockSolver:
         fit &= self.stops.is_fit & ~outside
         return march._replace(stops=self.stops.limits)
 
-    def _have_room(self, march: DesignBatch, fit: Array) -> Array:
-        """Which designs are fit (designs,) and start inside of the stops of the input that runs."""
-        if self.stops is None:
-            return fit
-        index = self.reference.running_index
-        return np.asarray(fit & self.stops.have_room(march.u0[index], self.range_length))
-
     def _end_at_input_stops(self, march: DesignBatch, good: Array, candidates: Array) -> None:
-        """End designs at a stop of the input that runs, beyond which they would have gone on.
-
-        good, candidates (designs,): see `_follow_to_dead_points`.
-        """
-        if march.stops is None:
+        """End designs at a stop of the input that runs, beyond which they would have gone on."""
+        if self.stops is None:
             return
-        index = self.reference.running_index
-        distances, last = np.abs(march.input_offsets[:, index]), abs(float(march.input_offsets[-1, index]))
-        rooms = march.stops.input_rooms(march.u0[index], self.range_length)
-        # a step at the stop itself is solved
-        ends = rooms < last - SAME_END
-        first = np.where(ends, np.searchsorted(distances, rooms + SAME_END), len(distances))
-        off = np.array([np.abs(distances[np.clip(first - k, 0, len(distances) - 1)] - rooms) for k in (0, 1)])
-        near = ends & ((off > SAME_END) & (off < DEAD_POINT_MARGIN * last)).any(axis=0)
-        some = np.flatnonzero((good > first) & ~near)
+        met = self.stops.find_input_stops(march, self.range_length)
+        some = np.flatnonzero((good > met.solved_steps) & met.is_clear)
         candidates[:] = np.maximum(candidates, good)
-        np.minimum(good, np.maximum(first, 1), out=good, where=good > 0)
-        self.solved_steps[some] = first[some]
-        self._keep_ends(some, rooms[some], np.ones(some.size, dtype=bool))
+        np.minimum(good, met.solved_steps, out=good)
+        self.solved_steps[some] = met.solved_steps[some]
+        self._keep_ends(some, met.distance[some], np.ones(some.size, dtype=bool))
 
     def _run_own_ranges(
         self, march: DesignBatch, fit: Array, signs: Array | None, runner: DesignRunner
     ) -> Array | None:
         """out of designs each of which has a range of its own; None where not all blocks are in closed form."""
-        fit = fit if self.has_own_range else self._have_room(march, fit)
+        fit = fit if self.stops is None or self.has_own_range else fit & self.stops.have_room(march, self.range_length)
         some = np.flatnonzero(fit & (self.range_length != 0.0))
         own = None if signs is None else signs[:, some]
         designs = closed_form_designs(march.select(some), self.reference.running_index, own, runner, self.block.backend)
@@ -360,7 +342,7 @@ class _DesignBlockSolver:
         self._keep_ends(settled, found.distance[found.is_settled], found.stop[found.is_settled] >= 0)
 
     def _keep_ends(self, settled: Array, distance: Array, is_stopped: Array) -> None:
-        """Keep where designs end that were followed so far, rad or sizes: at dead points, or at stops (designs,)."""
+        """Keep where designs end (designs,), rad or sizes from their start: at dead points, or at stops."""
         position = self.start[settled] + np.sign(self.range_length[settled]) * distance * self.scale
         ended = self.solved_steps[settled] <= self.block.steps
         self.dead_point[settled] = np.where(ended & ~is_stopped, position, np.nan)

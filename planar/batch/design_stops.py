@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from planar.batch.march.backend import DesignBatch
@@ -11,15 +13,24 @@ from planar.batch.march.stops import (
     SAME_END,
     SURE_DISTANCE,
     TURN,
-    StopLimits,
     are_periodic,
     stop_limits,
 )
 from planar.batch.reference_design import ReferenceDesign, stack_rows
-from planar.foundation.arrays import Array, BoolArray
 from planar.model.mechanism import Mechanism
 from planar.model.pairs import MeasureKind
 from planar.solving.stops import STOP_TOLERANCE
+
+Array = np.ndarray
+
+
+class InputStops(NamedTuple):
+    """How far inputs are from their stops, rad or sizes, how many steps there are up to these, and whether that is
+    clear, each (designs,)."""
+
+    distance: Array
+    solved_steps: Array
+    is_clear: Array
 
 
 class DesignStops:
@@ -52,8 +63,8 @@ class DesignStops:
         for k, pair in enumerate(pairs):
             if pair.name in inputs:
                 index = inputs.index(pair.name)
-                own = self._watch_input(u[index], low[k], high[k], bool(periodic[k]))
-                ends = own if index == reference.running_index else ends
+                found = self._watch_input(u[index], low[k], high[k], bool(periodic[k]))
+                ends = found if index == reference.running_index else ends
         own = [k for k, pair in enumerate(pairs) if pair.name not in inputs]
         for k in own:
             least = LEAST_RANGES[0 if periodic[k] else 1]
@@ -83,7 +94,20 @@ class DesignStops:
         self.is_outside[some] |= self.is_fit[some] & (rooms < -SURE_DISTANCE)
         self.is_fit[some] &= rooms > SURE_DISTANCE
 
-    def have_room(self, u: Array, lengths: Array) -> BoolArray:
-        """Whether the input that runs, at u (designs,), has room for the way that it is to go (designs,)."""
+    def have_room(self, march: DesignBatch, lengths: Array) -> Array:
+        """Whether the input that runs may begin to go the way that it is to go (designs,) from where a march starts."""
+        u = march.u0[self.reference.running_index]
         rooms = self.limits.input_rooms(u, lengths)
         return np.asarray((rooms > SURE_DISTANCE) & (self.limits.input_rooms(u, -lengths) >= -SAME_END))
+
+    def find_input_stops(self, march: DesignBatch, lengths: Array) -> InputStops:
+        """Where the input that runs meets a stop of its own in a march to either side (designs,); a step at the stop
+        itself is solved."""
+        index = self.reference.running_index
+        distances = np.abs(march.input_offsets[:, index])
+        rooms, last = self.limits.input_rooms(march.u0[index], lengths), distances[-1]
+        ends = rooms < last - SAME_END
+        solved = np.where(ends, np.maximum(np.searchsorted(distances, rooms + SAME_END), 1), len(distances))
+        off = np.array([np.abs(distances[np.clip(solved - k, 0, len(distances) - 1)] - rooms) for k in (0, 1)])
+        unclear = ends & ((off > SAME_END) & (off < SURE_DISTANCE * max(last, 1.0))).any(axis=0)
+        return InputStops(rooms, solved, ~unclear)

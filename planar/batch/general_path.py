@@ -26,7 +26,7 @@ GRID_TOLERANCE = 1e-9
 class SolvedDesign(NamedTuple):
     """One design: positions of the running input (rows,), the points (rows, 2 a point and order; m, s), the status of
     every row, what there is to say of its end (which as text is the sentence), and of rates that are missing or of few
-    digits; where the input is at the dead point that ends it, and at the stop (rad, m), not a number where none does."""
+    digits; where the input is at the dead point or at the stop that ends it (rad, m), not numbers where none does."""
 
     input: Array
     out: Array

@@ -50,8 +50,8 @@ class InputRanges(NamedTuple):
 
 class DeadPoints(NamedTuple):
     """How far designs surely go (designs,), rad or sizes from their start: to a dead point, or infinitely where there
-    is none up to the end; not a number where that is not decided. And the block that ends it, else -1; behind the blocks
-    are the pairs with stops, which end designs alike, and then the input that runs with its own."""
+    is none up to the end; not a number where that is not decided. And the block that ends it, else -1; behind the
+    blocks are the pairs with stops, which end designs alike, and then the input that runs with its own."""
 
     distance: Array
     block: Array

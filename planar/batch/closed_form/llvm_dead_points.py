@@ -22,7 +22,7 @@ from planar.batch.closed_form.dead_points import (
 )
 from planar.batch.closed_form.joined_blocks import LEAST_ARM
 from planar.batch.march.kernel import KernelEquations
-from planar.batch.march.llvm_kernel import KernelWriter, OperandNames
+from planar.batch.march.llvm.kernel_writer import KernelWriter, OperandNames
 from planar.codegen.llvm_trigonometry import write_cos_sin
 
 SEARCH_NAME = "search"

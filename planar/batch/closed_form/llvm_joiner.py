@@ -19,7 +19,7 @@ from planar.batch.closed_form.joined_blocks import (
 from planar.batch.closed_form.llvm_dead_points import MOST_WITHOUT_INTERVALS, SEARCH_NAME, DeadPointWriter
 from planar.batch.march.backend import DesignBatch
 from planar.batch.march.kernel import BareAngle, KernelBlock, KernelEquations
-from planar.batch.march.llvm_kernel import KernelWriter, OperandNames
+from planar.batch.march.llvm.kernel_writer import KernelWriter, OperandNames
 from planar.codegen.instructions import UnsupportedOperation
 from planar.codegen.llvm_compile import compile_function
 from planar.foundation.turns import leave_turn

@@ -41,8 +41,8 @@ Operand = tuple[str, int]
 """A number that the expressions take: which kind of it, and its index.
 
 "z" of an unknown, "zc" and "zs" the cos and sin of an angle; "u", "uc", "us" the same of what is given; "p" the numbers
-of pairs, "q" those of points; "u1", "u2" rates of what is given; "sign" of a block in closed form; "stop" the numbers of
-a pair's stops.
+of pairs, "q" those of points, "stop" those of stops; "u1", "u2" rates of what is given; "sign" of a block in closed
+form.
 """
 
 

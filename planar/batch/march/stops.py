@@ -7,9 +7,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from planar.foundation.arrays import Array, BoolArray
 from planar.model.mechanism import Mechanism, links_counting_turns
 from planar.model.pairs import MeasureKind, Pair
+
+Array = np.ndarray
 
 NUMBERS_PER_STOP = 4
 """Numbers a, b, c, d of a pair's stops: see `StopLimits`."""
@@ -65,7 +66,7 @@ class StopLimits(NamedTuple):
         return positions - self.low if sense > 0.0 else self.high - positions
 
     @property
-    def _periodic_rows(self) -> BoolArray:
+    def _periodic_rows(self) -> Array:
         return np.array(self.is_periodic, dtype=bool)[:, None]
 
     @property
@@ -98,7 +99,7 @@ class StopLimits(NamedTuple):
         """How far the input that runs may go on from where it is (designs,), as it is to go so far to either side."""
         return np.asarray(np.where(lengths >= 0.0, self.input_high - inputs, inputs - self.input_low))
 
-    def is_at_stop(self, positions: Array, stop: Array) -> BoolArray:
+    def is_at_stop(self, positions: Array, stop: Array) -> Array:
         """Whether positions (stops, designs) are where a stop of each design (designs,) is, to rounding of a search."""
         columns = np.arange(positions.shape[1])
         low, high = (self._offsets(positions, sense)[stop, columns] for sense in (1.0, -1.0))

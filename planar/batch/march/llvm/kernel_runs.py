@@ -10,12 +10,12 @@ import numpy as np
 
 from planar.batch.march.backend import CorrectedAssemblies, DesignBatch, erase_between
 from planar.batch.march.kernel import KernelEquations, batch_equations
-from planar.batch.march.llvm_designs import (
+from planar.batch.march.llvm.designs_writer import (
     ARGUMENT_TYPES,
     FUNCTION_NAME,
     write_designs_kernel,
 )
-from planar.batch.march.llvm_kernel import STATE_GIVEN, DesignsKernelLayout, KernelStart
+from planar.batch.march.llvm.kernel_writer import STATE_GIVEN, DesignsKernelLayout, KernelStart
 from planar.batch.march.prediction import (
     LONGEST_STEP,
     PREDICTOR_ORDER,

@@ -16,7 +16,7 @@ from planar.batch.march.kernel import (
     KernelInstructions,
     Operand,
 )
-from planar.batch.march.numpy_systems import newton_step, stack_values
+from planar.batch.march.numpy.systems import newton_step, stack_values
 from planar.batch.march.prediction import MAX_TURN_PER_STEP, PREDICTOR_ORDER, extrapolation_weights
 from planar.batch.march.regularity import LEAST_KERNEL_REGULARITY, LEAST_START_REGULARITY, least_regularity
 from planar.codegen.instructions import UnsupportedOperation, required_values
