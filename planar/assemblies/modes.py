@@ -37,7 +37,8 @@ MAX_CERTIFIED_FOR_CLAIM = 256
 
 @takes_mechanism
 def modes(mechanism: Mechanism, drives: Mapping[str, float] | Sequence[Drive] = (), *, certify: bool = True) -> Modes:
-    """Every real assembly of a mechanism at its inputs.
+    """Every real assembly of a mechanism at its inputs, in an order that its stops do not change: those beyond one
+    are listed too, with the outcome "stop" (`Mode.is_beyond_stop`), and are refused where a motion is to start.
 
     `drives` change inputs, as {pair: position} (rad or m). With `certify` every assembly is proved by intervals, group
     after group: dimensions, inputs and the groups before it are taken as the floats they are. It needs python-flint.
@@ -351,6 +352,11 @@ class Mode:
     def reason(self) -> str:
         """Why there is no state; empty where there is one."""
         return self._state_or_refusal.reason if isinstance(self._state_or_refusal, NoAnswer) else ""
+
+    @property
+    def is_beyond_stop(self) -> bool:
+        """Whether a pair lies beyond its stop: the assembly is there by the dimensions, but not to be had or run."""
+        return not self._solver.is_inside_stops(self.z)
 
     @property
     def shapes(self) -> dict[str, LinkShape]:

@@ -7,12 +7,12 @@ import pytest
 
 import planar
 from planar.batch.march import kernel
-from planar.batch.march.llvm import designs_writer, kernel_runs
-from planar.batch.march.numpy import runner as numpy_runner
 from planar.batch.march.backend import DesignBatch, UnsupportedStructure
 from planar.batch.march.kernel import BareAngle, kernel_equations
+from planar.batch.march.llvm import designs_writer, kernel_runs
 from planar.batch.march.llvm.kernel_runs import designs_kernel
 from planar.batch.march.llvm.runner import LLVMRunner
+from planar.batch.march.numpy import runner as numpy_runner
 from planar.batch.march.numpy.runner import NumpyRunner
 from planar.batch.reference_design import reference_design
 from planar.codegen import instructions, llvm_compile, numpy_code
