@@ -18,7 +18,7 @@ from planar.batch.march.stops import (
 )
 from planar.batch.reference_design import ReferenceDesign, stack_rows
 from planar.model.mechanism import Mechanism
-from planar.model.pairs import MeasureKind
+from planar.model.pairs import MeasureKind, Pair
 from planar.solving.stops import STOP_TOLERANCE
 
 Array = np.ndarray
@@ -33,6 +33,27 @@ class InputStops(NamedTuple):
     is_clear: Array
 
 
+def stop_ranges(reference: ReferenceDesign, designs: Mechanism, many: int) -> tuple[list[Pair], Array, Array, Array]:
+    """The pairs with stops, which of them are angles that do not count turns (stops,), and between which positions they
+    can go (stops, designs), in sizes and rad; infinite where open, of such angles a turn on."""
+    low, high = (
+        stack_rows([open_ if end is None else end for end in ends], many)
+        for ends, open_ in (
+            ([each.low for each in designs.stops], -np.inf),
+            ([each.high for each in designs.stops], np.inf),
+        )
+    )
+    pairs = [reference.motions[each.pair] for each in designs.stops]
+    periodic = np.array(are_periodic(pairs, reference.mechanism), dtype=bool)
+    scale = np.array([reference.unit if pair.input_kind is MeasureKind.LENGTH else 1.0 for pair in pairs])
+    low, high = low / scale[:, None], high / scale[:, None]
+    low, high = (
+        np.where(periodic[:, None] & np.isinf(low), high - TURN, low),
+        np.where(periodic[:, None] & np.isinf(high), low + TURN, high),
+    )
+    return pairs, periodic, low, high
+
+
 class DesignStops:
     """The stops of designs at their own inputs u (inputs, designs).
 
@@ -43,21 +64,7 @@ class DesignStops:
     def __init__(self, reference: ReferenceDesign, designs: Mechanism, u: Array):
         self.reference, many = reference, u.shape[1]
         inputs = [given.pair for given in reference.mechanism.inputs]
-        low, high = (
-            stack_rows([open_ if end is None else end for end in ends], many)
-            for ends, open_ in (
-                ([each.low for each in designs.stops], -np.inf),
-                ([each.high for each in designs.stops], np.inf),
-            )
-        )
-        pairs = [reference.motions[each.pair] for each in designs.stops]
-        periodic = np.array(are_periodic(pairs, reference.mechanism), dtype=bool)
-        scale = np.array([reference.unit if pair.input_kind is MeasureKind.LENGTH else 1.0 for pair in pairs])
-        low, high = low / scale[:, None], high / scale[:, None]
-        low, high = (
-            np.where(periodic[:, None] & np.isinf(low), high - TURN, low),
-            np.where(periodic[:, None] & np.isinf(high), low + TURN, high),
-        )
+        pairs, periodic, low, high = stop_ranges(reference, designs, many)
         self.is_outside, self.is_fit = np.zeros(many, dtype=bool), np.all(low < high, axis=0)
         ends = np.full(many, -np.inf), np.full(many, np.inf)
         for k, pair in enumerate(pairs):
