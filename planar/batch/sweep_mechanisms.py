@@ -27,6 +27,7 @@ from planar.batch.mechanisms.parts import (
     read_mechanisms,
 )
 from planar.batch.mechanisms.results import Each, PointMapping, Swept, SweptList, SweptPart
+from planar.batch.mechanisms.stop_checks import FirstStop, find_first_stop
 from planar.batch.pinned.march import FULL_TURN, REFINEMENT, make_values, step_division
 from planar.batch.pinned.results import PinnedPart, join_parts
 from planar.batch.pinned.solve import solve_pinned
@@ -321,7 +322,8 @@ def _run_attempt(
         attempt.verdict_only,
     )
     orders = 3 if request.rates else 1
-    out = told.out[:, :, : len(gone) : finer].reshape(len(told.out), orders, 2, steps + 1)
+    fine = told.out.reshape(len(told.out), orders, 2, -1)
+    out = fine[..., : len(gone) : finer]
     if finer > 1:
         out = np.ascontiguousarray(out)
     out = out.transpose(0, 1, 3, 2)
@@ -332,11 +334,23 @@ def _run_attempt(
     inputs = group.start[some][:, None] + grid
     come, dead = told.good_steps.tolist(), told.ends_in_dead_point.tolist()
     for k, one in enumerate(some.tolist()):
-        names = group.names[one]
-        own = out[first : first + len(names)]
-        first += len(names)
-        status, reason, good = solved, "", come[k]
-        if good < len(gone):
+        names, watched = group.names[one], group.watched[one]
+        own, places = out[first : first + len(names)], fine[first + len(names) :, 0]
+        first += len(names) + 2 * len(watched)
+        status, reason, good, met = solved, "", come[k], None
+        if watched and good:
+            met = _first_stop(group, one, places[..., :good], gone[:good], request)
+            if met is None or (met.step is None and good < len(gone)):
+                continue  # beside a dead point it is not clear which comes first
+            good = good if met.step is None else met.step
+        if met is not None and met.step is not None:
+            row = (good - 1) // finer + 1
+            own[:, :, row:] = np.nan
+            status = np.zeros(steps + 1, dtype=np.int8)
+            status[row:] = OUTCOMES.index(Outcome.STOP)
+            near = group.start[one] + gone[max(good - 1, 0) : good + 1]
+            reason = f"{met.reason}, at an input of {near[0]:.6g} to {near[-1]:.6g} rad"
+        elif good < len(gone):
             if not dead[k]:
                 continue
             row = (good - 1) // finer + 1
@@ -351,6 +365,14 @@ def _run_attempt(
         number = int(group.numbers[one])
         found[number] = Swept(position, velocity, acceleration, inputs[k], status, reason, False)
     return found
+
+
+def _first_stop(group: LinkageGroup, one: int, places: Array, gone: Array, request: SweepRequest) -> FirstStop | None:
+    """See `find_first_stop`; places (two a link, and more, 2, steps) where the input has gone so far (steps,)."""
+    mechanism, at = group.mechanisms[one], np.moveaxis(places, 1, 2)
+    pair = mechanism.inputs[running_input_index(mechanism, request.pair, "inputs")].pair
+    found = {link: (at[2 * k], at[2 * k + 1]) for k, link in enumerate(group.watched[one])}
+    return find_first_stop(mechanism, float(group.arrays.unit[one]), pair, group.start[one] + gone, found)
 
 
 def _solve_with_general_path(mechanism: Mechanism, request: SweepRequest) -> Swept:
