@@ -15,6 +15,7 @@ from planar.batch.executor import in_order, run_tasks, thread_count
 from planar.batch.general_path import OUTCOMES, solve_design
 from planar.batch.march.choice import available_backends
 from planar.batch.mechanisms.block_runner import BlockRunner, find_block_runner
+from planar.batch.mechanisms.endings import find_ending
 from planar.batch.mechanisms.initial_assembly import StartAssemblies, find_start_assemblies
 from planar.batch.mechanisms.linkage_groups import LinkageGroup, SweepRequest, linkage_group, wanted_points
 from planar.batch.mechanisms.march import run_linkages
@@ -27,7 +28,6 @@ from planar.batch.mechanisms.parts import (
     read_mechanisms,
 )
 from planar.batch.mechanisms.results import Each, PointMapping, Swept, SweptList, SweptPart
-from planar.batch.mechanisms.stop_checks import FirstStop, find_first_stop
 from planar.batch.pinned.march import FULL_TURN, REFINEMENT, make_values, step_division
 from planar.batch.pinned.results import PinnedPart, join_parts
 from planar.batch.pinned.solve import solve_pinned
@@ -322,7 +322,7 @@ def _run_attempt(
         attempt.verdict_only,
     )
     orders = 3 if request.rates else 1
-    fine = told.out.reshape(len(told.out), orders, 2, -1)
+    fine = told.out.reshape(len(told.out), orders, 2, told.out.shape[2])
     out = fine[..., : len(gone) : finer]
     if finer > 1:
         out = np.ascontiguousarray(out)
@@ -332,47 +332,24 @@ def _run_attempt(
     solved = np.zeros(steps + 1, dtype=np.int8)
     solved.flags.writeable = False
     inputs = group.start[some][:, None] + grid
-    come, dead = told.good_steps.tolist(), told.ends_in_dead_point.tolist()
     for k, one in enumerate(some.tolist()):
-        names, watched = group.names[one], group.watched[one]
-        own, places = out[first : first + len(names)], fine[first + len(names) :, 0]
-        first += len(names) + 2 * len(watched)
-        status, reason, good, met = solved, "", come[k], None
-        if watched and good:
-            met = _first_stop(group, one, places[..., :good], gone[:good], request)
-            if met is None or (met.step is None and good < len(gone)):
-                continue  # beside a dead point it is not clear which comes first
-            good = good if met.step is None else met.step
-        if met is not None and met.step is not None:
-            row = (good - 1) // finer + 1
+        names, watched = group.names[one], 2 * len(group.watched[one])
+        own, places = out[first : first + len(names)], fine[first + len(names) :, 0][:watched]
+        first += len(names) + watched
+        ending = find_ending(group, one, told, k, places, gone, request)
+        if ending is None:
+            continue
+        status = solved
+        if ending.outcome is not Outcome.SOLVED:
+            row = (ending.solved_steps - 1) // finer + 1
             own[:, :, row:] = np.nan
             status = np.zeros(steps + 1, dtype=np.int8)
-            status[row:] = OUTCOMES.index(Outcome.STOP)
-            near = group.start[one] + gone[max(good - 1, 0) : good + 1]
-            reason = f"{met.reason}, at an input of {near[0]:.6g} to {near[-1]:.6g} rad"
-        elif good < len(gone):
-            if not dead[k]:
-                continue
-            row = (good - 1) // finer + 1
-            own[:, :, row:] = np.nan
-            status = np.zeros(steps + 1, dtype=np.int8)
-            status[row:] = OUTCOMES.index(Outcome.DEAD_POINT)
-            near = group.start[one] + gone[good - 1 : good + 1]
-            links = group.links_of_block(int(told.dead_point_block[k]))
-            reason = f"links {links} come to a dead point at an input of {near[0]:.6g} to {near[1]:.6g} rad"
+            status[row:] = OUTCOMES.index(ending.outcome)
         parts = [PointMapping(names, own[:, order]) for order in range(orders)]
         position, velocity, acceleration = parts if request.rates else (parts[0], None, None)
         number = int(group.numbers[one])
-        found[number] = Swept(position, velocity, acceleration, inputs[k], status, reason, False)
+        found[number] = Swept(position, velocity, acceleration, inputs[k], status, ending.reason, False)
     return found
-
-
-def _first_stop(group: LinkageGroup, one: int, places: Array, gone: Array, request: SweepRequest) -> FirstStop | None:
-    """See `find_first_stop`; places (two a link, and more, 2, steps) where the input has gone so far (steps,)."""
-    mechanism, at = group.mechanisms[one], np.moveaxis(places, 1, 2)
-    pair = mechanism.inputs[running_input_index(mechanism, request.pair, "inputs")].pair
-    found = {link: (at[2 * k], at[2 * k + 1]) for k, link in enumerate(group.watched[one])}
-    return find_first_stop(mechanism, float(group.arrays.unit[one]), pair, group.start[one] + gone, found)
 
 
 def _solve_with_general_path(mechanism: Mechanism, request: SweepRequest) -> Swept:
