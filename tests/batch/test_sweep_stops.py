@@ -94,8 +94,7 @@ def test_designs_with_stops_are_what_the_general_path_finds(name, stops, pair, s
     if not stops or stops[0][0] not in motions:
         stops = [(each, at - 0.2, at + 0.25) for each, at in positions(mechanism)]
     mechanism = replace(mechanism, stops=tuple(Stops(*each) for each in stops))
-    swept = agrees_with_general_path(mechanism, designs_around(mechanism, 0.01, 4), 48, pair, start, stop)
-    print(name, swept.general, np.bincount(swept.status[:, -1]))
+    agrees_with_general_path(mechanism, designs_around(mechanism, 0.01, 4), 48, pair, start, stop)
 
 
 def positions(mechanism):
@@ -103,3 +102,19 @@ def positions(mechanism):
     state, inputs = planar.solve(mechanism), {given.pair for given in mechanism.inputs}
     names = [name for name in relative_motions(mechanism) if name not in inputs]
     return [(name, next(iter(state.pair(name).values()))) for name in names[-2:]]
+
+
+def test_mechanisms_of_one_list_end_at_their_stops():
+    base = planar.load("four-bar")
+    cases = [
+        replace(base, stops=(Stops("D", low, high),))
+        for low, high in ((1.0, 1.9), (None, 1.8), (1.72, 3.0), (2.0, 3.0), (-4.0, 1.5))
+    ]
+    found = planar.sweep_each(cases, 72)
+    for mechanism, each in zip(cases, found, strict=True):
+        grid = np.asarray(each.input)
+        alone = solve_design(mechanism, "A", grid, 72, (float(grid[0]), float(grid[-1])), ("C",), False)
+        np.testing.assert_array_equal(each.status, alone.status)
+        np.testing.assert_allclose(each.position["C"], alone.out, atol=1e-12)
+    assert not all(each.general for each in found)
+    assert "pair 'D' meets its upper stop at 108.862 deg, at an input of" in found[0].reason
