@@ -69,8 +69,8 @@ def prepared(
     """A mechanism made ready to be run over and over; calling what is returned solves it for one design after another.
 
     See `planar.sweep` for what is taken, and raised: this is a sweep of one design at a time, without its preparations.
-    With llvmlite a run takes some microseconds, of whatever design, also of one that cannot be assembled or comes to a
-    dead point; what the compiled code is not sure of goes through `planar.sweep`.
+    With llvmlite a run takes some microseconds, of whatever design, also of one that cannot be assembled, comes to a
+    dead point or meets a stop; what the compiled code is not sure of goes through `planar.sweep`.
 
     >>> import planar
     >>> planar.prepared(planar.load("four-bar"), 12, "C")
