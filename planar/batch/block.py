@@ -11,7 +11,7 @@ from planar.batch.closed_form.ends import closed_form_designs, find_ends
 from planar.batch.closed_form.own_ranges import run_between_limits
 from planar.batch.dead_point_tracking import DEAD_POINT_MARGIN, FollowedDesigns, follow_to_dead_points
 from planar.batch.design_arrays import values_of_design, with_design_values
-from planar.batch.design_stops import DesignStops
+from planar.batch.design_stops import DesignStops, StepRunner
 from planar.batch.general_path import OUTCOMES, DesignQuestion, solve_design
 from planar.batch.initial_assembly import find_assemblies, given_assemblies
 from planar.batch.march.backend import (
@@ -193,10 +193,8 @@ class _DesignBlockSolver:
             self.endings[code] = many + 1, first
 
     def _run_with_backend(self, is_common: bool) -> tuple[Array, Array] | None:
-        """out (m, s), and how many of the first steps passed; None where no backend can run the structure.
-
-        `is_common`: whether all inputs go equally far.
-        """
+        """out (m, s), and how many of the first steps passed, whether all go equally far (`is_common`) or not; None
+        where no backend can run the structure."""
         block, base_, runner = self.block, self.reference, find_runner(self.block.backend)
         shapes = base_.shapes(self.all_designs)
         p = base_.pair_numbers(shapes, self.design_count, self.all_designs)
@@ -223,7 +221,8 @@ class _DesignBlockSolver:
                 return None if out is None else (self._with_frame_points(out, told, shapes), np.zeros(len(fit), int))
             march, fit = self._lead_to_start(march, fit, start.signs, runner)
             fit = fit if self.stops is None else fit & self.stops.have_room(march, self.range_length)
-            out, good, candidates = self._run_fit_designs(runner, march, fit)
+            own = runner if self.stops is None else self.stops.shorten_runs(runner, march, self.range_length, fit)
+            out, good, candidates = self._run_fit_designs(own, march, fit)
             self._end_at_input_stops(march, good, candidates)
         except UnsupportedStructure:
             return None
@@ -289,7 +288,7 @@ class _DesignBlockSolver:
             self.out = allocate_aligned(block.steps + 1, rows, self.design_count, block.dtype)
         return self.out
 
-    def _run_fit_designs(self, runner: DesignRunner, march: DesignBatch, fit: Array) -> tuple[Array, Array, Array]:
+    def _run_fit_designs(self, runner: StepRunner, march: DesignBatch, fit: Array) -> tuple[Array, Array, Array]:
         """out, good and candidates of all designs, of which only the fit ones are run."""
         out, candidates = self._own_output(march), np.zeros(self.design_count, dtype=int)
         if fit.mean() > RUN_ALL_RATIO:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from planar.batch.march.backend import DesignBatch
+from planar.batch.march.backend import DesignBatch, DesignRunner
 from planar.batch.march.checks import pair_positions
 from planar.batch.march.stops import (
     LEAST_RANGES,
@@ -22,6 +22,9 @@ from planar.model.pairs import MeasureKind, Pair
 from planar.solving.stops import STOP_TOLERANCE
 
 Array = np.ndarray
+
+STEPS_BEYOND_STOP = 3
+"""Steps beyond the stop of an input that are looked at, so that it is sure how it comes there."""
 
 
 class InputStops(NamedTuple):
@@ -118,3 +121,30 @@ class DesignStops:
         off = np.array([np.abs(distances[np.clip(solved - k, 0, len(distances) - 1)] - rooms) for k in (0, 1)])
         unclear = ends & ((off > SAME_END) & (off < SURE_DISTANCE * max(last, 1.0))).any(axis=0)
         return InputStops(rooms, solved, ~unclear)
+
+    def shorten_runs(self, runner: DesignRunner, march: DesignBatch, lengths: Array, fit: Array) -> StepRunner:
+        """What runs a march as far as the input can go in any design that is fit (designs,)."""
+        if not fit.any():
+            return runner
+        needed = int(self.find_input_stops(march, lengths).solved_steps[fit].max()) + STEPS_BEYOND_STOP
+        return ShortenedRunner(runner, needed) if needed < len(march.input_offsets) else runner
+
+
+class StepRunner(Protocol):
+    """What runs the designs of a batch through all steps: of a `DesignRunner` that alone."""
+
+    def run(self, batch: DesignBatch, out: Array, candidates: Array | None = None) -> Array:
+        """See `DesignRunner`."""
+
+
+class ShortenedRunner:
+    """A runner that stops after so many steps; see `DesignRunner`."""
+
+    def __init__(self, runner: DesignRunner, step_count: int):
+        self.runner, self.step_count = runner, step_count
+
+    def run(self, batch: DesignBatch, out: Array, candidates: Array | None = None) -> Array:
+        """See `DesignRunner`."""
+        out[self.step_count :] = np.nan
+        own = batch._replace(input_offsets=batch.input_offsets[: self.step_count])
+        return self.runner.run(own, out[: self.step_count], candidates)
