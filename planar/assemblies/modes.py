@@ -37,8 +37,7 @@ MAX_CERTIFIED_FOR_CLAIM = 256
 
 @takes_mechanism
 def modes(mechanism: Mechanism, drives: Mapping[str, float] | Sequence[Drive] = (), *, certify: bool = True) -> Modes:
-    """Every real assembly of a mechanism at its inputs, in an order that its stops do not change: those beyond one
-    are listed too, with the outcome "stop" (`Mode.is_beyond_stop`), and are refused where a motion is to start.
+    """Every real assembly of a mechanism at its inputs; one beyond a stop is listed too, with the outcome "stop".
 
     `drives` change inputs, as {pair: position} (rad or m). With `certify` every assembly is proved by intervals, group
     after group: dimensions, inputs and the groups before it are taken as the floats they are. It needs python-flint.
@@ -235,10 +234,9 @@ class Modes(Displayable, Sequence["Mode"]):
         if moving:
             return NoAnswer(
                 Outcome.CHANGE_POINT,
-                f"{self._solver.describe_position()} {join_all_names(moving)} can move while the inputs are "
-                "held; what comes after does not "
-                f"go together with the places of theirs that were tried, but may with others: move the input, or give "
-                f"one more",
+                f"{self._solver.describe_position()} {join_all_names(moving)} can move while the inputs are held; what "
+                "comes after does not go together with the places of theirs that were tried, but may with others: move "
+                "the input, or give one more",
             )
         try:
             self._solver.state(self._solver.find_assembly().z)
@@ -355,7 +353,7 @@ class Mode:
 
     @property
     def is_beyond_stop(self) -> bool:
-        """Whether a pair lies beyond its stop: the assembly is there by the dimensions, but not to be had or run."""
+        """Whether a pair is beyond its stop: no motion starts there, though the dimensions allow the assembly."""
         return not self._solver.is_inside_stops(self.z)
 
     @property

@@ -118,3 +118,34 @@ def test_mechanisms_of_one_list_end_at_their_stops():
         np.testing.assert_allclose(each.position["C"], alone.out, atol=1e-12)
     assert not all(each.general for each in found)
     assert "pair 'D' meets its upper stop at 108.862 deg, at an input of" in found[0].reason
+
+
+def test_the_input_ends_at_its_own_stop_and_a_range_up_to_it_is_whole():
+    base = MODELS["crank-rocker"]
+    mechanism = replace(base, stops=(Stops("A0", 0.2, 2.0),))
+    designs = designs_around(mechanism, 0.02, 6)
+    whole = agrees_with_general_path(mechanism, designs, 30, start=0.2, stop=2.0)
+    assert whole.general == 0
+    assert whole.whole.all()
+    back = agrees_with_general_path(mechanism, designs, 30, start=2.0, stop=-1.0)
+    assert back.general == 0
+    np.testing.assert_allclose(back.stop_position, 0.2, atol=1e-12)
+    outside = agrees_with_general_path(replace(base, stops=(Stops("A0", -3.0, -1.0),)), designs, 30)
+    assert outside.general == 0
+    assert np.all(np.asarray(outside.status) == STOP)
+
+
+def test_prepared_runs_end_at_stops_in_their_compiled_code(monkeypatch):
+    pytest.importorskip("llvmlite")
+    base = four_bar(CRANK, COUPLER, ROCKER, GROUND, 0.8)
+    for stops, ends in (((Stops("D", 0.2, 1.9),), True), ((Stops("D", 0.2, 3.0),), False)):
+        mechanism = replace(base, stops=stops)
+        ready = planar.prepared(mechanism, 90, "C")
+        with monkeypatch.context() as alone:
+            alone.setattr(type(ready), "_run_as_sweep", lambda *_: pytest.fail("it went through a sweep"))
+            found = [ready({"AB.length": length}) for length in (0.28, 0.3, 0.33)]
+        swept = planar.sweep(mechanism, {"AB.length": [0.28, 0.3, 0.33]}, 90, "C", backend="numpy")
+        for k, each in enumerate(found):
+            np.testing.assert_array_equal(each.status, swept.status[k])
+            np.testing.assert_allclose(each.position["C"], swept.position["C"][k], atol=1e-12)
+            assert bool(each.status[-1] == STOP) is ends
