@@ -70,8 +70,8 @@ def spent(structure: str) -> dict[str, float]:
     """Seconds of each step in this process, which has the structure's equations."""
     import planar
     from planar.batch.march.kernel import kernel_equations
-    from planar.batch.march.llvm_designs import ARGUMENT_TYPES, FUNCTION_NAME
-    from planar.batch.march.llvm_runner import designs_kernel
+    from planar.batch.march.llvm.designs_writer import ARGUMENT_TYPES, FUNCTION_NAME
+    from planar.batch.march.llvm.kernel_runs import designs_kernel
     from planar.codegen import llvm_compile
     from planar.equations.functions import equation_functions
     from planar.equations.mechanism_numbers import equation_structure as of

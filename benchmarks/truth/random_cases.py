@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
@@ -14,7 +14,9 @@ from benchmarks.linkages import SliderCrank
 from benchmarks.swept import SWEPT
 from planar.batch.design_arrays import design_variables
 from planar.document.files import model_files
-from planar.model.mechanism import Mechanism
+from planar.model.mechanism import Mechanism, relative_motions
+from planar.model.pairs import MeasureKind
+from planar.model.stops import Stops
 from tests.linkages import random_linkage
 
 Array = np.ndarray
@@ -106,10 +108,35 @@ def _six_bars(seed: int) -> Mechanism:
     return planar.from_dict(SWEPT[1 + seed % (len(SWEPT) - 1)].document())
 
 
+def _with_stops(seed: int) -> Mechanism:
+    """A mechanism of another kind, one or two of whose pairs have stops, mostly about where they are."""
+    rng = np.random.default_rng([seed, 7])
+    others = [make for kind, make in KINDS.items() if kind != "stops"]
+    mechanism = others[seed % len(others)](seed // len(others))
+    motions = relative_motions(mechanism)
+    try:
+        solved = planar.solve(mechanism)
+    except planar.NoAnswer as problem:
+        raise planar.BadInput("stops", str(problem)) from None
+    stops = []
+    for name in rng.permutation(sorted(motions))[: int(rng.integers(1, 3))].tolist():
+        at = float(next(iter(solved.pair(name).values())) or 0.0)
+        size = 1.0 if motions[name].input_kind is MeasureKind.ANGLE else max(abs(at), 1e-3)
+        low, high = (size * float(rng.choice([0.1, 1.0, 4.0])) * rng.uniform(-0.1, 1.0) for _ in range(2))
+        if low + high <= 0.02 * size:
+            low, high = abs(low) + 0.1 * size, abs(high)
+        ends: list[float | None] = [at - low, at + high]
+        if rng.random() < 0.4:
+            ends[int(rng.integers(2))] = None
+        stops.append(Stops(name, *ends))
+    return replace(mechanism, stops=tuple(stops))
+
+
 KINDS: dict[str, Callable[[int], Mechanism]] = {
     "models": _model,
     "linkages": _linkage,
     "four-bars": lambda _: refusals.base(),
     "slider-cranks": lambda _: planar.from_dict(SliderCrank().document()),
     "six-bars": _six_bars,
+    "stops": _with_stops,
 }

@@ -37,7 +37,7 @@ MAX_CERTIFIED_FOR_CLAIM = 256
 
 @takes_mechanism
 def modes(mechanism: Mechanism, drives: Mapping[str, float] | Sequence[Drive] = (), *, certify: bool = True) -> Modes:
-    """Every real assembly of a mechanism at its inputs.
+    """Every real assembly of a mechanism at its inputs; one beyond a stop is listed too, with the outcome "stop".
 
     `drives` change inputs, as {pair: position} (rad or m). With `certify` every assembly is proved by intervals, group
     after group: dimensions, inputs and the groups before it are taken as the floats they are. It needs python-flint.
@@ -234,10 +234,9 @@ class Modes(Displayable, Sequence["Mode"]):
         if moving:
             return NoAnswer(
                 Outcome.CHANGE_POINT,
-                f"{self._solver.describe_position()} {join_all_names(moving)} can move while the inputs are "
-                "held; what comes after does not "
-                f"go together with the places of theirs that were tried, but may with others: move the input, or give "
-                f"one more",
+                f"{self._solver.describe_position()} {join_all_names(moving)} can move while the inputs are held; what "
+                "comes after does not go together with the places of theirs that were tried, but may with others: move "
+                "the input, or give one more",
             )
         try:
             self._solver.state(self._solver.find_assembly().z)
@@ -351,6 +350,11 @@ class Mode:
     def reason(self) -> str:
         """Why there is no state; empty where there is one."""
         return self._state_or_refusal.reason if isinstance(self._state_or_refusal, NoAnswer) else ""
+
+    @property
+    def is_beyond_stop(self) -> bool:
+        """Whether a pair is beyond its stop: no motion starts there, though the dimensions allow the assembly."""
+        return not self._solver.is_inside_stops(self.z)
 
     @property
     def shapes(self) -> dict[str, LinkShape]:

@@ -11,6 +11,7 @@ from planar.batch.closed_form.ends import closed_form_designs, find_ends
 from planar.batch.closed_form.own_ranges import run_between_limits
 from planar.batch.dead_point_tracking import DEAD_POINT_MARGIN, FollowedDesigns, follow_to_dead_points
 from planar.batch.design_arrays import values_of_design, with_design_values
+from planar.batch.design_stops import DesignStops, StepRunner
 from planar.batch.general_path import OUTCOMES, DesignQuestion, solve_design
 from planar.batch.initial_assembly import find_assemblies, given_assemblies
 from planar.batch.march.backend import (
@@ -21,7 +22,8 @@ from planar.batch.march.backend import (
     erase_from_steps,
 )
 from planar.batch.march.choice import find_runner
-from planar.batch.march.numpy_backend import NumpyRunner
+from planar.batch.march.numpy.runner import NumpyRunner
+from planar.batch.march.stops import SAME_END
 from planar.batch.reference_design import ReferenceDesign, reference_design
 from planar.codegen.aligned_arrays import allocate_aligned
 from planar.foundation.errors import NoAnswer, Outcome
@@ -63,7 +65,8 @@ class SolvedDesigns(NamedTuple):
     status (designs, steps + 1); positions of the running input (steps + 1,) or (designs, steps + 1); how many positions
     the general path solved, how many designs it was given; by outcome how many designs ended so, and what is said of
     one, which as text is its sentence: by that of what is solved, how many lack rates, or digits of them. dead_point
-    (designs,): where the running input is at the dead point that ends a design (rad, m), not a number where none does.
+    (designs,): where the running input is at the dead point that ends a design (rad, m), not a number where none does;
+    stop_position (designs,): the same of the stop that a pair meets.
     """
 
     out: Array
@@ -73,6 +76,7 @@ class SolvedDesigns(NamedTuple):
     general_designs: int
     endings: tuple[tuple[int, int, str | DesignQuestion | NoAnswer], ...]
     dead_point: Array
+    stop_position: Array
 
 
 def solve_design_block(block: DesignBlock, out: Array | None = None) -> SolvedDesigns:
@@ -104,7 +108,10 @@ class _DesignBlockSolver:
         "how many steps are solved of a design that was followed to its end, or to a dead point"
         self.general_positions, self.followed_designs = 0, 0
         self.endings: dict[int, tuple[int, str | DesignQuestion | NoAnswer]] = {}
-        self.dead_point = np.full(self.design_count, np.nan)
+        self.dead_point, self.stop_position = (np.full(self.design_count, np.nan) for _ in range(2))
+        self.stops: DesignStops | None = None
+        self.is_stopped = np.zeros(self.design_count, dtype=bool)
+        "which designs are ended by a stop, of those that were followed"
         self.limits = np.full((2, self.design_count), np.nan)
         "between which inputs run that have a range of their own, rad or sizes"
         self.failed_block = np.full(self.design_count, -1)
@@ -126,6 +133,7 @@ class _DesignBlockSolver:
         ended = (self.solved_steps >= 0) & (good <= block.steps)
         solved, code = np.where(ended, self.solved_steps, good), np.zeros(self.design_count, dtype=np.int8)
         code[ended & (solved <= block.steps)] = status_code(Outcome.DEAD_POINT)
+        code[ended & (solved <= block.steps) & self.is_stopped] = status_code(Outcome.STOP)
         failed = ~ended & (good == 0) & (self.failed_block >= 0)
         code[failed] = status_code(Outcome.CANNOT_BE_ASSEMBLED)
         if any(self.reference.point_member(name)[0] == self.reference.mechanism.frame for name in block.points):
@@ -144,7 +152,8 @@ class _DesignBlockSolver:
             self._solve_alone(int(index), out, status, inputs)
         sent = int(rest.size) + self.followed_designs
         endings = tuple((each, *self.endings[each]) for each in self.endings)
-        return SolvedDesigns(out, status, inputs, self.general_positions, sent, endings, self.dead_point)
+        ends = self.dead_point, self.stop_position
+        return SolvedDesigns(out, status, inputs, self.general_positions, sent, endings, *ends)
 
     def _input_positions(self, same: bool) -> Array:
         """Where the running input is at each step (steps + 1,), or (designs, steps + 1); unknown yet of own ranges."""
@@ -170,6 +179,7 @@ class _DesignBlockSolver:
         """Solve a design by the general path."""
         told = solve_design(*self._question(index, inputs), self.block.points, self.block.rates)
         out[:, :, index], status[index], self.dead_point[index] = told.out, told.status, told.dead_point
+        self.stop_position[index] = told.stop_position
         if self.has_own_range:
             inputs[index] = told.input
         self.general_positions += int(np.sum(told.status == 0))
@@ -183,10 +193,8 @@ class _DesignBlockSolver:
             self.endings[code] = many + 1, first
 
     def _run_with_backend(self, is_common: bool) -> tuple[Array, Array] | None:
-        """out (m, s), and how many of the first steps passed; None where no backend can run the structure.
-
-        `is_common`: whether all inputs go equally far.
-        """
+        """out (m, s), and how many of the first steps passed, whether all go equally far (`is_common`) or not; None
+        where no backend can run the structure."""
         block, base_, runner = self.block, self.reference, find_runner(self.block.backend)
         shapes = base_.shapes(self.all_designs)
         p = base_.pair_numbers(shapes, self.design_count, self.all_designs)
@@ -205,22 +213,48 @@ class _DesignBlockSolver:
         offsets[:, base_.running_index] = np.linspace(0.0, self.range_length[0] / self.scale, block.steps + 1)
         march = base_.design_batch(shapes, p, (u0, self.u1, self.u2), moving.values(), block.rates)
         march = march._replace(z0=start.z, signs=start.signs, input_offsets=offsets)
+        if base_.mechanism.stops:
+            march = self._watch_stops(march, fit)
         try:
             if not is_common:
                 out = self._run_own_ranges(march, fit, start.signs, runner)
                 return None if out is None else (self._with_frame_points(out, told, shapes), np.zeros(len(fit), int))
             march, fit = self._lead_to_start(march, fit, start.signs, runner)
-            out, good, candidates = self._run_fit_designs(runner, march, fit)
+            fit = fit if self.stops is None else fit & self.stops.have_room(march, self.range_length)
+            own = runner if self.stops is None else self.stops.shorten_runs(runner, march, self.range_length, fit)
+            out, good, candidates = self._run_fit_designs(own, march, fit)
+            self._end_at_input_stops(march, good, candidates)
         except UnsupportedStructure:
             return None
         self._follow_to_dead_points(march, out, (good, candidates), start.signs, runner)
         erase_between(out, np.where(self.solved_steps >= 0, self.solved_steps, good), candidates)
         return self._with_frame_points(out, told, shapes), good
 
+    def _watch_stops(self, march: DesignBatch, fit: Array) -> DesignBatch:
+        """The march with the stops of its pairs; designs that start outside of them end there, others may be unfit."""
+        self.stops = DesignStops(self.reference, self.all_designs, self.u)
+        self.stops.watch_start(march, self.u)
+        outside = fit & self.stops.is_outside
+        self.solved_steps[outside], self.is_stopped[outside] = 0, True
+        fit &= self.stops.is_fit & ~outside
+        return march._replace(stops=self.stops.limits)
+
+    def _end_at_input_stops(self, march: DesignBatch, good: Array, candidates: Array) -> None:
+        """End designs at a stop of the input that runs, beyond which they would have gone on."""
+        if self.stops is None:
+            return
+        met = self.stops.find_input_stops(march, self.range_length)
+        some = np.flatnonzero((good > met.solved_steps) & met.is_clear)
+        candidates[:] = np.maximum(candidates, good)
+        np.minimum(good, met.solved_steps, out=good)
+        self.solved_steps[some] = met.solved_steps[some]
+        self._keep_ends(some, met.distance[some], np.ones(some.size, dtype=bool))
+
     def _run_own_ranges(
         self, march: DesignBatch, fit: Array, signs: Array | None, runner: DesignRunner
     ) -> Array | None:
         """out of designs each of which has a range of its own; None where not all blocks are in closed form."""
+        fit = fit if self.stops is None or self.has_own_range else fit & self.stops.have_room(march, self.range_length)
         some = np.flatnonzero(fit & (self.range_length != 0.0))
         own = None if signs is None else signs[:, some]
         designs = closed_form_designs(march.select(some), self.reference.running_index, own, runner, self.block.backend)
@@ -254,7 +288,7 @@ class _DesignBlockSolver:
             self.out = allocate_aligned(block.steps + 1, rows, self.design_count, block.dtype)
         return self.out
 
-    def _run_fit_designs(self, runner: DesignRunner, march: DesignBatch, fit: Array) -> tuple[Array, Array, Array]:
+    def _run_fit_designs(self, runner: StepRunner, march: DesignBatch, fit: Array) -> tuple[Array, Array, Array]:
         """out, good and candidates of all designs, of which only the fit ones are run."""
         out, candidates = self._own_output(march), np.zeros(self.design_count, dtype=int)
         if fit.mean() > RUN_ALL_RATIO:
@@ -282,7 +316,7 @@ class _DesignBlockSolver:
         counts: how many steps of each design are good, and how many candidates (designs,).
         """
         good, candidates = counts
-        some = np.flatnonzero((good > 0) & (good < len(march.input_offsets)))
+        some = np.flatnonzero((good > 0) & (good < len(march.input_offsets)) & (self.solved_steps < 0))
         if not some.size:
             return
         index = self.reference.running_index
@@ -304,9 +338,15 @@ class _DesignBlockSolver:
         out[found.step, :, some[found.design]] = found.out.T
         settled = some[found.is_settled]
         self.solved_steps[settled] = found.solved_steps[found.is_settled]
-        distance = np.sign(self.range_length[settled]) * found.distance[found.is_settled] * self.scale
+        self._keep_ends(settled, found.distance[found.is_settled], found.stop[found.is_settled] >= 0)
+
+    def _keep_ends(self, settled: Array, distance: Array, is_stopped: Array) -> None:
+        """Keep where designs end (designs,), rad or sizes from their start: at dead points, or at stops."""
+        position = self.start[settled] + np.sign(self.range_length[settled]) * distance * self.scale
         ended = self.solved_steps[settled] <= self.block.steps
-        self.dead_point[settled] = np.where(ended, self.start[settled] + distance, np.nan)
+        self.dead_point[settled] = np.where(ended & ~is_stopped, position, np.nan)
+        self.stop_position[settled] = np.where(ended & is_stopped, position, np.nan)
+        self.is_stopped[settled] = is_stopped
 
     def _lead_to_start(
         self, march: DesignBatch, fit: Array, signs: Array | None, runner: DesignRunner
@@ -320,18 +360,22 @@ class _DesignBlockSolver:
             return march, np.zeros_like(fit)
         index, own = self.reference.running_index, np.flatnonzero(fit)
         there = march._replace(u0=self.u).select(own)
-        found = None if signs is None else signs[:, own]
-        designs = closed_form_designs(there, index, found, runner, self.block.backend)
+        signs = None if signs is None else signs[:, own]
+        designs = closed_form_designs(there, index, signs, runner, self.block.backend)
         if designs is not None:
             span = gone[index, own]
-            z, ends = designs.lead(span, LEAD_IN_STEP)
+            z, found = designs.lead(span, LEAD_IN_STEP)
+            ends = found.distance
             dead = np.isfinite(ends) & (np.abs(span) - ends > DEAD_POINT_MARGIN * np.abs(span))
             self.solved_steps[own[dead]] = 0
+            self.is_stopped[own[dead]] = designs.stops_of(found)[dead] >= 0
             passed = np.zeros_like(fit)
             passed[own] = ends - np.abs(span) > DEAD_POINT_MARGIN * np.abs(span)
             march.z0[:, own] = z
             return march, passed
         z, passed = NumpyRunner().lead(march._replace(u0=self.u), gone, LEAD_IN_STEP)
+        if march.stops is not None:
+            passed &= march.stops.input_rooms(self.u[index], gone[index]) >= np.abs(gone[index]) - SAME_END
         return march._replace(z0=z), fit & passed
 
     def _with_frame_points(

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from planar.batch.march.backend import DesignBatch, DesignRunner
-from planar.batch.march.checks import PointWriter, design_positions
+from planar.batch.march.checks import PointWriter, design_positions, pair_positions
 from planar.batch.march.design_functions import DesignFunctions
+from planar.batch.march.stops import nearest_end
 from planar.equations.linear import solve_vectors
 from planar.solving.checks.singular_values import SINGULAR_DISTANCE_RATIO
 from planar.solving.continuation.predictor_corrector import (
@@ -30,12 +31,15 @@ MAX_ARCS = 120
 DEAD_POINT_MARGIN = 1e-8
 """Parts of the run: so near to a dead point a step is left to be judged by itself."""
 MAX_HALVINGS = 60
+PLACES_ON_ARC = (0.0, 0.25, 0.5, 0.75, 1.0)
+"""Parts of an arc at which it is looked whether pairs keep off their stops."""
 
 
 class FollowedDesigns(NamedTuple):
     """Which designs are settled (designs,), how many of their steps are solved (designs,), how far from the start their
     dead points are, rad or sizes, infinitely where there is none (designs,), and the steps that were solved here:
-    design, step (solved,) and the points there, out (rows, solved)."""
+    design, step (solved,) and the points there, out (rows, solved). It is a stop that ends a design where `stop`
+    (designs,) is not negative: that of this pair, and behind these that of the input."""
 
     is_settled: Array
     solved_steps: Array
@@ -43,6 +47,7 @@ class FollowedDesigns(NamedTuple):
     design: Array
     step: Array
     out: Array
+    stop: Array
 
 
 class _CurvePoints(NamedTuple):
@@ -75,6 +80,10 @@ class _CurveArcs(NamedTuple):
         chord = np.linalg.norm(self.y1 - self.y0, axis=1)[:, None]
         a, b = (1 + 2 * x) * (1 - x) ** 2, x * x * (3 - 2 * x)
         return a * self.y0 + b * self.y1 + chord * (x * (1 - x) ** 2 * self.t0 + x * x * (x - 1) * self.t1)
+
+
+def _join_arcs(parts: Sequence[_CurveArcs]) -> _CurveArcs:
+    return _CurveArcs(*(np.concatenate(each) for each in zip(*parts, strict=True)))
 
 
 class _DesignCurves:
@@ -155,19 +164,34 @@ class _DeadPointTracker:
         self.dead_point_arcs: list[_CurveArcs] = []
         self.is_settled = np.zeros(self.design_count, dtype=bool)
         self.dead_point_distance = np.full(self.design_count, np.inf)
-        "the place of the dead point"
+        "the place of the dead point, or of the stop"
+        self.stop = np.full(self.design_count, -1)
+        self.stop_arcs: list[_CurveArcs] = []
+        self.input_rooms = np.full(self.design_count, np.inf)
+        if march.stops is not None:
+            self.input_rooms = march.stops.input_rooms(march.u0[index], np.full(self.design_count, length))
+        self.limits = np.minimum(self.distances[-1], self.input_rooms)
+        "where the input is at the end of its range, or at its stop"
+        self.turns = np.zeros((len(march.stop_pairs), self.design_count))
+        "rad to add to the positions of pairs with stops, so that they lie between these"
 
     def follow(self, z: Array) -> FollowedDesigns:
         """See `follow_to_dead_points`; z (designs, unknowns) at the last good steps."""
         self._track(z)
         if self.dead_point_arcs:
             self._find_dead_points()
+        if self.stop_arcs:
+            self._find_stops()
+        self._end_at_input_stops()
         return self._result()
 
     def _track(self, z: Array) -> None:
         active = np.flatnonzero(np.all(np.isfinite(z), axis=1))
         y = np.hstack([z[active], self.distances[self.good_steps[active] - 1][:, None]])
         curves = _DesignCurves(self.batch, active, self.direction)
+        if self.turns.size and self.batch.stops is not None:
+            at = pair_positions(self.batch.select(active), y[:, :-1].T, curves.inputs(y).T)
+            self.turns[:, active] = self.batch.stops.select(active).turns_between(at)
         ahead = np.zeros_like(y)
         ahead[:, -1] = 1.0
         here, step = curves.evaluate(y, ahead), np.full(len(active), FIRST_STEP)
@@ -195,7 +219,11 @@ class _DeadPointTracker:
             dips = (here.curvature[:, -1] < 0.0) & (after.curvature[:, -1] > 0.0) & (after.tangent[:, -1] > 0.0)
             low = np.minimum(here.tangent[:, -1], after.tangent[:, -1])
             fine &= ~(dips & (low < gone * np.maximum(np.abs(here.curvature[:, -1]), np.abs(after.curvature[:, -1]))))
-            self._record_arcs(active, here, after, fine)
+            meets = np.zeros_like(fine)
+            if self.turns.size:
+                clear, meets = self._judge_stops(_CurveArcs(active, here.y, here.tangent, after.y, after.tangent))
+                fine &= clear | (meets & (after.tangent[:, -1] > 0.0))
+            self._record_arcs(active, here, after, fine, meets)
             step = np.where(fine, 1.6 * step, 0.5 * step)
             here = _CurvePoints(
                 *(
@@ -204,12 +232,35 @@ class _DeadPointTracker:
                 )
             )
 
-    def _record_arcs(self, active: Array, here: _CurvePoints, after: _CurvePoints, accepted: Array) -> None:
-        """Keep what was gone through; a design is settled at its dead point, or at its last step."""
+    def _rooms(self, design: Array, y: Array) -> Array:
+        """How far pairs are from their stops (stops, designs) at points of designs, negative beyond."""
+        stops, own = self.batch.stops, self.batch.select(design)
+        assert stops is not None
+        u = own.u0 + y[:, -1] * self.direction[:, None]
+        at = pair_positions(own, y[:, :-1].T, u) + self.turns[:, design]
+        return np.minimum(at - stops.low[:, design], stops.high[:, design] - at)
+
+    def _judge_stops(self, arcs: _CurveArcs) -> tuple[Array, Array]:
+        """Where pairs surely keep off their stops all along arcs, and where they surely meet one (designs,)."""
+        rooms = np.array([self._rooms(arcs.design, arcs.interpolate(x + 0.0 * arcs.design)) for x in PLACES_ON_ARC])
+        bend = np.abs(np.diff(rooms, 2, axis=0)).max(axis=0)
+        clear = rooms.min(axis=0) > 0.5 * bend
+        inside = rooms > 0.0
+        passes = inside[0] & ~inside[-1] & (np.count_nonzero(inside[:-1] != inside[1:], axis=0) == 1)
+        return clear.all(axis=0), (clear | passes).all(axis=0) & passes.any(axis=0)
+
+    def _record_arcs(
+        self, active: Array, here: _CurvePoints, after: _CurvePoints, accepted: Array, meets: Array
+    ) -> None:
+        """Keep what was gone through; a design is settled at its dead point, where it `meets` a stop, or at its last
+        step."""
         arcs = _CurveArcs(active, here.y, here.tangent, after.y, after.tangent)
         dead = accepted & (after.tangent[:, -1] <= 0.0)
-        on = accepted & ~dead
-        self.is_settled[active[dead | (on & (after.y[:, -1] >= self.distances[-1]))]] = True
+        stopped = accepted & ~dead & meets
+        on = accepted & ~dead & ~stopped
+        self.is_settled[active[dead | stopped | (on & (after.y[:, -1] >= self.limits[active]))]] = True
+        if stopped.any():
+            self.stop_arcs.append(arcs.select(stopped))
         if dead.any():
             self.dead_point_arcs.append(arcs.select(dead))
         if on.any():
@@ -236,8 +287,26 @@ class _DeadPointTracker:
         return y, fine & (np.abs(value(curves, y)) < 1e-7)
 
     def _find_dead_points(self) -> None:
-        arcs = _CurveArcs(*(np.concatenate(parts) for parts in zip(*self.dead_point_arcs, strict=True)))
-        y, fine = self._find_falling_zero(arcs, lambda curves, y: curves.evaluate(y, arcs.t0, False).tangent[:, -1])
+        arcs = _join_arcs(self.dead_point_arcs)
+        found = self._find_falling_zero(arcs, lambda curves, y: curves.evaluate(y, arcs.t0, False).tangent[:, -1])
+        self._end_on(arcs, *found)
+
+    def _find_stops(self) -> None:
+        arcs = _join_arcs(self.stop_arcs)
+        y, fine = self._find_falling_zero(arcs, lambda _, y: self._rooms(arcs.design, y).min(axis=0))
+        self.stop[arcs.design] = np.argmin(self._rooms(arcs.design, y), axis=0)
+        self._end_on(arcs, y, fine)
+
+    def _end_at_input_stops(self) -> None:
+        """Designs whose input meets a stop of its own before anything else ends them there."""
+        last = self.distances[-1]
+        found = nearest_end(self.dead_point_distance, self.stop, self.input_rooms, last, len(self.turns))
+        self.dead_point_distance, self.stop = found
+        near = np.abs(self.distances[:, None] - self.input_rooms).min(axis=0) < DEAD_POINT_MARGIN * last
+        self.is_settled &= ~np.isnan(self.dead_point_distance) & ~(near & (self.stop == len(self.turns)))
+
+    def _end_on(self, arcs: _CurveArcs, y: Array, fine: Array) -> None:
+        """End designs at points y on arcs that are `fine`."""
         self.is_settled[arcs.design[~fine]] = False
         self.dead_point_distance[arcs.design] = y[:, -1]
         near = np.abs(self.distances[None] - y[:, -1:]).min(axis=1) < DEAD_POINT_MARGIN * self.distances[-1]
@@ -252,15 +321,15 @@ class _DeadPointTracker:
             np.searchsorted(self.distances, np.minimum(self.dead_point_distance, 2 * self.distances[-1])),
             0,
         )
-        arcs = [np.concatenate(parts) for parts in zip(*self.arcs, strict=True)] if self.arcs else None
-        wide = self.batch.output_row_count
-        if arcs is None:
-            none = np.zeros(0, dtype=int)
-            return FollowedDesigns(self.is_settled, solved, self.dead_point_distance, none, none, np.zeros((wide, 0)))
-        whole = _CurveArcs(*arcs)
+        none = np.zeros(0, dtype=int)
+        if not self.arcs:
+            out = np.zeros((self.batch.output_row_count, 0))
+            return FollowedDesigns(self.is_settled, solved, self.dead_point_distance, none, none, out, self.stop)
+        whole = _join_arcs(self.arcs)
         first, last = (np.searchsorted(self.distances, each[:, -1], side="right") for each in (whole.y0, whole.y1))
         first = np.maximum(first, self.good_steps[whole.design])
-        count = np.where(self.is_settled[whole.design], np.maximum(np.minimum(last, self.steps + 1) - first, 0), 0)
+        last = np.minimum(last, np.minimum(solved, self.steps + 1)[whole.design])
+        count = np.where(self.is_settled[whole.design], np.maximum(last - first, 0), 0)
         arc = np.repeat(np.arange(len(count)), count)
         step = first[arc] + np.arange(len(arc)) - np.repeat(np.cumsum(count) - count, count)
         out, fine = self._points_at_steps(whole.select(arc), step)
@@ -271,7 +340,7 @@ class _DeadPointTracker:
         self.is_settled &= held == np.maximum(solved - self.good_steps, 0)
         kept = self.is_settled[design]
         return FollowedDesigns(
-            self.is_settled, solved, self.dead_point_distance, design[kept], step[kept], out[:, kept]
+            self.is_settled, solved, self.dead_point_distance, design[kept], step[kept], out[:, kept], self.stop
         )
 
     def _points_at_steps(self, arcs: _CurveArcs, step: Array) -> tuple[Array, Array]:

@@ -26,7 +26,7 @@ GRID_TOLERANCE = 1e-9
 class SolvedDesign(NamedTuple):
     """One design: positions of the running input (rows,), the points (rows, 2 a point and order; m, s), the status of
     every row, what there is to say of its end (which as text is the sentence), and of rates that are missing or of few
-    digits; where the input is at the dead point that ends it (rad, m), not a number where none does."""
+    digits; where the input is at the dead point or at the stop that ends it (rad, m), not numbers where none does."""
 
     input: Array
     out: Array
@@ -34,6 +34,7 @@ class SolvedDesign(NamedTuple):
     message: str | NoAnswer
     rate_remark: str = ""
     dead_point: float = np.nan
+    stop_position: float = np.nan
 
 
 class DesignQuestion(NamedTuple):
@@ -113,9 +114,10 @@ def _solve(
     status[many:] = OUTCOMES.index(motion.outcome)
     told = "; ".join(motion.rate_remarks) if rates else ""
     ended = many <= steps
-    at_dead_point = ended and motion.outcome is Outcome.DEAD_POINT
-    reason, dead_point = motion.reason if ended else "", float(position[-1]) if at_dead_point else np.nan
-    return SolvedDesign(input_, out, status, reason, told, dead_point)
+    reason, last = motion.reason if ended else "", float(position[-1]) if ended else np.nan
+    at_dead_point, at_stop = (motion.outcome is each for each in (Outcome.DEAD_POINT, Outcome.STOP))
+    ends = last if at_dead_point else np.nan, last if at_stop else np.nan
+    return SolvedDesign(input_, out, status, reason, told, *ends)
 
 
 def link_angles(motion: Motion, links: tuple[str, ...]) -> Array:

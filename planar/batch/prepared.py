@@ -11,7 +11,7 @@ import numpy as np
 from planar.batch.general_path import OUTCOMES
 from planar.batch.prepare.kept_results import KeptPoints, LateSentences
 from planar.batch.prepare.native_run import NativeRuns, prepare_native_run
-from planar.batch.prepare.run_endings import ALL_SOLVED, CANNOT_BE_ASSEMBLED, UNSURE
+from planar.batch.prepare.run_endings import ALL_SOLVED, CANNOT_BE_ASSEMBLED, DEAD_POINT, STOP, UNSURE
 from planar.batch.reference_design import reference_design
 from planar.batch.sweep import check_range, sweep
 from planar.document.first_argument import takes_mechanism
@@ -24,7 +24,11 @@ Array = np.ndarray
 PLAIN_NUMBERS = frozenset({float, int, np.float64})
 """Types of values that are surely one number."""
 NOTHING_SAID: Sequence[str] = ()
-NOT_ASSEMBLED, DEAD = (OUTCOMES.index(each) for each in (Outcome.CANNOT_BE_ASSEMBLED, Outcome.DEAD_POINT))
+STATUS_OF_ENDING = {
+    CANNOT_BE_ASSEMBLED: OUTCOMES.index(Outcome.CANNOT_BE_ASSEMBLED),
+    DEAD_POINT: OUTCOMES.index(Outcome.DEAD_POINT),
+    STOP: OUTCOMES.index(Outcome.STOP),
+}
 
 
 class PreparedRun(NamedTuple):
@@ -65,8 +69,8 @@ def prepared(
     """A mechanism made ready to be run over and over; calling what is returned solves it for one design after another.
 
     See `planar.sweep` for what is taken, and raised: this is a sweep of one design at a time, without its preparations.
-    With llvmlite a run takes some microseconds, of whatever design, also of one that cannot be assembled or comes to a
-    dead point; what the compiled code is not sure of goes through `planar.sweep`.
+    With llvmlite a run takes some microseconds, of whatever design, also of one that cannot be assembled, comes to a
+    dead point or meets a stop; what the compiled code is not sure of goes through `planar.sweep`.
 
     >>> import planar
     >>> planar.prepared(planar.load("four-bar"), 12, "C")
@@ -136,7 +140,7 @@ class PreparedSweep:
         if ending != ALL_SOLVED:
             found[:, end:] = np.nan
             status = np.zeros(len(self._solved_status), dtype=np.int8)
-            status[end:] = NOT_ASSEMBLED if ending == CANNOT_BE_ASSEMBLED else DEAD
+            status[end:] = STATUS_OF_ENDING[ending]
             kept = dict(values)
             said = LateSentences(lambda: self._run_as_sweep(kept).remarks)
         position, wide = KeptPoints(found, self._index, 0), 2 * len(self.points)

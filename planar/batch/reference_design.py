@@ -68,10 +68,9 @@ class ReferenceDesign:
 
     @property
     def can_run_backend(self) -> bool:
-        """Whether a backend can run the structure: every block closes once, no contact is kept closed by others, and no
-        pair has stops."""
+        """Whether a backend can run the structure: every block closes once, and no contact is kept closed by others."""
         watched = any(type(pair).contact_gap is not Pair.contact_gap for pair in self.mechanism.pairs)
-        return self.functions.is_square and not watched and not self.mechanism.stops
+        return self.functions.is_square and not watched
 
     @property
     def moving_points(self) -> dict[str, NamedPoint]:

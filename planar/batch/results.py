@@ -59,7 +59,8 @@ class Sweep:
     it is missing or damaged. `status` (designs, steps + 1): 0 is solved, any other number k is `outcomes[k]`. `input`:
     positions of the input that runs, (steps + 1,), or (designs, steps + 1) where they differ; of a run in time the
     times (s). `general`: how many positions the general path solved, one design after the other. `dead_point`
-    (designs,): where the input is at the dead point at which a design's motion ends (rad or m), NaN where none does.
+    (designs,): where the input is at the dead point at which a design's motion ends (rad or m), NaN where none does;
+    `stop_position` (designs,): where it is as a pair meets the stop that ends the motion.
 
     What was asked for beside points stands by the names of links, pairs and inputs in arrays (designs, steps + 1), and
     is empty where nothing was: `angle`, `angular_velocity` and `angular_acceleration` of links (rad, s) as
@@ -83,6 +84,7 @@ class Sweep:
     input: Array
     general: int
     dead_point: Any
+    stop_position: Any
     notes: SweepNotes = field(repr=False)
     outcomes: tuple[Outcome, ...] = tuple(Outcome)
     angle: Mapping[str, Any] = field(default_factory=dict, repr=False)

@@ -155,7 +155,7 @@ def sweep(  # many: the public signature; # long: its docstring
     out and nothing else is asked for. `links` and `pairs` are those whose angles and relative motions are wanted, with
     `rates` their rates too; `outputs` links or pairs at the frame whose transmission angles are; `efforts` inputs and
     `reactions` pairs whose forces are, under loads, weights, springs and inertia: see `Sweep`. A design that comes to a
-    dead point has NaN from there on, `status` says why, and `Sweep.dead_point` where.
+    dead point or a stop has NaN from there on, `status` says why, `Sweep.dead_point` or `Sweep.stop_position` where.
 
     `assemblies` "nearest" takes of each design that nearest to the sketch; "all" takes every assembly that it has at
     its own inputs, each as a design of its own: see `Sweep.assembly`.

@@ -15,6 +15,7 @@ from planar.batch.executor import in_order, run_tasks, thread_count
 from planar.batch.general_path import OUTCOMES, solve_design
 from planar.batch.march.choice import available_backends
 from planar.batch.mechanisms.block_runner import BlockRunner, find_block_runner
+from planar.batch.mechanisms.endings import find_ending
 from planar.batch.mechanisms.initial_assembly import StartAssemblies, find_start_assemblies
 from planar.batch.mechanisms.linkage_groups import LinkageGroup, SweepRequest, linkage_group, wanted_points
 from planar.batch.mechanisms.march import run_linkages
@@ -321,7 +322,8 @@ def _run_attempt(
         attempt.verdict_only,
     )
     orders = 3 if request.rates else 1
-    out = told.out[:, :, : len(gone) : finer].reshape(len(told.out), orders, 2, steps + 1)
+    fine = told.out.reshape(len(told.out), orders, 2, told.out.shape[2])
+    out = fine[..., : len(gone) : finer]
     if finer > 1:
         out = np.ascontiguousarray(out)
     out = out.transpose(0, 1, 3, 2)
@@ -330,26 +332,23 @@ def _run_attempt(
     solved = np.zeros(steps + 1, dtype=np.int8)
     solved.flags.writeable = False
     inputs = group.start[some][:, None] + grid
-    come, dead = told.good_steps.tolist(), told.ends_in_dead_point.tolist()
     for k, one in enumerate(some.tolist()):
-        names = group.names[one]
-        own = out[first : first + len(names)]
-        first += len(names)
-        status, reason, good = solved, "", come[k]
-        if good < len(gone):
-            if not dead[k]:
-                continue
-            row = (good - 1) // finer + 1
+        names, watched = group.names[one], 2 * len(group.watched[one])
+        own, places = out[first : first + len(names)], fine[first + len(names) :, 0][:watched]
+        first += len(names) + watched
+        ending = find_ending(group, one, told, k, places, gone, request)
+        if ending is None:
+            continue
+        status = solved
+        if ending.outcome is not Outcome.SOLVED:
+            row = (ending.solved_steps - 1) // finer + 1
             own[:, :, row:] = np.nan
             status = np.zeros(steps + 1, dtype=np.int8)
-            status[row:] = OUTCOMES.index(Outcome.DEAD_POINT)
-            near = group.start[one] + gone[good - 1 : good + 1]
-            links = group.links_of_block(int(told.dead_point_block[k]))
-            reason = f"links {links} come to a dead point at an input of {near[0]:.6g} to {near[1]:.6g} rad"
+            status[row:] = OUTCOMES.index(ending.outcome)
         parts = [PointMapping(names, own[:, order]) for order in range(orders)]
         position, velocity, acceleration = parts if request.rates else (parts[0], None, None)
         number = int(group.numbers[one])
-        found[number] = Swept(position, velocity, acceleration, inputs[k], status, reason, False)
+        found[number] = Swept(position, velocity, acceleration, inputs[k], status, ending.reason, False)
     return found
 
 

@@ -14,8 +14,8 @@ FunctionKey = tuple[str, ...]
 
 SWEEP_PARTS: dict[FunctionKey, str] = {
     ("batch", "initial_assembly.py", "find_assemblies"): "assembling the starts",
-    ("march", "llvm_backend.py", "run"): "machine code",
-    ("march", "numpy_backend.py", "run"): "numpy",
+    ("llvm", "runner.py", "run"): "machine code",
+    ("numpy", "runner.py", "run"): "numpy",
     ("batch", "block.py", "_lead_to_start"): "leading designs to where the run starts",
     ("closed_form", "ends.py", "find_ends"): "finding dead points in closed form",
     ("batch", "dead_point_tracking.py", "follow_to_dead_points"): "following designs to where they stop",

@@ -96,6 +96,8 @@ class ReactionSolver:
 
     def solve(self) -> ForceSolution:
         """The efforts and reactions that balance loads and inertia, without friction."""
+        if not self.contacts:
+            return self.solve_beside({})
         found, *_ = self._solve_balance(self.required_forces[:, :, None])
         pushed = {}
         for name, contact in self.contacts.items():
@@ -170,8 +172,12 @@ class ReactionSolver:
         weak = np.full(many, bool(self.equilibrium_matrix.size))
         if links == forces:
             # the norms tell that no singular value is weak, in a tenth of the time that it takes to find them
-            whole = np.linalg.slogdet(self.equilibrium_matrix)[0] != 0.0
-            inverse[whole] = np.linalg.inv(self.equilibrium_matrix[whole])
+            whole = np.full(many, True)
+            try:
+                inverse = np.linalg.inv(self.equilibrium_matrix)
+            except np.linalg.LinAlgError:  # some are singular
+                whole = np.linalg.slogdet(self.equilibrium_matrix)[0] != 0.0
+                inverse[whole] = np.linalg.inv(self.equilibrium_matrix[whole])
             sizes = [np.linalg.norm(each, axis=(1, 2)) for each in (self.equilibrium_matrix, inverse)]
             weak = ~whole | (sizes[0] * sizes[1] >= 1.0 / RANK_TOLERANCE)
         if weak.any():

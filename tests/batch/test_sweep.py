@@ -10,7 +10,7 @@ from planar.batch.design_arrays import values_of_design, with_design_values
 from planar.batch.march import choice
 from planar.batch.march.backend import RunnerAttempt, UnsupportedStructure
 from planar.batch.march.checks import DesignResidualCheck
-from planar.batch.march.numpy_backend import NumpyRunner
+from planar.batch.march.numpy.runner import NumpyRunner
 from planar.batch.reference_design import reference_design
 from planar.document import files
 from planar.document.dimensions import link_lengths

@@ -461,3 +461,31 @@ def test_machine_code_tells_the_extremes_of_what_numpy_tells(monkeypatch):
             assert wanted[1] > 0.0
             np.testing.assert_allclose(quick[1:, 0], wanted[1:], rtol=1e-9, atol=1e-12)
             assert quick[0, 0] < 1e-14
+
+
+def test_the_sketch_of_what_rides_on_others_says_how_these_go_together():
+    """Two bars meet above or below; their pin is sketched a little above, and far below what slides on one of them."""
+    mechanism = planar.from_dict(
+        {
+            "planar": 1,
+            "name": "a rider",
+            "frame": "base",
+            "links": {
+                "base": {"points": {"O": [0, 0], "P": [1, 0], "Q": [2, 0]}},
+                "left": {"ends": ["O", "C"], "length": 0.8},
+                "right": {"ends": ["P", "C"], "length": 0.8},
+                "rider": {"points": {"R": [0, 0]}},
+                "crank": {"ends": ["Q", "S"], "length": 0.3},
+            },
+            "pairs": [
+                *({"turning": name} for name in "OPCQ"),
+                {"sliding": "ride", "links": ["left", "rider"], "line": {"through": "O", "to": "C"}, "point": "R"},
+            ],
+            "inputs": [{"pair": "Q", "position": "1 rad", "velocity": "1 rad/s"}, {"pair": "ride", "position": 1.5}],
+            "sketch": {"C": [0.5, 0.05], "R": [0.9, -1.1]},
+        }
+    )
+    (found,) = planar.sweep_each([mechanism], 24, pair="Q")
+    expected = planar.solve(mechanism).point("C").position
+    assert expected[1] < -0.5
+    np.testing.assert_allclose(found.position["C"][0], expected, atol=1e-12)

@@ -143,6 +143,7 @@ LOADED = {
     "slide": MODELS["two-stroke-engine"],
     "teeth": loaded("geared-five-bar", {"masses": [{"link": "AC", "mass": 2.0, "at": "C", "inertia": 0.001}]}),
     "balance": MODELS["balanced-lamp"],
+    "friction": MODELS["toggle-clamp"],
 }
 
 

@@ -6,12 +6,14 @@ import numpy as np
 import pytest
 
 import planar
-from planar.batch.march import kernel, llvm_designs, llvm_runner, numpy_backend
+from planar.batch.march import kernel
 from planar.batch.march.backend import DesignBatch, UnsupportedStructure
 from planar.batch.march.kernel import BareAngle, kernel_equations
-from planar.batch.march.llvm_backend import LLVMRunner
-from planar.batch.march.llvm_runner import designs_kernel
-from planar.batch.march.numpy_backend import NumpyRunner
+from planar.batch.march.llvm import designs_writer, kernel_runs
+from planar.batch.march.llvm.kernel_runs import designs_kernel
+from planar.batch.march.llvm.runner import LLVMRunner
+from planar.batch.march.numpy import runner as numpy_runner
+from planar.batch.march.numpy.runner import NumpyRunner
 from planar.batch.reference_design import reference_design
 from planar.codegen import instructions, llvm_compile, numpy_code
 from planar.codegen.aligned_arrays import allocate_aligned
@@ -183,7 +185,7 @@ def test_both_runners_correct_assemblies_alike_and_come_to_the_same_unknowns(ste
 
 @pytest.mark.parametrize(("stem", "backend"), [("stephenson-2-six-bar", "native"), ("double-butterfly", "numpy")])
 def test_blocks_too_large_for_expressions_are_solved_in_numbers_to_the_same(monkeypatch, stem, backend):
-    mechanism, caches = MODELS[stem], (numpy_backend._cached_kernel, llvm_runner._designs_kernel_or_reason)
+    mechanism, caches = MODELS[stem], (numpy_runner._cached_kernel, kernel_runs._designs_kernel_or_reason)
     designs = designs_around(mechanism, 0.005, 3)
     wanted = planar.sweep(mechanism, designs, 30, backend=backend)
     monkeypatch.setattr(kernel, "MAX_EXPRESSION_UNKNOWNS", 3)
@@ -259,9 +261,9 @@ def test_what_is_wanted_before_it_is_known_is_not_printed(monkeypatch):
     def written(self):
         raise BareAngle(("z", 0))
 
-    monkeypatch.setattr(llvm_designs._DesignsKernelWriter, "write", written)
+    monkeypatch.setattr(designs_writer._DesignsKernelWriter, "write", written)
     with watched(10), pytest.raises(UnsupportedOperation, match="a later one"):
-        llvm_designs.write_designs_kernel(
+        designs_writer.write_designs_kernel(
             kernel_equations(reference_design(IDLE, None).functions, equation_structure(IDLE)),
             ("L2",),
             False,
@@ -277,7 +279,7 @@ def test_what_cancels_is_nothing():
 
 
 def test_a_longer_function_is_left_to_casadi_and_printed_once_in_vain(monkeypatch):
-    mechanism, tried, really = MODELS["stephenson-1-six-bar"], [], llvm_designs.write_designs_kernel
+    mechanism, tried, really = MODELS["stephenson-1-six-bar"], [], designs_writer.write_designs_kernel
 
     def printing(*given, **more):
         tried.append(given)
@@ -287,10 +289,10 @@ def test_a_longer_function_is_left_to_casadi_and_printed_once_in_vain(monkeypatc
     designs, run_ = {f"{pair}.velocity": np.linspace(1, 2, 6)}, {"start": at, "stop": at + 0.1, "pair": pair}
     wanted = planar.sweep(mechanism, designs, 5, backend="numpy", **run_)
     monkeypatch.setattr(instructions, "MAX_INSTRUCTIONS", 100)
-    monkeypatch.setattr(llvm_runner, "write_designs_kernel", printing)
-    llvm_runner._designs_kernel_or_reason.cache_clear()
+    monkeypatch.setattr(kernel_runs, "write_designs_kernel", printing)
+    kernel_runs._designs_kernel_or_reason.cache_clear()
     found = planar.sweep(mechanism, designs, 5, backend="native", block=2, **run_)
-    llvm_runner._designs_kernel_or_reason.cache_clear()
+    kernel_runs._designs_kernel_or_reason.cache_clear()
     assert len({given[1:] for given in tried}) == len(tried) > 0
     assert (found.general, found.whole.all()) == (0, True)
     for point in found.points:

@@ -3,12 +3,15 @@
 import json
 import re
 from dataclasses import replace
+from io import StringIO
 
 import numpy as np
 import pytest
+from rich.console import Console
 
 import planar
 from planar.batch.general_path import OUTCOMES, solve_design
+from planar.reports.tables.modes import table
 
 DEG = np.pi / 180.0
 
@@ -192,3 +195,17 @@ def test_the_tippers_cylinder_holds_its_body_between_its_stops():
     ) / 1e-6
     assert forces.stops["stroke"] == pytest.approx(2000 * 9.81 * rate, rel=1e-5)
     assert planar.forces(planar.solve(mechanism, {"stroke": 1.2})).stops == {"stroke": 0.0}
+
+
+def test_assemblies_beyond_a_stop_are_listed_and_marked():
+    found = planar.modes(planar.from_dict(four_bar()), certify=False)
+    assert [mode.is_beyond_stop for mode in found] == [False, True]
+    assert [mode.outcome for mode in found] == [planar.Outcome.SOLVED, planar.Outcome.STOP]
+    assert len(found) == len(planar.modes("four-bar", certify=False))
+    page = Console(width=160, record=True, file=StringIO())
+    page.print(table(found, 10))
+    told = page.export_text()
+    assert "; 1 of these lies beyond a stop" in told
+    assert "2: at A = 60 deg pair 'D' is at" in told
+    with pytest.raises(planar.NoAnswer, match="outside of its stops"):
+        planar.solve(found[1].mechanism)

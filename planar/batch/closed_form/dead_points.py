@@ -76,7 +76,8 @@ def _cubic_root(values: Array) -> tuple[Array, Array]:
 class _DeadPointSearch:
     def __init__(self, joiner: BlockJoiner, batch: DesignBatch, signs: Array, direction: Array, span: Array):
         self.joiner, self.batch, self.signs, self.direction, self.span = joiner, batch, signs, direction, span
-        self.block_count = len(signs)
+        self.watched_count = len(signs) + len(batch.stop_pairs)
+        "blocks, and pairs with stops"
 
     def search(self, reached: Array, step: Array) -> DeadPoints:
         """See `find_dead_points`; how far each came, and the steps in which it went."""
@@ -172,7 +173,7 @@ class _DeadPointSearch:
 
         They change as the root of the way that is left: three places, evenly spread in that.
         """
-        if self.block_count == 1:
+        if self.watched_count == 1:
             return np.ones(len(of), dtype=bool)
         places = (begin, *(end - part * (end - begin) for part in OTHER_PLACES))
         f = np.array([1.0 - self._evaluate(batch, signs, x).coalescences for x in places])

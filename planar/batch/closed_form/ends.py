@@ -9,6 +9,8 @@ from planar.batch.closed_form.joined_blocks import BlockJoiner, DeadPoints, Inpu
 from planar.batch.dead_point_tracking import DEAD_POINT_MARGIN, FollowedDesigns
 from planar.batch.design_arrays import split_into_blocks
 from planar.batch.march.backend import DesignBatch, DesignRunner
+from planar.batch.march.checks import pair_positions
+from planar.batch.march.stops import nearest_end
 from planar.codegen.aligned_arrays import allocate_aligned
 from planar.model.mechanism import links_counting_turns
 
@@ -31,15 +33,47 @@ class ClosedFormDesigns:
         """The first dead points of designs that surely came so far, whose input is to go so far to either side, in
         steps of so much (designs,)."""
         ranges = InputRanges(self.index, reached, lengths, np.minimum(step, LONGEST_STEP))
-        return self.joiner.find_dead_points(self.batch, self.signs, ranges)
+        batch, stops = self.batch, self.batch.stops
+        if stops is None:
+            return self.joiner.find_dead_points(batch, self.signs, ranges)
+        if stops.has_wide_ranges:
+            batch = batch._replace(stops=stops.near_positions(self.stop_positions(np.sign(lengths) * reached)))
+        found = self._where_stops_are(self.joiner.find_dead_points(batch, self.signs, ranges), np.sign(lengths))
+        rooms = stops.input_rooms(self.direction @ batch.u0, lengths)
+        return DeadPoints(*nearest_end(*found, rooms, np.abs(lengths), self.end_count))
 
-    def lead(self, span: Array, step: float) -> tuple[Array, Array]:
-        """Designs led on so far (designs,): the unknowns there (unknowns, designs), and how far there was a dead point,
-        infinitely where there was none, not a number where that is not decided (designs,)."""
-        ends = self.find_dead_points(np.zeros(len(span)), span, np.full(len(span), step)).distance
+    @property
+    def end_count(self) -> int:
+        """How many blocks, and pairs with stops, may end designs."""
+        return len(self.signs) + len(self.batch.stop_pairs)
+
+    def stops_of(self, found: DeadPoints) -> Array:
+        """Which stop ends designs (designs,), -1 where none does."""
+        return np.where(found.block >= len(self.signs), found.block - len(self.signs), -1)
+
+    def stop_positions(self, moved: Array) -> Array:
+        """Where the pairs with stops are (stops, designs) when the input has moved so far (designs,)."""
+        u = self.batch.u0 + moved * self.direction[:, None]
+        state = self.follow(self.batch, self.signs, u)
+        return pair_positions(self.batch, unknowns_from_state(self.joiner.state, state, len(self.batch.z0)), u)
+
+    def _where_stops_are(self, found: DeadPoints, sense: Array) -> DeadPoints:
+        """Of what was found only that where stops are: what tells them is nothing elsewhere too."""
+        met, stops = np.flatnonzero(np.isfinite(found.distance) & (self.stops_of(found) >= 0)), self.batch.stops
+        if met.size and stops is not None:
+            moved = np.zeros(len(sense))
+            moved[met] = sense[met] * found.distance[met]
+            is_there = stops.select(met).is_at_stop(self.stop_positions(moved)[:, met], self.stops_of(found)[met])
+            found.distance[met[~is_there]] = np.nan
+        return found
+
+    def lead(self, span: Array, step: float) -> tuple[Array, DeadPoints]:
+        """Designs led on so far (designs,): the unknowns there (unknowns, designs), and what ends them before."""
+        found = self.find_dead_points(np.zeros(len(span)), span, np.full(len(span), step))
+        ends = found._replace(distance=np.where(span == 0.0, np.inf, found.distance))
         u = self.batch.u0 + span * self.direction[:, None]
         state = self.follow(self.batch, self.signs, u)
-        return unknowns_from_state(self.joiner.state, state, len(self.batch.z0)), np.where(span == 0.0, np.inf, ends)
+        return unknowns_from_state(self.joiner.state, state, len(self.batch.z0)), ends
 
     def follow(self, batch: DesignBatch, signs: Array, u: Array) -> Array:
         """The state (operands, designs) of a batch of some of the designs at inputs u (inputs, designs), by signs."""
@@ -51,6 +85,8 @@ class ClosedFormDesigns:
         out, passed = np.empty((self.batch.output_row_count, len(design))), np.zeros(len(design), dtype=bool)
         for part in split_into_blocks(len(design), POSITIONS_AT_ONCE):
             own = self.batch.select(design[part])
+            # they lie before their ends
+            own = own if own.stops is None else own._replace(stops=own.stops.cleared())
             u, signs = own.u0 + moved[part] * self.direction[:, None], np.take(self.signs, design[part], axis=1)
             z = unknowns_from_state(self.joiner.state, self.follow(own, signs, u), len(own.z0))
             row = allocate_aligned(1, len(out), len(moved[part]))
@@ -88,7 +124,8 @@ def find_ends(
     (designs,) need not be solved here, see `DesignRunner.run`.
     """
     step, count = np.abs(lengths) / steps, len(good)
-    ends = designs.find_dead_points(np.maximum(good - 1, 0) * step, lengths, step).distance
+    found = designs.find_dead_points(np.maximum(good - 1, 0) * step, lengths, step)
+    ends = found.distance
     nearest = np.clip(np.rint(ends / step), 0, steps) * step
     settled = ~np.isnan(ends) & (np.abs(ends - nearest) > DEAD_POINT_MARGIN * np.abs(lengths))
     solved = np.where(settled, np.ceil(np.minimum(ends / step, steps + 1.0)), 0.0).astype(int)
@@ -98,4 +135,6 @@ def find_ends(
     out, passed = designs.solve_positions(design, np.sign(lengths)[design] * at * step[design])
     settled[design[~passed]] = False
     kept = settled[design]
-    return FollowedDesigns(settled, np.where(settled, solved, 0), ends, design[kept], at[kept], out[:, kept])
+    return FollowedDesigns(
+        settled, np.where(settled, solved, 0), ends, design[kept], at[kept], out[:, kept], designs.stops_of(found)
+    )

@@ -31,8 +31,8 @@ class JoinedBlocks(NamedTuple):
 
 class FollowedBlocks(NamedTuple):
     """Designs in assemblies that are known, each array (..., designs): how near the two of each block are to where they
-    meet, as above (blocks, designs), no number where an arm on which a length turns is shorter than `LEAST_ARM`; and
-    their state (operands, designs)."""
+    meet, as above (blocks, designs), no number where an arm on which a length turns is shorter than `LEAST_ARM`; behind
+    these what reaches one where a pair meets its stop; and their state (operands, designs)."""
 
     coalescences: Array
     state: Array
@@ -50,7 +50,8 @@ class InputRanges(NamedTuple):
 
 class DeadPoints(NamedTuple):
     """How far designs surely go (designs,), rad or sizes from their start: to a dead point, or infinitely where there
-    is none up to the end; not a number where that is not decided. And the block that ends it, else -1."""
+    is none up to the end; not a number where that is not decided. And the block that ends it, else -1; behind the
+    blocks are the pairs with stops, which end designs alike, and then the input that runs with its own."""
 
     distance: Array
     block: Array

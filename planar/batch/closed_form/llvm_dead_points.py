@@ -22,7 +22,7 @@ from planar.batch.closed_form.dead_points import (
 )
 from planar.batch.closed_form.joined_blocks import LEAST_ARM
 from planar.batch.march.kernel import KernelEquations
-from planar.batch.march.llvm_kernel import KernelWriter, OperandNames
+from planar.batch.march.llvm.kernel_writer import KernelWriter, OperandNames
 from planar.codegen.llvm_trigonometry import write_cos_sin
 
 SEARCH_NAME = "search"
@@ -60,7 +60,8 @@ class DeadPointWriter(KernelWriter):
         t.write_line(f"define void @{SEARCH_NAME}(i64 %blocks, i64 %last, i64 %width, {arrays}, ptr noalias %out) {{")
         t.write_label("entry")
         self.slots = {name: t.allocate() for name in (*INTERVAL_SLOTS, *BRACKET_SLOTS)}
-        self.known = [t.allocate(PLACES) for _ in self.equations.blocks]
+        watched = (*self.equations.blocks, *self.equations.stop_pairs)
+        self.known = [t.allocate(PLACES) for _ in watched]
         most = t.add_instruction("load double, ptr %most")
         t.write_line(f"%most.places = fptosi double {most} to i64")
         t.write_line("br label %block")
@@ -119,6 +120,7 @@ class DeadPointWriter(KernelWriter):
         past = t.add_instruction(f"icmp sgt i64 {first}, %last")
         self.lane = t.add_instruction(f"select i1 {past}, i64 %last, i64 {first}")
         names: OperandNames = {("p", k): t.load(self._pointer("%p", k)) for k in range(self.symbols["p"].numel())}
+        names |= self.stop_number_names(lambda k: t.load(self._pointer("%p", k)))
         names |= {operand: t.load(self._pointer("%drive", k)) for k, operand in enumerate(self.input_operands)}
         names |= {("sign", k): t.load(self._pointer("%sign", k)) for k in range(len(self.equations.blocks))}
         reached, self.span, self.longest, self.sense = (t.load(self._pointer("%ranges", k)) for k in range(4))
@@ -137,7 +139,8 @@ class DeadPointWriter(KernelWriter):
         return names
 
     def _write_evaluation(self, start: OperandNames) -> list[str]:
-        """How far every block's coalescence is from one where the lanes look, no number where an arm is short."""
+        """How far every block's coalescence is from one where the lanes look, no number where an arm is short; then how
+        far what reaches one where a pair meets its stop."""
         t, values = self.ir, []
         way = t.binary("mul", self.sense, t.load(self.slots["place"]))
         names = start | {("u", self.index): t.binary("add", start["u", self.index], way)}
@@ -153,7 +156,7 @@ class DeadPointWriter(KernelWriter):
                 (arm,) = self.write_values([form.squared_arm], names)
                 value = t.select(t.compare("olt", arm, t.constant(LEAST_ARM**2)), t.constant(nan), value)
             values.append(value)
-        return values
+        return [*values, *(t.binary("sub", t.constant(1.0), each) for each in self.write_stops(names))]
 
     def _write_look(self, looking: str, values: list[str]) -> None:
         """Of the lanes that look at intervals: a place more is known, and where all are the interval is judged."""

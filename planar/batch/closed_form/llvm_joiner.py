@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import NamedTuple
 
 import numpy as np
@@ -19,7 +19,7 @@ from planar.batch.closed_form.joined_blocks import (
 from planar.batch.closed_form.llvm_dead_points import MOST_WITHOUT_INTERVALS, SEARCH_NAME, DeadPointWriter
 from planar.batch.march.backend import DesignBatch
 from planar.batch.march.kernel import BareAngle, KernelBlock, KernelEquations
-from planar.batch.march.llvm_kernel import KernelWriter, OperandNames
+from planar.batch.march.llvm.kernel_writer import KernelWriter, OperandNames
 from planar.codegen.instructions import UnsupportedOperation
 from planar.codegen.llvm_compile import compile_function
 from planar.foundation.turns import leave_turn
@@ -100,6 +100,7 @@ class BlockJoinWriter(KernelWriter):
         self.lane = t.add_instruction(f"select i1 {past}, i64 %last, i64 {first}")
         count = self.symbols["p"].numel()
         names |= {("p", k): self._load("%p", k) for k in range(count)}
+        names |= self.stop_number_names(partial(self._load, "%p"))
         names |= {("q", k): self._load("%q", k) for k in range(2 * len(self.links))}
         names |= {operand: self._load("%drive", k) for k, operand in enumerate(self.input_operands)}
         rows: list[str] = []
@@ -114,6 +115,7 @@ class BlockJoinWriter(KernelWriter):
                 arms += [] if form.squared_arm is None else self.write_values([form.squared_arm], names)
             else:
                 rows += self.write_block(part, names, sign)
+        rows += self.write_stops(names) if self.point_blocks is None else []
         state = [names[operand] for operand in state_operands(self.equations)]
         for k, value in enumerate([*rows, *state, *arms]):
             t.store(value, self._pointer("%out", k))
@@ -164,9 +166,10 @@ class NativeBlockJoiner:
 
     def follow(self, batch: DesignBatch, signs: Array, u: Array) -> FollowedBlocks:
         """See `BlockJoiner`."""
-        count, last = self.block_count, self.block_count + len(self.state)
+        count = self.block_count + len(self.equations.stop_pairs)
+        last = count + len(self.state)
         arms = sum(form.squared_arm is not None for form in self.equations.closed_forms)
-        rows = (batch.p, batch.q, input_rows(self.equations, u), signs)
+        rows = (batch.numbers, batch.q, input_rows(self.equations, u), signs)
         out = _call(self.following_text, FUNCTION_NAME, rows, np.zeros(0), last + arms)
         return FollowedBlocks(without_short_arms(out[:count], self.equations, list(out[last:])), out[count:last])
 
@@ -180,7 +183,7 @@ class NativeBlockJoiner:
         with np.errstate(all="ignore"):
             intervals = float(np.fmax.reduce((span - ranges.reached) / ranges.step, initial=0.0))
         most = np.array([MOST_WITHOUT_INTERVALS + 2.0 * intervals])
-        rows = (batch.p, input_rows(self.equations, batch.u0), signs, own)
+        rows = (batch.numbers, input_rows(self.equations, batch.u0), signs, own)
         distance, block = _call(text, SEARCH_NAME, rows, most, 2)
         return DeadPoints(np.where(span > 0.0, distance, np.nan), block.astype(int))
 

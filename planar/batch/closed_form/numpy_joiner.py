@@ -44,7 +44,7 @@ class NumpyBlockJoiner:
     def __init__(self, equations: KernelEquations, links: tuple[str, ...], point_blocks: tuple[int, ...]):
         self.equations, self.state = equations, state_operands(equations)
         self.kernel = KernelInstructions(equations, links, False, frozenset(), frozenset())
-        known = {(name, k) for name in ("p", "q", "sign") for k in range(self.kernel.symbols[name].numel())}
+        known = {(name, k) for name in ("p", "q", "sign", "stop") for k in range(self.kernel.symbols[name].numel())}
         known |= {*self.kernel.input_operands, *self.state}
         self.blocks = []
         for part in equations.blocks:
@@ -56,6 +56,8 @@ class NumpyBlockJoiner:
             meeting = [form.coalescence, *([] if form.squared_arm is None else [form.squared_arm])]
             near = self._compile(self.kernel.list_values(meeting), known)
             self.blocks.append(_BlockFunctions(part, *solving, *locating, points, *near))
+        stops = self.kernel.stop_outputs() if equations.stop_pairs else []
+        self.stops = self._compile(self.kernel.list_values(stops), known) if stops else None
 
     def _compile(self, wanted: list[int], known: set[Operand]) -> tuple[NumpyFunction, tuple[Operand, ...]]:
         made = self.kernel.hoister.result
@@ -75,6 +77,7 @@ class NumpyBlockJoiner:
     def _values(self, batch: DesignBatch, u: Array) -> dict[Operand, Any]:
         values: dict[Operand, Any] = {("p", k): row for k, row in enumerate(batch.p)}
         values |= {("q", k): row for k, row in enumerate(batch.q)}
+        values |= {} if batch.stops is None else {("stop", k): row for k, row in enumerate(batch.stops.numbers)}
         return values | dict(zip(self.kernel.input_operands, input_rows(self.equations, u), strict=True))
 
     def join(self, batch: DesignBatch, sketch: Array, forced: Array) -> JoinedBlocks:
@@ -98,11 +101,16 @@ class NumpyBlockJoiner:
 
     def follow(self, batch: DesignBatch, signs: Array, u: Array) -> FollowedBlocks:
         """See `BlockJoiner`."""
-        values, found, arms = self._values(batch, u), np.empty(signs.shape), []
+        values, arms = self._values(batch, u), []
+        found = np.empty((len(signs) + len(self.equations.stop_pairs), signs.shape[1]))
         for k, block in enumerate(self.blocks):
             self._solve_block(block, values, signs[k])
             found[k], *arm = block.meet(*(values[each] for each in block.meeting_operands))
             arms += arm
+        if self.stops is not None:
+            function, operands = self.stops
+            for k, value in enumerate(function(*(values[each] for each in operands)), len(self.blocks)):
+                found[k] = value
         state = np.array([np.broadcast_to(values[each], signs.shape[1:]) for each in self.state])
         return FollowedBlocks(without_short_arms(found, self.equations, arms), state)
 

@@ -1,4 +1,4 @@
-"""Designs in closed form whose input runs between two dead points, those of each design its own."""
+"""Designs in closed form whose input runs between two dead points or stops, those of each design its own."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ DISTANCE_FROM_LIMIT = 1e-8
 
 class LimitedRuns(NamedTuple):
     """Which designs are settled (designs,), the limits of their inputs (2, designs), rad or sizes, and the points out
-    (steps + 1, rows, designs), with no rates at the limits."""
+    (steps + 1, rows, designs), with no rates at dead points."""
 
     is_settled: Array
     limits: Array
@@ -33,7 +33,7 @@ class LimitedRuns(NamedTuple):
 
 
 def run_between_limits(designs: ClosedFormDesigns, steps: int) -> LimitedRuns:
-    """Run designs from the dead point below to that above, in so many steps."""
+    """Run designs from the dead point or stop below to that above, in so many steps."""
     batch, count = designs.batch, designs.batch.p.shape[1]
     span, none = np.full(count, SHOWN_SLIDE_EXTENT), np.zeros(count)
     down, up = (designs.find_dead_points(none, sense * span, np.full(count, SEARCH_STEP)) for sense in (-1.0, 1.0))
@@ -47,9 +47,14 @@ def run_between_limits(designs: ClosedFormDesigns, steps: int) -> LimitedRuns:
         out[step][:, some], passed = designs.solve_positions(some, moved)
         settled[some[~passed]] = False
     for step, sense, found in ((0, -1.0, down), (steps, 1.0, up)):
-        rows, passed = _points_at_limit(designs, some, sense * found.distance[some], found.block[some], length[some])
-        out[step][: len(rows), some] = rows
-        settled[some[~passed]] = False
+        moved, is_stop = sense * found.distance, found.block[some] >= len(designs.signs)
+        dead, stopped = some[~is_stop], some[is_stop]
+        rows, passed = _points_at_limit(designs, dead, moved[dead], found.block[dead], length[dead])
+        out[step][: len(rows), dead] = rows
+        settled[dead[~passed]] = False
+        if stopped.size:
+            out[step][:, stopped], passed = designs.solve_positions(stopped, moved[stopped])
+            settled[stopped[~passed]] = False
     start = designs.direction @ batch.u0
     limits = np.stack([start - down.distance, start + up.distance])
     return LimitedRuns(settled, np.where(settled, limits, np.nan), out)

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import NamedTuple, Protocol, TypeVar
+from typing import Any, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 
+from planar.batch.march.stops import StopLimits
 from planar.codegen.aligned_arrays import allocate_aligned
 from planar.equations.functions import EquationFunctions
 from planar.model.mechanism import Mechanism
+from planar.model.pairs import Pair
 
 Array = np.ndarray
 Answer = TypeVar("Answer")
@@ -29,6 +31,7 @@ class DesignBatch(NamedTuple):
     may leave open. `mechanism` has the pairs and inputs; its numbers are not those of the designs. `unit`: the size, m.
     `zeros`: rows of p and q, as ("p", row), that are nothing in all designs and are left out of what is computed.
     `signs` (blocks, designs): of the assemblies of blocks in closed form, 0 where one is not known; None of none.
+    `stops`: those of pairs, which no position of a design passes; None where there are none.
     """
 
     functions: EquationFunctions
@@ -46,6 +49,17 @@ class DesignBatch(NamedTuple):
     unit: float
     zeros: frozenset[tuple[str, int]] = frozenset()
     signs: Array | None = None
+    stops: StopLimits | None = None
+
+    @property
+    def stop_pairs(self) -> tuple[Pair, ...]:
+        """The pairs whose stops are looked at in the march."""
+        return () if self.stops is None else self.stops.pairs
+
+    @property
+    def numbers(self) -> Array:
+        """p, and behind it the numbers of stops, row by row."""
+        return np.concatenate([self.p, self.stops.numbers]) if self.stops is not None and self.stops.pairs else self.p
 
     @property
     def output_row_count(self) -> int:
@@ -61,7 +75,9 @@ class DesignBatch(NamedTuple):
         else:  # of which rows lie in one piece, unlike what an index gives
             which = np.flatnonzero(designs) if designs.dtype == bool else designs
             parts = {name: np.take(row, which, axis=1) for name, row in rows.items()}
-        return self._replace(**parts | ({} if z0 is None else {"z0": z0}))
+            designs = which
+        more: dict[str, Any] = {} if self.stops is None else {"stops": self.stops.select(designs)}
+        return self._replace(**parts | more | ({} if z0 is None else {"z0": z0}))
 
 
 class CorrectedAssemblies(NamedTuple):

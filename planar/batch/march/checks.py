@@ -126,6 +126,22 @@ def design_positions(functions: DesignFunctions, batch: DesignBatch, z: Array, u
     return DesignsAtStep(z, u, w, passed, positions)
 
 
+def pair_positions(batch: DesignBatch, z: Array, u: Array) -> Array:
+    """Where the pairs with stops are (stops, designs), in sizes and rad, at z (unknowns, designs), u (inputs, designs).
+
+    Not a number where one of these is none.
+    """
+    functions = batch.functions
+    w = DesignFunctions(functions, batch.p).coordinates(np.ascontiguousarray(z.T), np.ascontiguousarray(u.T))
+    links, pairs = [link.name for link in batch.mechanism.links], {each.name: each for each in batch.mechanism.pairs}
+    column = coordinate_columns(functions.equations.coordinates)
+    frames, own = frames_from_coordinates(w, column, links, pairs)
+    found = np.empty((len(batch.stop_pairs), u.shape[1]))
+    for row, pair in zip(found, batch.stop_pairs, strict=True):
+        row[:] = pair.input_position([frames[link] for link in pair.bodies], (), own.get(pair.name, ()))
+    return found
+
+
 class PointWriter:
     """The points of a march, with their rates."""
 

@@ -9,13 +9,13 @@ from planar.foundation.errors import BadInput
 
 
 def _native_attempts() -> tuple[RunnerAttempt, ...]:
-    from planar.batch.march.llvm_backend import EXTRA_CORRECTIONS, LLVMRunner
+    from planar.batch.march.llvm.runner import EXTRA_CORRECTIONS, LLVMRunner
 
     return RunnerAttempt(LLVMRunner(), True), RunnerAttempt(LLVMRunner(EXTRA_CORRECTIONS), True)
 
 
 def _numpy_attempts() -> tuple[RunnerAttempt, ...]:
-    from planar.batch.march.numpy_backend import NumpyRunner
+    from planar.batch.march.numpy.runner import NumpyRunner
 
     return (RunnerAttempt(NumpyRunner(), False),)
 
@@ -31,7 +31,7 @@ def available_backends(backend: str) -> list[str]:
 
 def find_runner(backend: str) -> RunnerLadder:
     """What runs the designs of a sweep by a backend, or "auto". Raises BadInput."""
-    from planar.batch.march.numpy_backend import StartRunner
+    from planar.batch.march.numpy.runner import StartRunner
 
     attempts = [each for _, attempts in _available_attempts(backend) for each in attempts]
     return RunnerLadder([*attempts, RunnerAttempt(StartRunner(), False)])

@@ -16,6 +16,7 @@ import numpy as np
 
 from planar.batch.march.backend import DesignBatch
 from planar.batch.march.regularity import LEAST_START_REGULARITY
+from planar.batch.march.stops import NUMBERS_PER_STOP, are_periodic, stop_rooms
 from planar.codegen.instructions import (
     CosSin,
     InstructionList,
@@ -34,13 +35,14 @@ from planar.equations.residuals import closing_error, residuals, scalars, split_
 from planar.equations.symbolic_equations import Block, ConstraintEquations, slice_length
 from planar.foundation.geometry import GROUND, Frame, Vector, frame_at
 from planar.model.mechanism import Mechanism, links_counting_turns
-from planar.model.pairs import MeasureKind
+from planar.model.pairs import MeasureKind, Pair
 
 Operand = tuple[str, int]
 """A number that the expressions take: which kind of it, and its index.
 
 "z" of an unknown, "zc" and "zs" the cos and sin of an angle; "u", "uc", "us" the same of what is given; "p" the numbers
-of pairs, "q" those of points; "u1", "u2" rates of what is given; "sign" of a block in closed form.
+of pairs, "q" those of points, "stop" those of stops; "u1", "u2" rates of what is given; "sign" of a block in closed
+form.
 """
 
 
@@ -89,6 +91,7 @@ class KernelEquations:
     twice.
 
     `zeros`: operands of kinds "p" and "q" that are nothing in all designs, as most coordinates of pins in their links.
+    `stop_pairs`: those whose stops are looked at.
     """
 
     def __init__(
@@ -97,11 +100,13 @@ class KernelEquations:
         mechanism: Mechanism,
         given: Sequence[str] = (),
         zeros: frozenset[Operand] = frozenset(),
+        stop_pairs: tuple[Pair, ...] = (),
     ):
         e = self.equations = equations
         if not e.is_square:
             raise UnsupportedOperation("constraints hold each other more than once")
         self.mechanism, self.given_links, self.zeros = mechanism, tuple(given), zeros
+        self.stop_pairs = stop_pairs
         self.blocks = tuple(
             KernelBlock(block, find_closed_form(e, block)) for block in e.blocks if slice_length(block.unknowns)
         )
@@ -144,6 +149,18 @@ class KernelEquations:
         rows = residuals(self.mechanism, frames, split_pair_numbers(pairs, e.p), own, u)
         return ca.vertcat(*(closing_error(value, row.kind) for row, value in rows))
 
+    def stop_coalescences(self, numbers: ca.SX) -> ca.SX:
+        """For each pair with stops what reaches one where it meets one of them; see `StopLimits`."""
+        e = self.equations
+        pairs = {pair.name: pair for pair in self.mechanism.pairs}
+        _, own = frames_from_coordinates(ca.vertsplit(e.w), self.column_of, (), pairs)
+        positions = [
+            pair.input_position([self.frame(link) for link in pair.bodies], (), own.get(pair.name, ()))
+            for pair in self.stop_pairs
+        ]
+        periodic = are_periodic(self.stop_pairs, self.mechanism)
+        return ca.vertcat(ca.SX(0, 1), *(1.0 - each for each in stop_rooms(positions, periodic, scalars(numbers), ca)))
+
     def rates(self, u1: ca.SX, u2: ca.SX) -> tuple[ca.SX, ca.SX]:
         """First and second rates of the unknowns, block after block."""
         return UnknownRates(self.equations, solve_by_determinants).first_and_second(u1, u2)
@@ -175,15 +192,18 @@ def _squared_arm(jacobian: ca.SX) -> ca.SX:
 
 @lru_cache(maxsize=256)
 def kernel_equations(
-    functions: EquationFunctions, structure: Mechanism, zeros: frozenset[Operand] = frozenset()
+    functions: EquationFunctions,
+    structure: Mechanism,
+    zeros: frozenset[Operand] = frozenset(),
+    stop_pairs: tuple[Pair, ...] = (),
 ) -> KernelEquations:
     """The equations of a structure, kept. Raises UnsupportedOperation."""
-    return KernelEquations(functions.equations, structure, (), zeros)
+    return KernelEquations(functions.equations, structure, (), zeros, stop_pairs)
 
 
 def batch_equations(batch: DesignBatch) -> KernelEquations:
     """The equations of a batch's structure. Raises UnsupportedOperation."""
-    return kernel_equations(batch.functions, equation_structure(batch.mechanism), batch.zeros)
+    return kernel_equations(batch.functions, equation_structure(batch.mechanism), batch.zeros, batch.stop_pairs)
 
 
 class KernelInstructions:
@@ -214,6 +234,7 @@ class KernelInstructions:
             "z2": ca.SX.sym("z2", e.z.numel()),
             "sign": ca.vertcat(ca.SX(0, 1), *(form.sign for form in equations.closed_forms)),
             "scale": ca.SX.sym("scale"),
+            "stop": ca.SX.sym("stop", NUMBERS_PER_STOP * len(equations.stop_pairs)),
         }
         self.hoister = InvariantHoister[Operand](lambda operand: operand[0] in invariant)
         self.sign_index = {
@@ -279,6 +300,10 @@ class KernelInstructions:
         if form.squared_arm is not None:
             near = near + LEAST_START_REGULARITY**2 * (1.0 / form.squared_arm)  # the form divides by it too
         return [*(value for values in form.values for value in values), near]
+
+    def stop_outputs(self) -> list[ca.SX]:
+        """See `KernelEquations.stop_coalescences`."""
+        return [self.equations.stop_coalescences(self.symbols["stop"])]
 
     def point_coordinates(self, points: Sequence[int]) -> ca.SX:
         """x and y of some of the points."""

@@ -76,9 +76,10 @@ def find_start_assemblies(linkages: LinkageArrays, runner: BlockRunner) -> Start
             good = left[every, best] <= START_TOLERANCE_FACTOR * linkages.tolerance[batch.owner]
             good &= np.all(~(np.abs(clear) < LEAST_CLEARANCE), axis=1)
         sure[batch.owner[~good]] = False
+        # what can be assembled in one way alone may lie far off where others are
+        nearest = np.where(np.isfinite(nearest), nearest, 0.0)
+        cost += np.bincount(batch.owner, np.maximum(nearest, 0.0), many)
         if ways > 1:
-            nearest = np.where(np.isfinite(nearest), nearest, 0.0)
-            cost += np.bincount(batch.owner, np.maximum(nearest, 0.0), many)
             distance[every, best] = np.inf
             margins.append((batch.owner, distance.min(axis=1) - nearest))
             table = np.array(list(product((1.0, -1.0), repeat=kind.sign_count)))

@@ -9,6 +9,7 @@ import numpy as np
 
 from planar.batch.mechanisms.linkage_arrays import LinkageArrays, PartitionedLinkage, make_linkage_arrays
 from planar.batch.mechanisms.partition import NotPartitionable, Partition, partition_mechanism
+from planar.batch.mechanisms.stop_checks import watched_links
 from planar.foundation.errors import BadInput
 from planar.model.link_shapes import PointPlacementError
 from planar.model.mechanism import Mechanism, named_points, running_input_index
@@ -29,13 +30,16 @@ class SweepRequest(NamedTuple):
 
 class LinkageGroup(NamedTuple):
     """Linkages that can be solved group after group: their numbers, as arrays, names of their points, where each
-    starts, and the links of all groups."""
+    starts, and the links of all groups. Behind the points of a linkage stand two of each of its `watched` links, which
+    tell where pairs with stops are: the origin of its axes, and the place at the size on the x-axis."""
 
     numbers: Array
     arrays: LinkageArrays
     names: Sequence[Sequence[str]]
     start: Array
     links_of_block: Callable[[int], str]
+    mechanisms: Sequence[Mechanism]
+    watched: Sequence[tuple[str, ...]]
 
 
 def linkage_group(mechanisms: Sequence[Mechanism], request: SweepRequest) -> LinkageGroup | None:
@@ -63,7 +67,9 @@ def linkage_group(mechanisms: Sequence[Mechanism], request: SweepRequest) -> Lin
             number -= len(one.partition.blocks)
         return ""
 
-    return LinkageGroup(np.array(numbers), make_linkage_arrays(ones), names, np.array(starts), block_links)
+    own = [mechanisms[k] for k in numbers]
+    watched, arrays = [watched_links(each) for each in own], make_linkage_arrays(ones)
+    return LinkageGroup(np.array(numbers), arrays, names, np.array(starts), block_links, own, watched)
 
 
 def _partition_linkage(
@@ -72,8 +78,6 @@ def _partition_linkage(
     """A mechanism parted into groups, with the names of its points and where it starts; None where it is for the
     general path."""
     running = running_input_index(mechanism, request.pair, "inputs")
-    if mechanism.stops:
-        return None
     try:
         own = partition_mechanism(mechanism)
     except (NotPartitionable, BadInput, PointPlacementError):
@@ -107,6 +111,8 @@ def _partition_linkage(
         place, link, point = min((own.link_index[link], link, point) for link, point in members[name])
         names.append(name)
         points.append((place, *own.shapes[link].points[point]))
+    for link in watched_links(mechanism):
+        points += [(own.link_index[link], x, 0.0) for x in (0.0, unit)]
     return PartitionedLinkage(own, inputs, sketch, points, shown), names, mechanism.inputs[running].position
 
 

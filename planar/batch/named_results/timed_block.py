@@ -77,7 +77,7 @@ class _TimedBlockSolver:
                     count, first = said.get(code, (0, sentence))
                     said[code] = count + 1, first
         endings = tuple((code, *each) for code, each in said.items())
-        return SolvedDesigns(out, status, self.time, general, int(rest.size), endings, np.full(many, np.nan))
+        return SolvedDesigns(out, status, self.time, general, int(rest.size), endings, *np.full((2, many), np.nan))
 
     def _design(self, index: int) -> Mechanism:
         design = with_design_values(self.reference.mechanism, values_of_design(self.block.designs, index))
@@ -90,7 +90,7 @@ class _TimedBlockSolver:
         """Fill out (steps + 1, rows, designs) as far as a backend does it; how many first steps passed (designs,)."""
         base_, block = self.reference, self.block
         good = np.zeros(self.design_count, dtype=int)
-        if not base_.can_run_backend:
+        if not base_.can_run_backend or base_.mechanism.stops:
             return good
         runner = find_runner(block.backend)
         designs = with_design_values(base_.mechanism, block.designs)

@@ -19,7 +19,7 @@ from planar.batch.prepare.llvm_positions import (
 )
 from planar.batch.prepare.llvm_start import FUNCTION_NAME as START_FUNCTION
 from planar.batch.prepare.llvm_start import write_start
-from planar.batch.prepare.run_endings import ALL_SOLVED, DEAD_POINT
+from planar.batch.prepare.run_endings import ALL_SOLVED, DEAD_POINT, STOP
 from planar.batch.prepare.value_binder import ValueBinder, address_of
 from planar.codegen.instructions import UnsupportedOperation
 from planar.codegen.llvm_compile import compile_function
@@ -114,4 +114,4 @@ class CompiledRun:
         self._function(self._context_pointer, places, pack(*values.values()), address_of(out))
         ending = out.item(self._ending)
         rows = out[: self._told, : self._positions]
-        return rows, ending, int(out.item(self._ending + 1)) if ending == DEAD_POINT else 0
+        return rows, ending, int(out.item(self._ending + 1)) if ending in (DEAD_POINT, STOP) else 0

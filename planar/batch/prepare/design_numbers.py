@@ -9,13 +9,16 @@ import casadi as ca
 import numpy as np
 
 from planar.batch.design_arrays import with_design_values
+from planar.batch.design_stops import stop_ranges
 from planar.batch.march.kernel import KernelEquations, Operand, kernel_equations
+from planar.batch.march.stops import LEAST_RANGES, SURE_DISTANCE, TURN, stop_limits
 from planar.batch.reference_design import ReferenceDesign
+from planar.codegen.instructions import UnsupportedOperation
 from planar.document.dimensions import Dimension, input_numbers, link_lengths
 from planar.equations.mechanism_numbers import equation_structure, scaled_pair_numbers
 from planar.model.link_shapes import Distances, Link, LinkShape, PointMember
 from planar.model.mechanism import LARGEST_INPUT_POSITION, Input, Mechanism
-from planar.model.pairs import MeasureKind
+from planar.model.pairs import MeasureKind, Pair
 from planar.solving.checks.residual_check import SHORT_ARM, residual_tolerance
 
 Array = np.ndarray
@@ -43,6 +46,7 @@ class DesignNumbers:
     - "p" of pairs, "q" of the wanted points (by their `members`, link and point), "u1" and "u2" rates of inputs;
     - "u", "uc", "us" of the inputs at the design's own positions, "d", "dc", "ds" of how far these are from the file's;
     - "at" of the sketched points (`sketched`) in the axes of their links, "sketch" where they are shown;
+    - "stop" of stops, those of the file, whatever a design has;
     - "tolerance" of the residual check; "unit", the size in m;
     - "margin", below zero where an arm is so short, or a length so great, that rounding takes digits, and where the
       inputs are not where they may be;
@@ -85,6 +89,8 @@ class DesignNumbers:
         self.numbers: dict[Operand, ca.SX] = {}
         self._add("p", p)
         self._add("q", self._local_coordinates(members))
+        self._stop_pairs, stops = _stop_numbers(reference)
+        self._add("stop", stops)
         margins = [
             *self._arm_margins(reference),
             *self._add_inputs(reference, list(zip(design.inputs, here, strict=True)), may_shift),
@@ -109,7 +115,7 @@ class DesignNumbers:
         zeros = frozenset(
             (kinds[kind], k) for (kind, k), value in self.numbers.items() if kind in kinds and value.is_zero()
         )
-        return kernel_equations(self._functions, self._structure, zeros)
+        return kernel_equations(self._functions, self._structure, zeros, self._stop_pairs if points == "q" else ())
 
     def _add(self, kind: str, values: Sequence[ca.SX | float]) -> None:
         self.numbers |= {(kind, k): ca.SX(value) for k, value in enumerate(values)}
@@ -163,3 +169,14 @@ class DesignNumbers:
             way = self.shapes[link].points[second] - self.shapes[link].points[first]
             arm = way.dot(way)
             yield ca.fmax(arm - SHORT_ARM**2 * size, -arm)
+
+
+def _stop_numbers(reference: ReferenceDesign) -> tuple[tuple[Pair, ...], list[float]]:
+    """The pairs with stops, and their numbers. Raises UnsupportedOperation where these do not tell where they are."""
+    if not reference.mechanism.stops:
+        return (), []
+    pairs, periodic, low, high = stop_ranges(reference, reference.mechanism, 1)
+    width, open_ = (high - low)[:, 0], np.full(1, np.inf)
+    if np.any(np.where(periodic, (width < LEAST_RANGES[0]) | (width > TURN + SURE_DISTANCE), width < LEAST_RANGES[1])):
+        raise UnsupportedOperation("a pair has stops that are too near to each other, or more than a turn apart")
+    return tuple(pairs), stop_limits(pairs, periodic.tolist(), low, high, (-open_, open_)).numbers[:, 0].tolist()

@@ -9,8 +9,8 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from planar.batch.march.kernel import BareAngle, KernelEquations, Operand
-from planar.batch.march.llvm_checks import write_keeps_apart
-from planar.batch.march.llvm_kernel import KernelWriter, OperandNames
+from planar.batch.march.llvm.checks import write_keeps_apart
+from planar.batch.march.llvm.kernel_writer import KernelWriter, OperandNames
 from planar.batch.march.prediction import MAX_TURN_PER_STEP
 from planar.batch.prepare.llvm_ending import FUNCTION_NAME as ENDING_FUNCTION
 from planar.batch.prepare.llvm_ending import PositionRows, write_ending
@@ -48,7 +48,7 @@ def write_positions(
 
 class _PositionsWriter(KernelWriter):
     def __init__(self, equations: KernelEquations, links: tuple[str, ...], rates: bool, order: Sequence[Operand]):
-        super().__init__(equations, links, rates, LANES, frozenset({"p", "q", "u1", "u2", "sign"}), frozenset())
+        super().__init__(equations, links, rates, LANES, frozenset({"p", "q", "u1", "u2", "sign", "stop"}), frozenset())
         if any(part.closed_form is None for part in equations.blocks):
             raise UnsupportedOperation("a group is not in closed form")
         self.order = order
@@ -67,7 +67,7 @@ class _PositionsWriter(KernelWriter):
         have: OperandNames = {
             operand: t.broadcast(t.add_instruction(f"load double, ptr {t.double_pointer('%numbers', str(k))}"))
             for k, operand in enumerate(self.order)
-            if operand[0] in ("p", "q", "u1", "u2", "sign", "d", "dc", "ds", "tolerance", "unit")
+            if operand[0] in ("p", "q", "u1", "u2", "sign", "stop", "d", "dc", "ds", "tolerance", "unit")
         }
         t.mark_hoist_point()
         t.write_line("br label %block")
@@ -76,6 +76,7 @@ class _PositionsWriter(KernelWriter):
         first = t.add_instruction(f"mul i64 %b, {t.lanes}")
         self._write_inputs(first, have)
         bends = [self.write_closed_form(part, have) for part in of.blocks]
+        bends += self.write_stops(have)
         left, counted, *values = self.write_separately(
             [of.residuals(), self.counted_angles(), *self.output_expressions()], have
         )

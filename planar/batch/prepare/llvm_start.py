@@ -12,7 +12,7 @@ from math import inf
 
 from planar.batch.closed_form.llvm_joiner import BlockJoinWriter
 from planar.batch.march.kernel import BareAngle, KernelBlock, KernelEquations, Operand
-from planar.batch.march.llvm_kernel import OperandNames
+from planar.batch.march.llvm.kernel_writer import OperandNames
 from planar.batch.prepare.llvm_numbers import SAID
 from planar.batch.prepare.run_endings import ALL_SOLVED, CANNOT_BE_ASSEMBLED, CLEARLY_OPEN, UNSURE
 from planar.codegen.instructions import UnsupportedOperation

@@ -12,7 +12,7 @@ import numpy as np
 from planar.batch.block import LEAD_IN_STEP
 from planar.batch.design_arrays import read_designs, with_design_values
 from planar.batch.prepare.design_numbers import DesignNumbers, compiled_variables
-from planar.batch.prepare.run_endings import DEAD_POINT, UNSURE
+from planar.batch.prepare.run_endings import DEAD_POINT, STOP, UNSURE
 from planar.batch.prepare.value_binder import MAX_BOUND_NAMES
 from planar.batch.reference_design import ReferenceDesign
 from planar.codegen.instructions import UnsupportedOperation
@@ -85,6 +85,8 @@ def _compile(  # many: what a run is made of
         shifting.remove(reference.running_index)
     design = DesignNumbers(reference, members, shifting, zeros)
     if design.equations("q").has_newton_blocks:
+        if reference.mechanism.stops:
+            raise UnsupportedOperation("stops are looked for where all groups are in closed form")
         if grid.lead or reference.candidates.counts_turns:
             raise UnsupportedOperation("a group that is not in closed form starts where the file has it, turns or not")
         run: NativeRun = NewtonRun(reference, design, members, rates, grid.u)
@@ -188,6 +190,6 @@ def _find_positions(reference: ReferenceDesign, positions: Array) -> _Positions:
 def _at_wanted_positions(run: NativeRun, grid: _Positions, values: Mapping[str, float]) -> tuple[Array, float, int]:
     """A run without the positions on its way, on which it must not end, and between."""
     rows, ending, position = run(values)
-    if ending == DEAD_POINT and position <= grid.lead:
+    if ending in (DEAD_POINT, STOP) and position <= grid.lead:
         ending = UNSURE
     return rows[:, grid.lead :: grid.every], ending, max(ceil((position - grid.lead) / grid.every), 0)

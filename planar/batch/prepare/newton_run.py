@@ -13,10 +13,10 @@ from planar.batch.assembly.nearest_assemblies import CORRECTIONS
 from planar.batch.initial_assembly import find_assemblies
 from planar.batch.march.choice import find_runner
 from planar.batch.march.kernel import KernelEquations
-from planar.batch.march.llvm_designs import ARGUMENT_TYPES as KERNEL_ARGUMENTS
-from planar.batch.march.llvm_designs import FUNCTION_NAME as KERNEL_FUNCTION
-from planar.batch.march.llvm_designs import write_designs_kernel
-from planar.batch.march.llvm_runner import operand_rows, run_designs_kernel, step_table, unknowns_at_steps
+from planar.batch.march.llvm.designs_writer import ARGUMENT_TYPES as KERNEL_ARGUMENTS
+from planar.batch.march.llvm.designs_writer import FUNCTION_NAME as KERNEL_FUNCTION
+from planar.batch.march.llvm.designs_writer import write_designs_kernel
+from planar.batch.march.llvm.kernel_runs import operand_rows, run_designs_kernel, step_table, unknowns_at_steps
 from planar.batch.march.prediction import (
     PREDICTOR_ORDER,
     correction_limit,

@@ -104,6 +104,7 @@ class ParquetStore(BlockStore):
             "input": np.broadcast_to(done.input, done.status.shape).ravel(),
             "status": done.status.ravel(),
             "dead_point": np.repeat(done.dead_point, steps),
+            "stop_position": np.repeat(done.stop_position, steps),
         }
         named = column_names(self.plan)
         for quantity, results in result_views(done.out, self.plan).items():
@@ -148,8 +149,9 @@ class ParquetStore(BlockStore):
 
     def result(self) -> Sweep:
         found = {quantity: _ParquetResults(self, names) for quantity, names in column_names(self.plan).items()}
-        status, inputs, dead_points = self.read_columns(("status", "input", "dead_point"))
-        return self.make_sweep(found, status, inputs[0] if np.all(inputs == inputs[0]) else inputs, dead_points[:, 0])
+        status, inputs, *ends = self.read_columns(("status", "input", "dead_point", "stop_position"))
+        common = inputs[0] if np.all(inputs == inputs[0]) else inputs
+        return self.make_sweep(found, status, common, (ends[0][:, 0], ends[1][:, 0]))
 
 
 class _ParquetResults(Mapping[str, Any]):

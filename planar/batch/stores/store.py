@@ -130,8 +130,10 @@ class BlockStore(ABC):
         """How many positions the general path solved."""
         return sum(each[0] for each in self.block_notes.values())
 
-    def make_sweep(self, found: Mapping[str, Mapping[str, Any]], status: Any, input_: Array, dead_point: Any) -> Sweep:
-        """The result out of arrays by quantity and name."""
+    def make_sweep(
+        self, found: Mapping[str, Mapping[str, Any]], status: Any, input_: Array, ends: tuple[Any, Any]
+    ) -> Sweep:
+        """The result out of arrays by quantity and name; `ends`: where dead points and stops end designs."""
         plan = self.plan
         position, velocity, acceleration = (found.get(order) for order in POINT_QUANTITIES)
         assert position is not None
@@ -147,7 +149,7 @@ class BlockStore(ABC):
             status,
             input_,
             self.general_positions,
-            dead_point,
+            *ends,
             self.notes(),
             **more,
         )
@@ -218,7 +220,7 @@ class MemoryStore(BlockStore):
         self.out = allocate_aligned(*self.shape, plan.all_designs.dtype)
         self.status = np.zeros((plan.design_count, plan.all_designs.steps + 1), dtype=np.int8)
         self.inputs: Array | None = None
-        self.dead_point = np.full(plan.design_count, np.nan)
+        self.dead_point, self.stop_position = np.full((2, plan.design_count), np.nan)
 
     def output_array(self, part: slice) -> Array:
         return self.out[:, :, part]
@@ -228,12 +230,14 @@ class MemoryStore(BlockStore):
         if not np.may_share_memory(own, done.out):
             own[:] = done.out
         self.status[part], self.dead_point[part] = done.status, done.dead_point
+        self.stop_position[part] = done.stop_position
         self.inputs = _join_inputs(self.inputs, done.input, part, self.plan)
         self.block_notes[number] = done.general_positions, done.general_designs, done.endings
 
     def result(self) -> Sweep:
         assert self.inputs is not None
-        return self.make_sweep(result_views(self.out, self.plan), self.status, self.inputs, self.dead_point)
+        ends = self.dead_point, self.stop_position
+        return self.make_sweep(result_views(self.out, self.plan), self.status, self.inputs, ends)
 
 
 def result_views(out: Array, plan: SweepPlan) -> dict[str, dict[str, Array]]:

@@ -89,7 +89,8 @@ class ZarrStore(BlockStore):
         yield self._open_array("status", dtype="int8", fill_value=MISSING_STATUS, **row)
         yield self._open_array("input", dtype="float64", fill_value=np.nan, **row)
         of_designs = {"shape": (plan.design_count,), "chunks": (rows,), "dimension_names": ("design",)}
-        yield self._open_array("dead_point", dtype="float64", fill_value=np.nan, **of_designs)
+        for name in ("dead_point", "stop_position"):
+            yield self._open_array(name, dtype="float64", fill_value=np.nan, **of_designs)
         records = {"shape": (plan.block_count, RECORD_BYTES), "chunks": (1, RECORD_BYTES)}
         yield self._open_array("blocks", dtype="uint8", fill_value=0, **records)
         for name, values in plan.design_columns.items():
@@ -160,7 +161,8 @@ class ZarrStore(BlockStore):
             for order, points in result_views(done.out, self.plan).items():
                 for name, values in points.items():
                     self.arrays[f"{order}/{_path_name(name)}"][part] = np.ascontiguousarray(values)
-            self.arrays["status"][part], self.arrays["dead_point"][part] = done.status, done.dead_point
+            for name in ("status", "dead_point", "stop_position"):
+                self.arrays[name][part] = getattr(done, name)
             self.arrays["input"][part] = np.broadcast_to(done.input, done.status.shape)
             note = done.general_positions, done.general_designs, _shorten_sentences(done.endings)
             record = json.dumps(note, ensure_ascii=False).encode()
@@ -175,9 +177,8 @@ class ZarrStore(BlockStore):
         for row in self.plan.result_rows:
             stored = StoredArray(self, f"{row.quantity}/{_path_name(row.name)}")
             found.setdefault(row.quantity, {})[row.name] = stored
-        return self.make_sweep(
-            found, StoredArray(self, "status"), self._input_positions(), StoredArray(self, "dead_point")
-        )
+        ends = StoredArray(self, "dead_point"), StoredArray(self, "stop_position")
+        return self.make_sweep(found, StoredArray(self, "status"), self._input_positions(), ends)
 
     def _input_positions(self) -> Any:
         """Positions of the input, as one row where all designs have the same; looked at block by block."""

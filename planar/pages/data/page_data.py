@@ -200,7 +200,10 @@ def _assembly_data(mechanism: Mechanism, solver: PositionSolver) -> dict[str, An
     every = circuits(mechanism) if small else None
     return {
         "more": len(listed) > MAX_ASSEMBLIES,
-        "list": [{"z": mode.z.tolist(), **_location_data(mode, every)} for mode in listed[:MAX_ASSEMBLIES]],
+        "list": [
+            {"z": mode.z.tolist(), "beyond_stop": mode.is_beyond_stop, **_location_data(mode, every)}
+            for mode in listed[:MAX_ASSEMBLIES]
+        ],
     }
 
 

@@ -33,7 +33,8 @@ def table(modes: Modes, limit: int, points: Sequence[str] = (), circuits: Circui
     """The first assemblies: how many there are, group by group, and where each has the points; on which circuit."""
     mechanism = modes.mechanism
     shown = list(islice(modes, limit))
-    head = [Text(mechanism.name, style="bold"), Text(_inputs_text(modes)), Text(count_text(modes, len(shown)))]
+    count = count_text(modes, len(shown)) + _beyond_stops_text(shown)
+    head = [Text(mechanism.name, style="bold"), Text(_inputs_text(modes)), Text(count)]
     names = _check_points(modes, points) if points else _distinguishing_points(modes, shown)
     told = [*modes.remarks]
     rest = [name for name in _moving_points(modes) if name not in names]
@@ -47,8 +48,8 @@ def table(modes: Modes, limit: int, points: Sequence[str] = (), circuits: Circui
         if mode.reason:
             why.setdefault(mode.reason, []).append(str(mode.number))
     for reason, which in why.items():
-        names = [*which[:MAX_LISTED_NAMES], "more"] if len(which) > MAX_LISTED_NAMES else which
-        told.append(f"{join_all_names(names)}: {reason}")
+        numbers = [*which[:MAX_LISTED_NAMES], "more"] if len(which) > MAX_LISTED_NAMES else which
+        told.append(f"{join_all_names(numbers)}: {reason}")
     notes = paragraphs((" -", sentence) for sentence in told)
     groups = [_groups_table(modes)] if modes.groups else []
     return Stack(*head, Text(), *groups, _assemblies_table(modes, shown, names, circuits), Text(), notes)
@@ -63,6 +64,12 @@ def count_text(modes: Modes, listed_count: int) -> str:
     beside = f" of {bound} complex solutions" if bound is not None and bound != modes.total else ""
     left = f"; the first {listed_count} are listed" if listed_count < modes.total else ""
     return f"{count_phrase(modes.total, 'assembly', 'assemblies')}{beside}, {modes.complete.value}{left}"
+
+
+def _beyond_stops_text(shown: Sequence[Mode]) -> str:
+    """How many of those that are listed lie beyond a stop, which none can be brought to."""
+    many = sum(mode.is_beyond_stop for mode in shown)
+    return f"; {many} of these {'lies' if many == 1 else 'lie'} beyond a stop" if many else ""
 
 
 def _groups_table(modes: Modes) -> FittedTable:
@@ -205,6 +212,7 @@ def record(modes: Modes, limit: int, circuits: Circuits | None = None) -> dict[s
                 "choices": list(mode.choices),
                 "certified": mode.certified,
                 "double": mode.double,
+                "beyond_stop": mode.is_beyond_stop,
                 "distance": mode.distance,
                 "outcome": mode.outcome.value,
                 "reason": mode.reason,

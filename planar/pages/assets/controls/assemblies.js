@@ -11,7 +11,11 @@ class Assemblies {
     this.count = `${list.length}${more ? " and more" : ""}`;
     this.select = Forms.element("select", { id: "assembly" });
     this.unlisted = Forms.element("option", { value: "" }, "none of those listed");
-    list.forEach((each, k) => this.select.append(Forms.element("option", { value: k }, this.told(each, k))));
+    list.forEach((each, k) => {
+      const option = Forms.element("option", { value: k }, this.told(each, k));
+      option.disabled = each.beyond_stop; // no motion brings the linkage there, or starts there
+      this.select.append(option);
+    });
     this.now = Forms.element("p", { class: "note" });
     section.append(
       Forms.element("h2", {}, "Assemblies"),
@@ -22,7 +26,8 @@ class Assemblies {
     this.show();
   }
 
-  told({ circuit, branch }, k) {
+  told({ circuit, branch, beyond_stop }, k) {
+    if (beyond_stop) return `${k + 1}: beyond a stop`;
     const on = circuit && `circuit ${circuit[0]} of ${circuit[1]}, branch ${branch[0]} of ${branch[1]}`;
     return on ? `${k + 1}: ${on}` : `${k + 1}`;
   }

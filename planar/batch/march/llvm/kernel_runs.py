@@ -10,12 +10,12 @@ import numpy as np
 
 from planar.batch.march.backend import CorrectedAssemblies, DesignBatch, erase_between
 from planar.batch.march.kernel import KernelEquations, batch_equations
-from planar.batch.march.llvm_designs import (
+from planar.batch.march.llvm.designs_writer import (
     ARGUMENT_TYPES,
     FUNCTION_NAME,
     write_designs_kernel,
 )
-from planar.batch.march.llvm_kernel import STATE_GIVEN, DesignsKernelLayout, KernelStart
+from planar.batch.march.llvm.kernel_writer import STATE_GIVEN, DesignsKernelLayout, KernelStart
 from planar.batch.march.prediction import (
     LONGEST_STEP,
     PREDICTOR_ORDER,
@@ -104,6 +104,7 @@ def run_designs_kernel(
 
 def unknowns_at_steps(batch: DesignBatch, extra_corrections: int, steps: Array) -> Array:
     """The unknowns (unknowns, designs) of a run that came to these steps, at (designs,), of each design to one."""
+    batch = batch._replace(stops=None)
     kernel = designs_kernel(batch_equations(batch), (), False, ())
     table, counts = step_table(batch.input_offsets)
     tolerances = batch.tolerance, correction_limit(_longest_step(batch)), 1.0
@@ -176,7 +177,7 @@ def _run_kernel(
     function = compile_function(kernel.ir, FUNCTION_NAME, *ARGUMENT_TYPES)
     many, steps, lanes = batch.p.shape[1], len(tables[0]), kernel.lanes
     rows = (
-        batch.p,
+        batch.numbers,
         batch.q,
         batch.signs if kernel.start.has_signs and batch.signs is not None else operand_rows(kernel.state, batch.z0),
         operand_rows(kernel.inputs, batch.u0) if not kernel.start.has_common_inputs else np.zeros((0, many)),

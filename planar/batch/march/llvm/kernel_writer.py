@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import reduce
 from typing import NamedTuple
 
@@ -97,6 +97,15 @@ class KernelWriter(KernelInstructions):
         *values, coalescence = self.write_values(self.closed_form_outputs(part), names)
         names.update(zip(self.closed_form_operands(part), values, strict=True))
         return coalescence
+
+    def stop_number_names(self, load_row: Callable[[int], str]) -> OperandNames:
+        """The numbers of stops, which stand behind p, by what loads a row of it."""
+        first = self.symbols["p"].numel()
+        return {("stop", k): load_row(first + k) for k in range(self.symbols["stop"].numel())}
+
+    def write_stops(self, names: OperandNames) -> list[str]:
+        """What reaches one where a pair meets its stop, of each pair with stops."""
+        return self.write_values(self.stop_outputs(), names) if self.equations.stop_pairs else []
 
     def write_angle_sum(self, cos: str, sin: str, c: str, s: str) -> tuple[str, str]:
         """The cos and sin of a sum of two angles."""

@@ -14,7 +14,7 @@ from planar.batch.march.backend import CorrectedAssemblies, DesignBatch, Unsuppo
 from planar.batch.march.checks import PointWriter, design_positions
 from planar.batch.march.design_functions import DesignFunctions
 from planar.batch.march.kernel import KernelEquations, batch_equations
-from planar.batch.march.numpy_kernel import (
+from planar.batch.march.numpy.kernel import (
     DesignMarch,
     MarchedSteps,
     NumpyKernel,

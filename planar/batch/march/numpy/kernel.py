@@ -16,7 +16,7 @@ from planar.batch.march.kernel import (
     KernelInstructions,
     Operand,
 )
-from planar.batch.march.numpy_systems import newton_step, stack_values
+from planar.batch.march.numpy.systems import newton_step, stack_values
 from planar.batch.march.prediction import MAX_TURN_PER_STEP, PREDICTOR_ORDER, extrapolation_weights
 from planar.batch.march.regularity import LEAST_KERNEL_REGULARITY, LEAST_START_REGULARITY, least_regularity
 from planar.codegen.instructions import UnsupportedOperation, required_values
@@ -49,7 +49,7 @@ class NumpyKernel(KernelInstructions):
         point_blocks: tuple[int, ...] | None,
         carried: frozenset[Operand],
     ):
-        super().__init__(equations, links, rates, frozenset({"p", "q", "u1", "u2"}), carried)
+        super().__init__(equations, links, rates, frozenset({"p", "q", "u1", "u2", "stop"}), carried)
         self.point_blocks = point_blocks
         self.has_newton_blocks = equations.has_newton_blocks
         self.is_sequential = self.has_newton_blocks or bool(carried)
@@ -73,6 +73,7 @@ class NumpyKernel(KernelInstructions):
             points = [k for k, each in enumerate(point_blocks or ()) if each == index]
             if points:
                 self.block_points[index] = points, self._make_part([self.point_coordinates(points)], known)
+        self.stops = self._make_part(self.stop_outputs(), known) if equations.stop_pairs else None
         self.rate_parts: list[tuple[KernelBlock, list[_KernelPart]]] = []
         "of each block the Jacobian's rows, then what its first and its second rates make up for"
         known |= {(name, k) for name in ("u1", "u2") for k in range(len(equations.input_is_angle))}
@@ -115,6 +116,7 @@ class NumpyKernel(KernelInstructions):
         parts = (
             self.sides,
             self.end,
+            *([] if self.stops is None else [self.stops]),
             *(own for _, own in self.blocks),
             *(own for _, own in self.block_points.values()),
             *(own for _, steps in self.rate_parts for own in steps),
@@ -173,6 +175,7 @@ class DesignMarch:
         self.kernel, self.counts, self.correction_limit = kernel, counts, correction_limit
         self.tolerance = batch.tolerance
         rows = {"p": batch.p, "q": batch.q, "u1": batch.u1, "u2": batch.u2}
+        rows |= {} if batch.stops is None else {"stop": batch.stops.numbers}
         given = [rows[name][k] for name, k in kernel.invariant_operands]
         held = kernel.invariant_function(*given)
         self.invariants = dict(zip(kernel.invariant_numbers, held, strict=True))
@@ -190,7 +193,8 @@ class DesignMarch:
         self.state = {each: state[each] for k in kept for each in kernel.unknown_operands(k)}
         self.history: list[OperandArrays] = [self.state]
         designs = batch.p.shape[1]
-        self.coalescences = [np.zeros((2, designs)) for _ in kernel.equations.closed_forms]
+        watched = (*kernel.equations.closed_forms, *kernel.equations.stop_pairs)
+        self.coalescences = [np.zeros((2, designs)) for _ in watched]
         self.counted_angles = [np.zeros(designs) for _ in range(kernel.counted_angle_count)]
         self.passed, self.step = np.ones(designs, dtype=bool), 0
 
@@ -234,7 +238,11 @@ class DesignMarch:
             else:
                 if part.block.block_index in kernel.block_points:
                     other_points |= self._other_points(part, own, values)
-                fine &= self._keeps_apart(part, self._solve_closed_form(part, own, values), steps, shape)
+                index = kernel.sign_index[part.block.block_index]
+                fine &= self._keeps_below(index, self._solve_closed_form(part, own, values), steps, shape)
+        if kernel.stops is not None:
+            for k, value in enumerate(self._evaluate(kernel.stops, values), len(kernel.equations.closed_forms)):
+                fine &= self._keeps_below(k, value, steps, shape)
         self._add_rates(values, shape)
         found = self._evaluate(kernel.end, values)
         first = kernel.residual_count + kernel.counted_angle_count
@@ -291,12 +299,12 @@ class DesignMarch:
                 self._carry_angle(k, values)
         return coalescence
 
-    def _keeps_apart(self, part: KernelBlock, coalescence: Any, steps: Array, shape: tuple[int, int]) -> Array:
-        """Where the two assemblies of a block keep apart, between steps too: `coalescence` does not reach one.
+    def _keeps_below(self, index: int, coalescence: Any, steps: Array, shape: tuple[int, int]) -> Array:
+        """Where two assemblies of a block keep apart, or a pair from its stops, between steps too: `coalescence` does
+        not reach one.
 
-        By as much as it bends over the last three steps. So it may be the step before at which they had come too near.
+        By as much as it bends over the last three steps. So it may be the step before at which it had come too near.
         """
-        index = self.kernel.sign_index[part.block.block_index]
         rows = np.concatenate([self.coalescences[index], np.broadcast_to(coalescence, shape)])
         self.coalescences[index] = rows[-2:]
         earlier, before, here = rows[:-2], rows[1:-1], rows[2:]

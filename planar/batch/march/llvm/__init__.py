@@ -1,0 +1,1 @@
+"""The march in machine code: designs in the lanes of vectors, their functions printed as LLVM IR."""

@@ -1,0 +1,1 @@
+"""The march by numpy: designs and steps in arrays."""
