@@ -34,8 +34,9 @@ def slide_stop_places(
     """Where the stops of slides are: their link, and the place in its axes."""
     guides = {mark.name: mark for mark in marks if isinstance(mark, GuideMark | SlotMark)}
     for stops in mechanism.stops:
-        guide = guides.get(stops.pair)
-        for at, _ in _ends(stops) if guide is not None else ():
+        if (guide := guides.get(stops.pair)) is None:
+            continue
+        for at, _ in _ends(stops):
             yield guide.link, guide.through + guide.direction * at
 
 
