@@ -103,18 +103,17 @@ def _solve(whole: Array, right: Array, is_firm: bool) -> Array:
 
 
 class CountedContacts(NamedTuple):
-    """The solution y (m,) that goes over into that without friction, how many there are, and how far coefficients can
-    grow on the way from none."""
+    """The solution y (m,) that goes over into that without friction, how many there are, and whether that is proved."""
 
     y: Array
     solution_count: int
-    part: float
+    is_complete: bool
 
 
 def solve_all(system: ContactSystem) -> CountedContacts:
     """The contacts at the one position of a system, all solutions counted."""
     found = solve_contacts(system)
-    return CountedContacts(found.first[0], int(found.solution_count[0]), float(found.part[0]))
+    return CountedContacts(found.first[0], int(found.solution_count[0]), bool(found.is_complete[0]))
 
 
 def is_single(system: ContactSystem) -> bool:

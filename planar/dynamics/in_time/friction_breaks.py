@@ -7,10 +7,9 @@ from functools import partial
 
 import numpy as np
 
-from planar.dynamics.friction.contact_dynamics import CountedContacts, is_single, solve_all
+from planar.dynamics.friction.contact_dynamics import is_single, solve_all
 from planar.dynamics.in_time.stick_slip import STILL_TOLERANCE, FrictionBreak, Release, StickSlip, StickSlipPhase
 from planar.foundation.arrays import Array, IntArray
-from planar.foundation.errors import NoAnswer, Outcome
 from planar.foundation.root_finding import find_first_passage, find_root
 
 SIDE_TOLERANCE = 1e-12
@@ -99,7 +98,7 @@ class FrictionBreaks:
             at = find_root(gap, ends[0], ends[1])
             yield FrictionBreak(at, lead=(int(k), int(leads(at)[1][k])))
         if not passed.size and not is_single(dynamics.system):
-            self._refuse_several(solve_all(dynamics.system))
+            self.stick_slip.refuse_several(solve_all(dynamics.system))
 
     def _releases(
         self, phase: StickSlipPhase, ends: tuple[float, float], state: StateFunction
@@ -130,9 +129,3 @@ class FrictionBreaks:
         pushed = dynamics.accelerations + dynamics.changes @ solution.y
         second = (values.slopes @ pushed + values.bends) / self.units
         return float((signs * second)[signs != 0].min()) - phase.least
-
-    def _refuse_several(self, solution: CountedContacts) -> None:
-        if solution.solution_count > 1:
-            raise NoAnswer(Outcome.BRANCH_LOST, self.stick_slip.several_sentence(solution.solution_count))
-        if not solution.solution_count:
-            raise NoAnswer(Outcome.INPUT_JAMMED, self.stick_slip.jam_sentence(True))

@@ -131,8 +131,7 @@ class StickSlip:
         standing = self._standing(base, values, time, y, None if event is None else event.stopped)
         release = event.release if event is not None else None
         chosen, releases = self._choose(time, y, sides, values, standing, release)
-        if chosen.solution.solution_count > 1:
-            raise NoAnswer(Outcome.BRANCH_LOST, self.several_sentence(chosen.solution.solution_count))
+        self.refuse_several(chosen.solution)
         contacts = HeldContacts(chosen.dynamics.system, chosen.solution.y)
         if event is not None and event.lead is not None:
             contacts.lead_by(*event.lead)
@@ -169,8 +168,8 @@ class StickSlip:
         rows = values.slopes @ ways / self.units[:, None]
         long = np.linalg.norm(rows, axis=1)
         if stopped is not None:  # and what moves with it, as far as rounding tells
-            along = np.abs(rows @ rows[stopped]) >= (1.0 - PARALLEL_TOLERANCE) * long * long[stopped]
-            moving &= ~(along & (np.abs(rates) <= STOPPED_TOLERANCE * self.fastest))
+            is_parallel = np.abs(rows @ rows[stopped]) >= (1.0 - PARALLEL_TOLERANCE) * long * long[stopped]
+            moving &= ~(is_parallel & (np.abs(rates) <= STOPPED_TOLERANCE * self.fastest))
             moving[stopped] = False
         senses = np.where(moving, np.sign(rates), 0.0)
         classes: list[list[tuple[int, int]]] = []
@@ -303,12 +302,20 @@ class StickSlip:
                 kept.append(k)
         return tuple(self.functions.pairs[standing.classes[k][0][0]] for k in kept)
 
-    def several_sentence(self, count: int) -> str:
-        """That nothing tells which of several solutions is there."""
-        return (
-            f"with the friction at {quote_names(self.functions.pairs)} there are {count} solutions for the forces and "
-            "accelerations, and nothing tells which is there; with less friction there is one"
-        )
+    def refuse_several(self, solution: CountedContacts) -> None:
+        """Raise NoAnswer where there is not just one solution, or that is not proved."""
+        at = f"with the friction at {quote_names(self.functions.pairs)}"
+        if not solution.solution_count:
+            raise NoAnswer(Outcome.INPUT_JAMMED, self.jam_sentence(True))
+        if solution.solution_count > 1:
+            raise NoAnswer(
+                Outcome.BRANCH_LOST,
+                f"{at} there are {solution.solution_count} solutions for the forces and accelerations, and nothing "
+                "tells which is there; with less friction there is one",
+            )
+        if not solution.is_complete:
+            told = f"{at} one solution for the forces and accelerations was found, but others could not be ruled out"
+            raise NoAnswer(Outcome.BRANCH_LOST, told)
 
     def jam_sentence(self, no_forces: bool) -> str:
         """That no solution goes with the motion."""
