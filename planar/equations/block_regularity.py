@@ -52,11 +52,21 @@ def _singular_value_bounds(matrix: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
     if matrix.numel() == 4:
         det = matrix[0, 0] * matrix[1, 1] - matrix[0, 1] * matrix[1, 0]
         greatest = ca.sqrt(0.5 * (square + ca.sqrt(ca.fmax(square * square - 4.0 * det * det, 0.0))))
-        return ca.fabs(det) / greatest, greatest, _sign(det)
+        return _or_singular(ca.fabs(det) / greatest), greatest, _sign(det)
     # the inverse is as large as that of the triangle
     triangle, sign = reduce_to_triangle(matrix)
     inverse = ca.solve(triangle, ca.SX.eye(matrix.size1()))
-    return 1.0 / ca.norm_fro(inverse), ca.sqrt(square), sign
+    return _or_singular(1.0 / ca.norm_fro(inverse)), ca.sqrt(square), sign
+
+
+def _inverse_or_none(value: ca.SX) -> ca.SX:
+    """1 by a number; none where it is none, so that a column without length is left as it is."""
+    return ca.if_else(value > 0.0, 1.0 / value, 0.0)
+
+
+def _or_singular(bound: ca.SX) -> ca.SX:
+    """A bound on a singular value; where it is no number, which `fmin` would pass over, none."""
+    return ca.if_else(bound >= 0.0, bound, 0.0)
 
 
 def _sign(value: ca.SX) -> ca.SX:
@@ -77,7 +87,7 @@ def reduce_to_triangle(matrix: ca.SX) -> tuple[ca.SX, ca.SX]:
             away = _sign(corner)
             length = ca.sqrt(sum((rows[i][k] ** 2 for i in below), corner**2))
             normal = {k: corner + away * length} | {i: rows[i][k] for i in below}
-            scale = 1.0 / (length * (length + ca.fabs(corner)))
+            scale = _inverse_or_none(length * (length + ca.fabs(corner)))
             for j in range(k + 1, count):
                 along = sum((normal[i] * rows[i][j] for i in used if not rows[i][j].is_zero()), ca.SX(0.0))
                 if not along.is_zero():

@@ -32,6 +32,8 @@ def velocity_and_acceleration(found, at):
 @pytest.mark.parametrize("model", some_models(3))
 def test_euler_savary_agrees_with_velocity_and_acceleration_for_random_points_of_every_link(model):
     state = state_of(model)
+    if not any(each.velocity for each in state.inputs.values()):
+        pytest.skip("its inputs are at rest")
     rng = np.random.default_rng(1)
     turning = 0
     for link in state.frames:

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 import planar
-from planar.equations.block_regularity import reduce_to_triangle
+from planar.equations.block_regularity import reduce_to_triangle, regularity_bound
 from planar.solving.position import PositionSolver
 
 
@@ -95,3 +95,20 @@ def test_assemblies_beside_each_other_have_other_signs_in_a_block_of_six_unknown
                 assert sign(other, at[-1 - before]) == -signs[0]
                 tried += 1
     assert tried > 4
+
+
+@pytest.mark.parametrize(
+    "matrix",
+    [
+        np.zeros((2, 2)),
+        [[0.0, 1.0, 2.0], [0.0, 0.5, -1.0], [0.0, 3.0, 1.0]],
+        [[1.0, 2.0, 0.5], [0.0, 0.0, 1.0], [0.0, 0.0, 2.0]],
+        [[1.0, 1.0, 1.0, 2.0], [0.0, 0.0, 1.0, 1.0], [0.0, 0.0, 2.0, 3.0], [0.0, 0.0, 0.0, 1.0]],
+    ],
+)
+def test_a_matrix_that_loses_a_column_on_the_way_is_singular_and_not_unknown(matrix):
+    """A bound that is no number would be passed over where the least of all blocks is taken."""
+    entries = np.asarray(matrix)
+    block = ca.SX.sym("block", *entries.shape)
+    bound = regularity_bound(block, ca.SX.ones(len(entries)), ca.SX.ones(len(entries)) * 1e-9)
+    assert float(ca.Function("bound", [block], [bound])(entries)) == pytest.approx(0.0, abs=1e-12)

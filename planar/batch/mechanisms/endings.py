@@ -8,7 +8,7 @@ import numpy as np
 
 from planar.batch.mechanisms.linkage_groups import LinkageGroup, SweepRequest
 from planar.batch.mechanisms.march import LinkageRuns
-from planar.batch.mechanisms.stop_checks import find_first_stop
+from planar.batch.stop_checks import find_first_stop
 from planar.foundation.errors import Outcome
 from planar.model.mechanism import running_input_index
 

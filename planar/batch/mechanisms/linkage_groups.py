@@ -9,7 +9,7 @@ import numpy as np
 
 from planar.batch.mechanisms.linkage_arrays import LinkageArrays, PartitionedLinkage, make_linkage_arrays
 from planar.batch.mechanisms.partition import NotPartitionable, Partition, partition_mechanism
-from planar.batch.mechanisms.stop_checks import watched_links
+from planar.batch.stop_checks import watched_links
 from planar.foundation.errors import BadInput
 from planar.model.link_shapes import PointPlacementError
 from planar.model.mechanism import Mechanism, named_points, running_input_index
