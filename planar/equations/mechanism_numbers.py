@@ -30,6 +30,7 @@ def equation_structure(mechanism: Mechanism) -> Mechanism:
             links=tuple(Link(link.name) for link in mechanism.links),
             pairs=mechanism.pairs,
             inputs=tuple(Input(given.pair, 0.0) for given in mechanism.inputs),
+            closes_within=None if mechanism.closes_within is None else 0.0,
         )
         object.__setattr__(mechanism, "_equation_structure", found)
     return found
@@ -41,7 +42,8 @@ def structure_fingerprint(structure: Mechanism) -> str | None:
     if stamp is None or not all(type(pair).__module__.startswith(own) for pair in structure.pairs):
         return None
     inputs, links = [given.pair for given in structure.inputs], [link.name for link in structure.links]
-    told = (stamp, ca.CasadiMeta.version(), repr((structure.frame, links, inputs, structure.pairs)))
+    parts = (structure.frame, links, inputs, structure.pairs, structure.closes_within)
+    told = (stamp, ca.CasadiMeta.version(), repr(parts))
     return sha256("\0".join(told).encode()).hexdigest()
 
 

@@ -63,6 +63,10 @@ class ConstraintEquations:
     F: ca.SX
     input_kinds: tuple[MeasureKind, ...]
     """What every entry of u is."""
+    open_rows: tuple[int, ...] = ()
+    """Of all rows of the pairs, in the mechanism's order, those that may stay open by a misfit."""
+    misfit_columns: tuple[int, ...] = ()
+    """The coordinate that is the misfit of each of them."""
 
     @cached_property
     def unknown_is_angle(self) -> np.ndarray:
@@ -76,8 +80,8 @@ class ConstraintEquations:
 
     @property
     def is_square(self) -> bool:
-        """Whether every block has as many rows as unknowns."""
-        return not any(
+        """Whether every block has as many rows as unknowns, and these close them."""
+        return not self.open_rows and not any(
             block.is_free or slice_length(block.rows) != slice_length(block.unknowns) for block in self.blocks
         )
 
@@ -102,6 +106,8 @@ class ConstraintEquations:
             ],
             "known_after_block": self.known_after_block,
             "input_kinds": [kind.value for kind in self.input_kinds],
+            "open_rows": self.open_rows,
+            "misfit_columns": self.misfit_columns,
         }
 
 
@@ -124,6 +130,8 @@ def equations_from_outline(outline: Mapping[str, Any], function: ca.Function) ->
         w,
         F,
         tuple(map(MeasureKind, outline["input_kinds"])),
+        tuple(outline["open_rows"]),
+        tuple(outline["misfit_columns"]),
     )
 
 
@@ -139,8 +147,29 @@ class _MechanismCoordinates(NamedTuple):
 def build_equations(mechanism: Mechanism, given_links: Sequence[str] = ()) -> ConstraintEquations:
     """The equations of a mechanism; only its structure matters, its numbers are `p` and `u`.
 
-    The links that are `given` are no unknowns: where they are is told by u, ahead of the inputs' positions.
+    The links that are `given` are no unknowns: where they are is told by u, ahead of the inputs' positions. Of a
+    mechanism that closes within a misfit the pairs that are held more than once take the position of least misfit.
     """
+    found, surplus = _build_equations(mechanism, given_links)
+    if mechanism.closes_within is None or not _is_overdetermined(found):
+        return found
+    if surplus:
+        found, _ = _build_equations(mechanism, given_links, surplus)
+    if _is_overdetermined(found):  # it showed after elimination only, or not for these alone
+        every = [row for pair in mechanism.pairs for row in pair.residual_kinds]
+        found, _ = _build_equations(mechanism, given_links, range(len(every)))
+    return found
+
+
+def _is_overdetermined(equations: ConstraintEquations) -> bool:
+    """Whether some block has more rows than unknowns."""
+    return any(slice_length(block.rows) > slice_length(block.unknowns) for block in equations.blocks)
+
+
+def _build_equations(
+    mechanism: Mechanism, given_links: Sequence[str], open_rows: Sequence[int] = ()
+) -> tuple[ConstraintEquations, list[int]]:
+    """The equations in which some rows of pairs may stay open, and the rows of pairs that are held more than once."""
     named = relative_motions(mechanism)
     drives = (
         *(MeasureKind.LENGTH, MeasureKind.LENGTH, MeasureKind.ANGLE) * len(given_links),
@@ -155,13 +184,21 @@ def build_equations(mechanism: Mechanism, given_links: Sequence[str] = ()) -> Co
     numbers = split_pair_numbers(mechanism.pairs, p)
     closing = list(residuals(mechanism, unknown.frames, numbers, unknown.own, u[3 * len(given_links) :]))
     rows = [row for row, _ in closing]
-    lines = split_constant_factors([value for _, value in closing], unknown.symbols)
+    misfits = {row: ca.SX.sym(f"misfit {row}") for row in open_rows}
+    lines = split_constant_factors([value - misfits.get(k, 0.0) for k, (_, value) in enumerate(closing)], unknown.symbols)
 
     solved: EliminationSteps = []
     columns: list[int] = []
     left: list[int] = []
+    surplus: list[int] = []
+    tied: set[int] = set()
+    pair_rows = len(rows) - len(mechanism.inputs)
     for group in decompose_blocks([line.dependencies for line in lines], len(unknown.coordinates)):
         remaining_rows, remaining = eliminate(group.rows, group.columns, lines, solved)
+        if len(group.rows) > len(group.columns):
+            surplus += [row for row in group.rows if row < pair_rows]
+        if misfits.keys() & set(group.rows):
+            tied |= {*range(len(columns), len(columns) + len(remaining))}
         columns += remaining
         left += remaining_rows
     z = ca.SX.sym("z", len(columns))
@@ -170,7 +207,72 @@ def build_equations(mechanism: Mechanism, given_links: Sequence[str] = ()) -> Co
     F, w = back_substitute(dict(zip(columns, ca.vertsplit(z), strict=True)), solved, unknown.symbols, wanted)
     kept = tuple(rows[row] for row in left)
     whole = ConstraintEquations(tuple(unknown.coordinates), tuple(columns), kept, (), (), z, u, p, w, F, drives)
-    return _split_into_blocks(mechanism, whole)
+    if misfits:
+        whole = _with_least_misfit(whole, rows, left, misfits, sorted(tied))
+    return _split_into_blocks(mechanism, whole), surplus
+
+
+def _with_least_misfit(
+    e: ConstraintEquations,
+    rows: Sequence[ConstraintRow],
+    left: Sequence[int],
+    misfits: Mapping[int, ca.SX],
+    tied: Sequence[int],
+) -> ConstraintEquations:
+    """Equations whose rows may stay open by their misfits, made those of the position of least misfit.
+
+    `rows` are all rows, `left` those that elimination leaves, `tied` the unknowns that these move. An eliminated row
+    leaves its misfit, which is an unknown; one that remains has for a misfit its residual. The weighed sum of their
+    squares is least where its derivatives by all these unknowns vanish; a row that has to close, as an input's, has a
+    multiplier. Angles count as arcs at the mechanism's size.
+    """
+    remaining = [misfits[row] for row in left if row in misfits]
+    every = ca.vertcat(e.F, e.w)
+    if remaining:
+        every = ca.substitute(every, stack_expressions(remaining), ca.SX.zeros(len(remaining)))
+    F, w = every[: len(left)], every[len(left) :]
+    own = {row: F[k] for k, row in enumerate(left)}
+    columns = set(tied)
+    # a row that must close is tied where it rests on unknowns that the misfits move
+    touched = _unknowns_in(F, e.z)
+    firm = [k for k, row in enumerate(left) if row not in misfits and touched[k] and touched[k] <= columns]
+    free = [row for row in misfits if row not in own]
+    multipliers = [ca.SX.sym(f"multiplier {k}") for k in firm]
+    weights = stack_expressions(ca.SX.sym(f"weight {row}") for row in misfits)
+    values = stack_expressions(own.get(row, symbol) for row, symbol in misfits.items())
+    unknowns = stack_expressions([*(e.z[k] for k in tied), *(misfits[row] for row in free), *multipliers])
+    held = stack_expressions(F[k] for k in firm)
+    # the derivatives of the sum of squares as J^T W r: a sum of squares itself would lose half of the digits
+    slope = ca.jtimes(values, unknowns, weights * values, True)
+    if firm:
+        slope += ca.jtimes(held, unknowns, stack_expressions(multipliers), True)
+        slope = ca.vertcat(slope[: -len(firm)], held)
+    rest = [k for k, row in enumerate(left) if row not in misfits and k not in firm]
+    untied = [k for k in range(e.z.numel()) if k not in columns]
+    first = len(e.coordinates)
+    shown = [Coordinate(rows[row].pair, f"misfit {row}", rows[row].kind, False) for row in misfits]
+    shown += [Coordinate(rows[left[k]].pair, "multiplier", MeasureKind.LENGTH, False) for k in firm]
+    place = {row: first + k for k, row in enumerate(misfits)}
+    names = [rows[row] for row in left if row in misfits] or [rows[row] for row in misfits]
+    labels = [ConstraintRow(names[k % len(names)].pair, MeasureKind.ANGLE) for k in range(len(tied))]
+    labels += [rows[row] for row in free] + [rows[left[k]] for k in firm] + [rows[left[k]] for k in rest]
+    return replace(
+        e,
+        coordinates=(*e.coordinates, *shown),
+        unknowns=(
+            *(e.unknowns[k] for k in tied),
+            *(place[row] for row in free),
+            *(first + len(misfits) + k for k in range(len(firm))),
+            *(e.unknowns[k] for k in untied),
+        ),
+        rows=tuple(labels),
+        z=ca.vertcat(unknowns, *(e.z[k] for k in untied)),
+        p=ca.vertcat(e.p, weights),
+        w=ca.vertcat(w, values, *multipliers),
+        F=ca.vertcat(slope, *(F[k] for k in rest)),
+        open_rows=tuple(misfits),
+        misfit_columns=tuple(place.values()),
+    )
 
 
 def _split_into_blocks(mechanism: Mechanism, equations: ConstraintEquations) -> ConstraintEquations:

@@ -91,6 +91,10 @@ class PositionSolver(PreparedMechanism):
             from planar.solving.diagnosis import refusals
 
             raise refusals.free_links(self)
+        if self.equations.open_rows:
+            from planar.solving.assembly.least_misfit import nearest_least_misfit  # few mechanisms have one
+
+            return nearest_least_misfit(self, PositionSolver(replace(self.mechanism, closes_within=None)))
         return find_nearest_assembly(BlockAssemblies(self), self._is_regular)
 
     def remarks(self, found: Assembly) -> tuple[str, ...]:

@@ -12,6 +12,7 @@ from planar.equations.acceptance import AcceptanceFunctions
 from planar.equations.coordinates import frames_from_coordinates
 from planar.equations.functions import EquationFunctions
 from planar.equations.mechanism_numbers import pair_numbers_from, shape_extent, shapes_of_links, size_from_extents
+from planar.equations.residuals import pair_residuals, wrapped_residual
 from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput
 from planar.foundation.errors import join_names as several
@@ -65,9 +66,11 @@ class PreparedMechanism:
         self.reach = {name: each / self.unit for name, each in extents.items()}
         self.has_extent = any(self.reach.values())
         "whether the unit is a length of some link, and no slide's travel"
-        self.inputs = PositionInputs(
-            *self._inputs(mechanism), pair_numbers_from(mechanism, self.residual_check.numbers, self.unit)
-        )
+        numbers = pair_numbers_from(mechanism, self.residual_check.numbers, self.unit)
+        if self.equations.open_rows:
+            self.residual_check.open_rows = frozenset(self.equations.open_rows)
+            numbers = np.append(numbers, self._misfit_weights())
+        self.inputs = PositionInputs(*self._inputs(mechanism), numbers)
 
     def with_inputs_of(self, mechanism: Mechanism) -> Self:
         """The same for a mechanism that differs from this one in its inputs' numbers alone."""
@@ -89,6 +92,29 @@ class PreparedMechanism:
             there.__dict__.pop(name, None)
         there.functions, there.equations = program, program.equations
         return there
+
+    def _misfit_weights(self) -> Array:
+        """By how much the square of each misfit counts: as the stiffness of its pair, beside the greatest."""
+        stiffness = dict(self.mechanism.pair_stiffness)
+        owners = [self.residual_check.row_pairs[row] for row in self.equations.open_rows]
+        found = np.array([stiffness.get(self.pairs[name].entry_name(), 1.0) for name in owners])
+        return found / found.max()
+
+    def pair_misfits(self, z: Array, u: Array) -> dict[str, Array]:
+        """By how much each pair that may stay open does (samples,): m, angles as arcs at the mechanism's size."""
+        w = self.functions.coordinates(z, u, self.inputs.p)
+        found: dict[str, Array] = {}
+        for row, column in zip(self.equations.open_rows, self.equations.misfit_columns, strict=True):
+            name = self.residual_check.row_pairs[row]
+            found[name] = np.hypot(found.get(name, 0.0), w[:, column] * self.unit)
+        return found
+
+    def _least_misfit_residuals(self, z: Array, u: Array, w: Array, of_pairs: Array) -> Array:
+        """How far misfits (coordinates, samples) are from what pairs leave open, and from being the least."""
+        e = self.equations
+        own = np.abs(of_pairs - w[list(e.misfit_columns)])
+        stationary = [np.abs(self.functions.residuals_and_jacobian(*each, self.inputs.p)[0]) for each in zip(z, u)]
+        return np.vstack([own, np.array(stationary).T])
 
     @property
     def is_deflated(self) -> bool:
@@ -150,7 +176,17 @@ class PreparedMechanism:
         scale = np.array([self.unit if self.is_sliding(given.pair) else 1.0 for given in self.mechanism.inputs])
         with np.errstate(invalid="ignore"):  # what is not a number counts as open, and is refused as such
             frames, own = frames_from_coordinates(w * self.scale[:, None], self.column, self.shapes, self.pairs)
-            return self.residual_check.residuals(frames, own, u.T * scale[:, None]).reshape(-1, len(z))
+            found = self.residual_check.residuals(frames, own, u.T * scale[:, None]).reshape(-1, len(z))
+            if not self.equations.open_rows:
+                return found
+            misfits = self._misfits(frames, own) / self.scale[list(self.equations.misfit_columns), None]
+            return np.vstack([found, self._least_misfit_residuals(z, u, w, misfits)])
+
+    def _misfits(self, frames: Mapping[str, Frame], own: Mapping[str, Sequence[Scalar]]) -> Array:
+        """What the rows that may stay open leave open (rows, samples), by the pairs' own formulas (m, rad)."""
+        rows = list(pair_residuals(self.mechanism.pairs, frames, self.residual_check.numbers, own))
+        some = [wrapped_residual(rows[k][1], rows[k][0].kind) for k in self.equations.open_rows]
+        return np.array(np.broadcast_arrays(*some))
 
     def coordinates(self, frames: Mapping[str, Frame], own: Mapping[str, Sequence[Scalar]]) -> Array:
         """w (coordinates,) where the links' frames and the pairs' own coordinates are, jets or numbers (m, rad)."""
@@ -159,7 +195,10 @@ class PreparedMechanism:
             parts |= {
                 (pair, name): value for (name, _), value in zip(self.pairs[pair].coordinate_kinds, values, strict=True)
             }
-        found = (parts[each.owner, each.part] for each in self.equations.coordinates)
+        if self.equations.open_rows:
+            left = zip(self.equations.misfit_columns, self._misfits(frames, own), strict=True)
+            parts |= {self.equations.coordinates[column][:2]: value for column, value in left}
+        found = (parts.get(each[:2], 0.0) for each in self.equations.coordinates)
         return np.array([value.parts[0] if isinstance(value, Jet) else value for value in found]) / self.scale
 
     def max_residuals(self, z: Array, u: Array) -> Array:

@@ -204,6 +204,17 @@ def not_closed(setup: PreparedMechanism, pair: str, gap: float, at: str = "") ->
     )
 
 
+def misfit_beyond(setup: PreparedMechanism, pair: str, misfit: float, at: str) -> NoAnswer:
+    """A position of least misfit with more of it than the file lets pass."""
+    within = setup.mechanism.closes_within or 0.0
+    units = setup.mechanism.units
+    return NoAnswer(
+        Outcome.CANNOT_BE_ASSEMBLED,
+        f"{at} the least misfit leaves pair {pair!r} open by {amount(misfit, 'length', units)}, beyond the "
+        f"{amount(within, 'length', units)} of `closes_within`; change a length, or let it be more",
+    )
+
+
 def open_contact(setup: PreparedMechanism, pair: str, gap: float) -> NoAnswer:
     """A contact that the pair does not keep closed by itself, and that nothing else does."""
     apart = amount(gap, "length", setup.mechanism.units)
