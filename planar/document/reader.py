@@ -18,6 +18,7 @@ from planar.document.schema import (
     GEOMETRY_SOURCES,
     INPUT_SCHEMA,
     LINK_SCHEMA,
+    PAIR_SCHEMA,
     PUBLISHED_SCHEMA,
     SENSE_WORDS,
     UNITS_SCHEMA,
@@ -54,6 +55,7 @@ def read_mechanism(value: Any) -> Mechanism:
         raise top.error_at("frame", f"there is no link {frame!r} to be the frame{suggest_name(frame, links, 'links')}")
     full = _expand_short_forms(replace(top, context=FileContext(units, frame, links)))
     links = dict(full.context.links)
+    stiffness = _read_pair_stiffness(full)
     pairs = _read_pairs(full)
     bare = Mechanism(
         name=(full["name"].as_line() if full.has("name") else "") or "mechanism",
@@ -67,6 +69,8 @@ def read_mechanism(value: Any) -> Mechanism:
         geometry=full.choice("geometry", GEOMETRY_SOURCES),
         notes=tuple(item.as_text() for item in full.list_items("notes")),
         remarks=_unpinned_link_remarks(full, pairs),
+        closes_within=full["closes_within"].as_positive("length") if full.has("closes_within") else None,
+        pair_stiffness=stiffness,
     )
     inputs = _read_inputs(full, relative_motions(bare))
     driven = replace(bare, inputs=inputs)
@@ -221,12 +225,30 @@ def _read_point_definition(cursor: Cursor) -> PointDefinition:
     return Distances(first, second, distances[first], distances[second], side == "left_of")
 
 
+def _read_pair_stiffness(top: Cursor) -> tuple[tuple[str, float], ...]:
+    """The stiffness of every pair by its name (N/m), where they are given."""
+    entries = tuple(top["pairs"].items())
+    given = [entry for entry in entries if entry.has("stiffness")]
+    if given and len(given) < len(entries):
+        without = next(entry for entry in entries if not entry.has("stiffness"))
+        told = "this pair has no 'stiffness', but others have: give it on all pairs, or on none"
+        raise without.error_at(None, told)
+    found = []
+    for entry in given:
+        stiffness = entry["stiffness"].as_quantity("stiffness")
+        if not stiffness > 0.0:
+            raise entry.error_at("stiffness", "a pair's stiffness is above 0")
+        found.append((entry[_pair_type(entry).keyword].as_text(), stiffness))
+    return tuple(found)
+
+
 def _read_pairs(top: Cursor) -> tuple[Pair, ...]:
     found: list[Pair] = []
     named: dict[str, str] = {}
     placed: dict[tuple[str, str], str] = {}
     for entry in top["pairs"].items():
-        group = _pair_type(entry).read(entry)
+        own = {key: value for key, value in entry.fields().items() if key not in PAIR_SCHEMA}
+        group = _pair_type(entry).read(replace(entry, value=own))
         name = group[0].entry_name()
         pinned = {member for pair in group for member in pair.coincident_points()}
         shared = [member for member in pinned if member in placed]

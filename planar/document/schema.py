@@ -123,6 +123,14 @@ INPUT_SCHEMA: Schema = {
         "its motion in time: one piece, or a list of pieces, one after the other",
     ),
 }
+PAIR_SCHEMA: Schema = {
+    "stiffness": described(
+        schema_reference("amount"),
+        "how stiff it is: the force by which it opens, in the declared unit or N/m, on all pairs or on none; from it "
+        "forces follow where the links are held more than once",
+    ),
+}
+"""What an entry of any pair may have."""
 DRIVE_SCHEMA: Schema = {key: INPUT_SCHEMA[key] for key in ("position", "velocity", "acceleration")}
 VARIATION_SCHEMA: Schema = {
     "with": described(_TEXT, "the input's pair whose position it varies with; left out: time"),
@@ -240,6 +248,11 @@ FILE_SCHEMA: Schema = {
     "gravity": described(
         _vector_schema("quantity"), "the acceleration of weights, as [0, -9.81], in the declared unit or m/s^2"
     ),
+    "closes_within": described(
+        schema_reference("size"),
+        "the misfit up to which the pairs of a linkage that is held more than once may stay open, where its lengths "
+        "are rounded: it takes the position of least misfit; left out: it has to close",
+    ),
     "sketch": described(
         {"type": "object", "additionalProperties": _vector_schema("length")},
         "roughly where some points are, in the frame's axes: the assembly nearest to them is taken",
@@ -307,7 +320,11 @@ def schema() -> dict[str, Any]:
 
 
 def _pair_schema(kind: type[Pair]) -> Schema:
-    properties = {kind.keyword: described(schema_reference("name"), kind.entry_description), **kind.entry_schemas}
+    properties = {
+        kind.keyword: described(schema_reference("name"), kind.entry_description),
+        **kind.entry_schemas,
+        **PAIR_SCHEMA,
+    }
     return _object_schema(properties, kind.keyword, *kind.required_keys) | dict(kind.entry_rule)
 
 

@@ -38,7 +38,13 @@ def write_mechanism(mechanism: Mechanism) -> dict[str, Any]:
     value["units"] = {key: unit for key, unit in mechanism.units._asdict().items() if unit}
     value["frame"] = mechanism.frame
     value["links"] = {link.name: write_link(link, quantity) for link in mechanism.links}
-    value["pairs"] = [type(group[0]).write(group, quantity) for group in pair_entries(mechanism)]
+    stiffness = {name: quantity(each, "stiffness") for name, each in mechanism.pair_stiffness}
+    value["pairs"] = [
+        type(group[0]).write(group, quantity) | _nonempty_fields(stiffness=stiffness.get(group[0].entry_name()))
+        for group in pair_entries(mechanism)
+    ]
+    if mechanism.closes_within is not None:
+        value["closes_within"] = quantity(mechanism.closes_within, "length")
     value |= _nonempty_fields(
         inputs=[write_input(given, motions, quantity) for given in mechanism.inputs],
         **write_loads(mechanism, quantity),

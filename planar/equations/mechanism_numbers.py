@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from hashlib import sha256
-from math import hypot
 
 import casadi as ca
 import numpy as np
@@ -12,7 +11,7 @@ import numpy as np
 from planar.foundation.arrays import Array
 from planar.foundation.jets import Scalar
 from planar.foundation.private_cache import source_stamp
-from planar.model.link_shapes import Link, LinkShape, link_shape
+from planar.model.link_shapes import Link, LinkShape, link_shape, shape_extent
 from planar.model.mechanism import Input, Mechanism, relative_motions
 from planar.model.pairs import MeasureKind, Pair
 
@@ -63,12 +62,6 @@ def size_from_extents(mechanism: Mechanism, extents: Mapping[str, float], is_sli
     """The mechanism's size (m) from the extents of its links and from which of its inputs slide."""
     slides = [abs(given.position) for given, slides in zip(mechanism.inputs, is_slide, strict=True) if slides]
     return max(extents.values(), default=0.0) or max(slides, default=0.0) or 1.0
-
-
-def shape_extent(shape: LinkShape) -> float:
-    """The greatest distance between two points of a link (m)."""
-    x, y = [at.x for at in shape.points.values()], [at.y for at in shape.points.values()]
-    return hypot(max(x) - min(x), max(y) - min(y)) if x else 0.0
 
 
 def pair_numbers(mechanism: Mechanism, shapes: Mapping[str, LinkShape], unit: float) -> Array:

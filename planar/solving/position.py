@@ -164,7 +164,11 @@ class PositionSolver(PreparedMechanism):
         gaps = self.residuals(z[None], self.inputs.u[None])[:, 0]
         residual = float(gaps.max(initial=0.0))
         if residual > self.tolerance:
-            raise self._open_refusal(z, residual, self.residual_check.row_pairs[int(np.argmax(gaps))])
+            raise self._open_refusal(z, residual, self.row_pairs[int(np.argmax(gaps))])
+        if self.equations.open_rows:
+            from planar.solving.assembly.least_misfit import refuse_misfit
+
+            refuse_misfit(self, z, self.inputs.u)
         try:
             mobility = determined_mobility(self, z, self._kinematics_at_rest(z))
         except (SingularPosition, NoAnswer) as problem:

@@ -170,8 +170,19 @@ class PreparedMechanism:
         """What the residual check lets pass: round-off of the residual, in lengths of the size."""
         return self.residual_check.tolerance
 
+    @property
+    def row_pairs(self) -> list[str]:
+        """The pair of every row of `residuals`."""
+        e, check = self.equations, self.residual_check
+        more = [check.row_pairs[row] for row in e.open_rows] + [row.pair for row in e.rows]
+        return check.row_pairs + (more if e.open_rows else [])
+
     def residuals(self, z: Array, u: Array) -> Array:
-        """What every constraint leaves open (constraints, samples); z (samples, unknowns), u (samples, inputs)."""
+        """What every constraint leaves open (rows, samples); z (samples, unknowns), u (samples, inputs).
+
+        Of pairs that may stay open first nothing, then how far what they leave open is from their misfits, and how far
+        these are from being the least.
+        """
         w = self.functions.coordinates(z, u, self.inputs.p).T
         scale = np.array([self.unit if self.is_sliding(given.pair) else 1.0 for given in self.mechanism.inputs])
         with np.errstate(invalid="ignore"):  # what is not a number counts as open, and is refused as such

@@ -20,6 +20,7 @@ from planar.reports.number_format import (
     paragraphs,
     precision_text,
 )
+from planar.reports.tables.position import misfit_table
 from planar.results.motion import Motion
 
 MAX_LISTED_ENDS = 6
@@ -32,6 +33,8 @@ def motion_tables(motion: Motion) -> RenderableType:
     """A run: its range, its limits, and for every point where it went and how fast it was, at most, among the rows."""
     tables: list[RenderableType] = [Text(), _limits_table(motion)] if motion.limits else []
     notes = [paragraphs(("-", remark) for remark in motion.remarks)] if motion.remarks else []
+    if motion.misfits:
+        tables += [Text(), misfit_table(motion)]
     return Group(*motion_heading(motion), *tables, Text(), _points_table(motion), *notes)
 
 
