@@ -20,9 +20,10 @@ from planar.dynamics.external_actions import (
 )
 from planar.dynamics.free_body_check import free_body_imbalance
 from planar.dynamics.imbalance import explain_imbalance, imbalance_refusal
+from planar.dynamics.least_work import yielding_power
 from planar.dynamics.load_validation import check_loads
 from planar.dynamics.load_variation import load_factors
-from planar.dynamics.reaction_solver import ReactionSolver
+from planar.dynamics.reaction_solver import ReactionSolver, Wrench
 from planar.dynamics.reactions import ZERO_COUPLE_TOLERANCE, Reaction, input_efforts, pair_reaction
 from planar.dynamics.virtual_velocities import has_length_motion, refuse_surplus_inputs, unit_rate_state
 from planar.dynamics.virtual_work import BalanceFunction, balance_function
@@ -149,7 +150,8 @@ def forces(moving: State | Motion, inertia: bool = True) -> Forces:
     names = [given.pair for given in mechanism.inputs]
     undetermined = {name: why for name, why in zip(names, whys, strict=True) if why}
     undetermined |= {name: each.why for name, each in by_pair.items() if each.why}
-    routes = None if state is None else _second_route_error(state, field, all_of, supplied[0])
+    yielded = yielding_power(solved.wrenches, moving.frames) if mechanism.closes_within else None
+    routes = None if state is None else _second_route_error(state, field, all_of, supplied[0], solved.wrenches)
     found = Forces(
         moving,
         dict(zip(names, supplied.T, strict=True)),
@@ -157,7 +159,7 @@ def forces(moving: State | Motion, inertia: bool = True) -> Forces:
         by_pair,
         tuple(all_of),
         undetermined,
-        ForceProof(_power_imbalance(powers, all_of, moved), routes, equilibrium),
+        ForceProof(_power_imbalance(powers, all_of, moved, yielded), routes, equilibrium),
         bodies,
     )
     return _single_position(found) if one else found
@@ -178,8 +180,15 @@ def _make_reaction_solver(
     return ReactionSolver(equations, balance, field)
 
 
-def _power_imbalance(powers: Array, all_of: Sequence[ExternalAction], moved: ActionVelocities) -> float | None:
-    """What all powers (acting, n) add up to, beside the greatest of them; None where that is rounding alone."""
+def _power_imbalance(
+    powers: Array, all_of: Sequence[ExternalAction], moved: ActionVelocities, yielded: Array | None
+) -> float | None:
+    """What all powers (acting, n) add up to, beside the greatest of them; None where that is rounding alone.
+
+    `yielded` (n,) is what pairs that stay open by a misfit put into the links as that changes.
+    """
+    if yielded is not None:
+        powers = np.vstack([powers, np.broadcast_to(yielded, powers.shape[1:])])
     told = np.isfinite(powers).all(axis=0)
     greatest = float(np.abs(powers[:, told]).max(initial=0.0))
     if greatest <= ZERO_COUPLE_TOLERANCE * _power_scale(all_of, moved):
@@ -199,7 +208,11 @@ def _greatest_size(values: Iterable[Array | float]) -> float:
 
 
 def _second_route_error(
-    state: State, field: KinematicArrays, all_of: Sequence[ExternalAction], supplied: Array
+    state: State,
+    field: KinematicArrays,
+    all_of: Sequence[ExternalAction],
+    supplied: Array,
+    wrenches: Mapping[str, Mapping[str, Wrench]],
 ) -> float | None:
     """How far the efforts are from those by virtual power, beside what each input would supply against every part."""
     worst, others = None, [each for each in all_of if each.kind != "input"]
@@ -207,6 +220,8 @@ def _second_route_error(
         unit = KinematicArrays(unit_rate_state(state, given.pair), field.shapes)
         moved = action_velocities(unit, others)
         parts = action_powers(unit, others, moved)
+        if state.mechanism.closes_within:
+            parts = np.vstack([parts, np.broadcast_to(yielding_power(wrenches, unit.moving.frames), parts.shape[1:])])
         whole = float(np.abs(parts).sum())
         could = _power_scale(others, moved)
         beside = whole if whole > ZERO_COUPLE_TOLERANCE * could else could

@@ -190,14 +190,13 @@ class PreparedMechanism:
             found = self.residual_check.residuals(frames, own, u.T * scale[:, None]).reshape(-1, len(z))
             if not self.equations.open_rows:
                 return found
-            misfits = self._misfits(frames, own) / self.scale[list(self.equations.misfit_columns), None]
+            misfits = np.array(np.broadcast_arrays(*self._misfits(frames, own))) / self.scale[list(self.equations.misfit_columns), None]
             return np.vstack([found, self._least_misfit_residuals(z, u, w, misfits)])
 
-    def _misfits(self, frames: Mapping[str, Frame], own: Mapping[str, Sequence[Scalar]]) -> Array:
-        """What the rows that may stay open leave open (rows, samples), by the pairs' own formulas (m, rad)."""
+    def _misfits(self, frames: Mapping[str, Frame], own: Mapping[str, Sequence[Scalar]]) -> list[Scalar]:
+        """What each row that may stay open leaves open, by the pairs' own formulas (m, rad)."""
         rows = list(pair_residuals(self.mechanism.pairs, frames, self.residual_check.numbers, own))
-        some = [wrapped_residual(rows[k][1], rows[k][0].kind) for k in self.equations.open_rows]
-        return np.array(np.broadcast_arrays(*some))
+        return [wrapped_residual(rows[k][1], rows[k][0].kind) for k in self.equations.open_rows]
 
     def coordinates(self, frames: Mapping[str, Frame], own: Mapping[str, Sequence[Scalar]]) -> Array:
         """w (coordinates,) where the links' frames and the pairs' own coordinates are, jets or numbers (m, rad)."""
