@@ -116,9 +116,7 @@ class ReactionSolver:
         }
         because = tuple(name for name, each in by_cause.items() for _ in range(each.shape[2]))
         ways = np.concatenate([*by_cause.values()], axis=2)
-        wrenches = {
-            name: self.pair_wrenches(pair, found[:, self.pair_rows[name]]) for name, pair in self.pairs.items()
-        }
+        wrenches = {name: self.pair_wrenches(pair, found[:, self.pair_rows[name]]) for name, pair in self.pairs.items()}
         for name, push in pushed.items():
             also = self._wrenches_on_bodies(self.pairs[name], push[:, 0, :, None])
             wrenches[name] = {

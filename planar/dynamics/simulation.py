@@ -112,6 +112,7 @@ def simulate(
             )
     kept = [given.pair for given in mechanism.inputs if given.law is not None or given.pair in driven]
     check_loads(mechanism)
+    PositionSolver(mechanism).refuse_misfit("a motion that is let go is not told")
     started = (
         mechanism
         if moving

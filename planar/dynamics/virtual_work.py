@@ -94,9 +94,8 @@ class BalanceFunction:
                 opening = (basis.transpose(0, 2, 1) @ opening[:, :, None])[:, count:, 0]
             constraints[:, self.pair_rows[pair.name]] = of_links
             openings[:, self.pair_rows[pair.name]] = opening
-        return VirtualWorkBalance(
-            constraints, *(each[..., : self.link_coordinate_count] for each in (drives, loads, inertia)), openings
-        )
+        of_all = self.link_coordinate_count
+        return VirtualWorkBalance(constraints, drives[..., :of_all], loads[:, :of_all], inertia[:, :of_all], openings)
 
 
 def balance_function(mechanism: Mechanism) -> BalanceFunction:

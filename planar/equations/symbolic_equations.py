@@ -185,7 +185,8 @@ def _build_equations(
     closing = list(residuals(mechanism, unknown.frames, numbers, unknown.own, u[3 * len(given_links) :]))
     rows = [row for row, _ in closing]
     misfits = {row: ca.SX.sym(f"misfit {row}") for row in open_rows}
-    lines = split_constant_factors([value - misfits.get(k, 0.0) for k, (_, value) in enumerate(closing)], unknown.symbols)
+    values = [value - misfits[k] if k in misfits else value for k, (_, value) in enumerate(closing)]
+    lines = split_constant_factors(values, unknown.symbols)
 
     solved: EliminationSteps = []
     columns: list[int] = []

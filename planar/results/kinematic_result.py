@@ -29,7 +29,6 @@ from planar.results.records import (
     vector_and_rates,
 )
 
-
 ZERO_MISFIT = 1e-13
 """Sizes: what rounding leaves of a pair that closes."""
 
@@ -107,9 +106,7 @@ class KinematicResult(Displayable):
             numbers = pair.measure([self.shapes[link] for link in pair.bodies])
             left = pair.residual([self.frames[link] for link in pair.bodies], numbers, self.own[pair.name])
             parts = [
-                wrap_angle(value_and_rates(each)[0]) * size
-                if kind is MeasureKind.ANGLE
-                else value_and_rates(each)[0]
+                wrap_angle(value_and_rates(each)[0]) * size if kind is MeasureKind.ANGLE else value_and_rates(each)[0]
                 for kind, each in zip(pair.residual_kinds, left, strict=True)
             ]
             whole = np.sqrt(sum(np.square(np.asarray(part, dtype=float)) for part in parts))

@@ -11,13 +11,14 @@ import numpy as np
 from planar.equations.acceptance import AcceptanceFunctions
 from planar.equations.coordinates import frames_from_coordinates
 from planar.equations.functions import EquationFunctions
-from planar.equations.mechanism_numbers import pair_numbers_from, shape_extent, shapes_of_links, size_from_extents
+from planar.equations.mechanism_numbers import pair_numbers_from, shapes_of_links, size_from_extents
 from planar.equations.residuals import pair_residuals, wrapped_residual
 from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput
 from planar.foundation.errors import join_names as several
 from planar.foundation.geometry import Frame
 from planar.foundation.jets import Jet, Scalar
+from planar.model.link_shapes import shape_extent
 from planar.model.mechanism import LARGEST_NUMBER, SMALLEST_NUMBER, Mechanism, pair_misfits
 from planar.model.pairs import MeasureKind
 from planar.model.wording import amount
@@ -100,6 +101,13 @@ class PreparedMechanism:
         found = np.array([stiffness.get(self.pairs[name].entry_name(), 1.0) for name in owners])
         return found / found.max()
 
+    def refuse_misfit(self, what: str) -> None:
+        """Raise BadInput where pairs may stay open by a misfit: `what` is told of pairs that close alone."""
+        if self.equations.open_rows:
+            raise BadInput(
+                "closes_within", f"{what} of a linkage that closes within a misfit only; give it lengths that agree"
+            )
+
     def pair_misfits(self, z: Array, u: Array) -> dict[str, Array]:
         """By how much each pair that may stay open does (samples,): m, angles as arcs at the mechanism's size."""
         w = self.functions.coordinates(z, u, self.inputs.p)
@@ -113,8 +121,8 @@ class PreparedMechanism:
         """How far misfits (coordinates, samples) are from what pairs leave open, and from being the least."""
         e = self.equations
         own = np.abs(of_pairs - w[list(e.misfit_columns)])
-        stationary = [np.abs(self.functions.residuals_and_jacobian(*each, self.inputs.p)[0]) for each in zip(z, u)]
-        return np.vstack([own, np.array(stationary).T])
+        y = np.hstack([z, u])
+        return np.vstack([own, np.abs(self.functions.kinematics(y, 0.0 * y, 0.0 * y, self.inputs.p).F.T)])
 
     @property
     def is_deflated(self) -> bool:
@@ -190,7 +198,10 @@ class PreparedMechanism:
             found = self.residual_check.residuals(frames, own, u.T * scale[:, None]).reshape(-1, len(z))
             if not self.equations.open_rows:
                 return found
-            misfits = np.array(np.broadcast_arrays(*self._misfits(frames, own))) / self.scale[list(self.equations.misfit_columns), None]
+            misfits = (
+                np.array(np.broadcast_arrays(*self._misfits(frames, own)))
+                / self.scale[list(self.equations.misfit_columns), None]
+            )
             return np.vstack([found, self._least_misfit_residuals(z, u, w, misfits)])
 
     def _misfits(self, frames: Mapping[str, Frame], own: Mapping[str, Sequence[Scalar]]) -> list[Scalar]:

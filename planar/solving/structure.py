@@ -97,6 +97,4 @@ def _cached_structure(
 ) -> MechanismStructure:
     bare = tuple(Link(name, tuple(Point(point, At(0.0, 0.0)) for point in points)) for name, points in links)
     drives = tuple(Input(pair, 0.0) for pair in inputs)
-    return MechanismStructure(
-        Mechanism("", frame, bare, pairs, drives, closes_within=0.0 if with_misfit else None)
-    )
+    return MechanismStructure(Mechanism("", frame, bare, pairs, drives, closes_within=0.0 if with_misfit else None))

@@ -44,7 +44,8 @@ def motion_heading(motion: Motion) -> list[Text]:
     lines += [Text(_range_text(motion, name)) for name in motion.inputs]
     if motion.time is not None:
         lines.append(Text(f"in time, from 0 s to {motion.time[-1]:.6g} s"))
-    worst = f"every pair closes {precision_text(motion.residual, SIZE_PHRASE)}"
+    met = "the misfit is the least" if motion.misfits else "every pair closes"
+    worst = f"{met} {precision_text(motion.residual, SIZE_PHRASE)}"
     lines.append(
         Text(f"{count_phrase(len(motion), 'position')}; {worst}" + (f"; {motion.reason}" if motion.reason else ""))
     )

@@ -80,9 +80,8 @@ def _state_heading(state: State) -> RenderableType:
         for name, given in state.inputs.items()
     ]
     at = f"at {join_all_names(inputs)}" if inputs else "without inputs"
-    lines.append(
-        Text(f"{at}; mobility {state.mobility}; every pair closes {precision_text(state.residual, SIZE_PHRASE)}")
-    )
+    met = "the misfit is the least" if state.misfits else "every pair closes"
+    lines.append(Text(f"{at}; mobility {state.mobility}; {met} {precision_text(state.residual, SIZE_PHRASE)}"))
     return Group(*lines)
 
 
