@@ -29,6 +29,9 @@ from planar.foundation.geometry import GROUND, Frame, frame_at
 from planar.model.mechanism import Mechanism, relative_motions
 from planar.model.pairs import MeasureKind
 
+HELD, UNRELATED = -1, -2
+"""Rows that are no derivatives of the sum of squares of misfits."""
+
 
 class Block(NamedTuple):
     """A block after elimination: which entries of z and of F it has, and the links and pairs that it is about."""
@@ -67,6 +70,9 @@ class ConstraintEquations:
     """Of all rows of the pairs, in the mechanism's order, those that may stay open by a misfit."""
     misfit_columns: tuple[int, ...] = ()
     """The coordinate that is the misfit of each of them."""
+    row_variables: tuple[int, ...] = ()
+    """For every row of F the coordinate that is the unknown by which it is the derivative of the sum of squares; HELD
+    for one that has to close beside that, UNRELATED for any other."""
 
     @cached_property
     def unknown_is_angle(self) -> np.ndarray:
@@ -108,6 +114,7 @@ class ConstraintEquations:
             "input_kinds": [kind.value for kind in self.input_kinds],
             "open_rows": self.open_rows,
             "misfit_columns": self.misfit_columns,
+            "row_variables": self.row_variables,
         }
 
 
@@ -132,6 +139,7 @@ def equations_from_outline(outline: Mapping[str, Any], function: ca.Function) ->
         tuple(map(MeasureKind, outline["input_kinds"])),
         tuple(outline["open_rows"]),
         tuple(outline["misfit_columns"]),
+        tuple(outline["row_variables"]),
     )
 
 
@@ -273,6 +281,12 @@ def _with_least_misfit(
         F=ca.vertcat(slope, *(F[k] for k in rest)),
         open_rows=tuple(misfits),
         misfit_columns=tuple(place.values()),
+        row_variables=(
+            *(e.unknowns[k] for k in tied),
+            *(place[row] for row in free),
+            *([HELD] * len(firm)),
+            *([UNRELATED] * len(rest)),
+        ),
     )
 
 
@@ -326,6 +340,7 @@ def _split_into_blocks(mechanism: Mechanism, equations: ConstraintEquations) -> 
         known_after_block=known_from,
         z=equations.z[columns],
         F=equations.F[order],
+        row_variables=tuple(equations.row_variables[row] for row in order) if equations.row_variables else (),
     )
 
 

@@ -13,6 +13,7 @@ from planar.equations.coordinates import frames_from_coordinates
 from planar.equations.functions import EquationFunctions
 from planar.equations.mechanism_numbers import pair_numbers_from, shapes_of_links, size_from_extents
 from planar.equations.residuals import pair_residuals, wrapped_residual
+from planar.equations.symbolic_equations import HELD
 from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput
 from planar.foundation.errors import join_names as several
@@ -116,6 +117,20 @@ class PreparedMechanism:
             name = self.residual_check.row_pairs[row]
             found[name] = np.hypot(found.get(name, 0.0), w[:, column] * self.unit)
         return found
+
+    def is_least_misfit(self, z: Array, u: Array) -> Array:
+        """At which stationary positions (samples,) the misfit is the least of all beside: whether its second derivative
+        is positive along all moves that keep what has to close."""
+        e = self.equations
+        slopes = self.functions.jacobians(z, u, self.inputs.p)[0]
+        columns = [k for k, column in enumerate(e.unknowns) if column in e.row_variables]
+        rows = [e.row_variables.index(e.unknowns[k]) for k in columns]
+        held = [k for k, variable in enumerate(e.row_variables) if variable == HELD]
+        curvature = slopes[:, rows][:, :, columns]
+        if held:
+            across = np.linalg.svd(slopes[:, held][:, :, columns])[2][:, len(held) :]
+            curvature = across @ curvature @ across.transpose(0, 2, 1)
+        return np.linalg.eigvalsh(curvature).min(axis=1, initial=1.0) > 0.0
 
     def _least_misfit_residuals(self, z: Array, u: Array, w: Array, of_pairs: Array) -> Array:
         """How far misfits (coordinates, samples) are from what pairs leave open, and from being the least."""

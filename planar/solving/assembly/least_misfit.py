@@ -75,6 +75,8 @@ def misfit_refusal(solver: PositionSolver, z: Array, u: Array, row: int) -> NoAn
     misfits = {name: float(each[row]) for name, each in solver.pair_misfits(z, u).items()}
     worst = max(misfits, key=lambda name: misfits[name])
     within = solver.mechanism.closes_within
+    if not solver.is_least_misfit(z[row : row + 1], u[row : row + 1])[0]:
+        return refusals.not_least_misfit(worst, f"at {solver.describe_inputs(u[row])}")
     if within is None or misfits[worst] <= within:
         return None
     return refusals.misfit_beyond(solver, worst, misfits[worst], f"at {solver.describe_inputs(u[row])}")

@@ -204,6 +204,15 @@ def not_closed(setup: PreparedMechanism, pair: str, gap: float, at: str = "") ->
     )
 
 
+def not_least_misfit(pair: str, at: str) -> NoAnswer:
+    """A position in which misfits balance, but from which they push the links away."""
+    return NoAnswer(
+        Outcome.CHANGE_POINT,
+        f"{at} the misfits, as that of pair {pair!r}, balance but are not the least: the links give way to one side or "
+        "the other, as beside a change point; move the input, or give lengths that agree",
+    )
+
+
 def misfit_beyond(setup: PreparedMechanism, pair: str, misfit: float, at: str) -> NoAnswer:
     """A position of least misfit with more of it than the file lets pass."""
     within = setup.mechanism.closes_within or 0.0

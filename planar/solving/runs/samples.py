@@ -175,7 +175,8 @@ def _rows_within_misfit(solver: PositionSolver, run: RunSamples) -> RunSamples:
     from planar.solving.assembly.least_misfit import misfit_refusal  # few mechanisms have one
 
     misfits = np.max([*solver.pair_misfits(run.z, run.inputs.u).values()], axis=0)
-    beyond = np.flatnonzero(~(misfits <= (solver.mechanism.closes_within or 0.0)))
+    passed = (misfits <= (solver.mechanism.closes_within or 0.0)) & solver.is_least_misfit(run.z, run.inputs.u)
+    beyond = np.flatnonzero(~passed)
     if not beyond.size:
         return run
     refusal = misfit_refusal(solver, run.z, run.inputs.u, int(beyond[0]))
