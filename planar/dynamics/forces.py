@@ -20,11 +20,11 @@ from planar.dynamics.external_actions import (
 )
 from planar.dynamics.free_body_check import free_body_imbalance
 from planar.dynamics.imbalance import explain_imbalance, imbalance_refusal
-from planar.dynamics.least_work import yielding_power
 from planar.dynamics.load_validation import check_loads
 from planar.dynamics.load_variation import load_factors
-from planar.dynamics.reaction_solver import ReactionSolver, Wrench
+from planar.dynamics.reaction_solver import ReactionSolver
 from planar.dynamics.reactions import ZERO_COUPLE_TOLERANCE, Reaction, input_efforts, pair_reaction
+from planar.dynamics.sharing.least_work import Wrench, yielding_power
 from planar.dynamics.virtual_velocities import has_length_motion, refuse_surplus_inputs, unit_rate_state
 from planar.dynamics.virtual_work import BalanceFunction, balance_function
 from planar.foundation.arrays import Array

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planar.dynamics.external_actions import KinematicArrays
-from planar.dynamics.least_work import share_by_least_work
+from planar.dynamics.sharing.least_work import Wrench, share_by_least_work
 from planar.dynamics.virtual_work import BalanceFunction, VirtualWorkBalance
 from planar.foundation.arrays import Array, BoolArray
 from planar.foundation.geometry import Vector
@@ -27,20 +27,6 @@ WHEEL_LOAD_TOLERANCE = 1e-7
 """What takes efforts, or is not held, by more than this beside a force of one is no way in which wheels load pairs."""
 BALANCE_TOLERANCE = 1e-8
 """Links that stay out of balance by more than this part of the greatest force are not held by any."""
-
-
-class Wrench(NamedTuple):
-    """Forces (..., 2) and their moments about the origin of the world (...)."""
-
-    force: Array
-    moment: Array
-
-    def __repr__(self) -> str:
-        return short_repr(self)
-
-    def moment_about(self, at: Array) -> Array:
-        """The moment about places (..., 2)."""
-        return self.moment - at[..., 0] * self.force[..., 1] + at[..., 1] * self.force[..., 0]
 
 
 class ForceSolution(NamedTuple):

@@ -23,14 +23,12 @@ from planar.equations.elimination import (
     split_constant_factors,
     stack_expressions,
 )
+from planar.equations.misfits.least_misfit import HELD, UNRELATED, expression_unknowns, least_misfit_equations
 from planar.equations.residuals import ConstraintRow, residuals, split_pair_numbers, wrapped_residual
 from planar.foundation.generic_numbers import generic_numbers
 from planar.foundation.geometry import GROUND, Frame, frame_at
 from planar.model.mechanism import Mechanism, relative_motions
 from planar.model.pairs import MeasureKind
-
-HELD, UNRELATED = -1, -2
-"""Rows that are no derivatives of the sum of squares of misfits."""
 
 
 class Block(NamedTuple):
@@ -230,63 +228,31 @@ def _with_least_misfit(
 ) -> ConstraintEquations:
     """Equations whose rows may stay open by their misfits, made those of the position of least misfit.
 
-    `rows` are all rows, `left` those that elimination leaves, `tied` the unknowns that these move. An eliminated row
-    leaves its misfit, which is an unknown; one that remains has for a misfit its residual. The weighed sum of their
-    squares is least where its derivatives by all these unknowns vanish; a row that has to close, as an input's, has a
-    multiplier. Angles count as arcs at the mechanism's size.
+    `rows` are all rows, `left` those that elimination leaves, `tied` the unknowns that the misfits move.
     """
-    remaining = [misfits[row] for row in left if row in misfits]
-    every = ca.vertcat(e.F, e.w)
-    if remaining:
-        every = ca.substitute(every, stack_expressions(remaining), ca.SX.zeros(len(remaining)))
-    F, w = every[: len(left)], every[len(left) :]
-    own = {row: F[k] for k, row in enumerate(left)}
-    columns = set(tied)
-    # a row that must close is tied where it rests on unknowns that the misfits move
-    touched = _unknowns_in(F, e.z)
-    firm = [k for k, row in enumerate(left) if row not in misfits and touched[k] and touched[k] <= columns]
-    free = [row for row in misfits if row not in own]
-    multipliers = [ca.SX.sym(f"multiplier {k}") for k in firm]
-    weights = stack_expressions(ca.SX.sym(f"weight {row}") for row in misfits)
-    values = stack_expressions(own.get(row, symbol) for row, symbol in misfits.items())
-    unknowns = stack_expressions([*(e.z[k] for k in tied), *(misfits[row] for row in free), *multipliers])
-    held = stack_expressions(F[k] for k in firm)
-    # the derivatives of the sum of squares as J^T W r: a sum of squares itself would lose half of the digits
-    slope = ca.jtimes(values, unknowns, weights * values, True)
-    if firm:
-        slope += ca.jtimes(held, unknowns, stack_expressions(multipliers), True)
-        slope = ca.vertcat(slope[: -len(firm)], held)
-    rest = [k for k, row in enumerate(left) if row not in misfits and k not in firm]
-    untied = [k for k in range(e.z.numel()) if k not in columns]
+    found = least_misfit_equations(ca.vertcat(e.F, e.w), e.z, left, misfits, tied)
     first = len(e.coordinates)
     shown = [Coordinate(rows[row].pair, f"misfit {row}", rows[row].kind, False) for row in misfits]
-    shown += [Coordinate(rows[left[k]].pair, "multiplier", MeasureKind.LENGTH, False) for k in firm]
+    shown += [Coordinate(rows[left[k]].pair, "multiplier", MeasureKind.LENGTH, False) for k in found.held]
     place = {row: first + k for k, row in enumerate(misfits)}
-    names = [rows[row] for row in left if row in misfits] or [rows[row] for row in misfits]
-    labels = [ConstraintRow(names[k % len(names)].pair, MeasureKind.ANGLE) for k in range(len(tied))]
-    labels += [rows[row] for row in free] + [rows[left[k]] for k in firm] + [rows[left[k]] for k in rest]
+    names = [rows[row].pair for row in left if row in misfits] or [rows[row].pair for row in misfits]
+    labels = [ConstraintRow(names[k % len(names)], MeasureKind.ANGLE) for k in range(len(tied))]
+    labels += [rows[row] for row in found.free] + [rows[left[k]] for k in (*found.held, *found.unrelated)]
+    untied = [k for k in range(e.z.numel()) if k not in {*tied}]
+    variables = [*(e.unknowns[k] for k in tied), *(place[row] for row in found.free)]
+    multipliers = range(first + len(misfits), first + len(shown))
     return replace(
         e,
         coordinates=(*e.coordinates, *shown),
-        unknowns=(
-            *(e.unknowns[k] for k in tied),
-            *(place[row] for row in free),
-            *(first + len(misfits) + k for k in range(len(firm))),
-            *(e.unknowns[k] for k in untied),
-        ),
+        unknowns=(*variables, *multipliers, *(e.unknowns[k] for k in untied)),
         rows=tuple(labels),
-        z=ca.vertcat(unknowns, *(e.z[k] for k in untied)),
-        p=ca.vertcat(e.p, weights),
-        w=ca.vertcat(w, values, *multipliers),
-        F=ca.vertcat(slope, *(F[k] for k in rest)),
+        z=ca.vertcat(found.unknowns, *(e.z[k] for k in untied)),
+        p=ca.vertcat(e.p, found.weights),
+        w=found.w,
+        F=found.F,
         open_rows=tuple(misfits),
         misfit_columns=tuple(place.values()),
-        row_variables=(
-            *(e.unknowns[k] for k in tied),
-            *(place[row] for row in free),
-            *([HELD] * len(firm)),
-            *([UNRELATED] * len(rest)),
-        ),
+        row_variables=(*variables, *([HELD] * len(found.held)), *([UNRELATED] * len(found.unrelated))),
     )
 
 
@@ -351,7 +317,7 @@ def _drop_idle_unknowns(equations: ConstraintEquations) -> tuple[ca.SX, list[set
     standing it would have a block, or a link, wait for unknowns that are solved after it.
     """
     both = ca.vertcat(equations.F, equations.w)
-    touched = _unknowns_in(both, equations.z)
+    touched = expression_unknowns(both, equations.z)
     if not any(touched):
         return both, touched
     slope = ca.Function("slope", [equations.z, equations.u, equations.p], [ca.jacobian(both, equations.z)])
@@ -365,14 +331,6 @@ def _drop_idle_unknowns(equations: ConstraintEquations) -> tuple[ca.SX, list[set
     for row, columns in idle.items():
         both[row] = ca.substitute(both[row], equations.z[columns], ca.SX.zeros(len(columns)))
     return both, moved
-
-
-def _unknowns_in(expressions: ca.SX, z: ca.SX) -> list[set[int]]:
-    """The entries of z on which each expression depends."""
-    held: list[set[int]] = [set() for _ in range(expressions.numel())]
-    for row, column in zip(*ca.jacobian_sparsity(expressions, z).get_triplet(), strict=True):
-        held[row].add(column)
-    return held
 
 
 def _make_coordinates(mechanism: Mechanism, given: Mapping[str, ca.SX]) -> _MechanismCoordinates:

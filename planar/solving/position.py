@@ -92,10 +92,19 @@ class PositionSolver(PreparedMechanism):
 
             raise refusals.free_links(self)
         if self.equations.open_rows:
-            from planar.solving.assembly.least_misfit import nearest_least_misfit  # few mechanisms have one
-
-            return nearest_least_misfit(self, PositionSolver(replace(self.mechanism, closes_within=None)))
+            return self._nearest_least_misfit()
         return find_nearest_assembly(BlockAssemblies(self), self._is_regular)
+
+    def _nearest_least_misfit(self) -> Assembly:
+        """The assembly of least misfit. Raises NoAnswer where there is none within that of the file."""
+        from planar.solving.assembly.least_misfit import find_least_misfit, refuse_misfit  # few mechanisms have one
+
+        exact = PositionSolver(replace(self.mechanism, closes_within=None))
+        found = find_least_misfit(self, exact, exact._is_regular)
+        if isinstance(found, AssemblySearchFailure):
+            raise exact.unassembled(found)
+        refuse_misfit(self, found.z, self.inputs.u)
+        return found
 
     def remarks(self, found: Assembly) -> tuple[str, ...]:
         """What there is to say of an assembly."""

@@ -12,8 +12,8 @@ from planar.equations.acceptance import AcceptanceFunctions
 from planar.equations.coordinates import frames_from_coordinates
 from planar.equations.functions import EquationFunctions
 from planar.equations.mechanism_numbers import pair_numbers_from, shapes_of_links, size_from_extents
+from planar.equations.misfits.least_misfit import HELD
 from planar.equations.residuals import pair_residuals, wrapped_residual
-from planar.equations.symbolic_equations import HELD
 from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput
 from planar.foundation.errors import join_names as several

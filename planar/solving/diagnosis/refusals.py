@@ -204,26 +204,6 @@ def not_closed(setup: PreparedMechanism, pair: str, gap: float, at: str = "") ->
     )
 
 
-def not_least_misfit(pair: str, at: str) -> NoAnswer:
-    """A position in which misfits balance, but from which they push the links away."""
-    return NoAnswer(
-        Outcome.CHANGE_POINT,
-        f"{at} the misfits, as that of pair {pair!r}, balance but are not the least: the links give way to one side or "
-        "the other, as beside a change point; move the input, or give lengths that agree",
-    )
-
-
-def misfit_beyond(setup: PreparedMechanism, pair: str, misfit: float, at: str) -> NoAnswer:
-    """A position of least misfit with more of it than the file lets pass."""
-    within = setup.mechanism.closes_within or 0.0
-    units = setup.mechanism.units
-    return NoAnswer(
-        Outcome.CANNOT_BE_ASSEMBLED,
-        f"{at} the least misfit leaves pair {pair!r} open by {amount(misfit, 'length', units)}, beyond the "
-        f"{amount(within, 'length', units)} of `closes_within`; change a length, or let it be more",
-    )
-
-
 def open_contact(setup: PreparedMechanism, pair: str, gap: float) -> NoAnswer:
     """A contact that the pair does not keep closed by itself, and that nothing else does."""
     apart = amount(gap, "length", setup.mechanism.units)
@@ -254,7 +234,7 @@ def _open_block_sentence(setup: PreparedMechanism, failure: AssemblySearchFailur
     by, what = (setup.unit, "length") if kind is MeasureKind.LENGTH else (1.0, "angle")
     links = _links(stage.links or setup.pairs.get(pair, setup.relative_motions[pair]).links)
     if slice_length(stage.rows) > slice_length(stage.unknowns):
-        from planar.solving.diagnosis.least_misfit_offer import offer_least_misfit
+        from planar.solving.assembly.least_misfit_offer import offer_least_misfit
 
         offer = offer_least_misfit(setup.mechanism)
         if offer:

@@ -9,23 +9,57 @@ force over its stiffness, and turns by its couple over its stiffness times the s
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
+from planar.dynamics.virtual_work import VirtualWorkBalance
 from planar.foundation.arrays import Array
 from planar.foundation.geometry import Frame
 from planar.foundation.jets import value_and_rates
-
-if TYPE_CHECKING:
-    from planar.dynamics.reaction_solver import ReactionSolver, Wrench
+from planar.foundation.short_repr import short_repr
+from planar.model.mechanism import Mechanism
+from planar.model.pairs import Pair
 
 MISFIT_RATIO = 10.0
 """A force that links held more than once may change by no more than this many times the misfit beside the size is
 told: rounded lengths alone let it change."""
 
 
-def share_by_least_work(reactions: ReactionSolver, forces: Array, ways: Array) -> tuple[Array, Array]:
+class Wrench(NamedTuple):
+    """Forces (..., 2) and their moments about the origin of the world (...)."""
+
+    force: Array
+    moment: Array
+
+    def __repr__(self) -> str:
+        return short_repr(self)
+
+    def moment_about(self, at: Array) -> Array:
+        """The moment about places (..., 2)."""
+        return self.moment - at[..., 0] * self.force[..., 1] + at[..., 1] * self.force[..., 0]
+
+
+class PairForces(Protocol):
+    """What is asked of a solver of reactions."""
+
+    mechanism: Mechanism
+    pairs: dict[str, Pair]
+    pair_rows: dict[str, slice]
+    balance: VirtualWorkBalance
+    column_scale: Array
+    equilibrium_matrix: Array
+    arm: float
+    position_count: int
+
+    def pair_wrenches(self, pair: Pair, forces: Array) -> Mapping[str, Wrench]:
+        """What a pair does to each of its bodies (n, ways) by forces of its own (n, rows, ways)."""
+
+    def reaction_point(self, pair: Pair) -> Array | None:
+        """Where a pair's force is told (n, 2)."""
+
+
+def share_by_least_work(reactions: PairForces, forces: Array, ways: Array) -> tuple[Array, Array]:
     """Forces (n, forces, 1) of least work, and how they may still be otherwise (n, forces, ways).
 
     Forces and ways are those of `ReactionSolver`. Without a given stiffness all pairs are taken as equally stiff: what
@@ -47,7 +81,7 @@ def share_by_least_work(reactions: ReactionSolver, forces: Array, ways: Array) -
     return shared, kept
 
 
-def _strains(reactions: ReactionSolver, forces: Array, compliance: Mapping[str, float]) -> Array:
+def _strains(reactions: PairForces, forces: Array, compliance: Mapping[str, float]) -> Array:
     """Forces (n, forces, ways) as the roots of twice the energies that they put into the pairs (n, strains, ways)."""
     found = []
     for name, pair in reactions.pairs.items():
@@ -59,7 +93,7 @@ def _strains(reactions: ReactionSolver, forces: Array, compliance: Mapping[str, 
     return np.stack(found, axis=1)
 
 
-def _forced_by_misfits(reactions: ReactionSolver, stiffness: Mapping[str, float]) -> Array:
+def _forced_by_misfits(reactions: PairForces, stiffness: Mapping[str, float]) -> Array:
     """The forces (n, forces, 1) with which pairs of a given stiffness resist their misfits."""
     found = np.zeros((reactions.position_count, reactions.equilibrium_matrix.shape[2], 1))
     for name, pair in reactions.pairs.items():

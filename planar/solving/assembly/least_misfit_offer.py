@@ -5,13 +5,12 @@ from __future__ import annotations
 from dataclasses import replace
 from math import floor, log10
 
-from planar.foundation.errors import NoAnswer
 from planar.foundation.units import parse_unit
 from planar.model.mechanism import Mechanism
 from planar.model.wording import amount
-from planar.solving.assembly.least_misfit import least_misfit
+from planar.solving.assembly.least_misfit import find_least_misfit
 from planar.solving.assembly.nearest_assembly import AssemblySearchFailure
-from planar.solving.position import PositionSolver
+from planar.solving.prepared_mechanism import PreparedMechanism
 
 MAX_OFFERED_RATIO = 0.02
 """Of the mechanism's size: lengths that are rounded leave less open than that."""
@@ -21,15 +20,12 @@ ROUND_NUMBERS = (1, 2, 5, 10)
 def offer_least_misfit(mechanism: Mechanism) -> str:
     """By how much the pair that is open most is open at least, and what to write to go on with that; empty where it is
     more than rounding of lengths leaves."""
-    exact = PositionSolver(replace(mechanism, closes_within=None))
+    exact = PreparedMechanism(replace(mechanism, closes_within=None))
     most = MAX_OFFERED_RATIO * exact.unit
-    solver = PositionSolver(replace(mechanism, closes_within=most))
+    solver = PreparedMechanism(replace(mechanism, closes_within=most))
     if not solver.equations.open_rows:
         return ""
-    try:
-        found = least_misfit(solver, exact)
-    except NoAnswer:
-        return ""
+    found = find_least_misfit(solver, exact)
     if isinstance(found, AssemblySearchFailure):
         return ""
     misfits = {name: float(each[0]) for name, each in solver.pair_misfits(found.z[None], solver.inputs.u[None]).items()}
