@@ -47,7 +47,7 @@ Beneath a picture stands what it shows.
 
 
 SHOWN_KEYS = {
-    "file": ("sketch",),
+    "file": ("closes_within", "sketch"),
     "link": ("links",),
     "input": ("inputs",),
     "law": ("inputs",),
