@@ -8,7 +8,7 @@ from textwrap import indent
 from typing import Any, NamedTuple
 
 from planar.document.files import read_packaged_text
-from planar.document.schema import schema
+from planar.document.schema import PAIR_SCHEMA, schema
 
 Schema = Mapping[str, Any]
 
@@ -47,7 +47,8 @@ Beneath a picture stands what it shows.
 
 
 SHOWN_KEYS = {
-    "file": ("closes_within", "sketch"),
+    "file": ("sketch",),
+    "misfit": ("closes_within", "pairs"),
     "link": ("links",),
     "input": ("inputs",),
     "law": ("inputs",),
@@ -80,6 +81,7 @@ def key_sections() -> tuple[KeySection, ...]:
         KeySection("A link", (kinds["link"],), "link"),
         KeySection("A point of a link", places, ""),
         *(KeySection(_title(pair), (pair,), next(iter(pair["properties"]))) for pair in kinds["pair"]["oneOf"]),
+        KeySection("Any pair, of links that are held more than once", ({"properties": PAIR_SCHEMA},), "misfit"),
         KeySection("An input", (lists["inputs"],), "input"),
         KeySection("A piece of an input's law", tuple(kinds["piece"]["oneOf"]), "law"),
         KeySection("A load", tuple(lists["loads"]["anyOf"]), "load"),

@@ -105,7 +105,7 @@ def test_without_stiffness_shares_stay_open_and_the_effort_is_told():
 
 
 def test_the_refusal_offers_the_misfit_that_would_do():
-    with pytest.raises(NoAnswer, match='at the least: "closes_within": "0.01 mm" would take that position'):
+    with pytest.raises(NoAnswer, match=r'at the least: "closes_within": "0\.01 mm" would take that position'):
         planar.solve(three_cranks(within=None))
     assert planar.solve(three_cranks(within=1e-5)).residual < 1e-14
 
