@@ -217,11 +217,17 @@ def _link_dimensions(mechanism: Mechanism, index: int) -> list[Dimension]:
 
 def _pair_dimensions(mechanism: Mechanism) -> Iterator[Dimension]:
     position = {id(pair): index for index, pair in enumerate(mechanism.pairs)}
+    stiffness = {name: (value, index) for index, (name, value) in enumerate(mechanism.pair_stiffness)}
     for number, group in enumerate(pair_entries(mechanism)):
         tagged = [_tagged(pair, ("pairs", position[id(pair)])) for pair in group]
         kind: type[Pair] = type(group[0])
         lists = frozenset(key for key, schema in kind.entry_schemas.items() if schema.get("type") == "array")
-        yield from _written_numbers(["pairs", number], kind.write(tagged, _mark), group[0].entry_name(), lists=lists)
+        name = group[0].entry_name()
+        yield from _written_numbers(["pairs", number], kind.write(tagged, _mark), name, lists=lists)
+        if name in stiffness:
+            value, at = stiffness[name]
+            place = ("pairs", number, "stiffness")
+            yield Dimension(f"{name}.stiffness", value, "stiffness", "", place, ("pair_stiffness", at, 1))
 
 
 def _input_dimensions(mechanism: Mechanism) -> Iterator[Dimension]:
