@@ -42,7 +42,7 @@ def modes(mechanism: Mechanism, drives: Mapping[str, float] | Sequence[Drive] = 
     `drives` change inputs, as {pair: position} (rad or m). With `certify` every assembly is proved by intervals, group
     after group: dimensions, inputs and the groups before it are taken as the floats they are. It needs python-flint.
 
-    Raises NoAnswer where the inputs leave links free whatever the dimensions.
+    Raises NoAnswer where inputs leave links free whatever the dimensions, BadInput where pairs may stay open.
 
     >>> import planar
     >>> len(planar.modes(planar.load("four-bar"), certify=False))
@@ -53,10 +53,10 @@ def modes(mechanism: Mechanism, drives: Mapping[str, float] | Sequence[Drive] = 
     solver = solved_mechanism(mechanism).solver
     if any(stage.is_free for stage in solver.equations.blocks):
         raise refusals.free_links(solver)
+    solver.refuse_misfit("the assemblies are not listed")
     moved = tuple(drives)
-    return Modes(
-        solver.with_inputs_of(replace_inputs(mechanism, moved)) if moved else solver, mechanism, moved, certify
-    )
+    solver = solver.with_inputs_of(replace_inputs(mechanism, moved)) if moved else solver
+    return Modes(solver, mechanism, moved, certify)
 
 
 class ModesBlock(NamedTuple):

@@ -31,7 +31,7 @@ def with_assembly_number(mechanism: Mechanism) -> Mechanism:
     """
     known = solved_mechanism(mechanism)
     stages = known.solver.equations.blocks
-    if len(stages) > MAX_SOLVED_FOR_REMARK:
+    if len(stages) > MAX_SOLVED_FOR_REMARK or known.solver.equations.open_rows:
         return mechanism
     try:
         z = known.assembly.z

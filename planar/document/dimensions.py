@@ -20,11 +20,11 @@ from math import isfinite
 from numbers import Real
 from typing import Any, NamedTuple
 
+from planar.document.common_pair_keys import write_stops
 from planar.document.cursor import Cursor, FileContext, suggest_spelling
 from planar.document.first_argument import takes_mechanism
 from planar.document.loads import write_load, write_mass, write_spring
 from planar.document.reader import read_mechanism
-from planar.document.stops import write_stops
 from planar.document.writer import write_input, write_link, write_mechanism
 from planar.foundation.errors import BadInput, join_names
 from planar.model.file_units import FileUnits
@@ -233,14 +233,20 @@ def _link_dimensions(mechanism: Mechanism, index: int) -> list[Dimension]:
 def _pair_dimensions(mechanism: Mechanism) -> Iterator[Dimension]:
     position = {id(pair): index for index, pair in enumerate(mechanism.pairs)}
     stops = [_tagged(each, ("stops", index)) for index, each in enumerate(mechanism.stops)]
+    stiffness = {name: (value, index) for index, (name, value) in enumerate(mechanism.pair_stiffness)}
     for number, group in enumerate(pair_entries(mechanism)):
         tagged = [_tagged(pair, ("pairs", position[id(pair)])) for pair in group]
         kind: type[Pair] = type(group[0])
         lists = frozenset(key for key, schema in kind.entry_schemas.items() if schema.get("type") == "array")
-        yield from _written_numbers(["pairs", number], kind.write(tagged, _mark), group[0].entry_name(), lists=lists)
+        name = group[0].entry_name()
+        yield from _written_numbers(["pairs", number], kind.write(tagged, _mark), name, lists=lists)
         named = frozenset(pair.name for pair in kind.relative_motions(group))
         written = write_stops({}, stops, group, _mark)
-        yield from _written_numbers(["pairs", number], written, group[0].entry_name(), lists=named | {"stops"})
+        yield from _written_numbers(["pairs", number], written, name, lists=named | {"stops"})
+        if name in stiffness:
+            value, at = stiffness[name]
+            place = ("pairs", number, "stiffness")
+            yield Dimension(f"{name}.stiffness", value, "stiffness", "", place, ("pair_stiffness", at, 1))
 
 
 def _input_dimensions(mechanism: Mechanism) -> Iterator[Dimension]:

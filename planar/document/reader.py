@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from planar.document.cursor import Cursor, FileContext, describe_value, suggest_name, suggest_spelling
 from planar.document.loads import read_loads
@@ -18,6 +18,7 @@ from planar.document.schema import (
     GEOMETRY_SOURCES,
     INPUT_SCHEMA,
     LINK_SCHEMA,
+    PAIR_SCHEMA,
     PUBLISHED_SCHEMA,
     SENSE_WORDS,
     STOP_SCHEMA,
@@ -37,9 +38,6 @@ from planar.model.mechanism import (
     relative_motions,
 )
 from planar.model.pairs import MeasureKind, Pair, pair_types
-
-if TYPE_CHECKING:
-    from planar.model.stops import Stops
 
 
 def read_mechanism(value: Any) -> Mechanism:
@@ -72,10 +70,11 @@ def read_mechanism(value: Any) -> Mechanism:
         geometry=full.choice("geometry", GEOMETRY_SOURCES),
         notes=tuple(item.as_text() for item in full.list_items("notes")),
         remarks=_unpinned_link_remarks(full, pairs),
+        closes_within=full["closes_within"].as_positive("length") if full.has("closes_within") else None,
     )
     inputs = _read_inputs(full, relative_motions(bare))
-    entries = zip(full["pairs"].items(), pair_entries(bare), strict=True)
-    driven = replace(bare, inputs=inputs, stops=tuple(each for entry in entries for each in _read_stops(*entry)))
+    entries = tuple(zip(full["pairs"].items(), pair_entries(bare), strict=True))
+    driven = replace(bare, inputs=inputs, **_read_common_keys(entries))
     if any(given.law is not None for given in inputs):
         from planar.document.input_laws import speed_jump_remarks
 
@@ -112,7 +111,7 @@ def _expand_short_forms(top: Cursor) -> Cursor:
     entries = [dict(item.fields()) for item in top["pairs"].items()]
     for index, entry in enumerate(entries):
         cursor = Cursor(entry, f"$.pairs[{index}]", top.context)
-        bare = _without_stops(cursor)
+        bare = _own_keys(cursor)
         whole = _pair_type(bare).expand_short_form(bare)
         if whole is None:
             continue
@@ -228,17 +227,20 @@ def _read_point_definition(cursor: Cursor) -> PointDefinition:
     return Distances(first, second, distances[first], distances[second], side == "left_of")
 
 
-def _without_stops(entry: Cursor) -> Cursor:
+def _own_keys(entry: Cursor) -> Cursor:
     """A pair's entry with the keys of its type alone."""
-    return replace(entry, value={key: value for key, value in entry.fields().items() if key not in STOP_SCHEMA})
+    common = STOP_SCHEMA | PAIR_SCHEMA
+    return replace(entry, value={key: value for key, value in entry.fields().items() if key not in common})
 
 
-def _read_stops(entry: Cursor, group: Sequence[Pair]) -> tuple[Stops, ...]:
-    if not any(map(entry.has, STOP_SCHEMA)):
-        return ()
-    from planar.document.stops import read_stops  # few pairs have stops
+def _read_common_keys(entries: Sequence[tuple[Cursor, Sequence[Pair]]]) -> dict[str, Any]:
+    """The mechanism's fields by the keys that the entry of any pair may have."""
+    if not any(entry.has(key) for entry, _ in entries for key in STOP_SCHEMA | PAIR_SCHEMA):
+        return {}
+    from planar.document.common_pair_keys import read_pair_stiffness, read_stops  # few pairs have them
 
-    return read_stops(entry, group)
+    stops = tuple(each for entry in entries for each in read_stops(*entry))
+    return {"stops": stops, "pair_stiffness": read_pair_stiffness(entries)}
 
 
 def _read_pairs(top: Cursor) -> tuple[Pair, ...]:
@@ -246,7 +248,7 @@ def _read_pairs(top: Cursor) -> tuple[Pair, ...]:
     named: dict[str, str] = {}
     placed: dict[tuple[str, str], str] = {}
     for entry in top["pairs"].items():
-        bare = _without_stops(entry)
+        bare = _own_keys(entry)
         group = _pair_type(bare).read(bare)
         name = group[0].entry_name()
         pinned = {member for pair in group for member in pair.coincident_points()}

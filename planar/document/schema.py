@@ -161,7 +161,15 @@ STOP_SCHEMA: Schema = {
         "the speed after an impact on a stop beside that before it; left out: 0",
     ),
 }
-"""Keys that the entry of any pair may have."""
+"""Keys of the stops that the entry of any pair may have."""
+PAIR_SCHEMA: Schema = {
+    "stiffness": described(
+        schema_reference("amount"),
+        "how stiff it is: the force by which it opens, in the declared unit or N/m, on all pairs or on none; from it "
+        "forces follow where the links are held more than once",
+    ),
+}
+"""What else the entry of any pair may have."""
 DRIVE_SCHEMA: Schema = {key: INPUT_SCHEMA[key] for key in ("position", "velocity", "acceleration")}
 VARIATION_SCHEMA: Schema = {
     "with": described(_TEXT, "the input's pair whose position it varies with; left out: time"),
@@ -279,6 +287,11 @@ FILE_SCHEMA: Schema = {
     "gravity": described(
         _vector_schema("quantity"), "the acceleration of weights, as [0, -9.81], in the declared unit or m/s^2"
     ),
+    "closes_within": described(
+        schema_reference("size"),
+        "the misfit up to which the pairs of a linkage that is held more than once may stay open, where its lengths "
+        "are rounded: it takes the position of least misfit; left out: it has to close",
+    ),
     "sketch": described(
         {"type": "object", "additionalProperties": _vector_schema("length")},
         "roughly where some points are, in the frame's axes: the assembly nearest to them is taken",
@@ -352,7 +365,8 @@ def schema() -> dict[str, Any]:
 def _pair_schema(kind: type[Pair]) -> Schema:
     own = {kind.keyword: described(schema_reference("name"), kind.entry_description), **kind.entry_schemas}
     dependent = {"dependentRequired": {"restitution": ["stops"]}}
-    return _object_schema({**own, **STOP_SCHEMA}, kind.keyword, *kind.required_keys) | dict(kind.entry_rule) | dependent
+    properties = {**own, **STOP_SCHEMA, **PAIR_SCHEMA}
+    return _object_schema(properties, kind.keyword, *kind.required_keys) | dict(kind.entry_rule) | dependent
 
 
 def _segment_schema(kind: type[LawSegment]) -> Schema:

@@ -38,7 +38,13 @@ def write_mechanism(mechanism: Mechanism) -> dict[str, Any]:
     value["units"] = {key: unit for key, unit in mechanism.units._asdict().items() if unit}
     value["frame"] = mechanism.frame
     value["links"] = {link.name: write_link(link, quantity) for link in mechanism.links}
-    value["pairs"] = [_write_pair(group, mechanism, quantity) for group in pair_entries(mechanism)]
+    stiffness = {name: quantity(each, "stiffness") for name, each in mechanism.pair_stiffness}
+    value["pairs"] = [
+        _write_pair(group, mechanism, quantity) | _nonempty_fields(stiffness=stiffness.get(group[0].entry_name()))
+        for group in pair_entries(mechanism)
+    ]
+    if mechanism.closes_within is not None:
+        value["closes_within"] = quantity(mechanism.closes_within, "length")
     value |= _nonempty_fields(
         inputs=[write_input(given, motions, quantity) for given in mechanism.inputs],
         **write_loads(mechanism, quantity),
@@ -120,7 +126,7 @@ def _write_pair(group: Sequence[Pair], mechanism: Mechanism, quantity: QuantityW
     entry = type(group[0]).write(group, quantity)
     if not mechanism.stops:
         return entry
-    from planar.document.stops import write_stops  # few pairs have any
+    from planar.document.common_pair_keys import write_stops  # few pairs have any
 
     return write_stops(entry, mechanism.stops, group, quantity)
 

@@ -26,6 +26,7 @@ from planar.dynamics.imbalance import explain_imbalance, imbalance_refusal
 from planar.dynamics.load_validation import check_loads
 from planar.dynamics.reaction_solver import ForceSolution, fill_balance
 from planar.dynamics.reactions import ZERO_COUPLE_TOLERANCE, Reaction, input_efforts, pair_reaction
+from planar.dynamics.sharing.least_work import Wrench, yielding_power
 from planar.dynamics.virtual_velocities import has_length_motion, refuse_surplus_inputs, unit_rate_state
 from planar.dynamics.virtual_work import balance_function
 from planar.foundation.arrays import Array, IntArray
@@ -232,7 +233,9 @@ class _Balance:
         undetermined |= {name: each.why for name, each in by_pair.items() if each.why}
         routes = None
         if isinstance(self.moving, State):
-            routes = _second_route_error(self.moving, all_of, supplied[0], [by_pair[name] for name in rubbing])
+            rubs = [by_pair[name] for name in rubbing]
+            routes = _second_route_error(self.moving, all_of, supplied[0], rubs, solved.wrenches)
+        yielded = yielding_power(solved.wrenches, self.moving.frames) if mechanism.closes_within else None
         lost = np.array([*powers, *(-each.heat for each in rubbing.values())]).reshape(-1, field.position_count)
         return Forces(
             self.moving,
@@ -241,7 +244,7 @@ class _Balance:
             by_pair,
             tuple(all_of),
             undetermined,
-            ForceProof(_power_imbalance(lost, all_of, moved), routes, equilibrium),
+            ForceProof(_power_imbalance(lost, all_of, moved, yielded), routes, equilibrium),
             bodies,
             rubbing,
         )
@@ -263,8 +266,15 @@ def _first_finite(values: Array, others: Array) -> Array:
     return np.where(np.isfinite(values), values, others)
 
 
-def _power_imbalance(powers: Array, all_of: Sequence[ExternalAction], moved: ActionVelocities) -> float | None:
-    """What all powers (acting, n) add up to, beside the greatest of them; None where that is rounding alone."""
+def _power_imbalance(
+    powers: Array, all_of: Sequence[ExternalAction], moved: ActionVelocities, yielded: Array | None
+) -> float | None:
+    """What all powers (acting, n) add up to, beside the greatest of them; None where that is rounding alone.
+
+    `yielded` (n,) is what pairs that stay open by a misfit put into the links as that changes.
+    """
+    if yielded is not None:
+        powers = np.vstack([powers, np.broadcast_to(yielded, powers.shape[1:])])
     told = np.isfinite(powers).all(axis=0)
     greatest = float(np.abs(powers[:, told]).max(initial=0.0))
     if greatest <= ZERO_COUPLE_TOLERANCE * _power_scale(all_of, moved):
@@ -284,7 +294,11 @@ def _greatest_size(values: Iterable[Array | float]) -> float:
 
 
 def _second_route_error(
-    state: State, all_of: Sequence[ExternalAction], supplied: Array, rubbing: Sequence[Reaction]
+    state: State,
+    all_of: Sequence[ExternalAction],
+    supplied: Array,
+    rubbing: Sequence[Reaction],
+    wrenches: Mapping[str, Mapping[str, Wrench]],
 ) -> float | None:
     """How far the efforts are from those by virtual power, beside what each input would supply against every part.
 
@@ -296,6 +310,8 @@ def _second_route_error(
         moved = action_velocities(unit, others)
         lost = [-pair_heat(unit, each) for each in rubbing]
         parts = np.concatenate([action_powers(unit, others, moved), np.array(lost).reshape(-1, 1)])
+        if state.mechanism.closes_within:
+            parts = np.vstack([parts, np.broadcast_to(yielding_power(wrenches, unit.moving.frames), parts.shape[1:])])
         whole = float(np.abs(parts).sum())
         could = _power_scale(others, moved)
         beside = whole if whole > ZERO_COUPLE_TOLERANCE * could else could

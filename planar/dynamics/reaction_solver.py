@@ -15,6 +15,7 @@ import numpy as np
 
 from planar.dynamics.external_actions import KinematicArrays
 from planar.dynamics.load_variation import load_factors
+from planar.dynamics.sharing.least_work import Wrench, share_by_least_work
 from planar.dynamics.virtual_work import BalanceFunction, VirtualWorkBalance, balance_function
 from planar.foundation.arrays import Array, BoolArray
 from planar.foundation.geometry import Vector
@@ -28,20 +29,6 @@ WHEEL_LOAD_TOLERANCE = 1e-7
 """What takes efforts, or is not held, by more than this beside a force of one is no way in which wheels load pairs."""
 BALANCE_TOLERANCE = 1e-8
 """Links that stay out of balance by more than this part of the greatest force are not held by any."""
-
-
-class Wrench(NamedTuple):
-    """Forces (..., 2) and their moments about the origin of the world (...)."""
-
-    force: Array
-    moment: Array
-
-    def __repr__(self) -> str:
-        return short_repr(self)
-
-    def moment_about(self, at: Array) -> Array:
-        """The moment about places (..., 2)."""
-        return self.moment - at[..., 0] * self.force[..., 1] + at[..., 1] * self.force[..., 0]
 
 
 class ForceSolution(NamedTuple):
@@ -70,6 +57,7 @@ class ReactionSolver:
 
     def __init__(self, balancing: BalanceFunction, balance: VirtualWorkBalance, field: KinematicArrays):
         self.work, self.pair_rows, self.balance = balancing.work, balancing.pair_rows, balance
+        self.mechanism, self.field = field.mechanism, field
         self.pairs = {pair.name: pair for pair in field.mechanism.pairs}
         self.position_count = len(balance.loads)
         self.frames = field.frames
@@ -114,22 +102,21 @@ class ReactionSolver:
             off = sum(pushed.values()) * self.coordinate_scale
             asked = asked - off
         found, ways, balanced = self._solve_balance(asked[:, :, None])
+        found, ways = share_by_least_work(self, found, ways)
         by_cause = {"": ways} | self._wheel_changes
         by_cause = {
             name: np.concatenate([each, *self._separation_changes(each)], axis=2) for name, each in by_cause.items()
         }
         because = tuple(name for name, each in by_cause.items() for _ in range(each.shape[2]))
         ways = np.concatenate([*by_cause.values()], axis=2)
-        wrenches = {
-            name: self._pair_wrenches(pair, found[:, self.pair_rows[name]]) for name, pair in self.pairs.items()
-        }
+        wrenches = {name: self.pair_wrenches(pair, found[:, self.pair_rows[name]]) for name, pair in self.pairs.items()}
         for name, push in pushed.items():
             also = self._wrenches_on_bodies(self.pairs[name], push[:, :, None])
             wrenches[name] = {
                 link: Wrench(each.force + also[link].force, each.moment + also[link].moment)
                 for link, each in wrenches[name].items()
             }
-        changes = {name: self._pair_wrenches(pair, ways[:, self.pair_rows[name]]) for name, pair in self.pairs.items()}
+        changes = {name: self.pair_wrenches(pair, ways[:, self.pair_rows[name]]) for name, pair in self.pairs.items()}
         inputs = slice(self.balance.constraints.shape[1], None)
         by = self.column_scale[:, inputs, None]
         return ForceSolution(
@@ -248,7 +235,15 @@ class ReactionSolver:
             found.append(-self._inverse_and_null_space[0] @ (push * self.coordinate_scale)[:, :, None])
         return found
 
-    def _pair_wrenches(self, pair: Pair, forces: Array) -> dict[str, Wrench]:
+    def reaction_point(self, pair: Pair) -> Array | None:
+        """Where a pair's force is told (n, 2): its pin, the point that rides on its line, where teeth touch."""
+        contact = self.contacts.get(pair.name)
+        if contact is not None:
+            return np.stack(np.broadcast_arrays(*contact.pitch_point, np.zeros(self.position_count))[:2], axis=-1)
+        end = bearing_point(pair)
+        return self.field.point_rates(end[0], self.shapes[end[0]].position(end[1])) if end is not None else None
+
+    def pair_wrenches(self, pair: Pair, forces: Array) -> dict[str, Wrench]:
         """What a pair does to each of its bodies (n, ways) by forces of its own (n, rows, ways)."""
         own = (self.equilibrium_matrix[:, :, self.pair_rows[pair.name]] @ forces) / self.coordinate_scale[None, :, None]
         return self._wrenches_on_bodies(pair, own)
@@ -267,6 +262,12 @@ class ReactionSolver:
         at, frame = self.work.link_columns[link], self.frames[link]
         force = own[:, at : at + 2].transpose(0, 2, 1)
         return Wrench(force, own[:, at + 2] + frame.x[:, None] * force[..., 1] - frame.y[:, None] * force[..., 0])
+
+
+def bearing_point(pair: Pair) -> tuple[str, str] | None:
+    """The (link, point) at which a pair without teeth bears; None where it joins its links at no place."""
+    rides = pair.point_on_line()
+    return next(iter(pair.coincident_points()[1:] or ((rides[0],) if rides else ())), None)
 
 
 def _pseudo_inverse(held: Array) -> tuple[Array, Array]:

@@ -53,7 +53,7 @@ def pair_reaction(pair: Pair, field: KinematicArrays, reactions: ReactionSolver,
     """What a pair does at every position."""
     wrenches, changes = solved.wrenches[pair.name], solved.wrench_changes[pair.name]
     second, arm = pair.links[1], reactions.arm
-    at = _reaction_point(pair, field, reactions)
+    at = reactions.reaction_point(pair)
     if at is None:
         couples = {
             link: np.where(_is_determined(changes[link].moment / arm) & solved.is_balanced, wrench.moment, np.nan)
@@ -68,21 +68,6 @@ def pair_reaction(pair: Pair, field: KinematicArrays, reactions: ReactionSolver,
     force = np.where((_is_determined(pushed) & solved.is_balanced)[:, None], wrench.force, np.nan)
     couple = np.where(_is_determined(turned) & solved.is_balanced, couple, np.nan)
     return Reaction(pair.links, at, force, couple, {}, _explain_undetermined(solved, [pushed, turned]))
-
-
-def _reaction_point(pair: Pair, field: KinematicArrays, reactions: ReactionSolver) -> Array | None:
-    """Where a pair's force is told (n, 2): its pin, the point that rides on its line, where teeth touch."""
-    contact = reactions.contacts.get(pair.name)
-    if contact is not None:
-        return np.stack(np.broadcast_arrays(*contact.pitch_point, np.zeros(field.position_count))[:2], axis=-1)
-    end = bearing_point(pair)
-    return field.point_rates(end[0], field.shapes[end[0]].position(end[1])) if end is not None else None
-
-
-def bearing_point(pair: Pair) -> tuple[str, str] | None:
-    """The (link, point) at which a pair without teeth bears; None where it joins its links at no place."""
-    rides = pair.point_on_line()
-    return next(iter(pair.coincident_points()[1:] or ((rides[0],) if rides else ())), None)
 
 
 def _is_determined(changes: Array) -> BoolArray:

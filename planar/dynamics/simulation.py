@@ -29,7 +29,7 @@ from planar.model.mechanism import Input, Mechanism
 from planar.model.run_arguments import check_steps
 from planar.model.wording import join_all_names
 from planar.results.motion import Motion, State
-from planar.solving.position import solve
+from planar.solving.position import PositionSolver, solve
 
 RELATIVE_TOLERANCE = 1e-12
 """What a step may be off, of sizes and turns and of the rates that are reached."""
@@ -136,6 +136,7 @@ def simulate(
         if (given.law is not None and given.motor is None) or given.pair in driven
     ]
     check_loads(mechanism)
+    PositionSolver(mechanism).refuse_misfit("a motion that is let go is not told")
     started = (
         mechanism
         if moving

@@ -10,21 +10,26 @@ import numpy as np
 
 from planar.dynamics.lagrangian import LagrangianFunctions
 from planar.equations.casadi_call import BufferedFunction
+from planar.equations.elimination import stack_expressions
+from planar.equations.residuals import wrapped_residual
 from planar.foundation.arrays import Array
 from planar.model.mechanism import Input, Mechanism
+from planar.model.pairs import MeasureKind
 
 
 class VirtualWorkBalance(NamedTuple):
     """Everything at positions (n, ...), over the coordinates of the links alone (links: 3 per moving link).
 
     `constraints` (n, rows, links) with the pairs' own coordinates gone, `drives` (n, inputs, links), `loads` (n, links)
-    what loads, weights, springs and dampers put on them, `inertia` (n, links) what accelerating them takes.
+    what loads, weights, springs and dampers put on them, `inertia` (n, links) what accelerating them takes, `openings`
+    (n, rows) by how much the pairs' constraints are open (m, angles as rad times the square of the size).
     """
 
     constraints: Array
     input_directions: Array
     loads: Array
     inertia: Array
+    openings: Array
 
 
 class BalanceFunction:
@@ -46,7 +51,11 @@ class BalanceFunction:
         drives = ca.vertcat(
             ca.SX(0, work.q.numel()), *(work.unit_effort_on_links(given.pair).T for given in work.mechanism.inputs)
         )
-        outputs = [ca.jacobian(work.residuals, work.q), drives, ca.sum2(work.actions_on_links), work.inertia]
+        openings = stack_expressions(
+            wrapped_residual(value, kind) * (1.0 if kind is MeasureKind.LENGTH else work.size**2)
+            for value, kind in zip(ca.vertsplit(work.residuals), self._residual_kinds(), strict=True)
+        )
+        outputs = [ca.jacobian(work.residuals, work.q), drives, ca.sum2(work.actions_on_links), work.inertia, openings]
         given = [
             work.q,
             work.q1,
@@ -57,6 +66,9 @@ class BalanceFunction:
         ]
         self._called = BufferedFunction(ca.Function("balance", given, [ca.densify(each) for each in outputs]))
 
+    def _residual_kinds(self) -> list[MeasureKind]:
+        return [kind for pair in self.work.mechanism.pairs for kind in pair.residual_kinds]
+
     def evaluate(
         self, q: Array, q1: Array, q2: Array, factors: Array, wound: Array, dimensions: Array | None = None
     ) -> VirtualWorkBalance:
@@ -66,22 +78,24 @@ class BalanceFunction:
         numbers = np.zeros(0) if dimensions is None else dimensions
         parts = self._called.evaluate_batch(len(q), q, q1, q2, factors, wound, numbers)
         slopes, drives = (each.transpose(0, 2, 1) for each in parts[:2])
-        loads, inertia = (each[:, 0] for each in parts[2:])
+        loads, inertia, open_by = (each[:, 0] for each in parts[2:])
         constraints = np.zeros((len(q), self.row_count, self.link_coordinate_count))
+        openings = np.zeros((len(q), self.row_count))
         first = 0
         for pair in self.work.mechanism.pairs:
             rows, own = slice(first, first + len(pair.residual_kinds)), self.work.own_slices[pair.name]
             first = rows.stop
             of_links, of_own = slopes[:, rows, : self.link_coordinate_count], slopes[:, rows, own]
-            count = of_own.shape[2]
+            count, opening = of_own.shape[2], open_by[:, rows]
             if count:
                 # what is left to hold the links, square to what its own coordinates do
                 basis = np.linalg.qr(of_own, mode="complete")[0]
                 of_links = (basis.transpose(0, 2, 1) @ of_links)[:, count:]
+                opening = (basis.transpose(0, 2, 1) @ opening[:, :, None])[:, count:, 0]
             constraints[:, self.pair_rows[pair.name]] = of_links
-        return VirtualWorkBalance(
-            constraints, *(each[..., : self.link_coordinate_count] for each in (drives, loads, inertia))
-        )
+            openings[:, self.pair_rows[pair.name]] = opening
+        of_all = self.link_coordinate_count
+        return VirtualWorkBalance(constraints, drives[..., :of_all], loads[:, :of_all], inertia[:, :of_all], openings)
 
 
 def balance_function(mechanism: Mechanism) -> BalanceFunction:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from hashlib import sha256
-from math import hypot
 
 import casadi as ca
 import numpy as np
@@ -12,7 +11,7 @@ import numpy as np
 from planar.foundation.arrays import Array
 from planar.foundation.jets import Scalar
 from planar.foundation.private_cache import source_stamp
-from planar.model.link_shapes import Link, LinkShape, link_shape
+from planar.model.link_shapes import Link, LinkShape, link_shape, shape_extent
 from planar.model.mechanism import Input, Mechanism, relative_motions
 from planar.model.pairs import MeasureKind, Pair
 
@@ -30,6 +29,7 @@ def equation_structure(mechanism: Mechanism) -> Mechanism:
             links=tuple(Link(link.name) for link in mechanism.links),
             pairs=mechanism.pairs,
             inputs=tuple(Input(given.pair, 0.0) for given in mechanism.inputs),
+            closes_within=None if mechanism.closes_within is None else 0.0,
         )
         object.__setattr__(mechanism, "_equation_structure", found)
     return found
@@ -41,7 +41,8 @@ def structure_fingerprint(structure: Mechanism) -> str | None:
     if stamp is None or not all(type(pair).__module__.startswith(own) for pair in structure.pairs):
         return None
     inputs, links = [given.pair for given in structure.inputs], [link.name for link in structure.links]
-    told = (stamp, ca.CasadiMeta.version(), repr((structure.frame, links, inputs, structure.pairs)))
+    parts = (structure.frame, links, inputs, structure.pairs, structure.closes_within)
+    told = (stamp, ca.CasadiMeta.version(), repr(parts))
     return sha256("\0".join(told).encode()).hexdigest()
 
 
@@ -61,12 +62,6 @@ def size_from_extents(mechanism: Mechanism, extents: Mapping[str, float], is_sli
     """The mechanism's size (m) from the extents of its links and from which of its inputs slide."""
     slides = [abs(given.position) for given, slides in zip(mechanism.inputs, is_slide, strict=True) if slides]
     return max(extents.values(), default=0.0) or max(slides, default=0.0) or 1.0
-
-
-def shape_extent(shape: LinkShape) -> float:
-    """The greatest distance between two points of a link (m)."""
-    x, y = [at.x for at in shape.points.values()], [at.y for at in shape.points.values()]
-    return hypot(max(x) - min(x), max(y) - min(y)) if x else 0.0
 
 
 def pair_numbers(mechanism: Mechanism, shapes: Mapping[str, LinkShape], unit: float) -> Array:

@@ -66,6 +66,13 @@ class ConstraintEquations:
     F: ca.SX
     input_kinds: tuple[MeasureKind, ...]
     """What every entry of u is."""
+    open_rows: tuple[int, ...] = ()
+    """Of all rows of the pairs, in the mechanism's order, those that may stay open by a misfit."""
+    misfit_columns: tuple[int, ...] = ()
+    """The coordinate that is the misfit of each of them."""
+    row_variables: tuple[int, ...] = ()
+    """For every row of F the coordinate that is the unknown by which it is the derivative of the sum of squares; HELD
+    for one that has to close beside that, UNRELATED for any other."""
 
     @cached_property
     def unknown_is_angle(self) -> np.ndarray:
@@ -79,8 +86,8 @@ class ConstraintEquations:
 
     @property
     def is_square(self) -> bool:
-        """Whether every block has as many rows as unknowns."""
-        return not any(
+        """Whether every block has as many rows as unknowns, and these close them."""
+        return not self.open_rows and not any(
             block.is_free or slice_length(block.rows) != slice_length(block.unknowns) for block in self.blocks
         )
 
@@ -105,6 +112,9 @@ class ConstraintEquations:
             ],
             "known_after_block": self.known_after_block,
             "input_kinds": [kind.value for kind in self.input_kinds],
+            "open_rows": self.open_rows,
+            "misfit_columns": self.misfit_columns,
+            "row_variables": self.row_variables,
         }
 
 
@@ -127,6 +137,9 @@ def equations_from_outline(outline: Mapping[str, Any], function: ca.Function) ->
         w,
         F,
         tuple(map(MeasureKind, outline["input_kinds"])),
+        tuple(outline["open_rows"]),
+        tuple(outline["misfit_columns"]),
+        tuple(outline["row_variables"]),
     )
 
 
@@ -142,8 +155,29 @@ class _MechanismCoordinates(NamedTuple):
 def build_equations(mechanism: Mechanism, given_links: Sequence[str] = ()) -> ConstraintEquations:
     """The equations of a mechanism; only its structure matters, its numbers are `p` and `u`.
 
-    The links that are `given` are no unknowns: where they are is told by u, ahead of the inputs' positions.
+    The links that are `given` are no unknowns: where they are is told by u, ahead of the inputs' positions. Of a
+    mechanism that closes within a misfit the pairs that are held more than once take the position of least misfit.
     """
+    found, surplus = _build_equations(mechanism, given_links)
+    if mechanism.closes_within is None or not _is_overdetermined(found):
+        return found
+    if surplus:
+        found, _ = _build_equations(mechanism, given_links, surplus)
+    if _is_overdetermined(found):  # it showed after elimination only, or not for these alone
+        every = [row for pair in mechanism.pairs for row in pair.residual_kinds]
+        found, _ = _build_equations(mechanism, given_links, range(len(every)))
+    return found
+
+
+def _is_overdetermined(equations: ConstraintEquations) -> bool:
+    """Whether some block has more rows than unknowns."""
+    return any(slice_length(block.rows) > slice_length(block.unknowns) for block in equations.blocks)
+
+
+def _build_equations(
+    mechanism: Mechanism, given_links: Sequence[str], open_rows: Sequence[int] = ()
+) -> tuple[ConstraintEquations, list[int]]:
+    """The equations in which some rows of pairs may stay open, and the rows of pairs that are held more than once."""
     named = relative_motions(mechanism)
     drives = (
         *(MeasureKind.LENGTH, MeasureKind.LENGTH, MeasureKind.ANGLE) * len(given_links),
@@ -158,13 +192,22 @@ def build_equations(mechanism: Mechanism, given_links: Sequence[str] = ()) -> Co
     numbers = split_pair_numbers(mechanism.pairs, p)
     closing = list(residuals(mechanism, unknown.frames, numbers, unknown.own, u[3 * len(given_links) :]))
     rows = [row for row, _ in closing]
-    lines = split_constant_factors([value for _, value in closing], unknown.symbols)
+    misfits = {row: ca.SX.sym(f"misfit {row}") for row in open_rows}
+    values = [value - misfits[k] if k in misfits else value for k, (_, value) in enumerate(closing)]
+    lines = split_constant_factors(values, unknown.symbols)
 
     solved: EliminationSteps = []
     columns: list[int] = []
     left: list[int] = []
+    surplus: list[int] = []
+    tied: set[int] = set()
+    pair_rows = len(rows) - len(mechanism.inputs)
     for group in decompose_blocks([line.dependencies for line in lines], len(unknown.coordinates)):
         remaining_rows, remaining = eliminate(group.rows, group.columns, lines, solved)
+        if len(group.rows) > len(group.columns):
+            surplus += [row for row in group.rows if row < pair_rows]
+        if misfits.keys() & set(group.rows):
+            tied |= {*range(len(columns), len(columns) + len(remaining))}
         columns += remaining
         left += remaining_rows
     z = ca.SX.sym("z", len(columns))
@@ -173,7 +216,48 @@ def build_equations(mechanism: Mechanism, given_links: Sequence[str] = ()) -> Co
     F, w = back_substitute(dict(zip(columns, ca.vertsplit(z), strict=True)), solved, unknown.symbols, wanted)
     kept = tuple(rows[row] for row in left)
     whole = ConstraintEquations(tuple(unknown.coordinates), tuple(columns), kept, (), (), z, u, p, w, F, drives)
-    return _split_into_blocks(mechanism, whole)
+    if misfits:
+        whole = _with_least_misfit(whole, rows, left, misfits, sorted(tied))
+    return _split_into_blocks(mechanism, whole), surplus
+
+
+def _with_least_misfit(
+    e: ConstraintEquations,
+    rows: Sequence[ConstraintRow],
+    left: Sequence[int],
+    misfits: Mapping[int, ca.SX],
+    tied: Sequence[int],
+) -> ConstraintEquations:
+    """Equations whose rows may stay open by their misfits, made those of the position of least misfit.
+
+    `rows` are all rows, `left` those that elimination leaves, `tied` the unknowns that the misfits move.
+    """
+    from planar.equations.misfits.least_misfit import HELD, UNRELATED, least_misfit_equations  # few pairs may stay open
+
+    found = least_misfit_equations(ca.vertcat(e.F, e.w), e.z, left, misfits, tied)
+    first = len(e.coordinates)
+    shown = [Coordinate(rows[row].pair, f"misfit {row}", rows[row].kind, False) for row in misfits]
+    shown += [Coordinate(rows[left[k]].pair, "multiplier", MeasureKind.LENGTH, False) for k in found.held]
+    place = {row: first + k for k, row in enumerate(misfits)}
+    names = [rows[row].pair for row in left if row in misfits] or [rows[row].pair for row in misfits]
+    labels = [ConstraintRow(names[k % len(names)], MeasureKind.ANGLE) for k in range(len(tied))]
+    labels += [rows[row] for row in found.free] + [rows[left[k]] for k in (*found.held, *found.unrelated)]
+    untied = [k for k in range(e.z.numel()) if k not in {*tied}]
+    variables = [*(e.unknowns[k] for k in tied), *(place[row] for row in found.free)]
+    multipliers = range(first + len(misfits), first + len(shown))
+    return replace(
+        e,
+        coordinates=(*e.coordinates, *shown),
+        unknowns=(*variables, *multipliers, *(e.unknowns[k] for k in untied)),
+        rows=tuple(labels),
+        z=ca.vertcat(found.unknowns, *(e.z[k] for k in untied)),
+        p=ca.vertcat(e.p, found.weights),
+        w=found.w,
+        F=found.F,
+        open_rows=tuple(misfits),
+        misfit_columns=tuple(place.values()),
+        row_variables=(*variables, *([HELD] * len(found.held)), *([UNRELATED] * len(found.unrelated))),
+    )
 
 
 def _split_into_blocks(mechanism: Mechanism, equations: ConstraintEquations) -> ConstraintEquations:
@@ -226,7 +310,16 @@ def _split_into_blocks(mechanism: Mechanism, equations: ConstraintEquations) -> 
         known_after_block=known_from,
         z=equations.z[columns],
         F=equations.F[order],
+        row_variables=tuple(equations.row_variables[row] for row in order) if equations.row_variables else (),
     )
+
+
+def expression_unknowns(expressions: ca.SX, z: ca.SX) -> list[set[int]]:
+    """The entries of z on which each expression depends."""
+    found: list[set[int]] = [set() for _ in range(expressions.numel())]
+    for row, column in zip(*ca.jacobian_sparsity(expressions, z).get_triplet(), strict=True):
+        found[row].add(column)
+    return found
 
 
 def _drop_idle_unknowns(equations: ConstraintEquations) -> tuple[ca.SX, list[set[int]]]:
@@ -236,7 +329,7 @@ def _drop_idle_unknowns(equations: ConstraintEquations) -> tuple[ca.SX, list[set
     standing it would have a block, or a link, wait for unknowns that are solved after it.
     """
     both = ca.vertcat(equations.F, equations.w)
-    touched = _unknowns_in(both, equations.z)
+    touched = expression_unknowns(both, equations.z)
     if not any(touched):
         return both, touched
     slope = ca.Function("slope", [equations.z, equations.u, equations.p], [ca.jacobian(both, equations.z)])
@@ -250,14 +343,6 @@ def _drop_idle_unknowns(equations: ConstraintEquations) -> tuple[ca.SX, list[set
     for row, columns in idle.items():
         both[row] = ca.substitute(both[row], equations.z[columns], ca.SX.zeros(len(columns)))
     return both, moved
-
-
-def _unknowns_in(expressions: ca.SX, z: ca.SX) -> list[set[int]]:
-    """The entries of z on which each expression depends."""
-    held: list[set[int]] = [set() for _ in range(expressions.numel())]
-    for row, column in zip(*ca.jacobian_sparsity(expressions, z).get_triplet(), strict=True):
-        held[row].add(column)
-    return held
 
 
 def _make_coordinates(mechanism: Mechanism, given: Mapping[str, ca.SX]) -> _MechanismCoordinates:

@@ -8,7 +8,7 @@ from textwrap import indent
 from typing import Any, NamedTuple
 
 from planar.document.files import read_packaged_text
-from planar.document.schema import schema
+from planar.document.schema import PAIR_SCHEMA, schema
 
 Schema = Mapping[str, Any]
 
@@ -50,6 +50,7 @@ Beneath a picture stands what it shows.
 
 SHOWN_KEYS = {
     "file": ("sketch",),
+    "misfit": ("closes_within", "pairs"),
     "link": ("links",),
     "input": ("inputs",),
     "law": ("inputs",),
@@ -86,6 +87,7 @@ def key_sections() -> tuple[KeySection, ...]:
         *(KeySection(_title(pair), (pair,), f"pairs/{_keyword(pair)}") for pair in kinds["pair"]["oneOf"]),
         KeySection("A piece of a cam's lift", tuple(kinds["lift"]["oneOf"]), "pairs/lift"),
         KeySection("A circle of a cam", (kinds["nose"],), "pairs/nose"),
+        KeySection("Any pair, of links that are held more than once", ({"properties": PAIR_SCHEMA},), "misfit"),
         KeySection("An input", (lists["inputs"],), "input"),
         KeySection("A piece of an input's law", tuple(kinds["piece"]["oneOf"]), "law"),
         KeySection("A load", tuple(lists["loads"]["anyOf"]), "load"),

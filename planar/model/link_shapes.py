@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from math import hypot
 from typing import NamedTuple
 
 from planar.foundation.geometry import Vector, direction
@@ -215,3 +216,9 @@ def _triangle_apex(name: str, place: Distances, base: Scalar) -> Vector:
         height = max(height, 0.0)  # a flat triangle, but for rounding
     root = sqrt(height)
     return Vector(along, root if place.left else -root)
+
+
+def shape_extent(shape: LinkShape) -> float:
+    """The greatest distance between two points of a link (m)."""
+    x, y = [at.x for at in shape.points.values()], [at.y for at in shape.points.values()]
+    return hypot(max(x) - min(x), max(y) - min(y)) if x else 0.0

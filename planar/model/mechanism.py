@@ -136,7 +136,8 @@ class Mechanism(Displayable, Revisable):
     """Links joined by pairs, one of them the frame.
 
     `pairs` are binary: a pin of n links is n - 1 of them. `gravity` is an acceleration (m/s^2), `stops` are those of
-    pairs. `remarks` are what the reader of the file has to say.
+    pairs. `closes_within` is the misfit (m) up to which the pairs of a redundant linkage may stay open,
+    `pair_stiffness` by pair what resists it (N/m). `remarks` are what the reader of the file has to say.
     """
 
     name: str
@@ -158,6 +159,8 @@ class Mechanism(Displayable, Revisable):
     notes: tuple[str, ...] = ()
     published: tuple[PublishedValue, ...] = ()
     remarks: tuple[str, ...] = ()
+    closes_within: float | None = None
+    pair_stiffness: tuple[tuple[str, float], ...] = ()
 
     def __repr__(self) -> str:
         driven = f", driven at {', '.join(given.pair for given in self.inputs)}" if self.inputs else ""

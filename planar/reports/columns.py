@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from typing import NamedTuple
 
+import numpy as np
+
 from planar.foundation.arrays import Array
 from planar.model.file_units import unit_of_kind
 from planar.results.motion import Motion
@@ -15,8 +17,9 @@ POINT_KINDS = {"position": "length", "velocity": "velocity", "acceleration": "ac
 _VECTOR_LETTERS = {"position": "", "velocity": "v", "acceleration": "a", "jerk": "j", "force": "F"}
 
 
-_GROUP_PREFIXES = {"inputs": "input ", "pairs": "pair ", "reactions": "reaction ", "friction": "friction "}
-_GROUP_PREFIXES |= {"without friction": "without friction input ", "rubbing": "rubbing ", "contacts": "contact "}
+_GROUP_PREFIXES = {"inputs": "input ", "pairs": "pair ", "misfits": "misfit ", "reactions": "reaction "}
+_GROUP_PREFIXES |= {"friction": "friction ", "without friction": "without friction input "}
+_GROUP_PREFIXES |= {"rubbing": "rubbing ", "contacts": "contact "}
 
 
 class ReportedSeries(NamedTuple):
@@ -66,6 +69,9 @@ def reported_series(motion: Motion) -> Iterator[ReportedSeries]:
         yield ReportedSeries("links", name, {what: what.replace("_", " ") for what in values}, values)
     for name, report in motion.pairs.items():
         yield ReportedSeries("pairs", name, motion.result_kinds(name), report)
+    for name, misfit in motion.misfits.items():
+        values = {"misfit": np.broadcast_to(misfit, (len(motion),))}
+        yield ReportedSeries("misfits", name, {"misfit": "length"}, values)
 
 
 def run_columns(motion: Motion, more: Iterable[ReportedSeries] = ()) -> Iterator[RunColumn]:

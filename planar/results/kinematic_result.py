@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from planar.foundation.angles import wrap_angle
 from planar.foundation.arrays import Array
 from planar.foundation.errors import Unknown, join_names
 from planar.foundation.geometry import Frame, Vector
 from planar.foundation.jets import Jet, value_and_rates
 from planar.foundation.notebook_display import Displayable
-from planar.model.link_shapes import LinkShape
+from planar.model.link_shapes import LinkShape, shape_extent
 from planar.model.mechanism import Mechanism, NamedPoint, links_counting_turns, named_points, relative_motions
 from planar.model.pairs import MeasureKind, Pair
 from planar.model.wording import amount
@@ -27,6 +28,9 @@ from planar.results.records import (
     stack_vectors,
     vector_and_rates,
 )
+
+ZERO_MISFIT = 1e-13
+"""Sizes: what rounding leaves of a pair that closes."""
 
 
 class KinematicResult(Displayable):
@@ -85,6 +89,29 @@ class KinematicResult(Displayable):
         ):
             return self._turns_of_pair(name, float(positions[0]))
         return principal_turns(positions)
+
+    @cached_property
+    def misfits(self) -> Mapping[str, Any]:
+        """By how much every pair stays open (m), of a motion an array (n,), where the mechanism closes within a misfit.
+
+        Of the lengths and angles that a pair closes the root of the sum of squares, angles as arcs at the mechanism's
+        size (the greatest distance between two points of one link); what rounding leaves of none is 0. Empty of a
+        mechanism that has to close.
+        """
+        if self.mechanism.closes_within is None:
+            return {}
+        size = max(map(shape_extent, self.shapes.values()), default=0.0) or 1.0
+        found = {}
+        for pair in self.mechanism.pairs:
+            numbers = pair.measure([self.shapes[link] for link in pair.bodies])
+            left = pair.residual([self.frames[link] for link in pair.bodies], numbers, self.own[pair.name])
+            parts = [
+                wrap_angle(value_and_rates(each)[0]) * size if kind is MeasureKind.ANGLE else value_and_rates(each)[0]
+                for kind, each in zip(pair.residual_kinds, left, strict=True)
+            ]
+            whole = np.sqrt(sum(np.square(np.asarray(part, dtype=float)) for part in parts))
+            found[pair.name] = np.where(whole <= ZERO_MISFIT * size, 0.0, whole)[()]
+        return found
 
     @property
     def point_names(self) -> tuple[str, ...]:

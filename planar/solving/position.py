@@ -92,7 +92,20 @@ class PositionSolver(PreparedMechanism):
             from planar.solving.diagnosis import refusals
 
             raise refusals.free_links(self)
+        if self.equations.open_rows:
+            return self._nearest_least_misfit()
         return find_nearest_assembly(BlockAssemblies(self), self._is_regular)
+
+    def _nearest_least_misfit(self) -> Assembly:
+        """The assembly of least misfit. Raises NoAnswer where there is none within that of the file."""
+        from planar.solving.assembly.least_misfit import find_least_misfit, refuse_misfit  # few mechanisms have one
+
+        exact = PositionSolver(replace(self.mechanism, closes_within=None))
+        found = find_least_misfit(self, exact, exact._is_regular)
+        if isinstance(found, AssemblySearchFailure):
+            raise exact.unassembled(found)
+        refuse_misfit(self, found.z, self.inputs.u)
+        return found
 
     def remarks(self, found: Assembly) -> tuple[str, ...]:
         """What there is to say of an assembly."""
@@ -174,7 +187,11 @@ class PositionSolver(PreparedMechanism):
         gaps = self.residuals(z[None], self.inputs.u[None])[:, 0]
         residual = float(gaps.max(initial=0.0))
         if residual > self.tolerance:
-            raise self._open_refusal(z, residual, self.residual_check.row_pairs[int(np.argmax(gaps))])
+            raise self._open_refusal(z, residual, self.row_pairs[int(np.argmax(gaps))])
+        if self.equations.open_rows:
+            from planar.solving.assembly.least_misfit import refuse_misfit
+
+            refuse_misfit(self, z, self.inputs.u)
         try:
             mobility = determined_mobility(self, z, self._kinematics_at_rest(z))
         except (SingularPosition, NoAnswer) as problem:

@@ -11,12 +11,14 @@ import numpy as np
 from planar.equations.acceptance import AcceptanceFunctions
 from planar.equations.coordinates import frames_from_coordinates
 from planar.equations.functions import EquationFunctions
-from planar.equations.mechanism_numbers import pair_numbers_from, shape_extent, shapes_of_links, size_from_extents
+from planar.equations.mechanism_numbers import pair_numbers_from, shapes_of_links, size_from_extents
+from planar.equations.residuals import pair_residuals, wrapped_residual
 from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput
 from planar.foundation.errors import join_names as several
 from planar.foundation.geometry import Frame
 from planar.foundation.jets import Jet, Scalar
+from planar.model.link_shapes import shape_extent
 from planar.model.mechanism import LARGEST_NUMBER, SMALLEST_NUMBER, Mechanism, pair_misfits
 from planar.model.pairs import MeasureKind
 from planar.model.wording import amount
@@ -68,9 +70,11 @@ class PreparedMechanism:
         self.reach = {name: each / self.unit for name, each in extents.items()}
         self.has_extent = any(self.reach.values())
         "whether the unit is a length of some link, and no slide's travel"
-        self.inputs = PositionInputs(
-            *self._inputs(mechanism), pair_numbers_from(mechanism, self.residual_check.numbers, self.unit)
-        )
+        numbers = pair_numbers_from(mechanism, self.residual_check.numbers, self.unit)
+        if self.equations.open_rows:
+            self.residual_check.open_rows = frozenset(self.equations.open_rows)
+            numbers = np.append(numbers, self._misfit_weights())
+        self.inputs = PositionInputs(*self._inputs(mechanism), numbers)
 
     def with_inputs_of(self, mechanism: Mechanism) -> Self:
         """The same for a mechanism that differs from this one in its inputs' numbers alone."""
@@ -114,6 +118,52 @@ class PreparedMechanism:
     def stops_at(self, z: Array, u: Array) -> tuple[MetStop, ...]:
         """The stops that pairs meet at unknowns and inputs."""
         return self.stops.met_at(self.stop_positions(z, u)) if self.stops else ()
+
+    def _misfit_weights(self) -> Array:
+        """By how much the square of each misfit counts: as the stiffness of its pair, beside the greatest."""
+        stiffness = dict(self.mechanism.pair_stiffness)
+        owners = [self.residual_check.row_pairs[row] for row in self.equations.open_rows]
+        found = np.array([stiffness.get(self.pairs[name].entry_name(), 1.0) for name in owners])
+        return found / found.max()
+
+    def refuse_misfit(self, what: str) -> None:
+        """Raise BadInput where pairs may stay open by a misfit: `what` is told of pairs that close alone."""
+        if self.equations.open_rows:
+            raise BadInput(
+                "closes_within", f"{what} of a linkage that closes within a misfit only; give it lengths that agree"
+            )
+
+    def pair_misfits(self, z: Array, u: Array) -> dict[str, Array]:
+        """By how much each pair that may stay open does (samples,): m, angles as arcs at the mechanism's size."""
+        w = self.functions.coordinates(z, u, self.inputs.p)
+        found: dict[str, Array] = {}
+        for row, column in zip(self.equations.open_rows, self.equations.misfit_columns, strict=True):
+            name = self.residual_check.row_pairs[row]
+            found[name] = np.hypot(found.get(name, 0.0), w[:, column] * self.unit)
+        return found
+
+    def is_least_misfit(self, z: Array, u: Array) -> Array:
+        """At which stationary positions (samples,) the misfit is the least of all beside: whether its second derivative
+        is positive along all moves that keep what has to close."""
+        from planar.equations.misfits.least_misfit import HELD  # few pairs may stay open
+
+        e = self.equations
+        slopes = self.functions.jacobians(z, u, self.inputs.p)[0]
+        columns = [k for k, column in enumerate(e.unknowns) if column in e.row_variables]
+        rows = [e.row_variables.index(e.unknowns[k]) for k in columns]
+        held = [k for k, variable in enumerate(e.row_variables) if variable == HELD]
+        curvature = slopes[:, rows][:, :, columns]
+        if held:
+            across = np.linalg.svd(slopes[:, held][:, :, columns])[2][:, len(held) :]
+            curvature = across @ curvature @ across.transpose(0, 2, 1)
+        return np.linalg.eigvalsh(curvature).min(axis=1, initial=1.0) > 0.0
+
+    def _least_misfit_residuals(self, z: Array, u: Array, w: Array, of_pairs: Array) -> Array:
+        """How far misfits (coordinates, samples) are from what pairs leave open, and from being the least."""
+        e = self.equations
+        own = np.abs(of_pairs - w[list(e.misfit_columns)])
+        y = np.hstack([z, u])
+        return np.vstack([own, np.abs(self.functions.kinematics(y, 0.0 * y, 0.0 * y, self.inputs.p).F.T)])
 
     @property
     def is_deflated(self) -> bool:
@@ -174,12 +224,35 @@ class PreparedMechanism:
         """What inputs are in units of (inputs,): m for one of the size, rad."""
         return np.array([self.unit if self.is_sliding(given.pair) else 1.0 for given in self.mechanism.inputs])
 
+    @property
+    def row_pairs(self) -> list[str]:
+        """The pair of every row of `residuals`."""
+        e, check = self.equations, self.residual_check
+        more = [check.row_pairs[row] for row in e.open_rows] + [row.pair for row in e.rows]
+        return check.row_pairs + (more if e.open_rows else [])
+
     def residuals(self, z: Array, u: Array) -> Array:
-        """What every constraint leaves open (constraints, samples); z (samples, unknowns), u (samples, inputs)."""
+        """What every constraint leaves open (rows, samples); z (samples, unknowns), u (samples, inputs).
+
+        Of pairs that may stay open first nothing, then how far what they leave open is from their misfits, and how far
+        these are from being the least.
+        """
         w = self.functions.coordinates(z, u, self.inputs.p).T
         with np.errstate(invalid="ignore"):  # what is not a number counts as open, and is refused as such
             frames, own = frames_from_coordinates(w * self.scale[:, None], self.column, self.shapes, self.pairs)
-            return self.residual_check.residuals(frames, own, u.T * self._input_scale[:, None]).reshape(-1, len(z))
+            found = self.residual_check.residuals(frames, own, u.T * self._input_scale[:, None]).reshape(-1, len(z))
+            if not self.equations.open_rows:
+                return found
+            misfits = (
+                np.array(np.broadcast_arrays(*self._misfits(frames, own)))
+                / self.scale[list(self.equations.misfit_columns), None]
+            )
+            return np.vstack([found, self._least_misfit_residuals(z, u, w, misfits)])
+
+    def _misfits(self, frames: Mapping[str, Frame], own: Mapping[str, Sequence[Scalar]]) -> list[Scalar]:
+        """What each row that may stay open leaves open, by the pairs' own formulas (m, rad)."""
+        rows = list(pair_residuals(self.mechanism.pairs, frames, self.residual_check.numbers, own))
+        return [wrapped_residual(rows[k][1], rows[k][0].kind) for k in self.equations.open_rows]
 
     def coordinates(self, frames: Mapping[str, Frame], own: Mapping[str, Sequence[Scalar]]) -> Array:
         """w (coordinates,) where the links' frames and the pairs' own coordinates are, jets or numbers (m, rad)."""
@@ -188,7 +261,10 @@ class PreparedMechanism:
             parts |= {
                 (pair, name): value for (name, _), value in zip(self.pairs[pair].coordinate_kinds, values, strict=True)
             }
-        found = (parts[each.owner, each.part] for each in self.equations.coordinates)
+        if self.equations.open_rows:
+            left = zip(self.equations.misfit_columns, self._misfits(frames, own), strict=True)
+            parts |= {self.equations.coordinates[column][:2]: value for column, value in left}
+        found = (parts.get(each[:2], 0.0) for each in self.equations.coordinates)
         return np.array([value.parts[0] if isinstance(value, Jet) else value for value in found]) / self.scale
 
     def max_residuals(self, z: Array, u: Array) -> Array:
@@ -197,6 +273,8 @@ class PreparedMechanism:
 
     def max_residual(self, z: Array, u: Array) -> float:
         """The same at one position, z (unknowns,) and u (inputs,)."""
+        if self.equations.open_rows:
+            return float(self.max_residuals(z[None], u[None])[0])
         w = (self.functions.coordinates(z, u, self.inputs.p) * self.scale).tolist()
         try:
             frames, own = frames_from_coordinates(w, self.column, self.shapes, self.pairs)

@@ -32,13 +32,14 @@ def rest_position(mechanism: Mechanism, drives: Sequence[Drive] = ()) -> State:
     gaps = solver.residuals(z[None], u[None])[:, 0]
     residual = float(gaps.max(initial=0.0))
     if residual > solver.tolerance:
-        raise refusals.not_closed(solver, solver.residual_check.row_pairs[int(np.argmax(gaps))], residual)
+        raise refusals.not_closed(solver, solver.row_pairs[int(np.argmax(gaps))], residual)
     w = solver.functions.coordinate_function(z, u, p).full().ravel()
     frames, own = frames_from_coordinates((w * solver.scale).tolist(), solver.column, solver.shapes, solver.pairs)
     solver.refuse_open_contact(frames, own)
     slopes = solver.functions.jacobians(z[None], u[None], p)
     # what is held to second order only is no freedom: the pairs' own Jacobian does not see it, the deflated one does
-    slope = np.hstack([each[0] for each in slopes]) if solver.is_deflated else FullConstraints(solver).jacobian(w)
+    more = solver.is_deflated or solver.equations.open_rows
+    slope = np.hstack([each[0] for each in slopes]) if more else FullConstraints(solver).jacobian(w)
     mobility = null_space(slope).shape[1] if w.size else 0
     if np.any(regularity(solver, slopes[0][0]) < MIN_REGULARITY):
         told = "the inputs are on a dead point or a change point, where places are exact to the root of rounding only"

@@ -81,16 +81,20 @@ def mechanism_structure(mechanism: Mechanism) -> MechanismStructure:
         raise BadInput(*wrong)
     links = tuple((link.name, link.names) for link in mechanism.links)
     try:
-        return _cached_structure(
-            mechanism.frame, links, mechanism.pairs, tuple(given.pair for given in mechanism.inputs)
-        )
+        inputs = tuple(given.pair for given in mechanism.inputs)
+        return _cached_structure(mechanism.frame, links, mechanism.pairs, inputs, mechanism.closes_within is not None)
     except TypeError:  # made in Python, of lists
         return MechanismStructure(mechanism)
 
 
 @lru_cache(maxsize=MAX_CACHED_STRUCTURES)
 def _cached_structure(
-    frame: str, links: tuple[tuple[str, tuple[str, ...]], ...], pairs: tuple[Pair, ...], inputs: tuple[str, ...]
+    frame: str,
+    links: tuple[tuple[str, tuple[str, ...]], ...],
+    pairs: tuple[Pair, ...],
+    inputs: tuple[str, ...],
+    with_misfit: bool,
 ) -> MechanismStructure:
     bare = tuple(Link(name, tuple(Point(point, At(0.0, 0.0)) for point in points)) for name, points in links)
-    return MechanismStructure(Mechanism("", frame, bare, pairs, tuple(Input(pair, 0.0) for pair in inputs)))
+    drives = tuple(Input(pair, 0.0) for pair in inputs)
+    return MechanismStructure(Mechanism("", frame, bare, pairs, drives, closes_within=0.0 if with_misfit else None))

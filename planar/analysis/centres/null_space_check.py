@@ -69,14 +69,16 @@ def full_position(state: State) -> FullPosition:
     setup = PositionSolver(state.mechanism)
     constraints = FullConstraints(setup)
     w = setup.coordinates(state.frames, state.own)
+    if setup.equations.open_rows:  # what the pairs allow but for their misfits
+        return FullPosition(setup, constraints, w, motions_at(setup, w[list(setup.equations.unknowns)]))
     free = null_space(constraints.jacobian(w)) if w.size else np.zeros((0, 0))
     regular = setup.regularized(w[list(setup.equations.unknowns)]) if free.shape[1] > 1 else None
     if regular is not None:
-        free = _motions_at(*regular)
+        free = motions_at(*regular)
     return FullPosition(setup, constraints, w, free)
 
 
-def _motions_at(solver: PositionSolver, z: Array) -> Array:
+def motions_at(solver: PositionSolver, z: Array) -> Array:
     """The motions at unknowns z (coordinates, ways), inputs left aside."""
     y = np.concatenate([z, solver.inputs.u])
     slope = np.hstack([each[0] for each in solver.functions.jacobians(z[None], solver.inputs.u[None], solver.inputs.p)])

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from planar.document.first_argument import takes_mechanism
 from planar.foundation.arrays import Array
 from planar.foundation.errors import NoAnswer
@@ -44,8 +46,23 @@ def mobility(mechanism: Mechanism) -> Mobility:
     1
     """
     setup = PositionSolver(mechanism)
+    if setup.equations.open_rows:
+        return _mobility_of_least_misfit(setup)
     constraints = FullConstraints(setup)
     return mobility_at(constraints, closed_position(setup, constraints))
+
+
+def _mobility_of_least_misfit(solver: PositionSolver) -> Mobility:
+    """The mobility of the motion of least misfit: that of lengths which agree."""
+    z, u = solver.find_assembly().z, solver.inputs.u
+    slopes = solver.functions.jacobians(z[None], u[None], solver.inputs.p)
+    finite, count = null_space(np.hstack([each[0] for each in slopes])).shape[1], gruebler(solver.mechanism)
+    surplus = max(0, finite - count)
+    told = (
+        f"{count_phrase(surplus, 'constraint')} of the pairs would follow from the others if the lengths agreed; they "
+        "are met within the misfit"
+    )
+    return Mobility(count, finite, finite, surplus, (), (told,) if surplus else ())
 
 
 def gruebler(mechanism: Mechanism) -> int:

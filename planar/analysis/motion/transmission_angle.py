@@ -121,6 +121,7 @@ class _DrivenOutput:
         if not mechanism.inputs:
             raise BadInput("inputs", "the mechanism has no input, and nothing is transmitted")
         self.prepared = PreparedMechanism(mechanism)
+        self.prepared.refuse_misfit("a transmission angle is not told")
         self.constraints = FullConstraints(self.prepared)
         self.inputs = tuple(given.pair for given in mechanism.inputs)
         self.columns = [self.prepared.column[self.link, part] for part in ("x", "y", "angle")]

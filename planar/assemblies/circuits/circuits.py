@@ -20,6 +20,7 @@ from planar.model.mechanism import Drive, Mechanism, replace_inputs, running_inp
 from planar.results.motion import Motion
 from planar.solving.cycle import cycle
 from planar.solving.position import solved_mechanism
+from planar.solving.prepared_mechanism import PreparedMechanism
 
 TURN = 2.0 * pi
 END_MARGIN = 1e-6
@@ -41,6 +42,7 @@ def circuits(mechanism: Mechanism, pair: str | None = None) -> Circuits:
     >>> planar.circuits(planar.load("four-bar"))
     <1 circuits of 'Four-bar chain' over A, numerically complete>
     """
+    PreparedMechanism(mechanism).refuse_misfit("the circuits are not listed")
     return Circuits(mechanism, mechanism.inputs[running_input_index(mechanism, pair)].pair)
 
 

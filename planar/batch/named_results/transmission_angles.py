@@ -15,8 +15,9 @@ from planar.batch.design_arrays import design_variables
 from planar.batch.named_results.design_forces import DesignBalance, design_balance, position_chunks
 from planar.batch.named_results.design_frames import DesignFrames
 from planar.dynamics.external_actions import KinematicArrays
-from planar.dynamics.reaction_solver import ForceSolution, ReactionSolver, Wrench
+from planar.dynamics.reaction_solver import ForceSolution, ReactionSolver
 from planar.dynamics.reactions import DETERMINED_TOLERANCE
+from planar.dynamics.sharing.least_work import Wrench
 from planar.foundation.errors import BadInput
 from planar.model.mechanism import Mechanism, relative_motions
 from planar.model.output_pair import find_output_pair

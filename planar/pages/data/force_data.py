@@ -13,7 +13,7 @@ from planar.drawing.forces.action_arrows import ActionSymbol, action_symbols, re
 from planar.dynamics.forces import forces
 from planar.dynamics.lagrangian import LagrangianFunctions
 from planar.dynamics.load_attachment import attachment_remarks
-from planar.dynamics.reactions import bearing_point
+from planar.dynamics.reaction_solver import bearing_point
 from planar.dynamics.virtual_velocities import has_length_motion
 from planar.foundation.errors import NoAnswer
 from planar.model.link_graph import link_numbers

@@ -66,7 +66,7 @@ def page_data(mechanism: Mechanism, z: np.ndarray | None = None) -> tuple[dict[s
     known = solved_mechanism(mechanism)
     solver, z = known.solver, known.assembly.z if z is None else z
     e, program, state = solver.equations, solver.functions, rest_position(mechanism)
-    numbers = DimensionNumbers(mechanism)
+    numbers = DimensionNumbers(mechanism, live=not e.open_rows)  # other lengths might agree less than the file allows
     measured = [
         value
         for pair in numbers.mechanism.pairs
@@ -74,6 +74,7 @@ def page_data(mechanism: Mechanism, z: np.ndarray | None = None) -> tuple[dict[s
             pair.measure([numbers.shapes[link] for link in pair.bodies]), pair.number_kinds, solver.unit
         )
     ]
+    measured += solver.inputs.p[len(measured) :].tolist()  # what the misfits count
     for value in measured:
         numbers.add(value)
     scheme, drawing = scheme_data(mechanism, numbers, motion_positions(mechanism, z))
@@ -190,6 +191,8 @@ def _pace_data(units: FileUnits) -> dict[str, Any]:
 
 def _assembly_data(mechanism: Mechanism, solver: PositionSolver) -> dict[str, Any]:
     """The first assemblies in the order of their numbers, whether these are all, and where each lies."""
+    if solver.equations.open_rows:  # by least misfit, of which assemblies are not listed
+        return {"more": False, "list": []}
     found = modes(mechanism, certify=False)
     listed = list(islice(found, MAX_ASSEMBLIES + 1))
     stages = solver.equations.blocks

@@ -34,6 +34,8 @@ def record(
         "pairs": state.pairs,
         "remarks": list(state.remarks),
     }
+    if state.misfits:
+        found["misfits"] = {name: float(each) for name, each in state.misfits.items()}
     published = [each.record() for each in comparisons]
     relative = {
         text: {name: part if isinstance(part, str) else part.tolist() for name, part in each._asdict().items()}

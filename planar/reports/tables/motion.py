@@ -21,6 +21,7 @@ from planar.reports.number_format import (
     paragraphs,
     precision_text,
 )
+from planar.reports.tables.position import misfit_table
 from planar.results.motion import Motion
 
 MAX_LISTED_ENDS = 6
@@ -33,6 +34,8 @@ def motion_tables(motion: Motion) -> RenderableType:
     """A run: its range, its limits, and for every point where it went and how fast it was, at most, among the rows."""
     tables: list[RenderableType] = [Text(), _limits_table(motion)] if motion.limits else []
     notes = [paragraphs(("-", remark) for remark in motion.remarks)] if motion.remarks else []
+    if motion.misfits:
+        tables += [Text(), misfit_table(motion)]
     return Group(*motion_heading(motion), *tables, Text(), _points_table(motion), *notes)
 
 
@@ -42,7 +45,8 @@ def motion_heading(motion: Motion) -> list[Text]:
     lines += [Text(_range_text(motion, name)) for name in motion.inputs]
     if motion.time is not None:
         lines.append(Text(f"in time, from 0 s to {motion.time[-1]:.6g} s"))
-    worst = f"every pair closes {precision_text(motion.residual, SIZE_PHRASE)}"
+    met = "the misfit is the least" if motion.misfits else "every pair closes"
+    worst = f"{met} {precision_text(motion.residual, SIZE_PHRASE)}"
     lines.append(
         Text(f"{count_phrase(len(motion), 'position')}; {worst}" + (f"; {motion.reason}" if motion.reason else ""))
     )

@@ -23,7 +23,7 @@ from planar.reports.number_format import (
     paragraphs,
     precision_text,
 )
-from planar.results.motion import State
+from planar.results.motion import Motion, State
 from planar.results.records import RelativeState
 
 
@@ -38,6 +38,8 @@ def solution_tables(
         _points_table(state),
         _pair_tables(state),
     ]
+    if state.misfits:
+        parts.append(misfit_table(state))
     parts += [_relative_table(text, each, state) for text, each in (relatives or {}).items()]
     comparisons = tuple(comparisons)
     if comparisons:
@@ -78,9 +80,8 @@ def _state_heading(state: State) -> RenderableType:
         for name, given in state.inputs.items()
     ]
     at = f"at {join_all_names(inputs)}" if inputs else "without inputs"
-    lines.append(
-        Text(f"{at}; mobility {state.mobility}; every pair closes {precision_text(state.residual, SIZE_PHRASE)}")
-    )
+    met = "the misfit is the least" if state.misfits else "every pair closes"
+    lines.append(Text(f"{at}; mobility {state.mobility}; {met} {precision_text(state.residual, SIZE_PHRASE)}"))
     return Group(*lines)
 
 
@@ -150,6 +151,17 @@ def _pair_tables(state: State) -> RenderableType:
             table.add_row(pair.name, " - ".join(pair.links), *values)
         tables.append(table)
     return Group(*tables)
+
+
+def misfit_table(moving: State | Motion) -> FittedTable:
+    """By how much the pairs stay open, over a motion at most, where the mechanism closes within a misfit."""
+    units, within = moving.mechanism.units, moving.mechanism.closes_within or 0.0
+    title = f"Least misfit, within {amount(within, 'length', units)}"
+    table = plain_table(title, "pair", "links", column_heading("misfit", "length", units), left=(0, 1))
+    for pair in moving.mechanism.pairs:
+        most = float(np.max(moving.misfits[pair.name]))
+        table.add_row(pair.name, " - ".join(pair.links), _report_cell(most, "length", units))
+    return table
 
 
 def _relative_table(text: str, relative: RelativeState, state: State) -> RenderableType:

@@ -60,7 +60,9 @@ class BlockAssembly(NamedTuple):
 class BlockAssemblies:
     """Assemblies of the blocks of one mechanism, at its own inputs."""
 
-    def __init__(self, setup: PreparedMechanism):
+    def __init__(self, setup: PreparedMechanism, misfit: float = 0.0):
+        """`misfit` (sizes) is what blocks with more rows than unknowns may leave open."""
+        self.misfit = misfit
         mechanism, unit = setup.mechanism, setup.unit
         self.setup = setup
         self.functions, self.u, self.p = setup.functions, setup.inputs.u, setup.inputs.p
@@ -93,7 +95,8 @@ class BlockAssemblies:
             return both, both[0].z
         closing = self.residual_function(stage, z, self.p)
         near, shown = self._starts_near_sketch(stage, z)
-        ended = damped_newton(closing, self._with_lengths(stage, closing, near))
+        tolerance = self._tolerance(stage)
+        ended = damped_newton(closing, self._with_lengths(stage, closing, near), tolerance)
         found = self._from_converged(stage, z, closing, ended.unknowns[ended.converged])
         sketched = len(self.sketched_by_level.get(stage.block_index, ()))
         lower = all(self.pairs[name].is_lower_pair for name in stage.pairs)
@@ -108,7 +111,7 @@ class BlockAssemblies:
         )
         if not (dyad or clear):
             for starts in self._start_batches(stage, closing):
-                more = damped_newton(closing, starts)
+                more = damped_newton(closing, starts, tolerance)
                 ended = NewtonResult(*(np.concatenate(both) for both in zip(ended, more, strict=True)))
                 if not sketched and np.any(more.converged):
                     break
@@ -116,6 +119,11 @@ class BlockAssemblies:
         nearest = z.copy()
         nearest[stage.unknowns] = ended.unknowns[int(np.argmin(ended.residual))]
         return found, nearest
+
+    def _tolerance(self, stage: Block) -> float:
+        """What closes a block."""
+        surplus = slice_length(stage.rows) > slice_length(stage.unknowns)
+        return max(CLOSED_TOLERANCE, self.misfit if surplus else 0.0)
 
     def _closed_form(self, stage: Block, z: Array) -> list[BlockAssembly] | None:
         """The two assemblies of a block in closed form; None where it has none, or where they all but meet."""

@@ -71,6 +71,8 @@ class ResidualCheck:
             (abs(value) for pair in mechanism.pairs for value in _lengths(pair, self.numbers[pair.name])), default=0.0
         )
         self.tolerance = float(residual_tolerance(len(mechanism.links), reach / unit))
+        self.open_rows: frozenset[int] = frozenset()
+        "rows of pairs that may stay open by a misfit: they are judged with it, see `PreparedMechanism.residuals`"
 
     def with_inputs_of(self, mechanism: Mechanism) -> ResidualCheck:
         """The same for a mechanism that differs from this one in its inputs' numbers alone."""
@@ -195,7 +197,8 @@ class ResidualCheck:
     ) -> Iterator[tuple[ConstraintRow, Scalar]]:
         """The residuals of all pairs, then of all inputs, with their rows: floats, arrays or jets alike."""
         inputs = self.mechanism.inputs
-        yield from pair_residuals(self.mechanism.pairs, frames, self.numbers, own)
+        for k, (row, left) in enumerate(pair_residuals(self.mechanism.pairs, frames, self.numbers, own)):
+            yield row, left * 0.0 if k in self.open_rows else left
         motions = [self.relative_motions[given.pair] for given in inputs]
         yield from input_residuals(
             motions, frames, self.numbers, own, [given.position for given in inputs] if u is None else u

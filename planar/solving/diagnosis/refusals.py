@@ -231,8 +231,6 @@ def not_assembled(setup: PreparedMechanism, failure: AssemblySearchFailure) -> N
 
 def _open_block_sentence(setup: PreparedMechanism, failure: AssemblySearchFailure) -> str:
     """What to say of a block that cannot be joined; what would mend it takes as long to find as an assembly."""
-    from planar.solving.diagnosis.remedy import describe_remedy
-
     stage = failure.stage
     gaps: dict[str, float] = {}
     still = setup.functions.block_function(stage)(failure.z, setup.inputs.u, setup.inputs.p)[0].full().ravel()
@@ -242,11 +240,24 @@ def _open_block_sentence(setup: PreparedMechanism, failure: AssemblySearchFailur
     kind = next(row.kind for row in setup.equations.rows[stage.rows] if row.pair == pair)
     by, what = (setup.unit, "length") if kind is MeasureKind.LENGTH else (1.0, "angle")
     links = _links(stage.links or setup.pairs.get(pair, setup.relative_motions[pair]).links)
+    if slice_length(stage.rows) > slice_length(stage.unknowns):
+        from planar.solving.assembly.least_misfit_offer import offer_least_misfit
+
+        offer = offer_least_misfit(setup.mechanism)
+        if offer:
+            return f"{setup.describe_position()} {offer}; or {_remedy(setup, failure, links)}"
     return (
         f"{setup.describe_position()} {links} cannot be joined: at the nearest, pair {pair!r} stays open by "
         f"{amount(gaps[pair] * by, what, setup.mechanism.units)}; "
-        f"{describe_remedy(setup, failure, f'change the input or a dimension of {links}')}"
+        f"{_remedy(setup, failure, links)}"
     )
+
+
+def _remedy(setup: PreparedMechanism, failure: AssemblySearchFailure, links: str) -> str:
+    """What would mend it."""
+    from planar.solving.diagnosis.remedy import describe_remedy
+
+    return describe_remedy(setup, failure, f"change the input or a dimension of {links}")
 
 
 def too_many_inputs(setup: PreparedMechanism) -> NoAnswer:

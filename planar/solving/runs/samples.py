@@ -136,6 +136,9 @@ def build_motion(
     time: Array | None = None,
 ) -> Motion:
     """The motion; raises NoAnswer where the gate does not let it pass."""
+    if solver.equations.open_rows:
+        run = _rows_within_misfit(solver, run)
+        time = time if time is None else time[: len(run.z)]
     told = run.fast_samples if not with_jerk else None
     remarks: tuple[str, ...] = ()
     if told is not None and told.is_sure.all():
@@ -167,6 +170,27 @@ def build_motion(
     )
 
 
+def _rows_within_misfit(solver: PositionSolver, run: RunSamples) -> RunSamples:
+    """The rows up to where a pair is open by more than may be. Raises NoAnswer where that is the first."""
+    from planar.solving.assembly.least_misfit import misfit_refusal  # few mechanisms have one
+
+    misfits = np.max([*solver.pair_misfits(run.z, run.inputs.u).values()], axis=0)
+    passed = (misfits <= (solver.mechanism.closes_within or 0.0)) & solver.is_least_misfit(run.z, run.inputs.u)
+    beyond = np.flatnonzero(~passed)
+    if not beyond.size:
+        return run
+    refusal = misfit_refusal(solver, run.z, run.inputs.u, int(beyond[0]))
+    assert refusal is not None
+    if not beyond[0]:
+        raise refusal
+    kept = np.arange(beyond[0])
+    some = run._replace(
+        dead_points=tuple(row for row in run.dead_points if row % len(run.z) < len(kept)),
+        branch_rates={row: each for row, each in run.branch_rates.items() if row < len(kept)},
+    )
+    return some.select(kept).with_problem(refusal)
+
+
 class _CheckedRates(NamedTuple):
     """Rows on the general path: w with its rates (rows, coordinates) of each order, what the worst constraint leaves
     open, and what there is to say."""
@@ -184,7 +208,7 @@ def _checked_rates(solver: PositionSolver, run: RunSamples, with_jerk: bool) -> 
     if not residual <= solver.tolerance:
         open_row, worst = np.unravel_index(int(np.argmax(gaps)), gaps.shape)
         raise refusals.not_closed(
-            solver, solver.residual_check.row_pairs[open_row], residual, f"at {solver.describe_inputs(given.u[worst])}"
+            solver, solver.row_pairs[open_row], residual, f"at {solver.describe_inputs(given.u[worst])}"
         )
     parts, doubt = sample_rates(solver, z, given, run.branch_rates, with_jerk)
     remarks = _undetermined_remark(solver, run, parts[1])

@@ -1,4 +1,4 @@
-"""Stops of pairs in a file: keys of a pair's entry to stops, and back."""
+"""Keys that the entry of any pair may have: its stops, read and written, and its stiffness."""
 
 from __future__ import annotations
 
@@ -34,6 +34,22 @@ def read_stops(entry: Cursor, group: Sequence[Pair]) -> tuple[Stops, ...]:
     else:
         given = [(pair, cursor) for pair in motions.values()]
     return tuple(_read_limits(place, pair, restitution, entry) for pair, place in given)
+
+
+def read_pair_stiffness(entries: Sequence[tuple[Cursor, Sequence[Pair]]]) -> tuple[tuple[str, float], ...]:
+    """The stiffness of every pair by its name (N/m). Raises BadInput where some pairs have one and some none."""
+    found = []
+    for entry, group in entries:
+        if entry.has("stiffness"):
+            stiffness = entry["stiffness"].as_quantity("stiffness")
+            if not stiffness > 0.0:
+                raise entry.error_at("stiffness", "a pair's stiffness is above 0")
+            found.append((group[0].entry_name(), stiffness))
+    if found and len(found) < len(entries):
+        without = next(entry for entry, _ in entries if not entry.has("stiffness"))
+        wrong = "this pair has no 'stiffness', but others have: give it on all pairs, or on none"
+        raise without.error_at(None, wrong)
+    return tuple(found)
 
 
 def _read_limits(cursor: Cursor, pair: Pair, restitution: float, entry: Cursor) -> Stops:

@@ -1,0 +1,1 @@
+"""How pairs share what links that are held more than once carry."""

@@ -1,0 +1,1 @@
+"""Linkages that are held more than once and close but for a misfit."""
