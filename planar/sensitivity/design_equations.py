@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any
 
 import casadi as ca
@@ -12,13 +12,14 @@ import numpy as np
 
 from planar.document.dimensions import Dimension, change_dimension, file_dimensions
 from planar.dynamics.lagrangian import LagrangianFunctions
-from planar.equations.elimination import stack_expressions
 from planar.equations.coordinates import FRAME_PARTS, frames_from_coordinates
+from planar.equations.elimination import stack_expressions
 from planar.equations.mechanism_numbers import scale_lengths
 from planar.equations.rates import time_derivatives
 from planar.equations.residuals import scalars
 from planar.foundation.arrays import Array
-from planar.foundation.jets import value_and_rates
+from planar.foundation.geometry import Frame
+from planar.foundation.jets import Scalar, value_and_rates
 from planar.model.mechanism import Input, Mechanism
 from planar.model.pairs import MeasureKind, Pair
 from planar.results.kinematic_result import KinematicResult
@@ -97,6 +98,12 @@ class DesignEquations:
         kinds = self.equations.input_kinds
         return np.array([self.solver.unit if kind is MeasureKind.LENGTH else 1.0 for kind in kinds])
 
+    @cached_property
+    def scale(self) -> Array:
+        """What each of t is in units of (parameters,): m for one of the size, else as it is."""
+        lengths = [self.solver.unit if each.kind == "length" else 1.0 for each in self.dimensions]
+        return np.concatenate([*[self.input_scale] * 3, lengths])
+
     def rates(self, value: ca.SX) -> tuple[ca.SX, ca.SX]:
         """The first and second rates of what is made of z, u and d."""
         y, y1 = ca.vertcat(self.z, self.u), ca.vertcat(self.z1, self.u1)
@@ -111,7 +118,7 @@ class DesignEquations:
         return ImplicitSystem(levels, self.t)
 
     @cached_property
-    def placed(self) -> tuple[dict, dict]:
+    def placed(self) -> tuple[dict[str, Frame], dict[str, tuple[Scalar, ...]]]:
         """The links' frames and the pairs' own coordinates, in symbols."""
         solver = self.solver
         return frames_from_coordinates(scalars(self.w), solver.column, list(solver.shapes), solver.pairs)
@@ -124,6 +131,10 @@ class DesignEquations:
         parts += [each for pair in self.mechanism.pairs for each in own[pair.name]]
         return stack_expressions(parts)
 
+    def in_link_coordinates(self, value: ca.SX) -> ca.SX:
+        """An expression in the coordinates q of `LagrangianFunctions`, in the unknowns."""
+        return ca.Function("value", [self.work.q, self.d], [value])(self.link_coordinates, self.d)
+
     def coordinates_at(self, moving: KinematicResult) -> tuple[list[Array], Array]:
         """z, z', z'' (n, unknowns) and t (n, parameters) at a state or a motion."""
         parts = [_parts_of(moving, each.owner, each.part, self.solver.pairs) for each in self.equations.coordinates]
@@ -134,7 +145,9 @@ class DesignEquations:
         unknown = list(self.equations.unknowns)
         z = (w[unknown] / self.solver.scale[unknown, None, None]).transpose(1, 2, 0)
         values = np.array([[np.broadcast_to(part, (many,)) for part in each] for each in given])
-        t = np.concatenate([values.reshape(-1, many).T, np.tile([each.value for each in self.dimensions], (many, 1))], 1)
+        t = np.concatenate(
+            [values.reshape(-1, many).T, np.tile([each.value for each in self.dimensions], (many, 1))], 1
+        )
         return list(z), t
 
 
@@ -144,3 +157,9 @@ def _parts_of(moving: KinematicResult, owner: str, part: str, pairs: Mapping[str
         return value_and_rates(getattr(moving.frames[owner], part))[:3]
     names = [name for name, _ in pairs[owner].coordinate_kinds]
     return value_and_rates(moving.own[owner][names.index(part)])[:3]
+
+
+@lru_cache(maxsize=32)
+def design_equations(mechanism: Mechanism) -> DesignEquations:
+    """The equations of a mechanism, kept for the next time."""
+    return DesignEquations(mechanism)

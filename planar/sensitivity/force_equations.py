@@ -13,10 +13,9 @@ from planar.dynamics.reaction_solver import bearing_point
 from planar.equations.casadi_call import BufferedFunction
 from planar.equations.residuals import pair_residuals
 from planar.foundation.arrays import Array
-from planar.foundation.errors import BadInput
 from planar.foundation.geometry import Vector
-from planar.model.pairs import Pair
-from planar.model.pairs.base import ToothContact
+from planar.model.pairs import MeasureKind, Pair
+from planar.results.motion import Motion, State
 from planar.sensitivity.design_equations import DesignEquations
 from planar.sensitivity.implicit_system import ImplicitSystem, Level, invert_matrices
 
@@ -52,7 +51,8 @@ class ForceEquations:
     @cached_property
     def pair_actions(self) -> dict[str, ca.SX]:
         """What each pair does on the coordinates of the links, and on its own (coordinates,)."""
-        work, values = self.work, {pair.name: [] for pair in self.work.mechanism.pairs}
+        work = self.work
+        values: dict[str, list[ca.SX]] = {pair.name: [] for pair in work.mechanism.pairs}
         for row, value in pair_residuals(work.mechanism.pairs, work.frames, work.numbers, work.own):
             values[row.pair].append(value)
         found = {}
@@ -83,7 +83,7 @@ class ForceEquations:
         pair, action = self._pair(name), self.pair_actions[name]
         work, zero = self.work, ca.SX(0.0)
         second = pair.links[1]
-        wrenches = {}
+        wrenches: dict[str, tuple[ca.SX, ...]] = {}
         for link in dict.fromkeys(pair.bodies):
             if link in work.link_columns:
                 at, frame = work.link_columns[link], work.frames[link]
@@ -92,8 +92,8 @@ class ForceEquations:
         if second not in wrenches:  # on the frame acts what adds up to nothing
             wrenches[second] = tuple(-sum((each[k] for each in wrenches.values()), zero) for k in range(3))
         x, y, moment = wrenches[second]
-        at = self._reaction_point(pair)
-        return ca.vertcat(x, y, moment if at is None else moment - at.x * y + at.y * x)
+        place = self._reaction_point(pair)
+        return ca.vertcat(x, y, moment if place is None else moment - place.x * y + place.y * x)
 
     def _reaction_point(self, pair: Pair) -> Vector | None:
         if pair.name in self.contacts:
@@ -132,6 +132,21 @@ class ForceEquations:
             found = self._solve_balance(values, parameters, constants)
             senses = np.sign(found[:, [self.first_multipliers[name] for name in self.contacts]])
         return [*values, found], parameters, constants
+
+    def factor_slopes(self, moving: State | Motion) -> Array:
+        """How the factors of loads change with t at positions (n, loads, parameters): with the inputs that they follow,
+        as the straight piece of their course does that comes next."""
+        names = [given.pair for given in moving.mechanism.inputs]
+        many = max(np.size(each.position) for each in moving.inputs.values()) if names else 1
+        found = np.zeros((many, len(moving.mechanism.loads), self.design.t.numel()))
+        for k, load in enumerate(moving.mechanism.loads):
+            if load.varies is None or load.varies.input is None:
+                continue
+            name = load.varies.input
+            turns = self.work.relative_motions[name].input_kind is MeasureKind.ANGLE
+            at = np.broadcast_to(moving.inputs[name].position, (many,))
+            found[:, k, names.index(name)] = [course_piece(load.varies, float(each), 1.0, turns).slope for each in at]
+        return found
 
     def _solve_balance(self, values: list[Array], parameters: Array, constants: Array) -> Array:
         none = np.zeros((len(parameters), self.unknowns.numel()))

@@ -116,7 +116,7 @@ class LinearLevels:
         """dx_k/dt (n, unknowns, parameters) of every level, and where a level contradicts a change of a parameter
         alone (n, parameters)."""
         slopes: list[Array] = []
-        against = np.zeros((len(self.is_singular), self.blocks[0][-1].shape[2]), bool)
+        against: BoolArray = np.zeros((len(self.is_singular), self.blocks[0][-1].shape[2]), dtype=bool)
         for row, inverse in zip(self.blocks, self._inverses, strict=True):
             changed = row[-1] + sum(block @ slope for block, slope in zip(row, slopes, strict=False))
             slope = -inverse @ changed
@@ -147,14 +147,14 @@ def invert_matrices(matrices: Array) -> tuple[Array, BoolArray]:
     """The inverses (n, columns, rows) of matrices (n, rows, columns), as far as there are any, and where they do not
     determine all that they are multiplied by (n,)."""
     many, rows, columns = matrices.shape
-    is_known = np.isfinite(matrices).all(axis=(1, 2))
+    is_known: BoolArray = np.isfinite(matrices).all(axis=(1, 2))
     if not columns or not many:
         return np.zeros((many, columns, rows)), ~is_known
     known = np.where(is_known[:, None, None], matrices, 0.0)
     by_row = _nonzero(np.linalg.norm(known, axis=2, keepdims=True))
     by_column = _nonzero(np.linalg.norm(known / by_row, axis=1, keepdims=True))
     u, s, v = np.linalg.svd(known / by_row / by_column, full_matrices=False)
-    weak = s <= SINGULAR * s[:, :1]
+    weak: BoolArray = s <= SINGULAR * s[:, :1]
     kept = np.where(weak, 0.0, 1.0 / np.where(weak, 1.0, s))
     inverse = (v.transpose(0, 2, 1) * kept[:, None]) @ u.transpose(0, 2, 1)
     whole = inverse / by_row.transpose(0, 2, 1) / by_column.transpose(0, 2, 1)
