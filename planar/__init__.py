@@ -34,6 +34,9 @@ if TYPE_CHECKING:
     from planar.analysis.motion.output import Extreme
     from planar.analysis.motion.time_ratio import TimeRatio, time_ratio
     from planar.analysis.motion.transmission_angle import Transmission, transmission
+    from planar.analysis.sensitivity.gradient import gradient
+    from planar.analysis.sensitivity.limit_slopes import LimitSlopes, TravelSlopes
+    from planar.analysis.sensitivity.sensitivity import Influence, Sensitivity, sensitivity
     from planar.assemblies.circuits.circuits import Circuit, Circuits, circuits
     from planar.assemblies.circuits.traced_circuit import Branch
     from planar.assemblies.conflict import Conflict, conflict
@@ -143,11 +146,13 @@ __all__ = [
     "Harmonics",
     "Holding",
     "Impact",
+    "Influence",
     "Input",
     "InputLaw",
     "Inspection",
     "LiftLaw",
     "Limit",
+    "LimitSlopes",
     "Link",
     "LinkLine",
     "LinkMotion",
@@ -184,6 +189,7 @@ __all__ = [
     "ReducedSweep",
     "RelativeState",
     "RubbingPair",
+    "Sensitivity",
     "Simulation",
     "SlidingPair",
     "SlotPair",
@@ -199,6 +205,7 @@ __all__ = [
     "TimeRatio",
     "Transmission",
     "TrapezoidalRise",
+    "TravelSlopes",
     "TurningPair",
     "Unknown",
     "UnknownLoad",
@@ -225,6 +232,7 @@ __all__ = [
     "flywheel",
     "forces",
     "from_dict",
+    "gradient",
     "greatest",
     "harmonics",
     "holding",
@@ -244,6 +252,7 @@ __all__ = [
     "problem_variants",
     "schema",
     "self_locking",
+    "sensitivity",
     "simulate",
     "solve",
     "stroke",

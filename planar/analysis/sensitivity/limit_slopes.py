@@ -11,11 +11,11 @@ import numpy as np
 from planar.analysis.interpolated_run import InterpolatedRun
 from planar.analysis.motion.output import Extreme, Output
 from planar.analysis.motion.time_ratio import Passage, TimeRatio, find_time_ratio
+from planar.derivatives.design_equations import design_equations
+from planar.derivatives.limit_systems import LimitPoint, LimitSystem
 from planar.foundation.errors import BadInput, NoAnswer, Outcome
 from planar.foundation.short_repr import short_repr
 from planar.results.motion import Motion
-from planar.sensitivity.design_equations import design_equations
-from planar.sensitivity.limit_systems import LimitPoint, LimitSystem
 
 NEAR = 1e-6
 """rad or sizes: a limit that is solved for anew is the same where it is so near."""

@@ -7,11 +7,12 @@ from typing import NamedTuple
 
 import casadi as ca
 
+from planar.derivatives.design_equations import DesignEquations
+from planar.derivatives.force_equations import ForceEquations
+from planar.equations.elimination import stack_expressions
 from planar.foundation.errors import Unknown, join_names
 from planar.model.pairs import MeasureKind
 from planar.results.kinematic_result import KinematicResult
-from planar.sensitivity.design_equations import DesignEquations
-from planar.sensitivity.force_equations import ForceEquations
 
 LINK_RESULTS = ("angle", "angular_velocity", "angular_acceleration")
 POINT_RESULTS = ("position", "velocity", "acceleration")
@@ -32,7 +33,7 @@ def kinematic_expressions(design: DesignEquations, moving: KinematicResult, name
     if name in moving._point_names:
         link, point = moving._point_names[name].members[0]
         at = frames[link].to_world(design.work.shapes[link].position(point))
-        position = ca.vertcat(*at)
+        position = stack_expressions(at)
         values = (position, *design.rates(position))
         yield from map(ResultExpression, POINT_RESULTS, POINT_KINDS, values)
     elif name in frames:
@@ -41,8 +42,8 @@ def kinematic_expressions(design: DesignEquations, moving: KinematicResult, name
         yield from map(ResultExpression, LINK_RESULTS, kinds, (angle, *design.rates(angle)))
     if name in design.work.relative_motions:
         pair = design.work.relative_motions[name]
-        position = design.in_link_coordinates(ca.vertcat(*design.work.relative_positions([name])))
-        found = pair.results(position, *design.rates(position))
+        place = design.in_link_coordinates(ca.vertcat(*design.work.relative_positions([name])))
+        found = pair.results(place, *design.rates(place))
         for key, value in found.items():
             if value is not None:
                 yield ResultExpression(key, pair.result_kinds[key], value)

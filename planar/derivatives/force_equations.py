@@ -7,6 +7,8 @@ from functools import cached_property
 import casadi as ca
 import numpy as np
 
+from planar.derivatives.design_equations import DesignEquations
+from planar.derivatives.implicit_system import ImplicitSystem, Level, invert_matrices
 from planar.dynamics.forces import Forces
 from planar.dynamics.load_variation import course_piece, load_factors
 from planar.dynamics.reaction_solver import bearing_point
@@ -16,8 +18,6 @@ from planar.foundation.arrays import Array
 from planar.foundation.geometry import Vector
 from planar.model.pairs import MeasureKind, Pair
 from planar.results.motion import Motion, State
-from planar.sensitivity.design_equations import DesignEquations
-from planar.sensitivity.implicit_system import ImplicitSystem, Level, invert_matrices
 
 
 class ForceEquations:

@@ -8,12 +8,12 @@ from typing import NamedTuple
 import casadi as ca
 import numpy as np
 
+from planar.derivatives.design_equations import DesignEquations
+from planar.derivatives.implicit_system import ImplicitSystem, Level, invert_matrices
+from planar.derivatives.result_expressions import kinematic_expressions
 from planar.equations.casadi_call import BufferedFunction
 from planar.foundation.arrays import Array
 from planar.results.motion import Motion, State
-from planar.sensitivity.design_equations import DesignEquations
-from planar.sensitivity.implicit_system import ImplicitSystem, Level, invert_matrices
-from planar.sensitivity.result_expressions import kinematic_expressions
 
 MAX_NEWTON_STEPS = 20
 CLOSED = 1e-10

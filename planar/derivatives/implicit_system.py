@@ -91,6 +91,77 @@ class ImplicitSystem:
             found.append(ResultSlopes(slope, linear.is_singular, against))
         return ResultSlopes(*(np.concatenate(each) for each in zip(*found, strict=True)))
 
+    def gradient(
+        self,
+        results: ca.SX,
+        weights: Array,
+        values: Sequence[Array],
+        parameters: Array,
+        constants: Array | None = None,
+    ) -> tuple[Array, BoolArray]:
+        """The derivative of the sum of results times their weights (n, results) at each of n positions, in the
+        parameters (n, parameters), and where there is none (n,): one transposed solution, for however many."""
+        constants = np.zeros((len(parameters), 0)) if constants is None else constants
+        given = [*values, parameters, constants]
+        of_results = self._weighed(results).evaluate_batch(len(parameters), *given, weights)
+        *by_unknowns, whole = (each[:, 0] for each in of_results)
+        blocks = iter(each.transpose(0, 2, 1) for each in self._level_jacobians.evaluate_batch(len(parameters), *given))
+        many, none = len(self.levels), np.zeros((len(parameters), 0, 0))
+        linear = LinearLevels(
+            [[*(next(blocks) for _ in range(k + 1)), none] for k in range(many)],
+            [level.is_determinate for level in self.levels],
+        )
+        multipliers = linear.multipliers(by_unknowns)
+        own = self._weighed_equations.evaluate_batch(len(parameters), *given, np.concatenate(multipliers, axis=1))
+        return whole - own[0][:, 0], linear.is_singular
+
+    def _weighed(self, results: ca.SX) -> BufferedFunction:
+        """(x_0, ..., t, constants, weights) -> the derivatives of the weighed sum in x_0, ..., t."""
+        weights = ca.SX.sym("weights", results.numel())
+        slopes = [ca.densify(ca.jtimes(results, of, weights, True)) for of in self.given[:-1]]
+        return BufferedFunction(ca.Function("weighed", [*self.given, weights], slopes))
+
+    @cached_property
+    def _weighed_equations(self) -> BufferedFunction:
+        """The same of all levels' equations, in t."""
+        equations = ca.vertcat(*(level.equations for level in self.levels))
+        weights = ca.SX.sym("weights", equations.numel())
+        slope = ca.densify(ca.jtimes(equations, self.parameters, weights, True))
+        return BufferedFunction(ca.Function("weighed", [*self.given, weights], [slope]))
+
+    @cached_property
+    def _level_jacobians(self) -> BufferedFunction:
+        """(x_0, ..., t, constants) -> of every level dG/dx_0, ..., dG/dx_k."""
+        found = [
+            ca.densify(ca.jacobian(level.equations, of))
+            for k, level in enumerate(self.levels)
+            for of in self.unknowns[: k + 1]
+        ]
+        return BufferedFunction(ca.Function("levels", self.given, found))
+
+    def second_slopes(
+        self, result: ca.SX, values: Sequence[Array], parameters: Array, constants: Array | None = None
+    ) -> Array:
+        """The second derivatives of one result in the parameters (n, parameters, parameters): with the first ones of
+        the unknowns X, (X, 1)^T H (X, 1) of the Hessian H of the Lagrangian r - lambda^T G."""
+        constants = np.zeros((len(parameters), 0)) if constants is None else constants
+        given = [*values, parameters, constants]
+        linear = self.linearise(given)
+        first, _ = linear.unknown_slopes()
+        one = np.ones((len(parameters), 1))
+        *by_unknowns, _ = (each[:, 0] for each in self._weighed(result).evaluate_batch(len(parameters), *given, one))
+        multipliers = np.concatenate(linear.multipliers(by_unknowns), axis=1)
+        equations = ca.vertcat(*(level.equations for level in self.levels))
+        weights = ca.SX.sym("weights", equations.numel())
+        variables = ca.vertcat(*self.given[:-1])
+        hessian = ca.hessian(result - ca.dot(weights, equations), variables)[0]
+        function = BufferedFunction(ca.Function("hessian", [*self.given, weights], [ca.densify(hessian)]))
+        whole = function.evaluate_batch(len(parameters), *given, multipliers)[0]
+        own = np.broadcast_to(np.eye(parameters.shape[1]), (len(parameters), *[parameters.shape[1]] * 2))
+        along = np.concatenate([*first, own], axis=1)
+        found: Array = along.transpose(0, 2, 1) @ whole @ along
+        return found
+
     def linearise(self, values: Sequence[Array]) -> LinearLevels:
         """The levels at positions: the unknowns, parameters and constants (n, ...) each."""
         found = iter(each.transpose(0, 2, 1) for each in self._jacobians.evaluate_batch(len(values[0]), *values))
@@ -147,14 +218,14 @@ def invert_matrices(matrices: Array) -> tuple[Array, BoolArray]:
     """The inverses (n, columns, rows) of matrices (n, rows, columns), as far as there are any, and where they do not
     determine all that they are multiplied by (n,)."""
     many, rows, columns = matrices.shape
-    is_known: BoolArray = np.isfinite(matrices).all(axis=(1, 2))
+    is_known: BoolArray = np.asarray(np.isfinite(matrices).all(axis=(1, 2)))
     if not columns or not many:
         return np.zeros((many, columns, rows)), ~is_known
     known = np.where(is_known[:, None, None], matrices, 0.0)
     by_row = _nonzero(np.linalg.norm(known, axis=2, keepdims=True))
     by_column = _nonzero(np.linalg.norm(known / by_row, axis=1, keepdims=True))
     u, s, v = np.linalg.svd(known / by_row / by_column, full_matrices=False)
-    weak: BoolArray = s <= SINGULAR * s[:, :1]
+    weak: BoolArray = np.asarray(s <= SINGULAR * s[:, :1])
     kept = np.where(weak, 0.0, 1.0 / np.where(weak, 1.0, s))
     inverse = (v.transpose(0, 2, 1) * kept[:, None]) @ u.transpose(0, 2, 1)
     whole = inverse / by_row.transpose(0, 2, 1) / by_column.transpose(0, 2, 1)

@@ -8,6 +8,15 @@ from typing import NamedTuple
 import casadi as ca
 import numpy as np
 
+from planar.derivatives.design_equations import DesignEquations, design_equations
+from planar.derivatives.force_equations import ForceEquations
+from planar.derivatives.implicit_system import ImplicitSystem, ResultSlopes
+from planar.derivatives.result_expressions import (
+    ResultExpression,
+    force_expressions,
+    kinematic_expressions,
+    refuse_name,
+)
 from planar.document.dimensions import Dimension, with_values
 from planar.dynamics.forces import Forces
 from planar.equations.residuals import pair_residuals
@@ -16,15 +25,6 @@ from planar.foundation.errors import BadInput
 from planar.model.mechanism import Mechanism
 from planar.model.pairs import MeasureKind
 from planar.results.motion import Motion, State
-from planar.sensitivity.design_equations import DesignEquations, design_equations
-from planar.sensitivity.force_equations import ForceEquations
-from planar.sensitivity.implicit_system import ImplicitSystem, ResultSlopes
-from planar.sensitivity.result_expressions import (
-    ResultExpression,
-    force_expressions,
-    kinematic_expressions,
-    refuse_name,
-)
 
 OPENING = 1e-6
 """Constraints that are opened by more than this part of a change (sizes, rad) do not go with it."""
@@ -101,6 +101,34 @@ class SlopeSystem:
             slopes[each.name] = moved
         kinds = {each.name: each.kind for each in found}
         return NamedSlopes(slopes, kinds, names, whole.is_singular, tuple(name for name in names if name in bound))
+
+    def gradient(self, weights: Mapping[str, Mapping[str, Array]]) -> tuple[Array, BoolArray]:
+        """The derivatives (n, parameters) of the sum of results by name times their weights (n, parts), and where there
+        are none (n,)."""
+        values, given = [], []
+        for name, of in weights.items():
+            expressions = {each.name: each.value for each in self.expressions(name)}
+            for result, numbers in of.items():
+                values.append(expressions[result])
+                given.append(numbers.reshape(len(self.parameters), -1))
+        found, is_singular = self.system.gradient(
+            ca.vertcat(*values), np.concatenate(given, axis=1), self.values, self.parameters, self.constants
+        )
+        own = self.design.t.numel()
+        if self.balance is None:
+            return found, is_singular
+        by_factors = np.einsum("nl,nlp->np", found[:, own:], self.balance.factor_slopes(self.moving))
+        return found[:, :own] + by_factors, is_singular
+
+    def second_slopes(self, name: str, result: str) -> Array:
+        """The second derivatives of a result (n, parts, parameters, parameters)."""
+        (value,) = (each.value for each in self.expressions(name) if each.name == result)
+        own = self.design.t.numel()
+        found = [
+            self.system.second_slopes(part, self.values, self.parameters, self.constants)[:, :own, :own]
+            for part in ca.vertsplit(value)
+        ]
+        return np.stack(found, axis=1)
 
     def _gaps(self) -> ca.SX:
         """What all constraints leave open (sizes, rad), those that the equations do without among them."""

@@ -10,6 +10,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from planar.derivatives.implicit_system import ImplicitSystem, Level
 from planar.document.dimensions import Dimension, change_dimension, file_dimensions
 from planar.dynamics.lagrangian import LagrangianFunctions
 from planar.equations.coordinates import FRAME_PARTS, frames_from_coordinates
@@ -23,7 +24,6 @@ from planar.foundation.jets import Scalar, value_and_rates
 from planar.model.mechanism import Input, Mechanism
 from planar.model.pairs import MeasureKind, Pair
 from planar.results.kinematic_result import KinematicResult
-from planar.sensitivity.implicit_system import ImplicitSystem, Level
 from planar.solving.position import PositionSolver, solved_mechanism
 
 DESIGN_SECTIONS = ("links", "pairs", "loads", "springs", "masses", "gravity")
