@@ -134,8 +134,8 @@ class ForceEquations:
         return [*values, found], parameters, constants
 
     def factor_slopes(self, moving: State | Motion) -> Array:
-        """How the factors of loads change with t at positions (n, loads, parameters): with the inputs that they follow,
-        as the straight piece of their course does that comes next."""
+        """How the factors of loads change with t at positions (n, loads, parameters), with the inputs that they follow;
+        NaN where two pieces of their course meet at an angle."""
         names = [given.pair for given in moving.mechanism.inputs]
         many = max(np.size(each.position) for each in moving.inputs.values()) if names else 1
         found = np.zeros((many, len(moving.mechanism.loads), self.design.t.numel()))
@@ -145,8 +145,17 @@ class ForceEquations:
             name = load.varies.input
             turns = self.work.relative_motions[name].input_kind is MeasureKind.ANGLE
             at = np.broadcast_to(moving.inputs[name].position, (many,))
-            found[:, k, names.index(name)] = [course_piece(load.varies, float(each), 1.0, turns).slope for each in at]
+            pieces = ([course_piece(load.varies, float(each), way, turns).slope for each in at] for way in (1.0, -1.0))
+            ahead, behind = map(np.array, pieces)
+            found[:, k, names.index(name)] = np.where(ahead == behind, ahead, np.nan)
         return found
+
+    def slopes_by_factors(self, by_factors: Array, moving: State | Motion) -> Array:
+        """What results (n, results, loads) that change with the factors of loads do by these (n, results, t)."""
+        slopes = self.factor_slopes(moving)
+        known = by_factors @ np.where(np.isnan(slopes), 0.0, slopes)
+        is_kink = (np.abs(by_factors) > 0.0).astype(float) @ np.isnan(slopes).astype(float) > 0.0
+        return np.where(is_kink, np.nan, known)
 
     def _solve_balance(self, values: list[Array], parameters: Array, constants: Array) -> Array:
         none = np.zeros((len(parameters), self.unknowns.numel()))

@@ -79,7 +79,7 @@ class SlopeSystem:
             return found
         own = self.design.t.numel()
         slopes, of_factors = found.slopes[..., :own], found.slopes[..., own:]
-        slopes = slopes + of_factors @ self.balance.factor_slopes(self.moving)
+        slopes = slopes + self.balance.slopes_by_factors(of_factors, self.moving)
         return ResultSlopes(slopes, found.is_singular, found.contradicts[:, :own])
 
     def named_slopes(self, name: str) -> NamedSlopes:
@@ -117,7 +117,7 @@ class SlopeSystem:
         own = self.design.t.numel()
         if self.balance is None:
             return found, is_singular
-        by_factors = np.einsum("nl,nlp->np", found[:, own:], self.balance.factor_slopes(self.moving))
+        by_factors = self.balance.slopes_by_factors(found[:, None, own:], self.moving)[:, 0]
         return found[:, :own] + by_factors, is_singular
 
     def second_slopes(self, name: str, result: str) -> Array:

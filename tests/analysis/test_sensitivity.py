@@ -68,7 +68,7 @@ def agree_with_differences(solve, mechanism, names, numbers, found):
                     v = {k: v[1] + np.remainder(each - v[1] + pi, 2.0 * pi) - pi for k, each in v.items()}
                 wide, near = (v[2] - v[-2]) / (4 * step), (v[1] - v[-1]) / (2 * step)
                 exact = np.asarray(slopes[number])
-                if not np.isfinite(near).all():
+                if not (np.isfinite(near).all() and np.isfinite(exact).all()):  # or at an angle of a load's course
                     continue
                 # what halving the step changes tells how far the difference itself is off
                 bound = np.max(np.abs(wide - near)) * 0.1 + 1e-11 * (np.max(np.abs(v[1])) + size) / step
