@@ -48,8 +48,8 @@ if TYPE_CHECKING:
     from planar.batch.sweep import sweep
     from planar.batch.sweep_mechanisms import sweep_each
     from planar.document.builder import build
-    from planar.document.dimensions import dimensions
     from planar.document.files import dumps, from_dict, load, loads, to_dict
+    from planar.document.revised.changed_numbers import dimensions
     from planar.document.schema import schema
     from planar.dynamics.flywheel import Flywheel, flywheel
     from planar.dynamics.forces import Forces, PairFriction, forces
@@ -276,7 +276,7 @@ def _present(result: Any) -> str | None:
 
 def _revise(mechanism: Any, values: Any) -> Any:
     """A mechanism with some numbers changed; the reader of files is loaded only where one is."""
-    return import_module("planar.document.dimensions").with_values(mechanism, values)
+    return import_module("planar.document.revised.changed_numbers").with_values(mechanism, values)
 
 
 Displayable.presenter, Revisable.reviser = _present, _revise

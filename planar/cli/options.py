@@ -102,7 +102,7 @@ def read_model(model: str) -> Mechanism:
     settings = click.get_current_context().meta.get(SETTINGS, ())
     if not settings:
         return mechanism
-    from planar.document.dimensions import with_values
+    from planar.document.revised.changed_numbers import with_values
 
     values: dict[str, Any] = {}
     for text in settings:

@@ -17,7 +17,8 @@ from planar.derivatives.result_expressions import (
     kinematic_expressions,
     refuse_name,
 )
-from planar.document.dimensions import Dimension, with_values
+from planar.document.dimensions import Dimension
+from planar.document.revised.changed_numbers import with_values
 from planar.dynamics.forces import Forces
 from planar.equations.residuals import pair_residuals
 from planar.foundation.arrays import Array, BoolArray

@@ -1,4 +1,4 @@
-"""The numbers of a mechanism's file: the name of each, its value and kind, and the mechanism with some changed.
+"""The numbers of a mechanism's file: the name of each, its value and kind, and where it is.
 
 A number's name is its place in the file, by the names of links, pairs and inputs: `BC.length`, `b.P.angle`, `AD.D.x`,
 `BC.F.B` (the distance of F from B), `stroke.line.angle`, `wheels.radii.0`, `A.velocity`, `A.law.0.by`,
@@ -16,20 +16,16 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import fields, is_dataclass, replace
 from functools import cache
-from math import isfinite
 from numbers import Real
 from typing import Any, NamedTuple
 
 from planar.document.common_pair_keys import write_stops
-from planar.document.cursor import Cursor, FileContext, suggest_spelling
-from planar.document.first_argument import takes_mechanism
+from planar.document.cursor import suggest_spelling
 from planar.document.loads import write_load, write_mass, write_spring
-from planar.document.reader import read_mechanism
-from planar.document.writer import write_input, write_link, write_mechanism
+from planar.document.writer import write_input, write_link
 from planar.foundation.errors import BadInput, join_names
-from planar.model.file_units import FileUnits
 from planar.model.input_laws import SEGMENT_TYPES
-from planar.model.mechanism import Mechanism, find_law_problem, pair_entries, relative_motions
+from planar.model.mechanism import Mechanism, pair_entries, relative_motions
 from planar.model.pairs import Pair
 
 Address = tuple[str | int, ...]
@@ -104,28 +100,17 @@ def input_numbers(mechanism: Mechanism) -> Iterator[Dimension]:
     return (each for each in _input_dimensions(mechanism) if len(each.address) == 3)
 
 
-@takes_mechanism
-def dimensions(mechanism: Mechanism) -> dict[str, float]:
-    """Every number of a mechanism's file by name (SI: m, rad, s, N, kg), those left out with their defaults.
-
-    >>> import planar
-    >>> planar.dimensions(planar.load("four-bar"))["BC.length"]
-    0.066
-    """
-    return {name: each.value for name, each in file_dimensions(mechanism).items()}
-
-
 def change_dimension(mechanism: Mechanism, dimension: Dimension, value: Any) -> Mechanism:
     """The mechanism with this number at another value (SI), or at an array or a symbol, unchecked."""
     where, index, *rest = dimension.address
     if where == "stops" and rest == ["restitution"]:
         return _with_restitution(mechanism, dimension, value)
     if where != "pairs" or not isinstance(index, int):
-        alone: Mechanism = _with_value(mechanism, dimension.address, value)
+        alone: Mechanism = replace_value(mechanism, dimension.address, value)
         return alone
     entry = mechanism.pairs[index].entry_name()  # a pin of several links is several pairs of one entry
     changed = (
-        _with_value(pair, tuple(rest), value) if pair.entry_name() == entry else pair for pair in mechanism.pairs
+        replace_value(pair, tuple(rest), value) if pair.entry_name() == entry else pair for pair in mechanism.pairs
     )
     return replace(mechanism, pairs=tuple(changed))
 
@@ -141,31 +126,6 @@ def _with_restitution(mechanism: Mechanism, dimension: Dimension, value: Any) ->
     return replace(mechanism, stops=tuple(changed))
 
 
-@takes_mechanism
-def with_values(mechanism: Mechanism, values: Mapping[str, Any], units: FileUnits | None = None) -> Mechanism:
-    """The mechanism with some numbers of its file changed, checked as a file is.
-
-    `values` by name as in `dimensions`: a number (SI, or in `units`), or a text with a unit as "400 mm". What a book
-    prints of the mechanism is left out where one changes. Raises BadInput with the number's name.
-    """
-    if not isinstance(values, Mapping):
-        raise BadInput("values", f"give the numbers by name, as {{'BC.length': 0.4}}, not {values!r:.60}")
-    known = file_dimensions(mechanism)
-    chosen = {name: find_dimension(known, name) for name in values}
-    changed = mechanism
-    for name, each in chosen.items():
-        changed = change_dimension(changed, each, _read_value(name, values[name], each.kind, units))
-    for index, given in enumerate(changed.inputs):
-        if given.law and any(
-            each.address[:2] == ("inputs", index) and len(each.address) == 3 for each in chosen.values()
-        ):
-            moved = given._replace(law=given.law.start_at(given.position, given.velocity))
-            changed = _with_value(changed, ("inputs", index), moved)
-    _check_as_file(changed, chosen)
-    same = all(_value_at(changed, each.address) == each.value for each in chosen.values())
-    return changed if same else replace(changed, published=())
-
-
 def find_dimension(known: Mapping[str, Dimension], name: str) -> Dimension:
     """The number of this name. Raises BadInput, with both readings where two numbers could be meant."""
     if name in known:
@@ -177,40 +137,6 @@ def find_dimension(known: Mapping[str, Dimension], name: str) -> Dimension:
         )
     near = suggest_spelling(str(name), known, cutoff=0.5) or f"; there are {', '.join(list(known)[:12])}"
     raise BadInput(str(name), f"the mechanism has no number of that name{near}")
-
-
-def _read_value(name: str, value: Any, kind: str, units: FileUnits | None) -> float:
-    if isinstance(value, Real) and not isinstance(value, bool):
-        value = float(value)
-        if not isfinite(value):
-            raise BadInput(name, f"a finite number is wanted, not {value!r}")
-    cursor = Cursor(value, name, FileContext(units or FileUnits()))
-    if kind == "count" and not float(cursor.as_number()).is_integer():
-        raise cursor.error_at(None, f"a whole number is wanted here, not {value!r}")
-    if kind in ("number", "count"):
-        return cursor.as_number()
-    return cursor.as_quantity(kind)
-
-
-def _check_as_file(changed: Mechanism, chosen: Mapping[str, Dimension]) -> None:
-    """Refuse what a file would be refused for; the place is the number whose place in the file that is."""
-    wrong = find_law_problem(changed)
-    try:
-        if wrong:
-            raise BadInput(*wrong)
-        read_mechanism(write_mechanism(changed))
-    except BadInput as problem:
-        at = [name for name, each in chosen.items() if problem.place == _json_place(each.path)]
-        raise BadInput(at[0] if at else ", ".join(chosen), problem.sentence) from None
-
-
-def _json_place(path: Address) -> str:
-    """A place in a file as the reader says it."""
-    cursor = Cursor(None)
-    for key in path:
-        place = f"{cursor.path}[{key}]" if isinstance(key, int) else cursor.place_of(key)
-        cursor = Cursor(None, place)
-    return cursor.path
 
 
 def _every_dimension(mechanism: Mechanism) -> Iterator[Dimension]:
@@ -351,18 +277,19 @@ def _written_numbers(
     return found
 
 
-def _value_at(data: Any, address: Address) -> Any:
+def value_at(data: Any, address: Address) -> Any:
+    """A part of nested data."""
     for step in address:
         data = getattr(data, step) if isinstance(step, str) else data[step]
     return data
 
 
-def _with_value(data: Any, address: Address, value: Any) -> Any:
+def replace_value(data: Any, address: Address, value: Any) -> Any:
     """Nested data with one part replaced."""
     if not address:
         return value
     step, rest = address[0], address[1:]
     if isinstance(step, int):
-        return (*data[:step], _with_value(data[step], rest, value), *data[step + 1 :])
-    part = _with_value(getattr(data, step), rest, value)
+        return (*data[:step], replace_value(data[step], rest, value), *data[step + 1 :])
+    part = replace_value(getattr(data, step), rest, value)
     return data._replace(**{step: part}) if hasattr(data, "_replace") else replace(data, **{step: part})

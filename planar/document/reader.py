@@ -80,12 +80,17 @@ def read_mechanism(value: Any) -> Mechanism:
 
         driven = replace(driven, remarks=(*bare.remarks, *speed_jump_remarks(inputs, relative_motions(bare), units)))
     points = point_aliases(driven)
-    return replace(
+    whole = replace(
         driven,
         **read_loads(full, driven, points),
         sketch=_read_sketch(full, points),
         published=tuple(_read_published(item, driven, points) for item in full.list_items("published")),
     )
+    if not full.has("tolerances"):
+        return whole
+    from planar.document.sections.tolerances import read_tolerances  # few files have any
+
+    return replace(whole, tolerances=read_tolerances(full["tolerances"], whole))
 
 
 def _read_units(top: Cursor) -> FileUnits:

@@ -242,6 +242,16 @@ PUBLISHED_SCHEMA: Schema = {
     "inputs": described(schema_reference("drives"), "inputs that are changed for it, by their pairs"),
     "from": described(schema_reference("drives"), "inputs at the position from which a displacement counts"),
 }
+TOLERANCE_SCHEMA: Schema = {
+    "general": described(
+        {"enum": [f"ISO 2768-1 {grade}" for grade in "fmcv"]},
+        "the general tolerances of lengths and angles of links and pairs that have none of their own",
+    ),
+    "clearance": described(
+        _named_values_schema({"anyOf": [schema_reference("amount"), _TEXT]}),
+        "by pins how far the centres of pin and hole may stand apart, as 0.03 mm, or their fit, as H7/g6",
+    ),
+}
 _LOADS: Schema = {
     "type": "array",
     "items": {
@@ -291,6 +301,12 @@ FILE_SCHEMA: Schema = {
         schema_reference("size"),
         "the misfit up to which the pairs of a linkage that is held more than once may stay open, where its lengths "
         "are rounded: it takes the position of least misfit; left out: it has to close",
+    ),
+    "tolerances": described(
+        _object_schema(TOLERANCE_SCHEMA)
+        | {"additionalProperties": {"anyOf": [schema_reference("quantity"), list_schema("quantity", 2, 2)]}},
+        "how far numbers of the file may be off, by their names as `planar inspect` lists them: 0.05, plus and minus, "
+        'or the lower and upper deviation, as ["-0.02 mm", "0.05 mm"]',
     ),
     "sketch": described(
         {"type": "object", "additionalProperties": _vector_schema("length")},

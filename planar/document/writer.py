@@ -45,6 +45,8 @@ def write_mechanism(mechanism: Mechanism) -> dict[str, Any]:
     ]
     if mechanism.closes_within is not None:
         value["closes_within"] = quantity(mechanism.closes_within, "length")
+    if mechanism.tolerances is not None:
+        value["tolerances"] = mechanism.tolerances.write(quantity)
     value |= _nonempty_fields(
         inputs=[write_input(given, motions, quantity) for given in mechanism.inputs],
         **write_loads(mechanism, quantity),

@@ -124,7 +124,7 @@ MODULES = {
     "curvature": "analysis.centres.curvature",
     "cycle": "solving.cycle",
     "dataset": "reports.files.xarray_dataset",
-    "dimensions": "document.dimensions",
+    "dimensions": "document.revised.changed_numbers",
     "dumps": "document.files",
     "dwells": "analysis.motion.dwells",
     "extremes": "analysis.motion.extremes",

@@ -58,6 +58,7 @@ SHOWN_KEYS = {
     "varies": ("loads",),
     "spring": ("springs",),
     "mass": ("masses", "gravity"),
+    "tolerances": ("tolerances",),
 }
 """What a page shows of the example of a section; of that of a pair the entry with its keyword."""
 KEYS_OF_PARTS = {"pairs/lift": "law", "pairs/nose": "noses"}
@@ -94,6 +95,7 @@ def key_sections() -> tuple[KeySection, ...]:
         KeySection("How a load varies", (kinds["varies"],), "varies"),
         KeySection("A spring", tuple(lists["springs"]["anyOf"]), "spring"),
         KeySection("A mass", (lists["masses"],), "mass"),
+        KeySection("Tolerances", (whole["properties"]["tolerances"],), "tolerances"),
         KeySection("Units", (whole["properties"]["units"],), ""),
         KeySection("A published value", (lists["published"],), ""),
     )
@@ -130,7 +132,7 @@ def _section_lines(section: KeySection) -> Iterator[str]:
         for key, own in kind["properties"].items():
             name = f"**`{key}`**" if key in kind.get("required", ()) else f"`{key}`"
             yield f"| {name} | {_value_words(own)} | {own['description']} |"
-            for inner, part in own.get("properties", {}).items() if key != "units" else ():
+            for inner, part in own.get("properties", {}).items() if key not in ("units", "tolerances") else ():
                 yield f"| `{key}.{inner}` | {_value_words(part)} | {part['description']} |"
 
 

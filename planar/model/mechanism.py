@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from planar.model.input_laws import InputLaw
     from planar.model.motors import Motor
     from planar.model.stops import Stops
+    from planar.model.tolerances.tolerances import Tolerances
 
 __all__ = [
     "PUBLISHED_QUANTITIES",
@@ -137,7 +138,8 @@ class Mechanism(Displayable, Revisable):
 
     `pairs` are binary: a pin of n links is n - 1 of them. `gravity` is an acceleration (m/s^2), `stops` are those of
     pairs. `closes_within` is the misfit (m) up to which the pairs of a redundant linkage may stay open,
-    `pair_stiffness` by pair what resists it (N/m). `remarks` are what the reader of the file has to say.
+    `pair_stiffness` by pair what resists it (N/m), `tolerances` how far numbers may be off. `remarks` are what the
+    reader of the file has to say.
     """
 
     name: str
@@ -161,6 +163,7 @@ class Mechanism(Displayable, Revisable):
     remarks: tuple[str, ...] = ()
     closes_within: float | None = None
     pair_stiffness: tuple[tuple[str, float], ...] = ()
+    tolerances: Tolerances | None = None
 
     def __repr__(self) -> str:
         driven = f", driven at {', '.join(given.pair for given in self.inputs)}" if self.inputs else ""

@@ -10,7 +10,7 @@ import planar
 from planar.batch.design_arrays import values_of_design, with_design_values
 from planar.batch.general_path import solve_design
 from planar.batch.reference_design import reference_design
-from planar.document.dimensions import with_values
+from planar.document.revised.changed_numbers import with_values
 from tests.cams import FOLLOWERS, cam_document
 
 every_follower = pytest.mark.parametrize("follower", FOLLOWERS)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import planar
-from planar.document.dimensions import with_values
+from planar.document.revised.changed_numbers import with_values
 
 
 def geneva(slots, velocity="1 rad/s", **more):

@@ -9,8 +9,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.document.dimensions import Dimension, file_dimensions, with_values
+from planar.document.dimensions import Dimension, file_dimensions
 from planar.document.first_argument import takes_mechanism
+from planar.document.revised.changed_numbers import with_values
 from planar.foundation.errors import BadInput, NoAnswer
 from planar.foundation.units import parse_unit
 from planar.model.file_units import FileUnits, unit_of_kind

@@ -134,6 +134,18 @@ class Pair(ABC):
         """How friction acts in it, in motion or with the coefficients at rest; nothing where it has none."""
         return ()
 
+    def pin_diameter(self) -> Scalar | None:
+        """The diameter (m) of its pin, where it has one and that is known."""
+        return None
+
+    def has_pin(self) -> bool:
+        """Whether it is a pin in a hole, which may have clearance."""
+        return False
+
+    def offset_pin(self, numbers: Sequence[Scalar], offset: Vector) -> Sequence[Scalar]:
+        """Its numbers with its pin aside on the first link by an offset (m, in that link's axes)."""
+        raise NotImplementedError
+
     def friction_circle_radius(self) -> Scalar | None:
         """The radius (m) of the circle to which its force is tangent in motion; None where there is no such circle."""
         return None

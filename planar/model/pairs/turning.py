@@ -100,6 +100,15 @@ class TurningPair(Pair):
         loads = tuple(ContactLoad(self.links[1], arm, way) for way in (Vector(1.0, 0.0), Vector(0.0, 1.0)))
         return (RubbingContact(self.effort_action(frames, shapes), loads, LoadLaw.RESULTANT),)
 
+    def pin_diameter(self) -> Scalar | None:
+        return None if self.radius is None else 2.0 * self.radius
+
+    def has_pin(self) -> bool:
+        return True
+
+    def offset_pin(self, numbers: Sequence[Scalar], offset: Vector) -> Sequence[Scalar]:
+        return (numbers[0] + offset.x, numbers[1] + offset.y, *numbers[2:])
+
     def friction_circle_radius(self) -> Scalar | None:
         if self.friction is None or self.radius is None:
             return None

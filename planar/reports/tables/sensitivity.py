@@ -11,7 +11,7 @@ from rich.text import Text
 
 from planar.analysis.sensitivity.limit_slopes import LimitSlopes, TravelSlopes
 from planar.analysis.sensitivity.sensitivity import INFLUENCE_STEP, Influence, Sensitivity
-from planar.document.dimensions import dimensions
+from planar.document.revised.changed_numbers import dimensions
 from planar.foundation.arrays import Array
 from planar.model.file_units import FileUnits, display_unit
 from planar.model.link_shapes import shape_extent

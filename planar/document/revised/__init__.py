@@ -1,0 +1,1 @@
+"""The numbers of mechanisms by name, and mechanisms with other numbers."""

@@ -1,0 +1,1 @@
+"""Sections of a file that few mechanisms have."""

@@ -1,0 +1,52 @@
+"""Tolerances of a mechanism's numbers and clearances of its pins, as immutable data in SI units."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+GENERAL = "ISO 2768-1 "
+"""How a file begins to name a class of general tolerances."""
+
+
+class Deviations(NamedTuple):
+    """How far one number of the file may be from its value: between `lower` and `upper` (SI, signed)."""
+
+    number: str
+    kind: str
+    lower: float
+    upper: float
+
+
+class Clearance(NamedTuple):
+    """How far the centres of a pin and its hole may stand apart (m), or the fit that says so, as H7/g6."""
+
+    pair: str
+    value: float | None = None
+    fit: str | None = None
+
+
+class Tolerances(NamedTuple):
+    """The tolerances of numbers, the class of general tolerances ("f", "m", "c" or "v" of ISO 2768-1) for the lengths
+    and angles that have none of their own, and the clearances of pins."""
+
+    numbers: tuple[Deviations, ...] = ()
+    general: str | None = None
+    clearances: tuple[Clearance, ...] = ()
+
+    def write(self, quantity: Callable[[float, str], float | str]) -> dict[str, Any]:
+        """What a file has of them."""
+        found: dict[str, Any] = {}
+        for each in self.numbers:
+            if each.lower == -each.upper:
+                found[each.number] = quantity(each.upper, each.kind)
+            else:
+                found[each.number] = [quantity(each.lower, each.kind), quantity(each.upper, each.kind)]
+        if self.general is not None:
+            found["general"] = f"{GENERAL}{self.general}"
+        if self.clearances:
+            found["clearance"] = {
+                each.pair: each.fit if each.value is None else quantity(each.value, "length")
+                for each in self.clearances
+            }
+        return found
