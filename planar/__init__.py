@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from planar.analysis.sensitivity.gradient import gradient
     from planar.analysis.sensitivity.limit_slopes import LimitSlopes, TravelSlopes
     from planar.analysis.sensitivity.sensitivity import Influence, Sensitivity, sensitivity
+    from planar.analysis.tolerance.tolerance import ToleranceBand, tolerance
     from planar.assemblies.circuits.circuits import Circuit, Circuits, circuits
     from planar.assemblies.circuits.traced_circuit import Branch
     from planar.assemblies.conflict import Conflict, conflict
@@ -203,6 +204,7 @@ __all__ = [
     "Swing",
     "TableSegment",
     "TimeRatio",
+    "ToleranceBand",
     "Transmission",
     "TrapezoidalRise",
     "TravelSlopes",
@@ -261,6 +263,7 @@ __all__ = [
     "swing",
     "time_ratio",
     "to_dict",
+    "tolerance",
     "transmission",
     "unknown_load",
     "velocity_by_centres",

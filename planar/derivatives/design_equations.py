@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from functools import cached_property, lru_cache
 from typing import Any
@@ -19,7 +19,7 @@ from planar.equations.mechanism_numbers import scale_lengths
 from planar.equations.rates import time_derivatives
 from planar.equations.residuals import scalars
 from planar.foundation.arrays import Array
-from planar.foundation.geometry import Frame
+from planar.foundation.geometry import Frame, Vector
 from planar.foundation.jets import Scalar, value_and_rates
 from planar.model.mechanism import Input, Mechanism
 from planar.model.pairs import MeasureKind, Pair
@@ -46,16 +46,23 @@ def design_dimensions(mechanism: Mechanism) -> tuple[Dimension, ...]:
 class DesignEquations:
     """The equations of one mechanism over t = (u, u', u'', d): inputs with two rates, and dimensions (SI).
 
-    Levels 0, 1, 2 determine the unknowns z and their two rates.
+    Levels 0, 1, 2 determine the unknowns z and their two rates. `offsets` name pairs whose pins may stand aside in
+    their holes: by `clearance.B.x` and `clearance.B.y` (m, in the axes of the pair's first link), which follow in d.
     """
 
-    def __init__(self, mechanism: Mechanism):
+    def __init__(self, mechanism: Mechanism, offsets: tuple[str, ...] = ()):
         self.solver: PositionSolver = solved_mechanism(mechanism).solver
         self.solver.refuse_misfit("derivatives are not told")
         self.mechanism, self.equations = mechanism, self.solver.equations
-        self.dimensions = design_dimensions(mechanism)
+        own = design_dimensions(mechanism)
+        self.dimensions = (*own, *(each for pair in offsets for each in _offset_dimensions(pair)))
         self.d = ca.SX.sym("d", len(self.dimensions))
-        self.work = LagrangianFunctions(self._symbolic_mechanism(), self.solver.unit)
+        self.work = LagrangianFunctions(self._symbolic_mechanism(own), self.solver.unit)
+        for k, pair in enumerate(each for name in offsets for each in mechanism.pairs if each.name == name):
+            at = len(own) + 2 * k
+            self.work.numbers[pair.name] = pair.offset_pin(
+                self.work.numbers[pair.name], Vector(self.d[at], self.d[at + 1])
+            )
         names = [given.pair for given in mechanism.inputs]
         self.u, self.u1, self.u2 = (ca.SX.sym(name, len(names)) for name in ("u", "u1", "u2"))
         self.t = ca.vertcat(self.u, self.u1, self.u2, self.d)
@@ -68,14 +75,14 @@ class DesignEquations:
         self.z1, self.z2 = (ca.SX.sym(name, self.z.numel()) for name in ("z1", "z2"))
         self.F, self.w = self._equations_of_design()
 
-    def _symbolic_mechanism(self) -> Mechanism:
+    def _symbolic_mechanism(self, dimensions: tuple[Dimension, ...]) -> Mechanism:
         changed = replace(
             self.mechanism,
             inputs=tuple(Input(given.pair, 0.0) for given in self.mechanism.inputs),
             loads=tuple(load._replace(varies=None) for load in self.mechanism.loads),
             stops=(),
         )
-        for k, each in enumerate(self.dimensions):
+        for k, each in enumerate(dimensions):
             changed = change_dimension(changed, each, self.d[k])
         return changed
 
@@ -151,6 +158,12 @@ class DesignEquations:
         return list(z), t
 
 
+def _offset_dimensions(pair: str) -> Iterator[Dimension]:
+    for axis in "xy":
+        place = ("tolerances", "clearance", pair, axis)
+        yield Dimension(f"clearance.{pair}.{axis}", 0.0, "length", "", place, place)
+
+
 def _parts_of(moving: KinematicResult, owner: str, part: str, pairs: Mapping[str, Pair]) -> tuple[Any, ...]:
     """A coordinate with its two rates."""
     if part in FRAME_PARTS and owner in moving.frames:
@@ -160,6 +173,6 @@ def _parts_of(moving: KinematicResult, owner: str, part: str, pairs: Mapping[str
 
 
 @lru_cache(maxsize=32)
-def design_equations(mechanism: Mechanism) -> DesignEquations:
+def design_equations(mechanism: Mechanism, offsets: tuple[str, ...] = ()) -> DesignEquations:
     """The equations of a mechanism, kept for the next time."""
-    return DesignEquations(mechanism)
+    return DesignEquations(mechanism, offsets)

@@ -20,6 +20,7 @@ from planar.derivatives.result_expressions import (
 from planar.document.dimensions import Dimension
 from planar.document.revised.changed_numbers import with_values
 from planar.dynamics.forces import Forces
+from planar.equations.casadi_call import BufferedFunction
 from planar.equations.residuals import pair_residuals
 from planar.foundation.arrays import Array, BoolArray
 from planar.foundation.errors import BadInput
@@ -47,10 +48,10 @@ class NamedSlopes(NamedTuple):
 class SlopeSystem:
     """The system of equations that a result follows from, with its values at the result's positions."""
 
-    def __init__(self, result: State | Motion | Forces):
+    def __init__(self, result: State | Motion | Forces, offsets: tuple[str, ...] = ()):
         self.moving = result.moving if isinstance(result, Forces) else result
         self.forces = result if isinstance(result, Forces) else None
-        self.design: DesignEquations = design_equations(self.moving.mechanism)
+        self.design: DesignEquations = design_equations(self.moving.mechanism, offsets)
         self.constants: Array | None = None
         if self.forces is None:
             self.balance = None
@@ -70,6 +71,18 @@ class SlopeSystem:
             found += force_expressions(self.balance, name)
         if not found:
             raise refuse_name(self.design, self.moving, name)
+        return found
+
+    def result_values(self, name: str) -> dict[str, Array]:
+        """What the result tells of a name (n, parts), by the names of its results; angles go on over a turn."""
+        found = {}
+        given = self.system.given
+        for each in self.expressions(name):
+            value = BufferedFunction(ca.Function("value", given, [ca.densify(each.value)]))
+            held = np.zeros((len(self.parameters), 0)) if self.constants is None else self.constants
+            told = value.evaluate_batch(len(self.parameters), *self.values, self.parameters, held)[0]
+            told = told.reshape(len(self.parameters), -1)
+            found[each.name] = np.unwrap(told, axis=0) if each.kind == "angle" else told
         return found
 
     def slopes(self, results: ca.SX) -> ResultSlopes:

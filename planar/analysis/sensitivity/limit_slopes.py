@@ -61,10 +61,11 @@ class TravelSlopes(NamedTuple):
         return short_repr(self)
 
 
-def dead_point_slopes(motion: Motion) -> tuple[LimitSlopes, ...]:
-    """The dead points of the running input between the ends of a motion, or at these."""
+def dead_point_slopes(motion: Motion, offsets: tuple[str, ...] = ()) -> tuple[LimitSlopes, ...]:
+    """The dead points of the running input between the ends of a motion, or at these; `offsets` as of
+    `DesignEquations`."""
     running = motion.running_input
-    design = design_equations(motion.mechanism)
+    design = design_equations(motion.mechanism, offsets)
     system = LimitSystem(design, running)
     found = []
     for limit in motion.limits:
@@ -77,14 +78,14 @@ def dead_point_slopes(motion: Motion) -> tuple[LimitSlopes, ...]:
     return tuple(found)
 
 
-def travel_slopes(motion: Motion, of: str) -> TravelSlopes | None:
+def travel_slopes(motion: Motion, of: str, offsets: tuple[str, ...] = ()) -> TravelSlopes | None:
     """The stroke of a slide, or the swing of a rocker; None of what does not turn back at both ends."""
     try:
         run = InterpolatedRun(motion)
         output = Output(run, of)
         if output.turning_extremes() is None:
             return None
-        return _TravelDerivatives(run, output).travel()
+        return _TravelDerivatives(run, output, offsets).travel()
     except (BadInput, NoAnswer):  # a run in time, or an end at which there is no derivative
         return None
 
@@ -92,9 +93,9 @@ def travel_slopes(motion: Motion, of: str) -> TravelSlopes | None:
 class _TravelDerivatives:
     """The ends between which an output goes, each solved for with its derivatives."""
 
-    def __init__(self, run: InterpolatedRun, output: Output):
+    def __init__(self, run: InterpolatedRun, output: Output, offsets: tuple[str, ...] = ()):
         self.run, self.output = run, output
-        self.system = LimitSystem(design_equations(run.mechanism), run.pair)
+        self.system = LimitSystem(design_equations(run.mechanism, offsets), run.pair)
 
     def travel(self) -> TravelSlopes:
         """The travel with the slopes of its ends, and of the time ratio. Raises NoAnswer."""
