@@ -24,6 +24,7 @@ main.modules = {
     "sensitivity": "planar.cli.sensitivity",
     "simulate": "planar.cli.forces_simulate",
     "solve": "planar.cli.solve_cycle_explain",
+    "tolerance": "planar.cli.design.tolerance",
     "view": "planar.cli.view_gallery",
 }
 

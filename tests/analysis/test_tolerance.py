@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import json
 from math import cos, pi, sin, sqrt
 
 import numpy as np
 import pytest
 
 import planar
+from planar.analysis.tolerance.allowance import allowance
 from planar.analysis.tolerance.spread import LinearSpread, NormalSpread
 from planar.foundation.errors import BadInput, Unknown
 from planar.guide.keys_page import read_example
 from tests.builders import slider_crank
+from tests.command import run
 
 EXAMPLE = planar.from_dict(read_example("tolerances"))
 
@@ -146,6 +149,43 @@ def test_a_mechanism_of_no_dyads_with_slides_is_as_its_samples():
     point = [name for name in state.points if np.any(state.point(name).velocity)][-1]
     band = planar.tolerance(state, point, {"general": "ISO 2768-1 f"}, samples=4000)
     assert band.second_order.std == pytest.approx(band.sampled.std[0], rel=0.08) or band.linear_error < 0.08
+
+
+@pytest.mark.parametrize("statistical", [False, True])
+def test_allowed_tolerances_reach_the_limit_and_lagranges_are_the_cheapest(statistical):
+    state, pair, crank, rod = crank_of()
+    given = {crank: 1e-4, rod: 2e-4}
+    band = planar.tolerance(state, pair, given)
+    found = allowance(band, 5e-4, statistical)
+
+    def reach(told):
+        spread = planar.tolerance(state, pair, told)
+        return 3.0 * spread.std if statistical else spread.worst
+
+    def cost(told):
+        return sum(given[name] / told[name] for name in given)
+
+    for told in (found.equal, found.least_cost, {name: found.factor * each for name, each in given.items()}):
+        assert reach(told) == pytest.approx(5e-4, rel=1e-9)
+    shares = planar.tolerance(state, pair, found.equal).contribution
+    assert shares[crank] == pytest.approx(0.5)
+    for part in (0.9, 1.1):
+        other = found.least_cost | {crank: part * found.least_cost[crank]}
+        scale = 5e-4 / reach(other)
+        assert cost({name: scale * each for name, each in other.items()}) > cost(found.least_cost)
+
+
+def test_the_command_tells_the_band_what_to_tighten_first_and_what_suffices(tmp_path):
+    path = tmp_path / "example.json"
+    path.write_text(json.dumps(read_example("tolerances")))
+    course = ("--cycle", "--steps", "12", "--samples", "50", "--limit", "0.5mm")
+    told = run(tmp_path, "tolerance", path.name, "--of", "E", *course).out
+    assert told.index("BC.E.angle") < told.index("BC.E.distance")
+    assert "of all mechanisms keep the limit at the worst position" in " ".join(told.split())
+    found = json.loads(run(tmp_path, "tolerance", path.name, "--of", "E", "--allow", "E=0.4mm", "--json").out)
+    assert found["worst"] == pytest.approx(planar.tolerance(planar.solve(EXAMPLE), "E").worst)
+    assert found["allowed"]["limit"] == pytest.approx(4e-4)
+    assert "write E=VALUE" in run(tmp_path, "tolerance", path.name, "--of", "E", "--allow", "C=1mm").err
 
 
 def test_what_is_asked_amiss_is_refused_in_a_sentence():

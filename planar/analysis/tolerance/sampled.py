@@ -28,6 +28,7 @@ class Sampled(NamedTuple):
     """Deviations of so many mechanisms from the nominal: mean and standard deviation, the least and the greatest, the
     greatest distance `worst` and, of a motion, at each position; `unsolved` of the `mechanisms` are left out.
 
+    `deviations` are all (mechanisms, n, parts).
     `within` is the share (n,) within the limit and `within_all` at all positions, None without one.
     """
 
@@ -38,6 +39,7 @@ class Sampled(NamedTuple):
     lower: Array
     upper: Array
     worst: Array
+    deviations: Array
     within: Array | None = None
     within_all: float | None = None
 
@@ -125,6 +127,7 @@ def summarise(deviations: Array, limit: tuple[float, float] | None) -> Sampled:
         np.where(alive, known, np.inf).min(axis=0),
         np.where(alive, known, -np.inf).max(axis=0),
         np.where(np.isfinite(sizes), sizes, 0.0).max(axis=0),
+        deviations,
         None if within is None else within.mean(axis=0),
         None if within is None else float((within | ~np.isfinite(sizes)).all(axis=1).mean()),
     )

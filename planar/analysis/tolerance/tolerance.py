@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -182,6 +182,12 @@ class ToleranceBand:
         size = np.nanmax(other, initial=0.0)
         return float(np.nanmax(np.abs(self.statistical.std - other), initial=0.0) / size) if size else 0.0
 
+    def with_limit(self, limit: float | tuple[float, float]) -> ToleranceBand:
+        """The same against another limit; samples are judged anew."""
+        between = _read_limit(limit)
+        sampled = self.sampled and summarise(self.sampled.deviations, between)
+        return replace(self, limit=between, sampled=sampled)
+
     @property
     def remarks(self) -> tuple[str, ...]:
         """What there is to say of it."""
@@ -197,7 +203,7 @@ class ToleranceBand:
 
 
 @takes_result("State", "Motion", "Forces")
-def tolerance(  # many: what is asked, of which tolerances, against which limit, and how it is sampled
+def tolerance(  # many: what is asked, of which tolerances, and how it is sampled; # long: its docstring
     source: State | Motion | Forces,
     of: str,
     tolerances: Tolerances | Mapping[str, Any] | None = None,
@@ -252,7 +258,8 @@ def tolerance(  # many: what is asked, of which tolerances, against which limit,
         draw = Draw(samples, seed, SIGMAS[distribution], distribution == "normal")
         by_pins = (linear.offset_slopes, linear.radii)
         deviations = sample_deviations(source, of, name, variations, draw, by_pins, linear.slopes)
-        sampled = summarise(deviations + (linear.shift if np.any(linear.shift) else 0.0), between)
+        deviations = deviations + (linear.shift if np.any(linear.shift) else 0.0)
+        sampled = summarise(deviations, between)
     return ToleranceBand(
         of,
         name,

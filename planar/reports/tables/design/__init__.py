@@ -1,0 +1,1 @@
+"""Tables for who designs a mechanism."""
