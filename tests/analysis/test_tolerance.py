@@ -124,6 +124,13 @@ def test_the_share_within_a_circle_is_that_of_its_closed_form():
     assert found[0] == pytest.approx(1.0 - np.exp(-9.0 / 8.0), abs=1e-6)
 
 
+def test_hoeckens_line_is_as_crooked_by_its_tolerances_as_by_its_curve():
+    motion = planar.cycle("hoeken-straight-line", 36, start=pi / 2, stop=1.5 * pi)
+    band = planar.tolerance(motion, "P")
+    assert 1e3 * band.upper[:, 1].max() == pytest.approx(0.97, abs=0.005)
+    assert 1e3 * np.abs(band.nominal[:, 1] - 0.4).max() == pytest.approx(0.97, abs=0.005)
+
+
 def test_strokes_time_ratios_and_dead_points_have_bands():
     r, l, e = 0.5, 1.7, 0.3  # noqa: E741
     motion = planar.cycle(slider_crank(r, l, e, velocity=3.0), 36)

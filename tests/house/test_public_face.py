@@ -52,6 +52,7 @@ def results():
     swept = planar.sweep_each([bars], steps=6)
     prepared = planar.prepared(bars, steps=6)
     yield from (slider, state, motion, planar.solve(planar.load("open-arm")), listed, listed[0], circuits, circuits[0])
+    yield planar.tolerance(state, "stroke", {"rod.length": 1e-4})
     yield from (state.point("B"), state.link("rod"), state.relative("B", "A"), motion.point("B"), motion.link("rod"))
     yield from (motion.limits[0], circuits[0].branches[0], planar.inspect(slider), planar.mobility(slider))
     yield from (centres := planar.centres(state), next(iter(centres)) if hasattr(centres, "__iter__") else centres)
@@ -201,6 +202,8 @@ def test_every_command_of_a_model_takes_set_and_what_is_piped_in(name, tmp_path,
         "cycle": ["--steps", "4"],
         "problem": ["--vary", "2"],
         "mark": ["answers.csv"],
+        "sensitivity": ["--of", "B"],
+        "tolerance": ["--of", "B", "--general", "m"],
     }
     (tmp_path / "answers.csv").write_text("seed 1\nstudent,variant,quantity,value\nAnn,1,velocity of B,1\n")
     model = {

@@ -56,7 +56,7 @@ def allowance(band: ToleranceBand, limit: float, statistical: bool = False) -> A
         shape = np.where(counts, shares, 0.0)
         told = shape * _scale(linear, shape, limit, statistical)
         found.append({name: float(t) for name, t, counted in zip(names, told, counts, strict=True) if counted})
-    return Allowance(limit, statistical, *found, _scale(linear, half, limit, statistical))
+    return Allowance(limit, statistical, found[0], found[1], _scale(linear, half, limit, statistical))
 
 
 def _reach(linear: LinearSpread, half: Array, statistical: bool) -> float:

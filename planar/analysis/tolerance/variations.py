@@ -74,12 +74,12 @@ def _general_deviations(
     mechanism: Mechanism, grade: str, dimensions: Mapping[str, Dimension]
 ) -> tuple[list[Deviations], int]:
     """Of lengths and angles of links and pairs; of an angle the shorter side is its point's distance, else the extent
-    of its link, else of the greatest link. And how many lengths have none, but those of 0."""
+    of its link, else of the greatest link. What is 0 has none. And how many other lengths have none."""
     extents = {link.name: shape_extent(link_shape(link)) for link in mechanism.links}
     found, without = [], 0
     for each in dimensions.values():
         moves = each.path[0] in ("links", "pairs") and each.path[-1] not in PIN_SIZES
-        if not moves or each.kind not in ("length", "angle"):
+        if not moves or each.kind not in ("length", "angle") or not each.value:
             continue
         if each.kind == "length":
             most = length_deviation(grade, each.value)
@@ -89,7 +89,7 @@ def _general_deviations(
             most = angle_deviation(grade, side)
         if most is not None:
             found.append(Deviations(each.name, each.kind, -most, most))
-        elif each.value:
+        else:
             without += 1
     return found, without
 

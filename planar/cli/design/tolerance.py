@@ -38,6 +38,7 @@ LIMIT_RESULTS = {"stroke": "travel", "swing": "travel", "travel": "travel", "tim
 @click.option("--of", "of", required=True, metavar="NAME", help="A point, a link, a pair or an input.")
 @click.option("--result", metavar="NAME", help="Which of its results, or travel, 'time ratio', dead_points.")
 @click.option("--cycle", "whole", is_flag=True, help="Over the whole motion, as `planar cycle` has it.")
+@click.option("--general", type=click.Choice(list("fmcv")), help="ISO 2768-1 of this class, in place of the file's.")
 @click.option("--limit", metavar="VALUE", help="A deviation, as 0.1mm: how many mechanisms keep it.")
 @click.option("--allow", metavar="NAME=VALUE", help="The loosest tolerances that suffice, as E=0.05mm.")
 @click.option("--statistical", is_flag=True, help="With --allow: by three standard deviations, not the worst case.")
@@ -53,6 +54,7 @@ def tolerance(  # many: options of the command
     of: str,
     result: str | None,
     whole: bool,
+    general: str | None,
     limit: str | None,
     allow: str | None,
     statistical: bool,
@@ -76,10 +78,11 @@ def tolerance(  # many: options of the command
     from planar.solving.position import solve
 
     mechanism = load_model(model, mode)
+    others = None if general is None else {"general": f"ISO 2768-1 {general}"}
     refuse_overwriting(model, output)
     with show_status(f"{mechanism.name}: tolerances"):
         moving = run_motion(mechanism, **course) if whole else solve(mechanism, parse_drives(mechanism, at))
-        band = band_of(moving, of, result=named, samples=samples or 0, seed=seed)
+        band = band_of(moving, of, others, result=named, samples=samples or 0, seed=seed)
         if limit is not None:
             band = band.with_limit(_read_deviation(limit, "--limit", band.kind, mechanism.units))
         allowed = None

@@ -67,7 +67,7 @@ def _band_table(band: ToleranceBand) -> FittedTable:
 def _contribution_table(band: ToleranceBand) -> FittedTable:
     units, row = band.moving.mechanism.units, band.row
     shown = plain_table(
-        "What contributes, the first to be tightened first",
+        "Contributions",
         "number",
         "tolerance",
         column_heading("deviation", band.kind, units),
@@ -112,7 +112,7 @@ def _allowance_table(band: ToleranceBand, allowed: Allowance) -> FittedTable:
     kinds = {each.number: each.kind for each in band.variations.numbers}
     by = "three standard deviations" if allowed.statistical else "the worst case"
     title = f"Tolerances that keep {band.of} within {amount(allowed.limit, band.kind, units)} by {by}"
-    shown = plain_table(title, "number", "contributing alike", "of least cost")
+    shown = plain_table(title, "number", "equal contribution", "least cost")
     for name, value in allowed.equal.items():
         texts = (f"± {amount(each, kinds[name], units)}" for each in (value, allowed.least_cost[name]))
         shown.add_row(name, *texts)
