@@ -85,7 +85,7 @@ def test_what_cannot_be_is_refused_at_its_place(told, place, sentence):
     ],
 )
 def test_limits_of_fits_are_those_printed(letter, grade, diameter, printed):
-    """Limit deviations in um as tables of ISO 286-2:2010 print them."""
+    """Limit deviations in um, as the tables of limits that follow from ISO 286-1 have them."""
     told = (hole_deviations if letter.isupper() else shaft_deviations)(letter, grade, diameter / 1e3)
     assert tuple(1e6 * each for each in told) == pytest.approx(printed)
 
