@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     from planar.analysis.efforts.motor_duty import MotorDuty, motor_duty
     from planar.analysis.efforts.self_locking import LockedInterval, jamming, self_locking
     from planar.analysis.efforts.unknown_load import UnknownLoad, unknown_load
+    from planar.analysis.force_maps.force_map import ForceMap, force_map
+    from planar.analysis.force_maps.worst_cases import WorstCase
     from planar.analysis.identity.inspection import Inspection, inspect
     from planar.analysis.identity.mobility import Mobility, mobility
     from planar.analysis.motion.answers import Answers, answers
@@ -134,6 +136,7 @@ __all__ = [
     "Extremes",
     "FileUnits",
     "Flywheel",
+    "ForceMap",
     "Forces",
     "Friction",
     "FrictionEvent",
@@ -203,6 +206,7 @@ __all__ = [
     "Unknown",
     "UnknownLoad",
     "Variant",
+    "WorstCase",
     "advantage",
     "advantage_over",
     "answers",
@@ -223,6 +227,7 @@ __all__ = [
     "dwells",
     "extremes",
     "flywheel",
+    "force_map",
     "forces",
     "from_dict",
     "greatest",

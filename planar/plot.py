@@ -15,6 +15,7 @@ from planar.foundation.safe_files import save_file as write
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from planar.analysis.force_maps.force_map import ForceMap
     from planar.assemblies.circuits.circuits import Circuits
     from planar.assemblies.modes import Modes
     from planar.drawing.polygons.panels import ScaleTexts
@@ -210,6 +211,17 @@ def torque(found: Forces | Motion | Mechanism, of: str | None = None, fluctuatio
     from planar.dynamics.flywheel import DEFAULT_FLUCTUATION
 
     return draw_pictures([torque_picture(found, of, DEFAULT_FLUCTUATION if fluctuation is None else fluctuation)])
+
+
+@takes_result("ForceMap")
+def force_map(found: ForceMap, of: str | None = None) -> Figure:
+    """What an input (left out: the first of the map) supplies over the first two inputs of a map of forces.
+
+    A curve over one input, lines of equal effort over two. Raises BadInput for an input that there is not.
+    """
+    from planar.drawing.forces.force_map import force_map_picture
+
+    return draw_pictures([force_map_picture(found, of)])
 
 
 @takes_result("Forces", "Motion", "Mechanism")
