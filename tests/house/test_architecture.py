@@ -53,6 +53,7 @@ LIBRARIES = {
     "scipy": {"dynamics", "model"},
     "pint": {"foundation"},
     "rich": {"cli", "reports"},
+    "contourpy": {"drawing"},
     "matplotlib": {"drawing", "plot"},
     "fontTools": {"drawing"},
     "PIL": {"drawing"},

@@ -88,6 +88,8 @@ def results():
     yield from (marks, student := marks.students[0], student.values[0], planar.problem_variants(bars, 1)[0])
     clamp = planar.cycle(planar.load("toggle-clamp"), steps=40)
     yield from (planar.holding(clamp), planar.self_locking(clamp), planar.forces(clamp).friction["A"])
+    grid = planar.force_map("excavator-arm", {"boom cylinder": (2.4, 2.9, 3)}, inertia=False)
+    yield from (grid, grid.worst[0])
     yield from (planar.BadInput("here", "wrong"), planar.Unknown("no such point"), planar.Outcome.SOLVED)
     yield planar.NoAnswer(planar.Outcome.DEAD_POINT, "it stops", links=["a"])
 
