@@ -36,7 +36,7 @@ POSITION_DRAWINGS = ("scheme", "velocity", "acceleration", "centres", "forces")
 ASSEMBLY_DRAWINGS = ("modes",)
 CIRCUIT_DRAWINGS = ("circuits",)
 PROFILE_DRAWINGS = tuple(keyword for keyword, kind in pair_types().items() if kind.has_profile)
-MOTION_DRAWINGS = ("positions", "loci", "centrodes", "diagrams", "torque", "bearings")
+MOTION_DRAWINGS = ("positions", "loci", "centrodes", "diagrams", "torque", "bearings", "sensitivity")
 SCALED_DRAWINGS = (*POSITION_DRAWINGS, "positions", "loci", "centrodes", *PROFILE_DRAWINGS, *ASSEMBLY_DRAWINGS)
 DRAWN_STEPS = 360
 """Steps of a run that is drawn."""
@@ -55,8 +55,12 @@ DRAWN_STEPS = 360
     "--point", "points", multiple=True, metavar="NAME", help="A point to be lettered, or whose path is drawn."
 )
 @click.option(
-    "--of", "of", metavar="NAME", help="Diagrams, or circuits, of this slide, point or link; torque of this input."
+    "--of",
+    "of",
+    metavar="NAME",
+    help="Diagrams, circuits or sensitivity of this slide, point or link; torque of this input.",
 )
+@click.option("--result", metavar="NAME", help="With sensitivity: which of its results, as velocity.")
 @click.option(
     "--link",
     "links",
@@ -83,6 +87,7 @@ def plot(  # many: options of a command; # long: each has its line
     at: tuple[str, ...],
     points: tuple[str, ...],
     of: str | None,
+    result: str | None,
     links: tuple[str, ...],
     pairs: tuple[str, ...],
     fluctuation: float | None,
@@ -100,7 +105,8 @@ def plot(  # many: options of a command; # long: each has its line
     steps_told = click.get_current_context().get_parameter_source("steps") is ParameterSource.COMMANDLINE
     for option, told, kinds in (
         ("--point", points, ("positions", "loci")),
-        ("--of", of, ("diagrams", "torque", *CIRCUIT_DRAWINGS)),
+        ("--of", of, ("diagrams", "torque", "sensitivity", *CIRCUIT_DRAWINGS)),
+        ("--result", result, ("sensitivity",)),
         ("--pair", pairs, ("bearings", *PROFILE_DRAWINGS)),
         ("--fluctuation", fluctuation is not None, ("torque",)),
         ("--link", links, ("centres", "centrodes")),
@@ -152,6 +158,7 @@ def plot(  # many: options of a command; # long: each has its line
                 "diagrams": lambda: drawn.diagrams(moving, of, steps if chords else None),
                 "torque": lambda: drawn.torque(moving, of, fluctuation),
                 "bearings": lambda: drawn.bearings(moving, pairs or None),
+                "sensitivity": lambda: drawn.sensitivity(moving, of, result),
             }
             figure = drawings[what]()
         drawn.save(figure, output)

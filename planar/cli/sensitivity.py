@@ -63,7 +63,7 @@ def sensitivity(  # many: options of the command
     if static and not with_forces:
         raise BadInput("--static", "this is for forces, with --forces")
     from planar.analysis.sensitivity.sensitivity import sensitivity as derivatives
-    from planar.reports.tables.sensitivity import record, table
+    from planar.reports.tables.design.sensitivity import record, table
     from planar.solving.position import solve
 
     mechanism = load_model(model, mode)

@@ -88,6 +88,8 @@ def results():
     yield from (marks, student := marks.students[0], student.values[0], planar.problem_variants(bars, 1)[0])
     clamp = planar.cycle(planar.load("toggle-clamp"), steps=40)
     yield from (planar.holding(clamp), planar.self_locking(clamp), planar.forces(clamp).friction["A"])
+    slopes = planar.sensitivity(motion, "stroke")
+    yield from (slopes, slopes.travel, slopes.travel.ends[0], slopes.influences("displacement")[0])
     yield from (planar.BadInput("here", "wrong"), planar.Unknown("no such point"), planar.Outcome.SOLVED)
     yield planar.NoAnswer(planar.Outcome.DEAD_POINT, "it stops", links=["a"])
 
@@ -201,6 +203,7 @@ def test_every_command_of_a_model_takes_set_and_what_is_piped_in(name, tmp_path,
         "cycle": ["--steps", "4"],
         "problem": ["--vary", "2"],
         "mark": ["answers.csv"],
+        "sensitivity": ["--of", "B"],
     }
     (tmp_path / "answers.csv").write_text("seed 1\nstudent,variant,quantity,value\nAnn,1,velocity of B,1\n")
     model = {

