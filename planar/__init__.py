@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from planar.analysis.sensitivity.gradient import gradient
     from planar.analysis.sensitivity.limit_slopes import LimitSlopes, TravelSlopes
     from planar.analysis.sensitivity.sensitivity import Influence, Sensitivity, sensitivity
+    from planar.analysis.sensitivity.transmission_slopes import TransmissionSlopes
     from planar.assemblies.circuits.circuits import Circuit, Circuits, circuits
     from planar.assemblies.circuits.traced_circuit import Branch
     from planar.assemblies.conflict import Conflict, conflict
@@ -204,6 +205,7 @@ __all__ = [
     "TableSegment",
     "TimeRatio",
     "Transmission",
+    "TransmissionSlopes",
     "TrapezoidalRise",
     "TravelSlopes",
     "TurningPair",

@@ -104,6 +104,7 @@ MODULES = {
     "TimeRatio": "analysis.motion.time_ratio",
     "Transmission": "analysis.motion.transmission_angle",
     "TrapezoidalRise": "model.input_laws.cam_rises",
+    "TransmissionSlopes": "analysis.sensitivity.transmission_slopes",
     "TravelSlopes": "analysis.sensitivity.limit_slopes",
     "TurningPair": "model.pairs.turning",
     "Unknown": "foundation.errors",

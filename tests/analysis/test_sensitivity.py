@@ -183,6 +183,26 @@ def test_dead_points_move_as_the_law_of_cosines_says():
         assert dead.input_slopes["AB.length"] == pytest.approx(by_crank, rel=1e-9)
 
 
+@given(st.floats(0.1, 6.2))
+def test_the_transmission_angle_of_a_four_bar_changes_as_the_law_of_cosines_says(angle):
+    a, b, c, d = 0.3, 0.8, 0.7, 1.0
+    state = planar.solve(four_bar(a, b, c, d, angle))
+    values = planar.dimensions(state.mechanism)
+    name = {round(values[each], 9): each for each in values if each.endswith(".length")}
+    out = next(
+        p.name
+        for p in state.mechanism.pairs
+        if planar.solve(state.mechanism).mechanism.frame in p.links and p.name not in state.inputs
+    )
+    found = planar.sensitivity(state, out).transmission
+    cosine = (b**2 + c**2 - a**2 - d**2 + 2.0 * a * d * cos(angle)) / (2.0 * b * c)
+    sense = 1.0 if cosine > 0.0 else -1.0
+    assert found.angle == pytest.approx(acos(abs(cosine)), abs=1e-10)
+    assume(abs(cosine) > 1e-3)
+    by_crank = -sense * (2.0 * d * cos(angle) - 2.0 * a) / (2.0 * b * c) / sqrt(1.0 - cosine**2)
+    assert found.slopes[name[a]] == pytest.approx(by_crank, abs=1e-9)
+
+
 # other routes
 
 

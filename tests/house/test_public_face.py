@@ -89,7 +89,7 @@ def results():
     clamp = planar.cycle(planar.load("toggle-clamp"), steps=40)
     yield from (planar.holding(clamp), planar.self_locking(clamp), planar.forces(clamp).friction["A"])
     slopes = planar.sensitivity(motion, "stroke")
-    yield from (slopes, slopes.travel, slopes.travel.ends[0], slopes.influences("displacement")[0])
+    yield from (slopes, slopes.travel, slopes.travel.ends[0], slopes.influences("displacement")[0], slopes.transmission)
     yield from (planar.BadInput("here", "wrong"), planar.Unknown("no such point"), planar.Outcome.SOLVED)
     yield planar.NoAnswer(planar.Outcome.DEAD_POINT, "it stops", links=["a"])
 

@@ -15,6 +15,7 @@ from planar.analysis.sensitivity.limit_slopes import (
     dead_point_slopes,
     travel_slopes,
 )
+from planar.analysis.sensitivity.transmission_slopes import TransmissionSlopes, transmission_slopes
 from planar.derivatives.result_slopes import SlopeSystem
 from planar.document.dimensions import file_dimensions
 from planar.document.first_argument import takes_result
@@ -109,6 +110,12 @@ class Sensitivity:
         moving = self.moving
         has_travel = self.of in moving.frames or self.of in moving._relative_motions
         return travel_slopes(moving, self.of) if isinstance(moving, Motion) and has_travel else None
+
+    @cached_property
+    def transmission(self) -> TransmissionSlopes | None:
+        """How the transmission angle of the link or pair changes, and the least of a motion; None of what has none."""
+        has_angle = self.of in self.moving.frames or self.of in self.moving._relative_motions
+        return transmission_slopes(self.moving, self.of) if has_angle else None
 
     def second(self, result: str) -> Mapping[str, Mapping[str, Array]]:
         """The second derivatives of a result: `second("position")["BC.length"]["AB.length"]`, SI, shaped as the first.
