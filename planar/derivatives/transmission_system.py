@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -49,9 +50,9 @@ class TransmissionSystem:
         forces = [self.balance.force_on(name, self.link) for name in self.through]
         force = Vector(sum(each.x for each in forces), sum(each.y for each in forces))
         way = self._way()
-        cross, dot = ca.fabs(way.cross(force)), ca.fabs(way.dot(force))
-        found: ca.SX = ca.atan2(dot, cross) if self.pair.input_kind is MeasureKind.LENGTH else ca.atan2(cross, dot)
-        return found
+        cross, dot = ca.SX(ca.fabs(way.cross(force))), ca.SX(ca.fabs(way.dot(force)))
+        found: Any = ca.atan2(dot, cross) if self.pair.input_kind is MeasureKind.LENGTH else ca.atan2(cross, dot)
+        return ca.SX(found)
 
     def _way(self) -> Vector:
         """Along the slide, or from the fixed pin to where the force acts."""

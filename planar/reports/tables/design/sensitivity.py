@@ -105,10 +105,8 @@ def _travel_table(travel: TravelSlopes, found: Sensitivity) -> FittedTable:
 def _transmission_table(transmission: TransmissionSlopes, found: Sensitivity) -> FittedTable:
     units, least = found.moving.mechanism.units, transmission.least
     if least is not None:
-        title, slopes = (
-            f"Least transmission angle: {amount(least.value, 'angle', units)}",
-            transmission.least_slopes or {},
-        )
+        title = f"Least transmission angle: {amount(least.value, 'angle', units)}"
+        slopes = dict(transmission.least_slopes or {})
     else:
         title = f"Transmission angle: {amount(float(transmission.angle), 'angle', units)}"
         slopes = {name: float(slope) for name, slope in transmission.slopes.items()}
