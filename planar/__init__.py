@@ -36,6 +36,10 @@ if TYPE_CHECKING:
     from planar.analysis.motion.output import Extreme
     from planar.analysis.motion.time_ratio import TimeRatio, time_ratio
     from planar.analysis.motion.transmission_angle import Transmission, transmission
+    from planar.analysis.sensitivity.gradient import gradient
+    from planar.analysis.sensitivity.limit_slopes import LimitSlopes, TravelSlopes
+    from planar.analysis.sensitivity.sensitivity import Influence, Sensitivity, sensitivity
+    from planar.analysis.sensitivity.transmission_slopes import TransmissionSlopes
     from planar.assemblies.circuits.circuits import Circuit, Circuits, circuits
     from planar.assemblies.circuits.traced_circuit import Branch
     from planar.assemblies.conflict import Conflict, conflict
@@ -146,11 +150,13 @@ __all__ = [
     "Harmonics",
     "Holding",
     "Impact",
+    "Influence",
     "Input",
     "InputLaw",
     "Inspection",
     "LiftLaw",
     "Limit",
+    "LimitSlopes",
     "Link",
     "LinkLine",
     "LinkMotion",
@@ -187,6 +193,7 @@ __all__ = [
     "ReducedSweep",
     "RelativeState",
     "RubbingPair",
+    "Sensitivity",
     "Simulation",
     "SlidingPair",
     "SlotPair",
@@ -201,7 +208,9 @@ __all__ = [
     "TableSegment",
     "TimeRatio",
     "Transmission",
+    "TransmissionSlopes",
     "TrapezoidalRise",
+    "TravelSlopes",
     "TurningPair",
     "Unknown",
     "UnknownLoad",
@@ -230,6 +239,7 @@ __all__ = [
     "force_map",
     "forces",
     "from_dict",
+    "gradient",
     "greatest",
     "harmonics",
     "holding",
@@ -249,6 +259,7 @@ __all__ = [
     "problem_variants",
     "schema",
     "self_locking",
+    "sensitivity",
     "simulate",
     "solve",
     "stroke",

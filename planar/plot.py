@@ -238,6 +238,25 @@ def bearings(found: Forces | Motion | Mechanism, pairs: Sequence[str] | None = N
     return draw_on_sheets(bearing_pictures(found, pairs), f"{mechanism.name}: loads of the pairs")
 
 
+@takes_result("Motion", "Forces", "Mechanism")
+def sensitivity(moving: Motion | Forces | Mechanism, of: str | None = None, result: str | None = None) -> Figure:
+    """What a little more of each number of the file does to a result over a motion: the greatest influences.
+
+    `of` is a point, link, pair or input (left out: the first slide or rocker that is an output, else the first point
+    that moves), `result` which of its results (left out: the first); of forces their efforts and reactions, too. Raises
+    Unknown and BadInput for a name that is not there.
+    """
+    from planar.analysis.sensitivity.sensitivity import sensitivity as derivatives
+    from planar.drawing.diagrams.sensitivity_curves import sensitivity_picture
+    from planar.model.mechanism import Mechanism
+    from planar.solving.cycle import cycle
+
+    run = cycle(moving) if isinstance(moving, Mechanism) else moving
+    mechanism = run.mechanism
+    name = of or next(iter(mechanism.inputs)).pair
+    return draw_pictures([sensitivity_picture(derivatives(run, name), result)])
+
+
 @takes_result("Motion", "Simulation", "Mechanism")
 def diagrams(
     motion: Motion | Simulation | Mechanism, of: str | None = None, chords: int | None = None, width: float = 120.0

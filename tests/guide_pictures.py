@@ -131,6 +131,7 @@ PICTURES: dict[str, Callable[[], object]] = {
     "centrodes": lambda: plot.centrodes(planar.cycle("antiparallelogram"), "coupler"),
     "positions": lambda: plot.positions(planar.cycle("whitworth")),
     "diagrams": lambda: plot.diagrams(planar.cycle("slider-crank")),
+    "design/sensitivity": lambda: plot.sensitivity("whitworth", "slot"),
     "bodies": lambda: plot.forces(planar.forces(planar.solve("two-stroke-engine"))),
     "forces/stick-slip": lambda: plot.diagrams(planar.simulate("stick-slip", 5.0), "block"),
     "forces/friction": lambda: plot.forces(planar.forces(planar.solve(thick_clamp()))),

@@ -21,6 +21,7 @@ main.modules = {
     "plot": "planar.cli.plot_animate",
     "problem": "planar.cli.problem_mark",
     "schema": "planar.cli.inspect_models_schema_bench",
+    "sensitivity": "planar.cli.sensitivity",
     "simulate": "planar.cli.forces_simulate",
     "solve": "planar.cli.solve_cycle_explain",
     "view": "planar.cli.view_gallery",

@@ -37,6 +37,11 @@ def sin(x: Scalar) -> Scalar:
     return _apply_function("sin", x)
 
 
+def tan(x: Scalar) -> Scalar:
+    """Tangent of an angle in radians."""
+    return _apply_function("tan", x)
+
+
 def sqrt(x: Scalar) -> Scalar:
     """Square root."""
     return _apply_function("sqrt", x)
@@ -240,6 +245,11 @@ def value_between(x: Scalar, low: Scalar | None, high: Scalar | None, value: Sca
     if is_inside.ndim == 0:
         return value if is_inside else value * 0.0
     return np.where(is_inside, value, 0.0)
+
+
+def sign_of(x: Scalar) -> Scalar:
+    """1 of a number from zero on, -1 below."""
+    return 1.0 - value_between(x, None, 0.0, 2.0)
 
 
 def part_of_piece(x: Scalar) -> Scalar:

@@ -90,6 +90,8 @@ def results():
     yield from (planar.holding(clamp), planar.self_locking(clamp), planar.forces(clamp).friction["A"])
     grid = planar.force_map("excavator-arm", {"boom cylinder": (2.4, 2.9, 3)}, inertia=False)
     yield from (grid, grid.worst[0])
+    slopes = planar.sensitivity(motion, "stroke")
+    yield from (slopes, slopes.travel, slopes.travel.ends[0], slopes.influences("displacement")[0], slopes.transmission)
     yield from (planar.BadInput("here", "wrong"), planar.Unknown("no such point"), planar.Outcome.SOLVED)
     yield planar.NoAnswer(planar.Outcome.DEAD_POINT, "it stops", links=["a"])
 
@@ -203,6 +205,7 @@ def test_every_command_of_a_model_takes_set_and_what_is_piped_in(name, tmp_path,
         "cycle": ["--steps", "4"],
         "problem": ["--vary", "2"],
         "mark": ["answers.csv"],
+        "sensitivity": ["--of", "B"],
     }
     (tmp_path / "answers.csv").write_text("seed 1\nstudent,variant,quantity,value\nAnn,1,velocity of B,1\n")
     model = {

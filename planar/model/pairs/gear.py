@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from math import pi, tan
+from math import pi
 from typing import Any, ClassVar, Self
 
 from planar.foundation.geometry import Frame, Vector
-from planar.foundation.jets import Scalar, sqrt
+from planar.foundation.jets import Scalar, sign_of, sqrt, tan
 from planar.model.link_shapes import LinkShape
 from planar.model.pairs.base import (
     EffortAction,
@@ -64,9 +64,9 @@ class GearPair(WheelPair):
     def _pitch_radii(self, centre_distance: Scalar) -> tuple[Scalar, ...]:
         """From ratio = -r / s and the distance |r + s|, where of an internal pair the larger wheel is negative."""
         ratio = self.ratio()
-        if ratio == 1.0:  # equal wheels that turn alike do not meet
+        if isinstance(ratio, float) and ratio == 1.0:  # equal wheels that turn alike do not meet
             return 0.0, 0.0
-        s = (centre_distance if ratio < 0.0 else -centre_distance) / (1.0 - ratio)
+        s = -sign_of(ratio) * centre_distance / (1.0 - ratio)
         return -ratio * s, s
 
     @classmethod
@@ -107,7 +107,7 @@ class GearPair(WheelPair):
         if isinstance(apart, float) and apart == 0.0:
             return None
         way = (second - first) * (1.0 / apart)
-        outside = 1.0 if self.ratio() < 0.0 else -1.0
+        outside = -sign_of(self.ratio())
         carrier = frames[self.carrier]
         at = carrier.to_world(first + way * (outside * self._pitch_radii(apart)[0]))
         # teeth push a wheel that has them on its outside towards its own centre

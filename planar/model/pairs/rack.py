@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from math import pi, tan
+from math import pi
 from typing import Any, ClassVar, Self
 
 from planar.foundation.geometry import Frame, Vector, direction, frame_at
-from planar.foundation.jets import Scalar
+from planar.foundation.jets import Scalar, sign_of, tan
 from planar.model.link_shapes import LinkShape
 from planar.model.pairs.base import (
     EffortAction,
@@ -137,7 +137,7 @@ class RackPair(GuidedPair):
         rack, pinion = self.links
         _, along_line = self._line_in_link(shapes)
         way = frames[rack].rotate_to_world(along_line)
-        left = Vector(-way.y, way.x) * (1.0 if self.radius > 0.0 else -1.0)
+        left = Vector(-way.y, way.x) * sign_of(self.radius)
         centre = frames[pinion].to_world(shapes[pinion].position(self.point))
         return ToothContact(centre - left * abs(self.radius), way, left, tan(self.pressure_angle))
 

@@ -1,0 +1,1 @@
+"""What each dimension does to a result."""

@@ -1,0 +1,77 @@
+"""The gradient of a weighed sum of results, in all numbers of the file at once."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from planar.derivatives.result_slopes import SlopeSystem, tied_dimensions
+from planar.document.first_argument import takes_result
+from planar.dynamics.forces import Forces
+from planar.foundation.arrays import Array
+from planar.foundation.errors import BadInput, NoAnswer, Outcome, join_names
+from planar.results.motion import Motion, State
+
+Weights = Mapping[str, Any]
+
+
+@takes_result("State", "Motion", "Forces")
+def gradient(result: State | Motion | Forces, weights: Weights) -> dict[str, float]:
+    """The derivatives of a weighed sum of results, by the name of each number of the file (SI).
+
+    `weights` by the name of a point, link, pair or input: an array for what is told of it first, as (n, 2) for the
+    positions of a point over a motion of n positions, (2,) in a state; or arrays by the names of its results, as
+    `{"E": {"velocity": ...}}`. The sum is over all that is given. It costs one transposed solution a position, however
+    many numbers the file has (A. Griewank, A. Walther, Evaluating Derivatives, SIAM 2008). Numbers that cannot change
+    alone are NaN (see `Sensitivity.tied`).
+
+    Raises Unknown for another name, BadInput for weights that do not fit, and NoAnswer where a position with a weight
+    has no derivatives.
+
+    >>> import planar
+    >>> motion = planar.cycle(planar.load("slider-crank"), 12)
+    >>> found = planar.gradient(motion, {"stroke": [1.0] + 12 * [0.0]})
+    >>> one = planar.sensitivity(motion, "stroke").displacement["rod.length"][0]
+    >>> round(found["rod.length"], 3), round(float(one), 3)
+    (1.036, 1.036)
+    """
+    if not isinstance(weights, Mapping) or not weights:
+        raise BadInput("weights", "name what is weighed, with an array each, as {'E': weights}")
+    system = SlopeSystem(result)
+    moving = result.moving if isinstance(result, Forces) else result
+    count = len(moving) if isinstance(moving, Motion) else 1
+    read = {name: _read_weights(system, name, given, count) for name, given in weights.items()}
+    found, is_singular = system.gradient(read)
+    used = np.any([np.any(each != 0.0, axis=1) for of in read.values() for each in of.values()], axis=0)
+    if (is_singular & used).any():
+        row = int(np.argmax(is_singular & used))
+        raise NoAnswer(
+            Outcome.DEAD_POINT,
+            f"position {row} is a dead point or change point, where there are no derivatives; give it the weight 0",
+        )
+    whole = found[used].sum(axis=0)
+    tied = {*tied_dimensions(moving.mechanism)}
+    names = system.design.names
+    return {name: float("nan") if name in tied else float(value) for name, value in zip(names, whole, strict=True)}
+
+
+def _read_weights(system: SlopeSystem, name: str, given: Any, count: int) -> dict[str, Array]:
+    """Weights (n, parts) by the name of the result."""
+    parts = {each.name: each.value.numel() for each in system.expressions(name)}
+    named = given if isinstance(given, Mapping) else {next(iter(parts)): given}
+    found = {}
+    for result, values in named.items():
+        place = f"weights[{name!r}]"
+        if result not in parts:
+            raise BadInput(place, f"of {name!r} are told {join_names(parts)}, and no {result!r}")
+        try:
+            array = np.asarray(values, dtype=float)
+            found[result] = array.reshape(count, parts[result])
+        except (TypeError, ValueError):
+            wanted = (count, parts[result]) if parts[result] > 1 else (count,)
+            raise BadInput(place, f"an array of shape {wanted} is wanted here, not {np.shape(values)}") from None
+        if not np.isfinite(array).all():
+            raise BadInput(place, "a number here is not finite")
+    return found

@@ -1,0 +1,1 @@
+"""Derivatives of results in every dimension of a mechanism's file."""

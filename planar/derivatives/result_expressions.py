@@ -1,0 +1,70 @@
+"""What results tell of a point, a link, a pair or an input, as expressions in the unknowns and dimensions."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import casadi as ca
+
+from planar.derivatives.design_equations import DesignEquations
+from planar.derivatives.force_equations import ForceEquations
+from planar.equations.elimination import stack_expressions
+from planar.foundation.errors import Unknown, join_names
+from planar.model.pairs import MeasureKind
+from planar.results.kinematic_result import KinematicResult
+
+LINK_RESULTS = ("angle", "angular_velocity", "angular_acceleration")
+POINT_RESULTS = ("position", "velocity", "acceleration")
+POINT_KINDS = ("length", "velocity", "acceleration")
+
+
+class ResultExpression(NamedTuple):
+    """A result by the name that it has in a state, its kind of quantity, and its parts (parts,) in SI."""
+
+    name: str
+    kind: str
+    value: ca.SX
+
+
+def kinematic_expressions(design: DesignEquations, moving: KinematicResult, name: str) -> Iterator[ResultExpression]:
+    """What a state tells of this name: of a point, else of a link, and of a pair."""
+    frames, _ = design.placed
+    if name in moving._point_names:
+        link, point = moving._point_names[name].members[0]
+        at = frames[link].to_world(design.work.shapes[link].position(point))
+        position = stack_expressions(at)
+        values = (position, *design.rates(position))
+        yield from map(ResultExpression, POINT_RESULTS, POINT_KINDS, values)
+    elif name in frames:
+        angle = ca.SX(frames[name].angle)
+        kinds = (each.replace("_", " ") for each in LINK_RESULTS)
+        yield from map(ResultExpression, LINK_RESULTS, kinds, (angle, *design.rates(angle)))
+    if name in design.work.relative_motions:
+        pair = design.work.relative_motions[name]
+        place = design.in_link_coordinates(ca.vertcat(*design.work.relative_positions([name])))
+        found = pair.results(place, *design.rates(place))
+        for key, value in found.items():
+            if value is not None:
+                yield ResultExpression(key, pair.result_kinds[key], value)
+
+
+def force_expressions(equations: ForceEquations, name: str) -> Iterator[ResultExpression]:
+    """What forces tell of this name: the effort of an input with its power, the force and couple of a pair."""
+    mechanism, design = equations.work.mechanism, equations.design
+    inputs = [given.pair for given in mechanism.inputs]
+    if name in inputs:
+        effort = equations.efforts[inputs.index(name)]
+        slides = equations.work.relative_motions[name].input_kind is MeasureKind.LENGTH
+        yield ResultExpression("effort", "force" if slides else "torque", effort)
+        yield ResultExpression("power", "power", effort * design.u1[inputs.index(name)])
+    if name in equations.pair_actions:
+        reaction = equations.in_unknowns(equations.reaction(name))
+        yield ResultExpression("force", "force", reaction[:2])
+        yield ResultExpression("couple", "torque", reaction[2])
+
+
+def refuse_name(design: DesignEquations, moving: KinematicResult, name: str) -> Unknown:
+    """That nothing bears a name."""
+    known = dict.fromkeys((*moving.point_names, *moving.frames, *design.work.relative_motions))
+    return Unknown(f"there is no point, link or pair {name!r}; there are {join_names(known)}")

@@ -1,0 +1,1 @@
+"""Tables of what the numbers of a design do to results."""
