@@ -9,6 +9,7 @@ Simple Linkages, J. Eng. Ind. 91, 1969, write the first so).
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -19,6 +20,10 @@ from planar.dynamics.reaction_solver import ReactionSolver, fill_balance
 from planar.foundation.arrays import Array, BoolArray
 from planar.foundation.geometry import Vector
 from planar.results.motion import Motion
+
+
+RATE_TOLERANCE = 1e-8
+"""Velocities with an input at unit rate that open the constraints by more than this are none."""
 
 
 class ShakingMaps(NamedTuple):
@@ -37,7 +42,7 @@ class UnitRateMomentum(NamedTuple):
     """The momentum of the links with one input alone at unit rate, as maps of mass parameters (4 links,).
 
     `linear` (n, inputs, 2, 4 links), `angular` (n, inputs, 4 links) about a point; `condition` (n,) is the condition
-    number of the equations from which the velocities come.
+    number of the equations from which the velocities come, infinite where these do not tell them, as at a dead point.
     """
 
     linear: Array
@@ -49,8 +54,10 @@ class LinkKinematics:
     """The axes of all moving links at the positions of a motion, in which their mass parameters are taken."""
 
     def __init__(self, motion: Motion):
+        """Loads and springs have no part in it."""
+        bare = replace(motion, mechanism=replace(motion.mechanism, loads=(), springs=()))
         self.motion = motion
-        self.reactions: ReactionSolver = fill_balance(KinematicArrays(motion, motion.shapes), None, inertia=False)
+        self.reactions: ReactionSolver = fill_balance(KinematicArrays(bare, motion.shapes), None, inertia=False)
         self.field = self.reactions.field
         self.axes = link_axes(motion.mechanism, motion.shapes)
 
@@ -89,6 +96,9 @@ class LinkKinematics:
                 angular[:, number, k, 3] = turning
         matrix, inverse = self.reactions.equilibrium_matrix, self.reactions.inverse
         condition = np.linalg.norm(matrix, axis=(1, 2)) * np.linalg.norm(inverse, axis=(1, 2))
+        driven = slice(self.reactions.balance.constraints.shape[1], None)
+        wrong = inverse[:, driven] @ matrix - np.eye(matrix.shape[2])[driven]
+        condition[np.abs(wrong).max(axis=(1, 2), initial=0.0) > RATE_TOLERANCE] = np.inf
         return UnitRateMomentum(
             linear.reshape(many, inputs, 4 * links, 2).transpose(0, 1, 3, 2),
             angular.reshape(many, inputs, 4 * links),

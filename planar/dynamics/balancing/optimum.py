@@ -1,0 +1,137 @@
+"""The counterweights that make something least over a motion, with a bound below which none can bring it.
+
+For any multipliers u_k, positions k, with the sum of |u_k| one, max |f_k| >= sum u_k . f_k, which is linear in the
+counterweights: what it is at least over all of them is known in closed form. So the bound does not rest on the solver.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from planar.dynamics.balancing.cone_program import ConeBlock, solve_cone_program
+from planar.dynamics.balancing.counterweights import CounterweightSet
+from planar.foundation.arrays import Array
+from planar.foundation.errors import NoAnswer, Outcome
+
+LIGHTEST_SLACK = 1e-9
+"""Of what it is without counterweights: by so much more the lightest of the best may leave."""
+INERTIA_WEIGHT = 1e-3
+"""Of a mass at the limit: what a moment of inertia at the limit counts where the lightest are looked for."""
+
+
+class Response(NamedTuple):
+    """What mass parameters do at positions: `matrix` (n, d, 4 links) of them and `offset` (n, d), in one unit.
+
+    Its size at a position is the length of the vector of d.
+    """
+
+    matrix: Array
+    offset: Array
+
+    def as_root_mean_square(self) -> Response:
+        """The same as one long vector, whose length is the root of the mean square."""
+        n, d, columns = self.matrix.shape
+        by = np.sqrt(n)
+        return Response(self.matrix.reshape(1, n * d, columns) / by, self.offset.reshape(1, n * d) / by)
+
+    def restricted(self, weights: CounterweightSet) -> Response:
+        """The same by the variables of counterweights."""
+        return Response(self.matrix[:, :, weights.columns] * weights.unit, self.offset)
+
+    def greatest(self, x: Array) -> float:
+        """The greatest size over the positions."""
+        return float(np.linalg.norm(self.matrix @ x + self.offset, axis=1).max(initial=0.0))
+
+
+class Optimum(NamedTuple):
+    """Variables of counterweights (4 links,), what they make of the objective, and a bound that no others go below."""
+
+    x: Array
+    value: float
+    bound: float
+
+
+def minimise_greatest(
+    objective: Response, weights: CounterweightSet, limits: Sequence[tuple[Response, float]] = ()
+) -> Optimum:
+    """The counterweights that make the greatest size of a response least, other responses within limits.
+
+    Of those that do so the lightest. Raises NoAnswer where none keep to the limits.
+    """
+    mine = objective.restricted(weights)
+    others = [(each.restricted(weights), limit) for each, limit in limits]
+    nothing = np.zeros(4 * len(weights.links))
+    scale = mine.greatest(nothing)
+    if scale == 0.0 and not others:
+        return Optimum(nothing, 0.0, 0.0)
+    scale = scale or float(np.abs(mine.matrix).max()) or 1.0
+    count = weights.variable_count
+    cost = np.zeros(count + 1)
+    cost[-1] = 1.0
+    blocks = [
+        *weights.cone_blocks(count + 1),
+        _size_block(mine, scale, count, None),
+        *(_size_block(each, limit or scale, count, 1.0) for each, limit in others),
+    ]
+    found = solve_cone_program(cost, blocks)
+    if not found.is_solved:
+        raise NoAnswer(Outcome.CANNOT_BE_ASSEMBLED, "no counterweights within the limits do that")
+    bound = _dual_bound(mine, scale, others, weights, found.multipliers[2:])
+    cost = np.zeros(count)
+    cost[np.arange(0, 4 * len(weights.links), 4)] = 1.0
+    cost[np.arange(3, 4 * len(weights.links), 4)] = INERTIA_WEIGHT
+    value = mine.greatest(found.x[: len(nothing)])
+    lighter = solve_cone_program(
+        cost,
+        [
+            *weights.cone_blocks(count),
+            _size_block(mine, value + LIGHTEST_SLACK * scale, count - 1, 1.0),
+            *(_size_block(each, (limit or scale) * (1.0 + LIGHTEST_SLACK), count - 1, 1.0) for each, limit in others),
+        ],
+    )
+    x = (lighter if lighter.is_solved else found).x[: len(nothing)]
+    return Optimum(x, mine.greatest(x), bound)
+
+
+def _size_block(response: Response, scale: float, last: int, limit: float | None) -> ConeBlock:
+    """That the size at every position is at most the last variable, or a limit, times the scale."""
+    n, d, columns = response.matrix.shape
+    matrix, offset = np.zeros((n, d + 1, last + 1)), np.zeros((n, d + 1))
+    matrix[:, 1:, :columns], offset[:, 1:] = response.matrix / scale, response.offset / scale
+    if limit is None:
+        matrix[:, 0, last] = 1.0
+    else:
+        offset[:, 0] = limit
+    return ConeBlock("second-order", matrix.reshape(n * (d + 1), -1), offset.ravel(), d + 1)
+
+
+def _dual_bound(
+    mine: Response,
+    scale: float,
+    others: Sequence[tuple[Response, float]],
+    weights: CounterweightSet,
+    multipliers: Sequence[Array],
+) -> float:
+    """The bound that multipliers of the sizes prove, whatever they are; nothing is below zero."""
+    vectors = [
+        -each.reshape(len(response.offset), -1)[:, 1:]
+        for each, (response, _) in zip(multipliers, [(mine, 0.0), *others], strict=True)
+    ]
+    total = float(np.linalg.norm(vectors[0], axis=1).sum())
+    if not total:
+        return 0.0
+    linear, constant = np.zeros(mine.matrix.shape[2]), 0.0
+    for vector, response, unit, limit in zip(
+        vectors,
+        [mine, *(each for each, _ in others)],
+        [scale, *((limit or scale) for _, limit in others)],
+        [0.0, *(limit for _, limit in others)],
+        strict=True,
+    ):
+        by = vector * (scale / (total * unit))
+        linear = linear + np.einsum("nd,ndc->c", by, response.matrix)
+        constant += float((by * response.offset).sum()) - limit * float(np.linalg.norm(by, axis=1).sum())
+    return max(constant + weights.least_sum(linear), 0.0)
