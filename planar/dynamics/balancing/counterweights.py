@@ -26,19 +26,29 @@ STEEL_DENSITY = 7850.0
 class CounterweightLimit(NamedTuple):
     """The greatest mass (kg) of a counterweight, and how far from the origin of its link's axes it may lie (m).
 
-    With a `thickness` (m) it is a solid disc of `density` (kg/m^3) whose centre lies within the radius; else a body of
-    any shape that lies within it as a whole.
+    Left out, the mass is that of all moving links together, and the radius that of the link's own points. With a
+    `thickness` (m) it is a solid disc of `density` (kg/m^3) whose centre lies within the radius; else a body of any
+    shape that lies within it as a whole.
     """
 
-    mass: float
-    radius: float
+    mass: float | None = None
+    radius: float | None = None
     thickness: float | None = None
     density: float = STEEL_DENSITY
 
+
+class SetLimit(NamedTuple):
+    """The limit of a counterweight with nothing left out."""
+
+    mass: float
+    radius: float
+    inertia_factor: float
+    "k of a disc, whose moment of inertia about its centre is k m^2; 0 of a body of any shape"
+
     @property
-    def inertia_factor(self) -> float:
-        """k of a disc, whose moment of inertia about its centre is k m^2: half a radius squared is m / (2 pi h rho)."""
-        return 0.0 if self.thickness is None else 1.0 / (2.0 * pi * self.thickness * self.density)
+    def disc(self) -> float:
+        """The greatest moment of inertia of a disc about its centre, in units of mass and radius."""
+        return self.inertia_factor * self.mass / self.radius**2
 
 
 class Counterweight(NamedTuple):
@@ -66,7 +76,7 @@ class CounterweightSet(NamedTuple):
     """
 
     links: tuple[int, ...]
-    limits: tuple[CounterweightLimit, ...]
+    limits: tuple[SetLimit, ...]
 
     @property
     def unit(self) -> Array:
@@ -83,7 +93,7 @@ class CounterweightSet(NamedTuple):
     @property
     def variable_count(self) -> int:
         """The variables of their cones: four of each, and of every disc its own moment of inertia."""
-        return 4 * len(self.links) + sum(limit.thickness is not None for limit in self.limits)
+        return 4 * len(self.links) + sum(limit.inertia_factor > 0.0 for limit in self.limits)
 
     def cone_blocks(self, variables: int) -> list[ConeBlock]:
         """The limits on the first of so many variables, of discs their convex hull: k m^2 lies above the square."""
@@ -91,7 +101,7 @@ class CounterweightSet(NamedTuple):
         own = 4 * len(self.links)
         for number, limit in enumerate(self.limits):
             m, x, y, inertia = (4 * number + k for k in range(4))
-            disc = limit.inertia_factor * limit.mass / limit.radius**2
+            disc = limit.disc
             part = {own: -1.0} if disc else {}
             for entries, offset in (
                 ({m: -1.0}, 1.0),
@@ -118,7 +128,7 @@ class CounterweightSet(NamedTuple):
     def least_sum(self, coefficients: Array) -> float:
         """The least that a sum of the variables (4 links,) can be over all these counterweights, exactly."""
         return sum(
-            _least_of_body(*coefficients[4 * k : 4 * k + 4], limit.inertia_factor * limit.mass / limit.radius**2)
+            _least_of_body(*coefficients[4 * k : 4 * k + 4], limit.disc)
             for k, limit in enumerate(self.limits)
         )
 
@@ -131,7 +141,7 @@ class CounterweightSet(NamedTuple):
             if mass <= NEGLIGIBLE_MASS * limit.mass:
                 continue
             radius = min(hypot(first, second) / mass, limit.radius)
-            inertia = limit.inertia_factor * mass**2 if limit.thickness else max(about_origin - mass * radius**2, 0.0)
+            inertia = limit.inertia_factor * mass**2 if limit.inertia_factor else max(about_origin - mass * radius**2, 0.0)
             own = inertia if inertia > NEGLIGIBLE_MASS * mass * limit.radius**2 else 0.0
             found.append(
                 Counterweight(
@@ -177,31 +187,41 @@ def choose_counterweights(
     shapes: Mapping[str, LinkShape],
     links: Sequence[str] | Mapping[str, CounterweightLimit] | None,
     default: CounterweightLimit,
+    mass: float,
 ) -> CounterweightSet:
     """The links that bear counterweights (left out: all that turn about a pivot on the frame), and their limits.
 
-    A limit whose radius is not above zero is that of the link's own points. Raises BadInput for a link that is not
-    there, and where a limit is none.
+    `mass` is that of all moving links. Raises BadInput for a link that is not there, and where a limit is none.
     """
     names = [each.link for each in axes]
-    chosen = [each.link for each in axes if each.is_pivoted] if links is None else list(links)
+    given = default.radius is not None
+    pivoted = [each.link for each in axes if each.is_pivoted and (given or link_reach(each, shapes[each.link]))]
+    chosen = pivoted if links is None else list(links)
     if not chosen:
-        told = f"no link turns about a pivot on the frame; name the links among {join_names(names)}"
+        told = "no link with a second point turns about a pivot on the frame"
+        told += f"; name links among {join_names(names)}, and a radius"
         raise BadInput("counterweights", told)
+    if len(set(chosen)) < len(chosen):
+        raise BadInput("counterweights", "a link bears one counterweight; one is named twice")
     limits = []
     for name in chosen:
         if name not in names:
             raise BadInput("counterweights", f"there is no moving link {name!r}; these are {join_names(names)}")
         limit = links[name] if isinstance(links, Mapping) else default
-        if not limit.radius > 0.0:
-            limit = limit._replace(radius=link_reach(axes[names.index(name)], shapes[name]))
-        if not (limit.radius > 0.0 and np.isfinite(limit.radius)):
-            raise BadInput("counterweights", f"link {name!r} has no second point that would give a radius; give one")
-        if not 0.0 < limit.mass < np.inf:
-            raise BadInput("counterweights", f"the greatest mass on {name!r} is above zero (kg), not {limit.mass!r:.40}")
-        if limit.thickness is not None and not (0.0 < limit.thickness < np.inf and 0.0 < limit.density < np.inf):
-            raise BadInput("counterweights", f"the disc on {name!r} has a thickness and a density above zero")
-        limits.append(limit)
-    if len(set(chosen)) < len(chosen):
-        raise BadInput("counterweights", "a link bears one counterweight; it is named twice")
+        reach = link_reach(axes[names.index(name)], shapes[name])
+        limits.append(_set_limit(name, limit, mass, reach))
     return CounterweightSet(tuple(names.index(name) for name in chosen), tuple(limits))
+
+
+def _set_limit(name: str, limit: CounterweightLimit, mass: float, reach: float) -> SetLimit:
+    greatest = mass if limit.mass is None else limit.mass
+    radius = reach if limit.radius is None else limit.radius
+    if limit.radius is None and not reach:
+        raise BadInput("counterweights", f"link {name!r} has no second point that tells a radius; give one")
+    for what, value in (("mass", greatest), ("radius", radius), ("thickness", limit.thickness or 1.0)):
+        if not 0.0 < value < np.inf:
+            raise BadInput("counterweights", f"the {what} on link {name!r} is to be above zero, not {value!r:.40}")
+    if not 0.0 < limit.density < np.inf:
+        raise BadInput("counterweights", f"a density above zero is wanted (kg/m^3), not {limit.density!r:.40}")
+    factor = 0.0 if limit.thickness is None else 1.0 / (2.0 * pi * limit.thickness * limit.density)
+    return SetLimit(float(greatest), float(radius), factor)

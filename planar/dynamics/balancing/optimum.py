@@ -18,6 +18,8 @@ from planar.foundation.errors import NoAnswer, Outcome
 
 LIGHTEST_SLACK = 1e-9
 """Of what it is without counterweights: by so much more the lightest of the best may leave."""
+ROUNDING = 1e-12
+"""Of the greatest part of a sum: what is less is none."""
 INERTIA_WEIGHT = 1e-3
 """Of a mass at the limit: what a moment of inertia at the limit counts where the lightest are looked for."""
 
@@ -25,21 +27,24 @@ INERTIA_WEIGHT = 1e-3
 class Response(NamedTuple):
     """What mass parameters do at positions: `matrix` (n, d, 4 links) of them and `offset` (n, d), in one unit.
 
-    Its size at a position is the length of the vector of d.
+    Its size at a position is the length of the vector of d; `greatest_part` is the greatest of the parts that the
+    offset is the sum of, beside which it is rounding.
     """
 
     matrix: Array
     offset: Array
+    greatest_part: float = 0.0
 
     def as_root_mean_square(self) -> Response:
         """The same as one long vector, whose length is the root of the mean square."""
         n, d, columns = self.matrix.shape
         by = np.sqrt(n)
-        return Response(self.matrix.reshape(1, n * d, columns) / by, self.offset.reshape(1, n * d) / by)
+        matrix, offset = self.matrix.reshape(1, n * d, columns) / by, self.offset.reshape(1, n * d) / by
+        return Response(matrix, offset, self.greatest_part)
 
     def restricted(self, weights: CounterweightSet) -> Response:
         """The same by the variables of counterweights."""
-        return Response(self.matrix[:, :, weights.columns] * weights.unit, self.offset)
+        return Response(self.matrix[:, :, weights.columns] * weights.unit, self.offset, self.greatest_part)
 
     def greatest(self, x: Array) -> float:
         """The greatest size over the positions."""
@@ -65,8 +70,8 @@ def minimise_greatest(
     others = [(each.restricted(weights), limit) for each, limit in limits]
     nothing = np.zeros(4 * len(weights.links))
     scale = mine.greatest(nothing)
-    if scale == 0.0 and not others:
-        return Optimum(nothing, 0.0, 0.0)
+    if scale <= ROUNDING * mine.greatest_part and not others:
+        return Optimum(nothing, scale, 0.0)
     scale = scale or float(np.abs(mine.matrix).max()) or 1.0
     count = weights.variable_count
     cost = np.zeros(count + 1)

@@ -177,13 +177,47 @@ class _MarginProblem:
             # masses that meet the conditions are all none, and the multipliers say why
             return -np.inf, found.x[:-1], -found.multipliers[0]
         if not found.is_solved:
-            told = f"the conic solver did not find whether bodies can balance this linkage ({found.status})"
-            raise NoAnswer(Outcome.TOO_INEXACT, told)
+            # it stands on the edge: what the conditions leave may be no masses at all
+            return -np.inf, found.x[:-1], self._certificate()
         margin = float(found.x[-1])
         parameters = found.x[:-1]
         if margin > MARGIN_TOLERANCE:
             parameters = self._near_origin(blocks, margin)
         return margin, parameters, -found.multipliers[0]
+
+    def _certificate(self) -> Array:
+        """Multipliers of the conditions whose sum is as far inside the cone of sums above zero as may be.
+
+        With its coefficients of masses and moments of inertia one in all there always are best multipliers, or none are
+        inside. Raises NoAnswer where the solver does not find them.
+        """
+        rank, many = len(self.basis), len(self.basis) + 1  # the last: how far inside
+        columns = np.pad(self.basis.T, ((0, 0), (0, 1)))  # (4 links, multipliers)
+        inside = columns[self.positive].copy()
+        inside[:, -1] = -1.0
+        free = [4 * k + part for k in self.free for part in (1, 2)]
+        blocks = [
+            ConeBlock("zero", columns[self.positive].sum(axis=0)[None], np.array([-1.0])),
+            ConeBlock("nonnegative", inside, np.zeros(len(inside))),
+            ConeBlock("second-order", np.vstack([np.zeros(many), np.eye(rank, many)]), np.eye(rank + 1)[0] * 1e3, rank + 1),
+        ]
+        if free:
+            blocks.append(ConeBlock("zero", columns[free], np.zeros(len(free))))
+        if self.coned:
+            cones = []
+            for k in self.coned:
+                m, x, y, inertia = columns[4 * k : 4 * k + 4]
+                both = m + inertia
+                both[-1] = -2.0
+                cones += [both, m - inertia, x, y]
+            blocks.append(ConeBlock("second-order", np.array(cones), np.zeros(len(cones)), 4))
+        cost = np.zeros(many)
+        cost[-1] = -1.0
+        found = solve_cone_program(cost, blocks)
+        if not found.is_solved:
+            told = f"the conic solver did not find whether bodies can balance this linkage ({found.status})"
+            raise NoAnswer(Outcome.TOO_INEXACT, told)
+        return found.x[:-1]
 
     def _near_origin(self, blocks: list[ConeBlock], margin: float) -> Array:
         """Parameters with half the margin whose first moments together are least."""
