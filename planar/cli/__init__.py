@@ -4,6 +4,7 @@ from planar.cli.options import main
 
 main.modules = {
     "animate": "planar.cli.plot_animate",
+    "balance": "planar.cli.balancing",
     "bench": "planar.cli.inspect_models_schema_bench",
     "cams": "planar.cli.cams",
     "centres": "planar.cli.centres_harmonics",

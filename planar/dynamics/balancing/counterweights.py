@@ -143,16 +143,21 @@ class CounterweightSet(NamedTuple):
             radius = min(hypot(first, second) / mass, limit.radius)
             inertia = limit.inertia_factor * mass**2 if limit.inertia_factor else max(about_origin - mass * radius**2, 0.0)
             own = inertia if inertia > NEGLIGIBLE_MASS * mass * limit.radius**2 else 0.0
-            found.append(
-                Counterweight(
-                    axes[link].link, mass, radius, atan2(second, first), own, axes[link].description
-                )
-            )
+            angle = counterweight_angle(first, second)
+            found.append(Counterweight(axes[link].link, mass, radius, angle, own, axes[link].description))
         return tuple(found)
 
 
+ANGLE_ROUNDING = 1e-8
+"""Of the first moments of a counterweight: a part that is less is rounding of the solver."""
 NEGLIGIBLE_MASS = 1e-9
 """Of the limit: a counterweight, or a moment of inertia, that is less is none."""
+
+
+def counterweight_angle(x: float, y: float) -> float:
+    """The direction of first moments (rad), above -pi up to pi; what rounding leaves of a part is none."""
+    least = ANGLE_ROUNDING * hypot(x, y)
+    return atan2(y if abs(y) > least else 0.0, x if abs(x) > least else 0.0)
 
 
 def _row(variables: int, entries: Mapping[int, float]) -> Array:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from math import atan2, hypot
+from math import hypot
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from planar.dynamics.balancing.counterweights import (
     CounterweightLimit,
     CounterweightSet,
     choose_counterweights,
+    counterweight_angle,
 )
 from planar.dynamics.balancing.mass_parameters import mass_parameters
 from planar.foundation.arrays import Array
@@ -92,7 +93,7 @@ def find_force_balance(
         if size > NEGLIGIBLE_MOMENT * total:
             away = min(radius * size / mass, radius) if mass > 0.0 else radius
             found.append(
-                Counterweight(axes.link, size * radius / away, away, atan2(second, first), 0.0, axes.description)
+                Counterweight(axes.link, size * radius / away, away, counterweight_angle(first, second), 0.0, axes.description)
             )
     return ForceBalance(True, tuple(found), ())
 

@@ -16,8 +16,9 @@ from planar.dynamics.balancing.counterweights import CounterweightSet
 from planar.foundation.arrays import Array
 from planar.foundation.errors import NoAnswer, Outcome
 
-LIGHTEST_SLACK = 1e-9
-"""Of what it is without counterweights: by so much more the lightest of the best may leave."""
+LIGHTEST_SLACKS = (1e-9, 1e-8, 1e-7)
+"""Of what it is without counterweights: by so much more the lightest of the best may leave, tried one after the other:
+the smaller the harder for the solver."""
 ROUNDING = 1e-12
 """Of the greatest part of a sum: what is less is none."""
 INERTIA_WEIGHT = 1e-3
@@ -85,20 +86,34 @@ def minimise_greatest(
     if not found.is_solved:
         raise NoAnswer(Outcome.CANNOT_BE_ASSEMBLED, "no counterweights within the limits do that")
     bound = _dual_bound(mine, scale, others, weights, found.multipliers[2:])
-    cost = np.zeros(count)
-    cost[np.arange(0, 4 * len(weights.links), 4)] = 1.0
-    cost[np.arange(3, 4 * len(weights.links), 4)] = INERTIA_WEIGHT
-    value = mine.greatest(found.x[: len(nothing)])
-    lighter = solve_cone_program(
-        cost,
-        [
-            *weights.cone_blocks(count),
-            _size_block(mine, value + LIGHTEST_SLACK * scale, count - 1, 1.0),
-            *(_size_block(each, (limit or scale) * (1.0 + LIGHTEST_SLACK), count - 1, 1.0) for each, limit in others),
-        ],
-    )
-    x = (lighter if lighter.is_solved else found).x[: len(nothing)]
+    x = found.x[: len(nothing)]
+    lighter = _lightest(mine, mine.greatest(x), scale, others, weights)
+    x = x if lighter is None else lighter
     return Optimum(x, mine.greatest(x), bound)
+
+
+def _lightest(
+    mine: Response, value: float, scale: float, others: Sequence[tuple[Response, float]], weights: CounterweightSet
+) -> Array | None:
+    """The lightest variables that leave hardly more than a value; None where the solver finds none."""
+    count, links = weights.variable_count, len(weights.links)
+    cost = np.zeros(count)
+    cost[np.arange(0, 4 * links, 4)] = 1.0
+    cost[np.arange(3, 4 * links, 4)] = INERTIA_WEIGHT
+    for slack in LIGHTEST_SLACKS:
+        found = solve_cone_program(
+            cost,
+            [
+                *weights.cone_blocks(count),
+                _size_block(mine, scale, count - 1, value / scale + slack),
+                *(_size_block(each, limit or scale, count - 1, 1.0) for each, limit in others),
+            ],
+        )
+        x = found.x[: 4 * links]
+        within = all(each.greatest(x) <= (limit or scale) * (1.0 + slack) for each, limit in others)
+        if found.is_solved and within and mine.greatest(x) <= value + 2.0 * slack * scale:
+            return x
+    return None
 
 
 def _size_block(response: Response, scale: float, last: int, limit: float | None) -> ConeBlock:
