@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -59,7 +61,7 @@ if TYPE_CHECKING:
 )
 @motion_options
 @output_option("Write the balanced mechanism to a .json file.")
-# many: options of the command
+# many: options of the command; # long: these
 def balance(
     model: str,
     as_json: bool,
@@ -81,6 +83,7 @@ def balance(
     from planar.dynamics.balancing.balance import balance as best_counterweights
     from planar.dynamics.balancing.balance import balance_tradeoff
     from planar.dynamics.balancing.conditions import balancing_conditions
+    from planar.dynamics.balancing.cone_program import NEEDS_SOLVER
     from planar.dynamics.balancing.force_balance import find_force_balance
     from planar.dynamics.balancing.positive_masses import KINDS, find_mass_balance
     from planar.reports.tables.forces.balancing import BalanceReport, balance_tables, record
@@ -94,12 +97,14 @@ def balance(
     limit = _limit(mechanism, mass, radius, disc)
     with show_status(f"{mechanism.name}: balancing"):
         conditions = balancing_conditions(mechanism, about)
-        found = BalanceReport(conditions, tuple(find_mass_balance(conditions, kind) for kind in KINDS))
+        found = BalanceReport(conditions)
+        if find_spec("clarabel") is not None:
+            found = found._replace(possible=tuple(find_mass_balance(conditions, kind) for kind in KINDS))
+        asked = (("--counterweights", links), ("--diagrams", diagrams), ("-o", output), ("--tradeoff", tradeoff))
         if conditions.is_massless:
-            asked = (("--counterweights", links), ("--diagrams", diagrams), ("-o", output), ("--tradeoff", tradeoff))
-            for option, told in asked:
-                if told:
-                    raise BadInput(option, "no moving link has a mass, so that nothing shakes; give 'masses'")
+            _refuse(asked, "no moving link has a mass, so that nothing shakes; give 'masses'")
+        elif not found.possible:
+            _refuse(asked, NEEDS_SOLVER)
         else:
             motion = run_motion(mechanism, **course)
             found = found._replace(
@@ -119,6 +124,13 @@ def balance(
         print_json(record(found), indent=1)
         return
     print_or_write(balance_tables(found), None)
+
+
+def _refuse(asked: Iterable[tuple[str, Any]], why: str) -> None:
+    """Refuse options that would not be heeded."""
+    for option, told in asked:
+        if told:
+            raise BadInput(option, why)
 
 
 def _limit(mechanism: Mechanism, mass: str | None, radius: str | None, disc: str | None) -> CounterweightLimit:

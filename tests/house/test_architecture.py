@@ -48,6 +48,7 @@ LIBRARIES = {
     },
     "casadi": {"assemblies", "batch", "codegen", "dynamics", "equations", "pages"},
     "networkx": {"model"},
+    "clarabel": {"dynamics"},
     "flint": {"assemblies"},
     "llvmlite": {"codegen"},
     "scipy": {"dynamics", "model"},

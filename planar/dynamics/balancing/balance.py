@@ -213,8 +213,8 @@ def balance(
 
     >>> import planar
     >>> found = planar.balance("two-stroke-engine", counterweights=["crank"])
-    >>> found.value < found.value_before, found.value - found.bound < 1e-6 * found.value
-    (True, True)
+    >>> round(found.value_before), round(found.value), round(found.bound)  # N
+    (1224, 870, 870)
     """
     if measure not in MEASURES:
         raise BadInput("measure", f"one of {', '.join(MEASURES)} is wanted, not {measure!r:.60}")
@@ -290,5 +290,5 @@ def balance_tradeoff(
         best = minimise_greatest(moment, weights, [(force, float(level))])
         values.append((mine[0].greatest(best.x), best.value, best.bound))
         found.append(weights.counterweights(best.x, known.kinematics.axes))
-    told = (np.array(each) for each in zip(*values, strict=True))
-    return BalanceTradeoff(known.motion.mechanism, *told, tuple(found), before, known.about_name)
+    sizes, moments, bounds = (np.array(each) for each in zip(*values, strict=True))
+    return BalanceTradeoff(known.motion.mechanism, sizes, moments, bounds, tuple(found), before, known.about_name)

@@ -138,9 +138,9 @@ def balancing_conditions(mechanism: Mechanism, about: str | None = None, seed: i
     The momentum with each input alone at unit rate is linear in mass, first moments and moment of inertia of every link
     about a point of its own; its rank over the positions is the number of conditions (4 for the force of a four-bar: R.
     S. Berkof and G. G. Lowen, J. Eng. Ind. 91, 1969). Ranks are by singular values, against a bound from the condition
-    numbers of the positions. The moment is about the point `about` of the frame (left out: its origin); where the
-    force is balanced that point does not matter. Raises BadInput for a point that is none of the frame's, NoAnswer where
-    there is no motion.
+    numbers of the positions. The moment is about the point `about` of the frame (left out: its origin), which does not
+    matter where the force is balanced. Raises BadInput for a point that is none of the frame's, NoAnswer where there is
+    no motion.
 
     >>> import planar
     >>> planar.balancing_conditions("four-bar").force.count
@@ -214,7 +214,8 @@ def _choose_pivots(basis: Array, axes: tuple[LinkAxes, ...]) -> IntArray:
         range(basis.shape[1]),
         key=lambda k: (rank_of[k % 4] + (0 if axes[k // 4].is_pivoted or k % 4 == 0 else 2), k),
     )
-    left, chosen = basis.copy(), []
+    left = basis.copy()
+    chosen: list[int] = []
     for column in order:
         size = float(np.linalg.norm(left[:, column]))
         if len(chosen) < len(basis) and size > PIVOT_RATIO:

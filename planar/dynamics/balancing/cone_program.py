@@ -10,6 +10,7 @@ import numpy as np
 from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput
 
+NEEDS_SOLVER = 'counterweights, and what bodies can balance, need clarabel: pip install "planar-linkages[balance]"'
 TOLERANCES = (1e-11, 1e-9, 1e-7)
 """The relative gap, and what constraints may be off by, that the solver is asked for, one after the other where it does
 not get there: what it finds is judged by its user."""
@@ -50,8 +51,7 @@ def solve_cone_program(objective: Array, blocks: Sequence[ConeBlock]) -> ConeSol
     try:
         import clarabel
     except ImportError:
-        told = 'optimal counterweights need clarabel: pip install "planar-linkages[balance]"'
-        raise BadInput("clarabel", told) from None
+        raise BadInput("clarabel", NEEDS_SOLVER) from None
     from scipy.sparse import csc_matrix
 
     cones: list[object] = []

@@ -105,12 +105,12 @@ class CounterweightSet(NamedTuple):
             part = {own: -1.0} if disc else {}
             for entries, offset in (
                 ({m: -1.0}, 1.0),
-                ({m: 1.0, inertia: -1.0} | {place: 1.0 for place in part}, 0.0),
+                ({m: 1.0, inertia: -1.0} | dict.fromkeys(part, 1.0), 0.0),
                 ({m: 1.0}, 0.0),
             ):
                 linear.append(_row(variables, entries))
                 offsets.append(offset)
-            pair = ({m: 1.0, inertia: 1.0} | part, {m: 1.0, inertia: -1.0} | {place: 1.0 for place in part})
+            pair = ({m: 1.0, inertia: 1.0} | part, {m: 1.0, inertia: -1.0} | dict.fromkeys(part, 1.0))
             cones += [_row(variables, each) for each in (*pair, {x: 2.0}, {y: 2.0})]
             heights += [0.0] * 4
             if disc:
@@ -127,10 +127,8 @@ class CounterweightSet(NamedTuple):
 
     def least_sum(self, coefficients: Array) -> float:
         """The least that a sum of the variables (4 links,) can be over all these counterweights, exactly."""
-        return sum(
-            _least_of_body(*coefficients[4 * k : 4 * k + 4], limit.disc)
-            for k, limit in enumerate(self.limits)
-        )
+        parts = zip(coefficients.reshape(-1, 4).tolist(), self.limits, strict=True)
+        return float(sum(_least_of_body(m, x, y, inertia, limit.disc) for (m, x, y, inertia), limit in parts))
 
     def counterweights(self, x: Array, axes: Sequence[LinkAxes]) -> tuple[Counterweight, ...]:
         """Those of variables (4 links,), without such as have no mass to speak of."""
@@ -141,7 +139,9 @@ class CounterweightSet(NamedTuple):
             if mass <= NEGLIGIBLE_MASS * limit.mass:
                 continue
             radius = min(hypot(first, second) / mass, limit.radius)
-            inertia = limit.inertia_factor * mass**2 if limit.inertia_factor else max(about_origin - mass * radius**2, 0.0)
+            inertia = (
+                limit.inertia_factor * mass**2 if limit.inertia_factor else max(about_origin - mass * radius**2, 0.0)
+            )
             own = inertia if inertia > NEGLIGIBLE_MASS * mass * limit.radius**2 else 0.0
             angle = counterweight_angle(first, second)
             found.append(Counterweight(axes[link].link, mass, radius, angle, own, axes[link].description))

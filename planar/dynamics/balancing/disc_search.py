@@ -26,9 +26,12 @@ def search_discs(objective: Response, weights: CounterweightSet, hull: Optimum, 
     starts = [_from_hull(hull.x, many)]
     for _ in range(RANDOM_STARTS):
         angle, radius = random.uniform(-np.pi, np.pi, many), np.sqrt(random.uniform(0.0, 1.0, many))
-        starts.append(np.stack([random.uniform(0.0, 1.0, many), radius * np.cos(angle), radius * np.sin(angle)], axis=1))
+        starts.append(
+            np.stack([random.uniform(0.0, 1.0, many), radius * np.cos(angle), radius * np.sin(angle)], axis=1)
+        )
     nothing = np.zeros(4 * many)
-    best, value = nothing, mine.greatest(nothing)
+    best: Array = nothing
+    value = mine.greatest(nothing)
     scale = value or 1.0
     for start in starts:
         found = _improve(mine, start, discs, scale)
@@ -94,7 +97,7 @@ def _improve(mine: Response, start: Array, discs: Array, scale: float) -> Array:
     found = minimize(
         lambda v: float(v[-1]),
         first,
-        jac=lambda v: cost,
+        jac=lambda _: cost,
         bounds=bounds,
         constraints=[{"type": "ineq", "fun": sizes, "jac": slopes}],
         method="SLSQP",

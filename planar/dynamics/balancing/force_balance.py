@@ -9,8 +9,8 @@ from math import hypot
 import numpy as np
 
 from planar.document.first_argument import takes_mechanism
-from planar.dynamics.balancing.cone_program import ConeBlock, solve_cone_program
 from planar.dynamics.balancing.conditions import BalanceCondition, BalancingConditions, balancing_conditions
+from planar.dynamics.balancing.cone_program import ConeBlock, solve_cone_program
 from planar.dynamics.balancing.counterweights import (
     Counterweight,
     CounterweightLimit,
@@ -82,7 +82,7 @@ def find_force_balance(
     columns, basis = weights.columns, conditions.force.basis
     asked = basis @ (parameters / rows.column_scale / total)
     unit = weights.unit / rows.column_scale[columns] / np.repeat([each.mass for each in weights.limits], 4)
-    x = _lightest(basis[:, columns] * unit, asked, weights)
+    x = _lightest(basis[:, columns] * unit, asked)
     if x is None:
         return ForceBalance(False, (), _unmet(conditions, weights, parameters))
     found = []
@@ -93,12 +93,14 @@ def find_force_balance(
         if size > NEGLIGIBLE_MOMENT * total:
             away = min(radius * size / mass, radius) if mass > 0.0 else radius
             found.append(
-                Counterweight(axes.link, size * radius / away, away, counterweight_angle(first, second), 0.0, axes.description)
+                Counterweight(
+                    axes.link, size * radius / away, away, counterweight_angle(first, second), 0.0, axes.description
+                )
             )
     return ForceBalance(True, tuple(found), ())
 
 
-def _lightest(matrix: Array, asked: Array, weights: CounterweightSet) -> Array | None:
+def _lightest(matrix: Array, asked: Array) -> Array | None:
     """Variables (4 links,) of the lightest points within their radii that add what is asked; None where none do."""
     count = matrix.shape[1]
     masses = np.arange(0, count, 4)

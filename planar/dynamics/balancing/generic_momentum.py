@@ -10,9 +10,9 @@ import numpy as np
 
 from planar.dynamics.balancing.mass_parameters import QUANTITY_POWERS, LinkAxes
 from planar.dynamics.balancing.shaking_maps import LinkKinematics
-from planar.foundation.arrays import Array
 from planar.dynamics.virtual_velocities import has_length_motion
 from planar.equations.mechanism_numbers import mechanism_size, shapes_of_links
+from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput, NoAnswer, Outcome
 from planar.model.link_shapes import LinkShape
 from planar.model.mechanism import Drive, Input, Mechanism, replace_inputs

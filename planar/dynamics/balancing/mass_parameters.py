@@ -53,9 +53,7 @@ def link_axes(mechanism: Mechanism, shapes: Mapping[str, LinkShape]) -> tuple[Li
     )
 
 
-def _axes_of_link(
-    mechanism: Mechanism, link: str, shape: LinkShape, joined: Mapping[str, list[str]]
-) -> LinkAxes:
+def _axes_of_link(mechanism: Mechanism, link: str, shape: LinkShape, joined: Mapping[str, list[str]]) -> LinkAxes:
     places = {
         each.name: shape.position(point)
         for each in named_points(mechanism)

@@ -17,13 +17,13 @@ from math import hypot
 import numpy as np
 
 from planar.document.first_argument import takes_mechanism
-from planar.dynamics.balancing.cone_program import ConeBlock, solve_cone_program
 from planar.dynamics.balancing.conditions import (
     BalancingConditions,
     ConditionSet,
     ConditionTerm,
     balancing_conditions,
 )
+from planar.dynamics.balancing.cone_program import ConeBlock, solve_cone_program
 from planar.dynamics.balancing.mass_parameters import QUANTITIES, as_mass
 from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput, NoAnswer, Outcome
@@ -33,7 +33,7 @@ from planar.model.mechanism import Mechanism
 
 MARGIN_TOLERANCE = 1e-7
 """A margin below this is none: bodies would have to be points, or to have no mass."""
-SHOWN_COEFFICIENT = 1e-7
+SHOWN_COEFFICIENT = 1e-6
 """Of the greatest, in units of the size: smaller ones of a certificate are rounding of the solver, and in its error."""
 CONDITION_TOLERANCE = 1e-3
 """Of the margin by which parameters are those of bodies: what the conditions may be off by; it takes less to mend."""
@@ -54,12 +54,13 @@ class MassBalance:
     """Whether bodies with mass on all links balance a linkage: its `kind` is "shaking force", "shaking moment" or
     "both".
 
-    Where they do (`is_possible`), `masses` are some that do (kg, m, kg m^2), the greatest link of one kilogram; they may
-    be multiplied by any number. Where they do not, `certificate` is a sum of mass parameters that is zero for every
-    balanced linkage, and greater than zero for any bodies: for each link m, m x, m y, I it is at least `margin` times
-    the sum of all m + I / size^2 that have a part in it. `error` is what rounding leaves beside the certificate's
-    coefficients, in units of the size. `margin` is at most zero where they do not, and a `margin` of about zero says that
-    only points, or links without mass, would.
+    Where they do (`is_possible`), `masses` are some that do (kg, m, kg m^2), the heaviest of one kilogram; they may be
+    multiplied by any number. `margin` is how far inside the cone of bodies they can be, in units of all masses.
+
+    Where they do not, `certificate` is a sum of mass parameters that is zero for every balanced linkage, and greater
+    than zero for any bodies: by -`margin` times the sum of all m + I / size^2 that have a part in it, at least. A
+    margin of about zero says that the sum is above zero but for points, or links without mass. `error` is what rounding
+    leaves of the certificate, beside its greatest coefficient in units of the size.
     """
 
     kind: str
@@ -199,7 +200,9 @@ class _MarginProblem:
         blocks = [
             ConeBlock("zero", columns[self.positive].sum(axis=0)[None], np.array([-1.0])),
             ConeBlock("nonnegative", inside, np.zeros(len(inside))),
-            ConeBlock("second-order", np.vstack([np.zeros(many), np.eye(rank, many)]), np.eye(rank + 1)[0] * 1e3, rank + 1),
+            ConeBlock(
+                "second-order", np.vstack([np.zeros(many), np.eye(rank, many)]), np.eye(rank + 1)[0] * 1e3, rank + 1
+            ),
         ]
         if free:
             blocks.append(ConeBlock("zero", columns[free], np.zeros(len(free))))

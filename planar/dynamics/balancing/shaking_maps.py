@@ -21,7 +21,6 @@ from planar.foundation.arrays import Array, BoolArray
 from planar.foundation.geometry import Vector
 from planar.results.motion import Motion
 
-
 RATE_TOLERANCE = 1e-8
 """Velocities with an input at unit rate that open the constraints by more than this are none."""
 
@@ -74,9 +73,7 @@ class LinkKinematics:
             moment[:, k, 1] = _cross(arm, first_second) + _cross(first, acceleration)
             moment[:, k, 2] = _cross(arm, second_second) + _cross(second, acceleration)
             moment[:, k, 3] = self.field.angle_rates(axes.link, 2)
-        efforts = {
-            given.pair: self._effort_map(number) for number, given in enumerate(self.motion.mechanism.inputs)
-        }
+        efforts = {given.pair: self._effort_map(number) for number, given in enumerate(self.motion.mechanism.inputs)}
         return ShakingMaps(-force.reshape(many, 4 * links, 2).transpose(0, 2, 1), -moment.reshape(many, -1), efforts)
 
     def unit_rate_momentum(self, about: Array) -> UnitRateMomentum:
@@ -120,7 +117,7 @@ class LinkKinematics:
     def _unit_vectors(self, axes: LinkAxes) -> tuple[list[Array], list[Array]]:
         """The unit vectors of axes with two rates, each (n, 2)."""
         tip = axes.origin + axes.axis
-        first = [
+        first: list[Array] = [
             self.field.point_rates(axes.link, tip, rate) - self.field.point_rates(axes.link, axes.origin, rate)
             for rate in range(3)
         ]

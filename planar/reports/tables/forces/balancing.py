@@ -11,16 +11,20 @@ from rich.text import Text
 
 from planar.dynamics.balancing.balance import OBJECTIVES, Balance, BalanceTradeoff
 from planar.dynamics.balancing.conditions import BalanceCondition, BalancingConditions, ConditionSet, ConditionTerm
+from planar.dynamics.balancing.cone_program import NEEDS_SOLVER
 from planar.dynamics.balancing.counterweights import Counterweight
 from planar.dynamics.balancing.force_balance import ForceBalance
 from planar.dynamics.balancing.mass_parameters import QUANTITIES, QUANTITY_POWERS
 from planar.dynamics.balancing.positive_masses import MassBalance
+from planar.equations.mechanism_numbers import mechanism_size
 from planar.foundation.units import parse_unit
 from planar.model.file_units import FileUnits, display_unit
 from planar.reports.fitted_table import FittedTable, plain_table
 from planar.reports.number_format import column_heading, format_quantity, paragraphs, precision_text, quantity_text
 
 POWERS = dict(zip(QUANTITIES, (int(power) for power in QUANTITY_POWERS), strict=True))
+ROUNDING = 1e-12
+"""Of the greatest force at the linkage's size: a moment or torque that is less is rounding."""
 NEGLIGIBLE = 1e-8
 """Of what it was before: what is less is shown as none."""
 OBJECTIVE_KINDS = {"shaking force": "force", "shaking moment": "torque", "peak torque": "torque"}
@@ -31,7 +35,7 @@ class BalanceReport(NamedTuple):
     some, what complete balance needs, the best counterweights, and the tradeoff where it is asked for."""
 
     conditions: BalancingConditions
-    possible: tuple[MassBalance, ...]
+    possible: tuple[MassBalance, ...] = ()
     complete: ForceBalance | None = None
     best: Balance | None = None
     tradeoff: BalanceTradeoff | None = None
@@ -46,7 +50,9 @@ def balance_tables(found: BalanceReport) -> RenderableType:
     if found.complete is not None:
         parts += [Text(), paragraphs(_complete_facts(found.complete, units))]
         if found.complete.counterweights:
-            parts.append(_counterweight_table("Complete balance of the force", found.complete.counterweights, units))
+            parts.append(
+                _counterweight_table("Counterweights of complete force balance", found.complete.counterweights, units)
+            )
     if found.best is not None:
         parts += [Text(), _shaking_table(found.best, units), paragraphs(_best_facts(found.best, units))]
         if found.best.counterweights:
@@ -88,6 +94,8 @@ def _condition_facts(found: BalanceReport, units: FileUnits) -> Iterator[tuple[s
         yield "on pivots", f"{told}: mass times distance counts, not the mass alone"
     for possible in found.possible:
         yield from _possible_facts(possible, units)
+    if not found.possible:
+        yield "not told", NEEDS_SOLVER
 
 
 def _each_condition(of: ConditionSet, conditions: BalancingConditions, units: FileUnits) -> Iterator[str]:
@@ -130,7 +138,7 @@ def _counterweight_table(title: str, weights: Iterable[Counterweight], units: Fi
         "link",
         column_heading("mass", "mass", units),
         column_heading("radius", "length", units),
-        f"mass times radius, {mass} {length}",
+        f"mass by radius, {mass} {length}",
         column_heading("angle", "angle", units),
         column_heading("inertia", "moment of inertia", units),
         left=(0,),
@@ -149,13 +157,15 @@ def _counterweight_table(title: str, weights: Iterable[Counterweight], units: Fi
 
 
 def _shaking_table(found: Balance, units: FileUnits) -> FittedTable:
-    table = plain_table("Over the motion", "", "before", "after", "root mean square before", "after", left=(0,), keys=1)
+    table = plain_table("Shaking", "", ("before", "after"), ("root mean square before", "after"), left=(0,), keys=1)
     names = {"shaking moment": f"shaking moment about {found.about_name}", "peak torque": f"effort of {found.input}"}
     slides = found.motion.has_length_motion(found.input)
+    arm = mechanism_size(found.motion.mechanism, found.motion.shapes)
+    rounding = ROUNDING / NEGLIGIBLE * found.before.measured("shaking force") * arm
     for objective in OBJECTIVES:
         kind = "force" if slides and objective == "peak torque" else OBJECTIVE_KINDS[objective]
         cells = [
-            _beside(part.measured(objective, measure), found.before.measured(objective), kind, units)
+            _beside(part.measured(objective, measure), max(found.before.measured(objective), rounding), kind, units)
             for measure in ("greatest", "root mean square")
             for part in (found.before, found.after)
         ]
@@ -187,10 +197,10 @@ def _beside(value: float, before: float, kind: str, units: FileUnits) -> str:
 
 def _tradeoff_table(found: BalanceTradeoff, units: FileUnits) -> FittedTable:
     table = plain_table(
-        f"Least shaking moment about {found.about_name}",
-        column_heading("greatest force", "force", units),
-        column_heading("least moment", "torque", units),
-        column_heading("none below", "torque", units),
+        f"Shaking moment beside shaking force, about {found.about_name}",
+        column_heading("force", "force", units),
+        column_heading("moment", "torque", units),
+        column_heading("bound", "torque", units),
         left=(),
         keys=1,
     )
@@ -261,9 +271,7 @@ def _possible_record(found: MassBalance) -> dict[str, Any]:
 
 def _best_record(found: Balance) -> dict[str, Any]:
     def values(array: np.ndarray) -> list[Any]:
-        nested: list[Any] = [
-            (None if not np.all(np.isfinite(each)) else each.tolist()) for each in np.asarray(array)
-        ]
+        nested: list[Any] = [(None if not np.all(np.isfinite(each)) else each.tolist()) for each in np.asarray(array)]
         return nested
 
     return {
