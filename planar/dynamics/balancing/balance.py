@@ -39,11 +39,13 @@ TRADEOFF_SLACK = 1e-6
 class Shaking(NamedTuple):
     """What a linkage does over the n rows of a motion: `force` (n, 2), N, and `moment` (n,), N m, on its frame by the
     inertia of its links, and what its input supplies, `effort` (n,), N m, at a slide N. NaN where rates are not told.
+    `share` (n,) is the part of the motion that each row stands for, by its input or its time: all add up to one.
     """
 
     force: Array
     moment: Array
     effort: Array
+    share: Array
 
     def __repr__(self) -> str:
         return short_repr(self)
@@ -55,7 +57,7 @@ class Shaking(NamedTuple):
             "shaking moment": np.abs(self.moment),
             "peak torque": np.abs(self.effort),
         }[objective]
-        return float(np.nanmax(values) if measure == "greatest" else np.sqrt(np.nanmean(values**2)))
+        return float(np.nanmax(values) if measure == "greatest" else np.sqrt(np.nansum(self.share * values**2)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,6 +143,7 @@ class _Responses:
         found = forces(self.motion, friction=False)
         self.effort = np.broadcast_to(found.inputs[self.input], (len(self.motion),))
         self.rows: BoolArray = self.kinematics.regular_rows & np.isfinite(self.effort)
+        self.share = _shares(self.motion, self.rows)
         if not self.rows.any():
             raise BadInput("motion", "at no position are all rates and the effort of the input told")
 
@@ -165,8 +168,9 @@ class _Responses:
             self.maps.force @ parameters,
             self.maps.moment @ parameters,
             self.effort + self.maps.efforts[self.input] @ more,
+            self.share,
         )
-        for each in found:
+        for each in found[:3]:
             each[~self.rows] = np.nan
         return found
 
@@ -177,15 +181,28 @@ class _Responses:
         return choose_counterweights(axes, self.motion.shapes, links, limit or CounterweightLimit(), total)
 
     def balanced(self, weights: CounterweightSet, x: Array) -> Mechanism:
-        """The linkage with counterweights of variables (4 links,) as further masses, negligible ones left out."""
+        """The linkage with counterweights of variables (4 links,) as further masses."""
         axes, shapes, mechanism = self.kinematics.axes, self.motion.shapes, self.motion.mechanism
-        borne = {each.link for each in weights.counterweights(x, axes)}
         more = tuple(
             as_mass(axes[link], shapes[axes[link].link], own)
             for link, own in zip(weights.links, (x * weights.unit).reshape(-1, 4), strict=True)
-            if axes[link].link in borne
+            if own[0] > 0.0
         )
         return replace(mechanism, masses=(*mechanism.masses, *more))
+
+
+def _shares(motion: Motion, rows: BoolArray) -> Array:
+    """The part of a motion that each row stands for (n,): half the way to its neighbours; none for rows left out."""
+    along = motion.inputs[motion.running_input].position if motion.time is None else motion.time
+    steps = np.abs(np.diff(along))
+    found = np.zeros(len(along))
+    found[:-1] += 0.5 * steps
+    found[1:] += 0.5 * steps
+    found[~rows] = 0.0
+    if not found.any():
+        found[rows] = 1.0
+    share: Array = found / max(float(found.sum()), 1e-300)
+    return share
 
 
 @takes_result("Mechanism", "Motion", "Motion")
@@ -224,27 +241,28 @@ def balance(
     if not np.abs(wanted.matrix).max(initial=0.0) and not np.abs(wanted.offset).max(initial=0.0):
         raise BadInput("inputs", "nothing speeds up or slows down, so that nothing shakes; give the input a velocity")
     if measure != "greatest":
-        wanted = wanted.as_root_mean_square()
+        wanted = wanted.as_root_mean_square(known.share[known.rows])
     best: Optimum = minimise_greatest(wanted, weights)
     searched = any(limit.inertia_factor for limit in weights.limits)
     if searched:
         best = search_discs(wanted, weights, best)
     more = np.zeros(len(known.parameters))
-    more[weights.columns] = best.x * weights.unit
+    x = weights.as_bodies(best.x)
+    more[weights.columns] = x * weights.unit
     before, after = known.shaking(0.0 * more), known.shaking(more)
     axes = known.kinematics.axes
     return Balance(
         known.motion,
         minimise,
         measure,
-        weights.counterweights(best.x, axes),
+        weights.counterweights(x, axes),
         before.measured(minimise, measure),
         after.measured(minimise, measure),
         best.bound,
         searched,
         before,
         after,
-        known.balanced(weights, best.x),
+        known.balanced(weights, x),
         known.input,
         known.about,
         known.about_name,
@@ -289,6 +307,6 @@ def balance_tradeoff(
     for level in np.linspace(first, most, count) if most > first else [first]:
         best = minimise_greatest(moment, weights, [(force, float(level))])
         values.append((mine[0].greatest(best.x), best.value, best.bound))
-        found.append(weights.counterweights(best.x, known.kinematics.axes))
+        found.append(weights.counterweights(weights.as_bodies(best.x), known.kinematics.axes))
     sizes, moments, bounds = (np.array(each) for each in zip(*values, strict=True))
     return BalanceTradeoff(known.motion.mechanism, sizes, moments, bounds, tuple(found), before, known.about_name)

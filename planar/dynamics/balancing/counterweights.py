@@ -130,13 +130,31 @@ class CounterweightSet(NamedTuple):
         parts = zip(coefficients.reshape(-1, 4).tolist(), self.limits, strict=True)
         return float(sum(_least_of_body(m, x, y, inertia, limit.disc) for (m, x, y, inertia), limit in parts))
 
+    def as_bodies(self, x: Array) -> Array:
+        """Variables (4 links,) that are off by what the solver leaves, as those of bodies within the limits.
+
+        Counterweights without mass to speak of are none.
+        """
+        found = np.zeros_like(x)
+        for number, limit in enumerate(self.limits):
+            mass, first, second, about_origin = (float(each) for each in x[4 * number : 4 * number + 4])
+            if mass <= NEGLIGIBLE_MASS:
+                continue
+            mass = min(mass, 1.0)
+            shorter = min(1.0, mass / max(hypot(first, second), 1e-300))
+            first, second = first * shorter, second * shorter
+            least = (first**2 + second**2) / mass
+            inertia = least + limit.disc * mass**2 if limit.disc else min(max(about_origin, least), mass)
+            found[4 * number : 4 * number + 4] = mass, first, second, max(inertia, least)
+        return found
+
     def counterweights(self, x: Array, axes: Sequence[LinkAxes]) -> tuple[Counterweight, ...]:
-        """Those of variables (4 links,), without such as have no mass to speak of."""
+        """Those of variables (4 links,) that have a mass."""
         found = []
         for number, link in enumerate(self.links):
             mass, first, second, about_origin = (float(each) for each in (x * self.unit)[4 * number : 4 * number + 4])
             limit = self.limits[number]
-            if mass <= NEGLIGIBLE_MASS * limit.mass:
+            if not mass > 0.0:
                 continue
             radius = min(hypot(first, second) / mass, limit.radius)
             inertia = (

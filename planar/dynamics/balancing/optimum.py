@@ -36,11 +36,11 @@ class Response(NamedTuple):
     offset: Array
     greatest_part: float = 0.0
 
-    def as_root_mean_square(self) -> Response:
-        """The same as one long vector, whose length is the root of the mean square."""
+    def as_root_mean_square(self, share: Array) -> Response:
+        """The same as one long vector, whose length is the root of the mean square; rows count by their share (n,)."""
         n, d, columns = self.matrix.shape
-        by = np.sqrt(n)
-        matrix, offset = self.matrix.reshape(1, n * d, columns) / by, self.offset.reshape(1, n * d) / by
+        by = np.sqrt(share)[:, None]
+        matrix, offset = (self.matrix * by[..., None]).reshape(1, n * d, columns), (self.offset * by).reshape(1, n * d)
         return Response(matrix, offset, self.greatest_part)
 
     def restricted(self, weights: CounterweightSet) -> Response:
