@@ -65,13 +65,14 @@ def minimise_greatest(
 ) -> Optimum:
     """The counterweights that make the greatest size of a response least, other responses within limits.
 
-    Of those that do so the lightest. Raises NoAnswer where none keep to the limits.
+    Of those that do so the lightest. Raises NoAnswer where none keep to the limits, or the solver does not get there.
     """
     mine = objective.restricted(weights)
     others = [(each.restricted(weights), limit) for each, limit in limits]
     nothing = np.zeros(4 * len(weights.links))
     scale = mine.greatest(nothing)
-    if scale <= ROUNDING * mine.greatest_part and not others:
+    # beside what the masses, and the greatest counterweights, do
+    if scale <= ROUNDING * max(mine.greatest_part, float(np.abs(mine.matrix).max(initial=0.0))) and not others:
         return Optimum(nothing, scale, 0.0)
     scale = scale or float(np.abs(mine.matrix).max()) or 1.0
     count = weights.variable_count
@@ -84,7 +85,8 @@ def minimise_greatest(
     ]
     found = solve_cone_program(cost, blocks)
     if not found.is_solved:
-        raise NoAnswer(Outcome.CANNOT_BE_ASSEMBLED, "no counterweights within the limits do that")
+        told = f"the conic solver did not find the best counterweights ({found.status})"
+        raise NoAnswer(Outcome.TOO_INEXACT, told)
     bound = _dual_bound(mine, scale, others, weights, found.multipliers[2:])
     x = found.x[: len(nothing)]
     lighter = _lightest(mine, mine.greatest(x), scale, others, weights)
