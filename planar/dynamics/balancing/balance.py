@@ -92,7 +92,8 @@ class Balance:
     @cached_property
     def frame_error(self) -> float | None:
         """How far what pairs, inputs and springs put on the frame, by `planar.forces` on the balanced linkage afresh,
-        is from `after` and the loads and weights: beside the greatest part of it. None where reactions are not told.
+        is from `after` and the loads and weights, beside the greatest part of it or of `before`. None where reactions
+        are not told.
         """
         found = frame_load(replace(self.motion, mechanism=self.balanced), self.about)
         if found is None:
@@ -100,7 +101,8 @@ class Balance:
         claimed = np.column_stack([self.after.force, self.after.moment / found.arm])
         off = np.abs(found.shaking - claimed)
         told = np.isfinite(off).all(axis=1)
-        return float(off[told].max(initial=0.0)) / found.scale if told.any() and found.scale else None
+        scale = max(found.scale, self.before.measured("shaking force"))
+        return float(off[told].max(initial=0.0)) / scale if told.any() and scale else None
 
 
 @dataclass(frozen=True, eq=False)
