@@ -189,3 +189,11 @@ def _dependency_order(solved: EliminationSteps) -> EliminationSteps:
             else:
                 done.setdefault(waiting.pop(), line)
     return list(done.items())
+
+
+def expression_unknowns(expressions: ca.SX, z: ca.SX) -> list[set[int]]:
+    """The entries of z on which each expression depends."""
+    found: list[set[int]] = [set() for _ in range(expressions.numel())]
+    for row, column in zip(*ca.jacobian_sparsity(expressions, z).get_triplet(), strict=True):
+        found[row].add(column)
+    return found

@@ -20,6 +20,7 @@ from planar.equations.elimination import (
     EliminationSteps,
     back_substitute,
     eliminate,
+    expression_unknowns,
     split_constant_factors,
     stack_expressions,
 )
@@ -312,14 +313,6 @@ def _split_into_blocks(mechanism: Mechanism, equations: ConstraintEquations) -> 
         F=equations.F[order],
         row_variables=tuple(equations.row_variables[row] for row in order) if equations.row_variables else (),
     )
-
-
-def expression_unknowns(expressions: ca.SX, z: ca.SX) -> list[set[int]]:
-    """The entries of z on which each expression depends."""
-    found: list[set[int]] = [set() for _ in range(expressions.numel())]
-    for row, column in zip(*ca.jacobian_sparsity(expressions, z).get_triplet(), strict=True):
-        found[row].add(column)
-    return found
 
 
 def _drop_idle_unknowns(equations: ConstraintEquations) -> tuple[ca.SX, list[set[int]]]:

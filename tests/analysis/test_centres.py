@@ -126,7 +126,10 @@ def lawful(centres: Centres, within: float = EXACT) -> None:
 
 @pytest.mark.parametrize("stem", some_models(3, 1))
 def test_every_model_has_all_its_centres_and_they_are_proved(stem):
-    lawful(found(stem))
+    centres = found(stem)
+    state = centres.state
+    misfit = max((float(each) for each in state.misfits.values()), default=0.0)  # by as much the routes differ
+    lawful(centres, max(EXACT, 10.0 * misfit / Scale(state).size))
 
 
 @pytest.mark.parametrize("stem", some_models(6))

@@ -23,6 +23,7 @@ RANGES = {
     "rack-differential": (0.0, 0.2),
     "rapsons-slide": (-0.2, 0.2),
     "rolling-wheel": (-0.3, 1.5),
+    "screw-jack": (0.0, 0.05),
 }
 """m: inputs that slide without limits."""
 

@@ -12,8 +12,7 @@ from typing import NamedTuple
 
 import casadi as ca
 
-from planar.equations.elimination import stack_expressions
-from planar.equations.symbolic_equations import expression_unknowns
+from planar.equations.elimination import expression_unknowns, stack_expressions
 
 HELD, UNRELATED = -1, -2
 """Rows that are no derivatives of the sum of squares of misfits: that have to close beside it, and the rest."""

@@ -34,7 +34,7 @@ def offer_least_misfit(mechanism: Mechanism) -> str:
         return ""
     unit = parse_unit(mechanism.units.length)
     return (
-        f"the links are held more than once and do not close, by {amount(misfits[worst], 'length', mechanism.units)} "
+        f"the links are held more than once, with a misfit of {amount(misfits[worst], 'length', mechanism.units)} "
         f'at pair {worst!r} at the least: "closes_within": "{_round_up(unit.from_si(misfits[worst])):.6g} '
         f'{mechanism.units.length}" would take that position'
     )

@@ -240,16 +240,15 @@ def _open_block_sentence(setup: PreparedMechanism, failure: AssemblySearchFailur
     kind = next(row.kind for row in setup.equations.rows[stage.rows] if row.pair == pair)
     by, what = (setup.unit, "length") if kind is MeasureKind.LENGTH else (1.0, "angle")
     links = _links(stage.links or setup.pairs.get(pair, setup.relative_motions[pair]).links)
+    offer = ""
     if slice_length(stage.rows) > slice_length(stage.unknowns):
         from planar.solving.assembly.least_misfit_offer import offer_least_misfit
 
         offer = offer_least_misfit(setup.mechanism)
-        if offer:
-            return f"{setup.describe_position()} {offer}; or {_remedy(setup, failure, links)}"
     return (
         f"{setup.describe_position()} {links} cannot be joined: at the nearest, pair {pair!r} stays open by "
         f"{amount(gaps[pair] * by, what, setup.mechanism.units)}; "
-        f"{_remedy(setup, failure, links)}"
+        f"{_remedy(setup, failure, links)}{'; or, ' * bool(offer)}{offer}"
     )
 
 

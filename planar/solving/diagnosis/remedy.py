@@ -215,7 +215,7 @@ def _smallest_changes_first(
     for _, number, value in found if thorough else found[:MAX_CHANGES_TRIED]:
         name = units.length if number.kind == "length" else units.angle
         by = parse_unit(name)
-        near = by.from_si(value)
+        near = 0.0 if abs(value) <= ROUNDING_TOLERANCE * number.size else by.from_si(value)
         # first a little beyond, where it goes together with ease; what is held twice needs the very value
         for shown in (
             f"{_rounded_beyond(near, value > number.was):.6g}",
