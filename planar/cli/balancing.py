@@ -23,11 +23,14 @@ from planar.cli.options import (
     show_status,
 )
 from planar.cli.streams import print_json
-from planar.foundation.errors import BadInput
+from planar.foundation.errors import BadInput, NoAnswer
 
 if TYPE_CHECKING:
+    from planar.dynamics.balancing.conditions import BalancingConditions
     from planar.dynamics.balancing.counterweights import CounterweightLimit
+    from planar.dynamics.balancing.positive_masses import MassBalance
     from planar.model.mechanism import Mechanism
+    from planar.reports.tables.forces.balancing import Undecided
 
 
 @main.command()
@@ -85,7 +88,7 @@ def balance(
     from planar.dynamics.balancing.conditions import balancing_conditions
     from planar.dynamics.balancing.cone_program import NEEDS_SOLVER
     from planar.dynamics.balancing.force_balance import find_force_balance
-    from planar.dynamics.balancing.positive_masses import KINDS, find_mass_balance
+    from planar.dynamics.balancing.positive_masses import KINDS
     from planar.reports.tables.forces.balancing import BalanceReport, balance_tables, record
 
     mechanism = load_model(model, mode)
@@ -99,7 +102,7 @@ def balance(
         conditions = balancing_conditions(mechanism, about)
         found = BalanceReport(conditions)
         if find_spec("clarabel") is not None:
-            found = found._replace(possible=tuple(find_mass_balance(conditions, kind) for kind in KINDS))
+            found = found._replace(possible=tuple(_mass_balance(conditions, kind) for kind in KINDS))
         asked = (("--counterweights", links), ("--diagrams", diagrams), ("-o", output), ("--tradeoff", tradeoff))
         if conditions.is_massless:
             _refuse(asked, "no moving link has a mass, so that nothing shakes; give 'masses'")
@@ -124,6 +127,17 @@ def balance(
         print_json(record(found), indent=1)
         return
     print_or_write(balance_tables(found), None)
+
+
+def _mass_balance(conditions: BalancingConditions, kind: str) -> MassBalance | Undecided:
+    """Whether bodies meet conditions, or why that is not told."""
+    from planar.dynamics.balancing.positive_masses import find_mass_balance
+    from planar.reports.tables.forces.balancing import Undecided
+
+    try:
+        return find_mass_balance(conditions, kind)
+    except NoAnswer as problem:
+        return Undecided(kind, problem.reason)
 
 
 def _refuse(asked: Iterable[tuple[str, Any]], why: str) -> None:

@@ -14,6 +14,7 @@ from planar.dynamics.balancing.mass_parameters import QUANTITIES, LinkAxes, mass
 from planar.foundation.arrays import Array, IntArray
 from planar.foundation.errors import BadInput, join_names
 from planar.foundation.short_repr import short_repr
+from planar.model.link_shapes import link_shape
 from planar.model.mechanism import Mechanism, named_points
 
 SAFETY_RATIO = 2.0
@@ -24,7 +25,6 @@ ZERO_COEFFICIENT = 1e-9
 """Of the greatest in its condition, in units of the linkage's size: a smaller coefficient is none."""
 EXACT_ZERO = 1e-14
 """What rounding leaves of an entry of an orthonormal row."""
-KINDS = ("shaking force", "shaking moment", "both")
 
 
 class ConditionTerm(NamedTuple):
@@ -78,6 +78,13 @@ class ConditionSet:
     def count(self) -> int:
         """How many conditions there are."""
         return len(self.conditions)
+
+    @property
+    def basis_error(self) -> float:
+        """What rounding puts into `basis`: what is left of singular values that are zero, by the least that is not."""
+        kept, dropped = self.singular_values[: self.count], self.singular_values[self.count :]
+        noise = max(float(dropped.max(initial=0.0)), float(np.finfo(float).eps * self.singular_values[0]))
+        return noise / float(kept[-1]) if len(kept) else 0.0
 
     @property
     def is_certain(self) -> bool:
@@ -158,8 +165,6 @@ def balancing_conditions(mechanism: Mechanism, about: str | None = None, seed: i
 
 def frame_point(mechanism: Mechanism, name: str | None) -> tuple[Array, str]:
     """Where a point of the frame is (2,), m, and its name; the frame's origin where none is named. Raises BadInput."""
-    from planar.model.link_shapes import link_shape
-
     if name is None:
         return np.zeros(2), "the frame's origin"
     shape = next(link_shape(link) for link in mechanism.links if link.name == mechanism.frame)

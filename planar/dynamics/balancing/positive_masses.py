@@ -39,8 +39,10 @@ CONDITION_TOLERANCE = 1e-3
 """Of the margin by which parameters are those of bodies: what the conditions may be off by; it takes less to mend."""
 GREATEST_MOMENT = 1e3
 """In units of the size and of all masses: first moments of links whose mass has no part in it are no greater."""
-CERTIFICATE_TOLERANCE = 1e-5
-"""A certificate with more rounding than this, beside its coefficients in units of the size, is none."""
+CERTIFICATE_TOLERANCE = 1e-10
+"""A certificate on the edge, with no margin, and more rounding than this beside its coefficients is none."""
+SPARSE_RATIO = 1e-4
+"""Of the greatest coefficient of a certificate: smaller ones are tried without."""
 IDLE_COLUMN = 1e-9
 """A column of the conditions below this is that of a mass parameter that has no part in them."""
 SPARE_MASS_RATIO = 0.1
@@ -100,13 +102,14 @@ def find_mass_balance(conditions: BalancingConditions, kind: str) -> MassBalance
     t, parameters, multipliers = problem.solve()
     size = conditions.rows.size
     if t > MARGIN_TOLERANCE:
-        problem.check(parameters)
+        problem.check(parameters, wanted.basis_error)
         return MassBalance(kind, True, t, _masses_of(conditions, problem.completed(parameters)), size=size)
-    combined = multipliers @ wanted.basis
+    combined = problem.without_rounding(multipliers)
     combined = combined / max(float(np.abs(combined).max()), 1e-300)
     margin, error = problem.margin_of(combined)
+    error = max(error, wanted.basis_error)
     if error > max(CERTIFICATE_TOLERANCE, 0.5 * margin / GREATEST_MOMENT):
-        told = f"the certificate that no bodies balance this linkage is off by {error:.1g}"
+        told = f"whether bodies balance this linkage is on the edge, and rounding of {error:.1g} hides it"
         raise NoAnswer(Outcome.TOO_INEXACT, told)
     terms = tuple(
         ConditionTerm(
@@ -239,9 +242,9 @@ class _MarginProblem:
         found: Array = solve_cone_program(length[0], wide).x[: self.count]
         return found
 
-    def check(self, parameters: Array) -> None:
+    def check(self, parameters: Array, basis_error: float) -> None:
         """Raise NoAnswer where parameters do not meet the conditions, or are not those of bodies."""
-        left = float(np.abs(self.basis @ parameters).max(initial=0.0))
+        left = float(np.abs(self.basis @ parameters).max(initial=0.0)) + basis_error * float(np.linalg.norm(parameters))
         least = float(parameters[self.positive].min())
         for k in self.coned:
             m, x, y, inertia = parameters[4 * k : 4 * k + 4]
@@ -261,6 +264,20 @@ class _MarginProblem:
             if not has_inertia:
                 row[3] = 2.0 * square / row[0] if row[0] > 0.0 else 0.0
         return found.ravel() / float(found[:, 0].max())
+
+    def without_rounding(self, multipliers: Array) -> Array:
+        """The sum of the conditions with these multipliers (4 links,), its small coefficients made none where others
+        can make up for that."""
+        whole = multipliers @ self.basis
+        greatest = float(np.abs(whole).max(initial=0.0)) or 1.0
+        small = np.abs(whole) <= SPARSE_RATIO * greatest
+        left, singular, _ = np.linalg.svd(self.basis[:, small])
+        held = left[:, : len(singular)][:, singular > IDLE_COLUMN]
+        sparse = (multipliers - held @ (held.T @ multipliers)) @ self.basis
+        sparse = np.where(small, 0.0, sparse)
+        is_near = float(np.abs(sparse - whole).max(initial=0.0)) <= 10.0 * SPARSE_RATIO * greatest
+        found: Array = sparse if is_near else whole
+        return found
 
     def margin_of(self, combined: Array) -> tuple[float, float]:
         """By how much a sum of mass parameters is above zero for bodies beside m + I, and its rounding.

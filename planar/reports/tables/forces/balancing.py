@@ -30,12 +30,19 @@ NEGLIGIBLE = 1e-8
 OBJECTIVE_KINDS = {"shaking force": "force", "shaking moment": "torque", "peak torque": "torque"}
 
 
+class Undecided(NamedTuple):
+    """Of one kind of conditions it is not told whether bodies meet them, and why."""
+
+    kind: str
+    reason: str
+
+
 class BalanceReport(NamedTuple):
     """What there is to say of a linkage: its conditions, whether bodies meet them, and of its own masses, where it has
     some, what complete balance needs, the best counterweights, and the tradeoff where it is asked for."""
 
     conditions: BalancingConditions
-    possible: tuple[MassBalance, ...] = ()
+    possible: tuple[MassBalance | Undecided, ...] = ()
     complete: ForceBalance | None = None
     best: Balance | None = None
     tradeoff: BalanceTradeoff | None = None
@@ -80,7 +87,11 @@ def condition_text(condition: Sequence[ConditionTerm], units: FileUnits) -> str:
 def _condition_facts(found: BalanceReport, units: FileUnits) -> Iterator[tuple[str, str]]:
     conditions = found.conditions
     for kind, each in (("force", conditions.force), ("moment", conditions.moment), ("both", conditions.both)):
-        about = {"force": "no shaking force", "moment": f"no moment about {conditions.about_name}", "both": "neither"}
+        about = {
+            "force": "no shaking force",
+            "moment": f"no moment about {conditions.about_name}",
+            "both": "neither of both",
+        }
         sure = "" if each.is_certain else "; a further one is not sure"
         count = f"{each.count} condition{'s' * (each.count != 1)} at any speed{sure}"
         yield about[kind], count
@@ -112,14 +123,20 @@ def _moment_text(value: float, condition: BalanceCondition, units: FileUnits) ->
     return f"{of.from_si(value) * length.from_si(1.0) ** power:.6g} {unit}"
 
 
-def _possible_facts(found: MassBalance, units: FileUnits) -> Iterator[tuple[str, str]]:
+def _possible_facts(found: MassBalance | Undecided, units: FileUnits) -> Iterator[tuple[str, str]]:
     what = {"shaking force": "the force", "shaking moment": "the moment", "both": "both"}[found.kind]
+    if isinstance(found, Undecided):
+        yield f"can bodies balance {what}", f"not told: {found.reason}"
+        return
     if found.is_possible:
         yield f"can bodies balance {what}", "yes, with mass on every link"
         return
     told = "no: for any bodies this sum is above zero, and balance wants it to be zero"
     yield f"can bodies balance {what}", told
-    yield "", condition_text(found.certificate, units)
+    first = next((term for term in found.certificate if term.quantity == "I"), found.certificate[0])
+    terms = [term._replace(coefficient=term.coefficient / abs(first.coefficient)) for term in found.certificate]
+    terms.sort(key=lambda term: (term.link, term.quantity) != (first.link, first.quantity))
+    yield "", condition_text(terms, units)
 
 
 def _complete_facts(found: ForceBalance, units: FileUnits) -> Iterator[tuple[str, str]]:
@@ -178,7 +195,8 @@ def _best_facts(found: Balance, units: FileUnits) -> Iterator[tuple[str, str]]:
     kind = "force" if slides and found.minimised == "peak torque" else OBJECTIVE_KINDS[found.minimised]
     value, bound = (_beside(each, found.value_before, kind, units) for each in (found.value, found.bound))
     borne = ", ".join(found.links)
-    yield "least", f"{found.measure} {found.minimised} {value}, by counterweights on {borne}"
+    rows = f"among {len(found.motion)} positions" if found.measure == "greatest" else "over the motion"
+    yield "least", f"{found.measure} {found.minimised} {rows}: {value}, by counterweights on {borne}"
     if found.is_searched:
         yield "", f"the best discs that were found by search; none within the limits go below {bound}"
     else:
@@ -256,7 +274,9 @@ def _set_record(found: ConditionSet) -> dict[str, Any]:
     }
 
 
-def _possible_record(found: MassBalance) -> dict[str, Any]:
+def _possible_record(found: MassBalance | Undecided) -> dict[str, Any]:
+    if isinstance(found, Undecided):
+        return {"possible": None, "reason": found.reason}
     return {
         "possible": found.is_possible,
         "margin": found.margin if np.isfinite(found.margin) else None,
