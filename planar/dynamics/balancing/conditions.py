@@ -125,7 +125,7 @@ class BalancingConditions:
 
     @cached_property
     def idle_links(self) -> tuple[str, ...]:
-        """The links of which it is the mass alone that shakes, wherever it is centred: those that do not turn."""
+        """The links that do not turn: of these the force depends on the mass alone, wherever it is centred."""
         return tuple(name for name in self._links_without("m x") if name in self._links_without("I", self.both))
 
     @cached_property

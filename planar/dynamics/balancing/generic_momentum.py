@@ -22,8 +22,8 @@ from planar.solving.cycle import cycle
 RUN_STEPS = (37, 53)
 """Steps of the runs whose positions are taken: coprime, so that no function of the input is nought at all of both and
 not everywhere, but for harmonics beyond these."""
-OTHER_SETTINGS, SETTING_RADIUS = 6, 0.3
-"""Positions at which the other inputs stand meanwhile, and how far from the file's (rad, or of a length's size)."""
+OTHER_SETTINGS, SETTING_RADII = 6, (0.3, 0.1, 0.03)
+"""Positions at which the other inputs stand meanwhile, and how far from the file's at most (rad, or of the size)."""
 MAX_CONDITION = 1e5
 """Positions at which velocities are less certain than so are left out: there are others."""
 ROUNDING = 64.0 * float(np.finfo(float).eps)
@@ -92,36 +92,49 @@ def _norm_of_errors(rows: Array, off: Array) -> float:
 
 
 def _generic_motions(mechanism: Mechanism, seed: int) -> Iterator[Motion]:
-    """Runs of every input at unit speed, with the others at rest in random positions."""
+    """Runs of every input at unit speed; where there are others these stand in random positions.
+
+    Where they cannot stand there, or the input not run, nearer positions are tried. Raises NoAnswer where the input
+    does not run from the file's position.
+    """
     random = np.random.default_rng(seed)
-    names = [given.pair for given in mechanism.inputs]
-    for name in names:
-        others = [each for each in names if each != name]
-        for number in range(OTHER_SETTINGS if others else 1):
-            for steps in RUN_STEPS[: 1 if others else None]:
-                moved = _stand_at(mechanism, others, random if number else None)
-                run = tuple(Input(given.pair, given.position, float(given.pair == name)) for given in moved.inputs)
+    for name in [given.pair for given in mechanism.inputs]:
+        if len(mechanism.inputs) == 1:
+            yield from (_run(mechanism, steps, name) for steps in RUN_STEPS)
+            continue
+        yield _run(mechanism, RUN_STEPS[0], name)
+        for _ in range(OTHER_SETTINGS):
+            for radius in SETTING_RADII:
                 try:
-                    yield _run(replace(moved, inputs=run), steps, name)
-                except NoAnswer:
-                    if not number:
-                        raise
+                    offsets = radius * random.uniform(-1.0, 1.0, len(mechanism.inputs))
+                    motion = _run(_moved(mechanism, name, offsets), RUN_STEPS[0], name)
+                except (NoAnswer, BadInput):
+                    continue
+                yield motion
+                break
 
 
 def _run(mechanism: Mechanism, steps: int, name: str) -> Motion:
-    """The motion of an input over its range; of one without ends, over a part of it."""
+    """The motion of an input at unit speed over its range, the others at rest; of one without ends, a part of it."""
+    inputs = tuple(Input(given.pair, given.position, float(given.pair == name)) for given in mechanism.inputs)
+    alone = replace(mechanism, inputs=inputs)
     try:
-        return cycle(mechanism, steps, pair=name)
+        return cycle(alone, steps, pair=name)
     except BadInput:
-        position = next(given.position for given in mechanism.inputs if given.pair == name)
-        reach = mechanism_size(mechanism, shapes_of_links(mechanism)) if has_length_motion(mechanism, name) else 1.0
-        return cycle(mechanism, steps, position, position + reach, name)
+        position = next(given.position for given in inputs if given.pair == name)
+        return cycle(alone, steps, position, position + _input_size(mechanism, name), name)
 
 
-def _stand_at(mechanism: Mechanism, names: list[str], random: np.random.Generator | None) -> Mechanism:
-    """The mechanism with inputs at positions about those of the file."""
-    if random is None:
-        return mechanism
-    places = {given.pair: given.position for given in mechanism.inputs}
-    drives = tuple(Drive(name, places[name] + SETTING_RADIUS * random.uniform(-1.0, 1.0)) for name in names)
+def _moved(mechanism: Mechanism, name: str, offsets: Array) -> Mechanism:
+    """The mechanism with all inputs but one off the positions of the file, by parts of a radian or of its size."""
+    drives = tuple(
+        Drive(given.pair, given.position + float(offset) * _input_size(mechanism, given.pair))
+        for given, offset in zip(mechanism.inputs, offsets, strict=True)
+        if given.pair != name
+    )
     return replace_inputs(mechanism, drives)
+
+
+def _input_size(mechanism: Mechanism, name: str) -> float:
+    """One radian, or at a length the mechanism's size (m)."""
+    return mechanism_size(mechanism, shapes_of_links(mechanism)) if has_length_motion(mechanism, name) else 1.0

@@ -103,6 +103,9 @@ def _condition_facts(found: BalanceReport, units: FileUnits) -> Iterator[tuple[s
     if conditions.free_masses:
         told = ", ".join(conditions.free_masses)
         yield "on pivots", f"{told}: mass times distance counts, not the mass alone"
+    if conditions.idle_links:
+        told = ", ".join(conditions.idle_links)
+        yield "do not turn", f"{told}: for the force the mass alone counts, wherever it is centred"
     for possible in found.possible:
         yield from _possible_facts(possible, units)
     if not found.possible:
