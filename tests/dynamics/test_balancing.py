@@ -71,6 +71,8 @@ def massive_bars() -> Mechanism:
         ("belt-arm", 4, 5),
         ("stephenson-1-six-bar", 6, 13),
         ("open-arm", 6, 9),
+        ("band-drafting-machine", 4, 10),
+        ("planetary-differential", 8, 10),
     ],
 )
 def test_conditions_are_as_many_as_the_rank(model, force, both):

@@ -15,9 +15,10 @@ from planar.equations.mechanism_numbers import mechanism_size, shapes_of_links
 from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput, NoAnswer, Outcome
 from planar.model.link_shapes import LinkShape
-from planar.model.mechanism import Drive, Input, Mechanism, replace_inputs
+from planar.model.mechanism import Drive, Input, Mechanism
 from planar.results.motion import Motion
 from planar.solving.cycle import cycle
+from planar.solving.position import solve
 
 RUN_STEPS = (37, 53)
 """Steps of the runs whose positions are taken: coprime, so that no function of the input is nought at all of both and
@@ -126,13 +127,18 @@ def _run(mechanism: Mechanism, steps: int, name: str) -> Motion:
 
 
 def _moved(mechanism: Mechanism, name: str, offsets: Array) -> Mechanism:
-    """The mechanism with all inputs but one off the positions of the file, by parts of a radian or of its size."""
+    """The mechanism with all inputs but one off the positions of the file, by parts of a radian or of its size.
+
+    It goes there along its branch, and its sketch is where it then stands.
+    """
     drives = tuple(
         Drive(given.pair, given.position + float(offset) * _input_size(mechanism, given.pair))
         for given, offset in zip(mechanism.inputs, offsets, strict=True)
         if given.pair != name
     )
-    return replace_inputs(mechanism, drives)
+    state = solve(mechanism, drives)
+    sketch = tuple((name, float(at.position[0]), float(at.position[1])) for name, at in state.points.items())
+    return replace(state.mechanism, sketch=sketch)
 
 
 def _input_size(mechanism: Mechanism, name: str) -> float:
