@@ -19,6 +19,8 @@ from planar.foundation.errors import NoAnswer, Outcome
 LIGHTEST_SLACKS = (1e-9, 1e-8, 1e-7)
 """Of what it is without counterweights: by so much more the lightest of the best may leave, tried one after the other:
 the smaller the harder for the solver."""
+LEAST_LIMIT = 1e-9
+"""Of what a counterweight at its limits does: no limit of a response is smaller."""
 ROUNDING = 1e-12
 """Of the greatest part of a sum: what is less is none."""
 INERTIA_WEIGHT = 1e-3
@@ -68,7 +70,7 @@ def minimise_greatest(
     Of those that do so the lightest. Raises NoAnswer where none keep to the limits, or the solver does not get there.
     """
     mine = objective.restricted(weights)
-    others = [(each.restricted(weights), limit) for each, limit in limits]
+    others = [_limited(each.restricted(weights), limit) for each, limit in limits]
     nothing = np.zeros(4 * len(weights.links))
     scale = mine.greatest(nothing)
     # beside what the masses, and the greatest counterweights, do
@@ -81,7 +83,7 @@ def minimise_greatest(
     blocks = [
         *weights.cone_blocks(count + 1),
         _size_block(mine, scale, count, None),
-        *(_size_block(each, limit or scale, count, 1.0) for each, limit in others),
+        *(_size_block(each, limit, count, 1.0) for each, limit in others),
     ]
     found = solve_cone_program(cost, blocks)
     if not found.is_solved:
@@ -92,6 +94,11 @@ def minimise_greatest(
     lighter = _lightest(mine, mine.greatest(x), scale, others, weights)
     x = x if lighter is None else lighter
     return Optimum(x, mine.greatest(x), bound)
+
+
+def _limited(response: Response, limit: float) -> tuple[Response, float]:
+    """A response with its limit, which is no smaller than rounding of what the greatest counterweights do."""
+    return response, max(limit, LEAST_LIMIT * float(np.abs(response.matrix).max(initial=0.0)), 1e-300)
 
 
 def _lightest(
@@ -108,11 +115,11 @@ def _lightest(
             [
                 *weights.cone_blocks(count),
                 _size_block(mine, scale, count - 1, value / scale + slack),
-                *(_size_block(each, limit or scale, count - 1, 1.0) for each, limit in others),
+                *(_size_block(each, limit, count - 1, 1.0) for each, limit in others),
             ],
         )
         x = found.x[: 4 * links]
-        within = all(each.greatest(x) <= (limit or scale) * (1.0 + slack) for each, limit in others)
+        within = all(each.greatest(x) <= limit * (1.0 + slack) for each, limit in others)
         if found.is_solved and within and mine.greatest(x) <= value + 2.0 * slack * scale:
             return x
     return None
@@ -149,7 +156,7 @@ def _dual_bound(
     for vector, response, unit, limit in zip(
         vectors,
         [mine, *(each for each, _ in others)],
-        [scale, *((limit or scale) for _, limit in others)],
+        [scale, *(limit for _, limit in others)],
         [0.0, *(limit for _, limit in others)],
         strict=True,
     ):
