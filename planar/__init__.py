@@ -54,6 +54,17 @@ if TYPE_CHECKING:
     from planar.document.dimensions import dimensions
     from planar.document.files import dumps, from_dict, load, loads, to_dict
     from planar.document.schema import schema
+    from planar.dynamics.balancing.balance import Balance, BalanceTradeoff, Shaking, balance, balance_tradeoff
+    from planar.dynamics.balancing.conditions import (
+        BalanceCondition,
+        BalancingConditions,
+        ConditionSet,
+        ConditionTerm,
+        balancing_conditions,
+    )
+    from planar.dynamics.balancing.counterweights import Counterweight, CounterweightLimit
+    from planar.dynamics.balancing.force_balance import ForceBalance, force_balance
+    from planar.dynamics.balancing.positive_masses import MassBalance, mass_balance
     from planar.dynamics.flywheel import Flywheel, flywheel
     from planar.dynamics.forces import Forces, PairFriction, forces
     from planar.dynamics.friction.holding import Holding, holding
@@ -112,6 +123,10 @@ __all__ = [
     "Area",
     "At",
     "BadInput",
+    "Balance",
+    "BalanceCondition",
+    "BalanceTradeoff",
+    "BalancingConditions",
     "BaseCircle",
     "BeltPair",
     "Branch",
@@ -124,10 +139,14 @@ __all__ = [
     "ChainPair",
     "Circuit",
     "Circuits",
+    "ConditionSet",
+    "ConditionTerm",
     "Conflict",
     "ConstantAccelerationSegment",
     "ConstantSpeedSegment",
     "ContactForce",
+    "Counterweight",
+    "CounterweightLimit",
     "Course",
     "Curvature",
     "CycloidalRise",
@@ -140,6 +159,7 @@ __all__ = [
     "Extremes",
     "FileUnits",
     "Flywheel",
+    "ForceBalance",
     "ForceMap",
     "Forces",
     "Friction",
@@ -166,6 +186,7 @@ __all__ = [
     "MarkedValue",
     "Marks",
     "Mass",
+    "MassBalance",
     "Mechanism",
     "Mobility",
     "Mode",
@@ -194,6 +215,7 @@ __all__ = [
     "RelativeState",
     "RubbingPair",
     "Sensitivity",
+    "Shaking",
     "Simulation",
     "SlidingPair",
     "SlotPair",
@@ -220,6 +242,9 @@ __all__ = [
     "advantage_over",
     "answers",
     "area",
+    "balance",
+    "balance_tradeoff",
+    "balancing_conditions",
     "build",
     "cam_profile",
     "centre_of",
@@ -236,6 +261,7 @@ __all__ = [
     "dwells",
     "extremes",
     "flywheel",
+    "force_balance",
     "force_map",
     "forces",
     "from_dict",
@@ -249,6 +275,7 @@ __all__ = [
     "load",
     "loads",
     "mark_answers",
+    "mass_balance",
     "mobility",
     "modes",
     "motor_duty",

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from planar.assemblies.circuits.circuits import Circuits
     from planar.assemblies.modes import Modes
     from planar.drawing.polygons.panels import ScaleTexts
+    from planar.dynamics.balancing.balance import Balance, BalanceTradeoff
     from planar.dynamics.forces import Forces
     from planar.dynamics.simulation import Simulation
     from planar.model.mechanism import Mechanism
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
 __all__ = [
     "acceleration",
     "animate",
+    "balance",
     "bearings",
     "cam_profile",
     "centres",
@@ -294,6 +296,17 @@ def two_directions(state: State, link: str, points: Sequence[str] | None = None,
 
     given = parse_scales(scale, units=state.mechanism.units)
     return draw_pictures([directions_picture(state, link, points, given.get("length"), given.get("velocity"))])
+
+
+@takes_result("Balance")
+def balance(found: Balance, tradeoff: BalanceTradeoff | None = None) -> Figure:
+    """What shakes the frame before and after balancing: a polar diagram of the force, the moment, the input's effort.
+
+    With `tradeoff`, as `planar.balance_tradeoff` gives it, also the least moment over the force.
+    """
+    from planar.drawing.forces.shaking import balance_pictures
+
+    return draw_pictures(balance_pictures(found, tradeoff), found.motion.mechanism.name)
 
 
 @takes_result("Motion", "Mechanism")

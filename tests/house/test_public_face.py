@@ -10,6 +10,7 @@ import sys
 import tomllib
 from concurrent.futures import ProcessPoolExecutor
 from importlib import import_module
+from importlib.util import find_spec
 from multiprocessing import get_context
 from pathlib import Path
 
@@ -80,6 +81,15 @@ def results():
     yield from ((rubbed := planar.simulate("stick-slip", 0.1, steps=1)).friction_events[0], rubbed.rubbing["block"])
     yield planar.unknown_load(planar.solve("balanced-lamp"), "springs.0")
     yield planar.motor_duty(planar.forces(planar.solve("motor-press")))
+    yield from (
+        conditions := planar.balancing_conditions(engine),
+        conditions.force,
+        one := conditions.force.conditions[0],
+    )
+    yield from (one.terms[0], planar.CounterweightLimit(1.0, 0.05), planar.force_balance(engine))
+    if find_spec("clarabel"):
+        yield from (best := planar.balance(run), best.before, best.counterweights[0], planar.mass_balance(engine))
+        yield planar.balance_tradeoff(run, ["crank", "rod"], count=2)
     yield from (planar.cam_profile("valve-cam"), planar.least_base_circle("valve-cam"))
     yield planar.contact_forces(planar.forces(planar.solve("cam-with-spring")))["lift"]
     yield from (swept, swept[0], prepared, prepared())
@@ -176,7 +186,7 @@ def function_of_cams(name):
 @pytest.mark.parametrize("name", sorted(of_mechanism()))
 def test_a_path_or_a_models_name_is_a_mechanism(name, tmp_path):
     path = tmp_path / "m.json"
-    model = "valve-cam" if function_of_cams(name) else "four-bar"
+    model = "valve-cam" if function_of_cams(name) else "two-stroke-engine" if "balance" in name else "four-bar"
     path.write_text(json.dumps(write_mechanism(planar.load(model))))
     function = FUNCTIONS[name]
     first = next(iter(inspect.signature(function).parameters))

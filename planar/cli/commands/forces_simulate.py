@@ -110,7 +110,7 @@ def forces(
     refuse_overwriting(model, output)
     require_loads(mechanism)
     if over is not None:
-        from planar.cli.force_map import show_force_map
+        from planar.cli.commands.force_map import show_force_map
 
         steps = int(course["steps"]) if _is_given("steps") else None
         show_force_map(mechanism, over, steps, taken, as_json, output)

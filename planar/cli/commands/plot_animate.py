@@ -140,7 +140,7 @@ def plot(  # many: options of a command; # long: each has its line
         _refuse_range(what, pair, start, stop)
         if what in MAP_DRAWINGS:
             from planar.analysis.force_maps.force_map import force_map
-            from planar.cli.force_map import parse_ranges
+            from planar.cli.commands.force_map import parse_ranges
 
             names = over or ",".join(given.pair for given in mechanism.inputs[:2])
             drawn.save(drawn.force_map(force_map(mechanism, parse_ranges(mechanism, names, None)), of), output)
