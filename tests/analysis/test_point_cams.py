@@ -1,11 +1,13 @@
 """Cams whose profile is given by points: laws that come back, closed forms, and the first contact by brute force."""
 
-from math import cos, degrees, pi, radians, sin, sqrt
+from math import cos, pi, radians, sin, sqrt
 
 import numpy as np
 import pytest
 
 import planar
+from planar.document.dimensions import with_values
+from planar.equations.mechanism_numbers import shapes_of_links
 from tests.cams import FOLLOWERS, cam_document
 
 every_follower = pytest.mark.parametrize("follower", FOLLOWERS)
@@ -77,12 +79,18 @@ def test_the_first_contact_is_that_of_brute_force(follower, seed):
     """Of thousands of points of the curve the highest that the follower's face meets, by its own geometry."""
     rng = np.random.default_rng(seed)
     flat = follower.endswith("flat")
-    mechanism = point_cam(follower, lobes(rng, 0.6 if flat else 1.0, 0.0 if flat else 9.0), **({} if flat else {"roller_radius": 14}))
+    mechanism = point_cam(
+        follower, lobes(rng, 0.6 if flat else 1.0, 0.0 if flat else 9.0), **({} if flat else {"roller_radius": 14})
+    )
     cam = mechanism.pairs[2]
     assert flat == (not mechanism.remarks)  # over hollows the contact jumps
     outline = cam.profile_by_points.outline(20001)
+    shapes = shapes_of_links(mechanism)
+    lift = cam.profile_by_points.solved(cam._follower_rest([shapes[body] for body in cam.bodies]))
+    tolerance = 2e-8 + lift.deviation * (0.09 if follower.startswith("swinging") else 1.0)  # m, of an arm of 80 mm
+    assert tolerance < 6e-7
     for angle in rng.uniform(0.0, 2.0 * pi, 12):
-        state = planar.solve(mechanism, {"O": angle})
+        state = planar.solve(with_values(mechanism, {"O.position": angle}))  # not followed from another angle
         turned = complex(cos(angle), sin(angle)) * (outline[:, 0] + 1j * outline[:, 1])
         middle = complex(*state.point("P").position)
         if flat:
@@ -91,7 +99,7 @@ def test_the_first_contact_is_that_of_brute_force(follower, seed):
             gap = ((middle - turned) * np.conj(normal)).real
         else:
             gap = np.abs(turned - middle) - 0.014
-        assert gap.min() == pytest.approx(0.0, abs=2e-8)
+        assert gap.min() == pytest.approx(0.0, abs=tolerance)
 
 
 @every_follower
@@ -114,3 +122,9 @@ def test_velocities_are_those_of_differences_and_batches_say_the_same(follower):
         np.testing.assert_allclose(other.point("P").position, single.point("P").position, atol=1e-15)
     run = planar.prepared(mechanism, steps=36)()
     np.testing.assert_allclose(run.position["P"], single.point("P").position, atol=1e-13)
+
+
+@pytest.mark.xfail(strict=True, raises=AssertionError, reason="the follower is not followed over jumps")
+def test_a_sliding_follower_beside_the_centre_goes_on_where_the_contact_jumps():
+    points = lobes(np.random.default_rng(1), 1.0, 9.0)
+    assert "branch lost" not in repr(planar.cycle(point_cam("roller", points, roller_radius=14), steps=36))

@@ -54,8 +54,8 @@ class CamPair(ProfiledPair):
         ),
         "profile": described(
             PROFILE_SCHEMA,
-            "in place of a law: points of a smooth closed profile, anticlockwise in the cam's axes from its centre; the "
-            "follower goes by its first contact",
+            "in place of a law: points of a smooth closed profile, anticlockwise in the cam's axes from its centre; "
+            "the follower goes by its first contact",
         ),
         "line": described(
             LINE_SCHEMA, "of a sliding follower: the line in the carrier along which its point is lifted"
@@ -109,7 +109,9 @@ class CamPair(ProfiledPair):
             {"required": ["noses"], "not": {"anyOf": [{"required": ["start"]}, {"required": ["clockwise"]}]}},
             {
                 "required": ["profile"],
-                "not": {"anyOf": [{"required": [key]} for key in ("start", "clockwise", "base_radius", "flank_radius")]},
+                "not": {
+                    "anyOf": [{"required": [key]} for key in ("start", "clockwise", "base_radius", "flank_radius")]
+                },
             },
         ],
     }
@@ -222,7 +224,8 @@ class CamPair(ProfiledPair):
         else:
             from planar.model.pairs.cams.arc_lift import write_noses  # which few files have
 
-            entry |= write_noses(pair.law, quantity)
+            circles: Any = pair.law
+            entry |= write_noses(circles, quantity)
         if pair.start != 0.0:
             entry["start"] = quantity(pair.start, "angle")
         if pair.clockwise:
@@ -320,7 +323,9 @@ def _read_law(entry: EntryReader, kind: str, shape: CamShape | None) -> LiftLaw 
             raise entry.error_at(key, f"the {given} of a cam stand in its own axes; leave {key!r} out")
     if entry.has("profile"):
         if entry.has("flank_radius"):
-            raise entry.error_at("flank_radius", "flanks are between 'noses'; a profile goes smoothly through its points")
+            raise entry.error_at(
+                "flank_radius", "flanks are between 'noses'; a profile goes smoothly through its points"
+            )
         from planar.model.pairs.cams.profile_lift import read_profile  # which few files have
 
         return read_profile(entry, "profile")

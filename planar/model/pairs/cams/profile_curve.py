@@ -33,7 +33,10 @@ class ProfileCurve(NamedTuple):
         k = np.clip(np.searchsorted(self.knots, value - turns, side="right") - 1, 0, len(self.knots) - 2)
         way = parameter - (turns + self.knots[k])
         a = self.coefficients[:, k]
-        x, y = (((a[3, ..., axis] * way + a[2, ..., axis]) * way + a[1, ..., axis]) * way + a[0, ..., axis] for axis in (0, 1))
+        x, y = (
+            ((a[3, ..., axis] * way + a[2, ..., axis]) * way + a[1, ..., axis]) * way + a[0, ..., axis]
+            for axis in (0, 1)
+        )
         return x, y
 
     def samples(self, per_chord: int = SAMPLES_PER_CHORD) -> Array:
@@ -130,7 +133,7 @@ def _find_crossing(curve: ProfileCurve) -> int | None:
 
 
 def find_hollow(points: tuple[tuple[float, float], ...]) -> tuple[int, float] | None:
-    """The number of the point nearest to where a profile is hollow most, and its angle (deg); None where it is convex."""
+    """The number of the point where a profile is hollow most, about, and its angle (deg); None where it is convex."""
     curve = profile_curve(points)
     at = curve.samples()
     bend = curve.curvature(at)

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import pairwise
 from math import degrees, pi
 from typing import Any, NamedTuple
 
@@ -19,7 +20,7 @@ from planar.foundation.geometry import Vector
 from planar.foundation.jets import Jet, Scalar, TermSizes, value_between, within_turn
 from planar.model.pairs.base import EntryReader, MeasureKind, QuantityWriter
 from planar.model.pairs.cams import FollowerAxes, FollowerFace, FollowerRest
-from planar.model.pairs.cams.first_contact import ANGLES, ContactMotion, FirstContact
+from planar.model.pairs.cams.first_contact import ContactMotion, FirstContact
 from planar.model.pairs.cams.lift_law import LiftPiece
 from planar.model.pairs.cams.profile_curve import (
     find_hollow,
@@ -33,6 +34,10 @@ HEAD = 4
 """Numbers before those of the pieces: where the first starts, and the greatest lift, first and second derivative."""
 PIECE = 8
 """Numbers of a piece: where it starts, the inverse of its length, six coefficients."""
+COARSE_PIECES = 24
+"""Of these over a turn, before the worst are halved."""
+COMPARED_PARTS = (0.2, 0.5, 0.8)
+"""Of a piece, where it is compared with the contact."""
 TOLD_PIECES = 12
 """Parts of a turn of which something is told, beside where the contact jumps."""
 
@@ -46,6 +51,15 @@ class ContactJump(NamedTuple):
     end: tuple[float, float]
     rate_before: float
     rate_after: float
+
+
+class _Pieces(NamedTuple):
+    """Polynomials from `start` to `stop` (n,), their `coefficients` (6, n) and how far they are off (n,)."""
+
+    start: Array
+    stop: Array
+    coefficients: Array
+    deviation: Array
 
 
 class SolvedLift(NamedTuple):
@@ -85,7 +99,15 @@ class ProfileLift:
         """The numbers of `lift`; not a number where the follower cannot go round."""
         axes, face, base = rest
         keys = (axes.line is not None, face.normal is not None, axes.side)
-        given = [*axes.centre, *axes.origin, *(axes.line or ()), *axes.arm, face.roller_radius, *(face.normal or ()), base]
+        given = [
+            *axes.centre,
+            *axes.origin,
+            *(axes.line or ()),
+            *axes.arm,
+            face.roller_radius,
+            *(face.normal or ()),
+            base,
+        ]
         points = [part for point in self.points for part in point]
         many = len(given)
 
@@ -98,7 +120,15 @@ class ProfileLift:
         """The lift with what is to be said of it, of plain numbers."""
         axes, face, base = rest
         keys = (axes.line is not None, face.normal is not None, axes.side)
-        given = [*axes.centre, *axes.origin, *(axes.line or ()), *axes.arm, face.roller_radius, *(face.normal or ()), base]
+        given = [
+            *axes.centre,
+            *axes.origin,
+            *(axes.line or ()),
+            *axes.arm,
+            face.roller_radius,
+            *(face.normal or ()),
+            base,
+        ]
         return _solve_lift(_floats(self.points), keys, tuple(map(float, given)), self.piece_count)
 
     def lift(self, angle: Scalar, numbers: Sequence[Scalar]) -> Scalar:
@@ -125,10 +155,12 @@ class ProfileLift:
         solved = self.solved(rest)
         jumps = [jump.angle for jump in solved.jumps]
         first = jumps[0] if jumps else 0.0
-        ends = sorted({*(jump - first for jump in jumps), *(2.0 * pi * k / TOLD_PIECES for k in range(TOLD_PIECES + 1))})
+        ends = sorted(
+            {*(jump - first for jump in jumps), *(2.0 * pi * k / TOLD_PIECES for k in range(TOLD_PIECES + 1))}
+        )
         return [
             LiftPiece("profile", first + start, first + stop, True)
-            for start, stop in zip(ends, ends[1:], strict=False)
+            for start, stop in pairwise(ends)
             if stop - start > 1e-9
         ]
 
@@ -172,7 +204,7 @@ def _select_piece(at: Scalar, pieces: Sequence[Scalar]) -> list[Scalar]:
     starts = pieces[::PIECE]
     value = at.parts[0] if isinstance(at, Jet) else at
     if isinstance(value, float | complex | np.ndarray) and all(isinstance(each, float) for each in pieces):
-        k = np.searchsorted(np.array(starts[1:]), np.real(value), side="right")
+        k = np.searchsorted(np.array(starts[1:]), np.asarray(np.real(value)), side="right")
         return list(np.array(pieces).reshape(-1, PIECE).T[:, k])
     ends = [*starts[1:], None]
     flags = [
@@ -180,7 +212,10 @@ def _select_piece(at: Scalar, pieces: Sequence[Scalar]) -> list[Scalar]:
         for k, (start, end) in enumerate(zip(starts, ends, strict=True))
     ]
     return [
-        sum((flag * each for flag, each in zip(flags[1:], pieces[k + PIECE :: PIECE], strict=True)), flags[0] * pieces[k])
+        sum(
+            (flag * each for flag, each in zip(flags[1:], pieces[k + PIECE :: PIECE], strict=True)),
+            flags[0] * pieces[k],
+        )
         for k in range(PIECE)
     ]
 
@@ -213,55 +248,51 @@ def _solve_lift(
 
 
 def _fit_pieces(contact: FirstContact, motion: ContactMotion, pieces: int) -> SolvedLift:
-    """The polynomials between and at the ends of pieces, as many to each stretch without jumps as its length is worth."""
-    stretches = list(_stretches(motion))
-    length = np.array([stretch[1] for stretch in stretches])
-    share = np.maximum(1, np.floor(length / (2.0 * pi) * (pieces - len(stretches)))).astype(int)
-    while share.sum() < pieces:
-        share[int(np.argmax(length / share))] += 1
-    first = stretches[0][0]
-    starts: list[Array] = []
-    coefficients: list[Array] = []
-    off, ends = 0.0, []
-    for (begin, whole, known, ways), parts in zip(stretches, share.tolist(), strict=True):
-        part = np.linspace(0.0, whole, 2 * parts + 1)
-        _, rates = contact.rates(begin + part, np.interp(part, known, ways))
-        step = whole / parts
-        scaled = np.stack([rates.lift, rates.first * step, rates.second * step * step])
-        found = _hermite_coefficients(scaled[:, :-1:2], scaled[:, 2::2])
-        between = sum(found[k] * 0.5**k for k in range(6))
-        off = max(off, float(np.abs(between - scaled[0, 1::2]).max()))
-        starts.append(begin - first + part[:-1:2])
-        coefficients.append(found)
-        ends.append((rates.first[0], rates.first[-1]))
-    start, table = np.concatenate(starts), np.concatenate(coefficients, axis=1)
-    stop = np.append(start[1:], 2.0 * pi)
-    rates = contact.rates(motion.angles, motion.parameters)[1]
+    """The polynomials: a coarse division, then always the pieces halved that are off most."""
+    first = float(motion.jump_angles[0]) if len(motion.jump_angles) else 0.0
+    fixed = np.append(motion.jump_angles - first if len(motion.jump_angles) else [0.0], 2.0 * pi)
+    joints = [
+        low + (high - low) * k / n for low, high in pairwise(fixed) for n in [_coarse(high - low)] for k in range(n)
+    ]
+    made = _make_pieces(contact, motion, first, np.array(joints), np.append(joints[1:], 2.0 * pi))
+    while len(made.start) < pieces:
+        count = min(pieces - len(made.start), max(1, len(made.start) // 4))
+        worst = np.argsort(made.deviation)[len(made.start) - count :]
+        middle = 0.5 * (made.start + made.stop)[worst]
+        kept = _Pieces(*(np.delete(each, worst, axis=-1) for each in made))
+        ends = np.concatenate([middle, made.stop[worst]])
+        halves = _make_pieces(contact, motion, first, np.concatenate([made.start[worst], middle]), ends)
+        made = _Pieces(*(np.concatenate(each, axis=-1) for each in zip(kept, halves, strict=True)))
+    made = _Pieces(*(each[..., np.argsort(made.start)] for each in made))
+    rates = contact.rates(motion.angles, motion.parameters)
     sizes = [float(np.abs(rate).max()) for rate in rates]
-    if not np.isfinite(table).all():
+    if not np.isfinite(made.coefficients).all():
         return SolvedLift((float("nan"),) * (HEAD + PIECE * pieces), 0.0, (), "the contact has no acceleration")
-    rows = np.vstack([start, 1.0 / (stop - start), table])
-    return SolvedLift((first, *sizes, *rows.T.ravel().tolist()), off, tuple(_jumps(contact, motion, ends)), "")
+    rows = np.vstack([made.start, 1.0 / (made.stop - made.start), made.coefficients])
+    off = float(made.deviation.max())
+    return SolvedLift((first, *sizes, *rows.T.ravel().tolist()), off, tuple(_jumps(contact, motion)), "")
 
 
-def _stretches(motion: ContactMotion) -> Iterator[tuple[float, float, Array, Array]]:
-    """Where the contact goes on without a jump: the angle at which that begins, how far it goes (rad), and at known
-    angles from there (n,) the parameters of the curve (n,), about."""
-    whole = 2.0 * pi
-    if not len(motion.jump_angles):
-        ways = np.append(motion.parameters, motion.parameters[0])
-        yield 0.0, whole, np.append(motion.angles, whole), ways
-        return
-    count = len(motion.jump_angles)
-    for k in range(count):
-        begin, stop = float(motion.jump_angles[k]), float(motion.jump_angles[(k + 1) % count])
-        stop += whole if k == count - 1 else 0.0
-        first = int(motion.jump_after[k]) + 1
-        last = int(motion.jump_after[(k + 1) % count]) + (ANGLES if k == count - 1 else 0)
-        rows = np.arange(first, last + 1)
-        known = np.concatenate([[0.0], rows * (whole / ANGLES) - begin, [stop - begin]])
-        ways = np.concatenate([[motion.after[k]], motion.parameters[rows % ANGLES], [motion.before[(k + 1) % count]]])
-        yield begin, stop - begin, known, ways
+def _coarse(length: float) -> int:
+    """Pieces over an angle to begin with."""
+    return max(1, round(length / (2.0 * pi) * COARSE_PIECES))
+
+
+def _make_pieces(contact: FirstContact, motion: ContactMotion, first: float, start: Array, stop: Array) -> _Pieces:
+    """Polynomials between angles from the first; jumps have their contacts before and after."""
+    step = stop - start
+    ways = [contact.parameters(first + angle) for angle in (start, stop)]
+    for angle, before, after in zip(motion.jump_angles - first, motion.before, motion.after, strict=True):
+        ways[0] = np.where(start == angle, after, ways[0])
+        ways[1] = np.where((stop == angle) | (stop == angle + 2.0 * pi), before, ways[1])
+    ends = [contact.rates(first + angle, way) for angle, way in zip((start, stop), ways, strict=True)]
+    scaled = [np.stack([rates.lift, rates.first * step, rates.second * step * step]) for rates in ends]
+    found, off = _hermite_coefficients(*scaled), np.zeros_like(start)
+    for part in COMPARED_PARTS:
+        at = first + start + part * step
+        wanted = contact.rates(at, contact.parameters(at)).lift
+        off = np.maximum(off, np.abs(sum(found[k] * part**k for k in range(6)) - wanted))
+    return _Pieces(start, stop, found, off)
 
 
 def _hermite_coefficients(start: Array, stop: Array) -> Array:
@@ -281,19 +312,23 @@ def _hermite_coefficients(start: Array, stop: Array) -> Array:
     )
 
 
-def _jumps(contact: FirstContact, motion: ContactMotion, ends: Sequence[tuple[float, float]]) -> Iterator[ContactJump]:
-    for k, angle in enumerate(motion.jump_angles.tolist()):
-        (x0, y0), (x1, y1) = (contact.curve.at(np.array(way)) for way in (motion.before[k], motion.after[k]))
-        yield ContactJump(
-            angle, (float(x0), float(y0)), (float(x1), float(y1)), float(ends[k - 1][1]), float(ends[k][0])
-        )
+def _jumps(contact: FirstContact, motion: ContactMotion) -> Iterator[ContactJump]:
+    ends = [contact.rates(motion.jump_angles, ways).first.tolist() for ways in (motion.before, motion.after)]
+    points = [
+        list(zip(*(each.tolist() for each in contact.curve.at(way)), strict=True))
+        for way in (motion.before, motion.after)
+    ]
+    for angle, start, end, before, after in zip(motion.jump_angles.tolist(), *points, *ends, strict=True):
+        yield ContactJump(angle, start, end, before, after)
 
 
 def jump_remarks(name: str, jumps: Sequence[ContactJump]) -> Iterator[str]:
     """What is to be said of a cam whose follower goes over hollows."""
     if not jumps:
         return
-    told = f"the follower of cam {name!r} goes over a hollow: at {degrees(jumps[0].angle):.6g} deg of the cam the contact"
+    told = (
+        f"the follower of cam {name!r} goes over a hollow: at {degrees(jumps[0].angle):.6g} deg of the cam the contact"
+    )
     more = f"; so it does at {len(jumps) - 1} more angles" if len(jumps) > 1 else ""
     yield f"{told} jumps along the profile, and the follower's speed with it{more}"
 

@@ -40,8 +40,9 @@ SHAPE_KEYS = ("centre", "base_radius", "roller_radius", "flat", "pivot", "side",
 
 class CamShape(NamedTuple):
     """What makes a profile of a law: the cam's `centre` (a point of cam and carrier), its base circle (m; 0 where that
-    follows from the points of a profile), and the follower's face: a roller's radius (m; 0: a point), or, where it is flat, the angle of its normal away from the cam
-    (rad): to the line of a sliding follower, to the x-axis of a swinging one.
+    follows from the points of a profile), and the follower's face: a roller's radius (m; 0: a point), or, where it is
+    flat, the angle of its normal away from the cam (rad): to the line of a sliding follower, to the x-axis of a
+    swinging one.
 
     A swinging follower turns about `pivot`, a point of it and of the carrier, and lies to the left or right (`side`)
     of the way from there to the cam's centre. A `grooved` cam, as a pair of conjugate ones, holds it both ways.
@@ -179,7 +180,9 @@ class ProfiledPair(Pair):
             return self.law.lift_pieces()
         if self.profile_by_points is not None:
             return self.profile_by_points.lift_pieces(self._follower_rest(shapes))
-        return self.law.lift_pieces(self.law_numbers(shapes))
+        circles: Any = self.law
+        found: list[LiftPiece] = circles.lift_pieces(self.law_numbers(shapes))
+        return found
 
     def contact(self, shapes: Sequence[LinkShape], law_angle: Scalar) -> CamContact | None:
         """Where cam and follower touch at an angle of the law (rad), seen from the carrier; None without a shape."""
