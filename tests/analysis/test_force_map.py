@@ -77,6 +77,45 @@ def test_a_force_that_stays_finite_at_a_dead_point_has_a_bound():
     assert [each.value for each in own] == pytest.approx([50.0, 50.0])
 
 
+def five_bar(lengths, at, force, sense):
+    """Cranks OA and PD, bars AC and CD, a force at C; C to the left of the way from A to D for a sense of 1."""
+    a, b, c, d, ground = lengths
+    first, second = complex(0.0, 0.0) + a * np.exp(1j * at[0]), ground + d * np.exp(1j * at[1])
+    way = second - first
+    along = (abs(way) ** 2 + b**2 - c**2) / (2.0 * abs(way))
+    corner = first + way / abs(way) * complex(along, sense * np.sqrt(b**2 - along**2))
+    links = {"f": {"points": {"O": [0, 0], "P": [ground, 0]}}}
+    named = zip("abcd", ("OA", "AC", "CD", "PD"), lengths[:4], strict=True)
+    links |= {name: {"ends": list(ends), "length": length} for name, ends, length in named}
+    sketch = {name: [z.real, z.imag] for name, z in (("A", first), ("C", corner), ("D", second))}
+    inputs = [{"pair": name, "position": position} for name, position in zip("OP", at, strict=True)]
+    pairs = [{"turning": name} for name in "OPACD"]
+    value = {"planar": 1, "name": "five-bar", "frame": "f", "links": links, "pairs": pairs, "inputs": inputs}
+    return planar.from_dict(value | {"loads": [{"point": "C", "force": list(force)}], "sketch": sketch})
+
+
+def worst(found, kind, of):
+    return next(each for each in found.worst if (each.kind, each.of) == (kind, of))
+
+
+def test_growth_that_begins_between_two_lines_of_the_grid_is_found():
+    lengths = (0.45347102170475334, 1.0885012032657382, 0.9113251906884169, 0.6988839743156844, 0.9553214933874714)
+    bars = five_bar(lengths, (-0.6664714561253771, -2.189420969865533), (54.08455846858077, 21.46591225063409), 1.0)
+    over = {"O": (-1.3873481052543437, -0.4048159790246413, 23), "P": (-3.2303209647192714, -1.8614831752893353, 23)}
+    found = worst(planar.force_map(bars, over), "greatest effort", "P")
+    assert found.is_unbounded
+    assert found.at["O"] == pytest.approx(-1.15266, abs=0.1)
+
+
+def test_the_greatest_of_two_tops_is_told():
+    lengths = (0.5832112825248865, 0.7991849382835157, 0.5225518996188554, 0.6896120012136783, 0.8464475129223028)
+    bars = five_bar(lengths, (0.04753596573440477, 1.7444613143761192), (65.86355550421837, 43.90936380317561), -1.0)
+    over = {"O": (-0.4085655638407162, 1.8404455396917179, 29), "P": (1.263818161226, 1.9436578062326952, 29)}
+    found = worst(planar.force_map(bars, over), "greatest effort", "P")
+    assert found.value == pytest.approx(34.557, abs=1e-3)
+    assert found.at["O"] == pytest.approx(0.6676, abs=1e-3)
+
+
 def test_what_is_asked_amiss_is_refused():
     with pytest.raises(BadInput, match="no input"):
         planar.force_map("excavator-arm", ["bucket"])

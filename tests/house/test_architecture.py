@@ -53,7 +53,7 @@ LIBRARIES = {
     "clarabel": {"dynamics"},
     "flint": {"assemblies"},
     "llvmlite": {"codegen"},
-    "scipy": {"dynamics", "model"},
+    "scipy": {"analysis", "dynamics", "model"},
     "pint": {"foundation"},
     "rich": {"cli", "reports"},
     "contourpy": {"drawing"},

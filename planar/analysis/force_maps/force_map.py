@@ -152,17 +152,26 @@ def _read_ranges(mechanism: Mechanism, over: Mapping[str, Range] | Sequence[str]
     for name, limits in given.items():
         if name not in names:
             raise BadInput("over", f"{name!r} is no input; inputs are at {join_names(names)}")
-        if isinstance(limits, tuple):
-            start, stop, *count = limits
-        else:
-            (start, stop), count = _whole_range(mechanism, name), [] if limits is None else [limits]
-        many = int(count[0]) if count else usual
-        if many < 2 or not np.isfinite([start, stop]).all() or start == stop:
-            raise BadInput(f"over[{name!r}]", "give (start, stop, count): two positions that differ, and 2 or more")
-        found[name] = np.linspace(float(start), float(stop), many)
+        found[name] = np.linspace(*_read_range(mechanism, name, limits, usual))
     if prod(map(len, found.values())) > MAX_POSITIONS:
         raise BadInput("over", f"{prod(map(len, found.values()))} positions are more than {MAX_POSITIONS}")
     return found
+
+
+def _read_range(mechanism: Mechanism, name: str, limits: Range, usual: int) -> tuple[float, float, int]:
+    """The first and the last position of an input, and how many. Raises BadInput."""
+    wanted = f"give (start, stop, count) for {name!r}: two positions that differ (rad, m), and a whole number from 2 on"
+    given = list(limits) if isinstance(limits, list | tuple) else [] if limits is None else [limits]
+    if len(given) < 2:
+        given = [*_whole_range(mechanism, name), *given]
+    try:
+        start, stop, count = *(float(each) for each in given[:2]), float(given[2] if len(given) > 2 else usual)
+    except (TypeError, ValueError):
+        raise BadInput("over", wanted) from None
+    is_range = np.isfinite([start, stop]).all() and start != stop and len(given) <= 3
+    if not is_range or count < 2 or not count.is_integer():
+        raise BadInput("over", wanted)
+    return start, stop, int(count)
 
 
 def _whole_range(mechanism: Mechanism, name: str) -> tuple[float, float]:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import product
+from math import sqrt
 from typing import NamedTuple
 
 import numpy as np
+from scipy.optimize import minimize_scalar
 
 from planar.analysis.force_maps.grid_forces import (
     GridForces,
@@ -17,8 +19,9 @@ from planar.analysis.force_maps.grid_forces import (
 )
 from planar.dynamics.forces import Forces
 from planar.foundation.arrays import Array, IntArray
-from planar.foundation.errors import NoAnswer, Outcome
+from planar.foundation.errors import NoAnswer, Outcome, join_names
 from planar.foundation.short_repr import short_repr
+from planar.model.wording import amount
 from planar.solving.continuation.path import follow_samples
 from planar.solving.grids.input_grid import Border, InputGrid
 
@@ -33,6 +36,13 @@ LEAST_GROWTH = 1.4
 twofold, and those that have one less and less."""
 MAX_BORDERS = 3
 """Dead points and stops that are looked into for each force, those beside its greatest."""
+MAX_TOPS = 5
+"""Local maxima among the nodes from which the greatest is looked for."""
+NO_GROWTH = 1e30
+SEARCHED_LINES = 10
+"""Lines between two of the grid that are looked at."""
+SEARCHED_STEPS = 4.0
+"""Steps of the grid in which a line beside another comes to its dead point, too."""
 MORE_BORDERS = 48
 """And so many of all, evenly: a force may begin to grow next to a dead point alone."""
 
@@ -66,12 +76,11 @@ class _Approach(NamedTuple):
 
 
 class _Start(NamedTuple):
-    """Where the search for a greatest begins, or the dead point towards which it has no bound."""
+    """Where the search for a greatest begins."""
 
     value: float
     u: Array
     z: Array
-    unbounded: Border | None
 
 
 class WorstCaseSearch:
@@ -90,12 +99,20 @@ class WorstCaseSearch:
     def worst_cases(self) -> tuple[WorstCase, ...]:
         """Of every quantity one."""
         approaches = self._approaches()
-        starts = [self._start(quantity, approaches) for quantity in self.quantities]
-        refined = self._refine([k for k, start in enumerate(starts) if start.unbounded is None], starts)
+        unbounded = [self._unbounded(quantity, approaches) for quantity in self.quantities]
+        tasks = [
+            (k, start)
+            for k, quantity in enumerate(self.quantities)
+            for start in (self._starts(quantity, approaches) if unbounded[k] is None else ())
+        ]
+        best: dict[int, tuple[float, Array]] = {}
+        for (k, _), (value, u) in zip(tasks, self._refine(tasks), strict=True):
+            if k not in best or value > best[k][0]:
+                best[k] = value, u
         found = []
-        for k, (quantity, start) in enumerate(zip(self.quantities, starts, strict=True)):
-            value, u = refined.get(k, (start.value, start.u))
-            found.append(self._worst_case(quantity, value, u, start.unbounded))
+        for k, quantity in enumerate(self.quantities):
+            value, u = best.get(k, (-np.inf, self.u[0]))
+            found.append(self._worst_case(quantity, value, u, unbounded[k]))
         return tuple(found)
 
     def _worst_case(self, quantity: Quantity, value: float, u: Array, unbounded: Border | None) -> WorstCase:
@@ -106,25 +123,99 @@ class WorstCaseSearch:
             at = named_positions(self.maker.solver, u, self.names)
             return WorstCase(kind, quantity.of, quantity.sense * value, at, False, "")
         at = named_positions(self.maker.solver, unbounded.u, self.names)
-        place = self.maker.solver.describe_inputs(unbounded.u)
+        units = self.maker.solver.mechanism.units
+        motions = self.maker.solver.relative_motions
+        place = join_names(
+            [f"{name} = {amount(each, motions[name].input_kind.value, units)}" for name, each in at.items()], None
+        )
         told = f"grows without bound towards the dead point at {place}"
         return WorstCase(kind, quantity.of, quantity.sense * np.inf, at, True, told)
 
-    def _start(self, quantity: Quantity, approaches: list[_Approach]) -> _Start:
-        """The greatest at a node or on the way to a dead point, with the unknowns there; or towards which dead point it
-        grows without bound."""
-        values = np.nan_to_num(quantity_values(self.found, quantity), nan=-np.inf)
-        row = int(np.argmax(values))
-        value, u, z = float(values[row]), self.u[row], self.z[row]
-        unbounded: tuple[float, Border] | None = None
-        for border, places, unknowns, forces in approaches:
-            near = quantity_values(forces, quantity)
-            if len(near) and np.isfinite(near).all() and near.max() > value:
-                k = int(np.argmax(near))
-                value, u, z = float(near[k]), places[k], unknowns[k]
-            if _grows_without_bound(near) and (unbounded is None or near[-1] > unbounded[0]):
-                unbounded = float(near[-1]), border
-        return _Start(value, u, z, unbounded and unbounded[1])
+    def _starts(self, quantity: Quantity, approaches: list[_Approach]) -> Iterator[_Start]:
+        """The greatest local maxima among the nodes, and the greatest on the way to a dead point or a stop."""
+        rows = np.nan_to_num(quantity_values(self.found, quantity), nan=-np.inf)
+        whole = np.full(self.grid.shape, -np.inf)
+        whole[tuple(self.nodes.T)] = rows
+        padded = np.pad(whole, 1, constant_values=-np.inf)
+        inside = (slice(1, -1),) * whole.ndim
+        is_top = np.isfinite(whole)
+        for axis, way in product(range(whole.ndim), (1, -1)):
+            is_top &= whole >= np.roll(padded, way, axis)[inside]
+        tops = np.flatnonzero(is_top[tuple(self.nodes.T)])
+        for row in tops[np.argsort(-rows[tops])[:MAX_TOPS]]:
+            yield _Start(float(rows[row]), self.u[row], self.z[row])
+        at_borders = [
+            _Start(float(near[k]), each.u[k], each.z[k])
+            for each in approaches
+            if len(near := quantity_values(each.forces, quantity)) and np.isfinite(near).all()
+            for k in [int(np.argmax(near))]
+        ]
+        if at_borders:
+            yield max(at_borders, key=lambda each: each.value)
+
+    def _unbounded(self, quantity: Quantity, approaches: list[_Approach]) -> Border | None:
+        """The dead point towards which a quantity grows without bound, if there is one; an effort's are looked for
+        between the lines of the grid, too, where it grows with the other sign on these."""
+        growing = [each for each in approaches if _grows_without_bound(quantity_values(each.forces, quantity))]
+        if not growing and quantity.kind == "effort":
+            growing = [*self._growing_between_lines(quantity, approaches)]
+        if not growing:
+            return None
+        return max(growing, key=lambda each: float(quantity_values(each.forces, quantity)[-1])).border
+
+    def _growing_between_lines(self, quantity: Quantity, approaches: list[_Approach]) -> Iterator[_Approach]:
+        """The approach between two lines towards which the effort grows most, where it has no bound.
+
+        Beside a dead point an effort is c / sqrt(distance), and c goes on along the dead points: it is greatest next to
+        the line on which it is.
+        """
+        known = [each for each in approaches if each.border.outcome is Outcome.DEAD_POINT]
+        known.sort(key=lambda each: -_growth(each, quantity))
+        for start in known[:1]:
+            (along,) = np.flatnonzero(np.array(start.border.node) != np.array(start.border.beyond))
+            for axis, way in product(range(len(self.grid.shape)), (1, -1)):
+                if axis != along and 0 <= start.border.node[axis] + way < self.grid.shape[axis]:
+                    beside = self._greatest_beside(quantity, start.border, (int(along), axis), way)
+                    if beside is not None and _grows_without_bound(quantity_values(beside.forces, quantity)):
+                        yield beside
+
+    def _greatest_beside(self, quantity: Quantity, border: Border, axes: tuple[int, int], way: int) -> _Approach | None:
+        """The approach with the greatest c up to the next line on a side."""
+        seen: list[_Approach] = []
+
+        def shortfall(part: float) -> float:
+            found = self._approach_beside(border, *axes, way * part)
+            if found is None:
+                return NO_GROWTH
+            seen.append(found)
+            return -_growth(found, quantity)
+
+        minimize_scalar(shortfall, bounds=(0.0, 1.0), method="bounded", options={"maxiter": SEARCHED_LINES})
+        return max(seen, key=lambda each: _growth(each, quantity), default=None)
+
+    def _approach_beside(self, border: Border, along: int, axis: int, part: float) -> _Approach | None:
+        """The approach to the dead point on a line that is so far, in steps of the grid, beside that of a border."""
+        solver = self.maker.solver
+        start = self.grid.inputs_at(border.node)
+        there, far = start.copy(), np.sign(border.beyond[along] - border.node[along])
+        there[self.grid.columns[axis]] += part * self.step[axis]
+        beyond = there.copy()
+        beyond[self.grid.columns[along]] += SEARCHED_STEPS * far * self.step[along]
+        try:
+            aside = follow_samples(solver, solver.inputs.p, self.grid.z[border.node], np.stack([start, there]))
+            if aside.stopped is not None:
+                return None
+            way = follow_samples(solver, solver.inputs.p, aside.z[-1], np.stack([there, beyond]))
+        except NoAnswer:
+            return None
+        if way.stopped is None or way.last_position is None or way.stopped.outcome is not Outcome.DEAD_POINT:
+            return None
+        dead = way.last_position[1]
+        place = dead[self.grid.columns[along]]
+        if not self.low[along] <= place <= self.high[along]:
+            return None
+        met = border._replace(u=dead)
+        return self._approach(met, there, aside.z[-1])
 
     def _approaches(self) -> list[_Approach]:
         """Positions nearer and nearer to the dead points beside the nodes with the greatest forces, with their forces;
@@ -137,31 +228,33 @@ class WorstCaseSearch:
             values = np.nan_to_num(quantity_values(self.found, quantity), nan=-np.inf)[at]
             chosen |= dict.fromkeys(map(int, np.argsort(-values)[:MAX_BORDERS]))
         chosen |= dict.fromkeys(np.linspace(0, len(borders) - 1, min(len(borders), MORE_BORDERS), dtype=int).tolist())
-        found = []
-        for border in (borders[k] for k in chosen):
-            assert border.u is not None
-            start = self.grid.inputs_at(border.node)
-            parts = (
-                APPROACH ** -np.arange(APPROACHES + 1.0)
-                if border.outcome is Outcome.DEAD_POINT
-                else np.array([1.0, 0.0])
-            )
-            places = border.u + (start - border.u) * parts[:, None]
-            try:
-                way = follow_samples(self.maker.solver, self.maker.solver.inputs.p, self.grid.z[border.node], places)
-                forces = self.maker.forces(self.maker.motion(way.z, places[: len(way.z)]))
-            except NoAnswer:
-                continue
-            found.append(_Approach(border, places[: len(way.z)], way.z, forces))
-        return found
+        every = (
+            self._approach(borders[k], self.grid.inputs_at(borders[k].node), self.grid.z[borders[k].node])
+            for k in chosen
+        )
+        return [each for each in every if each is not None]
 
-    def _refine(self, chosen: Sequence[int], starts: Sequence[_Start]) -> dict[int, tuple[float, Array]]:
-        """The greatest of some quantities between the nodes, all at once: (value, inputs) of each."""
-        best = {k: (starts[k].value, starts[k].u, starts[k].z) for k in chosen}
+    def _approach(self, border: Border, start: Array, z: Array) -> _Approach | None:
+        """Positions from one that is known nearer and nearer to a border, with their forces."""
+        assert border.u is not None
+        nearer = APPROACH ** -np.arange(APPROACHES + 1.0)
+        parts = nearer if border.outcome is Outcome.DEAD_POINT else np.array([1.0, 0.0])
+        places = border.u + (start - border.u) * parts[:, None]
+        try:
+            way = follow_samples(self.maker.solver, self.maker.solver.inputs.p, z, places)
+            forces = self.maker.forces(self.maker.motion(way.z, places[: len(way.z)]))
+        except NoAnswer:
+            return None
+        return _Approach(border, places[: len(way.z)], way.z, forces)
+
+    def _refine(self, tasks: Sequence[tuple[int, _Start]]) -> list[tuple[float, Array]]:
+        """The greatest of quantities, by their numbers, near where each search starts, all at once: values, inputs."""
+        chosen = range(len(tasks))
+        best = {k: (start.value, start.u, start.z) for k, (_, start) in enumerate(tasks)}
         width = {k: self.step.copy() for k in chosen}
         columns = list(self.grid.columns)
         pattern = np.array(list(product(STENCIL, repeat=len(columns))))
-        for _ in range(REFINEMENTS if chosen else 0):
+        for _ in range(REFINEMENTS if tasks else 0):
             z, start, inputs = [], [], []
             for k in chosen:
                 _, here, unknowns = best[k]
@@ -181,7 +274,7 @@ class WorstCaseSearch:
             for number, k in enumerate(chosen):
                 own: IntArray = np.arange(number * len(pattern), (number + 1) * len(pattern))
                 ours = own[row_of[own] >= 0]
-                values = np.nan_to_num(quantity_values(forces, self.quantities[k])[row_of[ours]], nan=-np.inf)
+                values = np.nan_to_num(quantity_values(forces, self.quantities[tasks[k][0]])[row_of[ours]], nan=-np.inf)
                 top = int(np.argmax(values)) if len(values) else -1
                 moved = top >= 0 and values[top] > best[k][0]
                 if moved:
@@ -189,7 +282,16 @@ class WorstCaseSearch:
                     best[k] = float(values[top]), every[row], found[row]
                 if not moved or np.abs(pattern[int(ours[top] - own[0])]).max() < 1.0:
                     width[k] = 0.5 * width[k]
-        return {k: each[:2] for k, each in best.items()}
+        return [best[k][:2] for k in chosen]
+
+
+def _growth(approach: _Approach, quantity: Quantity) -> float:
+    """c of an effort that is c / sqrt(distance) beside a dead point."""
+    values = quantity_values(approach.forces, quantity)
+    if not len(values) or approach.border.u is None or not np.isfinite(values[-1]):
+        return -NO_GROWTH
+    distance = float(np.linalg.norm(approach.u[-1] - approach.border.u))
+    return float(values[-1]) * sqrt(distance)
 
 
 def _grows_without_bound(values: Array) -> bool:
