@@ -1,0 +1,1 @@
+"""Commands on what is measured of a mechanism."""
