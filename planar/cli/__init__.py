@@ -5,6 +5,7 @@ from planar.cli.options import main
 main.modules = {
     "animate": "planar.cli.plot_animate",
     "bench": "planar.cli.inspect_models_schema_bench",
+    "calibrate": "planar.cli.measured.calibrate",
     "cams": "planar.cli.cams",
     "centres": "planar.cli.centres_harmonics",
     "circuits": "planar.cli.circuits",

@@ -52,7 +52,7 @@ LIBRARIES = {
     "networkx": {"model"},
     "flint": {"assemblies"},
     "llvmlite": {"codegen"},
-    "scipy": {"dynamics", "model"},
+    "scipy": {"analysis", "dynamics", "model"},
     "pint": {"foundation"},
     "rich": {"cli", "reports"},
     "matplotlib": {"drawing", "plot"},

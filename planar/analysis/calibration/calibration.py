@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from planar.analysis.calibration.fitted_residuals import FittedSamples, ResidualFunction
+from planar.analysis.calibration.fitted_residuals import FittedSamples, ResidualFunction, without_dead_points
 from planar.analysis.calibration.identifiability import Unidentified, describe_unseen, unseen_changes
 from planar.analysis.calibration.measurements import Measurement, read_measurement
 from planar.analysis.calibration.outliers import Outlier, find_outliers
@@ -19,6 +19,7 @@ from planar.document.first_argument import takes_mechanism
 from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput, NoAnswer, PlanarError, join_names
 from planar.model.mechanism import Mechanism
+from planar.model.wording import count_phrase
 
 LOSSES = ("linear", "soft_l1", "huber", "cauchy")
 """How much large residuals count, as scipy's `least_squares` has it: by their squares, else less."""
@@ -29,6 +30,7 @@ MEDIAN_TO_DEVIATION = 1.4826
 """The standard deviation beside the median of absolute values, of a normal distribution."""
 LOSS_SCALE = 1.5
 """Standard deviations from which on a residual counts less in a robust loss."""
+NO_FREEDOM = "there are no more measured numbers than free ones: how exact these are cannot be told"
 NO_INFLUENCE = 1e-9
 """Of the greatest slope: a number with less does not matter."""
 
@@ -42,11 +44,11 @@ class Calibration:
     determine alone, which stay near what the file had. `unidentified` are the changes of numbers that it does not see,
     each with a `sentence`; `singular_values` tell how near others are to that.
 
-    `residuals` are what was measured less what the fitted `mechanism` shows, shaped as what was given (SI), by the names
-    of what was measured; angles by less than half a turn. `inputs` are the positions of the inputs (n,) at the samples:
-    as given, else those of the nearest points of the path. `residual_deviation` is the standard deviation of a residual
-    beside the one given for it; where none is given beside the mechanism's size for lengths and a rad for angles.
-    `outliers` are samples that do not fit the rest. `remarks` say what else there is to know.
+    `residuals` are what was measured less what the fitted `mechanism` shows, shaped as what was given (SI), by the
+    names of what was measured; angles by less than half a turn. `inputs` are the positions of the inputs (n,) at
+    the samples: as given, else those of the nearest points of the path. `residual_deviation` is the standard deviation
+    of a residual beside the one given for it; where none is given beside the mechanism's size for lengths and a rad for
+    angles. `outliers` are samples that do not fit the rest. `remarks` say what else there is to know.
     """
 
     start: Mechanism
@@ -98,17 +100,19 @@ def calibrate(  # many: what is measured, and how it is fitted
     The numbers of the file are where the search starts; the assembly is the file's. Raises BadInput, Unknown, and
     NoAnswer where a sample cannot be reached by the mechanism.
 
-    >>> import numpy, planar
-    >>> path = planar.cycle("crank-rocker", 24).point("E").position
-    >>> start = planar.load("crank-rocker").with_values({"coupler.length": "121 mm"})
-    >>> found = planar.calibrate(start, {"E": path}, free=["coupler.length"])
+    >>> import planar
+    >>> motion = planar.cycle("crank-rocker", 24)
+    >>> start = planar.load("crank-rocker").with_values({"coupler.length": 0.182})
+    >>> measured, inputs = {"B": motion.point("B").position}, {"A0": motion.inputs["A0"].position}
+    >>> found = planar.calibrate(start, measured, ["coupler.length"], inputs=inputs)
     >>> round(found.values["coupler.length"], 9)
-    0.12
+    0.18
     """
     if loss not in LOSSES:
         raise BadInput("loss", f"{join_names(LOSSES, last_joiner=' or ')} is wanted, not {loss!r:.40}")
     size = design_equations(mechanism).solver.unit
     measurement = read_measurement(mechanism, measured, inputs, deviations, size)
+    measurement, lost = without_dead_points(mechanism, measurement)
     dimensions, is_chosen = _free_dimensions(mechanism, free), bool(free)
     first = ResidualFunction(mechanism, measurement, [each.name for each in dimensions]).at(mechanism)
     if not is_chosen:
@@ -118,7 +122,7 @@ def calibrate(  # many: what is measured, and how it is fitted
         dimensions = tuple(each for each, kept in zip(dimensions, matters, strict=True) if kept)
     if not dimensions:
         raise BadInput("free", "what was measured depends on no number of the file")
-    return _Fit(mechanism, measurement, dimensions, size, loss).calibration()
+    return _Fit(mechanism, measurement, dimensions, size, loss).calibration(lost)
 
 
 def _free_dimensions(mechanism: Mechanism, free: Sequence[str]) -> tuple[Dimension, ...]:
@@ -176,10 +180,11 @@ class _Fit:
         """Their derivatives in the scaled numbers."""
         found = self.samples(x)
         assert found is not None
-        return found.slopes * self.scale
+        slopes: Array = found.slopes * self.scale
+        return slopes
 
-    def calibration(self) -> Calibration:
-        """The result. Raises NoAnswer."""
+    def calibration(self, lost: int) -> Calibration:
+        """The result, where so many samples are left out already. Raises NoAnswer."""
         x = np.array([each.value for each in self.dimensions]) / self.scale
         start = self.function.at(self.mechanism)
         self._count = len(start.rows)
@@ -196,7 +201,7 @@ class _Fit:
                     problem.outcome, f"the numbers that would fit better cannot be assembled: {problem}"
                 ) from None
             raise problem
-        return self._result(x, found, is_done)
+        return self._result(x, found, self._remarks(found, lost, is_done))
 
     def _minimise(self, x: Array, loss: str, f_scale: float) -> tuple[Array, bool]:
         from scipy.optimize import least_squares  # slow to load, and only needed here
@@ -220,7 +225,7 @@ class _Fit:
         assert found is not None
         return max(MEDIAN_TO_DEVIATION * float(np.median(np.abs(found.rows[found.is_active]))), np.finfo(float).tiny)
 
-    def _result(self, x: Array, found: FittedSamples, is_done: bool) -> Calibration:
+    def _result(self, x: Array, found: FittedSamples, remarks: list[str]) -> Calibration:
         slopes = found.slopes[found.is_active] * self.scale
         singular, unseen, rank = unseen_changes(slopes)
         freedom = int(found.is_active.sum()) - rank
@@ -250,7 +255,7 @@ class _Fit:
             find_outliers(found, slopes, deviation, freedom, self.measurement),
             singular,
             self.evaluations,
-            tuple(self._remarks(found, freedom, is_done)),
+            (*remarks, *([] if freedom > 0 else [NO_FREEDOM])),
         )
 
     def _named_residuals(self, found: FittedSamples) -> dict[str, Array]:
@@ -261,16 +266,15 @@ class _Fit:
             residuals[name] = own if own.shape[1] > 1 else own[:, 0]
         return residuals
 
-    def _remarks(self, found: FittedSamples, freedom: int, is_done: bool) -> list[str]:
+    def _remarks(self, found: FittedSamples, lost: int, is_done: bool) -> list[str]:
         told = []
         if not is_done:
             told.append(f"the fit was stopped after {MAX_EVALUATIONS} steps, and may go on from the fitted file")
-        if freedom <= 0:
-            told.append("there are no more measured numbers than free ones: how exact they are cannot be told")
         kinds = {each.kind for each in self.measurement.series}
         if len(kinds) > 1 and not self.measurement.has_deviations:
             told.append("lengths and angles are weighed alike, by the mechanism's size and a rad; give deviations")
-        lost = {int(each) for each in found.row_samples} - {int(each) for each in found.row_samples[found.is_active]}
-        if lost and (self.measurement.inputs is not None or self.measurement.values.shape[1] > 1):
-            told.append(f"{len(lost)} samples lie on dead points, and are left out")
+        if self.measurement.values.shape[1] > 1 or self.measurement.inputs is not None:
+            lost += len({*found.row_samples.tolist()} - {*found.row_samples[found.is_active].tolist()})
+        if lost:
+            told.append(f"{count_phrase(lost, 'sample')} at dead points left out, where nothing follows smoothly")
         return told

@@ -10,11 +10,13 @@ import numpy as np
 from planar.analysis.calibration.measurements import Measurement
 from planar.derivatives.predicted_results import PredictedResults, PredictedValues
 from planar.document.dimensions import with_values
-from planar.foundation.arrays import Array, BoolArray
+from planar.foundation.arrays import Array, BoolArray, IntArray
+from planar.foundation.errors import NoAnswer
 from planar.foundation.jets import TURN
 from planar.model.mechanism import Mechanism
 from planar.results.motion import Motion
 from planar.solving.cycle import cycle
+from planar.solving.position import solve
 
 PATH_STEPS = 180
 """Positions of a path from which the nearest one to a sample is looked for."""
@@ -23,6 +25,8 @@ FOOT_TOLERANCE = 1e-7
 """Of a part's scale: a foot that is no further off along the path is one."""
 CLOSED_TURN = 1e-9
 """rad"""
+LIMIT_DISTANCE = 1e-6
+"""rad or m: an input so near to a limit is on it."""
 
 
 class FittedSamples(NamedTuple):
@@ -36,9 +40,9 @@ class FittedSamples(NamedTuple):
     "(rows,): what is to be small, in standard deviations"
     slopes: Array
     "(rows, numbers): its derivatives, per SI"
-    row_samples: Array
+    row_samples: IntArray
     "(rows,): the sample of each"
-    row_parts: Array
+    row_parts: IntArray
     "(rows,): the part of each; what is square to a path is of none, -1"
     is_active: BoolArray
     "(rows,): false for what a sample tells of its own place on the path, and on a dead point"
@@ -65,9 +69,7 @@ class ResidualFunction:
     def at(self, mechanism: Mechanism) -> FittedSamples:
         """The residuals of a mechanism. Raises NoAnswer."""
         inputs = self.measurement.inputs
-        if inputs is not None:
-            return self._timed(inputs, self._predict(mechanism, inputs))
-        return self._untimed(mechanism)
+        return self._untimed(mechanism) if inputs is None else self._timed(mechanism, inputs)
 
     def _predict(self, mechanism: Mechanism, inputs: Array) -> PredictedValues:
         return self.predicted.at_inputs(mechanism, [dict(zip(self.names, map(float, u), strict=True)) for u in inputs])
@@ -78,13 +80,18 @@ class ResidualFunction:
         turned: Array = difference - TURN * np.round(difference / TURN)
         return np.where(self.measurement.is_angle, turned, difference)
 
-    def _timed(self, inputs: Array, found: PredictedValues) -> FittedSamples:
-        differences = self._differences(found.values)
-        rows = -differences / self.measurement.deviations
+    def _timed(self, mechanism: Mechanism, inputs: Array) -> FittedSamples:
+        kept = np.isfinite(self.measurement.values).any(axis=1)
+        found = self._predict(mechanism, inputs[kept])
+        shown = np.full(self.measurement.values.shape, np.nan)
+        shown[kept] = found.values
+        differences = self._differences(shown)
+        rows = -differences[kept] / self.measurement.deviations
         slopes = found.by_numbers / self.measurement.deviations[:, None]
         known = np.isfinite(rows)
-        sample, part = np.nonzero(known)
+        sample, part = (each.astype(np.int64) for each in np.nonzero(known))
         active = ~found.is_singular[sample]
+        sample = np.flatnonzero(kept)[sample]
         told = np.where(active, rows[known], 0.0), np.where(active[:, None], slopes[known], 0.0)
         return FittedSamples(inputs, differences, *told, sample, part, active)
 
@@ -107,7 +114,7 @@ class ResidualFunction:
             slopes.append(np.where(is_told[:, None], turned @ own, 0.0))
             samples += [k] * len(turned)
             active.append(is_told)
-        sample = np.array(samples, int)
+        sample = np.array(samples, np.int64)
         told = np.concatenate(rows), np.concatenate(slopes)
         return FittedSamples(
             foot[:, None], differences, *told, sample, np.full(len(sample), -1), np.concatenate(active)
@@ -151,6 +158,30 @@ class ResidualFunction:
         """How far the path extends, in standard deviations (parts,)."""
         spread: Array = np.ptp(along.values, axis=0) / self.measurement.deviations
         return spread
+
+
+def without_dead_points(mechanism: Mechanism, measurement: Measurement) -> tuple[Measurement, int]:
+    """What was measured, without samples at which the mechanism stands on a limit of its input, and how many those are.
+
+    Raises NoAnswer where it cannot be at another one.
+    """
+    if measurement.inputs is None:
+        return measurement, 0
+    names = [each.pair for each in mechanism.inputs]
+    lost = []
+    for k, position in enumerate(measurement.inputs):
+        try:
+            solve(mechanism, dict(zip(names, map(float, position), strict=True)))
+        except NoAnswer as problem:
+            limits = cycle(mechanism, PATH_STEPS).limits if len(names) == 1 else ()
+            if not any(each.of == names[0] and abs(each.input - position[0]) < LIMIT_DISTANCE for each in limits):
+                raise NoAnswer(problem.outcome, f"sample {k + 1}: {problem}") from None
+            lost.append(k)
+    blank = [each.values.copy() for each in measurement.series]
+    for values in blank:
+        values[lost] = np.nan
+    series = tuple(each._replace(values=own) for each, own in zip(measurement.series, blank, strict=True))
+    return measurement._replace(series=series), len(lost)
 
 
 def _turned_to(tangent: Array) -> Array:

@@ -63,9 +63,7 @@ class Measurement(NamedTuple):
         return found
 
 
-def read_measurement(
-    mechanism: Mechanism, measured: Any, inputs: Any, deviations: Any, size: float
-) -> Measurement:
+def read_measurement(mechanism: Mechanism, measured: Any, inputs: Any, deviations: Any, size: float) -> Measurement:
     """What a caller gives, checked: see `planar.calibrate`. Raises BadInput, Unknown."""
     if not isinstance(measured, Mapping) or not measured:
         raise BadInput("measured", "name what was measured, with an array each, as {'E': positions}")

@@ -13,6 +13,8 @@ from planar.foundation.short_repr import short_repr
 
 RISK = 0.05
 """How often a sample of a set without outliers is taken for one."""
+ROUNDING = 1e-10
+"""Of the greatest measured number: residuals so small are rounding."""
 FULL_LEVERAGE = 1.0 - 1e-9
 """A residual that the fit makes zero whatever was measured tells nothing."""
 
@@ -34,7 +36,8 @@ def find_outliers(
 ) -> tuple[Outlier, ...]:
     """Samples whose externally studentised residual is beyond the quantile of Student's distribution for the greatest
     of all (R. D. Cook, S. Weisberg, Residuals and Influence in Regression, 1982), the worst first."""
-    if freedom < 2 or not deviation > 0.0:
+    greatest = float(np.nanmax(np.abs(measurement.values) / measurement.deviations))
+    if freedom < 2 or not deviation > ROUNDING * greatest:
         return ()
     from scipy.stats import t as student  # slow to load, and only needed here
 
