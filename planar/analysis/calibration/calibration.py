@@ -30,6 +30,8 @@ MEDIAN_TO_DEVIATION = 1.4826
 """The standard deviation beside the median of absolute values, of a normal distribution."""
 LOSS_SCALE = 1.5
 """Standard deviations from which on a residual counts less in a robust loss."""
+RESTING = 1e-9
+"""Of the greatest singular value: how strongly numbers are held to those of the file."""
 NO_FREEDOM = "there are no more measured numbers than free ones: how exact these are cannot be told"
 NO_INFLUENCE = 1e-9
 """Of the greatest slope: a number with less does not matter."""
@@ -174,20 +176,22 @@ class _Fit:
     def rows(self, x: Array) -> Array:
         """The residuals; what cannot be assembled is no number, and the step is taken back."""
         found = self.samples(x)
-        return np.full(self._count, np.nan) if found is None else found.rows
+        resting = self._rest * (x - self._start)
+        return np.full(self._count, np.nan) if found is None else np.concatenate([found.rows, resting])
 
     def slopes(self, x: Array) -> Array:
         """Their derivatives in the scaled numbers."""
         found = self.samples(x)
         assert found is not None
-        slopes: Array = found.slopes * self.scale
-        return slopes
+        return np.concatenate([found.slopes * self.scale, self._rest * np.eye(len(x))])
 
     def calibration(self, lost: int) -> Calibration:
         """The result, where so many samples are left out already. Raises NoAnswer."""
         x = np.array([each.value for each in self.dimensions]) / self.scale
         start = self.function.at(self.mechanism)
-        self._count = len(start.rows)
+        self._count, self._start = len(start.rows) + len(x), x
+        # what the samples do not see stays where it is, by rows that are nothing beside the others
+        self._rest = RESTING * float(np.linalg.norm(start.slopes * self.scale, 2))
         self._last = (x, start)
         x, is_done = self._minimise(x, "linear", 1.0)
         if self.loss != "linear":
