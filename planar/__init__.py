@@ -9,6 +9,9 @@ from planar.model.revision import Revisable
 
 if TYPE_CHECKING:
     from planar import plot
+    from planar.analysis.calibration.calibration import Calibration, calibrate
+    from planar.analysis.calibration.identifiability import Unidentified
+    from planar.analysis.calibration.outliers import Outlier
     from planar.analysis.cams.base_circle import BaseCircle, least_base_circle
     from planar.analysis.cams.cam_profile import CamProfile, cam_profile
     from planar.analysis.cams.contact_force import ContactForce, contact_forces
@@ -130,6 +133,7 @@ __all__ = [
     "BaseCircle",
     "BeltPair",
     "Branch",
+    "Calibration",
     "CamPair",
     "CamProfile",
     "CamShape",
@@ -197,6 +201,7 @@ __all__ = [
     "MotorDuty",
     "NoAnswer",
     "Outcome",
+    "Outlier",
     "Pair",
     "PairFriction",
     "ParabolicRise",
@@ -234,6 +239,7 @@ __all__ = [
     "TrapezoidalRise",
     "TravelSlopes",
     "TurningPair",
+    "Unidentified",
     "Unknown",
     "UnknownLoad",
     "Variant",
@@ -246,6 +252,7 @@ __all__ = [
     "balance_tradeoff",
     "balancing_conditions",
     "build",
+    "calibrate",
     "cam_profile",
     "centre_of",
     "centres",

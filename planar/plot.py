@@ -15,6 +15,7 @@ from planar.foundation.safe_files import save_file as write
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from planar.analysis.calibration.calibration import Calibration
     from planar.analysis.force_maps.force_map import ForceMap
     from planar.assemblies.circuits.circuits import Circuits
     from planar.assemblies.modes import Modes
@@ -33,6 +34,7 @@ __all__ = [
     "animate",
     "balance",
     "bearings",
+    "calibration",
     "cam_profile",
     "centres",
     "centrodes",
@@ -106,6 +108,14 @@ def centres(
         circle_picture(found, shown),
     ]
     return draw_pictures(pictures, state.mechanism.name)
+
+
+@takes_result("Calibration")
+def calibration(found: Calibration) -> Figure:
+    """What was measured over what the fitted mechanism shows: residuals enlarged, and their histograms."""
+    from planar.drawing.diagrams.calibration_drawing import calibration_pictures
+
+    return draw_pictures(calibration_pictures(found), found.mechanism.name)
 
 
 @takes_mechanism

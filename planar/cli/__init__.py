@@ -6,6 +6,7 @@ main.modules = {
     "animate": "planar.cli.commands.plot_animate",
     "balance": "planar.cli.commands.balancing",
     "bench": "planar.cli.commands.inspect_models_schema_bench",
+    "calibrate": "planar.cli.commands.calibrate",
     "cams": "planar.cli.commands.cams",
     "centres": "planar.cli.commands.centres_harmonics",
     "circuits": "planar.cli.commands.circuits",
