@@ -100,6 +100,11 @@ def results():
     yield from (planar.holding(clamp), planar.self_locking(clamp), planar.forces(clamp).friction["A"])
     grid = planar.force_map("excavator-arm", {"boom cylinder": (2.4, 2.9, 3)}, inertia=False)
     yield from (grid, grid.worst[0])
+    path = planar.cycle("crank-rocker", 24).point("B").position + 1e-5 * np.sin(np.arange(50.0)).reshape(25, 2)
+    path[7] += 1e-3
+    measured = {"B": path}
+    fitted = planar.calibrate("crank-rocker", measured, ["coupler.length", "rocker.length"])
+    yield from (fitted, *fitted.unidentified[:1], *fitted.outliers[:1])
     slopes = planar.sensitivity(motion, "stroke")
     yield from (slopes, slopes.travel, slopes.travel.ends[0], slopes.influences("displacement")[0], slopes.transmission)
     yield from (planar.BadInput("here", "wrong"), planar.Unknown("no such point"), planar.Outcome.SOLVED)
@@ -216,7 +221,12 @@ def test_every_command_of_a_model_takes_set_and_what_is_piped_in(name, tmp_path,
         "problem": ["--vary", "2"],
         "mark": ["answers.csv"],
         "sensitivity": ["--of", "B"],
+        "calibrate": ["measured.csv", "--free", "rod.length"],
     }
+    run_of = planar.cycle(planar.load("slider-crank").with_values({"crank.length": 0.025}), 12)
+    rows = zip(np.degrees(run_of.inputs["O"].position), 1e3 * run_of.pair("stroke")["displacement"], strict=True)
+    lines = ["input O position [deg],pair stroke displacement [mm]", *(f"{at},{far}" for at, far in rows)]
+    (tmp_path / "measured.csv").write_text("\n".join(lines))
     (tmp_path / "answers.csv").write_text("seed 1\nstudent,variant,quantity,value\nAnn,1,velocity of B,1\n")
     model = {
         "forces": "two-stroke-engine",
