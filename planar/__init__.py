@@ -9,6 +9,9 @@ from planar.model.revision import Revisable
 
 if TYPE_CHECKING:
     from planar import plot
+    from planar.analysis.calibration.calibration import Calibration, calibrate
+    from planar.analysis.calibration.identifiability import Unidentified
+    from planar.analysis.calibration.outliers import Outlier
     from planar.analysis.cams.base_circle import BaseCircle, least_base_circle
     from planar.analysis.cams.cam_profile import CamProfile, cam_profile
     from planar.analysis.cams.contact_force import ContactForce, contact_forces
@@ -22,6 +25,8 @@ if TYPE_CHECKING:
     from planar.analysis.efforts.motor_duty import MotorDuty, motor_duty
     from planar.analysis.efforts.self_locking import LockedInterval, jamming, self_locking
     from planar.analysis.efforts.unknown_load import UnknownLoad, unknown_load
+    from planar.analysis.force_maps.force_map import ForceMap, force_map
+    from planar.analysis.force_maps.worst_cases import WorstCase
     from planar.analysis.identity.inspection import Inspection, inspect
     from planar.analysis.identity.mobility import Mobility, mobility
     from planar.analysis.motion.answers import Answers, answers
@@ -37,6 +42,7 @@ if TYPE_CHECKING:
     from planar.analysis.sensitivity.gradient import gradient
     from planar.analysis.sensitivity.limit_slopes import LimitSlopes, TravelSlopes
     from planar.analysis.sensitivity.sensitivity import Influence, Sensitivity, sensitivity
+    from planar.analysis.sensitivity.transmission_slopes import TransmissionSlopes
     from planar.analysis.tolerance.tolerance import ToleranceBand, tolerance
     from planar.assemblies.circuits.circuits import Circuit, Circuits, circuits
     from planar.assemblies.circuits.traced_circuit import Branch
@@ -52,6 +58,17 @@ if TYPE_CHECKING:
     from planar.document.files import dumps, from_dict, load, loads, to_dict
     from planar.document.revised.changed_numbers import dimensions
     from planar.document.schema import schema
+    from planar.dynamics.balancing.balance import Balance, BalanceTradeoff, Shaking, balance, balance_tradeoff
+    from planar.dynamics.balancing.conditions import (
+        BalanceCondition,
+        BalancingConditions,
+        ConditionSet,
+        ConditionTerm,
+        balancing_conditions,
+    )
+    from planar.dynamics.balancing.counterweights import Counterweight, CounterweightLimit
+    from planar.dynamics.balancing.force_balance import ForceBalance, force_balance
+    from planar.dynamics.balancing.positive_masses import MassBalance, mass_balance
     from planar.dynamics.flywheel import Flywheel, flywheel
     from planar.dynamics.forces import Forces, PairFriction, forces
     from planar.dynamics.friction.holding import Holding, holding
@@ -110,9 +127,14 @@ __all__ = [
     "Area",
     "At",
     "BadInput",
+    "Balance",
+    "BalanceCondition",
+    "BalanceTradeoff",
+    "BalancingConditions",
     "BaseCircle",
     "BeltPair",
     "Branch",
+    "Calibration",
     "CamPair",
     "CamProfile",
     "CamShape",
@@ -122,10 +144,14 @@ __all__ = [
     "ChainPair",
     "Circuit",
     "Circuits",
+    "ConditionSet",
+    "ConditionTerm",
     "Conflict",
     "ConstantAccelerationSegment",
     "ConstantSpeedSegment",
     "ContactForce",
+    "Counterweight",
+    "CounterweightLimit",
     "Course",
     "Curvature",
     "CycloidalRise",
@@ -138,6 +164,8 @@ __all__ = [
     "Extremes",
     "FileUnits",
     "Flywheel",
+    "ForceBalance",
+    "ForceMap",
     "Forces",
     "Friction",
     "FrictionEvent",
@@ -163,6 +191,7 @@ __all__ = [
     "MarkedValue",
     "Marks",
     "Mass",
+    "MassBalance",
     "Mechanism",
     "Mobility",
     "Mode",
@@ -173,6 +202,7 @@ __all__ = [
     "MotorDuty",
     "NoAnswer",
     "Outcome",
+    "Outlier",
     "Pair",
     "PairFriction",
     "ParabolicRise",
@@ -191,6 +221,7 @@ __all__ = [
     "RelativeState",
     "RubbingPair",
     "Sensitivity",
+    "Shaking",
     "Simulation",
     "SlidingPair",
     "SlotPair",
@@ -206,17 +237,24 @@ __all__ = [
     "TimeRatio",
     "ToleranceBand",
     "Transmission",
+    "TransmissionSlopes",
     "TrapezoidalRise",
     "TravelSlopes",
     "TurningPair",
+    "Unidentified",
     "Unknown",
     "UnknownLoad",
     "Variant",
+    "WorstCase",
     "advantage",
     "advantage_over",
     "answers",
     "area",
+    "balance",
+    "balance_tradeoff",
+    "balancing_conditions",
     "build",
+    "calibrate",
     "cam_profile",
     "centre_of",
     "centres",
@@ -232,6 +270,8 @@ __all__ = [
     "dwells",
     "extremes",
     "flywheel",
+    "force_balance",
+    "force_map",
     "forces",
     "from_dict",
     "gradient",
@@ -244,6 +284,7 @@ __all__ = [
     "load",
     "loads",
     "mark_answers",
+    "mass_balance",
     "mobility",
     "modes",
     "motor_duty",

@@ -15,9 +15,12 @@ from planar.foundation.safe_files import save_file as write
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from planar.analysis.calibration.calibration import Calibration
+    from planar.analysis.force_maps.force_map import ForceMap
     from planar.assemblies.circuits.circuits import Circuits
     from planar.assemblies.modes import Modes
     from planar.drawing.polygons.panels import ScaleTexts
+    from planar.dynamics.balancing.balance import Balance, BalanceTradeoff
     from planar.dynamics.forces import Forces
     from planar.dynamics.simulation import Simulation
     from planar.model.mechanism import Mechanism
@@ -29,7 +32,9 @@ if TYPE_CHECKING:
 __all__ = [
     "acceleration",
     "animate",
+    "balance",
     "bearings",
+    "calibration",
     "cam_profile",
     "centres",
     "centrodes",
@@ -103,6 +108,14 @@ def centres(
         circle_picture(found, shown),
     ]
     return draw_pictures(pictures, state.mechanism.name)
+
+
+@takes_result("Calibration")
+def calibration(found: Calibration) -> Figure:
+    """What was measured over what the fitted mechanism shows: residuals enlarged, and their histograms."""
+    from planar.drawing.diagrams.calibration_drawing import calibration_pictures
+
+    return draw_pictures(calibration_pictures(found), found.mechanism.name)
 
 
 @takes_mechanism
@@ -212,6 +225,17 @@ def torque(found: Forces | Motion | Mechanism, of: str | None = None, fluctuatio
     return draw_pictures([torque_picture(found, of, DEFAULT_FLUCTUATION if fluctuation is None else fluctuation)])
 
 
+@takes_result("ForceMap")
+def force_map(found: ForceMap, of: str | None = None) -> Figure:
+    """What an input (left out: the first of the map) supplies over the first two inputs of a map of forces.
+
+    A curve over one input, lines of equal effort over two. Raises BadInput for an input that there is not.
+    """
+    from planar.drawing.forces.force_map import force_map_picture
+
+    return draw_pictures([force_map_picture(found, of)])
+
+
 @takes_result("Forces", "Motion", "Mechanism")
 def bearings(found: Forces | Motion | Mechanism, pairs: Sequence[str] | None = None) -> list[Figure]:
     """The loads of pairs (left out: of all in which points or lines meet) over a cycle, on sheets of A4 on its side.
@@ -224,6 +248,25 @@ def bearings(found: Forces | Motion | Mechanism, pairs: Sequence[str] | None = N
 
     mechanism = found if isinstance(found, Mechanism) else found.mechanism
     return draw_on_sheets(bearing_pictures(found, pairs), f"{mechanism.name}: loads of the pairs")
+
+
+@takes_result("Motion", "Forces", "Mechanism")
+def sensitivity(moving: Motion | Forces | Mechanism, of: str | None = None, result: str | None = None) -> Figure:
+    """What a little more of each number of the file does to a result over a motion: the greatest influences.
+
+    `of` is a point, link, pair or input (left out: the first slide or rocker that is an output, else the first point
+    that moves), `result` which of its results (left out: the first); of forces their efforts and reactions, too. Raises
+    Unknown and BadInput for a name that is not there.
+    """
+    from planar.analysis.sensitivity.sensitivity import sensitivity as derivatives
+    from planar.drawing.diagrams.sensitivity_curves import sensitivity_picture
+    from planar.model.mechanism import Mechanism
+    from planar.solving.cycle import cycle
+
+    run = cycle(moving) if isinstance(moving, Mechanism) else moving
+    mechanism = run.mechanism
+    name = of or next(iter(mechanism.inputs)).pair
+    return draw_pictures([sensitivity_picture(derivatives(run, name), result)])
 
 
 @takes_result("Motion", "Simulation", "Mechanism")
@@ -263,6 +306,17 @@ def two_directions(state: State, link: str, points: Sequence[str] | None = None,
 
     given = parse_scales(scale, units=state.mechanism.units)
     return draw_pictures([directions_picture(state, link, points, given.get("length"), given.get("velocity"))])
+
+
+@takes_result("Balance")
+def balance(found: Balance, tradeoff: BalanceTradeoff | None = None) -> Figure:
+    """What shakes the frame before and after balancing: a polar diagram of the force, the moment, the input's effort.
+
+    With `tradeoff`, as `planar.balance_tradeoff` gives it, also the least moment over the force.
+    """
+    from planar.drawing.forces.shaking import balance_pictures
+
+    return draw_pictures(balance_pictures(found, tradeoff), found.motion.mechanism.name)
 
 
 @takes_result("Motion", "Mechanism")

@@ -114,6 +114,8 @@ def variation_figure(name: str) -> Figure:
     return figure
 
 
+LIGHT = planar.CounterweightLimit(mass=0.3)
+"""kg: counterweights of an engine that cannot balance it altogether."""
 SMALL_TEXT = {"ha": "center", "va": "bottom", "fontsize": 6}
 PICTURES: dict[str, Callable[[], object]] = {
     "points": lambda: plot.scheme(planar.solve(planar.from_dict(PLATE))),
@@ -131,8 +133,13 @@ PICTURES: dict[str, Callable[[], object]] = {
     "centrodes": lambda: plot.centrodes(planar.cycle("antiparallelogram"), "coupler"),
     "positions": lambda: plot.positions(planar.cycle("whitworth")),
     "diagrams": lambda: plot.diagrams(planar.cycle("slider-crank")),
+    "design/sensitivity": lambda: plot.sensitivity("whitworth", "slot"),
     "bodies": lambda: plot.forces(planar.forces(planar.solve("two-stroke-engine"))),
     "forces/stick-slip": lambda: plot.diagrams(planar.simulate("stick-slip", 5.0), "block"),
+    "forces/balance": lambda: plot.balance(
+        planar.balance("two-stroke-engine", "shaking force", ["crank", "rod"], LIGHT),
+        planar.balance_tradeoff("two-stroke-engine", ["crank", "rod"], LIGHT),
+    ),
     "forces/friction": lambda: plot.forces(planar.forces(planar.solve(thick_clamp()))),
     "circuits": lambda: plot.circuits(planar.circuits("watt-six-bar")),
     **{f"keys/{each.example}": partial(example_figure, each.example) for each in key_sections() if each.example},

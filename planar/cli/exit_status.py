@@ -149,7 +149,9 @@ def _exit_with_status() -> Iterator[None]:
         _exit_refused(f"interrupted: {told}", "interrupted", told, INTERRUPTED)
     except click.UsageError as problem:
         told = " ".join(problem.format_message().split()).rstrip(".").replace(". Did", "; did").replace(". (", " (")
-        told = re.sub(r" for '\{[^}]*\}'", "", told)  # click names an argument by its choices, and then lists them
+        told = re.sub(r"(?: for)? '\{[^}]*\}'", "", told).replace(
+            ". Choose", "; choose"
+        )  # click names an argument by its choices, and then lists them
         if not told.endswith(("?", "?)")):
             told += f"; see `{problem.ctx.command_path if problem.ctx else 'planar'} --help`"
         wrong = str(BadInput("command line", told[0].lower() + told[1:]))

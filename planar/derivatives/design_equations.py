@@ -19,6 +19,7 @@ from planar.equations.mechanism_numbers import scale_lengths
 from planar.equations.rates import time_derivatives
 from planar.equations.residuals import scalars
 from planar.foundation.arrays import Array
+from planar.foundation.errors import BadInput
 from planar.foundation.geometry import Frame, Vector
 from planar.foundation.jets import Scalar, value_and_rates
 from planar.model.mechanism import Input, Mechanism
@@ -53,6 +54,9 @@ class DesignEquations:
     def __init__(self, mechanism: Mechanism, offsets: tuple[str, ...] = ()):
         self.solver: PositionSolver = solved_mechanism(mechanism).solver
         self.solver.refuse_misfit("derivatives are not told")
+        for pair in mechanism.pairs:
+            if not pair.measures_symbols:
+                raise BadInput(pair.name, "derivatives are not told of a mechanism with a cam of given points")
         self.mechanism, self.equations = mechanism, self.solver.equations
         own = design_dimensions(mechanism)
         self.dimensions = (*own, *(each for pair in offsets for each in _offset_dimensions(pair)))

@@ -9,7 +9,6 @@ import numpy as np
 
 from planar.derivatives.design_equations import DesignEquations
 from planar.derivatives.implicit_system import ImplicitSystem, Level, invert_matrices
-from planar.dynamics.forces import Forces
 from planar.dynamics.load_variation import course_piece, load_factors
 from planar.dynamics.reaction_solver import bearing_point
 from planar.equations.casadi_call import BufferedFunction
@@ -95,6 +94,11 @@ class ForceEquations:
         place = self._reaction_point(pair)
         return ca.vertcat(x, y, moment if place is None else moment - place.x * y + place.y * x)
 
+    def force_on(self, name: str, link: str) -> Vector:
+        """The force of a pair on one of its moving links."""
+        at, action = self.work.link_columns[link], self.pair_actions[name]
+        return Vector(action[at], action[at + 1])
+
     def _reaction_point(self, pair: Pair) -> Vector | None:
         if pair.name in self.contacts:
             return self.contacts[pair.name].pitch_point
@@ -117,14 +121,13 @@ class ForceEquations:
         parameters = ca.vertcat(self.design.t, self.work.factors)
         return ImplicitSystem([*self.design.kinematics.levels, level], parameters, self.constants)
 
-    def values_at(self, forces: Forces) -> tuple[list[Array], Array, Array]:
-        """The unknowns of all levels, parameters and constants (n, ...) at positions of which the forces are known."""
-        moving = forces.moving
+    def values_at(self, moving: State | Motion) -> tuple[list[Array], Array, Array]:
+        """The unknowns of all levels, parameters and constants (n, ...) at a state or a motion."""
         values, t = self.design.coordinates_at(moving)
         many = len(t)
         inputs = {name: np.broadcast_to(each.position, (many,)) for name, each in moving.inputs.items()}
-        factors = load_factors(moving.mechanism, inputs, getattr(moving, "time", None), many)
-        turns = self.work.initial_spring_turns(self.work.coordinates(moving)[0][0], moving.mechanism.springs)
+        factors = load_factors(self.design.mechanism, inputs, getattr(moving, "time", None), many)
+        turns = self.work.initial_spring_turns(self.work.coordinates(moving)[0][0], self.design.mechanism.springs)
         parameters = np.concatenate([t, factors], axis=1)
         senses = np.zeros((many, len(self.contacts)))
         for _ in range(2 if self.contacts else 1):  # first which way teeth press
@@ -136,10 +139,10 @@ class ForceEquations:
     def factor_slopes(self, moving: State | Motion) -> Array:
         """How the factors of loads change with t at positions (n, loads, parameters), with the inputs that they follow;
         NaN where two pieces of their course meet at an angle."""
-        names = [given.pair for given in moving.mechanism.inputs]
+        names = [given.pair for given in self.design.mechanism.inputs]
         many = max(np.size(each.position) for each in moving.inputs.values()) if names else 1
-        found = np.zeros((many, len(moving.mechanism.loads), self.design.t.numel()))
-        for k, load in enumerate(moving.mechanism.loads):
+        found = np.zeros((many, len(self.design.mechanism.loads), self.design.t.numel()))
+        for k, load in enumerate(self.design.mechanism.loads):
             if load.varies is None or load.varies.input is None:
                 continue
             name = load.varies.input

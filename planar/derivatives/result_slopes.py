@@ -62,7 +62,7 @@ class SlopeSystem:
             inertia = any(each.kind == "inertia" for each in self.forces.acting)
             self.balance = ForceEquations(self.design, inertia)
             self.system = self.balance.system
-            self.values, self.parameters, self.constants = self.balance.values_at(self.forces)
+            self.values, self.parameters, self.constants = self.balance.values_at(self.moving)
 
     def expressions(self, name: str) -> list[ResultExpression]:
         """What the result tells of a point, link, pair or input. Raises Unknown."""

@@ -4,21 +4,16 @@ from __future__ import annotations
 
 import csv
 import re
-from codecs import BOM_UTF8, BOM_UTF16_BE, BOM_UTF16_LE
-from math import isfinite
 from pathlib import Path
 from typing import NamedTuple
 
 from planar.document.cursor import suggest_spelling
 from planar.document.files import read_limited
+from planar.document.tables.spreadsheet_text import SEPARATOR_LINE, choose_separator, decode_text, read_number
 from planar.foundation.errors import BadInput, join_names
 
 COLUMNS = ("student", "variant", "quantity", "value", "unit")
 SEED_LINE = re.compile(r"#?\s*seed[\s:=,;]*(\d{1,18})", re.IGNORECASE)
-SEPARATOR_LINE = re.compile(r"sep=.\s*$", re.IGNORECASE)
-"""What some spreadsheets write in front."""
-THOUSANDS_BLANK = re.compile(r"(?<=\d)[ \u00a0\u202f](?=\d{3}(?!\d))")
-NUMBER = re.compile(r"([+-]?[\d.,]*\d[\d.,]*(?:[eE][+-]?\d+)?)\s*(|[^\d\s.,].*)")
 
 
 class HandedInValue(NamedTuple):
@@ -50,14 +45,14 @@ class AnswerList(NamedTuple):
 
 MAX_VARIANT = 1000
 """As many variants as a problem has at most."""
-MAX_VARIANT_DIGITS, MAX_CELL_LENGTH = 9, 100
-"""Digits and characters that are looked at."""
+MAX_VARIANT_DIGITS = 9
+"""Digits that are looked at."""
 
 
 def read_answers(path: Path) -> AnswerList:
     """The list in a file as spreadsheets save it: `seed 7`, then a head, then lines of student, variant, quantity,
     value, unit; separated by commas, semicolons or tabs. Raises BadInput where it is no such list."""
-    lines = _decode_text(read_limited(path)).splitlines()
+    lines = decode_text(read_limited(path)).splitlines()
     told = [number for number, line in enumerate(lines) if _cells_text(line) and not SEPARATOR_LINE.match(line)]
     first = told[0] if told else 0
     seed = SEED_LINE.fullmatch(_cells_text(lines[first])) if lines else None
@@ -69,7 +64,7 @@ def read_answers(path: Path) -> AnswerList:
     if len(told) == 1:
         raise BadInput(str(path), f"after the seed come the columns {join_names(COLUMNS)}, and a line for each value")
     head = told[1]
-    separator = max(",;\t", key=lines[head].count)
+    separator = choose_separator(lines[head])
     rows = csv.reader(lines[head:], delimiter=separator)
     values, unread = [], []
     try:
@@ -89,18 +84,6 @@ def read_answers(path: Path) -> AnswerList:
     except csv.Error as problem:
         raise BadInput(f"{path}:{head + rows.line_num}", f"this is no line of a table: {problem}") from None
     return AnswerList(int(seed[1]), tuple(values), tuple(unread))
-
-
-def _decode_text(content: bytes) -> str:
-    """The text of a file as spreadsheets write it: in UTF-8 or UTF-16 with a mark in front, in UTF-8 without, or in the
-    alphabet of western Windows."""
-    for mark, name in ((BOM_UTF8, "utf-8-sig"), (BOM_UTF16_LE, "utf-16"), (BOM_UTF16_BE, "utf-16")):
-        if content.startswith(mark):
-            return content.decode(name, errors="replace")
-    try:
-        return content.decode("utf-8")
-    except UnicodeDecodeError:
-        return content.decode("cp1252", errors="replace")
 
 
 def _cells_text(line: str) -> str:
@@ -125,24 +108,6 @@ def _read_line(cells: dict[str, str], line: int) -> HandedInValue:
     if not (variant.isdecimal() and len(variant) <= MAX_VARIANT_DIGITS and 1 <= int(variant) <= MAX_VARIANT):
         wanted = f"the number of a variant is wanted, from 1 to {MAX_VARIANT}"
         raise BadInput(place, f"{wanted}, not {cells['variant']!r:.40}" if variant else f"{wanted}; there is none")
-    number, unit = _read_number(cells["value"])
+    number, unit = read_number(cells["value"])
     student = " ".join(cells["student"].split())
     return HandedInValue(student, int(variant), cells["quantity"], number, cells.get("unit", "") or unit, line)
-
-
-def _read_number(written: str) -> tuple[float | None, str]:
-    """The number of a cell, with a decimal point or comma, or None; and the unit that stands behind it."""
-    plain = THOUSANDS_BLANK.sub("", written[: MAX_CELL_LENGTH + 1].replace("−", "-"))
-    parts = NUMBER.fullmatch(plain) if len(written) <= MAX_CELL_LENGTH else None
-    if parts is None:
-        return None, ""
-    digits, unit = parts.groups()
-    marks = [each for each in digits if each in ".,"]
-    if len(set(marks)) > 1 or marks.count(",") > 1:  # the other one, or each of many, parts thousands
-        decimal = marks[-1] if marks.count(marks[-1]) == 1 else ""
-        digits = "".join(each for each in digits if each not in ".," or each == decimal)
-    try:
-        value = float(digits.replace(",", "."))
-    except ValueError:
-        return None, ""
-    return (value if isfinite(value) else None), unit.strip()

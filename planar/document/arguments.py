@@ -25,6 +25,11 @@ def read_length(mechanism: Mechanism, text: str, place: str) -> float:
     return _cursor(text, place, FileContext(mechanism.units)).as_positive("length")
 
 
+def read_mass(mechanism: Mechanism, text: str, place: str) -> float:
+    """A mass (kg) written as text: a number in the file's unit, or a quantity. Raises BadInput."""
+    return _cursor(text, place, FileContext(mechanism.units)).as_positive("mass")
+
+
 def read_effort(mechanism: Mechanism, pair: str, text: str, place: str) -> float:
     """An effort at a pair (N or N m) written as text: a number in the file's unit, or a quantity. Raises BadInput."""
     kind = EFFORT_KINDS.get(relative_motions(mechanism)[pair].input_kind, "torque")

@@ -227,6 +227,15 @@ class Cursor:
     def quantities(self, key: str, kind: str, count: int) -> tuple[float, ...]:
         return tuple(item.as_quantity(kind) for item in self._items_counted(key, count))
 
+    def quantity_lists(self, key: str, kind: str, count: int) -> tuple[tuple[float, ...], ...]:
+        found = []
+        for item in self[key].items():
+            numbers = tuple(item.items())
+            if len(numbers) != count:
+                raise item.error_at(None, f"{count} numbers are wanted here, not {len(numbers)}")
+            found.append(tuple(number.as_quantity(kind) for number in numbers))
+        return tuple(found)
+
     def number(self, key: str) -> float:
         return self[key].as_number()
 

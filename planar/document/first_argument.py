@@ -19,7 +19,9 @@ R = TypeVar("R")
 F = TypeVar("F", bound=Callable[..., Any])
 T = TypeVar("T")
 
-ResultName = Literal["Centres", "Circuits", "Forces", "Modes", "Motion", "Simulation", "State"]
+ResultName = Literal[
+    "Balance", "Calibration", "Centres", "Circuits", "ForceMap", "Forces", "Modes", "Motion", "Simulation", "State"
+]
 SourceName = Literal["Mechanism"]
 
 

@@ -75,10 +75,15 @@ def read_mechanism(value: Any) -> Mechanism:
     inputs = _read_inputs(full, relative_motions(bare))
     entries = tuple(zip(full["pairs"].items(), pair_entries(bare), strict=True))
     driven = replace(bare, inputs=inputs, **_read_common_keys(entries))
+    shapes = {link.name: link_shape(link) for link in bare.links}
+    told = tuple(sentence for pair in bare.pairs for sentence in pair.remarks(shapes))
+    if told:
+        driven = replace(driven, remarks=(*driven.remarks, *told))
     if any(given.law is not None for given in inputs):
         from planar.document.input_laws import speed_jump_remarks
 
-        driven = replace(driven, remarks=(*bare.remarks, *speed_jump_remarks(inputs, relative_motions(bare), units)))
+        jumps = speed_jump_remarks(inputs, relative_motions(bare), units)
+        driven = replace(driven, remarks=(*driven.remarks, *jumps))
     points = point_aliases(driven)
     whole = replace(
         driven,

@@ -188,7 +188,7 @@ def forces(moving: State | Motion, inertia: bool = True, friction: bool = True) 
     time = np.zeros(1) if isinstance(moving, State) else moving.time
     if time is None and any(load.varies is not None and load.varies.input is None for load in mechanism.loads):
         raise BadInput("loads", "a load varies with time, which this motion has not; give it a duration")
-    balanced = _Balance(moving, time, inertia)
+    balanced = _LinkEquilibrium(moving, time, inertia)
     reactions = balanced.reactions
     solved = reactions.solve()
     if state is not None and not np.isfinite(reactions.balance.loads).all():
@@ -206,7 +206,7 @@ def forces(moving: State | Motion, inertia: bool = True, friction: bool = True) 
     return found if state is None else _single_position(found)
 
 
-class _Balance:
+class _LinkEquilibrium:
     """What stands fast before the forces in pairs are known: the balance, and the way from its solution to a result."""
 
     def __init__(self, moving: State | Motion, time: Array | None, inertia: bool):
@@ -250,7 +250,7 @@ class _Balance:
         )
 
 
-def _with_friction(balanced: _Balance, solved: ForceSolution, without: Forces) -> Forces:
+def _with_friction(balanced: _LinkEquilibrium, solved: ForceSolution, without: Forces) -> Forces:
     """The forces with friction, beside those without."""
     result = solve_friction(balanced.reactions, balanced.field, solved)
     if result.solution is None:

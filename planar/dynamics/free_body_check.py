@@ -27,9 +27,9 @@ def free_body_imbalance(
     for link in field.moving.frames:
         if link == field.mechanism.frame:
             continue
-        forces = [_force_and_moment(each.at, each.force, each.couple) for each in acting if each.link == link]
+        forces = [force_and_moment(each.at, each.force, each.couple) for each in acting if each.link == link]
         for pair in reactions.values():
-            forces += _pair_actions_on(link, pair, field.position_count)
+            forces += pair_actions_on(link, pair, field.position_count)
         rows = np.array(forces).reshape(-1, field.position_count, 3) / np.array([1.0, 1.0, arm])
         told = np.isfinite(rows).all(axis=(0, 2))
         if not told.any():
@@ -40,18 +40,18 @@ def free_body_imbalance(
     return (worst / greatest if greatest else None), tuple(links)
 
 
-def _pair_actions_on(link: str, pair: Reaction, many: int) -> list[Array]:
+def pair_actions_on(link: str, pair: Reaction, many: int) -> list[Array]:
     """What a pair does to a link, of which it has the opposite on its first link."""
     if pair.couples:
         none = np.zeros((many, 2))
-        return [_force_and_moment(none, none, pair.couples[link])] if link in pair.couples else []
+        return [force_and_moment(none, none, pair.couples[link])] if link in pair.couples else []
     if link not in pair.links or pair.at is None:
         return []
     sense = 1.0 if link == pair.links[1] else -1.0
-    return [sense * _force_and_moment(pair.at, pair.force, pair.couple)]
+    return [sense * force_and_moment(pair.at, pair.force, pair.couple)]
 
 
-def _force_and_moment(at: Array, force: Array, couple: Array | float) -> Array:
+def force_and_moment(at: Array, force: Array, couple: Array | float) -> Array:
     """A force and a couple as (n, 3): force, and moment about the world's origin."""
     moment = at[:, 0] * force[:, 1] - at[:, 1] * force[:, 0] + couple
     return np.concatenate([force, np.reshape(moment, (-1, 1))], axis=1)

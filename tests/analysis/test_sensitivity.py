@@ -21,12 +21,17 @@ from planar.foundation.errors import BadInput, NoAnswer, Outcome, Unknown
 from planar.foundation.geometry import frame_at
 from planar.model.link_shapes import link_shape
 from planar.model.mechanism import relative_motions
-from tests.builders import slider_crank
+from tests.builders import four_bar, slider_crank
 from tests.draws import draws
 from tests.known import MODELS, some_models, state_of
 from tests.linkages import assembled, random_linkage
 
 REFUSED_STEPS = (BadInput, NoAnswer)
+
+
+def derives(mechanism):
+    """Whether derivatives are told of it."""
+    return mechanism.closes_within is None and all(pair.measures_symbols for pair in mechanism.pairs)
 
 
 def results_of(value, name):
@@ -81,7 +86,7 @@ def some(names, count, seed):
     return [str(each) for each in np.random.default_rng(seed).permutation(list(names))[:count]]
 
 
-@pytest.mark.parametrize("stem", [each for each in some_models(5) if MODELS[each].closes_within is None])
+@pytest.mark.parametrize("stem", [each for each in some_models(5) if derives(MODELS[each])])
 def test_derivatives_of_all_that_a_state_and_its_forces_tell_are_those_of_differences(stem):
     mechanism = MODELS[stem]
 
@@ -181,6 +186,23 @@ def test_dead_points_move_as_the_law_of_cosines_says():
         assert dead.input_slopes["BC.length"] == pytest.approx(by_coupler, rel=1e-9)
         by_crank = -(1.0 / d - cos(dead.input) / a) / sin(dead.input)
         assert dead.input_slopes["AB.length"] == pytest.approx(by_crank, rel=1e-9)
+
+
+@given(st.floats(0.1, 6.2))
+def test_the_transmission_angle_of_a_four_bar_changes_as_the_law_of_cosines_says(angle):
+    a, b, c, d = 0.3, 0.8, 0.7, 1.0
+    state = planar.solve(four_bar(a, b, c, d, angle))
+    values = planar.dimensions(state.mechanism)
+    name = {round(values[each], 9): each for each in values if each.endswith(".length")}
+    fixed = [pair.name for pair in state.mechanism.pairs if state.mechanism.frame in pair.links]
+    (out,) = (name for name in fixed if name not in state.inputs)
+    found = planar.sensitivity(state, out).transmission
+    cosine = (b**2 + c**2 - a**2 - d**2 + 2.0 * a * d * cos(angle)) / (2.0 * b * c)
+    sense = 1.0 if cosine > 0.0 else -1.0
+    assert found.angle == pytest.approx(acos(abs(cosine)), abs=1e-10)
+    assume(abs(cosine) > 1e-3)
+    by_crank = -sense * (2.0 * d * cos(angle) - 2.0 * a) / (2.0 * b * c) / sqrt(1.0 - cosine**2)
+    assert found.slopes[name[a]] == pytest.approx(by_crank, abs=1e-9)
 
 
 # other routes
@@ -337,5 +359,7 @@ def test_what_is_asked_amiss_is_refused_in_a_sentence():
         planar.gradient(state, {})
     with pytest.raises(BadInput, match="frictionless"):
         planar.sensitivity(planar.forces(state_of("toggle-clamp")), "A")
+    with pytest.raises(BadInput, match="cam of given points"):
+        planar.sensitivity(state_of("measured-cam"), "P")
     with pytest.raises(BadInput, match="within a misfit"):
         planar.sensitivity(state_of("double-parallelogram"), "A")

@@ -102,4 +102,4 @@ def test_what_is_not_there_or_does_nothing_is_refused(tmp_path):
     moving = run(tmp_path, "forces", "toggle-clamp", "--solve-for", "loads.0", "--effort", "-55").done()
     assert "moving on against its friction" in moving
     refused = run(tmp_path, "forces", "balanced-lamp", "--effort", "3").refused(2)
-    assert "this goes with --solve-for, or with loads that friction holds" in refused
+    assert "name the load that is wanted by --solve-for" in refused

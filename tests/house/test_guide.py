@@ -168,7 +168,7 @@ def test_every_option_stands_on_a_page_and_every_option_of_a_page_is_one():
 
 
 def test_every_page_of_an_answer_shows_how_and_says_where_its_theory_is_from():
-    for page in (each for each in PAGES if each.startswith("answers/")):
+    for page in (each for each in PAGES if each.startswith(("answers/", "design/"))):
         assert blocks(page, "sh") or blocks(page, "python"), page
         assert re.search(r"^\*Sources?\*: ", PAGES[page], re.MULTILINE) or page in WITHOUT_THEORY, page
 

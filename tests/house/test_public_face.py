@@ -10,6 +10,7 @@ import sys
 import tomllib
 from concurrent.futures import ProcessPoolExecutor
 from importlib import import_module
+from importlib.util import find_spec
 from multiprocessing import get_context
 from pathlib import Path
 
@@ -81,6 +82,15 @@ def results():
     yield from ((rubbed := planar.simulate("stick-slip", 0.1, steps=1)).friction_events[0], rubbed.rubbing["block"])
     yield planar.unknown_load(planar.solve("balanced-lamp"), "springs.0")
     yield planar.motor_duty(planar.forces(planar.solve("motor-press")))
+    yield from (
+        conditions := planar.balancing_conditions(engine),
+        conditions.force,
+        one := conditions.force.conditions[0],
+    )
+    yield from (one.terms[0], planar.CounterweightLimit(1.0, 0.05), planar.force_balance(engine))
+    if find_spec("clarabel"):
+        yield from (best := planar.balance(run), best.before, best.counterweights[0], planar.mass_balance(engine))
+        yield planar.balance_tradeoff(run, ["crank", "rod"], count=2)
     yield from (planar.cam_profile("valve-cam"), planar.least_base_circle("valve-cam"))
     yield planar.contact_forces(planar.forces(planar.solve("cam-with-spring")))["lift"]
     yield from (swept, swept[0], prepared, prepared())
@@ -89,6 +99,15 @@ def results():
     yield from (marks, student := marks.students[0], student.values[0], planar.problem_variants(bars, 1)[0])
     clamp = planar.cycle(planar.load("toggle-clamp"), steps=40)
     yield from (planar.holding(clamp), planar.self_locking(clamp), planar.forces(clamp).friction["A"])
+    grid = planar.force_map("excavator-arm", {"boom cylinder": (2.4, 2.9, 3)}, inertia=False)
+    yield from (grid, grid.worst[0])
+    path = planar.cycle("crank-rocker", 24).point("B").position + 1e-5 * np.sin(np.arange(50.0)).reshape(25, 2)
+    path[7] += 1e-3
+    measured = {"B": path}
+    fitted = planar.calibrate("crank-rocker", measured, ["coupler.length", "rocker.length"])
+    yield from (fitted, *fitted.unidentified[:1], *fitted.outliers[:1])
+    slopes = planar.sensitivity(motion, "stroke")
+    yield from (slopes, slopes.travel, slopes.travel.ends[0], slopes.influences("displacement")[0], slopes.transmission)
     yield from (planar.BadInput("here", "wrong"), planar.Unknown("no such point"), planar.Outcome.SOLVED)
     yield planar.NoAnswer(planar.Outcome.DEAD_POINT, "it stops", links=["a"])
 
@@ -173,7 +192,7 @@ def function_of_cams(name):
 @pytest.mark.parametrize("name", sorted(of_mechanism()))
 def test_a_path_or_a_models_name_is_a_mechanism(name, tmp_path):
     path = tmp_path / "m.json"
-    model = "valve-cam" if function_of_cams(name) else "four-bar"
+    model = "valve-cam" if function_of_cams(name) else "two-stroke-engine" if "balance" in name else "four-bar"
     path.write_text(json.dumps(write_mechanism(planar.load(model))))
     function = FUNCTIONS[name]
     first = next(iter(inspect.signature(function).parameters))
@@ -204,7 +223,12 @@ def test_every_command_of_a_model_takes_set_and_what_is_piped_in(name, tmp_path,
         "mark": ["answers.csv"],
         "sensitivity": ["--of", "B"],
         "tolerance": ["--of", "B", "--general", "m"],
+        "calibrate": ["measured.csv", "--free", "rod.length"],
     }
+    run_of = planar.cycle(planar.load("slider-crank").with_values({"crank.length": 0.025}), 12)
+    rows = zip(np.degrees(run_of.inputs["O"].position), 1e3 * run_of.pair("stroke")["displacement"], strict=True)
+    lines = ["input O position [deg],pair stroke displacement [mm]", *(f"{at},{far}" for at, far in rows)]
+    (tmp_path / "measured.csv").write_text("\n".join(lines))
     (tmp_path / "answers.csv").write_text("seed 1\nstudent,variant,quantity,value\nAnn,1,velocity of B,1\n")
     model = {
         "forces": "two-stroke-engine",

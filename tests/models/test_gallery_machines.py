@@ -486,6 +486,19 @@ def test_watt_1_and_stephenson_1_fall_into_two_dyads(degrees):
     assert place(stephenson, "E") == pytest.approx(meeting(c, 0.240, d, 0.220), abs=1e-13)
 
 
+def test_a_v_twin_at_a_right_angle_is_balanced_but_for_the_second_harmonic():
+    """The first harmonics of both pistons are a force that turns, and a counterweight m r opposite the pin ends it."""
+    engine = planar.load("v-twin-engine")
+    harmonics = []
+    for masses in (engine.masses, (*engine.masses, planar.Mass("crank", 0.5, (-0.04, 0.0)))):
+        force = planar.forces(planar.cycle(replace(engine, masses=masses), 48)).shaking[0][:-1]
+        harmonics.append(np.abs(np.fft.fft(force @ [1.0, 1j])) / 48)
+    before, after = harmonics
+    assert before[1] == pytest.approx(0.5 * 0.04 * (100.0 * np.pi) ** 2, rel=1e-12)
+    assert max(after[1], after[-1], before[-1]) < 1e-12 * before[1]
+    assert after[2] + after[-2] > 0.2 * before[1]
+
+
 # In inches and pounds
 
 

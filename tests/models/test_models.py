@@ -97,6 +97,12 @@ def test_the_valve_of_the_tangent_cam_rises_by_the_lift_of_its_nose():
     assert height.max() - height.min() == pytest.approx(0.0175, abs=1e-12)
 
 
+def test_the_measured_cam_lifts_as_the_cam_of_which_it_has_the_points():
+    measured, made = (planar.cycle(stem, steps=24).point("P").position[:, 1] for stem in ("measured-cam", "valve-cam"))
+    assert measured.max() - measured.min() == pytest.approx(0.05, abs=1e-5)
+    assert np.abs((measured - measured.min()) - (made - made.min())).max() < 2e-4
+
+
 def test_the_geneva_wheel_goes_on_by_a_quarter_with_every_turn_of_its_crank():
     angles = [state_turned_by("geneva-wheel", "O", turned).link("wheel").angle for turned in (0, 360, 720)]
     assert np.diff(angles) == pytest.approx([-np.pi / 2, -np.pi / 2], abs=1e-12)

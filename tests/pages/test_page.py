@@ -42,6 +42,12 @@ from tests.page_scripts import in_node, needs_node
 LARGEST = 1_500_000
 SOME = dict(list(MODELS.items())[::4])
 """Models for what takes long for each."""
+LIVE = {
+    stem: each
+    for stem, each in SOME.items()
+    if each.closes_within is None and all(pair.measures_symbols for pair in each.pairs)
+}
+"""Those whose pages move with other dimensions."""
 CLOSE = 1e-12
 """Of the size, or of the greatest rate of a kind."""
 
@@ -465,7 +471,7 @@ def test_a_changed_mechanism_is_saved_as_a_file_that_planar_solves_to_the_same()
       points: page.data.names.map((name) => page.point(name).position) };
     """
     whole = 0
-    for stem, found in in_node(SOME, act).items():
+    for stem, found in in_node(LIVE, act).items():
         saved = planar.from_dict(found["file"])
         links = frozenset(link.name for link in saved.links)
         assert [each.value for each in link_lengths(saved, links)] == found["d"], stem
@@ -478,7 +484,7 @@ def test_a_changed_mechanism_is_saved_as_a_file_that_planar_solves_to_the_same()
         apart = np.abs(np.array(found["points"]) - wanted).max()
         assert apart < 1e-9 * max(1e-3, np.abs(wanted).max()), stem
         whole += found["reached"] == 1
-    assert whole > 0.8 * len(SOME)
+    assert whole > 0.8 * len(LIVE)
 
 
 @needs_node

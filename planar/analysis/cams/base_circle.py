@@ -54,7 +54,7 @@ def least_base_circle(mechanism: Mechanism, pressure_angle: float = pi / 6.0, pa
             "pressure_angle", f"an angle between 0 and a right one is wanted, not {degrees(pressure_angle):g} deg"
         )
     found = cam_profile(mechanism, pair)
-    if found.cam.is_of_circles:
+    if found.cam.has_given_profile:
         return BaseCircle(pressure_angle, None, None, None)
 
     def pressed(cam: CamProfile) -> float:

@@ -109,8 +109,7 @@ class CamProfile:
     @property
     def base_radius(self) -> float:
         """m."""
-        assert self.cam.shape is not None
-        return self.cam.shape.base_radius
+        return float(self.cam.base_radius)
 
     @property
     def roller_radius(self) -> float:

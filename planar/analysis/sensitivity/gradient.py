@@ -33,8 +33,9 @@ def gradient(result: State | Motion | Forces, weights: Weights) -> dict[str, flo
     >>> import planar
     >>> motion = planar.cycle(planar.load("slider-crank"), 12)
     >>> found = planar.gradient(motion, {"stroke": [1.0] + 12 * [0.0]})
-    >>> found["rod.length"] == planar.sensitivity(motion, "stroke").displacement["rod.length"][0]
-    True
+    >>> one = planar.sensitivity(motion, "stroke").displacement["rod.length"][0]
+    >>> round(found["rod.length"], 3), round(float(one), 3)
+    (1.036, 1.036)
     """
     if not isinstance(weights, Mapping) or not weights:
         raise BadInput("weights", "name what is weighed, with an array each, as {'E': weights}")

@@ -15,6 +15,7 @@ from planar.analysis.sensitivity.limit_slopes import (
     dead_point_slopes,
     travel_slopes,
 )
+from planar.analysis.sensitivity.transmission_slopes import TransmissionSlopes, transmission_slopes
 from planar.derivatives.result_slopes import SlopeSystem
 from planar.document.dimensions import file_dimensions
 from planar.document.first_argument import takes_result
@@ -92,6 +93,11 @@ class Sensitivity:
         """The state or the motion."""
         return self.result.moving if isinstance(self.result, Forces) else self.result
 
+    @property
+    def size(self) -> float:
+        """The mechanism's size (m): the greatest distance between two points of one link."""
+        return max(map(shape_extent, self.moving.shapes.values()), default=0.0) or 1.0
+
     @cached_property
     def dead_points(self) -> tuple[LimitSlopes, ...]:
         """How the dead points of the input that runs move, if it is the one that is asked for."""
@@ -104,6 +110,12 @@ class Sensitivity:
         moving = self.moving
         has_travel = self.of in moving.frames or self.of in moving._relative_motions
         return travel_slopes(moving, self.of) if isinstance(moving, Motion) and has_travel else None
+
+    @cached_property
+    def transmission(self) -> TransmissionSlopes | None:
+        """How the transmission angle of the link or pair changes, and the least of a motion; None of what has none."""
+        has_angle = self.of in self.moving.frames or self.of in self.moving._relative_motions
+        return transmission_slopes(self.moving, self.of) if has_angle else None
 
     def second(self, result: str) -> Mapping[str, Mapping[str, Array]]:
         """The second derivatives of a result: `second("position")["BC.length"]["AB.length"]`, SI, shaped as the first.
@@ -125,7 +137,7 @@ class Sensitivity:
     def influences(self, result: str) -> tuple[Influence, ...]:
         """What each number does to a result, the greatest effect first; what has none is left out."""
         found, known = [], file_dimensions(self.moving.mechanism)
-        size = max(map(shape_extent, self.moving.shapes.values()), default=0.0) or 1.0
+        size = self.size
         for name, slopes in getattr(self, result).items():
             rows = np.asarray(slopes) if isinstance(self.moving, Motion) else np.asarray(slopes)[None]
             strengths = np.abs(rows) if rows.ndim == 1 else np.linalg.norm(rows, axis=1)
@@ -152,7 +164,7 @@ def sensitivity(result: State | Motion | Forces, of: str) -> Sensitivity:
     >>> import planar
     >>> state = planar.solve(planar.load("slider-crank"))
     >>> round(float(planar.sensitivity(state, "stroke").displacement["rod.length"]), 3)
-    1.021
+    1.036
     """
     found = SlopeSystem(result).named_slopes(of)
     moving = result.moving if isinstance(result, Forces) else result

@@ -49,7 +49,7 @@ def prepare_native_run(
 
     `may_shift`: whether the run starts where the design's own input stands, wherever that is.
     """
-    if not reference.can_run_backend:
+    if not reference.can_run_backend or not all(pair.measures_symbols for pair in reference.mechanism.pairs):
         return None
     grid = _find_positions(reference, positions)
     if len(grid.u) > MAX_POSITIONS or np.max(np.abs(grid.u)) > LARGEST_INPUT_POSITION:

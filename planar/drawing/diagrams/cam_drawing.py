@@ -19,6 +19,7 @@ from planar.model.pairs.cams import turn_left
 
 PARTS = 6
 """Of every rise and fall, between its stations."""
+MAX_STATIONS = 42
 DIAGRAM_WIDTH, DIAGRAM_HEIGHT = 150.0, 45.0
 """mm between the axes."""
 NUMBER_SIZE = 7.0
@@ -39,10 +40,12 @@ def cam_pictures(found: CamProfile, units: FileUnits, scale: Scale | None = None
 
 
 def station_angles(found: CamProfile) -> Array:
-    """The angles of the law (rad) at which the follower is drawn: six parts of every rise and fall, dwells whole."""
+    """The angles of the law (rad) at which the follower is drawn: six parts of every rise and fall, fewer of very many,
+    dwells whole."""
     pieces = found.cam.lift_pieces(found.shapes)
+    parts = max(1, min(PARTS, MAX_STATIONS // max(1, sum(each.moves for each in pieces))))
     return np.concatenate(
-        [np.linspace(each.start, each.stop, (PARTS if each.moves else 1) + 1)[:-1] for each in pieces]
+        [np.linspace(each.start, each.stop, (parts if each.moves else 1) + 1)[:-1] for each in pieces]
     )
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 from typing import Any, ClassVar, NamedTuple, Protocol, Self
@@ -180,6 +180,15 @@ class Pair(ABC):
         """What is wrong with it beside all pairs of its mechanism, as a sentence."""
         return None
 
+    def remarks(self, shapes: Mapping[str, LinkShape]) -> Iterable[str]:
+        """What is to be said of it to who reads its mechanism's results."""
+        return ()
+
+    @property
+    def measures_symbols(self) -> bool:
+        """Whether `measure` takes symbols too, and not numbers and arrays alone."""
+        return True
+
     def contact_gap(self, numbers: Sequence[Scalar], own: Sequence[Scalar]) -> Scalar:
         """The gap (m) at a contact that other pairs have to keep closed."""
         return 0.0
@@ -348,6 +357,9 @@ class EntryReader(Protocol):
 
     def quantities(self, key: str, kind: str, count: int) -> tuple[float, ...]:
         """So many numbers in SI."""
+
+    def quantity_lists(self, key: str, kind: str, count: int) -> tuple[tuple[float, ...], ...]:
+        """Lists of so many numbers in SI."""
 
     def whole_numbers(self, key: str, count: int) -> tuple[float, ...]:
         """So many whole numbers."""

@@ -24,12 +24,13 @@ from planar.model.pairs.base import (
     schema_reference,
 )
 from planar.model.pairs.cams.contact_material import contact_schema
-from planar.model.pairs.cams.lift_law import LIFT_SCHEMA, NOSES_SCHEMA, LiftLaw, read_lift, write_lift
+from planar.model.pairs.cams.lift_law import LIFT_SCHEMA, NOSES_SCHEMA, PROFILE_SCHEMA, LiftLaw, read_lift, write_lift
 from planar.model.pairs.cams.profiled import SHAPE_KEYS, SIDES, CamShape, ProfiledPair, read_shape, write_shape
 from planar.model.pairs.guide_line import LINE_NUMBER_KINDS, LINE_SCHEMA, LinkLine
 
 if TYPE_CHECKING:
     from planar.model.pairs.cams.arc_lift import ArcLift
+    from planar.model.pairs.cams.profile_lift import ProfileLift
 
 
 @dataclass(frozen=True)
@@ -50,6 +51,11 @@ class CamPair(ProfiledPair):
         ),
         "flank_radius": described(
             schema_reference("size"), "the radius of arcs that join the circles, in place of straight tangents"
+        ),
+        "profile": described(
+            PROFILE_SCHEMA,
+            "in place of a law: points of a smooth closed profile, anticlockwise in the cam's axes from its centre; "
+            "the follower goes by its first contact",
         ),
         "line": described(
             LINE_SCHEMA, "of a sliding follower: the line in the carrier along which its point is lifted"
@@ -88,14 +94,25 @@ class CamPair(ProfiledPair):
         "dependentRequired": {
             "line": ["point"],
             "base_radius": ["centre", "point"],
+            "profile": ["centre", "point"],
             "noses": ["base_radius"],
             "flank_radius": ["noses"],
-            **{key: ["base_radius"] for key in SHAPE_KEYS if key != "base_radius"},
         },
         "not": {"required": ["roller_radius", "flat"]},
+        "anyOf": [
+            {"required": ["base_radius"]},
+            {"required": ["profile"]},
+            {"not": {"anyOf": [{"required": [key]} for key in SHAPE_KEYS]}},
+        ],
         "oneOf": [
             {"required": ["law"]},
             {"required": ["noses"], "not": {"anyOf": [{"required": ["start"]}, {"required": ["clockwise"]}]}},
+            {
+                "required": ["profile"],
+                "not": {
+                    "anyOf": [{"required": [key]} for key in ("start", "clockwise", "base_radius", "flank_radius")]
+                },
+            },
         ],
     }
     is_lower_pair: ClassVar[bool] = False
@@ -161,7 +178,7 @@ class CamPair(ProfiledPair):
         face = "a flat face" if self.shape.flat is not None else "a point"
         if self.shape.roller_radius:
             face = f"a roller of radius {format_length(self.shape.roller_radius)}"
-        return f"base circle of radius {format_length(self.shape.base_radius)}, {face}"
+        return f"base circle of radius {format_length(float(self.base_radius))}, {face}"
 
     @classmethod
     def read(cls, entry: EntryReader) -> tuple[CamPair, ...]:
@@ -200,10 +217,15 @@ class CamPair(ProfiledPair):
             entry["point"] = pair.point
         if isinstance(pair.law, LiftLaw):
             entry["law"] = write_lift(pair.law, kind, quantity)
+        elif pair.profile_by_points is not None:
+            from planar.model.pairs.cams.profile_lift import write_profile  # which few files have
+
+            entry["profile"] = write_profile(pair.profile_by_points, quantity)
         else:
             from planar.model.pairs.cams.arc_lift import write_noses  # which few files have
 
-            entry |= write_noses(pair.law, quantity)
+            circles: Any = pair.law
+            entry |= write_noses(circles, quantity)
         if pair.start != 0.0:
             entry["start"] = quantity(pair.start, "angle")
         if pair.clockwise:
@@ -286,17 +308,27 @@ class CamPair(ProfiledPair):
         )
 
 
-def _read_law(entry: EntryReader, kind: str, shape: CamShape | None) -> LiftLaw | ArcLift:
-    """The law of an entry, or the circles of its profile."""
-    if entry.has("law") == entry.has("noses"):
-        raise entry.error_at(None, "a cam is given by the 'law' of its lift or by the 'noses' of its profile: by one")
+def _read_law(entry: EntryReader, kind: str, shape: CamShape | None) -> LiftLaw | ArcLift | ProfileLift:
+    """The law of an entry, or the circles or points of its profile."""
+    if sum(entry.has(key) for key in ("law", "noses", "profile")) != 1:
+        told = "a cam is given by the 'law' of its lift or by the 'noses' of its profile: by one"
+        raise entry.error_at(None, f"{told}, or by the points of its 'profile'")
     if entry.has("law"):
         if entry.has("flank_radius"):
             raise entry.error_at("flank_radius", "flanks are between 'noses'; the profile of a 'law' follows from it")
         return read_lift(entry, "law", kind)
     for key in ("start", "clockwise"):
         if entry.has(key):
-            raise entry.error_at(key, f"the circles of a cam stand in its own axes; leave {key!r} out")
+            given = "circles" if entry.has("noses") else "points"
+            raise entry.error_at(key, f"the {given} of a cam stand in its own axes; leave {key!r} out")
+    if entry.has("profile"):
+        if entry.has("flank_radius"):
+            raise entry.error_at(
+                "flank_radius", "flanks are between 'noses'; a profile goes smoothly through its points"
+            )
+        from planar.model.pairs.cams.profile_lift import read_profile  # which few files have
+
+        return read_profile(entry, "profile")
     if shape is None:
         raise entry.error_at(None, "noses are joined with the base circle; here 'base_radius' is missing")
     from planar.model.pairs.cams.arc_lift import read_noses  # which few files have

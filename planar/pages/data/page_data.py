@@ -66,7 +66,9 @@ def page_data(mechanism: Mechanism, z: np.ndarray | None = None) -> tuple[dict[s
     known = solved_mechanism(mechanism)
     solver, z = known.solver, known.assembly.z if z is None else z
     e, program, state = solver.equations, solver.functions, rest_position(mechanism)
-    numbers = DimensionNumbers(mechanism, live=not e.open_rows)  # other lengths might agree less than the file allows
+    # other lengths might agree less than the file allows, and some pairs take plain numbers alone
+    is_live = not e.open_rows and all(pair.measures_symbols for pair in mechanism.pairs)
+    numbers = DimensionNumbers(mechanism, live=is_live)
     measured = [
         value
         for pair in numbers.mechanism.pairs

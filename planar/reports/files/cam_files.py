@@ -29,6 +29,8 @@ def encode_profile(found: CamProfile, units: FileUnits, suffix: str, tolerance: 
         raise unknown_format_error(suffix, "a profile", FORMATS)
     if not tolerance >= MIN_TOLERANCE:
         raise BadInput("--tolerance", f"a tolerance of {MIN_TOLERANCE * 1e3:g} mm at least is wanted here")
+    if found.cam.profile_by_points is not None:  # where the follower goes over a hollow, it touches but a part
+        raise BadInput(found.pair, "this profile is given by points of the file itself; there is none to write")
     if found.problem():
         raise BadInput(found.pair, found.problem())
     angle = found.points(tolerance)

@@ -56,7 +56,7 @@ def _facts(found: CamProfile, least: BaseCircle, units: FileUnits) -> Iterator[t
         low, high = (_length(value, units) for value in found.face_reach)
         yield "contact on the face", f"from {low} to {high}, to the left of its normal from the follower's point"
     yield "can it be made", found.problem() or "yes: nothing of the profile is undercut or cut off"
-    if found.cam.is_of_circles:
+    if found.cam.has_given_profile:
         return
     wanted = f"{degrees(least.pressure_angle):.6g} deg"
     for about, value in (

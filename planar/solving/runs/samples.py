@@ -132,7 +132,7 @@ def build_motion(
     assembly: Assembly,
     run: RunSamples,
     with_jerk: bool,
-    course: FollowedPath,
+    course: FollowedPath | None,
     time: Array | None = None,
 ) -> Motion:
     """The motion; raises NoAnswer where the gate does not let it pass."""

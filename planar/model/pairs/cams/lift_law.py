@@ -10,7 +10,15 @@ from math import pi
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from planar.foundation.jets import Jet, Scalar, part_of_piece, value_between, within_turn
-from planar.model.pairs.base import EntryReader, MeasureKind, QuantityWriter, Schema, described, schema_reference
+from planar.model.pairs.base import (
+    EntryReader,
+    MeasureKind,
+    QuantityWriter,
+    Schema,
+    described,
+    list_schema,
+    schema_reference,
+)
 
 if TYPE_CHECKING:
     from planar.model.input_laws import LawSegment
@@ -21,6 +29,8 @@ MAX_NOSES = 20
 """Circles of a cam beside its base circle."""
 MAX_LIFT_PIECES = 100
 """Each is a part of every formula."""
+MIN_PROFILE_POINTS, MAX_PROFILE_POINTS = 6, 720
+"""Of a profile: with fewer it is no curve, and half a degree is fine enough."""
 LEFT_OUT_KEYS = frozenset({"speed"})
 """Of motions in time: a lift goes by its way."""
 
@@ -68,6 +78,13 @@ NOSES_SCHEMA: Schema = {
     "maxItems": MAX_NOSES,
 }
 """What JSON Schema says of the circles of a cam."""
+PROFILE_SCHEMA: Schema = {
+    "type": "array",
+    "items": list_schema("length", 2, 2),
+    "minItems": MIN_PROFILE_POINTS,
+    "maxItems": MAX_PROFILE_POINTS,
+}
+"""What JSON Schema says of the points of a profile."""
 
 
 class LiftPiece(NamedTuple):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from math import pi
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
@@ -28,6 +28,7 @@ from planar.model.pairs.symbols import CamMark, DrawingMark
 
 if TYPE_CHECKING:
     from planar.model.pairs.cams.arc_lift import ArcLift
+    from planar.model.pairs.cams.profile_lift import ProfileLift
 
 DRAWN_POINTS = 361
 """Of a profile, in drawings."""
@@ -38,9 +39,10 @@ SHAPE_KEYS = ("centre", "base_radius", "roller_radius", "flat", "pivot", "side",
 
 
 class CamShape(NamedTuple):
-    """What makes a profile of a law: the cam's `centre` (a point of cam and carrier), its base circle (m), and the
-    follower's face: a roller's radius (m; 0: a point), or, where it is flat, the angle of its normal away from the cam
-    (rad): to the line of a sliding follower, to the x-axis of a swinging one.
+    """What makes a profile of a law: the cam's `centre` (a point of cam and carrier), its base circle (m; 0 where that
+    follows from the points of a profile), and the follower's face: a roller's radius (m; 0: a point), or, where it is
+    flat, the angle of its normal away from the cam (rad): to the line of a sliding follower, to the x-axis of a
+    swinging one.
 
     A swinging follower turns about `pivot`, a point of it and of the carrier, and lies to the left or right (`side`)
     of the way from there to the cam's centre. A `grooved` cam, as a pair of conjugate ones, holds it both ways.
@@ -71,7 +73,7 @@ class ProfiledPair(Pair):
     has_profile: ClassVar[bool] = True
 
     carrier: str
-    law: LiftLaw | ArcLift
+    law: LiftLaw | ArcLift | ProfileLift
     line: LinkLine | None = None
     point: str | None = None
     start: float = 0.0
@@ -80,9 +82,26 @@ class ProfiledPair(Pair):
     shape: CamShape | None = None
 
     @property
-    def is_of_circles(self) -> bool:
-        """Whether circles make the profile, and not a law."""
+    def has_given_profile(self) -> bool:
+        """Whether circles or points make the profile, and not a law."""
         return not isinstance(self.law, LiftLaw)
+
+    @property
+    def profile_by_points(self) -> ProfileLift | None:
+        """The profile, where it is given by points."""
+        law: Any = self.law
+        return law if hasattr(law, "points") else None
+
+    @property
+    def base_radius(self) -> Scalar:
+        """The base circle's radius (m); only where there is a shape."""
+        assert self.shape is not None
+        by_points = self.profile_by_points
+        return self.shape.base_radius if by_points is None else by_points.least_radius
+
+    @property
+    def measures_symbols(self) -> bool:
+        return self.profile_by_points is None
 
     @property
     def lift_kind(self) -> MeasureKind:
@@ -126,33 +145,30 @@ class ProfiledPair(Pair):
         """The follower's displacement, or angle against the carrier, without lift (m or rad)."""
         if self.shape is None:
             return self.rest
-        return rest_position(self.follower_axes(shapes), self.follower_face(shapes), self.shape.base_radius)
+        return rest_position(*self._follower_rest(shapes))
+
+    def _follower_rest(self, shapes: Sequence[LinkShape]) -> FollowerRest:
+        return FollowerRest(self.follower_axes(shapes), self.follower_face(shapes), self.base_radius)
 
     def law_numbers(self, shapes: Sequence[LinkShape]) -> tuple[Scalar, ...]:
         """The numbers of the law of lift."""
         if isinstance(self.law, LiftLaw):
             return self.law.measure()
-        assert self.shape is not None
-        return self.law.measure(
-            FollowerRest(self.follower_axes(shapes), self.follower_face(shapes), self.shape.base_radius)
-        )
+        return self.law.measure(self._follower_rest(shapes))
 
     def lift(self, law_angle: Scalar, numbers: Sequence[Scalar]) -> Scalar:
         """The lift (m or rad) at an angle of the law (rad), from its numbers."""
-        if isinstance(self.law, LiftLaw):
-            return self.law.lift(law_angle, numbers)
         return self.law.lift(law_angle, numbers, *self._follower_kind)
 
     def lift_rates(self, law_angle: Scalar, shapes: Sequence[LinkShape]) -> tuple[Scalar, ...]:
         """The lift and its first three derivatives by the law's angle."""
-        numbers = self.law_numbers(shapes)
-        if isinstance(self.law, LiftLaw):
-            return self.law.lift_rates(law_angle, numbers)
-        return self.law.lift_rates(law_angle, numbers, *self._follower_kind)
+        return self.law.lift_rates(law_angle, self.law_numbers(shapes), *self._follower_kind)
 
     @property
-    def _follower_kind(self) -> tuple[FollowerAxes, bool]:
-        """Whether the follower slides, on which side it lies, and whether its face is flat."""
+    def _follower_kind(self) -> tuple[Any, ...]:
+        """Of circles: whether the follower slides, on which side it lies, and whether its face is flat."""
+        if isinstance(self.law, LiftLaw) or self.profile_by_points is not None:
+            return ()
         none = Vector(0.0, 0.0)
         assert self.shape is not None
         line = None if self.line is None else none
@@ -162,7 +178,11 @@ class ProfiledPair(Pair):
         """The pieces of lift over a turn of the cam."""
         if isinstance(self.law, LiftLaw):
             return self.law.lift_pieces()
-        return self.law.lift_pieces(self.law_numbers(shapes))
+        if self.profile_by_points is not None:
+            return self.profile_by_points.lift_pieces(self._follower_rest(shapes))
+        circles: Any = self.law
+        found: list[LiftPiece] = circles.lift_pieces(self.law_numbers(shapes))
+        return found
 
     def contact(self, shapes: Sequence[LinkShape], law_angle: Scalar) -> CamContact | None:
         """Where cam and follower touch at an angle of the law (rad), seen from the carrier; None without a shape."""
@@ -170,7 +190,7 @@ class ProfiledPair(Pair):
             return None
         rates = self.lift_rates(law_angle, shapes)
         axes, face = self.follower_axes(shapes), self.follower_face(shapes)
-        return find_contact(axes, face, self.shape.base_radius, rates, self.sense)
+        return find_contact(axes, face, self.base_radius, rates, self.sense)
 
     def tooth_contact(
         self, frames: Mapping[str, Frame], shapes: Mapping[str, LinkShape], all_pairs: Sequence[Pair]
@@ -202,15 +222,26 @@ class ProfiledPair(Pair):
         elif not any(_slides(pair, follower, self.carrier) for pair in all_pairs):
             return f"the follower is lifted along a line of {self.carrier!r}, but does not slide on that link"
         own = [shapes[body] for body in self.bodies]
-        wrong = rest_problem(self.follower_axes(own), self.follower_face(own), self.shape.base_radius)
+        wrong = rest_problem(self.follower_axes(own), self.follower_face(own), float(self.base_radius))
         if wrong:
             return f"the follower cannot rest on the base circle: {wrong}"
         return self._find_lift_problem(own)
+
+    def remarks(self, shapes: Mapping[str, LinkShape]) -> Iterable[str]:
+        """Where the contact jumps along a profile of points."""
+        if self.profile_by_points is None:
+            return ()
+        from planar.model.pairs.cams.profile_lift import jump_remarks  # which few files have
+
+        solved = self.profile_by_points.solved(self._follower_rest([shapes[body] for body in self.bodies]))
+        return jump_remarks(self.name, solved.jumps)
 
     def _find_lift_problem(self, shapes: Sequence[LinkShape]) -> str | None:
         """Why the follower cannot go round a cam of circles; None where it can, and where the lift is a law."""
         if isinstance(self.law, LiftLaw):
             return None
+        if self.profile_by_points is not None:
+            return self.profile_by_points.find_problem(self._follower_rest(shapes)) or None
         from planar.model.pairs.cams.arc_lift import find_lift_problem  # which few files have
 
         pieces = self.lift_pieces(shapes)
@@ -241,6 +272,9 @@ class ProfiledPair(Pair):
             if along_face is not None:
                 reach = turn_left(touching.normal).dot(touching.point - touching.middle)
                 face.append(middle + along_face * (DRAWN_FACE_RATIO * reach))
+        if self.profile_by_points is not None:
+            x, y = self.profile_by_points.outline(DRAWN_POINTS).T
+            profile = [at_centre + Vector(float(px), float(py)) for px, py in zip(x, y, strict=True)]
         radius = self.shape.roller_radius
         return (CamMark(self.name, cam, at_centre, tuple(profile), follower, middle, radius, tuple(face[1:] and face)),)
 
@@ -283,9 +317,11 @@ def read_shape(entry: EntryReader, links: tuple[str, str], carrier: str, slides:
     given = [key for key in SHAPE_KEYS if entry.has(key)]
     if not given:
         return None
-    for key in ("base_radius", "centre"):
+    for key in ("centre",) if entry.has("profile") else ("base_radius", "centre"):
         if not entry.has(key):
             raise entry.error_at(None, f"a profile has a 'base_radius' and a 'centre'; here {key!r} is missing")
+    if entry.has("profile") and entry.has("base_radius"):
+        raise entry.error_at("base_radius", "the base circle follows from the points of the profile; leave it out")
     if entry.has("roller_radius") and entry.has("flat"):
         raise entry.error_at("flat", "a follower has a roller or a flat face, not both")
     for key in ("pivot", "side") if slides else ():
@@ -312,7 +348,9 @@ def read_shape(entry: EntryReader, links: tuple[str, str], carrier: str, slides:
 
 
 def write_shape(shape: CamShape, quantity: QuantityWriter) -> dict[str, Any]:
-    entry: dict[str, Any] = {"centre": shape.centre, "base_radius": quantity(shape.base_radius, "length")}
+    entry: dict[str, Any] = {"centre": shape.centre}
+    if shape.base_radius != 0.0:
+        entry["base_radius"] = quantity(shape.base_radius, "length")
     if shape.flat is not None:
         entry["flat"] = quantity(shape.flat, "angle")
     elif shape.roller_radius != 0.0:

@@ -1,1 +1,1 @@
-"""Tables for who designs a mechanism."""
+"""Tables of what the numbers of a design do to results."""

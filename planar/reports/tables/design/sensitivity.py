@@ -11,10 +11,10 @@ from rich.text import Text
 
 from planar.analysis.sensitivity.limit_slopes import LimitSlopes, TravelSlopes
 from planar.analysis.sensitivity.sensitivity import INFLUENCE_STEP, Influence, Sensitivity
+from planar.analysis.sensitivity.transmission_slopes import TransmissionSlopes
 from planar.document.revised.changed_numbers import dimensions
 from planar.foundation.arrays import Array
 from planar.model.file_units import FileUnits, display_unit
-from planar.model.link_shapes import shape_extent
 from planar.model.mechanism import relative_motions
 from planar.model.wording import amount, join_all_names
 from planar.reports.fitted_table import FittedTable, plain_table
@@ -35,6 +35,7 @@ def table(found: Sensitivity, result: str | None = None) -> RenderableType:
     influences = found.influences(name)
     parts: list[RenderableType] = [*head, Text(), _influence_table(found, name, influences)]
     parts += [Text(), _travel_table(found.travel, found)] if found.travel is not None else []
+    parts += [Text(), _transmission_table(found.transmission, found)] if found.transmission is not None else []
     parts += [each for dead in found.dead_points for each in (Text(), _dead_point_table(dead, found))]
     return Group(*parts, Text(), paragraphs((" -", sentence) for sentence in _remarks(found, name, influences)))
 
@@ -101,6 +102,21 @@ def _travel_table(travel: TravelSlopes, found: Sensitivity) -> FittedTable:
     return shown
 
 
+def _transmission_table(transmission: TransmissionSlopes, found: Sensitivity) -> FittedTable:
+    units, least = found.moving.mechanism.units, transmission.least
+    if least is not None:
+        title = f"Least transmission angle: {amount(least.value, 'angle', units)}"
+        slopes = dict(transmission.least_slopes or {})
+    else:
+        title = f"Transmission angle: {amount(float(transmission.angle), 'angle', units)}"
+        slopes = {name: float(slope) for name, slope in transmission.slopes.items()}
+    shown = plain_table(title, "number", "transmission angle, slope")
+    for name, slope in sorted(slopes.items(), key=lambda each: -abs(each[1])):
+        if abs(slope) >= ZERO_SLOPE:
+            shown.add_row(name, slope_text(slope, "angle", found.dimensions[name], units))
+    return shown
+
+
 def _dead_point_table(dead: LimitSlopes, found: Sensitivity) -> FittedTable:
     units, kind = found.moving.mechanism.units, _output_kind(found)
     shown = plain_table(f"Dead point at {dead.of} = {amount(dead.input, kind, units)}", "number", "slope")
@@ -121,8 +137,8 @@ def _output_kind(found: Sensitivity) -> str:
 
 def _remarks(found: Sensitivity, name: str, influences: tuple[Influence, ...]) -> Iterator[str]:
     units = found.moving.mechanism.units
-    size = max(map(shape_extent, found.moving.shapes.values()), default=0.0) or 1.0
-    length, angle = (amount(INFLUENCE_STEP * step, kind, units) for step, kind in ((size, "length"), (1.0, "angle")))
+    steps = ((found.size, "length"), (1.0, "angle"))
+    length, angle = (amount(INFLUENCE_STEP * step, kind, units) for step, kind in steps)
     yield f"effect: of {length} more of a length, of {angle} of an angle, of 0.1 % of any other number"
     if len(influences) > MAX_ROWS:
         yield f"the first {MAX_ROWS} of {len(influences)} numbers; --json has all"
@@ -163,6 +179,14 @@ def record(found: Sensitivity) -> dict[str, Any]:
             "ends": [_limit_record(each) for each in found.travel.ends],
             "time_ratio": found.travel.time_ratio,
             "time_ratio_slopes": found.travel.time_ratio_slopes and _finite(found.travel.time_ratio_slopes),
+        }
+    if found.transmission is not None:
+        least = found.transmission.least
+        told["transmission"] = {
+            "angle": _values(np.asarray(found.transmission.angle)),
+            "slopes": {name: _values(np.asarray(slope)) for name, slope in found.transmission.slopes.items()},
+            "least": least and {"input": least.input, "value": least.value},
+            "least_slopes": found.transmission.least_slopes and _finite(found.transmission.least_slopes),
         }
     if found.dead_points:
         told["dead_points"] = [_limit_record(each) for each in found.dead_points]

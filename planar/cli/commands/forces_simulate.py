@@ -46,6 +46,11 @@ ONE_DESTINATION = "results go to a file or are printed with --json; give one of 
 @click.option("--without-friction", "frictionless", is_flag=True, help="Leave the friction of the pairs out.")
 @click.option("--cycle", "whole", is_flag=True, help="Over the whole motion, as `planar cycle` has it.")
 @click.option(
+    "--over",
+    metavar="INPUTS",
+    help="Worst cases over several inputs, each in its range: 'O,P' or 'O=10deg:50deg,P'; --steps says how finely.",
+)
+@click.option(
     "--fluctuation",
     type=float,
     metavar="NUMBER",
@@ -78,6 +83,7 @@ def forces(
     static: bool,
     frictionless: bool,
     whole: bool,
+    over: str | None,
     fluctuation: float | None,
     rim_radius: str | None,
     solve_for: str | None,
@@ -92,26 +98,40 @@ def forces(
         raise BadInput("--at", "the forces of a whole motion have no one position; say where it starts with --from")
     if whole and effort is not None and solve_for is None:
         raise BadInput("--effort", "how much of each load is held is told at one position; leave --cycle out")
+    if over is not None:
+        _refuse_beside_over((("--at", at), ("--cycle", whole), ("--solve-for", solve_for), ("--effort", effort)))
     if not whole:
-        _refuse_motion_options((*course, "fluctuation", "rim_radius"))
+        _refuse_motion_options(set(course) - ({"steps"} if over else set()) | {"fluctuation", "rim_radius"})
     if rim_radius is not None and fluctuation is None:
         raise BadInput("--rim-radius", "this is the radius of a flywheel; say for which --fluctuation")
     from planar.dynamics.load_validation import require_loads
 
-    mechanism = load_model(model, mode)
+    mechanism, taken = load_model(model, mode), (not static, not frictionless)
     refuse_overwriting(model, output)
     require_loads(mechanism)
+    if over is not None:
+        from planar.cli.commands.force_map import show_force_map
+
+        steps = int(course["steps"]) if _is_given("steps") else None
+        show_force_map(mechanism, over, steps, taken, as_json, output)
+        return
     given = None if effort is None else _parse_effort(mechanism, effort)
-    held = mechanism.loads and any(pair.has_friction for pair in mechanism.pairs)
-    if given is not None and solve_for is None and not held:
-        raise BadInput("--effort", "this goes with --solve-for, or with loads that friction holds, and there are none")
-    taken = (not static, not frictionless)
     if effort is not None and solve_for is None:
         _require_held_loads(mechanism)
     if whole:
         _forces_over_motion(mechanism, taken, as_json, output, (fluctuation, rim_radius, solve_for, given), course)
     else:
         _forces_at_position(mechanism, at, taken, as_json, output, (solve_for, given))
+
+
+def _refuse_beside_over(options: Iterable[tuple[str, Any]]) -> None:
+    for option, value in options:
+        if value:
+            raise BadInput(option, "worst cases over several inputs are told without; leave it out, or --over")
+
+
+def _is_given(option: str) -> bool:
+    return click.get_current_context().get_parameter_source(option) is ParameterSource.COMMANDLINE
 
 
 def _refuse_motion_options(course: Iterable[str]) -> None:

@@ -36,7 +36,8 @@ POSITION_DRAWINGS = ("scheme", "velocity", "acceleration", "centres", "forces")
 ASSEMBLY_DRAWINGS = ("modes",)
 CIRCUIT_DRAWINGS = ("circuits",)
 PROFILE_DRAWINGS = tuple(keyword for keyword, kind in pair_types().items() if kind.has_profile)
-MOTION_DRAWINGS = ("positions", "loci", "centrodes", "diagrams", "torque", "bearings")
+MOTION_DRAWINGS = ("positions", "loci", "centrodes", "diagrams", "torque", "bearings", "sensitivity")
+MAP_DRAWINGS = ("force-map",)
 SCALED_DRAWINGS = (*POSITION_DRAWINGS, "positions", "loci", "centrodes", *PROFILE_DRAWINGS, *ASSEMBLY_DRAWINGS)
 DRAWN_STEPS = 360
 """Steps of a run that is drawn."""
@@ -46,7 +47,16 @@ DRAWN_STEPS = 360
 @model_argument()
 @click.argument(
     "what",
-    type=click.Choice((*POSITION_DRAWINGS, *MOTION_DRAWINGS, *PROFILE_DRAWINGS, *ASSEMBLY_DRAWINGS, *CIRCUIT_DRAWINGS)),
+    type=click.Choice(
+        (
+            *POSITION_DRAWINGS,
+            *MOTION_DRAWINGS,
+            *MAP_DRAWINGS,
+            *PROFILE_DRAWINGS,
+            *ASSEMBLY_DRAWINGS,
+            *CIRCUIT_DRAWINGS,
+        )
+    ),
 )
 @output_option("Write the drawing to a .png, .svg or .pdf file.", required=True)
 @scale_option
@@ -55,8 +65,13 @@ DRAWN_STEPS = 360
     "--point", "points", multiple=True, metavar="NAME", help="A point to be lettered, or whose path is drawn."
 )
 @click.option(
-    "--of", "of", metavar="NAME", help="Diagrams, or circuits, of this slide, point or link; torque of this input."
+    "--of",
+    "of",
+    metavar="NAME",
+    help="Diagrams, circuits or sensitivity of this slide, point or link; torque of this input.",
 )
+@click.option("--over", metavar="INPUTS", help="With force-map: the inputs, as 'O,P' or 'O=10deg:50deg,P'.")
+@click.option("--result", metavar="NAME", help="With sensitivity: which of its results, as velocity.")
 @click.option(
     "--link",
     "links",
@@ -83,6 +98,8 @@ def plot(  # many: options of a command; # long: each has its line
     at: tuple[str, ...],
     points: tuple[str, ...],
     of: str | None,
+    over: str | None,
+    result: str | None,
     links: tuple[str, ...],
     pairs: tuple[str, ...],
     fluctuation: float | None,
@@ -100,7 +117,9 @@ def plot(  # many: options of a command; # long: each has its line
     steps_told = click.get_current_context().get_parameter_source("steps") is ParameterSource.COMMANDLINE
     for option, told, kinds in (
         ("--point", points, ("positions", "loci")),
-        ("--of", of, ("diagrams", "torque", *CIRCUIT_DRAWINGS)),
+        ("--of", of, ("diagrams", "torque", "sensitivity", *MAP_DRAWINGS, *CIRCUIT_DRAWINGS)),
+        ("--over", over, MAP_DRAWINGS),
+        ("--result", result, ("sensitivity",)),
         ("--pair", pairs, ("bearings", *PROFILE_DRAWINGS)),
         ("--fluctuation", fluctuation is not None, ("torque",)),
         ("--link", links, ("centres", "centrodes")),
@@ -119,6 +138,13 @@ def plot(  # many: options of a command; # long: each has its line
     refuse_overwriting(model, output)
     with show_status(f"{mechanism.name}: {what}"):
         _refuse_range(what, pair, start, stop)
+        if what in MAP_DRAWINGS:
+            from planar.analysis.force_maps.force_map import force_map
+            from planar.cli.commands.force_map import parse_ranges
+
+            names = over or ",".join(given.pair for given in mechanism.inputs[:2])
+            drawn.save(drawn.force_map(force_map(mechanism, parse_ranges(mechanism, names, None)), of), output)
+            return
         if what in PROFILE_DRAWINGS:
             if at or len(pairs) > 1:
                 raise BadInput("--at" if at else "--pair", f"a profile of one {what} is drawn, over its whole turn")
@@ -152,6 +178,7 @@ def plot(  # many: options of a command; # long: each has its line
                 "diagrams": lambda: drawn.diagrams(moving, of, steps if chords else None),
                 "torque": lambda: drawn.torque(moving, of, fluctuation),
                 "bearings": lambda: drawn.bearings(moving, pairs or None),
+                "sensitivity": lambda: drawn.sensitivity(moving, of, result),
             }
             figure = drawings[what]()
         drawn.save(figure, output)

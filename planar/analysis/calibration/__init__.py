@@ -1,0 +1,1 @@
+"""Dimensions of a mechanism from measurements of it."""

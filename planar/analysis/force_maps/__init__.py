@@ -1,0 +1,1 @@
+"""Forces over several inputs at once."""

@@ -1,0 +1,1 @@
+"""Positions over a grid of several inputs."""
