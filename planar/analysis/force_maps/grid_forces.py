@@ -56,7 +56,7 @@ class GridForces:
         redundant pairs followed."""
         p, many = self.solver.inputs.p, len(u)
         found, is_reached = z.copy(), np.zeros(many, dtype=bool)
-        if self.solver.functions.is_square and z.shape[1] and self.solver.stops is None:
+        if self.solver.functions.is_square and self.solver.stops is None:
             tried = self.solver.functions.correct_samples(z, u, p)
             gaps = self.solver.max_residuals(tried, u)
             slopes, by_inputs = self.solver.functions.jacobians(z, start, p)
