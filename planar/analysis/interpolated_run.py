@@ -15,7 +15,7 @@ from planar.foundation.jets import Jet
 from planar.model.mechanism import Drive, replace_inputs
 from planar.model.pairs import MeasureKind
 from planar.results.motion import Motion, State
-from planar.solving.continuation.path import follow_straight
+from planar.solving.continuation.path import follow_samples
 from planar.solving.position import PositionSolver
 
 CLOSED_TOLERANCE = 1e-9
@@ -75,7 +75,9 @@ class InterpolatedRun:
             there = self._solver_at(position)
             start = there.inputs.u.copy()
             start[self._running_index] = self.positions[index] / self._input_scale
-            way = follow_straight(there, there.inputs.p, self.z[index], start, there.inputs.u)
+            way = follow_samples(there, there.inputs.p, self.z[index], np.stack([start, there.inputs.u]))
+            if way.stopped is not None:
+                raise way.stopped
             z, local = way.z[-1], way.branch_rates.get(1)
             self._states[position] = there.state(z) if local is None else there.state_on_branch(z, local)
         return self._states[position]
@@ -136,7 +138,7 @@ class InterpolatedRun:
         return min(max(position, self.lowest), self.highest) if inside else None
 
     def _solver_at(self, position: float) -> PositionSolver:
-        return PositionSolver(replace_inputs(self.mechanism, (Drive(self.pair, position),)))
+        return self.solver.with_inputs_of(replace_inputs(self.mechanism, (Drive(self.pair, position),)))
 
     def _find_rates(self) -> BoolArray:
         """Which samples have rates (samples,)."""
