@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import planar
-from planar.document.dimensions import with_values
+from planar.document.revised.changed_numbers import with_values
 from planar.equations.mechanism_numbers import shapes_of_links
 from tests.cams import FOLLOWERS, cam_document
 from tests.draws import part
