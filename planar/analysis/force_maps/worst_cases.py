@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from itertools import product
-from math import sqrt
+from math import inf, sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -29,6 +30,9 @@ STENCIL = (-1.0, -0.5, 0.0, 0.5, 1.0)
 """Parts of its width at which the neighbourhood of a greatest force is looked at, along each input."""
 REFINEMENTS = 18
 """Halvings of that neighbourhood: its greatest, flat as it is there, is known to rounding long before."""
+SAME_TOP = 0.3
+"""Of the width: searches so near to one another, in a neighbourhood that is smaller than a step by as much, go on to
+the same top."""
 APPROACHES, APPROACH = 8, 4.0
 """Places towards a dead point, each so many times nearer than the one before."""
 LEAST_GROWTH = 1.4
@@ -81,6 +85,17 @@ class _Start(NamedTuple):
     value: float
     u: Array
     z: Array
+
+
+@dataclass(eq=False)
+class _Search:
+    """The greatest of a quantity, by its number, that is found so far, half the `width` of the neighbourhood that is
+    looked at next along each input, and by how much the least value of the last was less."""
+
+    quantity: int
+    best: _Start
+    width: Array
+    spread: float = inf
 
 
 class WorstCaseSearch:
@@ -249,40 +264,55 @@ class WorstCaseSearch:
 
     def _refine(self, tasks: Sequence[tuple[int, _Start]]) -> list[tuple[float, Array]]:
         """The greatest of quantities, by their numbers, near where each search starts, all at once: values, inputs."""
-        chosen = range(len(tasks))
-        best = {k: (start.value, start.u, start.z) for k, (_, start) in enumerate(tasks)}
-        width = {k: self.step.copy() for k in chosen}
-        columns = list(self.grid.columns)
-        pattern = np.array(list(product(STENCIL, repeat=len(columns))))
+        searches = [_Search(quantity, start, self.step.copy()) for quantity, start in tasks]
         for _ in range(REFINEMENTS if tasks else 0):
-            z, start, inputs = [], [], []
-            for k in chosen:
-                _, here, unknowns = best[k]
-                places = np.tile(here, (len(pattern), 1))
-                places[:, columns] = np.clip(here[columns] + pattern * width[k], self.low, self.high)
-                inputs.append(places)
-                start.append(np.tile(here, (len(pattern), 1)))
-                z.append(np.tile(unknowns, (len(pattern), 1)))
-            found, is_reached = self.maker.near(np.concatenate(z), np.concatenate(start), np.concatenate(inputs))
-            every = np.concatenate(inputs)
+            going = [each for each in searches if not self._is_outdone(each, searches)]
             try:
-                forces = self.maker.forces(self.maker.motion(found[is_reached], every[is_reached]))
+                self._look_around(going)
             except NoAnswer:
                 break
-            row_of: IntArray = np.full(len(every), -1)
-            row_of[is_reached] = np.arange(int(is_reached.sum()))
-            for number, k in enumerate(chosen):
-                own: IntArray = np.arange(number * len(pattern), (number + 1) * len(pattern))
-                ours = own[row_of[own] >= 0]
-                values = np.nan_to_num(quantity_values(forces, self.quantities[tasks[k][0]])[row_of[ours]], nan=-np.inf)
-                top = int(np.argmax(values)) if len(values) else -1
-                moved = top >= 0 and values[top] > best[k][0]
-                if moved:
-                    row = int(ours[top])
-                    best[k] = float(values[top]), every[row], found[row]
-                if not moved or np.abs(pattern[int(ours[top] - own[0])]).max() < 1.0:
-                    width[k] = 0.5 * width[k]
-        return [best[k][:2] for k in chosen]
+        return [(each.best.value, each.best.u) for each in searches]
+
+    def _look_around(self, searches: Sequence[_Search]) -> None:
+        """Each search goes to the greatest in its neighbourhood, or looks at a smaller one. Raises NoAnswer."""
+        columns = list(self.grid.columns)
+        pattern = np.array(list(product(STENCIL, repeat=len(columns))))
+        every = np.repeat([each.best.u for each in searches], len(pattern), axis=0)
+        start = every.copy()
+        for number, each in enumerate(searches):
+            own = slice(number * len(pattern), (number + 1) * len(pattern))
+            every[own, columns] = np.clip(each.best.u[columns] + pattern * each.width, self.low, self.high)
+        z = np.repeat([each.best.z for each in searches], len(pattern), axis=0)
+        found, is_reached = self.maker.near(z, start, every)
+        forces = self.maker.forces(self.maker.motion(found[is_reached], every[is_reached]))
+        for number, each in enumerate(searches):
+            own = slice(number * len(pattern), (number + 1) * len(pattern))
+            values = np.full(len(every), -np.inf)
+            values[is_reached] = quantity_values(forces, self.quantities[each.quantity])
+            near = np.nan_to_num(values[own], nan=-np.inf)
+            top = int(np.argmax(near))
+            moved = near[top] > each.best.value
+            if moved:
+                each.best = _Start(float(near[top]), every[own][top], found[own][top])
+            each.spread = each.best.value - float(near.min())
+            if not moved or np.abs(pattern[top]).max() < 1.0:
+                each.width = 0.5 * each.width
+
+    def _is_outdone(self, search: _Search, searches: Sequence[_Search]) -> bool:
+        """Whether a search cannot come up to another of its quantity, or comes to the same top: around a top what may
+        still be gained is less than what the values of the neighbourhood differ by."""
+        columns = list(self.grid.columns)
+        for other in searches:
+            if other is search or other.quantity != search.quantity:
+                continue
+            ahead = other.best.value - search.best.value
+            if ahead > search.spread:
+                return True
+            apart = np.abs(other.best.u - search.best.u)[columns]
+            same = (apart <= SAME_TOP * search.width).all() and (search.width < SAME_TOP * self.step).all()
+            if same and (ahead > 0.0 or (ahead == 0.0 and searches.index(other) < searches.index(search))):
+                return True
+        return False
 
 
 def _growth(approach: _Approach, quantity: Quantity) -> float:
