@@ -1,12 +1,15 @@
 """The guide: its commands and snippets run as a reader would, its links lead somewhere, its site is whole."""
 
+import ast
 import inspect
+import io
 import json
 import os
 import re
 import shlex
 import subprocess
 import sys
+from contextlib import chdir, redirect_stdout
 from pathlib import Path
 
 import pytest
@@ -78,12 +81,25 @@ def test_a_command_of_the_guide_runs(line, folder):
 
 @pytest.mark.parametrize("page", [page for page in PAGES if blocks(page, "python")])
 def test_the_snippets_of_a_page_run(page, folder):
-    environment = os.environ | {"PYTHONPATH": str(ROOT), "PYTHONWARNINGS": "error"}
-    code = [sys.executable, "-c", "\n".join(blocks(page, "python"))]
-    done = subprocess.run(code, cwd=folder, capture_output=True, text=True, env=environment, check=False)
-    assert done.returncode == 0, done.stderr
-    printed = done.stdout.splitlines()
+    whole, told = compile("\n".join(blocks(page, "python")), page, "exec"), io.StringIO()
+    with chdir(folder), redirect_stdout(told):
+        exec(whole, {"__name__": "__main__"})
+    printed = told.getvalue().splitlines()
     assert [line for text in blocks(page, "text") for line in text.splitlines() if line not in printed] == []
+
+
+def test_what_snippets_name_of_modules_is_there_in_a_process_that_has_imported_no_more():
+    named = set()
+    for page in PAGES:
+        nodes = [*ast.walk(ast.parse("\n".join(blocks(page, "python"))))]
+        imports = [each for each in nodes if isinstance(each, ast.Import | ast.ImportFrom)]
+        modules = {alias.asname or alias.name for each in imports for alias in each.names}
+        taken = [each for each in nodes if isinstance(each, ast.Attribute) and isinstance(each.value, ast.Name)]
+        named.add("\n".join(map(ast.unparse, [*imports, *(each for each in taken if each.value.id in modules)])))
+    environment = os.environ | {"PYTHONPATH": str(ROOT), "PYTHONWARNINGS": "error"}
+    code = [sys.executable, "-c", f"for text in {sorted(named)!r}: exec(text, {{}})"]
+    done = subprocess.run(code, capture_output=True, text=True, env=environment, check=False)
+    assert done.returncode == 0, done.stderr
 
 
 @pytest.mark.parametrize("page", PAGES)
