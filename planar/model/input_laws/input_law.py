@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.foundation.arrays import Array
+from planar.foundation.arrays import Array, IntArray
 from planar.model.input_laws.segment import LawSegment
 from planar.model.input_laws.spline_table import TableSegment
 from planar.model.loads import MAX_LAW_ITEMS
@@ -63,20 +63,21 @@ class InputLaw:
         """
         t = np.atleast_1d(np.asarray(t, dtype=float))
         joints = self.joints(position, velocity)
-        index = np.clip(np.searchsorted(self.joint_times, t, side="right") - 1, 0, len(self.segments) - 1)
+        index = np.minimum(np.searchsorted(self.joint_times[1:], t, side="right"), len(self.segments) - 1)
         found = np.zeros((4, len(t)))
-        order = np.argsort(index, kind="stable")
-        for rows in np.split(order, np.flatnonzero(np.diff(index[order])) + 1) if len(t) else ():
-            i = index[rows[0]]
+        for rows in _rows_alike(index):
+            i = index[rows][0]
             piece = self.segments[i]
             # at the end of the last piece it is its own time that counts, not the difference of two rounded ones
             own = np.where(t[rows] >= self.joint_times[i + 1], piece.duration, t[rows] - self.joint_times[i])
-            found[:, rows] = piece.evaluate(np.clip(own, 0.0, piece.duration), joints[i].velocity_before)
+            own = np.minimum(np.maximum(own, 0.0), piece.duration)
+            found[:, rows] = piece.evaluate(own, joints[i].velocity_before)
             found[0, rows] += joints[i].position
         for outside, joint in ((t < 0.0, joints[0]), (t > self.duration, joints[-1])):
-            found[:, outside] = 0.0
-            found[0, outside] = joint.position + joint.velocity_before * (t[outside] - joint.time)
-            found[1, outside] = joint.velocity_before
+            if outside.any():
+                found[:, outside] = 0.0
+                found[0, outside] = joint.position + joint.velocity_before * (t[outside] - joint.time)
+                found[1, outside] = joint.velocity_before
         return found
 
     def start_at(self, position: float, velocity: float) -> InputLaw:
@@ -98,3 +99,11 @@ class InputLaw:
             if wrong is not None:
                 return f"[{i}].{wrong[0]}", wrong[1]
         return None
+
+
+def _rows_alike(index: IntArray) -> list[IntArray] | list[slice]:
+    """The rows with each of the numbers; where all have the same, all at once."""
+    if len(index) and (index == index[0]).all():
+        return [slice(None)]
+    order = np.argsort(index, kind="stable")
+    return np.split(order, np.flatnonzero(np.diff(index[order])) + 1) if len(index) else []
