@@ -22,8 +22,6 @@ MODELS = {
     "oscillating-cylinder": "piston",
     "geared-five-bar": "P",
     "stephenson-1-six-bar": "E",
-    "watt-1-six-bar": "E",
-    "sewing-machine": "eyelet",
     "klann-leg": "foot",
 }
 """A point of a coupler each."""
