@@ -1,5 +1,5 @@
-"""Whether calibration says how exact it is: models fitted again and again to noisy samples of their paths without the
-input's position, the spread of what is found beside the predicted one.
+"""Whether calibration says how exact it is: models whose numbers are off are fitted again and again to noisy samples
+of their paths without the input's position; the spread of what is found beside the predicted one.
 
     python -m benchmarks.calibration_spread [REPEATS] [MODEL ...]
 """
@@ -14,25 +14,21 @@ import planar
 
 MODELS = {
     "hoeken-straight-line": "P",
-    "chebyshev-straight-line": "",
-    "crank-rocker": "B",
+    "chebyshev-straight-line": "P",
+    "roberts-straight-line": "P",
     "four-bar": "E",
-    "slider-crank": "",
-    "whitworth": "",
-    "drag-link": "",
-    "watt-six-bar": "",
-    "elliptical-trammel": "",
-    "oscillating-cylinder": "",
+    "slider-crank": "E",
+    "evans-grasshopper": "P",
+    "oscillating-cylinder": "piston",
+    "geared-five-bar": "P",
+    "stephenson-1-six-bar": "E",
+    "klann-leg": "foot",
 }
-"""A point each; where none is named the last that is carried round."""
+"""A point of a coupler each."""
 SAMPLES, NOISE = 48, 2e-4
 """Of a path, and of the greatest extent of a path: the standard deviation of each coordinate."""
-
-
-def tracing_point(motion: planar.Motion) -> str:
-    """The last point that moves in both directions."""
-    spans = {name: np.ptp(motion.point(name).position, axis=0) for name in motion.point_names}
-    return [name for name, span in spans.items() if span.min() > 1e-3 * span.max() > 0.0][-1]
+CHANGE = 0.003
+"""How far from the truth, as a part of each number, the search starts."""
 
 
 def spread_ratios(
@@ -42,11 +38,13 @@ def spread_ratios(
     error in predicted standard deviations."""
     mechanism = planar.load(model)
     motion = planar.cycle(mechanism, 4 * SAMPLES)
-    name = point or tracing_point(motion)
-    path = motion.point(name).position[2:-2][:: len(motion) // SAMPLES]
+    path = motion.point(point).position[2:-2][:: len(motion) // SAMPLES]
     noise = NOISE * float(np.ptp(path, axis=0).max())
     true = planar.dimensions(mechanism)
-    found = [planar.calibrate(mechanism, {name: path + rng.normal(size=path.shape) * noise}) for _ in range(repeats)]
+    free = [*planar.calibrate(mechanism, {point: path}).values]
+    start = mechanism.with_values({key: true[key] * (1.0 + CHANGE * rng.uniform(-1.0, 1.0)) for key in free})
+    noisy = [{point: path + rng.normal(size=path.shape) * noise} for _ in range(repeats)]
+    found = [planar.calibrate(start, each, free) for each in noisy]
     known = [key for key in found[0].values if np.isfinite(found[0].deviations[key])]
     errors = {key: np.array([each.values[key] - true[key] for each in found]) for key in known}
     predicted = {key: np.sqrt(np.mean([each.deviations[key] ** 2 for each in found])) for key in known}
@@ -58,7 +56,7 @@ def main() -> None:
     """Print a line for each model."""
     repeats = int(sys.argv[1]) if len(sys.argv) > 1 else 200
     for model in sys.argv[2:] or MODELS:
-        ratios, unseen, worst = spread_ratios(model, MODELS.get(model, ""), repeats, np.random.default_rng(7))
+        ratios, unseen, worst = spread_ratios(model, MODELS[model], repeats, np.random.default_rng(7))
         told = ", ".join(f"{name} {ratio:.3f}" for name, ratio in ratios.items())
         print(f"{model}: {unseen} unseen; {worst:.1%} beyond 3 deviations; spread over predicted: {told}", flush=True)
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
+from contextlib import suppress
 from functools import cached_property
 from typing import NamedTuple
 
@@ -15,9 +16,11 @@ from planar.derivatives.result_expressions import ResultExpression, kinematic_ex
 from planar.document.dimensions import file_dimensions
 from planar.equations.casadi_call import BufferedFunction
 from planar.foundation.arrays import Array, BoolArray
+from planar.foundation.errors import NoAnswer
 from planar.model.mechanism import Mechanism
 from planar.results.kinematic_result import KinematicResult
 from planar.results.motion import Motion
+from planar.solving.grids.grid_motion import motion_over_input
 from planar.solving.position import solve
 
 
@@ -67,9 +70,14 @@ class PredictedResults:
     def _values(self) -> BufferedFunction:
         return BufferedFunction(ca.Function("values", [self.design.z, self.design.t], [ca.densify(self._value)]))
 
-    def at_inputs(self, mechanism: Mechanism, inputs: Sequence[Mapping[str, float]]) -> PredictedValues:
-        """The results of a mechanism at positions of its inputs. Raises NoAnswer."""
-        found = [self.design.coordinates_at(solve(mechanism, each)) for each in inputs]
+    def at_inputs(self, mechanism: Mechanism, inputs: Array) -> PredictedValues:
+        """The results of a mechanism at positions of its inputs (n, inputs), rad or m. Raises NoAnswer."""
+        if self._inputs == 1:
+            with suppress(NoAnswer):  # of a single position the reason is told
+                return self.along(motion_over_input(mechanism, inputs[:, 0]))
+        names = [each.pair for each in mechanism.inputs]
+        each_given = (dict(zip(names, map(float, u), strict=True)) for u in inputs)
+        found = [self.design.coordinates_at(solve(mechanism, each)) for each in each_given]
         return self._predict(np.concatenate([z[0] for z, _ in found]), np.concatenate([t for _, t in found]), mechanism)
 
     def along(self, motion: Motion) -> PredictedValues:

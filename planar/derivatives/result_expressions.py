@@ -62,6 +62,10 @@ def force_expressions(equations: ForceEquations, name: str) -> Iterator[ResultEx
         reaction = equations.in_unknowns(equations.reaction(name))
         yield ResultExpression("force", "force", reaction[:2])
         yield ResultExpression("couple", "torque", reaction[2])
+    if equations.rubbing is not None and name in equations.rubbing.pairs:
+        slides = equations.work.relative_motions[name].input_kind is MeasureKind.LENGTH
+        friction = equations.in_unknowns(equations.rubbing.effort(name))
+        yield ResultExpression("friction", "force" if slides else "torque", friction)
 
 
 def refuse_name(design: DesignEquations, moving: KinematicResult, name: str) -> Unknown:

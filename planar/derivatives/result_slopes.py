@@ -58,9 +58,9 @@ class SlopeSystem:
             self.system: ImplicitSystem = self.design.kinematics
             self.values, self.parameters = self.design.coordinates_at(self.moving)
         else:
-            refuse_friction(self.forces)
+            refuse_stiffness(self.forces)
             inertia = any(each.kind == "inertia" for each in self.forces.acting)
-            self.balance = ForceEquations(self.design, inertia)
+            self.balance = ForceEquations(self.design, inertia, self.forces)
             self.system = self.balance.system
             self.values, self.parameters, self.constants = self.balance.values_at(self.moving)
 
@@ -94,7 +94,7 @@ class SlopeSystem:
         own = self.design.t.numel()
         slopes, of_factors = found.slopes[..., :own], found.slopes[..., own:]
         slopes = slopes + self.balance.slopes_by_factors(of_factors, self.moving)
-        return ResultSlopes(slopes, found.is_singular, found.contradicts[:, :own])
+        return ResultSlopes(slopes, found.is_singular | self.balance.is_unknown, found.contradicts[:, :own])
 
     def named_slopes(self, name: str) -> NamedSlopes:
         """The derivatives of all that the result tells of a name."""
@@ -132,7 +132,7 @@ class SlopeSystem:
         if self.balance is None:
             return found, is_singular
         by_factors = self.balance.slopes_by_factors(found[:, None, own:], self.moving)[:, 0]
-        return found[:, :own] + by_factors, is_singular
+        return found[:, :own] + by_factors, is_singular | self.balance.is_unknown
 
     def second_slopes(self, name: str, result: str) -> Array:
         """The second derivatives of a result (n, parts, parameters, parameters)."""
@@ -154,12 +154,8 @@ class SlopeSystem:
         return ca.vertcat(ca.SX(0, 1), *scaled)
 
 
-def refuse_friction(forces: Forces) -> None:
+def refuse_stiffness(forces: Forces) -> None:
     """Refuse forces whose derivatives do not follow from equilibrium alone. Raises BadInput."""
-    if forces.friction:
-        raise BadInput(
-            next(iter(forces.friction)), "derivatives of forces are told without friction; take `forces.frictionless`"
-        )
     if forces.mechanism.pair_stiffness:
         raise BadInput(
             forces.mechanism.pair_stiffness[0][0],

@@ -23,8 +23,10 @@ from planar.model.link_shapes import link_shape
 from planar.model.mechanism import relative_motions
 from tests.builders import four_bar, slider_crank
 from tests.draws import draws
+from tests.draws import part as sparse
 from tests.known import MODELS, some_models, state_of
 from tests.linkages import assembled, random_linkage
+from tests.rubbing import rubbing_linkage
 
 REFUSED_STEPS = (BadInput, NoAnswer)
 
@@ -49,6 +51,8 @@ def results_of(value, name):
             told |= {"effort": value.inputs[name], "power": value.powers[name]}
         if name in value.reactions:
             told |= {"force": value.reactions[name].force, "couple": value.reactions[name].couple}
+        if name in value.friction:
+            told["friction"] = value.friction[name].effort
     return told
 
 
@@ -130,6 +134,35 @@ def test_derivatives_over_random_linkages_are_those_of_differences(seed, links):
     found = {name: planar.sensitivity(base, name) for name in dict.fromkeys(names)}
     numbers = some(next(iter(next(iter(found.values())).slopes.values())), 3, seed)
     agree_with_differences(solve, mechanism, list(found), numbers, found)
+
+
+@pytest.mark.parametrize("seed", sparse(range(60), 12))
+def test_derivatives_with_friction_are_those_of_differences(seed):
+    mechanism = rubbing_linkage(seed, 0.3)
+
+    def solve(changed):
+        return planar.forces(planar.solve(changed))
+
+    try:
+        base = solve(mechanism)
+    except NoAnswer:
+        return
+    if base.undetermined:
+        return
+    names = dict.fromkeys([*some(base.friction or base.moving.pairs, 2, seed), *base.inputs])
+    found = {name: planar.sensitivity(base, name) for name in names}
+    numbers = [name for name in planar.dimensions(mechanism) if name.endswith((".friction", ".efficiency"))]
+    numbers = [*some(numbers, 2, seed), *some(next(iter(next(iter(found.values())).slopes.values())), 2, seed)]
+    agree_with_differences(solve, mechanism, list(names), numbers, found)
+
+
+def test_derivatives_of_the_screw_jack_with_friction_are_those_of_the_wedge():
+    """The effort is W r tan(lead + friction angle)."""
+    found = planar.forces(planar.solve("screw-jack"))
+    slopes = planar.sensitivity(found, "turn").effort
+    angle = np.arctan(8.0 / (40.0 * pi)) + np.arctan(0.12)
+    by_angle = found.inputs["turn"] / np.tan(angle) / np.cos(angle) ** 2
+    assert slopes["flank.friction"] == pytest.approx(by_angle / (1.0 + 0.12**2), rel=1e-9)
 
 
 # closed forms
@@ -357,8 +390,6 @@ def test_what_is_asked_amiss_is_refused_in_a_sentence():
         planar.gradient(state, {"C": [1.0, 2.0, 3.0]})
     with pytest.raises(BadInput, match="name what is weighed"):
         planar.gradient(state, {})
-    with pytest.raises(BadInput, match="frictionless"):
-        planar.sensitivity(planar.forces(state_of("toggle-clamp")), "A")
     with pytest.raises(BadInput, match="cam of given points"):
         planar.sensitivity(state_of("measured-cam"), "P")
     with pytest.raises(BadInput, match="within a misfit"):

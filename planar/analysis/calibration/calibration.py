@@ -168,6 +168,7 @@ class _Fit:
             self.evaluations += 1
             try:
                 self._last = (x.copy(), self.function.at(self.function.changed(x * self.scale)))
+                self.problem = None
             except PlanarError as problem:
                 self.problem = problem
                 return None

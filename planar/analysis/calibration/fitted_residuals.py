@@ -72,7 +72,7 @@ class ResidualFunction:
         return self._untimed(mechanism) if inputs is None else self._timed(mechanism, inputs)
 
     def _predict(self, mechanism: Mechanism, inputs: Array) -> PredictedValues:
-        return self.predicted.at_inputs(mechanism, [dict(zip(self.names, map(float, u), strict=True)) for u in inputs])
+        return self.predicted.at_inputs(mechanism, inputs)
 
     def _differences(self, shown: Array) -> Array:
         """Measured less shown (..., parts), angles by less than half a turn."""

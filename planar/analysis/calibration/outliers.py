@@ -39,7 +39,7 @@ def find_outliers(
     greatest = float(np.nanmax(np.abs(measurement.values) / measurement.deviations))
     if freedom < 2 or not deviation > ROUNDING * greatest:
         return ()
-    from scipy.stats import t as student  # slow to load, and only needed here
+    from scipy.special import stdtrit  # slow to load, and only needed here
 
     rows, samples, parts = (each[found.is_active] for each in (found.rows, found.row_samples, found.row_parts))
     u, s, _ = np.linalg.svd(slopes, full_matrices=False)
@@ -48,7 +48,7 @@ def find_outliers(
     inside = rows / (deviation * np.sqrt(free))
     left = np.maximum(freedom - inside**2, 1e-12)
     outside = inside * np.sqrt((freedom - 1) / left)
-    limit = float(student.ppf(1.0 - RISK / (2.0 * len(rows)), freedom - 1))
+    limit = float(stdtrit(freedom - 1, 1.0 - RISK / (2.0 * len(rows))))
     labels, worst = measurement.labels, dict[int, Outlier]()
     for k in np.argsort(-np.abs(outside)):
         if abs(outside[k]) > limit and leverage[k] < FULL_LEVERAGE:

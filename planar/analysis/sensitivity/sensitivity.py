@@ -21,7 +21,7 @@ from planar.document.dimensions import file_dimensions
 from planar.document.first_argument import takes_result
 from planar.dynamics.forces import Forces
 from planar.foundation.arrays import Array
-from planar.foundation.errors import NoAnswer, Outcome, join_names
+from planar.foundation.errors import BadInput, NoAnswer, Outcome, join_names
 from planar.foundation.short_repr import short_repr
 from planar.model.link_shapes import shape_extent
 from planar.results.motion import Motion, State
@@ -158,17 +158,25 @@ def sensitivity(result: State | Motion | Forces, of: str) -> Sensitivity:
     """The derivatives of what a result tells of a point, a link, a pair or an input, in every number of the file.
 
     Exact but for rounding, by one linear solution a position; see `Sensitivity`. Raises Unknown where there is nothing
-    of that name, NoAnswer at a dead point or change point, where there are no derivatives, and BadInput of forces with
-    friction and of a linkage that closes within a misfit.
+    of that name, NoAnswer at a dead point or change point, where there are no derivatives, and BadInput of forces
+    with friction where these are not determined or a contact is about to bear another way, and of a linkage that closes
+    within a misfit.
 
     >>> import planar
     >>> state = planar.solve(planar.load("slider-crank"))
     >>> round(float(planar.sensitivity(state, "stroke").displacement["rod.length"]), 3)
     1.036
     """
-    found = SlopeSystem(result).named_slopes(of)
+    system = SlopeSystem(result)
+    found = system.named_slopes(of)
     moving = result.moving if isinstance(result, Forces) else result
     is_motion = isinstance(moving, Motion)
+    if system.balance is not None and system.balance.is_unknown.all():
+        raise BadInput(
+            of,
+            "there are no derivatives of forces with friction here: they are not determined, or a contact is about to "
+            "bear another way; take `forces.frictionless`",
+        )
     if found.is_singular.all():
         raise NoAnswer(
             Outcome.DEAD_POINT,

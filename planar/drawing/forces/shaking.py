@@ -14,6 +14,7 @@ from planar.dynamics.balancing.balance import Balance, BalanceTradeoff
 from planar.dynamics.forces import forces
 from planar.foundation.arrays import Array
 from planar.model.file_units import FileUnits
+from planar.model.link_shapes import shape_extent
 from planar.model.wording import amount
 
 POLAR_SIZE, DIAGRAM_WIDTH, DIAGRAM_HEIGHT = 80.0, 110.0, 62.0
@@ -38,7 +39,9 @@ def balance_pictures(found: Balance, tradeoff: BalanceTradeoff | None = None) ->
     pictures = [_polar_picture(found, units)]
     of_moment = {name: getattr(found, name).moment for name in PENS}
     told = f"Shaking moment about {found.about_name}"
-    if any(np.nanmax(np.abs(each)) > 0.0 for each in of_moment.values()):
+    force = max(float(np.nanmax(np.hypot(*getattr(found, name).force.T))) for name in PENS)
+    rounding = NEGLIGIBLE * force * (max(map(shape_extent, found.motion.shapes.values()), default=0.0) or 1.0)
+    if any(np.nanmax(np.abs(each)) > rounding for each in of_moment.values()):
         pictures.append(_curves(drawn, of_moment, "M", "torque", told))
     symbol, kind = ("F", "force") if drawn.forces.is_force_input(found.input) else ("T", "torque")
     of_effort = {name: getattr(found, name).effort for name in PENS}

@@ -150,7 +150,7 @@ class RackPair(GuidedPair):
         """
         rack, pinion = self.links
         way = frames[rack].rotate_to_world(self._line_in_link(shapes)[1])
-        sense = -1.0 if self.radius > 0.0 else 1.0
+        sense = -self.radius / abs(self.radius)
         # seen from the pinion's centre the rack runs back: it drives where it pushes the pinion that way
         torque = ContactLoad(pinion, abs(self.radius), way * -1.0)
         if self.friction is not None and self.pinion_teeth is not None:
