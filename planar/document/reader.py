@@ -12,27 +12,22 @@ from planar.document.names import find_motion, find_point, point_aliases
 from planar.document.schema import (
     ALONG_SCHEMA,
     DISTANCES_SCHEMA,
-    DRIVE_SCHEMA,
     FILE_SCHEMA,
     FORMAT_VERSION,
     GEOMETRY_SOURCES,
     INPUT_SCHEMA,
     LINK_SCHEMA,
     PAIR_SCHEMA,
-    PUBLISHED_SCHEMA,
-    SENSE_WORDS,
     STOP_SCHEMA,
     UNITS_SCHEMA,
 )
+from planar.document.sections.published import read_published
 from planar.foundation.units import UnitError, example_quantity
 from planar.model.file_units import FileUnits, OtherKind, parse_declared_unit
 from planar.model.link_shapes import Along, At, Distances, Link, Point, PointDefinition, PointPlacementError, link_shape
 from planar.model.mechanism import (
-    PUBLISHED_QUANTITIES,
-    Drive,
     Input,
     Mechanism,
-    PublishedValue,
     pair_entries,
     pair_misfits,
     relative_motions,
@@ -89,7 +84,7 @@ def read_mechanism(value: Any) -> Mechanism:
         driven,
         **read_loads(full, driven, points),
         sketch=_read_sketch(full, points),
-        published=tuple(_read_published(item, driven, points) for item in full.list_items("published")),
+        published=tuple(read_published(item, driven, points) for item in full.list_items("published")),
     )
     if not full.has("tolerances"):
         return whole
@@ -334,71 +329,3 @@ def _read_sketch(top: Cursor, points: Mapping[str, str]) -> tuple[tuple[str, flo
             raise place.error_at(None, f"the point {point!r} is sketched already, under another of its names")
         found[point] = (point, *place.as_vector("length"))
     return tuple(found.values())
-
-
-def _read_drives(cursor: Cursor, key: str, mechanism: Mechanism) -> tuple[Drive, ...]:
-    if not cursor.has(key):
-        return ()
-    known = {given.pair: relative_motions(mechanism)[given.pair] for given in mechanism.inputs}
-    found = []
-    for name, drive in cursor[key].members():
-        if name not in known:
-            raise drive.error_at(
-                None, f"there is no input at {name!r}{suggest_name(name, known, 'the pairs with inputs')}"
-            )
-        drive.check_keys(*DRIVE_SCHEMA)
-        kinds = known[name].input_quantity_kinds()
-        found.append(
-            Drive(
-                name,
-                drive.optional_quantity("position", kinds[0]),
-                drive.optional_quantity("velocity", kinds[1]),
-                drive.optional_quantity("acceleration", kinds[2]),
-            )
-        )
-    return tuple(found)
-
-
-def _read_published(cursor: Cursor, mechanism: Mechanism, points: Mapping[str, str]) -> PublishedValue:
-    cursor.check_keys(*PUBLISHED_SCHEMA)
-    quantity = cursor["quantity"].as_text()
-    if quantity not in PUBLISHED_QUANTITIES:
-        raise cursor.error_at(
-            "quantity", f"{quantity!r} is no quantity{suggest_spelling(quantity, PUBLISHED_QUANTITIES)}"
-        )
-    kind = PUBLISHED_QUANTITIES[quantity]
-    of, relative_to = cursor["of"].as_text(), cursor.text("relative_to")
-    if quantity.startswith("angular"):
-        of = cursor["of"].as_link()
-    elif quantity in ("rubbing speed", "displacement", "sliding velocity", "sliding acceleration", "input torque"):
-        of = find_motion(cursor["of"], relative_motions(mechanism)).name
-    else:
-        of = find_point(cursor["of"], of, points)
-        if relative_to is not None:
-            relative_to = find_point(cursor["relative_to"], relative_to, points)
-    return PublishedValue(
-        symbol=cursor["symbol"].as_line(),
-        quantity=quantity,
-        of=of,
-        value=cursor.optional_quantity("value", kind)
-        if cursor.has("value") and cursor["value"].value is not None
-        else None,
-        tolerance=_read_tolerance(cursor),
-        relative_to=relative_to,
-        component=cursor.choice("component", ("x", "y")),
-        sense=cursor.choice("sense", SENSE_WORDS),
-        case=cursor["case"].as_line() if cursor.has("case") else None,
-        note=cursor.text("note"),
-        slip=cursor.text("slip"),
-        inputs=_read_drives(cursor, "inputs", mechanism),
-        start=_read_drives(cursor, "from", mechanism),
-    )
-
-
-def _read_tolerance(cursor: Cursor) -> float:
-    if not cursor.has("tolerance"):
-        return float(PublishedValue._field_defaults["tolerance"])
-    found = cursor["tolerance"].as_number()
-    if not 0.0 <= found < 1e100:
-        raise cursor.error_at("tolerance", f"a number from zero on is wanted here, not {found!r}")
-    return found

@@ -67,7 +67,7 @@ LIBRARIES = {
     "xarray": {"reports"},
 }
 MOST_FILES, MOST_LINES, LONGEST_FUNCTION, MOST_PARAMETERS = 16, 400, 60, 8
-MOST_MODULES_TO_SOLVE, MOST_OTHERS_TO_SOLVE = 103, 40
+MOST_MODULES_TO_SOLVE, MOST_OTHERS_TO_SOLVE = 106, 40
 """Modules of planar, and others beside the libraries that are needed, which `planar solve` loads."""
 FILES = sorted(ROOT.rglob("*.py"))
 NAMES = {".".join(path.relative_to(ROOT.parent).with_suffix("").parts): path for path in FILES}

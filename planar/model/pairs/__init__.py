@@ -7,7 +7,8 @@ from inspect import isabstract
 from pkgutil import iter_modules
 from typing import Any
 
-from planar.model.pairs.base import EntryReader, ExpandedEntry, MeasureKind, Pair, PairSample, QuantityWriter
+from planar.model.entry_reader import EntryReader, QuantityWriter
+from planar.model.pairs.base import ExpandedEntry, MeasureKind, Pair, PairSample
 
 __all__ = [
     "EntryReader",

@@ -7,18 +7,9 @@ from dataclasses import dataclass
 from typing import Any, ClassVar, Self
 
 from planar.foundation.jets import Scalar
+from planar.model.entry_reader import EntryReader, QuantityWriter
 from planar.model.link_shapes import LinkShape
-from planar.model.pairs.base import (
-    EntryReader,
-    LengthFormatter,
-    Pair,
-    PairSample,
-    QuantityWriter,
-    Schema,
-    described,
-    list_schema,
-    schema_reference,
-)
+from planar.model.pairs.base import LengthFormatter, Pair, PairSample, Schema, described, list_schema, schema_reference
 from planar.model.pairs.friction import read_efficiency
 from planar.model.pairs.symbols import BeltMark, DrawingMark, WheelMark
 from planar.model.pairs.wheel_pairs import WheelPair

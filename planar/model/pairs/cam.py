@@ -9,14 +9,13 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 from planar.foundation.geometry import Frame, Vector, direction, frame_at
 from planar.foundation.jets import Scalar
+from planar.model.entry_reader import EntryReader, QuantityWriter
 from planar.model.link_shapes import LinkShape
 from planar.model.pairs.base import (
     EffortAction,
-    EntryReader,
     LengthFormatter,
     MeasureKind,
     PairSample,
-    QuantityWriter,
     Schema,
     described,
     list_schema,

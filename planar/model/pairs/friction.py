@@ -6,15 +6,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from planar.foundation.jets import Scalar
-from planar.model.pairs.base import (
-    EffortAction,
-    EntryReader,
-    QuantityWriter,
-    RubbingContact,
-    Schema,
-    described,
-    schema_reference,
-)
+from planar.model.entry_reader import EntryReader, QuantityWriter
+from planar.model.pairs.base import EffortAction, RubbingContact, Schema, described, schema_reference
 from planar.model.pairs.rubbing import ContactLoad, Friction, LoadLaw
 
 _COEFFICIENT: Schema = {**schema_reference("number"), "minimum": 0}

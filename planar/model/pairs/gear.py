@@ -9,14 +9,13 @@ from typing import Any, ClassVar, Self
 
 from planar.foundation.geometry import Frame, Vector
 from planar.foundation.jets import Scalar, sign_of, sqrt, tan
+from planar.model.entry_reader import EntryReader, QuantityWriter
 from planar.model.link_shapes import LinkShape
 from planar.model.pairs.base import (
     EffortAction,
-    EntryReader,
     LengthFormatter,
     Pair,
     PairSample,
-    QuantityWriter,
     RubbingContact,
     Schema,
     ToothContact,

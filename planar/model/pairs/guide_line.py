@@ -8,17 +8,9 @@ from typing import Any, ClassVar, NamedTuple
 
 from planar.foundation.geometry import Frame, Vector, direction
 from planar.foundation.jets import Scalar, atan2, hypot
+from planar.model.entry_reader import EntryReader, QuantityWriter
 from planar.model.link_shapes import LinkShape, PointReference
-from planar.model.pairs.base import (
-    EffortAction,
-    EntryReader,
-    MeasureKind,
-    Pair,
-    QuantityWriter,
-    Schema,
-    described,
-    schema_reference,
-)
+from planar.model.pairs.base import EffortAction, MeasureKind, Pair, Schema, described, schema_reference
 
 LINE_SCHEMA: Schema = {
     "type": "object",

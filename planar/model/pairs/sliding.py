@@ -9,15 +9,14 @@ from typing import Any, ClassVar, Self
 
 from planar.foundation.geometry import Frame, Vector, direction, frame_at
 from planar.foundation.jets import Scalar
+from planar.model.entry_reader import EntryReader, QuantityWriter
 from planar.model.link_shapes import LinkShape
 from planar.model.pairs.base import (
     EffortAction,
-    EntryReader,
     ExpandedEntry,
     MeasureKind,
     Pair,
     PairSample,
-    QuantityWriter,
     RubbingContact,
     Schema,
     described,

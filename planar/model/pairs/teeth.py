@@ -6,7 +6,8 @@ from collections.abc import Mapping
 from math import pi, radians
 from typing import Any
 
-from planar.model.pairs.base import EntryReader, QuantityWriter, Schema, described, schema_reference
+from planar.model.entry_reader import EntryReader, QuantityWriter
+from planar.model.pairs.base import Schema, described, schema_reference
 
 STANDARD_PRESSURE_ANGLE = radians(20.0)
 """Of involute teeth by ISO 53, unless said."""

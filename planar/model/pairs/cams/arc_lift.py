@@ -14,15 +14,8 @@ from typing import Any, NamedTuple
 from planar.foundation.angles import wrap_angle
 from planar.foundation.geometry import Vector, direction
 from planar.foundation.jets import Jet, Scalar, TermSizes, atan2, hypot, sqrt, value_between, within_turn
-from planar.model.pairs.base import (
-    EntryReader,
-    MeasureKind,
-    QuantityWriter,
-    Schema,
-    described,
-    list_schema,
-    schema_reference,
-)
+from planar.model.entry_reader import EntryReader, QuantityWriter
+from planar.model.pairs.base import MeasureKind, Schema, described, list_schema, schema_reference
 from planar.model.pairs.cams import (
     FollowerAxes,
     FollowerFace,

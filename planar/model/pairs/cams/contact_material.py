@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from planar.model.pairs.base import EntryReader, QuantityWriter, Schema, described, schema_reference
+from planar.model.entry_reader import EntryReader, QuantityWriter
+from planar.model.pairs.base import Schema, described, schema_reference
 
 KEYS = ("width", "modulus", "poisson_ratio", "follower_modulus", "follower_poisson_ratio")
 

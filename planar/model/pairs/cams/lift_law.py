@@ -10,15 +10,8 @@ from math import pi
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from planar.foundation.jets import Jet, Scalar, part_of_piece, value_between, within_turn
-from planar.model.pairs.base import (
-    EntryReader,
-    MeasureKind,
-    QuantityWriter,
-    Schema,
-    described,
-    list_schema,
-    schema_reference,
-)
+from planar.model.entry_reader import EntryReader, QuantityWriter
+from planar.model.pairs.base import MeasureKind, Schema, described, list_schema, schema_reference
 
 if TYPE_CHECKING:
     from planar.model.input_laws import LawSegment

@@ -18,7 +18,8 @@ import numpy as np
 from planar.foundation.arrays import Array
 from planar.foundation.geometry import Vector
 from planar.foundation.jets import Jet, Scalar, TermSizes, value_between, within_turn
-from planar.model.pairs.base import EntryReader, MeasureKind, QuantityWriter
+from planar.model.entry_reader import EntryReader, QuantityWriter
+from planar.model.pairs.base import MeasureKind
 from planar.model.pairs.cams import FollowerAxes, FollowerFace, FollowerRest
 from planar.model.pairs.cams.first_contact import ContactMotion, FirstContact
 from planar.model.pairs.cams.lift_law import LiftPiece

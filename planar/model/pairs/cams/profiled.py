@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 from planar.foundation.geometry import Frame, Vector, direction, frame_at
 from planar.foundation.jets import Scalar
+from planar.model.entry_reader import EntryReader, QuantityWriter
 from planar.model.link_shapes import LinkShape
-from planar.model.pairs.base import EntryReader, LengthFormatter, MeasureKind, Pair, QuantityWriter, ToothContact
+from planar.model.pairs.base import LengthFormatter, MeasureKind, Pair, ToothContact
 from planar.model.pairs.cams import (
     CamContact,
     FollowerAxes,
