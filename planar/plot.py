@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
     from planar.analysis.calibration.calibration import Calibration
     from planar.analysis.force_maps.force_map import ForceMap
+    from planar.analysis.tolerance.tolerance import ToleranceBand
     from planar.assemblies.circuits.circuits import Circuits
     from planar.assemblies.modes import Modes
     from planar.drawing.polygons.panels import ScaleTexts
@@ -267,6 +268,33 @@ def sensitivity(moving: Motion | Forces | Mechanism, of: str | None = None, resu
     mechanism = run.mechanism
     name = of or next(iter(mechanism.inputs)).pair
     return draw_pictures([sensitivity_picture(derivatives(run, name), result)])
+
+
+@takes_result("Motion", "Forces", "ToleranceBand", "Mechanism")
+def tolerance(
+    moving: ToleranceBand | Motion | Forces | Mechanism,
+    of: str | None = None,
+    result: str | None = None,
+    scale: ScaleTexts = None,
+) -> Figure:
+    """The band of a result within the tolerances of the file, or of a band: of a point's place round its path, wider by
+    a factor that is told, else over the motion; and the share of the variance of each number and pin.
+
+    `of` and `result` are chosen as for `sensitivity`. Raises Unknown and BadInput for a name that is not there, a file
+    without tolerances, and a scale that is none.
+    """
+    from planar.analysis.tolerance.tolerance import ToleranceBand
+    from planar.analysis.tolerance.tolerance import tolerance as find_band
+    from planar.drawing.diagrams.tolerance_band import tolerance_pictures
+    from planar.model.mechanism import Mechanism
+    from planar.solving.cycle import cycle
+
+    if isinstance(moving, ToleranceBand):
+        band = moving
+    else:
+        run = cycle(moving) if isinstance(moving, Mechanism) else moving
+        band = find_band(run, of or next(iter(run.mechanism.inputs)).pair, result=result)
+    return draw_pictures(tolerance_pictures(band, _length_scale(scale, band.moving)))
 
 
 @takes_result("Motion", "Simulation", "Mechanism")

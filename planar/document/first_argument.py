@@ -20,7 +20,17 @@ F = TypeVar("F", bound=Callable[..., Any])
 T = TypeVar("T")
 
 ResultName = Literal[
-    "Balance", "Calibration", "Centres", "Circuits", "ForceMap", "Forces", "Modes", "Motion", "Simulation", "State"
+    "Balance",
+    "Calibration",
+    "Centres",
+    "Circuits",
+    "ForceMap",
+    "Forces",
+    "Modes",
+    "Motion",
+    "Simulation",
+    "State",
+    "ToleranceBand",
 ]
 SourceName = Literal["Mechanism"]
 
@@ -43,6 +53,8 @@ def takes_mechanism(function: Callable[Concatenate[Mechanism, P], R]) -> Callabl
 def takes_result(result: ResultName, source: SourceName, /) -> _TakesSource: ...
 @overload
 def takes_result(result: ResultName, other: ResultName, source: SourceName, /) -> _TakesSource: ...
+@overload
+def takes_result(result: ResultName, other: ResultName, third: ResultName, source: SourceName, /) -> _TakesSource: ...
 @overload
 def takes_result(source: SourceName, result: ResultName, other: ResultName, /) -> _TakesSource: ...
 @overload

@@ -582,7 +582,7 @@ def test_of_an_argument_that_is_none_of_its_choices_every_choice_is_named_whole(
 
 def test_a_word_that_is_no_command_is_answered_with_the_commands(tmp_path: Path) -> None:
     sentence = run(tmp_path, "zzz", "four-bar").refused(2)
-    for word in ("no such command 'zzz'", "animate", "solve and view", "planar --help"):
+    for word in ("no such command 'zzz'", "animate", "tolerance and view", "planar --help"):
         assert word in sentence
 
 

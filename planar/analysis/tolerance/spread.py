@@ -82,6 +82,12 @@ class LinearSpread(NamedTuple):
             towards = np.where(size > 0.0, point / np.where(size > 0.0, size, 1.0), towards)
         return np.asarray(np.linalg.norm(self._support(towards), axis=1))
 
+    def boundary(self, count: int) -> Array:
+        """The farthest deviations of a point in so many directions all round (n, count, 2)."""
+        angles = np.linspace(0.0, 2.0 * pi, count, endpoint=False)
+        ways = np.stack([np.cos(angles), np.sin(angles)], axis=1)
+        return np.stack([self._support(np.broadcast_to(each, self.shift.shape)) for each in ways], axis=1)
+
     def _support(self, towards: Array) -> Array:
         """The farthest point (n, 2) of the sum along directions (n, 2)."""
         along = np.einsum("npk,np->nk", self.slopes, towards)
@@ -103,6 +109,15 @@ class NormalSpread(NamedTuple):
     def std(self) -> Array:
         """Of each part (n, parts)."""
         return np.sqrt(np.diagonal(self.covariance, axis1=1, axis2=2))
+
+    def ellipse(self, count: int, sigmas: float) -> Array:
+        """So many standard deviations of a point all round its mean (n, count, 2)."""
+        angles = np.linspace(0.0, 2.0 * pi, count, endpoint=False)
+        variances, axes = np.linalg.eigh(np.nan_to_num(self.covariance))
+        half = axes * np.sqrt(np.clip(variances, 0.0, None))[:, None]
+        circle = np.stack([np.cos(angles), np.sin(angles)])
+        found: Array = self.mean[:, None] + sigmas * (half @ circle).transpose(0, 2, 1)
+        return found
 
     def share_within(self, low: float, high: float) -> Array:
         """The share (n,) of parts whose deviation is between limits; of a point, no farther off than `high`."""

@@ -36,9 +36,17 @@ POSITION_DRAWINGS = ("scheme", "velocity", "acceleration", "centres", "forces")
 ASSEMBLY_DRAWINGS = ("modes",)
 CIRCUIT_DRAWINGS = ("circuits",)
 PROFILE_DRAWINGS = tuple(keyword for keyword, kind in pair_types().items() if kind.has_profile)
-MOTION_DRAWINGS = ("positions", "loci", "centrodes", "diagrams", "torque", "bearings", "sensitivity")
+MOTION_DRAWINGS = ("positions", "loci", "centrodes", "diagrams", "torque", "bearings", "sensitivity", "tolerance")
 MAP_DRAWINGS = ("force-map",)
-SCALED_DRAWINGS = (*POSITION_DRAWINGS, "positions", "loci", "centrodes", *PROFILE_DRAWINGS, *ASSEMBLY_DRAWINGS)
+SCALED_DRAWINGS = (
+    *POSITION_DRAWINGS,
+    "positions",
+    "loci",
+    "centrodes",
+    "tolerance",
+    *PROFILE_DRAWINGS,
+    *ASSEMBLY_DRAWINGS,
+)
 DRAWN_STEPS = 360
 """Steps of a run that is drawn."""
 
@@ -68,10 +76,10 @@ DRAWN_STEPS = 360
     "--of",
     "of",
     metavar="NAME",
-    help="Diagrams, circuits or sensitivity of this slide, point or link; torque of this input.",
+    help="Diagrams, circuits, sensitivity or tolerance of this slide, point or link; torque of this input.",
 )
 @click.option("--over", metavar="INPUTS", help="With force-map: the inputs, as 'O,P' or 'O=10deg:50deg,P'.")
-@click.option("--result", metavar="NAME", help="With sensitivity: which of its results, as velocity.")
+@click.option("--result", metavar="NAME", help="With sensitivity and tolerance: which of its results, as velocity.")
 @click.option(
     "--link",
     "links",
@@ -117,9 +125,9 @@ def plot(  # many: options of a command; # long: each has its line
     steps_told = click.get_current_context().get_parameter_source("steps") is ParameterSource.COMMANDLINE
     for option, told, kinds in (
         ("--point", points, ("positions", "loci")),
-        ("--of", of, ("diagrams", "torque", "sensitivity", *MAP_DRAWINGS, *CIRCUIT_DRAWINGS)),
+        ("--of", of, ("diagrams", "torque", "sensitivity", "tolerance", *MAP_DRAWINGS, *CIRCUIT_DRAWINGS)),
         ("--over", over, MAP_DRAWINGS),
-        ("--result", result, ("sensitivity",)),
+        ("--result", result, ("sensitivity", "tolerance")),
         ("--pair", pairs, ("bearings", *PROFILE_DRAWINGS)),
         ("--fluctuation", fluctuation is not None, ("torque",)),
         ("--link", links, ("centres", "centrodes")),
@@ -128,7 +136,7 @@ def plot(  # many: options of a command; # long: each has its line
         (
             "--scale",
             scales,
-            (*POSITION_DRAWINGS, "positions", "loci", "centrodes", *PROFILE_DRAWINGS, *ASSEMBLY_DRAWINGS),
+            SCALED_DRAWINGS,
         ),
         ("--mode", mode is not None, (*POSITION_DRAWINGS, *MOTION_DRAWINGS)),
     ):
@@ -179,6 +187,7 @@ def plot(  # many: options of a command; # long: each has its line
                 "torque": lambda: drawn.torque(moving, of, fluctuation),
                 "bearings": lambda: drawn.bearings(moving, pairs or None),
                 "sensitivity": lambda: drawn.sensitivity(moving, of, result),
+                "tolerance": lambda: drawn.tolerance(moving, of, result, scales),
             }
             figure = drawings[what]()
         drawn.save(figure, output)

@@ -62,7 +62,7 @@ def positions(
     run = steady_run(motion, steps=MIN_PATH_STEPS, count=count)
     mechanism, shapes = run.motion.mechanism, run.motion.shapes
     chosen = resolve_points(run, points) if points is not None else _moving_point_names(run)
-    scale = scale or _motion_scale(run, SHEET_SIZE)
+    scale = scale or motion_scale(run, SHEET_SIZE)
     rows, made, travel = _division_rows(run, count), link_bodies(mechanism, shapes), run.slide_ranges
     marks: list[Mark] = [*ground_marks(mechanism, made, run.frames(rows[0]), shapes, scale, travel)]
     last = count if not run.is_periodic else count - 1
@@ -98,7 +98,7 @@ def loci(motion: Motion | Mechanism, points: Iterable[str] | None = None, scale:
     run = closed_run(steady_run(motion, steps=MIN_PATH_STEPS))
     mechanism = run.motion.mechanism
     chosen = resolve_points(run, points) if points is not None else coupler_points(run)
-    scale = scale or _motion_scale(run)
+    scale = scale or motion_scale(run)
     here, low, high = run.input.position, float(run.position.min()), float(run.position.max())
     within = run.makes_whole_turns or low <= here <= high
     state = solve(mechanism, {} if within else {run.input.pair: float(run.position[len(run.position) // 2])})
@@ -188,7 +188,7 @@ def _division_rows(run: DrawnRun, count: int) -> Sequence[int]:
     return [int(row) for row in rows]
 
 
-def _motion_scale(run: DrawnRun, room: tuple[float, float] = (DRAWING_WIDTH, DRAWING_HEIGHT)) -> Scale:
+def motion_scale(run: DrawnRun, room: tuple[float, float] = (DRAWING_WIDTH, DRAWING_HEIGHT)) -> Scale:
     """The round scale at which the whole motion fits the paper."""
     low, high = run.bounds
     width, height = map(float, high - low)

@@ -6,13 +6,11 @@ import numpy as np
 
 from planar.analysis.sensitivity.sensitivity import INFLUENCE_STEP, Sensitivity
 from planar.drawing.diagrams import axes
+from planar.drawing.diagrams.running_axis import running_axis
 from planar.drawing.paper.picture import Label, Mark, Pen, Picture
 from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput
-from planar.foundation.units import parse_unit
 from planar.model.file_units import display_unit
-from planar.model.mechanism import relative_motions
-from planar.model.pairs import MeasureKind
 from planar.model.wording import amount
 from planar.results.motion import Motion
 
@@ -40,7 +38,7 @@ def sensitivity_picture(found: Sensitivity, result: str | None = None) -> Pictur
         raise BadInput(found.of, "no number of the file has an influence on it")
     units, kind = motion.mechanism.units, found.kinds[name]
     symbol, of = display_unit(kind, units)
-    abscissa, across_name, is_angle = _abscissa(motion)
+    abscissa, across_name, is_angle = running_axis(motion)
     curves: dict[str, Array] = {}
     for each in influences:
         slopes = np.asarray(found.slopes[name][each.dimension])
@@ -75,15 +73,3 @@ def _labels(curves: dict[str, Array], up: axes.Axis) -> list[Mark]:
         low = max(height, low + LABEL_GAP)
         found.append(Label(number, (DIAGRAM_WIDTH, low), f"label {number}", LABEL_SIZE, 1.2, side=(1, 0)))
     return found
-
-
-def _abscissa(motion: Motion) -> tuple[Array, str, bool]:
-    """What runs, in its unit, the name of its axis, and whether it is an angle."""
-    if motion.time is not None:
-        return motion.time, "time (s)", False
-    name = motion.running_input
-    positions = motion.inputs[name].position
-    if relative_motions(motion.mechanism)[name].input_kind is MeasureKind.ANGLE:
-        return np.degrees(positions), f"{name} (°)", True
-    unit = motion.mechanism.units.length
-    return np.array([parse_unit(unit).from_si(float(each)) for each in positions]), f"{name} ({unit})", False

@@ -53,6 +53,8 @@ PEN_STYLES = {
     Pen.CURVE: PenStyle(0.45, "#000000"),
     Pen.SHARE: PenStyle(0.2, "#0b46a8"),
     Pen.MEAN: PenStyle(0.25, "#333333", (4.0, 0.9, 0.5, 0.9)),
+    Pen.WORST: PenStyle(0.1, "#c9dcf2"),
+    Pen.LIKELY: PenStyle(0.1, "#85addc"),
 }
 FILL_COLOURS = {
     Fill.PAPER: "#ffffff",
@@ -60,6 +62,8 @@ FILL_COLOURS = {
     Fill.SOLID: "#000000",
     Fill.ABOVE: "#c9c9c9",
     Fill.BELOW: "#ececec",
+    Fill.WORST: "#c9dcf2",
+    Fill.LIKELY: "#85addc",
 }
 """Colours of areas; those that are not here are empty."""
 

@@ -75,6 +75,8 @@ class Pen(Enum):
     """A part of what a curve is made of."""
     MEAN = "mean"
     """The mean of a curve."""
+    WORST, LIKELY = "worst", "likely"
+    """The edge of where something is in the worst case, and nearly always."""
 
 
 class Fill(Enum):
@@ -91,6 +93,8 @@ class Fill(Enum):
     """What of a curve is above its mean."""
     BELOW = "below"
     """What of a curve is below its mean."""
+    WORST, LIKELY = "worst", "likely"
+    """Where something is in the worst case, and nearly always."""
 
 
 class Polyline(NamedTuple):
