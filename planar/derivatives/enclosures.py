@@ -1,0 +1,234 @@
+"""Solutions of F(x, t) = 0 and results r(x, t) over boxes of parameters, enclosed by Krawczyk's operator.
+
+For t in a box P about p, x in a box X about c, and any matrix Y near the inverse of the middle of F_x(X, P)
+
+    K = c - Y F(c, p) - Y F_t(X, P) (P - p) + (1 - Y F_x(X, P)) (X - c)
+
+holds every solution in X, and where K lies inside of X there is one for each t, no other one in X, and F_x is regular
+(R. Krawczyk, Computing 4 (1969) 187; A. Neumaier, Interval Methods for Systems of Equations, Cambridge 1990, ch. 5;
+R. E. Moore, R. B. Kearfott, M. J. Cloud, Introduction to Interval Analysis, SIAM 2009, ch. 8). How they move with the
+parameters, S = dx/dt, is enclosed by S = -Y F_t + (1 - Y F_x) S over the same boxes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import casadi as ca
+import numpy as np
+
+from planar.codegen.generic_evaluation import evaluate_function
+from planar.derivatives.implicit_system import invert_matrices
+from planar.derivatives.intervals import (
+    INTERVAL_OPERATIONS,
+    OVER,
+    TINY,
+    Balls,
+    Intervals,
+    apply_to_intervals,
+    down,
+    exact,
+    to_balls,
+    up,
+)
+from planar.equations.casadi_call import BufferedFunction
+from planar.foundation.arrays import Array, BoolArray
+
+START_STEPS = 2
+"""Newton's steps to where boxes have their middles."""
+MAX_GROWTHS = 8
+FIRST_GROWTH = 1.25
+"""How much wider a box is made first than its parameters make it to the first order."""
+GROWTH = 1.15
+"""What a box that does not hold K is made greater than K."""
+SPARE = 0.98
+"""The part of a box that K has to lie in."""
+LEAST_REACH = 1e-12
+SLOPE_STEPS = 3
+MAX_LANES = 2048
+"""Boxes that are worked on side by side."""
+HELD = ("OP_INPUT", "OP_OUTPUT", "OP_CONST")
+
+
+class ParameterBoxes(NamedTuple):
+    """Bounds of all parameters (lanes, parameters); they are about the middle that floats have."""
+
+    lower: Array
+    upper: Array
+
+    @property
+    def middle(self) -> Array:
+        """(lanes, parameters)"""
+        return 0.5 * (self.lower + self.upper)
+
+    def rows(self, which: BoolArray | Sequence[int] | slice) -> ParameterBoxes:
+        """Some of them."""
+        return ParameterBoxes(self.lower[which], self.upper[which])
+
+
+class Enclosures(NamedTuple):
+    """What is proved over boxes of parameters: of every lane, whether there is one solution for all of them, within
+    `radius` of `middle` (lanes, unknowns) and no other within `reach`; balls (lanes, results, columns) of how results
+    move with the parameters `columns`; and how unknowns do at the middle, as floats (lanes, unknowns, columns)."""
+
+    is_proved: BoolArray
+    middle: Array
+    radius: Array
+    reach: Array
+    slopes: Balls
+    tangents: Array
+
+    def holds(self, other: Enclosures) -> BoolArray:
+        """Whether the solutions of another lie where these are the only ones (lanes,)."""
+        inside = np.abs(other.middle - self.middle) * OVER + other.radius < self.reach
+        found: BoolArray = self.is_proved & other.is_proved & inside.all(axis=1)
+        return found
+
+    def rows(self, which: Sequence[int] | BoolArray) -> Enclosures:
+        """Those of some lanes."""
+        slopes = Balls(*(each[which] for each in self.slopes))
+        return Enclosures(*(each[which] for each in self[:4]), slopes, self.tangents[which])
+
+    @staticmethod
+    def stack(parts: Sequence[Enclosures]) -> Enclosures:
+        """Those of several."""
+        proved, middle, radius, reach, balls, tangents = zip(*parts, strict=True)
+        slopes = Balls(*(np.concatenate(each) for each in zip(*balls, strict=True)))
+        vectors = (np.concatenate(each) for each in (middle, radius, reach))
+        return Enclosures(np.concatenate(proved), *vectors, slopes, np.concatenate(tangents))
+
+
+class ParametricSystem:
+    """Equations F(x, t) = 0, as many as unknowns, and results r(x, t), whose slopes in `columns` of t are wanted.
+
+    Raises KeyError, with the name of a casadi operation, where there are some of which no intervals are known.
+    """
+
+    def __init__(self, x: ca.SX, t: ca.SX, equations: ca.SX, results: ca.SX, columns: Sequence[int]):
+        self.columns = list(columns)
+        self.count, self.parts = x.numel(), results.numel()
+        by = ca.vertcat(ca.SX(0, 1), *(t[k] for k in self.columns))
+        slopes = [ca.jacobian(each, of) for each in (equations, results) for of in (x, by)]
+        self._slopes = ca.Function("slopes", [x, t], [ca.densify(each) for each in slopes])
+        self._left = ca.Function("left", [x, t], [ca.densify(equations)])
+        self._step = BufferedFunction(
+            ca.Function("step", [x, t], [ca.densify(slopes[0]), ca.densify(slopes[1]), equations])
+        )
+        names = {getattr(ca, name): name for name in dir(ca) if name.startswith("OP_")}
+        for function in (self._slopes, self._left):
+            for k in range(function.n_instructions()):
+                code = function.instruction_id(k)
+                if code not in INTERVAL_OPERATIONS and names[code] not in HELD:
+                    raise KeyError(names[code].removeprefix("OP_").lower())
+
+    def enclose(self, boxes: ParameterBoxes, start: Array) -> Enclosures:
+        """What can be proved over boxes, of solutions near a start (lanes, unknowns) at their middles."""
+        parts = [slice(first, first + MAX_LANES) for first in range(0, max(1, len(start)), MAX_LANES)]
+        return Enclosures.stack([self._enclose_lanes(boxes.rows(part), start[part]) for part in parts])
+
+    def _enclose_lanes(self, boxes: ParameterBoxes, start: Array) -> Enclosures:
+        middle, tangents = self._find_middles(boxes, start)
+        many = len(start)
+        left = self._left_open(middle, boxes.middle)
+        half = self._half_widths(boxes)
+        proved = np.zeros(many, dtype=bool)
+        reach = FIRST_GROWTH * (np.abs(tangents) @ half[:, :, None])[:, :, 0] + LEAST_REACH
+        inside = reach.copy()
+        alive = np.isfinite(reach).all(axis=1)
+        for _ in range(MAX_GROWTHS):
+            at = np.flatnonzero(alive & ~proved)
+            if not len(at):
+                break
+            linear = self._linearise(middle[at], reach[at], boxes.rows(at))
+            image = linear.image(Balls(left.middle[at], left.radius[at]), half[at], reach[at])
+            known = np.isfinite(image).all(axis=1)
+            within = known & (image < SPARE * reach[at]).all(axis=1)
+            proved[at[within]], inside[at[within]] = True, image[within]
+            alive[at[~known]] = False
+            reach[at[~within]] = (GROWTH * np.maximum(image, reach[at]) + TINY)[~within]
+        found = np.flatnonzero(proved)
+        slopes = Balls(*(np.full((many, self.parts, len(self.columns)), np.nan) for _ in range(2)))
+        if len(found):
+            linear = self._linearise(middle[found], inside[found], boxes.rows(found))
+            slopes.middle[found], slopes.radius[found] = linear.slopes(reach[found])
+        return Enclosures(proved, middle, inside, reach, slopes, tangents)
+
+    def _find_middles(self, boxes: ParameterBoxes, start: Array) -> tuple[Array, Array]:
+        """Solutions at the middles and how they move with the columns, as floats have both."""
+        t, x = boxes.middle, start
+        inverse, by = np.zeros((len(x), self.count, self.count)), np.zeros((len(x), self.count, len(self.columns)))
+        for _ in range(START_STEPS):
+            slope, by, left = (each.transpose(0, 2, 1) for each in self._step.evaluate_batch(len(x), x, t))
+            inverse, is_singular = invert_matrices(slope)
+            x = x - (inverse @ left)[:, :, 0]
+            x[is_singular] = np.nan
+        return x, -inverse @ by
+
+    def _half_widths(self, boxes: ParameterBoxes) -> Array:
+        """Of the varying parameters, from the middle (lanes, columns)."""
+        middle = boxes.middle
+        both = np.maximum(up(boxes.upper - middle), up(middle - boxes.lower))
+        return both[:, self.columns]
+
+    def _left_open(self, middle: Array, t: Array) -> Balls:
+        """F at the middles (lanes, unknowns, 1)."""
+        given = [[exact(each) for each in values.T] for values in (middle, t)]
+        return _stack_balls(evaluate_function(self._left, given, exact, apply_to_intervals)[0], len(t), (self.count, 1))
+
+    def _linearise(self, middle: Array, reach: Array, boxes: ParameterBoxes) -> _LinearLanes:
+        x = [Intervals(down(at - far), up(at + far)) for at, far in zip(middle.T, reach.T, strict=True)]
+        t = [_interval(*both) for both in zip(boxes.lower.T, boxes.upper.T, strict=True)]
+        found = evaluate_function(self._slopes, [x, t], exact, apply_to_intervals)
+        shapes = [self._slopes.size_out(k) for k in range(4)]
+        balls = [_stack_balls(values, len(middle), shape) for values, shape in zip(found, shapes, strict=True)]
+        return _LinearLanes(*balls)
+
+
+class _LinearLanes:
+    """F_x, F_t, r_x, r_t as balls, with all preconditioned by the inverse of the middle of F_x."""
+
+    def __init__(self, F_x: Balls, F_t: Balls, r_x: Balls, r_t: Balls):
+        self.inverse, is_singular = invert_matrices(F_x.middle)
+        self.inverse[is_singular] = np.nan
+        unit = np.eye(F_x.middle.shape[1])
+        near = F_x.times(self.inverse)
+        self.rest = Balls(near.middle - unit, near.radius + 2.0**-52).size
+        "|1 - Y F_x|"
+        self.by = F_t.times(-self.inverse)
+        self.r_x, self.r_t = r_x, r_t
+
+    def image(self, left: Balls, half: Array, reach: Array) -> Array:
+        """How far K goes from the middle (lanes, unknowns)."""
+        step = left.times(self.inverse).size[:, :, 0]
+        moved = (self.by.size @ half[:, :, None])[:, :, 0]
+        turned = (self.rest @ reach[:, :, None])[:, :, 0]
+        return (step + moved + turned) * OVER + TINY
+
+    def slopes(self, reach: Array) -> Balls:
+        """Of results, where K lies within the reach, by which sizes are measured."""
+        scaled = (self.rest @ reach[:, :, None])[:, :, 0] / reach
+        factor = 1.0 - scaled.max(axis=1, initial=0.0) * OVER
+        most = (self.by.size / reach[:, :, None]).max(axis=1, initial=0.0) / factor[:, None] * OVER
+        size = reach[:, :, None] * most[:, None] * OVER
+        for _ in range(SLOPE_STEPS):
+            far = (self.rest @ size) * OVER + TINY
+            unknown = Balls(self.by.middle, (self.by.radius + far) * OVER)
+            size = np.minimum(size, unknown.size)
+        return self.r_x.product(unknown).plus(self.r_t)
+
+
+def _interval(lower: Array, upper: Array) -> Intervals:
+    """The bounds of one parameter, which mostly is the same number in all lanes."""
+    if lower[0] == upper[0] and (lower == lower[0]).all() and (upper == upper[0]).all():
+        return exact(lower[:1])
+    return Intervals(lower, upper)
+
+
+def _stack_balls(values: Sequence[Intervals], lanes: int, shape: tuple[int, int]) -> Balls:
+    """Dense results, column by column, as balls (lanes, rows, columns)."""
+    both = [np.empty((shape[1], shape[0], lanes)) for _ in range(2)]
+    for k, each in enumerate(values):
+        place = divmod(k, shape[0])
+        both[0][place], both[1][place] = each.lower, each.upper
+    return to_balls(*(each.transpose(2, 1, 0) for each in both))
