@@ -13,7 +13,7 @@ parameters, S = dx/dt, is enclosed by S = -Y F_t + (1 - Y F_x) S over the same b
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import casadi as ca
 import numpy as np
@@ -33,7 +33,7 @@ from planar.derivatives.intervals import (
     up,
 )
 from planar.equations.casadi_call import BufferedFunction
-from planar.foundation.arrays import Array, BoolArray
+from planar.foundation.arrays import Array, BoolArray, IntArray
 
 START_STEPS = 2
 """Newton's steps to where boxes have their middles."""
@@ -51,6 +51,9 @@ MAX_LANES = 2048
 HELD = ("OP_INPUT", "OP_OUTPUT", "OP_CONST")
 
 
+Lanes: TypeAlias = IntArray | BoolArray
+
+
 class ParameterBoxes(NamedTuple):
     """Bounds of all parameters (lanes, parameters); they are about the middle that floats have."""
 
@@ -62,7 +65,7 @@ class ParameterBoxes(NamedTuple):
         """(lanes, parameters)"""
         return 0.5 * (self.lower + self.upper)
 
-    def rows(self, which: BoolArray | Sequence[int] | slice) -> ParameterBoxes:
+    def rows(self, which: Lanes | slice) -> ParameterBoxes:
         """Some of them."""
         return ParameterBoxes(self.lower[which], self.upper[which])
 
@@ -85,18 +88,19 @@ class Enclosures(NamedTuple):
         found: BoolArray = self.is_proved & other.is_proved & inside.all(axis=1)
         return found
 
-    def rows(self, which: Sequence[int] | BoolArray) -> Enclosures:
+    def rows(self, which: Lanes) -> Enclosures:
         """Those of some lanes."""
-        slopes = Balls(*(each[which] for each in self.slopes))
-        return Enclosures(*(each[which] for each in self[:4]), slopes, self.tangents[which])
+        proved, middle, radius, reach, slopes, tangents = self
+        parts = Balls(slopes.middle[which], slopes.radius[which])
+        return Enclosures(proved[which], middle[which], radius[which], reach[which], parts, tangents[which])
 
     @staticmethod
     def stack(parts: Sequence[Enclosures]) -> Enclosures:
         """Those of several."""
         proved, middle, radius, reach, balls, tangents = zip(*parts, strict=True)
         slopes = Balls(*(np.concatenate(each) for each in zip(*balls, strict=True)))
-        vectors = (np.concatenate(each) for each in (middle, radius, reach))
-        return Enclosures(np.concatenate(proved), *vectors, slopes, np.concatenate(tangents))
+        middles, radii, reaches = (np.concatenate(each) for each in (middle, radius, reach))
+        return Enclosures(np.concatenate(proved), middles, radii, reaches, slopes, np.concatenate(tangents))
 
 
 class ParametricSystem:
@@ -122,13 +126,14 @@ class ParametricSystem:
                 if code not in INTERVAL_OPERATIONS and names[code] not in HELD:
                     raise KeyError(names[code].removeprefix("OP_").lower())
 
-    def enclose(self, boxes: ParameterBoxes, start: Array) -> Enclosures:
-        """What can be proved over boxes, of solutions near a start (lanes, unknowns) at their middles."""
+    def enclose(self, boxes: ParameterBoxes, start: Array, steps: int = START_STEPS) -> Enclosures:
+        """What can be proved over boxes, of solutions at their middles that so many of Newton's steps from a start
+        (lanes, unknowns) lead to."""
         parts = [slice(first, first + MAX_LANES) for first in range(0, max(1, len(start)), MAX_LANES)]
-        return Enclosures.stack([self._enclose_lanes(boxes.rows(part), start[part]) for part in parts])
+        return Enclosures.stack([self._enclose_lanes(boxes.rows(part), start[part], steps) for part in parts])
 
-    def _enclose_lanes(self, boxes: ParameterBoxes, start: Array) -> Enclosures:
-        middle, tangents = self._find_middles(boxes, start)
+    def _enclose_lanes(self, boxes: ParameterBoxes, start: Array, steps: int) -> Enclosures:
+        middle, tangents = self._find_middles(boxes, start, steps)
         many = len(start)
         left = self._left_open(middle, boxes.middle)
         half = self._half_widths(boxes)
@@ -154,11 +159,12 @@ class ParametricSystem:
             slopes.middle[found], slopes.radius[found] = linear.slopes(reach[found])
         return Enclosures(proved, middle, inside, reach, slopes, tangents)
 
-    def _find_middles(self, boxes: ParameterBoxes, start: Array) -> tuple[Array, Array]:
+    def _find_middles(self, boxes: ParameterBoxes, start: Array, steps: int) -> tuple[Array, Array]:
         """Solutions at the middles and how they move with the columns, as floats have both."""
         t, x = boxes.middle, start
-        inverse, by = np.zeros((len(x), self.count, self.count)), np.zeros((len(x), self.count, len(self.columns)))
-        for _ in range(START_STEPS):
+        inverse: Array = np.zeros((len(x), self.count, self.count))
+        by: Array = np.zeros((len(x), self.count, len(self.columns)))
+        for _ in range(steps):
             slope, by, left = (each.transpose(0, 2, 1) for each in self._step.evaluate_batch(len(x), x, t))
             inverse, is_singular = invert_matrices(slope)
             x = x - (inverse @ left)[:, :, 0]

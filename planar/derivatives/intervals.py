@@ -16,7 +16,7 @@ import casadi as ca
 import numpy as np
 
 from planar.codegen.generic_evaluation import OPERATIONS
-from planar.foundation.arrays import Array
+from planar.foundation.arrays import Array, BoolArray
 
 HALF_PI_PARTS = (1.5707963267341256, 6.077100506506192e-11)
 """pi / 2 to 33 binary digits, times any number of quarter turns below 2^20 a float, and the rest to 1e-26."""
@@ -158,11 +158,12 @@ def _turned_cosine(angle: Intervals, quarters: int) -> Intervals:
     return Intervals(np.where(known, lower, np.nan), np.where(known, upper, np.nan))
 
 
-def _may_hold(angle: Intervals, on: float) -> Array:
+def _may_hold(angle: Intervals, on: float) -> BoolArray:
     """Whether a whole turn lies within, as far as floats tell it, once so many turns are added."""
     low, high = (end / (2.0 * np.pi) + on for end in (angle.lower, angle.upper))
     margin = 1e-14 * (1.0 + np.maximum(np.abs(low), np.abs(high)))
-    return np.floor(high + margin) >= np.ceil(low - margin)
+    found: BoolArray = np.floor(high + margin) >= np.ceil(low - margin)
+    return found
 
 
 def _point_angle(y: Array, x: Array) -> Intervals:
