@@ -37,7 +37,7 @@ from planar.foundation.arrays import Array, BoolArray, IntArray
 
 START_STEPS = 2
 """Newton's steps to where boxes have their middles."""
-MAX_GROWTHS = 8
+MAX_GROWTHS = 10
 FIRST_GROWTH = 1.25
 """How much wider a box is made first than its parameters make it to the first order."""
 GROWTH = 1.15
@@ -151,7 +151,7 @@ class ParametricSystem:
             within = known & (image < SPARE * reach[at]).all(axis=1)
             proved[at[within]], inside[at[within]] = True, image[within]
             alive[at[~known]] = False
-            reach[at[~within]] = (GROWTH * np.maximum(image, reach[at]) + TINY)[~within]
+            reach[at[~within]] = (GROWTH * image + LEAST_REACH)[~within]
         found = np.flatnonzero(proved)
         slopes = Balls(*(np.full((many, self.parts, len(self.columns)), np.nan) for _ in range(2)))
         if len(found):

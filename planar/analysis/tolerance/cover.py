@@ -127,7 +127,7 @@ class Cover:
             row = np.zeros(1, dtype=int)
         else:
             near = [(3.0 * self.z[:-1] + self.z[1:]) / 4.0, (self.z[:-1] + 3.0 * self.z[1:]) / 4.0]
-            start = np.stack(near, axis=1).reshape(-1, self.z.shape[1])
+            start = np.stack(near, axis=1).reshape(2 * len(self.u) - 2, self.z.shape[1])
             row = np.repeat(np.arange(len(self.u)), 2)[1:-1]
         bounds = np.stack(ends, axis=2).reshape(2, len(row), -1)
         lower, upper = (

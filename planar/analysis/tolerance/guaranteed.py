@@ -47,6 +47,9 @@ def guaranteed_band(system: SlopeSystem, of: str, result: str, variations: Varia
     rates = ca.vertcat(design.z1, design.z2, design.u1, design.u2)
     if system.balance is not None or (rates.numel() and ca.depends_on(value, rates)):
         raise BadInput("guaranteed", f"guaranteed bands are told of places, angles and lengths, and not of {result!r}")
+    if design.F.numel() != design.z.numel():
+        told = "guaranteed bands are told of mechanisms without redundant constraints, which deviations contradict"
+        raise BadInput("guaranteed", told)
     varied, names = _what_varies(system, value, variations)
     try:
         columns = sorted(set(varied.columns.tolist()))
