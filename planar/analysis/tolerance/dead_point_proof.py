@@ -5,10 +5,10 @@ from __future__ import annotations
 from functools import cached_property
 from typing import NamedTuple
 
-import casadi as ca
 import numpy as np
 
 from planar.analysis.tolerance.cover import Undecided, Varied
+from planar.derivatives.design_enclosures import dead_points_over_boxes, fold_function
 from planar.derivatives.enclosures import ParameterBoxes, ParametricSystem
 from planar.derivatives.result_slopes import SlopeSystem
 from planar.equations.casadi_call import BufferedFunction
@@ -50,27 +50,16 @@ class DeadPointProof:
 
     @cached_property
     def _dead_points(self) -> ParametricSystem:
-        """Unknowns z, v and f over t, e of all t, and c."""
-        design = self.design
-        v, factor = ca.SX.sym("v", design.z.numel()), ca.SX.sym("factor")
-        e, c = ca.SX.sym("e", design.t.numel()), ca.SX.sym("c", design.z.numel())
-        both = ca.Function("both", [design.z, design.t, v], [design.F, ca.jtimes(design.F, design.z, v)])
-        left = ca.vertcat(*both(design.z, design.t + factor * e, v), ca.dot(c, v) - 1.0)
-        return ParametricSystem(ca.vertcat(design.z, v, factor), ca.vertcat(design.t, e, c), left, ca.SX(0, 1), ())
+        return dead_points_over_boxes(self.design)
 
     @cached_property
-    def _curvature(self) -> BufferedFunction:
-        """(z, t, v) -> F_z, F_t and F_zz v v."""
-        design = self.design
-        v = ca.SX.sym("v", design.z.numel())
-        turned = ca.jtimes(ca.jtimes(design.F, design.z, v), design.z, v)
-        slopes = [ca.densify(ca.jacobian(design.F, of)) for of in (design.z, design.t)]
-        return BufferedFunction(ca.Function("curvature", [design.z, design.t, v], [*slopes, ca.densify(turned)]))
+    def _fold(self) -> BufferedFunction:
+        return fold_function(self.design)
 
     def _weakest(self, lower: Array, upper: Array, near: Array) -> list[Weakest]:
         """Of all boxes those nearest to singular, the nearest first, each at another position of the inputs."""
         t = self.varied.boxes_of_t(self.nominal, lower, upper).middle
-        slopes = self._curvature.evaluate_batch(len(t), near, t, near)[0].transpose(0, 2, 1)
+        slopes = self._fold.evaluate_batch(len(t), near, t, near)[0].transpose(0, 2, 1)
         least = np.linalg.svd(np.nan_to_num(slopes), compute_uv=False).min(axis=1, initial=np.inf)
         known = np.isfinite(slopes).all(axis=(1, 2)) & np.isfinite(least)
         found: dict[bytes, Weakest] = {}
@@ -83,8 +72,8 @@ class DeadPointProof:
         return list(found.values())
 
     def _near_singular(self, t: Array, near: Array) -> Weakest:
-        left, sizes, right = np.linalg.svd(self._curvature(near, t, near)[0].T)
-        by, turned = self._curvature(near, t, right[-1])[1:]
+        left, sizes, right = np.linalg.svd(self._fold(near, t, near)[0].T)
+        by, turned = self._fold(near, t, right[-1])[1:]
         push = (left[:, -1] @ by.T)[self.varied.columns]
         return Weakest(t, near, float(sizes[-1]), right[-1], float(left[:, -1] @ turned[0]), push)
 

@@ -9,17 +9,16 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import casadi as ca
 import numpy as np
 
 from planar.analysis.tolerance.cover import Cover, Undecided, Varied
 from planar.analysis.tolerance.dead_point_proof import DeadPointProof
 from planar.analysis.tolerance.variations import Variations
-from planar.derivatives.enclosures import ParametricSystem
+from planar.derivatives.design_enclosures import PositionResult
 from planar.derivatives.intervals import OVER
 from planar.derivatives.result_slopes import SlopeSystem
 from planar.foundation.arrays import Array, IntArray
-from planar.foundation.errors import BadInput, NoAnswer, Outcome
+from planar.foundation.errors import NoAnswer, Outcome
 from planar.foundation.short_repr import short_repr
 
 DIRECTIONS = 48
@@ -42,21 +41,9 @@ class Guaranteed(NamedTuple):
 def guaranteed_band(system: SlopeSystem, of: str, result: str, variations: Variations) -> Guaranteed:
     """The guaranteed band of a result of positions. Raises BadInput where it is of no such kind, and NoAnswer where a
     dead point is proved within the tolerances, or nothing can be proved."""
-    design = system.design
-    value = next(each.value for each in system.expressions(of) if each.name == result)
-    rates = ca.vertcat(design.z1, design.z2, design.u1, design.u2)
-    if system.balance is not None or (rates.numel() and ca.depends_on(value, rates)):
-        raise BadInput("guaranteed", f"guaranteed bands are told of places, angles and lengths, and not of {result!r}")
-    if design.F.numel() != design.z.numel():
-        told = "guaranteed bands are told of mechanisms without redundant constraints, which deviations contradict"
-        raise BadInput("guaranteed", told)
-    varied, names = _what_varies(system, value, variations)
-    try:
-        columns = sorted(set(varied.columns.tolist()))
-        equations = ParametricSystem(design.z, design.t, design.F, value, columns)
-    except KeyError as problem:
-        told = f"guaranteed bands are not told of this mechanism, whose formulas have a {problem.args[0]!r} in them"
-        raise BadInput("guaranteed", told) from None
+    position = PositionResult(system, of, result)
+    varied, names = _what_varies(position, variations)
+    equations = position.over_boxes(sorted(set(varied.columns.tolist())))
     t = system.parameters
     cover = Cover(equations, varied, t[0], t[:, : varied.inputs], system.values[0])
     proof = DeadPointProof(system, varied, names)
@@ -69,15 +56,13 @@ def guaranteed_band(system: SlopeSystem, of: str, result: str, variations: Varia
     return Guaranteed(*_band_of_rows(varied, len(t), row, low, high), len(cover.boxes.row))
 
 
-def _what_varies(system: SlopeSystem, value: ca.SX, variations: Variations) -> tuple[Varied, tuple[str, ...]]:
+def _what_varies(position: PositionResult, variations: Variations) -> tuple[Varied, tuple[str, ...]]:
     """Inputs, then numbers and pins on which positions depend, with their names."""
-    design = system.design
-    inputs = [given.pair for given in design.mechanism.inputs]
-    moved = set(ca.jacobian_sparsity(ca.vertcat(design.F, value), design.t).get_col())
-    numbers = [each for each in variations.numbers if design.names.index(each.number) in moved]
-    names = [each.number for each in numbers]
-    names += [f"clearance.{each.pair}.{axis}" for each in variations.offsets for axis in "xy"]
-    columns = [*range(len(inputs)), *(design.names.index(name) for name in names)]
+    inputs = [given.pair for given in position.design.mechanism.inputs]
+    known = position.moving(each.number for each in variations.numbers)
+    numbers = [each for each in variations.numbers if each.number in known]
+    names = [*known, *(f"clearance.{each.pair}.{axis}" for each in variations.offsets for axis in "xy")]
+    columns = [*range(len(inputs)), *(position.design.names.index(name) for name in names)]
     radii = [each.radius for each in variations.offsets for _ in "xy"]
     lower = np.array([*(each.lower for each in numbers), *(-each for each in radii)])
     upper = np.array([*(each.upper for each in numbers), *radii])
