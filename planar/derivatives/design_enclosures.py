@@ -8,6 +8,7 @@ import casadi as ca
 
 from planar.derivatives.design_equations import DesignEquations
 from planar.derivatives.enclosures import ParametricSystem
+from planar.derivatives.limit_systems import LimitEquations, LimitSystem
 from planar.derivatives.result_slopes import SlopeSystem
 from planar.equations.casadi_call import BufferedFunction
 from planar.foundation.errors import BadInput
@@ -41,8 +42,21 @@ class PositionResult:
         try:
             return ParametricSystem(design.z, design.t, design.F, self.value, columns)
         except KeyError as problem:
-            told = f"guaranteed bands are not told of this mechanism, whose formulas have a {problem.args[0]!r} in them"
-            raise BadInput("guaranteed", told) from None
+            raise _refuse_operation(problem) from None
+
+
+def limit_over_boxes(system: LimitSystem, limit: LimitEquations, columns: list[int]) -> ParametricSystem:
+    """A limit with its value, where some of the limit system's parameters vary. Raises BadInput."""
+    t = ca.vertcat(system.parameters, limit.constants)
+    try:
+        return ParametricSystem(limit.unknowns, t, limit.equations, limit.value, columns)
+    except KeyError as problem:
+        raise _refuse_operation(problem) from None
+
+
+def _refuse_operation(problem: KeyError) -> BadInput:
+    told = f"guaranteed bands are not told of this mechanism, whose formulas have a {problem.args[0]!r} in them"
+    return BadInput("guaranteed", told)
 
 
 def dead_points_over_boxes(design: DesignEquations) -> ParametricSystem:

@@ -148,6 +148,33 @@ def test_clearance_is_a_disc_and_an_inputs_own_tolerance_counts():
     assert np.all(band.guaranteed.worst >= band.worst)
 
 
+def test_a_stroke_and_a_dead_point_are_enclosed_where_they_go_themselves():
+    """sqrt((l + r)^2 - e^2) - sqrt((l - r)^2 - e^2); and a crank as far as where coupler and rocker are in line."""
+    r, l, e, t = 0.5, 1.7, 0.3, 2e-3  # noqa: E741
+    motion = planar.cycle(slider_crank(r, l, e, velocity=3.0), 36)
+    pair = next(name for name, each in motion.pairs.items() if "displacement" in each)
+    values = planar.dimensions(motion.mechanism)
+    told = {name: t for name, value in values.items() if value in (r, l) and "length" in name}
+    strokes = [
+        np.sqrt((b + a) ** 2 - e**2) - np.sqrt((b - a) ** 2 - e**2)
+        for a in (r - t, r, r + t)
+        for b in (l - t, l, l + t)
+    ]
+    found = planar.tolerance(motion, pair, told, result="travel", guaranteed=True).guaranteed
+    least, greatest = min(strokes) - strokes[4], max(strokes) - strokes[4]
+    assert found.lower[0, 0] <= least < greatest <= found.upper[0, 0]
+    assert found.upper[0, 0] - found.lower[0, 0] < 1.01 * (greatest - least)
+
+    four_bar = planar.cycle("four-bar", 24)
+    values = planar.dimensions(four_bar.mechanism)
+    a, b, c, d = (values[name] for name in ("AB.length", "BC.length", "DC.length", "AD.D.x"))
+    turned = [np.arccos((a**2 + d**2 - (x + c) ** 2) / (2.0 * a * d)) for x in (b - 1e-4, b, b + 1e-4)]
+    band = planar.tolerance(four_bar, "A", {"BC.length": 1e-4}, result="dead_points", guaranteed=True)
+    assert abs(band.nominal).max() == pytest.approx(turned[1])
+    far = np.abs(np.array(turned) - turned[1]).max()
+    assert far <= band.guaranteed.worst[0] < 1.01 * far
+
+
 def test_a_dead_point_within_the_tolerances_is_proved_and_what_cannot_be_proved_is_said():
     motion = planar.cycle("crank-rocker", 24)
     with pytest.raises(NoAnswer, match=r"within the tolerances there is a dead point at A0 = .* brings it nearest"):
@@ -157,12 +184,14 @@ def test_a_dead_point_within_the_tolerances_is_proved_and_what_cannot_be_proved_
 
 
 def test_what_has_no_guaranteed_band_is_refused_in_a_sentence():
-    told = {"rod.length": 1e-4}
+    told, told_of_whitworth = {"rod.length": 1e-4}, {"crank.length": 1e-4}
     state = planar.solve("slider-crank")
     with pytest.raises(BadInput, match="not of 'velocity'"):
         planar.tolerance(state, "B", told, result="velocity", guaranteed=True)
-    with pytest.raises(BadInput, match="not of 'travel'"):
-        planar.tolerance(planar.cycle("slider-crank", 12), "stroke", told, result="travel", guaranteed=True)
+    with pytest.raises(BadInput, match="not of ratios"):
+        planar.tolerance(
+            planar.cycle("whitworth", 12), "guide", told_of_whitworth, result="time_ratio", guaranteed=True
+        )
     with pytest.raises(BadInput, match="without redundant constraints"):
         planar.tolerance(planar.solve("three-parallel-cranks"), "C", {"A0.position": 1e-3}, guaranteed=True)
     with pytest.raises(BadInput, match="'floor'"):

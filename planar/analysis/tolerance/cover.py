@@ -11,8 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.derivatives.enclosures import Enclosures, ParameterBoxes, ParametricSystem
-from planar.derivatives.intervals import OVER, Balls, down, up
+from planar.analysis.tolerance.varied import Varied, mean_slopes, slope_bounds
+from planar.derivatives.enclosures import Enclosures, ParametricSystem
 from planar.foundation.arrays import Array, BoolArray, IntArray
 
 TIGHT = 0.03
@@ -21,52 +21,12 @@ OTHER_PART = 0.2
 """Of a point's other coordinate's width, which counts too."""
 TIGHT_DEPTH = 4
 """How often, at most."""
-NESTED = 4
-"""Boxes of deviations within one another along which slopes are taken."""
 MAX_BOXES = 6000
 """Where more would be wanted it is undecided."""
 DEPTH_OF_DOUBT = 4
 """After so many bisections it is asked whether there is a dead point."""
 INPUT_FIRST = 0.5
 """An input is bisected where it moves what is solved for by this part of what a deviation does."""
-
-
-class Varied(NamedTuple):
-    """What varies: inputs, then deviations from nominal, each with its column of t.
-
-    The last ones are x and y of `discs` points, each of which stays within a circle about its nominal place.
-    """
-
-    columns: IntArray
-    inputs: int
-    lower: Array
-    "the least deviations (k,)"
-    upper: Array
-    discs: int
-
-    def boxes_of_t(self, base: Array, lower: Array, upper: Array) -> ParameterBoxes:
-        """Boxes (lanes, parameters) where what varies has bounds (lanes, varied), and all else is as in `base`."""
-        low, high = np.tile(base, (2, len(lower), 1))
-        for k, column in enumerate(self.columns):
-            if k < self.inputs:
-                low[:, column], high[:, column] = lower[:, k], upper[:, k]
-                continue
-            moves = (lower[:, k] != 0.0) | (upper[:, k] != 0.0)
-            low[:, column] = np.where(moves, down(low[:, column] + lower[:, k]), low[:, column])
-            high[:, column] = np.where(moves, up(high[:, column] + upper[:, k]), high[:, column])
-        return ParameterBoxes(low, high)
-
-    def deviations(self, low: Array, high: Array) -> tuple[Array, Array]:
-        """The least and the greatest deviation (lanes, parts) by slopes between bounds (lanes, parts, varied)."""
-        split = self.inputs + len(self.lower) - 2 * self.discs
-        own = slice(self.inputs, split)
-        many = split - self.inputs
-        products = [slope[..., own] * end[:many] for slope in (low, high) for end in (self.lower, self.upper)]
-        least, greatest = np.minimum.reduce(products), np.maximum.reduce(products)
-        size = np.maximum(np.abs(low), np.abs(high))[..., split:]
-        reach = np.hypot(size[..., ::2], size[..., 1::2]) * self.upper[many::2]
-        lost = (np.abs(least).sum(axis=2) + np.abs(greatest).sum(axis=2) + reach.sum(axis=2)) * (OVER - 1.0)
-        return least.sum(axis=2) - reach.sum(axis=2) - lost, greatest.sum(axis=2) + reach.sum(axis=2) + lost
 
 
 class Undecided(Exception):
@@ -161,28 +121,13 @@ class Cover:
         self.found, self.low, self.high = whole, np.concatenate([self.low, low]), np.concatenate([self.high, high])
 
     def _slope_bounds(self, boxes: Boxes, told: Enclosures, which: IntArray) -> tuple[Array, Array]:
-        """What slopes are between (lanes, parts, varied): deviations grow along a straight way from the nominal, of
-        which each part lies in a box of its own, one in the other. Slopes are the mean of those."""
-        low, high = _bounds(told.slopes)
+        """What slopes are between (lanes, parts, varied)."""
+        low, high = (each[..., self.place] for each in slope_bounds(told.slopes))
         whole = np.flatnonzero(told.is_proved & (boxes.group == which))
-        if len(whole) and len(self.varied.lower):
-            shares = np.arange(1, NESTED) / NESTED
-            k = self.varied.inputs
-            lower, upper = (np.repeat(each[whole], NESTED - 1, axis=0) for each in (boxes.lower, boxes.upper))
-            share = np.tile(shares, len(whole))[:, None]
-            lower[:, k:], upper[:, k:] = down(lower[:, k:] * share), up(upper[:, k:] * share)
-            outer = told.rows(np.repeat(whole, NESTED - 1))
-            moved = 0.5 * (lower + upper - np.repeat((boxes.lower + boxes.upper)[whole], NESTED - 1, axis=0))
-            start = outer.middle + self._along(outer.tangents, moved)
-            inner = self.system.enclose(self.varied.boxes_of_t(self.base, lower, upper), start)
-            inside = outer.holds(inner)[:, None, None]
-            parts = [np.where(inside, *both) for both in zip(_bounds(inner.slopes), _bounds(outer.slopes), strict=True)]
-            for ends, own in zip(parts, (low, high), strict=True):
-                summed = ends.reshape(len(whole), NESTED - 1, *own.shape[1:]).sum(axis=1)
-                own[whole] = (summed + own[whole]) / NESTED
-            slack = (OVER - 1.0) * np.maximum(np.abs(low), np.abs(high))
-            low, high = low - slack, high + slack
-        return low[..., self.place], high[..., self.place]
+        if len(whole):
+            bounds = boxes.lower[whole], boxes.upper[whole]
+            low[whole], high[whole] = mean_slopes(self.system, self.varied, self.base, bounds, told.rows(whole))
+        return low, high
 
     def _along(self, tangents: Array, moved: Array) -> Array:
         """How unknowns move, to the first order, with what varies (lanes, varied)."""
@@ -293,7 +238,3 @@ class Cover:
         np.minimum.at(low, at, self.low[leaves])
         np.maximum.at(high, at, self.high[leaves])
         return self.boxes.row[group], low, high
-
-
-def _bounds(slopes: Balls) -> tuple[Array, Array]:
-    return down(slopes.middle - slopes.radius), up(slopes.middle + slopes.radius)

@@ -7,7 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.analysis.tolerance.cover import Undecided, Varied
+from planar.analysis.tolerance.cover import Undecided
+from planar.analysis.tolerance.varied import Varied
 from planar.derivatives.design_enclosures import dead_points_over_boxes, fold_function
 from planar.derivatives.enclosures import ParameterBoxes, ParametricSystem
 from planar.derivatives.result_slopes import SlopeSystem

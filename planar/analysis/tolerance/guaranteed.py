@@ -11,9 +11,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.analysis.tolerance.cover import Cover, Undecided, Varied
+from planar.analysis.tolerance.cover import Cover, Undecided
 from planar.analysis.tolerance.dead_point_proof import DeadPointProof
 from planar.analysis.tolerance.variations import Variations
+from planar.analysis.tolerance.varied import Varied
 from planar.derivatives.design_enclosures import PositionResult
 from planar.derivatives.intervals import OVER
 from planar.derivatives.result_slopes import SlopeSystem

@@ -11,6 +11,7 @@ import numpy as np
 
 from planar.analysis.sensitivity.limit_slopes import dead_point_slopes, travel_slopes
 from planar.analysis.tolerance.guaranteed import Guaranteed, guaranteed_band
+from planar.analysis.tolerance.guaranteed_limits import guaranteed_dead_points, guaranteed_travel
 from planar.analysis.tolerance.sampled import Draw, Sampled, sample_deviations, summarise
 from planar.analysis.tolerance.spread import SIGMAS, LinearSpread, NormalSpread
 from planar.analysis.tolerance.variations import PinOffset, Variations, find_variations, leave_out_tied
@@ -243,11 +244,7 @@ def tolerance(  # many: what is asked, of which tolerances, and how it is sample
     variations = find_variations(moving.mechanism, tolerances)
     between = _read_limit(limit)
     if result in LIMIT_RESULTS:
-        if guaranteed:
-            raise BadInput(
-                "guaranteed", f"guaranteed bands are told of places, angles and lengths, and not of {result!r}"
-            )
-        return _of_limits(source, of, result, variations, between, distribution)
+        return _of_limits(source, of, result, variations, between, distribution, guaranteed)
     offsets = tuple(each.pair for each in variations.offsets)
     system = SlopeSystem(source, offsets)
     found = system.named_slopes(of)
@@ -351,6 +348,7 @@ def _of_limits(  # many: a limit, what varies, and what is asked of it
     variations: Variations,
     limit: tuple[float, float] | None,
     distribution: str,
+    guaranteed: bool,
 ) -> ToleranceBand:
     """The band of a stroke or swing, of its time ratio, or of the dead points of the running input."""
     moving = source.moving if isinstance(source, Forces) else source
@@ -380,7 +378,14 @@ def _of_limits(  # many: a limit, what varies, and what is asked of it
     known_numbers = tuple(each for each in variations.numbers if each.number in names)
     kept = leave_out_tied(variations._replace(numbers=known_numbers), unknown)
     spread = _linear_spread(moving, whole, names, kept, SIGMAS[distribution])
-    rows = np.array(nominal)[None]
-    return ToleranceBand(
-        of, result, kind, source, kept, limit, (), None, distribution, _contributor_names(kept), spread, rows
+    rows, names = np.array(nominal)[None], _contributor_names(kept)
+    proved = _guaranteed_limits(moving, of, result, kept) if guaranteed else None
+    return ToleranceBand(of, result, kind, source, kept, limit, (), None, distribution, names, spread, rows, proved)
+
+
+def _guaranteed_limits(motion: Motion, of: str, result: str, variations: Variations) -> Guaranteed:
+    if result == "time_ratio":
+        raise BadInput("guaranteed", "guaranteed bands are told of places, angles, lengths and travels, not of ratios")
+    return (
+        guaranteed_travel(motion, of, variations) if result == "travel" else guaranteed_dead_points(motion, variations)
     )
