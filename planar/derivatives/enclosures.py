@@ -29,6 +29,7 @@ from planar.derivatives.intervals import (
     apply_to_intervals,
     down,
     exact,
+    mean_of_balls,
     to_balls,
     up,
 )
@@ -45,7 +46,10 @@ GROWTH = 1.15
 SPARE = 0.98
 """The part of a box that K has to lie in."""
 LEAST_REACH = 1e-12
-SLOPE_STEPS = 3
+NESTED = (1, 4)
+"""Boxes within one another over which slopes of ways from the middle are taken: first, and where that does not do."""
+MAX_REACH = 1e3
+SLACK = 1e-9
 MAX_LANES = 2048
 """Boxes that are worked on side by side."""
 HELD = ("OP_INPUT", "OP_OUTPUT", "OP_CONST")
@@ -64,6 +68,14 @@ class ParameterBoxes(NamedTuple):
     def middle(self) -> Array:
         """(lanes, parameters)"""
         return 0.5 * (self.lower + self.upper)
+
+    def shrunk(self, share: float) -> ParameterBoxes:
+        """Those of a part of the widths about the middle."""
+        if share == 1.0:
+            return self
+        middle, thin = self.middle, self.lower == self.upper
+        low, high = middle + share * (self.lower - middle), middle + share * (self.upper - middle)
+        return ParameterBoxes(np.where(thin, middle, down(low)), np.where(thin, middle, up(high)))
 
     def rows(self, which: Lanes | slice) -> ParameterBoxes:
         """Some of them."""
@@ -141,22 +153,26 @@ class ParametricSystem:
         reach = FIRST_GROWTH * (np.abs(tangents) @ half[:, :, None])[:, :, 0] + LEAST_REACH
         inside = reach.copy()
         alive = np.isfinite(reach).all(axis=1)
-        for _ in range(MAX_GROWTHS):
-            at = np.flatnonzero(alive & ~proved)
-            if not len(at):
-                break
-            linear = self._linearise(middle[at], reach[at], boxes.rows(at))
-            image = linear.image(Balls(left.middle[at], left.radius[at]), half[at], reach[at])
-            known = np.isfinite(image).all(axis=1)
-            within = known & (image < SPARE * reach[at]).all(axis=1)
-            proved[at[within]], inside[at[within]] = True, image[within]
-            alive[at[~known]] = False
-            reach[at[~within]] = (GROWTH * image + LEAST_REACH)[~within]
-        found = np.flatnonzero(proved)
+        first = reach.copy()
+        for nested in NESTED:
+            alive = np.isfinite(reach).all(axis=1) & ~proved
+            reach[alive] = first[alive]
+            for _ in range(MAX_GROWTHS):
+                at = np.flatnonzero(alive & ~proved)
+                if not len(at):
+                    break
+                linear = self._linearise(middle[at], reach[at], boxes.rows(at), nested)
+                image = linear.image(Balls(left.middle[at], left.radius[at]), half[at], reach[at])
+                known = np.isfinite(image).all(axis=1) & (image < MAX_REACH).all(axis=1)
+                within = known & (image < SPARE * reach[at]).all(axis=1)
+                proved[at[within]], inside[at[within]] = True, image[within]
+                alive[at[~known]] = False
+                reach[at[~within]] = (GROWTH * image + LEAST_REACH)[~within]
         slopes = Balls(*(np.full((many, self.parts, len(self.columns)), np.nan) for _ in range(2)))
+        found = np.flatnonzero(proved)
         if len(found):
             linear = self._linearise(middle[found], inside[found], boxes.rows(found))
-            slopes.middle[found], slopes.radius[found] = linear.slopes(reach[found])
+            proved[found], (slopes.middle[found], slopes.radius[found]) = linear.slopes()
         return Enclosures(proved, middle, inside, reach, slopes, tangents)
 
     def _find_middles(self, boxes: ParameterBoxes, start: Array, steps: int) -> tuple[Array, Array]:
@@ -182,13 +198,19 @@ class ParametricSystem:
         given = [[exact(each) for each in values.T] for values in (middle, t)]
         return _stack_balls(evaluate_function(self._left, given, exact, apply_to_intervals)[0], len(t), (self.count, 1))
 
-    def _linearise(self, middle: Array, reach: Array, boxes: ParameterBoxes) -> _LinearLanes:
-        x = [Intervals(down(at - far), up(at + far)) for at, far in zip(middle.T, reach.T, strict=True)]
-        t = [_interval(*both) for both in zip(boxes.lower.T, boxes.upper.T, strict=True)]
-        found = evaluate_function(self._slopes, [x, t], exact, apply_to_intervals)
+    def _linearise(self, middle: Array, reach: Array, boxes: ParameterBoxes, nested: int = 1) -> _LinearLanes:
+        """Over boxes, or the mean along straight ways from the middle, each part of which is in one of nested boxes."""
         shapes = [self._slopes.size_out(k) for k in range(4)]
-        balls = [_stack_balls(values, len(middle), shape) for values, shape in zip(found, shapes, strict=True)]
-        return _LinearLanes(*balls)
+        parts = []
+        for k in range(1, nested + 1):
+            share = k / nested
+            x = [Intervals(down(at - far), up(at + far)) for at, far in zip(middle.T, up(share * reach.T), strict=True)]
+            t = [_interval(*both) for both in zip(*(each.T for each in boxes.shrunk(share)), strict=True)]
+            found = evaluate_function(self._slopes, [x, t], exact, apply_to_intervals)
+            parts.append(
+                [_stack_balls(values, len(middle), shape) for values, shape in zip(found, shapes, strict=True)]
+            )
+        return _LinearLanes(*(mean_of_balls(each) for each in zip(*parts, strict=True)))
 
 
 class _LinearLanes:
@@ -211,17 +233,22 @@ class _LinearLanes:
         turned = (self.rest @ reach[:, :, None])[:, :, 0]
         return (step + moved + turned) * OVER + TINY
 
-    def slopes(self, reach: Array) -> Balls:
-        """Of results, where K lies within the reach, by which sizes are measured."""
-        scaled = (self.rest @ reach[:, :, None])[:, :, 0] / reach
-        factor = 1.0 - scaled.max(axis=1, initial=0.0) * OVER
-        most = (self.by.size / reach[:, :, None]).max(axis=1, initial=0.0) / factor[:, None] * OVER
-        size = reach[:, :, None] * most[:, None] * OVER
-        for _ in range(SLOPE_STEPS):
-            far = (self.rest @ size) * OVER + TINY
-            unknown = Balls(self.by.middle, (self.by.radius + far) * OVER)
-            size = np.minimum(size, unknown.size)
-        return self.r_x.product(unknown).plus(self.r_t)
+    def slopes(self) -> tuple[BoolArray, Balls]:
+        """Whether F_x is regular, by some v > 0 with |1 - Y F_x| v < v (A. Neumaier, sec. 4.1), and slopes of results.
+
+        A size X of S with |B| + |1 - Y F_x| X <= X holds it, for B = -Y F_t.
+        """
+        many, count = self.rest.shape[:2]
+        whole = np.concatenate([np.ones((many, count, 1)), self.by.size], axis=2)
+        known = np.isfinite(self.rest).all(axis=(1, 2))
+        inverse, is_singular = invert_matrices(np.eye(count) - np.where(known[:, None, None], self.rest, 0.0))
+        wider = whole + SLACK * whole.max(axis=1, keepdims=True, initial=0.0) + LEAST_REACH
+        size = inverse @ wider * (1.0 + SLACK)
+        image = (self.rest @ size + whole) * OVER + TINY
+        is_regular = known & ~is_singular & ((size > 0.0) & (image <= size)).all(axis=(1, 2))
+        far = (self.rest @ size[:, :, 1:]) * OVER + TINY
+        unknown = Balls(self.by.middle, (self.by.radius + far) * OVER)
+        return np.asarray(is_regular), self.r_x.product(unknown).plus(self.r_t)
 
 
 def _interval(lower: Array, upper: Array) -> Intervals:

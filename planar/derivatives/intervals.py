@@ -223,6 +223,16 @@ class Balls(NamedTuple):
         return Balls(middle, (self.radius + other.radius + 2.0 * UNIT_ROUNDOFF * np.abs(middle)) * OVER + TINY)
 
 
+def mean_of_balls(parts: Sequence[Balls]) -> Balls:
+    """The mean of some."""
+    if len(parts) == 1:
+        return parts[0]
+    middle = np.sum([each.middle for each in parts], axis=0) / len(parts)
+    size = np.sum([np.abs(each.middle) for each in parts], axis=0) / len(parts)
+    radius = np.sum([each.radius for each in parts], axis=0) / len(parts)
+    return Balls(middle, (radius + (len(parts) + 1) * 2.0 * UNIT_ROUNDOFF * size) * OVER + TINY)
+
+
 def to_balls(lower: Array, upper: Array) -> Balls:
     """The balls that hold intervals."""
     middle = 0.5 * (lower + upper)
