@@ -30,6 +30,19 @@ class LimitPoint(NamedTuple):
     value_slopes: Array
 
 
+class LimitEquations(NamedTuple):
+    """A square system that a limit is solved from: the unknowns x, of which the running input is the last, equations
+    and the output's value in x, the parameters of `LimitSystem` and constants; a start, and the numbers of both."""
+
+    unknowns: ca.SX
+    equations: ca.SX
+    value: ca.SX
+    constants: ca.SX
+    start: Array
+    numbers: Array
+    known: Array
+
+
 class LimitSystem:
     """The equations of one limit of a running input; parameters are the other inputs' positions, then dimensions."""
 
@@ -46,24 +59,32 @@ class LimitSystem:
         "of the parameters"
 
     def dead_point(self, motion: Motion, row: int) -> LimitPoint | None:
-        """Where the input turns back near a row: a null vector v of dF/dz with c v = 1 beside F = 0."""
+        """Where the input turns back near a row."""
+        return self._solve(self.dead_point_equations(motion, row))
+
+    def turning_point(self, state: State, output: str) -> LimitPoint | None:
+        """Where an output, a pair or else a link, turns back near a state."""
+        return self._solve(self.turning_point_equations(state, output))
+
+    def dead_point_equations(self, motion: Motion, row: int) -> LimitEquations:
+        """A null vector v of dF/dz with c v = 1 beside F = 0."""
         design = self.design
         v, c = ca.SX.sym("v", design.z.numel()), ca.SX.sym("c", design.z.numel())
         equations = ca.vertcat(design.F, ca.jtimes(design.F, design.z, v), ca.dot(c, v) - 1.0)
         (z, *_), t = design.coordinates_at(motion)
         slope = ca.Function("slope", [design.z, design.t], [ca.jacobian(design.F, design.z)])(z[row], t[row]).full()
         null = np.linalg.svd(slope)[2][-1]
-        return self._solve([design.z, v], equations, self.u, [z[row], null], t[row], c, null)
+        return self._of_limit([design.z, v], equations, self.u, [z[row], null], t[row], c, null)
 
-    def turning_point(self, state: State, output: str) -> LimitPoint | None:
-        """Where an output, a pair or else a link, turns back near a state."""
+    def turning_point_equations(self, state: State, output: str) -> LimitEquations:
+        """The first rate of F, and of the output, both 0 beside F = 0, where the input runs at 1."""
         design = self.design
         first = _first_result(design, state, output)
         rates = ca.substitute(ca.vertcat(*design.rates(design.F)[:1], *design.rates(first)[:1]), design.u1, self._unit)
         z, t = design.coordinates_at(state)
         rate = t[0][len(self.others) + 1 + self.index]
         equations = ca.vertcat(design.F, rates)
-        return self._solve([design.z, design.z1], equations, first, [z[0][0], z[1][0] / rate], t[0])
+        return self._of_limit([design.z, design.z1], equations, first, [z[0][0], z[1][0] / rate], t[0])
 
     @property
     def _unit(self) -> ca.DM:
@@ -71,7 +92,7 @@ class LimitSystem:
         unit[self.index] = 1.0
         return unit
 
-    def _solve(  # many: a square system, what it tells, and where it is solved from
+    def _of_limit(  # many: a square system, what it tells, and where it is solved from
         self,
         unknowns: Sequence[ca.SX],
         equations: ca.SX,
@@ -80,15 +101,18 @@ class LimitSystem:
         t: Array,
         constants: ca.SX | None = None,
         known: Array | None = None,
-    ) -> LimitPoint | None:
-        """The limit by Newton's method, with its derivatives; None where there is none so near."""
+    ) -> LimitEquations:
         x = ca.vertcat(*unknowns, self.u)
         held = ca.SX(0, 1) if constants is None else constants
-        given = [x, self.parameters, held]
-        step = BufferedFunction(ca.Function("limit", given, [ca.densify(ca.jacobian(equations, x)), equations]))
         here = np.concatenate([*start, [t[self.index]]])
         numbers = np.concatenate([t[self.others], t[3 * (len(self.others) + 1) :]])
-        kept = np.zeros(0) if known is None else known
+        return LimitEquations(x, equations, value, held, here, numbers, np.zeros(0) if known is None else known)
+
+    def _solve(self, limit: LimitEquations) -> LimitPoint | None:
+        """The limit by Newton's method, with its derivatives; None where there is none so near."""
+        x, equations, value, held, here, numbers, kept = limit
+        given = [x, self.parameters, held]
+        step = BufferedFunction(ca.Function("limit", given, [ca.densify(ca.jacobian(equations, x)), equations]))
         for _ in range(MAX_NEWTON_STEPS):
             slopes, open_by = step.evaluate_batch(1, here[None], numbers[None], kept[None])
             inverse, is_singular = invert_matrices(slopes.transpose(0, 2, 1))
@@ -100,7 +124,7 @@ class LimitSystem:
                 break
         else:
             return None
-        system = ImplicitSystem([Level(x, equations)], self.parameters, constants)
+        system = ImplicitSystem([Level(x, equations)], self.parameters, held)
         results = ca.vertcat(self.u, value)
         found = system.slopes(system.result_jacobians(results), [here[None]], numbers[None], kept[None])
         told = float(ca.Function("told", given, [value])(here, numbers, kept))

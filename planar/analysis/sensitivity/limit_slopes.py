@@ -12,10 +12,10 @@ from planar.analysis.interpolated_run import InterpolatedRun
 from planar.analysis.motion.output import Extreme, Output
 from planar.analysis.motion.time_ratio import Passage, TimeRatio, find_time_ratio
 from planar.derivatives.design_equations import design_equations
-from planar.derivatives.limit_systems import LimitPoint, LimitSystem
+from planar.derivatives.limit_systems import LimitEquations, LimitPoint, LimitSystem
 from planar.foundation.errors import BadInput, NoAnswer, Outcome
 from planar.foundation.short_repr import short_repr
-from planar.results.motion import Motion
+from planar.results.motion import Motion, State
 
 NEAR = 1e-6
 """rad or sizes: a limit that is solved for anew is the same where it is so near."""
@@ -90,6 +90,25 @@ def travel_slopes(motion: Motion, of: str, offsets: tuple[str, ...] = ()) -> Tra
         return None
 
 
+def travel_end_equations(
+    motion: Motion, of: str, offsets: tuple[str, ...] = ()
+) -> tuple[LimitSystem, list[tuple[LimitEquations, ...]]]:
+    """The equations of the ends of a travel: of all places of the least value, and of the greatest."""
+    run = InterpolatedRun(motion)
+    output = Output(run, of)
+    ends = _TravelDerivatives(run, output, offsets)
+    found = [tuple(map(ends.equations, each)) for each in output.all_turning_extremes()]
+    return ends.system, found
+
+
+def dead_point_equations(motion: Motion, offsets: tuple[str, ...] = ()) -> tuple[LimitSystem, list[LimitEquations]]:
+    """The equations of the dead points that `dead_point_slopes` tells of."""
+    system = LimitSystem(design_equations(motion.mechanism, offsets), motion.running_input)
+    at = motion.inputs[motion.running_input].position
+    places = (each.input for each in dead_point_slopes(motion, offsets))
+    return system, [system.dead_point_equations(motion, int(np.argmin(np.abs(at - each)))) for each in places]
+
+
 class _TravelDerivatives:
     """The ends between which an output goes, each solved for with its derivatives."""
 
@@ -139,10 +158,16 @@ class _TravelDerivatives:
         known = {name: nan if name in apart else slope for name, slope in first.value_slopes.items()}
         return first._replace(value_slopes=known)
 
-    def _end(self, kind: str, end: Extreme) -> LimitSlopes:
+    def _state(self, end: Extreme) -> State:
         place = self.run.wrap_position(end.input)
-        state = self.run.state_at(end.input if place is None else place)
-        point = self.system.turning_point(state, self.output.name)
+        return self.run.state_at(end.input if place is None else place)
+
+    def equations(self, end: Extreme) -> LimitEquations:
+        """What an end is solved from."""
+        return self.system.turning_point_equations(self._state(end), self.output.name)
+
+    def _end(self, kind: str, end: Extreme) -> LimitSlopes:
+        point = self.system.turning_point(self._state(end), self.output.name)
         if point is None:
             raise NoAnswer(Outcome.CHANGE_POINT, "an end of the travel does not move smoothly with the dimensions")
         return _limit_slopes(kind, self.output.name, end.input, end.value, self.system, point)

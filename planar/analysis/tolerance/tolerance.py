@@ -10,6 +10,8 @@ from typing import Any
 import numpy as np
 
 from planar.analysis.sensitivity.limit_slopes import dead_point_slopes, travel_slopes
+from planar.analysis.tolerance.guaranteed import Guaranteed, guaranteed_band
+from planar.analysis.tolerance.guaranteed_limits import guaranteed_dead_points, guaranteed_travel
 from planar.analysis.tolerance.sampled import Draw, Sampled, sample_deviations, summarise
 from planar.analysis.tolerance.spread import SIGMAS, LinearSpread, NormalSpread
 from planar.analysis.tolerance.variations import PinOffset, Variations, find_variations, leave_out_tied
@@ -41,7 +43,8 @@ class ToleranceBand:
     the result, and the pin's share is 0.
 
     `second_order` has mean and std with the second derivatives, `sampled` what random mechanisms do, None where none
-    were asked for. `share_within` is the share of mechanisms that keep the `limit`. NaN at `singular_rows`, dead points
+    were asked for. `guaranteed` are least and greatest deviations that no mechanism exceeds, None where not asked for.
+    `share_within` is the share of mechanisms that keep the `limit`. NaN at `singular_rows`, dead points
     and change points.
     """
 
@@ -60,6 +63,7 @@ class ToleranceBand:
     "(n, parts, ...), n = 1 of a state"
     nominal_rows: Array
     "(n, parts)"
+    guaranteed: Guaranteed | None = None
 
     def __repr__(self) -> str:
         return f"<ToleranceBand of {self.of!r}, {self.result}, in {self.moving!r}: {len(self.names)} contributions>"
@@ -213,6 +217,7 @@ def tolerance(  # many: what is asked, of which tolerances, and how it is sample
     samples: int = 0,
     seed: int = 0,
     distribution: str = "normal",
+    guaranteed: bool = False,
 ) -> ToleranceBand:
     """How far a result of a point, link, pair or input may be off by the tolerances of the mechanism.
 
@@ -220,11 +225,12 @@ def tolerance(  # many: what is asked, of which tolerances, and how it is sample
     of those that a state, a motion or forces tell of that name, left out the first; or "travel" (stroke or swing),
     "time_ratio" and, of the running input, "dead_points". `limit` is a deviation, plus and minus, or the least and
     the greatest; of a point a distance. With `samples` so many random mechanisms are solved, too, from a `seed`. See
-    `ToleranceBand` for what is assumed and told.
+    `ToleranceBand` for what is assumed and told. `guaranteed` asks for a band that is proved, of a motion at all
+    positions of its inputs from one to the next; see `planar.analysis.tolerance.guaranteed`.
 
     The worst case adds |slope| t of all; the statistical one squares (root sum of squares: ASME Y14.5; K. W. Chase,
     A. R. Parkinson, Research in Engineering Design 3 (1991) 23). Raises Unknown, BadInput, and NoAnswer where there are
-    no derivatives at any position.
+    no derivatives at any position, or nothing can be guaranteed.
 
     >>> import planar
     >>> state = planar.solve(planar.load("slider-crank"))
@@ -238,7 +244,7 @@ def tolerance(  # many: what is asked, of which tolerances, and how it is sample
     variations = find_variations(moving.mechanism, tolerances)
     between = _read_limit(limit)
     if result in LIMIT_RESULTS:
-        return _of_limits(source, of, result, variations, between, distribution)
+        return _of_limits(source, of, result, variations, between, distribution, guaranteed)
     offsets = tuple(each.pair for each in variations.offsets)
     system = SlopeSystem(source, offsets)
     found = system.named_slopes(of)
@@ -273,6 +279,7 @@ def tolerance(  # many: what is asked, of which tolerances, and how it is sample
         _contributor_names(variations),
         linear,
         system.result_values(of)[name],
+        guaranteed_band(system, of, name, variations) if guaranteed else None,
     )
 
 
@@ -341,6 +348,7 @@ def _of_limits(  # many: a limit, what varies, and what is asked of it
     variations: Variations,
     limit: tuple[float, float] | None,
     distribution: str,
+    guaranteed: bool,
 ) -> ToleranceBand:
     """The band of a stroke or swing, of its time ratio, or of the dead points of the running input."""
     moving = source.moving if isinstance(source, Forces) else source
@@ -370,7 +378,14 @@ def _of_limits(  # many: a limit, what varies, and what is asked of it
     known_numbers = tuple(each for each in variations.numbers if each.number in names)
     kept = leave_out_tied(variations._replace(numbers=known_numbers), unknown)
     spread = _linear_spread(moving, whole, names, kept, SIGMAS[distribution])
-    rows = np.array(nominal)[None]
-    return ToleranceBand(
-        of, result, kind, source, kept, limit, (), None, distribution, _contributor_names(kept), spread, rows
+    rows, names = np.array(nominal)[None], _contributor_names(kept)
+    proved = _guaranteed_limits(moving, of, result, kept) if guaranteed else None
+    return ToleranceBand(of, result, kind, source, kept, limit, (), None, distribution, names, spread, rows, proved)
+
+
+def _guaranteed_limits(motion: Motion, of: str, result: str, variations: Variations) -> Guaranteed:
+    if result == "time_ratio":
+        raise BadInput("guaranteed", "guaranteed bands are told of places, angles, lengths and travels, not of ratios")
+    return (
+        guaranteed_travel(motion, of, variations) if result == "travel" else guaranteed_dead_points(motion, variations)
     )

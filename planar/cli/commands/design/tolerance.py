@@ -44,6 +44,7 @@ LIMIT_RESULTS = {"stroke": "travel", "swing": "travel", "travel": "travel", "tim
 @click.option("--statistical", is_flag=True, help="With --allow: by three standard deviations, not the worst case.")
 @click.option("--samples", type=click.IntRange(min=2), metavar="N", help="Solve N random mechanisms, too.")
 @click.option("--seed", type=int, default=0, metavar="S", help="From which they are drawn.")
+@click.option("--guaranteed", is_flag=True, help="A band that is proved, at all positions between two, too.")
 @motion_options
 @output_option("Write the table to a .txt, .svg or .html file.")
 def tolerance(  # many: options of the command
@@ -60,6 +61,7 @@ def tolerance(  # many: options of the command
     statistical: bool,
     samples: int | None,
     seed: int,
+    guaranteed: bool,
     output: Path | None,
     **course: Any,
 ) -> None:
@@ -82,7 +84,7 @@ def tolerance(  # many: options of the command
     refuse_overwriting(model, output)
     with show_status(f"{mechanism.name}: tolerances"):
         moving = run_motion(mechanism, **course) if whole else solve(mechanism, parse_drives(mechanism, at))
-        band = band_of(moving, of, others, result=named, samples=samples or 0, seed=seed)
+        band = band_of(moving, of, others, result=named, samples=samples or 0, seed=seed, guaranteed=guaranteed)
         if limit is not None:
             band = band.with_limit(_read_deviation(limit, "--limit", band.kind, mechanism.units))
         allowed = None

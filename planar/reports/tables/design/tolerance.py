@@ -20,6 +20,7 @@ from planar.results.motion import Motion
 
 MAX_ROWS = 24
 """Contributions that a table lists; JSON, and Python, has all."""
+ENDS = ("least", "greatest")
 LEAST_SHARE = 5e-5
 """Of the variance: less is not listed."""
 
@@ -50,6 +51,7 @@ def _band_table(band: ToleranceBand) -> FittedTable:
         column_heading("std linear", band.kind, units),
         *([] if band.second_order is None else [column_heading("std second order", band.kind, units)]),
         *([] if band.sampled is None else [column_heading("std sampled", band.kind, units)]),
+        *([] if band.guaranteed is None else [column_heading(f"guaranteed {end}", band.kind, units) for end in ENDS]),
     )
     lower, upper = band.linear.limits()
     count = band.nominal_rows.shape[1]
@@ -60,6 +62,8 @@ def _band_table(band: ToleranceBand) -> FittedTable:
             values.append(band.second_order.std)
         if band.sampled is not None:
             values.append(band.sampled.std)
+        if band.guaranteed is not None:
+            values += [band.guaranteed.lower, band.guaranteed.upper]
         shown.add_row(label or band.of, *(format_number(unit.from_si(float(each[row, k]))) for each in values))
     return shown
 
@@ -134,6 +138,10 @@ def _remarks(band: ToleranceBand, allowed: Allowance | None) -> Iterator[str]:
     if band.sampled is not None:
         worst = amount(float(band.sampled.worst.max()), band.kind, units)
         yield f"of {band.sampled.mechanisms} random mechanisms the farthest is off by {worst}"
+    if band.guaranteed is not None:
+        worst = amount(float(band.guaranteed.worst.max()), band.kind, units)
+        where = ", at any position of the motion" if band.has_rows else ""
+        yield f"guaranteed: no mechanism within the tolerances is off by more than {worst}{where} (Krawczyk's operator)"
     if allowed is not None:
         yield "contributing alike: each number moves the result as far"
         yield "of least cost: the sum of what is given over what is allowed is least"
@@ -168,14 +176,17 @@ def record(band: ToleranceBand, allowed: Allowance | None = None) -> dict[str, A
     if band.limit is not None:
         told["limit"], told["share_within"] = list(band.limit), _values(band.share_within)
     if band.sampled is not None:
-        told["sampled"] = {
-            name: _values(value) if isinstance(value, np.ndarray) else value
-            for name, value in band.sampled._asdict().items()
-            if name != "deviations"
-        }
+        own = band.sampled._asdict().items()
+        told["sampled"] = {name: _plain(value) for name, value in own if name != "deviations"}
+    if band.guaranteed is not None:
+        told["guaranteed"] = {name: _plain(value) for name, value in band.guaranteed._asdict().items()}
     if allowed is not None:
         told["allowed"] = allowed._asdict()
     return told
+
+
+def _plain(value: Any) -> Any:
+    return _values(value) if isinstance(value, np.ndarray) else value
 
 
 def _values(value: Any) -> Any:
