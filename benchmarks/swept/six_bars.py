@@ -10,6 +10,8 @@ from benchmarks.linkages.base import ALPHA, OMEGA, THETA
 from benchmarks.swept.base import Array, Dimension, Moving, Swept, crank_pin, dyad_pin, fixed, rows
 
 BELL = 0.4
+ROUNDED_STEP = 1e-12
+"""m: steps below this that grow no smaller are rounding."""
 """The angle from DC to DF of the rocker that is a bell crank, rad; limit.c has it too."""
 INPUT = {"position": THETA, "velocity": OMEGA, "acceleration": ALPHA}
 
@@ -148,12 +150,15 @@ class Stephenson(Swept):
         at[3, 0] = g
         at[5] = gx + r * np.cos(theta[0]), gy + r * np.sin(theta[0])
         wanted = np.stack([a, b, c, np.hypot(x, y), np.hypot(b - x, y), to_e]) ** 2
+        before = np.inf
         for _ in range(60):
             off = self._squares(at) - wanted
             step = self._solve(self._slope(at), -0.5 * off)
             at[_FREE] += step
-            if np.max(np.abs(step)) < 1e-17:
+            size = np.max(np.abs(step))
+            if size < 1e-17 or before <= size < ROUNDED_STEP:
                 break
+            before = size
         return at[:, :, None]
 
     def _slope(self, at: Array) -> Array:

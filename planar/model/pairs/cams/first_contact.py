@@ -21,7 +21,8 @@ from planar.model.pairs.cams.profile_curve import ProfileCurve
 
 ANGLES = 720
 """Over a turn, at which contacts are looked for anywhere on the curve."""
-NEWTON_STEPS = 10
+NEWTON_STEPS, SETTLED_STEP = 10, 1e-13
+"""At most, and of the profile's size the step that is the last."""
 ZERO_SLOPE = 1e-7
 """Of the greatest slope of the follower's position along the curve: what is less is none."""
 JUMP_TOLERANCE = 1e-9
@@ -100,7 +101,9 @@ class FirstContact:
         for _ in range(NEWTON_STEPS):
             slope, bend = self._along(angle, found, 0.0, 1.0)
             step = np.where(bend < 0.0, -slope / np.minimum(bend, -1e-300), np.sign(slope) * 0.25 * reach)
-            found = np.clip(found + np.nan_to_num(step), near - reach, near + reach)
+            before, found = found, np.clip(found + np.nan_to_num(step), near - reach, near + reach)
+            if not (np.abs(found - before) > SETTLED_STEP * self.size).any():
+                break
         return found, slope
 
     def parameters(self, angle: Array) -> Array:
@@ -120,9 +123,12 @@ class FirstContact:
         tops = []
         for _ in range(CANDIDATES):  # of tops of samples the true ones may have another order
             top = np.argmax(peaks, axis=1)
-            near = np.where(np.isfinite(peaks[rows, top]), self._samples[top], np.nan)
-            at, slope = self._polish(angle, near, 1.5 * spacing)
-            tops.append((np.nan_to_num(self._lift_of(angle, at), nan=-np.inf), at, slope))
+            is_top = np.isfinite(peaks[rows, top])
+            height, at, slope = (np.full(len(angle), each) for each in (-np.inf, np.nan, np.nan))
+            if is_top.any():
+                at[is_top], slope[is_top] = self._polish(angle[is_top], self._samples[top[is_top]], 1.5 * spacing)
+                height[is_top] = np.nan_to_num(self._lift_of(angle[is_top], at[is_top]), nan=-np.inf)
+            tops.append((height, at, slope))
             peaks[rows, top] = -np.inf
         best = np.argmax(np.stack([height for height, *_ in tops]), axis=0)
         at, slope = (np.stack([top[k] for top in tops])[best, rows] for k in (1, 2))
