@@ -53,7 +53,7 @@ PEN_STYLES = {
     Pen.CURVE: PenStyle(0.45, "#000000"),
     Pen.SHARE: PenStyle(0.2, "#0b46a8"),
     Pen.MEAN: PenStyle(0.25, "#333333", (4.0, 0.9, 0.5, 0.9)),
-    Pen.WORST: PenStyle(0.1, "#c9dcf2"),
+    Pen.WORST: PenStyle(0.05, "#c9dcf2"),
     Pen.LIKELY: PenStyle(0.1, "#85addc"),
 }
 FILL_COLOURS = {
