@@ -25,7 +25,7 @@ MODELS = {
     "klann-leg": "foot",
 }
 """A point of a coupler each."""
-SAMPLES, NOISE = 48, 2e-4
+SAMPLES, NOISE = 48, 2e-6
 """Of a path, and of the greatest extent of a path: the standard deviation of each coordinate."""
 CHANGE = 0.003
 """How far from the truth, as a part of each number, the search starts."""

@@ -46,6 +46,16 @@ def test_what_cannot_be_told_apart_is_said():
     assert [each.sentence for each in alone.unidentified] == ["the measurement does not depend on coupler.length"]
 
 
+def test_deviations_beyond_what_is_linear_are_called_rough():
+    """Of a few degrees of the crank a path does not tell much."""
+    motion = planar.cycle("crank-rocker", 360)
+    path, inputs = motion.point("B").position[20:50], {"A0": motion.inputs["A0"].position[20:50]}
+    noise = np.random.default_rng(3).normal(size=path.shape)
+    rough, fine = (planar.calibrate("crank-rocker", {"B": path + each * noise}, inputs=inputs) for each in (1e-4, 1e-8))
+    assert any("do not act linearly" in remark for remark in rough.remarks)
+    assert not any("do not act linearly" in remark for remark in fine.remarks)
+
+
 def test_a_wrong_sample_is_named_and_counts_less_in_a_robust_loss():
     motion, path = noisy("crank-rocker", "B")
     path[7] += 0.002

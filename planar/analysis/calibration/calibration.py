@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -33,6 +34,12 @@ LOSS_SCALE = 1.5
 RESTING = 1e-9
 """Of the greatest singular value: how strongly numbers are held to those of the file."""
 NO_FREEDOM = "there are no more measured numbers than free ones: how exact these are cannot be told"
+MAX_BEND = 1.0
+"""Of a standard deviation of a residual: what bends off more over one deviation of the numbers is not linear."""
+CURVED = (
+    "within their deviations the numbers do not act linearly: these deviations are rough; more exact samples, or some "
+    "of a larger part of the motion, would tell more"
+)
 NO_INFLUENCE = 1e-9
 """Of the greatest slope: a number with less does not matter."""
 
@@ -245,6 +252,7 @@ class _Fit:
         numbers = x * self.scale
         names = [each.name for each in self.dimensions]
         told = tuple(describe_unseen(each * self.scale, self.dimensions, self.mechanism.frame) for each in unseen)
+        remarks = [*remarks, *self._linearity_remark(x, found, deviation)]
         return Calibration(
             self.mechanism,
             self.function.changed(numbers),
@@ -262,6 +270,22 @@ class _Fit:
             self.evaluations,
             (*remarks, *([] if freedom > 0 else [NO_FREEDOM])),
         )
+
+    def _linearity_remark(self, x: Array, found: FittedSamples, deviation: float) -> list[str]:
+        """Whether residuals go on as they change here, for one deviation of the change that is seen least."""
+        slopes = found.slopes[found.is_active] * self.scale
+        _, singular, changes = np.linalg.svd(slopes, full_matrices=False)
+        rank = unseen_changes(slopes)[2]
+        if not rank or not deviation > 0.0:
+            return []
+        change = deviation / singular[rank - 1] * changes[rank - 1]
+        with suppress(PlanarError):
+            there = self.function.at(self.function.changed((x + change) * self.scale))
+            if np.array_equal(there.is_active, found.is_active):
+                expected = found.rows[found.is_active] + slopes @ change
+                if np.linalg.norm(there.rows[found.is_active] - expected) <= MAX_BEND * deviation:
+                    return []
+        return [CURVED]
 
     def _named_residuals(self, found: FittedSamples) -> dict[str, Array]:
         ends = np.cumsum([each.values.shape[1] for each in self.measurement.series])[:-1]
