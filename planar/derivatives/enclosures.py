@@ -48,6 +48,9 @@ SPARE = 0.98
 LEAST_REACH = 1e-12
 NESTED = (1, 4)
 """Boxes within one another over which slopes of ways from the middle are taken: first, and where that does not do."""
+WIDE = 1.05
+"""Boxes that are wider than this part of the first ones are made narrower."""
+REFINEMENTS = 2
 MAX_REACH = 1e3
 SLACK = 1e-9
 MAX_LANES = 2048
@@ -171,6 +174,11 @@ class ParametricSystem:
         slopes = Balls(*(np.full((many, self.parts, len(self.columns)), np.nan) for _ in range(2)))
         found = np.flatnonzero(proved)
         if len(found):
+            wide = found[(inside[found] > WIDE * first[found]).any(axis=1)]
+            for _ in range(REFINEMENTS if len(wide) else 0):
+                linear = self._linearise(middle[wide], inside[wide], boxes.rows(wide), NESTED[-1])
+                image = linear.image(Balls(left.middle[wide], left.radius[wide]), half[wide], inside[wide])
+                inside[wide] = np.fmin(inside[wide], image)
             linear = self._linearise(middle[found], inside[found], boxes.rows(found))
             proved[found], (slopes.middle[found], slopes.radius[found]) = linear.slopes()
         return Enclosures(proved, middle, inside, reach, slopes, tangents)
@@ -240,15 +248,15 @@ class _LinearLanes:
         """
         many, count = self.rest.shape[:2]
         whole = np.concatenate([np.ones((many, count, 1)), self.by.size], axis=2)
-        known = np.isfinite(self.rest).all(axis=(1, 2))
+        known: BoolArray = np.asarray(np.isfinite(self.rest).all(axis=(1, 2)))
         inverse, is_singular = invert_matrices(np.eye(count) - np.where(known[:, None, None], self.rest, 0.0))
         wider = whole + SLACK * whole.max(axis=1, keepdims=True, initial=0.0) + LEAST_REACH
         size = inverse @ wider * (1.0 + SLACK)
         image = (self.rest @ size + whole) * OVER + TINY
-        is_regular = known & ~is_singular & ((size > 0.0) & (image <= size)).all(axis=(1, 2))
+        holds: BoolArray = np.all((size > 0.0) & (image <= size), axis=(1, 2))
         far = (self.rest @ size[:, :, 1:]) * OVER + TINY
         unknown = Balls(self.by.middle, (self.by.radius + far) * OVER)
-        return np.asarray(is_regular), self.r_x.product(unknown).plus(self.r_t)
+        return known & ~is_singular & holds, self.r_x.product(unknown).plus(self.r_t)
 
 
 def _interval(lower: Array, upper: Array) -> Intervals:
