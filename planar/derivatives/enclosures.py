@@ -121,7 +121,8 @@ class Enclosures(NamedTuple):
 class ParametricSystem:
     """Equations F(x, t) = 0, as many as unknowns, and results r(x, t), whose slopes in `columns` of t are wanted.
 
-    Raises KeyError, with the name of a casadi operation, where there are some of which no intervals are known.
+    Raises KeyError, with the name of a casadi operation, where there are some of which no intervals are known, or that
+    jump.
     """
 
     def __init__(self, x: ca.SX, t: ca.SX, equations: ca.SX, results: ca.SX, columns: Sequence[int]):
@@ -135,17 +136,19 @@ class ParametricSystem:
             ca.Function("step", [x, t], [ca.densify(slopes[0]), ca.densify(slopes[1]), equations])
         )
         names = {getattr(ca, name): name for name in dir(ca) if name.startswith("OP_")}
-        for function in (self._slopes, self._left):
+        values = ca.Function("values", [x, t], [equations, results])
+        for function, jumps in ((values, [ca.OP_SIGN]), (self._slopes, [])):
             for k in range(function.n_instructions()):
                 code = function.instruction_id(k)
-                if code not in INTERVAL_OPERATIONS and names[code] not in HELD:
+                if (code not in INTERVAL_OPERATIONS and names[code] not in HELD) or code in jumps:
                     raise KeyError(names[code].removeprefix("OP_").lower())
 
     def enclose(self, boxes: ParameterBoxes, start: Array, steps: int = START_STEPS) -> Enclosures:
         """What can be proved over boxes, of solutions at their middles that so many of Newton's steps from a start
         (lanes, unknowns) lead to."""
         parts = [slice(first, first + MAX_LANES) for first in range(0, max(1, len(start)), MAX_LANES)]
-        return Enclosures.stack([self._enclose_lanes(boxes.rows(part), start[part], steps) for part in parts])
+        with np.errstate(all="ignore"):  # what overflows, or has no value, is not proved
+            return Enclosures.stack([self._enclose_lanes(boxes.rows(part), start[part], steps) for part in parts])
 
     def _enclose_lanes(self, boxes: ParameterBoxes, start: Array, steps: int) -> Enclosures:
         middle, tangents = self._find_middles(boxes, start, steps)
@@ -181,6 +184,7 @@ class ParametricSystem:
                 inside[wide] = np.fmin(inside[wide], image)
             linear = self._linearise(middle[found], inside[found], boxes.rows(found))
             proved[found], (slopes.middle[found], slopes.radius[found]) = linear.slopes()
+            proved &= np.isfinite(slopes.radius).all(axis=(1, 2))
         return Enclosures(proved, middle, inside, reach, slopes, tangents)
 
     def _find_middles(self, boxes: ParameterBoxes, start: Array, steps: int) -> tuple[Array, Array]:
