@@ -48,6 +48,9 @@ SPARE = 0.98
 LEAST_REACH = 1e-12
 NESTED = (1, 4)
 """Boxes within one another over which slopes of ways from the middle are taken: first, and where that does not do."""
+WIDE = 1.05
+"""Boxes that are wider than this part of the first ones are made narrower."""
+REFINEMENTS = 2
 MAX_REACH = 1e3
 SLACK = 1e-9
 MAX_LANES = 2048
@@ -118,7 +121,8 @@ class Enclosures(NamedTuple):
 class ParametricSystem:
     """Equations F(x, t) = 0, as many as unknowns, and results r(x, t), whose slopes in `columns` of t are wanted.
 
-    Raises KeyError, with the name of a casadi operation, where there are some of which no intervals are known.
+    Raises KeyError, with the name of a casadi operation, where there are some of which no intervals are known, or that
+    jump.
     """
 
     def __init__(self, x: ca.SX, t: ca.SX, equations: ca.SX, results: ca.SX, columns: Sequence[int]):
@@ -132,17 +136,19 @@ class ParametricSystem:
             ca.Function("step", [x, t], [ca.densify(slopes[0]), ca.densify(slopes[1]), equations])
         )
         names = {getattr(ca, name): name for name in dir(ca) if name.startswith("OP_")}
-        for function in (self._slopes, self._left):
+        values = ca.Function("values", [x, t], [equations, results])
+        for function, jumps in ((values, [ca.OP_SIGN]), (self._slopes, [])):
             for k in range(function.n_instructions()):
                 code = function.instruction_id(k)
-                if code not in INTERVAL_OPERATIONS and names[code] not in HELD:
+                if (code not in INTERVAL_OPERATIONS and names[code] not in HELD) or code in jumps:
                     raise KeyError(names[code].removeprefix("OP_").lower())
 
     def enclose(self, boxes: ParameterBoxes, start: Array, steps: int = START_STEPS) -> Enclosures:
         """What can be proved over boxes, of solutions at their middles that so many of Newton's steps from a start
         (lanes, unknowns) lead to."""
         parts = [slice(first, first + MAX_LANES) for first in range(0, max(1, len(start)), MAX_LANES)]
-        return Enclosures.stack([self._enclose_lanes(boxes.rows(part), start[part], steps) for part in parts])
+        with np.errstate(all="ignore"):  # what overflows, or has no value, is not proved
+            return Enclosures.stack([self._enclose_lanes(boxes.rows(part), start[part], steps) for part in parts])
 
     def _enclose_lanes(self, boxes: ParameterBoxes, start: Array, steps: int) -> Enclosures:
         middle, tangents = self._find_middles(boxes, start, steps)
@@ -171,8 +177,14 @@ class ParametricSystem:
         slopes = Balls(*(np.full((many, self.parts, len(self.columns)), np.nan) for _ in range(2)))
         found = np.flatnonzero(proved)
         if len(found):
+            wide = found[(inside[found] > WIDE * first[found]).any(axis=1)]
+            for _ in range(REFINEMENTS if len(wide) else 0):
+                linear = self._linearise(middle[wide], inside[wide], boxes.rows(wide), NESTED[-1])
+                image = linear.image(Balls(left.middle[wide], left.radius[wide]), half[wide], inside[wide])
+                inside[wide] = np.fmin(inside[wide], image)
             linear = self._linearise(middle[found], inside[found], boxes.rows(found))
             proved[found], (slopes.middle[found], slopes.radius[found]) = linear.slopes()
+            proved &= np.isfinite(slopes.radius).all(axis=(1, 2))
         return Enclosures(proved, middle, inside, reach, slopes, tangents)
 
     def _find_middles(self, boxes: ParameterBoxes, start: Array, steps: int) -> tuple[Array, Array]:
@@ -240,15 +252,15 @@ class _LinearLanes:
         """
         many, count = self.rest.shape[:2]
         whole = np.concatenate([np.ones((many, count, 1)), self.by.size], axis=2)
-        known = np.isfinite(self.rest).all(axis=(1, 2))
+        known: BoolArray = np.asarray(np.isfinite(self.rest).all(axis=(1, 2)))
         inverse, is_singular = invert_matrices(np.eye(count) - np.where(known[:, None, None], self.rest, 0.0))
         wider = whole + SLACK * whole.max(axis=1, keepdims=True, initial=0.0) + LEAST_REACH
         size = inverse @ wider * (1.0 + SLACK)
         image = (self.rest @ size + whole) * OVER + TINY
-        is_regular = known & ~is_singular & ((size > 0.0) & (image <= size)).all(axis=(1, 2))
+        holds: BoolArray = np.all((size > 0.0) & (image <= size), axis=(1, 2))
         far = (self.rest @ size[:, :, 1:]) * OVER + TINY
         unknown = Balls(self.by.middle, (self.by.radius + far) * OVER)
-        return np.asarray(is_regular), self.r_x.product(unknown).plus(self.r_t)
+        return known & ~is_singular & holds, self.r_x.product(unknown).plus(self.r_t)
 
 
 def _interval(lower: Array, upper: Array) -> Intervals:

@@ -13,6 +13,7 @@ import numpy as np
 
 from planar.analysis.tolerance.varied import Varied, mean_slopes, slope_bounds
 from planar.derivatives.enclosures import Enclosures, ParametricSystem
+from planar.derivatives.intervals import OVER, down, up
 from planar.foundation.arrays import Array, BoolArray, IntArray
 
 TIGHT = 0.03
@@ -21,6 +22,8 @@ OTHER_PART = 0.2
 """Of a point's other coordinate's width, which counts too."""
 TIGHT_DEPTH = 4
 """How often, at most."""
+WAY_PARTS = 8
+"""Parts of the ways from the nominal to all deviations, where boxes of these are bisected."""
 MAX_BOXES = 6000
 """Where more would be wanted it is undecided."""
 DEPTH_OF_DOUBT = 4
@@ -230,11 +233,22 @@ class Cover:
             raise Undecided(place[~joined], place[~joined], near[~joined])
 
     def grouped_slopes(self) -> tuple[IntArray, Array, Array]:
-        """What slopes are between (groups, parts, varied) over boxes that cover all deviations, and their rows."""
+        """What the mean slopes to all deviations are between (groups, parts, varied), over boxes that cover all
+        deviations together, and the rows of these groups.
+
+        Ways from the nominal are cut into parts, of which each goes through some of the boxes.
+        """
         leaves = self._leaves()
         group, at = np.unique(self.boxes.group[leaves], return_inverse=True)
-        shape = (len(group), *self.low.shape[1:])
-        low, high = np.full(shape, np.inf), np.full(shape, -np.inf)
-        np.minimum.at(low, at, self.low[leaves])
-        np.maximum.at(high, at, self.high[leaves])
-        return self.boxes.row[group], low, high
+        low, high = np.zeros((2, len(group), *self.low.shape[1:]))
+        k, size = self.varied.inputs, np.zeros_like(low)
+        for share in np.arange(1, WAY_PARTS + 1) / WAY_PARTS:
+            far = up(share * np.maximum(self.varied.upper, 0.0)), down(share * np.minimum(self.varied.lower, 0.0))
+            near = (self.boxes.lower[leaves, k:] <= far[0]) & (self.boxes.upper[leaves, k:] >= far[1])
+            met = np.flatnonzero(near.all(axis=1))
+            least, greatest = np.full(low.shape, np.inf), np.full(low.shape, -np.inf)
+            np.minimum.at(least, at[met], self.low[leaves[met]])
+            np.maximum.at(greatest, at[met], self.high[leaves[met]])
+            low, high, size = low + least, high + greatest, size + np.maximum(np.abs(least), np.abs(greatest))
+        slack = (OVER - 1.0) * size
+        return self.boxes.row[group], (low - slack) / WAY_PARTS, (high + slack) / WAY_PARTS

@@ -16,6 +16,7 @@ from planar.analysis.tolerance.guaranteed import Guaranteed
 from planar.analysis.tolerance.variations import Variations
 from planar.analysis.tolerance.varied import Varied, mean_slopes
 from planar.derivatives.design_enclosures import limit_over_boxes
+from planar.derivatives.intervals import down, up
 from planar.derivatives.limit_systems import LimitEquations, LimitSystem
 from planar.foundation.arrays import Array
 from planar.foundation.errors import NoAnswer, Outcome
@@ -29,7 +30,7 @@ def guaranteed_travel(motion: Motion, of: str, variations: Variations) -> Guaran
     system, ends = travel_end_equations(motion, of, tuple(each.pair for each in variations.offsets))
     varied = _varied(system, variations)
     low, high = ([_value_slopes(system, each, varied, of) for each in places] for places in ends)
-    bands = [varied.deviations(one[0] - other[1], one[1] - other[0]) for one, other in product(high, low)]
+    bands = [varied.deviations(down(one[0] - other[1]), up(one[1] - other[0])) for one, other in product(high, low)]
     # of ends that tie in the nominal mechanism any may be the farthest
     return _guaranteed([(min(each[0] for each in bands), max(each[1] for each in bands))], len(low) + len(high))
 
