@@ -117,7 +117,7 @@ if TYPE_CHECKING:
     from planar.solving.cycle import cycle
     from planar.solving.position import solve
 
-__version__ = "0.15.0"
+__version__ = "0.16.0"
 
 __all__ = [
     "Advantage",

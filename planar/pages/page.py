@@ -41,6 +41,7 @@ SCRIPTS = (
     "solve/linkage.js",
     "page.js",
     "solve/course.js",
+    "solve/slopes.js",
     "stage/plane.js",
     "stage/symbols.js",
     "stage/strokes.js",
@@ -60,8 +61,10 @@ SCRIPTS = (
     "controls/forces_table.js",
     "controls/numbers.js",
     "controls/charts.js",
+    "layers/bands.js",
     "layers/layers.js",
     "controls/dimensions.js",
+    "controls/influence.js",
     "controls/assemblies.js",
     "controls/undo.js",
     "controls/saving.js",
@@ -131,7 +134,9 @@ new Dimensions(page, document.getElementById("dimensions"));
 new Assemblies(page, document.getElementById("assemblies"));
 new UndoHistory(page, controls.bar, () => controls.pause());
 new Saving(page, document.getElementById("saving"), document.getElementById("drawing"));
+page.tolerances = Tolerances.ofFile(page);
 startLayers(page);
+new Influence(page, document.getElementById("dimensions"));
 document.getElementById("still").remove(); // what moves stands in its place
 """
 

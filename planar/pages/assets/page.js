@@ -2,13 +2,14 @@
 /* The page's one state: where the mechanism is. What shows it listens; what changes it calls `moveTo`, `changeTo`,
    `take`. Events: "move" (another position), "size" (other dimensions, or another assembly: all that was remembered of
    the motion is void), "said" (a sentence for the reader), "course" (the whole motion is known, or void), "chosen" (other
-   points and links are looked at), "shown" (other layers are), "view" (the drawing lies elsewhere on the screen, or is of another size). */
+   points and links are looked at), "shown" (other layers are), "view" (the drawing lies elsewhere on the screen, or is of another size),
+   "tolerance" (dimensions may be off by more or less). */
 
 class Page {
   constructor(data, program) {
     this.data = data;
     this.linkage = new Linkage(data, program);
-    this.listeners = { move: [], size: [], said: [], course: [], chosen: [], shown: [], view: [] };
+    this.listeners = { move: [], size: [], said: [], course: [], chosen: [], shown: [], view: [], tolerance: [] };
     this.running = 0; // which input is moved
     this.assembly = null; // the number of the assembly that it was moved from, if it is one of those listed
     this.update();
@@ -113,8 +114,8 @@ class Page {
   size(at) { return this.linkage.sizes[at]; }
 
   /** Where a place of a link lies in the world (m), given by the places of its x and y. */
-  place(link, [x, y], frames = this.frames) {
-    const f = frames[link], a = this.size(x), b = this.size(y);
+  place(link, [x, y], frames = this.frames, sizes = this.linkage.sizes) {
+    const f = frames[link], a = sizes[x], b = sizes[y];
     return [f.x + f.cos * a - f.sin * b, f.y + f.sin * a + f.cos * b];
   }
 

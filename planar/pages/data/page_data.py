@@ -30,6 +30,7 @@ from planar.pages.data.force_data import force_data
 from planar.pages.data.polygon_data import polygon_data
 from planar.pages.data.scheme_data import motion_positions, scheme_data
 from planar.pages.data.stop_data import stop_data, stop_position_function
+from planar.pages.data.tolerance_data import tolerance_data
 from planar.solving.position import PositionSolver, solved_mechanism
 from planar.solving.rest_position import rest_position
 
@@ -81,6 +82,7 @@ def page_data(mechanism: Mechanism, z: np.ndarray | None = None) -> tuple[dict[s
         numbers.add(value)
     scheme, drawing = scheme_data(mechanism, numbers, motion_positions(mechanism, z))
     named = _point_data(mechanism, numbers)
+    tolerances = tolerance_data(mechanism, numbers.dimensions)
     data = named | {
         "scheme": scheme,
         "name": mechanism.name,
@@ -115,7 +117,11 @@ def page_data(mechanism: Mechanism, z: np.ndarray | None = None) -> tuple[dict[s
         "row_lengths": [row.kind is MeasureKind.LENGTH for row in e.rows],
         "owners": [e.coordinates[column].owner for column in e.unknowns],
         "inputs": [_input_data(given, solver.is_sliding(given.pair)) for given in mechanism.inputs],
-        "dimensions": [_dimension_data(mechanism, each, solver.unit) for each in numbers.dimensions],
+        "dimensions": [
+            {**_dimension_data(mechanism, each, solver.unit), "tolerance": tolerance}
+            for each, tolerance in zip(numbers.dimensions, tolerances.dimensions, strict=True)
+        ],
+        "other_tolerances": tolerances.others,
         "numbers": link_numbers(mechanism),
         "counting": sorted(links_counting_turns(mechanism)),
         "centres": centre_data(state, named["points"]),

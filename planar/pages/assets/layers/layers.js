@@ -1,6 +1,6 @@
 "use strict";
 /* The layers that can be laid over the mechanism or shown beside it: a checkbox for each, remembered in the address.
-   A layer is {key, label, still: whether it stays as it is while the mechanism moves, draw(ink, layers): what is drawn
+   A layer is {key, label, still: whether it stays as it is while the mechanism moves, under: whether it lies below the others, draw(ink, layers): what is drawn
    over the mechanism, and a sentence on it; places(), pick(name, layers): what can be picked in the drawing by a click, in
    px; beside(layers, part): fills a part of the page, {draw(): a sentence}}. */
 
@@ -63,13 +63,14 @@ class Layers {
     this.svg = document.getElementById("drawing");
     this.section = document.getElementById("layers");
     this.all = layers;
+    this.below = [...layers].sort((a, b) => Number(b.under ?? false) - Number(a.under ?? false)); // in the order in which they are drawn
     const told = memory.read("layers");
     this.on = new Set(told === null ? page.data.layers : told.split(",").filter((key) => layers.some((each) => each.key === key)));
     this.kept = new Map();  // what was drawn by layers that stay as they are
     this.stood = new Map(); // where letters stood, by layer
     this.group = svgPart("g", { class: "layers" });
     this.panel();
-    for (const event of ["move", "size", "course", "chosen", "view"]) page.on(event, () => this.draw());
+    for (const event of ["move", "size", "course", "chosen", "view", "tolerance"]) page.on(event, () => this.draw());
     new ResizeObserver(() => this.draw()).observe(this.svg);
     this.picking();
     this.draw();
@@ -106,21 +107,21 @@ class Layers {
     if (letters !== null && letters.previousElementSibling !== this.group) letters.before(this.group);
     const shapes = [];
     if (this.ready) this.group.replaceChildren();
-    const { course, chosen, view: now } = this.page;
-    for (const layer of this.all) {
+    const { course, chosen, view: now, tolerances } = this.page;
+    for (const layer of this.below) {
       const { part, beside, told } = this.parts.get(layer.key), shown = this.on.has(layer.key);
       if (!shown) { part.hidden = true; continue; }
       let text = "";
       if (layer.draw && this.ready) {
         const kept = layer.still ? this.kept.get(layer.key) : undefined;
-        if (kept !== undefined && kept.of.every((each, k) => each === [course, chosen.list, now][k])) {
+        if (kept !== undefined && kept.of.every((each, k) => each === [course, chosen.list, now, tolerances][k])) {
           this.group.append(kept.ink.group);
           ({ text } = kept);
         } else {
           const ink = new Ink(svgPart("g", { class: layer.key }, this.group), now.mm);
           text = layer.draw(ink, this) ?? "";
           shapes.push([layer.key, ink]);
-          if (layer.still) this.kept.set(layer.key, { of: [course, chosen.list, now], ink, text });
+          if (layer.still) this.kept.set(layer.key, { of: [course, chosen.list, now, tolerances], ink, text });
         }
       }
       part.hidden = beside === null && text === "";
@@ -197,7 +198,7 @@ function startLayers(page) {
   const rates = Object.keys(RATES);
   page.forces = page.data.forces === null ? null : new PageForces(page);
   const acting = page.forces === null ? [] : [forceArrows];
-  page.layers = new Layers(page, [paths, ...rates.map(arrows), ...acting, ...rates.map(polygon), centres, centrodes]);
+  page.layers = new Layers(page, [paths, ...rates.map(arrows), ...acting, ...rates.map(polygon), centres, centrodes, ...(page.data.dimensions.length ? [bands] : [])]);
   new Numbers(page);
   if (page.forces !== null) new ForceTables(page);
   page.charts = new Charts(page);
