@@ -84,6 +84,47 @@ def solve_timed_design(
     return _solve(run, np.linspace(0.0, duration, steps + 1), steps, points, rates)
 
 
+class GridMotion(NamedTuple):
+    """The motion of one design (None where there is none), how many of its rows are on the grid, the status of every
+    row, and what there is to say of its end."""
+
+    motion: Motion | None
+    many: int
+    status: Array
+    message: str | NoAnswer
+
+
+def run_design(mechanism: Mechanism, pair: str, grid: Array) -> GridMotion:
+    """The motion of a design over a grid of positions (rows,) of its running input. Never raises NoAnswer."""
+
+    def run() -> tuple[Motion, Array]:
+        motion = cycle(mechanism, len(grid) - 1, float(grid[0]), float(grid[-1]), pair)
+        return motion, motion.inputs[pair].position
+
+    return _run_on_grid(run, grid, len(grid) - 1)[0]
+
+
+def _run_on_grid(
+    run: Callable[[], tuple[Motion, Array]], grid: Array | None, steps: int
+) -> tuple[GridMotion, Array | None]:
+    """A motion, and where its rows are; which of these are on a grid, or all where there is none."""
+    status = np.zeros(steps + 1, dtype=np.int8)
+    try:
+        motion, position = run()
+    except NoAnswer as problem:
+        status[:] = OUTCOMES.index(problem.outcome)
+        return GridMotion(None, 0, status, problem.with_traceback(None)), None  # its sentence takes long to find
+    except (BadInput, PointPlacementError) as problem:
+        status[:] = OUTCOMES.index(Outcome.CANNOT_BE_ASSEMBLED)
+        return GridMotion(None, 0, status, str(problem)), None
+    many = min(len(position), steps + 1)
+    if grid is not None:
+        off = np.abs(position[:many] - grid[:many]) > GRID_TOLERANCE * max(1.0, float(np.max(np.abs(grid))))
+        many = int(np.argmax(off)) if off.any() else many
+    status[many:] = OUTCOMES.index(motion.outcome)
+    return GridMotion(motion, many, status, motion.reason if many <= steps else ""), position
+
+
 def _solve(
     run: Callable[[], tuple[Motion, Array]],
     grid: Array | None,
@@ -93,31 +134,19 @@ def _solve(
 ) -> SolvedDesign:
     """The rows of a motion on a grid (rows,), or on its own; `run` gives the motion, and where its rows are."""
     wide = 2 * len(points) * (3 if rates else 1)
-    out, status = np.full((steps + 1, wide), np.nan), np.zeros(steps + 1, dtype=np.int8)
+    out = np.full((steps + 1, wide), np.nan)
     input_ = np.full(steps + 1, np.nan) if grid is None else grid
-    try:
-        motion, position = run()
-    except NoAnswer as problem:
-        status[:] = OUTCOMES.index(problem.outcome)
-        return SolvedDesign(input_, out, status, problem.with_traceback(None))  # its sentence takes long to find
-    except (BadInput, PointPlacementError) as problem:
-        status[:] = OUTCOMES.index(Outcome.CANNOT_BE_ASSEMBLED)
-        return SolvedDesign(input_, out, status, str(problem))
-    both = min(len(position), steps + 1)
+    (motion, many, status, message), position = _run_on_grid(run, grid, steps)
+    if motion is None or position is None:
+        return SolvedDesign(input_, out, status, message)
     if grid is None:
         input_[: len(position)] = position[: steps + 1]
-        many = both
-    else:
-        off = np.abs(position[:both] - grid[:both]) > GRID_TOLERANCE * max(1.0, float(np.max(np.abs(grid))))
-        many = int(np.argmax(off)) if off.any() else both
-    out[:many] = _point_rows(motion, points, rates)[:many]
-    status[many:] = OUTCOMES.index(motion.outcome)
+    out[:many] = point_rows(motion, points, rates)[:many]
     told = "; ".join(motion.rate_remarks) if rates else ""
-    ended = many <= steps
-    reason, last = motion.reason if ended else "", float(position[-1]) if ended else np.nan
+    last = float(position[-1]) if many <= steps else np.nan
     at_dead_point, at_stop = (motion.outcome is each for each in (Outcome.DEAD_POINT, Outcome.STOP))
     ends = last if at_dead_point else np.nan, last if at_stop else np.nan
-    return SolvedDesign(input_, out, status, reason, told, *ends)
+    return SolvedDesign(input_, out, status, message, told, *ends)
 
 
 def link_angles(motion: Motion, links: tuple[str, ...]) -> Array:
@@ -125,7 +154,8 @@ def link_angles(motion: Motion, links: tuple[str, ...]) -> Array:
     return np.array([np.broadcast_to(value_and_rates(motion.frames[link].angle)[0], len(motion)) for link in links])
 
 
-def _point_rows(motion: Motion, points: tuple[PointName, ...], rates: bool) -> Array:
+def point_rows(motion: Motion, points: tuple[PointName, ...], rates: bool) -> Array:
+    """x and y of points (rows, 2 a point and order) over a motion."""
     found = [_point_motion(motion, name) for name in points]
     orders = ("position", "velocity", "acceleration") if rates else ("position",)
     if not found:

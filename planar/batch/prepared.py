@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple, TypedDict
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, NamedTuple, TypedDict
 
 import numpy as np
 
+from planar.batch.design_arrays import read_designs
 from planar.batch.general_path import OUTCOMES
+from planar.batch.gradients.run_gradient import RunGradient, RunWeights, read_names, read_weights
 from planar.batch.prepare.kept_results import KeptPoints, LateSentences
 from planar.batch.prepare.native_run import NativeRuns, prepare_native_run
 from planar.batch.prepare.run_endings import ALL_SOLVED, CANNOT_BE_ASSEMBLED, DEAD_POINT, STOP, UNSURE
@@ -18,6 +21,9 @@ from planar.document.first_argument import takes_mechanism
 from planar.foundation.errors import BadInput, Outcome
 from planar.foundation.short_repr import short_repr
 from planar.model.mechanism import Mechanism
+
+if TYPE_CHECKING:
+    from planar.batch.gradients.general_gradient import GeneralGradients
 
 Array = np.ndarray
 
@@ -123,9 +129,7 @@ class PreparedSweep:
 
     def __call__(self, values: Mapping[str, float] | None = None) -> PreparedRun:
         """The run of one design. Raises BadInput for a name that is not there."""
-        values = {} if values is None else values
-        if not PLAIN_NUMBERS.issuperset(map(type, values.values())):
-            values = {name: _check_number(name, value) for name, value in values.items()}
+        values = self._read_values(values)
         if self._runs is None:
             return self._run_as_sweep(values)
         try:
@@ -148,6 +152,55 @@ class PreparedSweep:
             return PreparedRun(position, None, None, status, said)
         orders = KeptPoints(found, self._index, wide), KeptPoints(found, self._index, 2 * wide)
         return PreparedRun(position, *orders, status, said)
+
+    def gradient(
+        self, weights: RunWeights, values: Mapping[str, float] | None = None, *, of: Sequence[str] | str | None = None
+    ) -> RunGradient:
+        """The derivatives of a weighed sum over the run of one design, in all numbers of the file at once (SI).
+
+        `weights`: by what the run tells, and the points, an array (steps + 1, 2) each, as `{"position": {"C": ...}}`;
+        "velocity" and "acceleration" where it has rates. `values` as in a call; `of` names the numbers by which
+        derivatives are wanted, all where it is left out. Names and numbers are those of `planar.gradient` of the same
+        motion: the position of the running input moves the whole run, what inputs that stand still say of their rates
+        does nothing, and numbers that cannot change alone are NaN.
+
+        A position that is not solved, or that has no derivatives, as a dead point, brings nothing; `status` says so.
+
+        Raises BadInput for weights or names that do not fit, and for a structure of which derivatives are not told.
+
+        >>> import numpy as np
+        >>> import planar
+        >>> run = planar.prepared("four-bar", 12, "C", start=0.5, stop=1.0)
+        >>> found = run.gradient({"position": {"C": np.eye(13, 2)}}, {"BC.length": 0.066}, of="BC.length")
+        >>> round(found.derivatives["BC.length"], 3)
+        1.131
+        """
+        values = self._read_values(values)
+        gradients = self._general_gradients
+        names = read_names(of, gradients.names)
+        read = read_weights(weights, self._index, self.rates, self.steps + 1)
+        if values:
+            read_designs(self.mechanism, values)
+        value, slopes, status = gradients.gradient(read, values, self.range["start"], self.range["stop"])
+        every = dict(zip(gradients.names, slopes.tolist(), strict=True))
+        return RunGradient(value, every if of is None else {name: every[name] for name in names}, status)
+
+    @cached_property
+    def _general_gradients(self) -> GeneralGradients:
+        from planar.batch.gradients.general_gradient import GeneralGradients  # derivatives are seldom wanted
+
+        if self.reference.is_sliding and self.range["stop"] is None:
+            raise BadInput(
+                "stop", "a slide runs between limits that change with the design; give start and stop for derivatives"
+            )
+        return GeneralGradients(self.reference, self.points, self.rates)
+
+    @staticmethod
+    def _read_values(values: Mapping[str, float] | None) -> Mapping[str, float]:
+        values = {} if values is None else values
+        if not PLAIN_NUMBERS.issuperset(map(type, values.values())):
+            values = {name: _check_number(name, value) for name, value in values.items()}
+        return values
 
     def _run_other(self, runs: NativeRuns, values: Mapping[str, float]) -> tuple[Array, float, int]:
         """The run of a design with a name that the usual function does not know."""

@@ -93,17 +93,18 @@ class ImplicitSystem:
 
     def gradient(
         self,
-        results: ca.SX,
+        weighed: BufferedFunction,
         weights: Array,
         values: Sequence[Array],
         parameters: Array,
         constants: Array | None = None,
     ) -> tuple[Array, BoolArray]:
-        """The derivative of the sum of results times their weights (n, results) at each of n positions, in the
-        parameters (n, parameters), and where there is none (n,): one transposed solution, for however many."""
+        """The derivative of the sum of results (see `weighed_results`) times their weights (n, results) at each of n
+        positions, in the parameters (n, parameters), and where there is none (n,): one transposed solution, for however
+        many."""
         constants = np.zeros((len(parameters), 0)) if constants is None else constants
         given = [*values, parameters, constants]
-        of_results = self._weighed(results).evaluate_batch(len(parameters), *given, weights)
+        of_results = weighed.evaluate_batch(len(parameters), *given, weights)
         *by_unknowns, whole = (each[:, 0] for each in of_results)
         blocks = iter(each.transpose(0, 2, 1) for each in self._level_jacobians.evaluate_batch(len(parameters), *given))
         many, none = len(self.levels), np.zeros((len(parameters), 0, 0))
@@ -115,7 +116,7 @@ class ImplicitSystem:
         own = self._weighed_equations.evaluate_batch(len(parameters), *given, np.concatenate(multipliers, axis=1))
         return whole - own[0][:, 0], linear.is_singular
 
-    def _weighed(self, results: ca.SX) -> BufferedFunction:
+    def weighed_results(self, results: ca.SX) -> BufferedFunction:
         """(x_0, ..., t, constants, weights) -> the derivatives of the weighed sum in x_0, ..., t."""
         weights = ca.SX.sym("weights", results.numel())
         slopes = [ca.densify(ca.jtimes(results, of, weights, True)) for of in self.given[:-1]]
@@ -149,7 +150,9 @@ class ImplicitSystem:
         linear = self.linearise(given)
         first, _ = linear.unknown_slopes()
         one = np.ones((len(parameters), 1))
-        *by_unknowns, _ = (each[:, 0] for each in self._weighed(result).evaluate_batch(len(parameters), *given, one))
+        *by_unknowns, _ = (
+            each[:, 0] for each in self.weighed_results(result).evaluate_batch(len(parameters), *given, one)
+        )
         multipliers = np.concatenate(linear.multipliers(by_unknowns), axis=1)
         equations = ca.vertcat(*(level.equations for level in self.levels))
         weights = ca.SX.sym("weights", equations.numel())

@@ -125,8 +125,9 @@ class SlopeSystem:
             for result, numbers in of.items():
                 values.append(expressions[result])
                 given.append(numbers.reshape(len(self.parameters), -1))
+        weighed = self.system.weighed_results(ca.vertcat(*values))
         found, is_singular = self.system.gradient(
-            ca.vertcat(*values), np.concatenate(given, axis=1), self.values, self.parameters, self.constants
+            weighed, np.concatenate(given, axis=1), self.values, self.parameters, self.constants
         )
         own = self.design.t.numel()
         if self.balance is None:

@@ -101,6 +101,7 @@ MODULES = {
     "ReducedSweep": "batch.reductions.reduced_sweep",
     "RelativeState": "results.records",
     "RubbingPair": "dynamics.in_time.friction_record",
+    "RunGradient": "batch.gradients.run_gradient",
     "Sensitivity": "analysis.sensitivity.sensitivity",
     "Shaking": "dynamics.balancing.balance",
     "Simulation": "dynamics.simulation",

@@ -94,6 +94,7 @@ def results():
     yield from (planar.cam_profile("valve-cam"), planar.least_base_circle("valve-cam"))
     yield planar.contact_forces(planar.forces(planar.solve("cam-with-spring")))["lift"]
     yield from (swept, swept[0], prepared, prepared())
+    yield prepared.gradient({"position": {"C": np.ones((7, 2))}}, of="BC.length")
     handed_in = AnswerList(7, (HandedInValue("Ann", 1, "velocity of C", 0.6, "m/s", 3),))
     marks = planar.mark_answers(bars, handed_in)
     yield from (marks, student := marks.students[0], student.values[0], planar.problem_variants(bars, 1)[0])

@@ -1,0 +1,86 @@
+"""What a gradient of a run gives, and the weights that it is asked with."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from planar.document.cursor import suggest_spelling
+from planar.foundation.arrays import Array
+from planar.foundation.errors import BadInput, join_names
+from planar.foundation.short_repr import short_repr
+
+ORDERS = ("position", "velocity", "acceleration")
+"""What a run tells of its points, in the order of its rows."""
+RunWeights = Mapping[str, Mapping[str, Any]]
+
+
+class RunGradient(NamedTuple):
+    """The gradient of a weighed sum over a run: the sum itself, `value`; its `derivatives` in each number of the file
+    by name (SI); `status` (steps + 1,): 0 is a position that brings its part, any other number k is
+    `Sweep.outcomes[k]`: it brings nothing.
+    """
+
+    value: float
+    derivatives: Mapping[str, float]
+    status: Array
+
+    def __repr__(self) -> str:
+        return short_repr(self)
+
+
+class WeightRows(NamedTuple):
+    """Weights by the rows of a run: `rows` (weighed rows,), x and y of each weighed point one after the other, and
+    `arrays` of two rows each (steps + 1, 2)."""
+
+    rows: tuple[int, ...]
+    arrays: tuple[Array, ...]
+
+
+def read_weights(weights: RunWeights, index: Mapping[str, int], rates: bool, count: int) -> WeightRows:
+    """The weights (count, 2) of points, `index` the row of each point's x among the positions. Raises BadInput."""
+    if not isinstance(weights, Mapping) or not weights:
+        raise BadInput("weights", "name what is weighed, with an array each, as {'position': {'C': weights}}")
+    orders = ORDERS if rates else ORDERS[:1]
+    wide, rows, arrays = 2 * len(index), [], []
+    for order, points in weights.items():
+        if order not in orders:
+            without = "" if rates or order not in ORDERS else "; prepare it with rates"
+            raise BadInput("weights", f"the run tells {join_names(orders)}, and no {str(order)!r:.60}{without}")
+        if not isinstance(points, Mapping):
+            raise BadInput(f"weights[{order!r}]", "points by name are wanted here, with an array each")
+        first = wide * ORDERS.index(order)
+        for point, given in points.items():
+            if point not in index:
+                meant = suggest_spelling(str(point), index, cutoff=0.5) or f"; there are {join_names(index)}"
+                raise BadInput(f"weights[{order!r}]", f"the run was not prepared with the point {point!r:.60}{meant}")
+            rows += [first + index[point], first + index[point] + 1]
+            arrays.append(_read_array(given, f"weights[{order!r}][{point!r}]", count))
+    return WeightRows(tuple(rows), tuple(arrays))
+
+
+def _read_array(given: Any, place: str, count: int) -> Array:
+    try:
+        array = np.asarray(given, dtype=float)
+    except (TypeError, ValueError):
+        array = np.empty(0)
+    if array.shape != (count, 2):
+        raise BadInput(place, f"an array of numbers of shape {(count, 2)} is wanted here, not {np.shape(given)}")
+    if not np.isfinite(array).all():
+        raise BadInput(place, "a number here is not finite")
+    return array
+
+
+def read_names(of: Sequence[str] | str | None, known: Iterable[str]) -> tuple[str, ...]:
+    """The numbers by which derivatives are wanted; all where none are named. Raises BadInput."""
+    known = tuple(known)
+    if of is None:
+        return known
+    names = tuple(dict.fromkeys([of] if isinstance(of, str) else of))
+    for name in names:
+        if name not in known:
+            meant = suggest_spelling(str(name), known, cutoff=0.5) or f"; there are {', '.join(known[:12])}"
+            raise BadInput("of", f"there is no derivative in a number {str(name)!r:.60}{meant}")
+    return names
