@@ -50,9 +50,9 @@ def test_commands_of_the_tour_run(words, folder):
         assert len(done.out) > 100
 
 
-def test_the_tour_has_ten_pictures_which_are_there_as_all_that_it_leads_to():
+def test_the_tour_has_twelve_pictures_which_are_there_as_all_that_it_leads_to():
     targets = re.findall(r"\]\(([^)\s]+)\)", README)
-    assert sum(target.startswith("planar/guide/pictures/") for target in targets) == 10
+    assert sum(target.startswith("planar/guide/pictures/") for target in targets) == 12
     assert [target for target in targets if not (ROOT / target).is_file()] == []
 
 

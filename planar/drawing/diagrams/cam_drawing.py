@@ -148,13 +148,15 @@ def _displacement_diagram(found: CamProfile, units: FileUnits) -> Picture:
     # of stations that lie close every second, third, ... bears its number
     least = float(np.diff(np.append(stations, 2.0 * pi)).min())
     every = ceil(3.2 / max(float(across.on_paper(degrees(least))), 0.1))
+    rises = np.sign(np.round(np.interp(stations, found.angle - first, np.gradient(lift, turned)), 9))
+    rises[0] = -1.0  # clear of the axis
     for number, (angle, height) in enumerate(zip(stations, heights, strict=True)):
         foot = axes.point_on_paper(degrees(float(angle)), 0.0, across, up)
         top = axes.point_on_paper(degrees(float(angle)), float(height), across, up)
         if hypot(top[0] - foot[0], top[1] - foot[1]) > 0.0:
             marks.append(Polyline((foot, top), Pen.CONSTRUCTION, f"station {number}"))
         if number % every == 0:
-            marks.append(Label(str(number), top, f"station {number}", NUMBER_SIZE, 0.8, side=(0, 1)))
+            marks.append(Label(str(number), top, f"station {number}", NUMBER_SIZE, 0.8, side=(-int(rises[number]), 1)))
     marks += axes.curve_strokes(turned, lift, across, up, Pen.CURVE, "lift")
     notes = [f"greatest lift {lift.max():.6g} {written}"]
     if first:
