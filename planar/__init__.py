@@ -117,6 +117,9 @@ if TYPE_CHECKING:
     from planar.results.records import Limit, LinkMotion, LinkState, PointMotion, PointState, RelativeState
     from planar.solving.cycle import cycle
     from planar.solving.position import solve
+    from planar.structures.chain import Chain, ChainMechanism
+    from planar.structures.chains import Chains, chains
+    from planar.structures.symmetry import ChainSymmetry
 
 __version__ = "0.16.0"
 
@@ -142,7 +145,11 @@ __all__ = [
     "Centre",
     "Centres",
     "Centrodes",
+    "Chain",
+    "ChainMechanism",
     "ChainPair",
+    "ChainSymmetry",
+    "Chains",
     "Circuit",
     "Circuits",
     "ConditionSet",
@@ -261,6 +268,7 @@ __all__ = [
     "centre_of",
     "centres",
     "centrodes",
+    "chains",
     "circuits",
     "conflict",
     "contact_forces",

@@ -9,6 +9,7 @@ main.modules = {
     "calibrate": "planar.cli.commands.design.calibrate",
     "cams": "planar.cli.commands.cams",
     "centres": "planar.cli.commands.centres_harmonics",
+    "chains": "planar.cli.commands.design.chains",
     "circuits": "planar.cli.commands.circuits",
     "cycle": "planar.cli.commands.solve_cycle_explain",
     "explain": "planar.cli.commands.solve_cycle_explain",

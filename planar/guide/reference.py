@@ -15,6 +15,7 @@ ROOM_TITLES = {
     "solving": "Positions and motions",
     "results": "Positions and motions",
     "assemblies": "Assemblies and circuits",
+    "structures": "Chains",
     "analysis": "Analyses",
     "dynamics": "Forces and simulation",
     "batch": "Many designs",

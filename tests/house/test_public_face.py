@@ -34,7 +34,19 @@ FUNCTIONS = {
 }
 DRAWINGS = {name: getattr(planar.plot, name) for name in planar.plot.__all__}
 CLASSES = {name: each for name in planar.__all__ if inspect.isclass(each := getattr(planar, name))}
-FREE = {"schema", "build", "pinned", "pinned_linkages", "centre_of", "from_dict", "load", "loads", "sweep_each", "save"}
+FREE = {
+    "chains",
+    "schema",
+    "build",
+    "pinned",
+    "pinned_linkages",
+    "centre_of",
+    "from_dict",
+    "load",
+    "loads",
+    "sweep_each",
+    "save",
+}
 """Functions whose first argument is neither a mechanism nor a result."""
 COMMANDS = {
     name: command
@@ -109,6 +121,7 @@ def results():
     yield from (fitted, *fitted.unidentified[:1], *fitted.outliers[:1])
     slopes = planar.sensitivity(motion, "stroke")
     yield from (slopes, slopes.travel, slopes.travel.ends[0], slopes.influences("displacement")[0], slopes.transmission)
+    yield from (planar.chains(8), chain := planar.chains(6)[0], chain.mechanisms()[0], chain.symmetry)
     yield from (planar.BadInput("here", "wrong"), planar.Unknown("no such point"), planar.Outcome.SOLVED)
     yield planar.NoAnswer(planar.Outcome.DEAD_POINT, "it stops", links=["a"])
 

@@ -29,6 +29,7 @@ from planar.model.link_graph import (
 from planar.model.mechanism import Mechanism
 from planar.model.pairs import MeasureKind
 from planar.model.wording import count_phrase
+from planar.structures.chain_names import EIGHT_BARS, SIX_BARS
 
 MAX_FAMILY_LINKS = 100
 """Links; a larger mechanism is not compared with those of any number of parts, as that may take long."""
@@ -77,24 +78,6 @@ class MechanismPattern:
         return pin_distance(a.locations[likeness.links[letter]], b.locations[likeness.links[letter]])
 
 
-_WATT = "ab bc cd de ex xa ad"
-"""Two ternary links, a and d, joined to one another: two loops of four."""
-_STEPHENSON = "ab bd ac cd ae ex xd"
-"""Two ternary links, a and d, not joined to one another: a loop of four, abdc, and two of five."""
-SIX_BARS = (
-    ("Watt I six-bar", _WATT, "b"),
-    ("Watt II six-bar", _WATT, "a"),
-    ("Stephenson I six-bar", _STEPHENSON, "b"),
-    ("Stephenson II six-bar", _STEPHENSON, "e"),
-    ("Stephenson III six-bar", _STEPHENSON, "a"),
-)
-"""The chains of six links and seven pairs by their fixed link: of Watt's a binary one or a ternary one; of Stephenson's
-a binary one of the four-bar loop, one of the two binaries joined to each other, a ternary one.
-
-L. Burmester, Lehrbuch der Kinematik, 1888; R. Norton, Design of Machinery, on linkage transformation and isomers;
-J. M. McCarthy and G. Soh, Geometric Design of Linkages, on six-bars.
-"""
-
 _CELL = "fab fc cpq apx bqy xy"
 PATTERNS = (
     # a knee of two links, one on the frame, one on a slider, and the crank's rod at the knee:
@@ -109,12 +92,7 @@ PATTERNS = (
     MechanismPattern("exact straight-line linkage", _CELL, ("a b", "p q x y", "c f")),
     # C. Scheiner 1631: a parallelogram on one fixed pin
     MechanismPattern("pantograph", "fd dq da ac cq", ("a q", "c da.dq")),
-    # the eight-bars in which Kennedy's theorem stops short, whichever link is fixed: G. Pennock and A. Hasan, J. of
-    # Mechanical Design 124, 2002; D. Foster and G. Pennock, ASME DETC 2004; G. Pennock and D. Raje, Mechanism and
-    # Machine Theory 39, 2004. Which of the two fliers is which is inferred from their structure: see the models' notes
-    MechanismPattern("double butterfly linkage", "ab ai ae bc cd cg eg eh dh di"),
-    MechanismPattern("single flier eight-bar", "ab ai aj bgh cd cg ci dh dj"),
-    MechanismPattern("double flier eight-bar", "ab ad ae bc cg ch dg di ei eh"),
+    *(MechanismPattern(name, joints) for name, joints in EIGHT_BARS),
 )
 
 

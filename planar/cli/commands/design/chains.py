@@ -1,0 +1,48 @@
+"""The command `chains`."""
+
+from __future__ import annotations
+
+from itertools import islice
+
+import click
+
+from planar.cli.options import json_option, main, print_or_write, show_status
+from planar.cli.streams import print_json
+
+MAX_CHAINS_LISTED = 250
+"""Chains that are printed unless more are asked for."""
+
+
+@main.command()
+@click.argument("links", type=int)
+@click.option(
+    "--freedom", type=int, default=1, show_default=True, metavar="F", help="How many joints have to be driven."
+)
+@click.option(
+    "--fractionated/--not-fractionated",
+    default=True,
+    show_default=True,
+    help="Whether chains are among them that a single link parts.",
+)
+@click.option("--mechanisms", is_flag=True, help="Also what differs by the fixed link and by the driven joints on it.")
+@click.option(
+    "--limit",
+    type=click.IntRange(1),
+    default=MAX_CHAINS_LISTED,
+    show_default=True,
+    metavar="N",
+    help="So many are listed.",
+)
+@json_option
+def chains(links: int, freedom: int, fractionated: bool, mechanisms: bool, limit: int, as_json: bool) -> None:
+    """All kinematic chains of so many LINKS: every structure that a linkage with pins can have."""
+    from planar.reports.tables.structures import record, table
+    from planar.structures.chains import chains as all_chains
+
+    found = all_chains(links, freedom, fractionated=fractionated)
+    if as_json:
+        print_json([record(each, mechanisms) for each in found])
+        return
+    with show_status(f"chains of {links} links"):
+        told = table(found, [*islice(found, limit)], mechanisms)
+    print_or_write(told, None)

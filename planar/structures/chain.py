@@ -1,0 +1,172 @@
+"""A kinematic chain: links joined by pins, none of them fixed yet."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from itertools import combinations
+from typing import NamedTuple
+
+from planar.model.wording import count_phrase
+from planar.structures.assur_groups import AssurGroup, assur_groups
+from planar.structures.chain_names import chain_name, inversion_names
+from planar.structures.rigid_parts import Joint
+from planar.structures.symmetry import (
+    Automorphism,
+    ChainSymmetry,
+    automorphisms,
+    chain_symmetry,
+    joint_exchanges,
+    neighbour_sets,
+)
+
+
+class ChainMechanism(NamedTuple):
+    """A chain with one link fixed and some joints driven, by their numbers in the chain.
+
+    `name` is what the field calls the inversion, or nothing. `groups` are the Assur groups, in an order in which they
+    can be placed once the driven links are: of each its links, and its class, "II" for a dyad, "III" or "IV" for four
+    links, else nothing.
+    """
+
+    frame: int
+    drives: tuple[int, ...]
+    name: str
+    groups: tuple[AssurGroup, ...]
+
+
+@dataclass(frozen=True)
+class Chain:
+    """A kinematic chain of links and pins, in the numbering of links that all chains of its kind share.
+
+    `links` is how many there are, numbered from 0: those with most joints first, binary ones last. `edges` are the
+    joints, each by its two links, in order; a joint's number is its place among them. `number` is that among all
+    chains of so many links and this freedom, see `planar.chains`; None where these are too many to be counted for it.
+    """
+
+    links: int
+    freedom: int
+    edges: tuple[Joint, ...]
+    number: int | None = field(default=None, compare=False)
+
+    def __repr__(self) -> str:
+        number = "" if self.number is None else f" {self.number}"
+        name = f", {self.name}" if self.name else ""
+        return f"<Chain{number} of {self.links} links, freedom {self.freedom}{name}>"
+
+    @property
+    def joints(self) -> int:
+        """How many joints there are."""
+        return len(self.edges)
+
+    @property
+    def loops(self) -> int:
+        """How many independent loops there are: joints - links + 1."""
+        return len(self.edges) - self.links + 1
+
+    @cached_property
+    def degrees(self) -> tuple[int, ...]:
+        """How many joints each link has."""
+        return tuple(map(len, neighbour_sets(self.links, self.edges)))
+
+    @property
+    def assortment(self) -> tuple[int, ...]:
+        """How many links are binary, ternary, quaternary and so on, up to the most joints that a link has."""
+        count = Counter(self.degrees)
+        return tuple(count[degree] for degree in range(2, max(self.degrees) + 1))
+
+    @cached_property
+    def is_fractionated(self) -> bool:
+        """Whether a single link parts the chain, so that what is on one side of it moves without the other."""
+        beside = neighbour_sets(self.links, self.edges)
+        return any(len(_reached(beside, link)) < self.links - 1 for link in range(self.links))
+
+    @cached_property
+    def is_planar(self) -> bool:
+        """Whether it can be drawn so that no two links cross, whatever their shapes."""
+        from networkx import Graph, check_planarity
+
+        return bool(check_planarity(Graph(self.edges))[0])
+
+    @property
+    def name(self) -> str:
+        """What the field calls the chain, or nothing."""
+        return chain_name(self.edges)
+
+    @cached_property
+    def symmetry(self) -> ChainSymmetry:
+        """Its automorphisms: how many, and which links and which joints they exchange."""
+        return chain_symmetry(self.links, self.edges, self._automorphisms)
+
+    @cached_property
+    def _automorphisms(self) -> tuple[Automorphism, ...]:
+        return tuple(automorphisms(self.links, self.edges))
+
+    @property
+    def inversions(self) -> tuple[int, ...]:
+        """The links that give different mechanisms where they are fixed: the first of each orbit."""
+        return tuple(orbit[0] for orbit in self.symmetry.link_orbits)
+
+    def mechanisms(self, moving_drives: bool = False) -> tuple[ChainMechanism, ...]:
+        """All choices of a fixed link and of driven joints, as many as the freedom, that differ up to isomorphism.
+
+        Driven joints are on the fixed link; with `moving_drives` they may also be between moving links, as cylinders
+        are. Drives of which one only moves what others move already are left out.
+
+        >>> import planar
+        >>> for each in planar.chains(6)[0].mechanisms():
+        ...     print(each.frame, each.drives, each.name)
+        0 (0,) Watt II six-bar
+        0 (1,) Watt II six-bar
+        2 (1,) Watt I six-bar
+        2 (5,) Watt I six-bar
+        """
+        found = []
+        for frame in self.inversions:
+            for drives in self._drive_sets(frame, moving_drives):
+                groups = assur_groups(self.links, self.edges, frame, drives)
+                if groups is not None:
+                    found.append(ChainMechanism(frame, drives, self.inversion_name(frame), groups))
+        return tuple(found)
+
+    def inversion_name(self, frame: int) -> str:
+        """What the field calls the mechanisms with this link fixed, or nothing."""
+        orbit = next(each for each in self.symmetry.link_orbits if frame in each)
+        named = inversion_names(self.edges)
+        return next((named[link] for link in orbit if link in named), "")
+
+    def _drive_sets(self, frame: int, moving_drives: bool) -> tuple[tuple[int, ...], ...]:
+        """Sets of joints, as many as the freedom, of those that can stand for one another the first."""
+        usable = [number for number, joint in enumerate(self.edges) if moving_drives or frame in joint]
+        keeping = joint_exchanges((each for each in self._automorphisms if each[frame] == frame), self.edges)
+        return tuple(
+            drives
+            for drives in combinations(usable, self.freedom)
+            if all(drives <= tuple(sorted(each[joint] for joint in drives)) for each in keeping)
+        )
+
+    def describe(self) -> str:
+        """A sentence that tells links, joints, loops and freedom."""
+        kinds = ("binary", "ternary", "quaternary", "quinary")
+        words = [
+            f"{count} {kinds[k] if k < len(kinds) else f'with {k + 2} joints'}"
+            for k, count in enumerate(self.assortment)
+            if count
+        ]
+        return (
+            f"{count_phrase(self.links, 'link')} ({', '.join(words)}), {count_phrase(self.joints, 'joint')}, "
+            f"{count_phrase(self.loops, 'loop')}, freedom {self.freedom}"
+        )
+
+
+def _reached(beside: Sequence[set[int]], without: int) -> set[int]:
+    """The links that can be reached from one other than a link that is left out."""
+    start = 0 if without else 1
+    reached, waiting = {start}, [start]
+    while waiting:
+        for end in beside[waiting.pop()] - reached - {without}:
+            reached.add(end)
+            waiting.append(end)
+    return reached

@@ -1,0 +1,93 @@
+"""The symmetry of a chain: which links, and which joints, can stand for one another."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from typing import NamedTuple
+
+from planar.structures.rigid_parts import Joint
+
+Automorphism = tuple[int, ...]
+"""Which link stands in the place of each."""
+
+
+class ChainSymmetry(NamedTuple):
+    """The automorphisms of a chain: how many there are, and what they take to each other, by numbers.
+
+    `link_orbits` and `joint_orbits` are sets of links, and of joints, that are alike but for their numbers; each begins
+    with its least number.
+    """
+
+    order: int
+    link_orbits: tuple[tuple[int, ...], ...]
+    joint_orbits: tuple[tuple[int, ...], ...]
+
+
+def neighbour_sets(links: int, joints: Iterable[Joint]) -> list[set[int]]:
+    """The links that each is joined to."""
+    found: list[set[int]] = [set() for _ in range(links)]
+    for a, b in joints:
+        found[a].add(b)
+        found[b].add(a)
+    return found
+
+
+def automorphisms(links: int, joints: Sequence[Joint]) -> Iterator[Automorphism]:
+    """Every way to exchange the links of a connected chain that keeps its joints.
+
+    Links are mapped one after the other, each beside one that has been, to a neighbour of that one's image with the
+    same joints to all that have been.
+    """
+    beside = neighbour_sets(links, joints)
+    order, earlier = [0], [0]
+    while len(order) < links:
+        link, before = next((end, at) for at in order for end in sorted(beside[at]) if end not in order)
+        order.append(link)
+        earlier.append(before)
+    image: dict[int, int] = {}
+
+    def choices(step: int) -> Iterator[int]:
+        link = order[step]
+        for end in sorted(beside[image[earlier[step]]]) if step else range(links):
+            if len(beside[end]) == len(beside[link]) and end not in image.values():
+                known = {image[each] for each in beside[link] if each in image}
+                if known == {each for each in beside[end] if each in image.values()}:
+                    yield end
+
+    waiting = [choices(0)]
+    while waiting:
+        step = len(waiting) - 1
+        image = {link: image[link] for link in order[:step]}
+        end = next(waiting[-1], None)
+        if end is None:
+            waiting.pop()
+            continue
+        image[order[step]] = end
+        if step + 1 < links:
+            waiting.append(choices(step + 1))
+        else:
+            yield tuple(image[link] for link in range(links))
+
+
+def orbits(size: int, exchanges: Iterable[Sequence[int]]) -> tuple[tuple[int, ...], ...]:
+    """What exchanges of numbers take to each other, each set in order, and the sets by their first number."""
+    least = list(range(size))
+    for each in exchanges:
+        for number, other in enumerate(each):
+            least[other] = min(least[other], least[number])
+    return tuple(
+        tuple(other for other in range(size) if least[other] == number)
+        for number in range(size)
+        if number == least[number]
+    )
+
+
+def joint_exchanges(exchanges: Iterable[Automorphism], joints: Sequence[Joint]) -> list[tuple[int, ...]]:
+    """What exchanges of links do to the joints."""
+    place = {joint: number for number, joint in enumerate(joints)}
+    return [tuple(place[min(e[a], e[b]), max(e[a], e[b])] for a, b in joints) for e in exchanges]
+
+
+def chain_symmetry(links: int, joints: Sequence[Joint], group: Sequence[Automorphism]) -> ChainSymmetry:
+    """The symmetry of a chain whose automorphisms are given, all of them."""
+    return ChainSymmetry(len(group), orbits(links, group), orbits(len(joints), joint_exchanges(group, joints)))
