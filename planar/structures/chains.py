@@ -97,7 +97,7 @@ class Chains(Sequence[Chain]):
                 return self._chain(expand_graph(graph, rows[left]), number)
             left -= len(rows)
         raise IndexError(
-            f"there are {count_phrase(len(self), 'chain')} of {self.links} links, not one of number {index}"
+            f"there are {count_phrase(len(self), 'kinematic chain')} of {self.links} links, not one of number {index}"
         )
 
     def index(self, value: Any, start: int = 0, stop: int | None = None) -> int:

@@ -230,7 +230,7 @@ def test_the_list_is_made_as_it_is_read():
     assert len(found._rows) == 1
     assert pickle.loads(pickle.dumps(found))[2] == found[2]
     assert planar.chains(8)[-1].number == 15
-    with pytest.raises(IndexError, match="16 chains"):
+    with pytest.raises(IndexError, match="16 kinematic chains"):
         planar.chains(8)[16]
 
 

@@ -18,12 +18,7 @@ MAX_CHAINS_LISTED = 250
 @click.option(
     "--freedom", type=int, default=1, show_default=True, metavar="F", help="How many joints have to be driven."
 )
-@click.option(
-    "--fractionated/--not-fractionated",
-    default=True,
-    show_default=True,
-    help="Whether chains are among them that a single link parts.",
-)
+@click.option("--not-fractionated", is_flag=True, help="Leave out chains that a single link parts.")
 @click.option("--mechanisms", is_flag=True, help="Also what differs by the fixed link and by the driven joints on it.")
 @click.option(
     "--limit",
@@ -34,12 +29,12 @@ MAX_CHAINS_LISTED = 250
     help="So many are listed.",
 )
 @json_option
-def chains(links: int, freedom: int, fractionated: bool, mechanisms: bool, limit: int, as_json: bool) -> None:
+def chains(links: int, freedom: int, not_fractionated: bool, mechanisms: bool, limit: int, as_json: bool) -> None:
     """All kinematic chains of so many LINKS: every structure that a linkage with pins can have."""
-    from planar.reports.tables.structures import record, table
+    from planar.reports.tables.design.structures import record, table
     from planar.structures.chains import chains as all_chains
 
-    found = all_chains(links, freedom, fractionated=fractionated)
+    found = all_chains(links, freedom, fractionated=not not_fractionated)
     if as_json:
         print_json([record(each, mechanisms) for each in found])
         return

@@ -29,7 +29,7 @@ def table(found: Chains, shown: Sequence[Chain], with_mechanisms: bool) -> Rende
         f"{count_phrase(len(found), 'kinematic chain')} of {found.links} links, freedom {found.freedom}{beside}",
         style="bold",
     )
-    rows = plain_table(None, "chain", "assortment", "symmetry", "inversions", "planar", "name", left=(1, 4, 5), keys=1)
+    rows = plain_table(None, "no.", "assortment", "symmetry", "inversions", "planar", "name", left=(1, 4, 5), keys=1)
     for each in shown:
         rows.add_row(
             str(each.number),
@@ -53,7 +53,7 @@ def table(found: Chains, shown: Sequence[Chain], with_mechanisms: bool) -> Rende
 
 def _mechanisms_table(shown: Iterable[Chain]) -> FittedTable:
     """Every choice of a frame and drives, with its groups."""
-    rows = plain_table("Mechanisms", "chain", "frame", "driven joints", "groups", "name", left=(2, 3, 4), keys=1)
+    rows = plain_table("Mechanisms", "no.", "frame", "driven joints", "groups", "name", left=(2, 3, 4), keys=1)
     for chain in shown:
         for each in chain.mechanisms():
             driven = join_all_names([joint_text(chain, joint) for joint in each.drives])
