@@ -9,32 +9,25 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypedDict
 
 import numpy as np
 
-from planar.batch.design_arrays import read_designs
-from planar.batch.general_path import OUTCOMES
 from planar.batch.gradients.run_gradient import RunGradient, RunWeights, read_names, read_weights
 from planar.batch.prepare.kept_results import KeptPoints, LateSentences
 from planar.batch.prepare.native_run import NativeRuns, prepare_native_run
-from planar.batch.prepare.run_endings import ALL_SOLVED, CANNOT_BE_ASSEMBLED, DEAD_POINT, STOP, UNSURE
+from planar.batch.prepare.run_endings import ALL_SOLVED, STATUS_OF_ENDING, UNSURE
 from planar.batch.reference_design import reference_design
 from planar.batch.sweep import check_range, sweep
 from planar.document.first_argument import takes_mechanism
-from planar.foundation.errors import BadInput, Outcome
+from planar.foundation.errors import BadInput
 from planar.foundation.short_repr import short_repr
 from planar.model.mechanism import Mechanism
 
 if TYPE_CHECKING:
-    from planar.batch.gradients.general_gradient import GeneralGradients
+    from planar.batch.gradients.run_gradients import RunGradients
 
 Array = np.ndarray
 
 PLAIN_NUMBERS = frozenset({float, int, np.float64})
 """Types of values that are surely one number."""
 NOTHING_SAID: Sequence[str] = ()
-STATUS_OF_ENDING = {
-    CANNOT_BE_ASSEMBLED: OUTCOMES.index(Outcome.CANNOT_BE_ASSEMBLED),
-    DEAD_POINT: OUTCOMES.index(Outcome.DEAD_POINT),
-    STOP: OUTCOMES.index(Outcome.STOP),
-}
 
 
 class PreparedRun(NamedTuple):
@@ -176,24 +169,20 @@ class PreparedSweep:
         1.131
         """
         values = self._read_values(values)
-        gradients = self._general_gradients
-        names = read_names(of, gradients.names)
-        read = read_weights(weights, self._index, self.rates, self.steps + 1)
-        if values:
-            read_designs(self.mechanism, values)
-        value, slopes, status = gradients.gradient(read, values, self.range["start"], self.range["stop"])
-        every = dict(zip(gradients.names, slopes.tolist(), strict=True))
+        gradients = self._gradients
+        names = gradients.names if of is None else read_names(of, gradients.names)
+        value, slopes, status = gradients.gradient(
+            read_weights(weights, self._index, self.rates, self.steps + 1), values
+        )
+        every = dict(zip(gradients.names, slopes, strict=True))
         return RunGradient(value, every if of is None else {name: every[name] for name in names}, status)
 
     @cached_property
-    def _general_gradients(self) -> GeneralGradients:
-        from planar.batch.gradients.general_gradient import GeneralGradients  # derivatives are seldom wanted
+    def _gradients(self) -> RunGradients:
+        from planar.batch.gradients.run_gradients import RunGradients  # derivatives are seldom wanted
 
-        if self.reference.is_sliding and self.range["stop"] is None:
-            raise BadInput(
-                "stop", "a slide runs between limits that change with the design; give start and stop for derivatives"
-            )
-        return GeneralGradients(self.reference, self.points, self.rates)
+        ends = self.range["start"], self.range["stop"]
+        return RunGradients(self.reference, self.points, self.rates, self.input, *ends)
 
     @staticmethod
     def _read_values(values: Mapping[str, float] | None) -> Mapping[str, float]:

@@ -141,14 +141,21 @@ class InstructionList(Generic[Key]):
             return self.add(BINARY_OPERATIONS[code], of[0], of[1])
         if code in UNARY_OPERATIONS:
             return self.add(UNARY_OPERATIONS[code], of[0])
-        if code == ca.OP_SQ:
-            return self.add("mul", of[0], of[0])
-        if code == ca.OP_TWICE:
-            return self.add("add", of[0], of[0])
+        if code in (ca.OP_SQ, ca.OP_TWICE):
+            return self.add("mul" if code == ca.OP_SQ else "add", of[0], of[0])
         if code == ca.OP_INV:
             return self.add("div", self.add_constant(1.0), of[0])
         if code == ca.OP_ASSIGN:
             return of[0]
+        return self._add_step(code, of[0])
+
+    def _add_step(self, code: int, of: int) -> int:
+        """What derivatives of pieces are made of."""
+        if code == ca.OP_SIGN:
+            zero = self.add_constant(0.0)
+            return self.add("sub", self.add("less", zero, of), self.add("less", of, zero))
+        if code == ca.OP_NOT:
+            return self.add("sub", self.add_constant(1.0), of)
         raise UnsupportedOperation(f"operation {code}")
 
 

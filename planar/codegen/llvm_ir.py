@@ -77,6 +77,19 @@ class IRWriter:
     def load(self, pointer: str) -> str:
         return self.add_instruction(f"load {self.vector}, ptr {pointer}, align 8")
 
+    def load_pairs(self, pointer: str) -> tuple[str, str]:
+        """The first and the second numbers of as many pairs as there are lanes."""
+        both = f"<{2 * self.lanes} x double>"
+        pairs = self.add_instruction(f"load {both}, ptr {pointer}, align 8")
+        first, second = (
+            self.add_instruction(
+                f"shufflevector {both} {pairs}, {both} poison, "
+                f"<{self.lanes} x i32> <{', '.join(f'i32 {2 * k + part}' for k in range(self.lanes))}>"
+            )
+            for part in range(2)
+        )
+        return first, second
+
     def store(self, value: str, pointer: str) -> None:
         self.write_line(f"store {self.vector} {value}, ptr {pointer}, align 8")
 

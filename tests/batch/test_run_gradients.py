@@ -4,7 +4,10 @@ import numpy as np
 import pytest
 
 import planar
+from planar.batch.design_arrays import design_variables
 from planar.foundation.errors import BadInput, Outcome
+from planar.model.mechanism import relative_motions
+from planar.model.pairs import MeasureKind
 from tests.draws import part
 from tests.known import MODELS
 
@@ -29,6 +32,11 @@ def agree(found, wanted):
     assert list(found) == list(wanted)
     one, other = (np.array(list(each.values())) for each in (found, wanted))
     np.testing.assert_allclose(one, other, rtol=1e-10, atol=1e-10 * np.nanmax(np.abs(other)))
+
+
+def is_turning(mechanism):
+    """Whether the input turns."""
+    return relative_motions(mechanism)[mechanism.inputs[0].pair].input_kind is MeasureKind.ANGLE
 
 
 def try_gradient(ready, weights):
@@ -89,6 +97,35 @@ def test_where_and_how_fast_the_input_runs_has_derivatives_too():
         assert name in own
         above, below = (ready.gradient(weights, {**values, name: value + step}).value for step in (1e-5, -1e-5))
         assert (above - below) / 2e-5 == pytest.approx(exact.derivatives[name], rel=1e-6)
+
+
+def both_ways(ready, weights, values):
+    """The gradient by compiled code, where that is sure, and by the general path."""
+    quick = ready.gradient(weights, values)
+    general = planar.prepared(ready.mechanism, ready.steps, ready.points, rates=ready.rates, **ready.range)
+    general._gradients._native_sums = lambda rows: None
+    return quick, general.gradient(weights, values)
+
+
+@pytest.mark.parametrize("stem", part([*RUNNING, "crank-rocker", "whitworth", "four-bar"], 12, 5))
+def test_compiled_code_gives_what_the_general_path_gives(stem):
+    """Of other designs, those with pins elsewhere too, and where the run comes to a dead point."""
+    mechanism, rng = MODELS[stem], np.random.default_rng(5)
+    known = {name: each for name, each in design_variables(mechanism).items() if each.link and each.kind == "length"}
+    ready = planar.prepared(mechanism, 24, stop=None if is_turning(mechanism) else mechanism.inputs[0].position + 0.1)
+    weights = random_weights(ready, rng)
+    for spread in (0.0, 0.01, 0.1):
+        values = {name: float(each.value * np.exp(spread * rng.normal())) for name, each in known.items()}
+        if spread == 0.01:
+            values |= {name: 0.01 * rng.normal() for name, each in known.items() if not each.value}
+        try:
+            quick, general = both_ways(ready, weights, values)
+        except BadInput:
+            return
+        np.testing.assert_array_equal(quick.status, general.status)
+        one, other = (np.array(list(each.derivatives.values())) for each in (quick, general))
+        np.testing.assert_allclose(one, other, rtol=1e-7, atol=1e-8 * np.nanmax(np.abs(other), initial=1.0))
+        assert quick.value == pytest.approx(general.value, rel=1e-8, abs=1e-8)
 
 
 def test_positions_that_are_not_solved_bring_nothing():

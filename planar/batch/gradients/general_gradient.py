@@ -18,7 +18,7 @@ from planar.derivatives.result_slopes import tied_dimensions
 from planar.document.dimensions import value_at
 from planar.equations.casadi_call import BufferedFunction
 from planar.equations.elimination import stack_expressions
-from planar.foundation.arrays import Array
+from planar.foundation.arrays import Array, IntArray
 from planar.foundation.errors import BadInput, Outcome
 from planar.model.mechanism import Mechanism
 
@@ -90,10 +90,10 @@ class GeneralGradients:
         values: Mapping[str, float],
         start: float | None,
         stop: float | None,
-    ) -> tuple[float, Array, Array]:
+    ) -> tuple[float, Array, IntArray]:
         """The weighed sum, its derivatives (names,), and the status of every position (steps + 1,)."""
         mechanism, found = self.run(values, start, stop, len(weights.arrays[0]) - 1)
-        status = np.array(found.status)
+        status: IntArray = np.array(found.status)
         if found.motion is None or not found.many:
             return 0.0, np.where([name in self.bound for name in self.names], np.nan, 0.0), status
         motion, solved = found.motion, slice(found.many)

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from planar.document.cursor import suggest_spelling
-from planar.foundation.arrays import Array
+from planar.foundation.arrays import Array, IntArray
 from planar.foundation.errors import BadInput, join_names
 from planar.foundation.short_repr import short_repr
 
@@ -25,7 +25,7 @@ class RunGradient(NamedTuple):
 
     value: float
     derivatives: Mapping[str, float]
-    status: Array
+    status: IntArray
 
     def __repr__(self) -> str:
         return short_repr(self)
@@ -44,33 +44,47 @@ def read_weights(weights: RunWeights, index: Mapping[str, int], rates: bool, cou
     if not isinstance(weights, Mapping) or not weights:
         raise BadInput("weights", "name what is weighed, with an array each, as {'position': {'C': weights}}")
     orders = ORDERS if rates else ORDERS[:1]
-    wide, rows, arrays = 2 * len(index), [], []
+    wide, shape = 2 * len(index), (count, 2)
+    rows: list[int] = []
+    arrays: list[Array] = []
     for order, points in weights.items():
-        if order not in orders:
-            without = "" if rates or order not in ORDERS else "; prepare it with rates"
-            raise BadInput("weights", f"the run tells {join_names(orders)}, and no {str(order)!r:.60}{without}")
-        if not isinstance(points, Mapping):
-            raise BadInput(f"weights[{order!r}]", "points by name are wanted here, with an array each")
+        if order not in orders or not isinstance(points, Mapping):
+            raise _refuse_order(order, orders, rates)
         first = wide * ORDERS.index(order)
         for point, given in points.items():
             if point not in index:
                 meant = suggest_spelling(str(point), index, cutoff=0.5) or f"; there are {join_names(index)}"
                 raise BadInput(f"weights[{order!r}]", f"the run was not prepared with the point {point!r:.60}{meant}")
-            rows += [first + index[point], first + index[point] + 1]
-            arrays.append(_read_array(given, f"weights[{order!r}][{point!r}]", count))
+            row = first + index[point]
+            rows += (row, row + 1)
+            is_read = type(given) is np.ndarray and given.dtype == np.float64 and given.shape == shape
+            arrays.append(given if is_read else _read_array(given, f"weights[{order!r}][{point!r}]", shape))
+    if not rows:
+        raise BadInput("weights", "name the points that are weighed, with an array each")
     return WeightRows(tuple(rows), tuple(arrays))
 
 
-def _read_array(given: Any, place: str, count: int) -> Array:
+def _refuse_order(order: str, orders: Sequence[str], rates: bool) -> BadInput:
+    if order in orders:
+        return BadInput(f"weights[{order!r}]", "points by name are wanted here, with an array each")
+    without = "" if rates or order not in ORDERS else "; prepare it with rates"
+    return BadInput("weights", f"the run tells {join_names(orders)}, and no {str(order)!r:.60}{without}")
+
+
+def _read_array(given: Any, place: str, shape: tuple[int, int]) -> Array:
     try:
         array = np.asarray(given, dtype=float)
     except (TypeError, ValueError):
         array = np.empty(0)
-    if array.shape != (count, 2):
-        raise BadInput(place, f"an array of numbers of shape {(count, 2)} is wanted here, not {np.shape(given)}")
-    if not np.isfinite(array).all():
-        raise BadInput(place, "a number here is not finite")
+    if array.shape != shape:
+        raise BadInput(place, f"an array of numbers of shape {shape} is wanted here, not {np.shape(given)}")
     return array
+
+
+def check_finite(weights: WeightRows) -> None:
+    """Refuse weights that are no numbers. Raises BadInput."""
+    if not all(np.isfinite(each).all() for each in weights.arrays):
+        raise BadInput("weights", "a number here is not finite")
 
 
 def read_names(of: Sequence[str] | str | None, known: Iterable[str]) -> tuple[str, ...]:

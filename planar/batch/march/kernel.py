@@ -256,6 +256,10 @@ class KernelInstructions:
             return [("z", k)]
         return [("zc", k), ("zs", k), *([("z", k)] if self.is_carried(("z", k)) else [])]
 
+    def state_operands(self) -> tuple[Operand, ...]:
+        """What stands for all unknowns."""
+        return tuple(operand for k in range(len(self.equations.is_angle)) for operand in self.unknown_operands(k))
+
     def list_values(self, outputs: Sequence[ca.SX], written: int | None = None) -> list[int]:
         """The numbers, in `hoister.result`, of the values of expressions. Raises UnsupportedOperation.
 

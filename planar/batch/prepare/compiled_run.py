@@ -42,12 +42,12 @@ class RunLayout(NamedTuple):
     inputs: tuple[Operand, ...]
 
 
-def write_run(design: DesignNumbers, links: tuple[str, ...], rates: bool) -> RunLayout:
-    """The function for points on these links. Raises UnsupportedOperation."""
+def write_run(design: DesignNumbers, links: tuple[str, ...], rates: bool, states: bool = False) -> RunLayout:
+    """The function for points on these links, or for the states. Raises UnsupportedOperation."""
     equations = design.equations("q")
     signs = [("sign", k) for k in range(len(equations.closed_forms))]
     order: list[Operand] = [*design.numbers, SAID, *signs]
-    positions = write_positions(equations, links, rates, order)
+    positions = write_positions(equations, links, rates, order, states)
     numbers, start = write_numbers(design, order), write_start(design.equations("at"), design.sketched, order)
     t = IRWriter(1)
     t.write_line(f"define void @{FUNCTION_NAME}(ptr %context, ptr %places, ptr %given, ptr %out) {{")
@@ -86,11 +86,14 @@ class CompiledRun:
     Raises UnsupportedOperation.
     """
 
-    def __init__(self, design: DesignNumbers, links: tuple[str, ...], rates: bool, u: Array):
-        """u (positions, inputs): where the inputs are of a design that has them where the file has them."""
+    def __init__(self, design: DesignNumbers, links: tuple[str, ...], rates: bool, u: Array, states: bool = False):
+        """u (positions, inputs): where the inputs are of a design that has them where the file has them.
+
+        With `states` the rows are what stands for the unknowns, and not those of points.
+        """
         if len(u) < 3:
             raise UnsupportedOperation("two positions do not show what lies between them")
-        layout = write_run(design, links, rates)
+        layout = write_run(design, links, rates, states)
         self._function: Any = compile_function(layout.ir, FUNCTION_NAME, *ARGUMENT_TYPES)
         blocks = -(-len(u) // LANES)
         width = blocks * LANES
@@ -101,17 +104,23 @@ class CompiledRun:
         self._own = design.own_values
         self._context = np.array([self._own.ctypes.data, self._drive.ctypes.data, blocks, len(u)], dtype=np.int64)
         self._context_pointer = self._context.ctypes.data
-        self._shape = layout.rows.row_count + 1, width
+        self._shape, self.stride = (layout.rows.row_count + 1, width), width
         self._told, self._positions, self._ending = layout.rows.told, len(u), layout.rows.row_count * width
         binder = ValueBinder(design.index)
-        self._bind, self._bound = binder.bind, binder.bound
+        self.bind, self.bound = binder.bind, binder.bound
 
     def __call__(self, values: Mapping[str, float]) -> tuple[Array, float, int]:
         """See `native_run.NativeRun`."""
         names = tuple(values)
-        pack, _, places = self._bound.get(names) or self._bind(names)
+        pack, _, places = self.bound.get(names) or self.bind(names)
+        out, _, ending, end = self.run_bound(places, pack(*values.values()))
+        return out[: self._told, : self._positions], ending, end
+
+    def run_bound(self, places: int, given: bytes) -> tuple[Array, int, float, int]:
+        """The same of values that are bound: an array, the address in it of the rows, `stride` numbers apart, how the
+        run ended, and at which position."""
         out = np.empty(self._shape)
-        self._function(self._context_pointer, places, pack(*values.values()), address_of(out))
+        address = address_of(out)
+        self._function(self._context_pointer, places, given, address)
         ending = out.item(self._ending)
-        rows = out[: self._told, : self._positions]
-        return rows, ending, int(out.item(self._ending + 1)) if ending in (DEAD_POINT, STOP) else 0
+        return out, address, ending, int(out.item(self._ending + 1)) if ending in (DEAD_POINT, STOP) else 0

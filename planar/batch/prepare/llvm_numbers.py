@@ -34,7 +34,7 @@ def write_numbers(design: DesignNumbers, order: Sequence[Operand]) -> IRWriter:
     size = design.symbols.numel()
     t.write_line(f"%values = alloca [{size} x double], align 64")
     t.write_line(f"call void @llvm.memcpy.p0.p0.i64(ptr %values, ptr %own, i64 {8 * size}, i1 false)")
-    is_given = _write_given(t)
+    is_given = write_given(t)
     given = [t.load(t.double_pointer("%values", str(k))) for k in range(design.symbols.numel())]
     outputs = [*design.numbers.values(), *design.points]
     function = ca.Function("numbers", [design.symbols], [ca.densify(ca.vertcat(*outputs))], {"cse": True})
@@ -61,7 +61,7 @@ def write_numbers(design: DesignNumbers, order: Sequence[Operand]) -> IRWriter:
     return t
 
 
-def _write_given(t: IRWriter) -> str:
+def write_given(t: IRWriter) -> str:
     """Put the given values where they belong; a flag that they are neither too great nor too small."""
     slot = t.allocate()
     t.store(t.constant(1.0), slot)

@@ -31,15 +31,18 @@ class PositionFunctions(NamedTuple):
 
 
 def write_positions(
-    equations: KernelEquations, links: tuple[str, ...], rates: bool, order: Sequence[Operand]
+    equations: KernelEquations, links: tuple[str, ...], rates: bool, order: Sequence[Operand], states: bool = False
 ) -> PositionFunctions:
     """The functions of a structure for points on these links, which read a design's numbers in this order.
+
+    With `states` what is told is what stands for the unknowns, see `KernelInstructions.unknown_operands`, and no point.
 
     `positions` writes the rows, and how the run ends; where that is not well, it asks `ending`. Raises
     UnsupportedOperation.
     """
     try:
-        writer = _PositionsWriter(equations, links, rates, order)
+        writer = _PositionsWriter(equations, () if states else links, rates and not states, order)
+        writer.tells_states = states
         rows = writer.write()
     except BareAngle as angle:
         raise UnsupportedOperation(f"an angle counts its turns: {angle.operand}") from None
@@ -52,6 +55,7 @@ class _PositionsWriter(KernelWriter):
         if any(part.closed_form is None for part in equations.blocks):
             raise UnsupportedOperation("a group is not in closed form")
         self.order = order
+        self.tells_states = False
 
     def write(self) -> PositionRows:
         """The whole function: blocks of positions, then whether the blocks keep clear of their dead points."""
@@ -85,6 +89,8 @@ class _PositionsWriter(KernelWriter):
         )
         self._write_condition(t.compare("ole", worst, have["tolerance", 0]))
         told = [t.binary("mul", have["unit", 0], each) for part in values for each in part]
+        if self.tells_states:
+            told = [have[operand] for operand in self.state_operands()]
         for k, each in enumerate((*told, *counted, *bends, worst)):
             t.store(each, self._row_pointer("%out", k, first))
         t.close_loop("b", "blocks", "block", "after")

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from math import ceil
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -16,11 +16,16 @@ from planar.batch.prepare.run_endings import DEAD_POINT, STOP, UNSURE
 from planar.batch.prepare.value_binder import MAX_BOUND_NAMES
 from planar.batch.reference_design import ReferenceDesign
 from planar.codegen.instructions import UnsupportedOperation
+from planar.model.link_shapes import PointMember
 from planar.model.mechanism import LARGEST_INPUT_POSITION
 from planar.model.pairs.base import Pair
 
+if TYPE_CHECKING:
+    from planar.batch.prepare.compiled_run import CompiledRun
+    from planar.batch.prepare.newton_run import NewtonRun
+
 Array = np.ndarray
-NativeRun = Callable[[Mapping[str, float]], tuple[Array, float, int]]
+NativeRun = Callable[..., tuple[Array, float, int]]
 """From values by name to the rows of the wanted points (rows, positions), which are the caller's own, how the run ended
 (see `run_endings`), and at which position. Raises KeyError for a name that is not there."""
 
@@ -49,53 +54,70 @@ def prepare_native_run(
 
     `may_shift`: whether the run starts where the design's own input stands, wherever that is.
     """
+
+    def compile_run(grid: RunPositions, zeros: frozenset[str]) -> NativeRun:
+        members = [reference.point_member(name) for name in points]
+        design = run_design_numbers(reference, members, may_shift, zeros)
+        run = compile_run_function(reference, design, members, rates, grid)
+        return partial(_at_wanted_positions, run, grid) if grid.lead or grid.every > 1 else run
+
+    return prepare_native(reference, positions, compile_run)
+
+
+def prepare_native(
+    reference: ReferenceDesign, positions: Array, compile_run: Callable[[RunPositions, frozenset[str]], NativeRun]
+) -> NativeRuns | None:
+    """What is compiled of a run over these positions, for each choice of lengths that are nothing in all designs; None
+    where that cannot be."""
     if not reference.can_run_backend or not all(pair.measures_symbols for pair in reference.mechanism.pairs):
         return None
-    grid = _find_positions(reference, positions)
+    grid = find_positions(reference, positions)
     if len(grid.u) > MAX_POSITIONS or np.max(np.abs(grid.u)) > LARGEST_INPUT_POSITION:
         return None
     try:
-        runs = _RunsByZeros(partial(_compile, reference, points, rates, grid, may_shift), reference)
+        runs = RunsByZeros(partial(compile_run, grid), reference)
     except (ImportError, UnsupportedOperation):
         return None
     if any(type(pair).find_misfit is not Pair.find_misfit for pair in reference.mechanism.pairs):
-        return NativeRuns(_FittingPairs(reference, runs.run), _FittingPairs(reference, runs.run_other))
+        return NativeRuns(FittingPairs(reference, runs.run), FittingPairs(reference, runs.run_other))
     return NativeRuns(runs.run, runs.run_other)
 
 
-def _compile(  # many: what a run is made of
-    reference: ReferenceDesign,
-    points: tuple[str, ...],
-    rates: bool,
-    grid: _Positions,
-    may_shift: bool,
-    zeros: frozenset[str],
-) -> NativeRun:
-    """The function of a run over these positions.
+def run_design_numbers(
+    reference: ReferenceDesign, members: Sequence[PointMember], may_shift: bool, zeros: frozenset[str]
+) -> DesignNumbers:
+    """What a run takes of a design; `zeros`: lengths that are nothing in all designs."""
+    shifting = set(range(len(reference.mechanism.inputs)))
+    if not may_shift:
+        shifting.remove(reference.running_index)
+    return DesignNumbers(reference, members, shifting, zeros)
 
-    `zeros`: lengths that are nothing in all designs. Raises UnsupportedOperation; ImportError where there is no
-    compiler.
+
+def compile_run_function(  # many: what a run is made of
+    reference: ReferenceDesign,
+    design: DesignNumbers,
+    members: Sequence[PointMember],
+    rates: bool,
+    grid: RunPositions,
+    states: bool = False,
+) -> CompiledRun | NewtonRun:
+    """The function of a run over all these positions, for points on links, or for the states.
+
+    Raises UnsupportedOperation; ImportError where there is no compiler.
     """
     from planar.batch.prepare.compiled_run import CompiledRun
     from planar.batch.prepare.newton_run import NewtonRun
 
-    members = [reference.point_member(name) for name in points]
-    shifting = set(range(grid.u.shape[1]))
-    if not may_shift:
-        shifting.remove(reference.running_index)
-    design = DesignNumbers(reference, members, shifting, zeros)
     if design.equations("q").has_newton_blocks:
         if reference.mechanism.stops:
             raise UnsupportedOperation("stops are looked for where all groups are in closed form")
         if grid.lead or reference.candidates.counts_turns:
             raise UnsupportedOperation("a group that is not in closed form starts where the file has it, turns or not")
-        run: NativeRun = NewtonRun(reference, design, members, rates, grid.u)
-    else:
-        run = CompiledRun(design, tuple(link for link, _ in members), rates, grid.u)
-    return partial(_at_wanted_positions, run, grid) if grid.lead or grid.every > 1 else run
+        return NewtonRun(reference, design, members, rates, grid.u, states)
+    return CompiledRun(design, tuple(link for link, _ in members), rates, grid.u, states)
 
 
-class _RunsByZeros:
+class RunsByZeros:
     """Runs compiled without the lengths that the file has as nothing, as most coordinates of pins on the frame; of
     designs that give such a length a value there is one for each choice of them, made when it is first wanted."""
 
@@ -108,7 +130,7 @@ class _RunsByZeros:
         self._others: dict[frozenset[str], NativeRun] = {}
         self._by_names: dict[tuple[str, ...], NativeRun] = {}
 
-    def run_other(self, values: Mapping[str, float]) -> tuple[Array, float, int]:
+    def run_other(self, values: Mapping[str, float], *more: Any) -> tuple[Array, float, int]:
         """The run of a design that gives a length a value which the file has as nothing."""
         names = tuple(values)
         run = self._by_names.get(names)
@@ -118,7 +140,7 @@ class _RunsByZeros:
             if len(self._by_names) >= MAX_BOUND_NAMES:
                 self._by_names.clear()
             run = self._by_names[names] = self._find_other(self._zeros.intersection(names))
-        return run(values)
+        return run(values, *more)
 
     def _find_other(self, given: frozenset[str]) -> NativeRun:
         """The run of designs that give these lengths a value."""
@@ -134,12 +156,12 @@ class _RunsByZeros:
         return run
 
 
-def _refuse(_values: Mapping[str, float]) -> tuple[Array, float, int]:
+def _refuse(_values: Mapping[str, float], *_more: Any) -> tuple[Array, float, int]:
     """Of a structure that is not compiled nothing is known."""
     return np.empty((0, 0)), UNSURE, 0
 
 
-class _FittingPairs:
+class FittingPairs:
     """A run of designs that pairs may refuse before anything moves, as wheels that do not mesh: they are asked once for
     each change."""
 
@@ -147,8 +169,8 @@ class _FittingPairs:
         self._reference, self._run = reference, run
         self._fitting: dict[str, float] = {}
 
-    def __call__(self, values: Mapping[str, float]) -> tuple[Array, float, int]:
-        found = self._run(values)
+    def __call__(self, values: Mapping[str, float], *more: Any) -> tuple[Array, float, int]:
+        found = self._run(values, *more)
         return found if self._is_fit(values) else (found[0], UNSURE, 0)
 
     def _is_fit(self, values: Mapping[str, float]) -> bool:
@@ -161,7 +183,7 @@ class _FittingPairs:
         return True
 
 
-class _Positions(NamedTuple):
+class RunPositions(NamedTuple):
     """Where all inputs are, u (positions, inputs): `lead` positions on the way to where the run starts; from there on
     every so manieth is a position of the run."""
 
@@ -170,7 +192,7 @@ class _Positions(NamedTuple):
     every: int
 
 
-def _find_positions(reference: ReferenceDesign, positions: Array) -> _Positions:
+def find_positions(reference: ReferenceDesign, positions: Array) -> RunPositions:
     """All positions of a run over those of its input (rad or m)."""
     u, _, _ = reference.inputs(reference.mechanism, 1)
     running = reference.running_index
@@ -184,12 +206,17 @@ def _find_positions(reference: ReferenceDesign, positions: Array) -> _Positions:
     way = own + (run[0] - own) * np.arange(lead) / max(lead, 1)
     found = np.repeat(u.T, lead + len(run), axis=0)
     found[:, running] = np.concatenate([way, run])
-    return _Positions(found, lead, every)
+    return RunPositions(found, lead, every)
 
 
-def _at_wanted_positions(run: NativeRun, grid: _Positions, values: Mapping[str, float]) -> tuple[Array, float, int]:
+def _at_wanted_positions(run: NativeRun, grid: RunPositions, values: Mapping[str, float]) -> tuple[Array, float, int]:
     """A run without the positions on its way, on which it must not end, and between."""
     rows, ending, position = run(values)
+    return rows[:, grid.lead :: grid.every], *wanted_end(grid, ending, position)
+
+
+def wanted_end(grid: RunPositions, ending: float, position: int) -> tuple[float, int]:
+    """How a run ends, and at which of its own positions, where it ends at this one of all."""
     if ending in (DEAD_POINT, STOP) and position <= grid.lead:
         ending = UNSURE
-    return rows[:, grid.lead :: grid.every], ending, max(ceil((position - grid.lead) / grid.every), 0)
+    return ending, max(ceil((position - grid.lead) / grid.every), 0)

@@ -62,8 +62,10 @@ class NewtonRun:
         members: Sequence[PointMember],
         rates: bool,
         u: Array,
+        states: bool = False,
     ):
-        """u (positions, inputs): where the inputs are."""
+        """u (positions, inputs): where the inputs are. With `states` the rows are what stands for the unknowns, see
+        `KernelInstructions.unknown_operands`, and not those of points."""
         links, shown = tuple(link for link, _ in members), [link for *_, link, _ in design.sketched]
         blocks, equations = tuple(block for block, *_ in design.sketched), design.equations("q")
         if set(blocks) < {part.block.block_index for part in equations.blocks}:
@@ -93,26 +95,36 @@ class NewtonRun:
         self._context = np.array([numbers[name] for name in CONTEXT], dtype=np.int64)
         self._context_pointer = self._context.ctypes.data
         self._function: Any = compile_function(layout.ir, FUNCTION_NAME, *ARGUMENT_TYPES)
-        self._shape, self._positions = (layout.told, pieces.width), len(u)
+        self.stride, self._positions = pieces.width, len(u)
         marched = (pieces.steps + 1) * kernels[1].output_row_count * LANES
         self._scratch = (
             layout.scratch + len(kernels[1].state) * pieces.width + LANES + marched + WIDEST_VECTOR_BYTES // 8
         )
         self._size = HEADER + layout.told * pieces.width
+        self._state_first = layout.scratch if states else None
+        self._rows = len(kernels[1].state) if states else layout.told
         binder = ValueBinder(design.index)
-        self._bind, self._bound = binder.bind, binder.bound
+        self.bind, self.bound = binder.bind, binder.bound
 
     def __call__(self, values: Mapping[str, float]) -> tuple[Array, float, int]:
         """See `native_run.NativeRun`."""
         names = tuple(values)
-        pack, _, places = self._bound.get(names) or self._bind(names)
+        pack, _, places = self.bound.get(names) or self.bind(names)
+        held, address, ending, end = self.run_bound(places, pack(*values.values()))
+        begin = (address - address_of(held)) // 8
+        rows = held[begin : begin + self._rows * self.stride].reshape(self._rows, self.stride)
+        return rows[:, : self._positions], ending, end
+
+    def run_bound(self, places: int, given: bytes) -> tuple[Array, int, float, int]:
+        """See `CompiledRun.run_bound`."""
         out, scratch = np.empty(self._size), np.empty(self._scratch)
-        first = address_of(scratch)
+        first, told = address_of(scratch), address_of(out)
         # where whole vectors begin
         first += -first % (WIDEST_VECTOR_BYTES)
-        self._function(self._context_pointer, places, pack(*values.values()), first, address_of(out))
-        rows = out[HEADER:].reshape(self._shape)[:, : self._positions]
-        return rows, out.item(0), 0
+        self._function(self._context_pointer, places, given, first, told)
+        if self._state_first is None:
+            return out, told + 8 * HEADER, out.item(0), 0
+        return scratch, first + 8 * self._state_first, out.item(0), 0
 
 
 class _Pieces:

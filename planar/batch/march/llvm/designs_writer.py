@@ -84,7 +84,7 @@ class _DesignsKernelWriter(NewtonBlockWriter):
         self.other_points: dict[int, list[str]] = {}
         self.apart_here: list[str] = []  # flags of blocks in closed form: their assemblies are apart at a step
         self.start = start
-        self.state = tuple(leaf for k in range(len(equations.is_angle)) for leaf in self.unknown_operands(k))
+        self.state = self.state_operands()
         if start.has_signs:
             self.state = tuple(("sign", k) for k in range(len(equations.closed_forms)))
         self.input_count = len(equations.input_is_angle)

@@ -1,0 +1,123 @@
+"""The adjoint of a run as an LLVM function: positions in the lanes, sums over all of them at the end."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import casadi as ca
+
+from planar.batch.gradients.adjoint_equations import WeighedRow, adjoint_expressions
+from planar.batch.march.kernel import BareAngle, KernelEquations, Operand
+from planar.batch.march.llvm.kernel_writer import KernelWriter, OperandNames
+from planar.codegen.instructions import UnsupportedOperation
+from planar.codegen.llvm_ir import IRWriter
+
+LANES = 8
+FUNCTION_NAME = "adjoint"
+ARGUMENTS = (
+    "i64 %good, ptr noalias readonly %numbers, ptr noalias readonly %drive, i64 %width, ptr noalias readonly %state, "
+    "i64 %stride, ptr noalias readonly %weights, ptr noalias %sums"
+)
+"""How many positions are good, from the first on; the numbers of a design; inputs, rows of so many; states, rows so far
+apart; weights (weighed rows, so many, 2); and what is written: the sum, and its derivatives one after the other."""
+
+
+class AdjointFunction(NamedTuple):
+    """The function's writer; what the rows of given inputs are; which numbers the sums are derived by, after the sum
+    itself; and how many rows a state has."""
+
+    writer: IRWriter
+    inputs: tuple[Operand, ...]
+    derived: tuple[Operand, ...]
+    state_count: int
+
+
+def write_adjoint(
+    equations: KernelEquations, links: tuple[str, ...], weighed: Sequence[WeighedRow], order: Sequence[Operand]
+) -> AdjointFunction:
+    """The function of a structure for weighed rows of points on these links, which reads a design's numbers in this
+    order. Raises UnsupportedOperation."""
+    if equations.has_large_blocks:
+        raise UnsupportedOperation("a group has so many unknowns that expressions do not solve it")
+    try:
+        return _AdjointWriter(equations, links, weighed, order).write()
+    except BareAngle as angle:
+        raise UnsupportedOperation(f"an angle counts its turns: {angle.operand}") from None
+
+
+class _AdjointWriter(KernelWriter):
+    def __init__(
+        self,
+        equations: KernelEquations,
+        links: tuple[str, ...],
+        weighed: Sequence[WeighedRow],
+        order: Sequence[Operand],
+    ):
+        invariant = frozenset({"p", "q", "u1", "u2"})
+        super().__init__(equations, links, any(row.order for row in weighed), LANES, invariant, frozenset())
+        self.order, self.weighed = order, weighed
+        self.symbols["weight"] = ca.SX.sym("weight", 2 * len(weighed))
+
+    def write(self) -> AdjointFunction:
+        """The whole function: blocks of positions, whose parts are added up."""
+        t, inputs = self.ir, self.equations.equations.u.numel()
+        adjoint = adjoint_expressions(self, self.weighed, self.symbols["weight"])
+        rates = [(kind, k) for kind in ("u1", "u2") for k in range(inputs)] if adjoint.in_input_rates.numel() else []
+        derived: list[Operand] = [("p", k) for k in range(adjoint.in_numbers.numel())]
+        derived += [("q", k) for k in range(adjoint.in_points.numel())]
+        derived += [*(("u", k) for k in range(inputs)), *rates]
+        t.write_line(f"define internal void @{FUNCTION_NAME}({ARGUMENTS}) {{")
+        t.write_label("entry")
+        slots = [t.allocate() for _ in range(1 + len(derived))]
+        for slot in slots:
+            t.store("zeroinitializer", slot)
+        have: OperandNames = {
+            operand: t.broadcast(t.add_instruction(f"load double, ptr {t.double_pointer('%numbers', str(k))}"))
+            for k, operand in enumerate(self.order)
+        }
+        last = t.add_instruction(f"insertelement <{LANES} x i64> poison, i64 %good, i64 0")
+        t.write_line(f"%many = add i64 %good, {LANES - 1}")
+        t.write_line(f"%blocks = sdiv i64 %many, {LANES}")
+        t.mark_hoist_point()
+        t.write_line("%any = icmp sgt i64 %good, 0")
+        t.write_line("br i1 %any, label %block, label %after")
+        t.write_label("block")
+        t.write_line("%b = phi i64 [0, %entry], [%bnext, %block]")
+        first = t.add_instruction(f"mul i64 %b, {LANES}")
+        self._write_given(first, have)
+        found = self.write_values(adjoint.outputs, have)
+        beyond = t.lanes_from(first, last)
+        for value, slot in zip(found, slots, strict=True):
+            part = t.select(beyond, t.constant(0.0), value)
+            t.store(t.binary("add", t.load(slot), part), slot)
+        t.close_loop("b", "blocks", "block", "after")
+        t.write_label("after")
+        for k, slot in enumerate(slots):
+            total = t.reduce("fadd", t.load(slot))
+            t.write_line(f"store double {total}, ptr {t.double_pointer('%sums', str(k))}")
+        t.write_line("ret void")
+        t.write_line("}")
+        return AdjointFunction(t, self.input_operands, tuple(derived), len(self.state_operands()))
+
+    def _write_given(self, first: str, have: OperandNames) -> None:
+        """Where the inputs are, farther than the file has them by as much as the design has; states; and weights."""
+        t = self.ir
+
+        def load(base: str, row: int, stride: str) -> str:
+            begin = t.add_instruction(f"mul i64 {stride}, {row}")
+            return t.load(t.double_pointer(base, t.add_instruction(f"add i64 {begin}, {first}")))
+
+        given = {leaf: load("%drive", k, "%width") for k, leaf in enumerate(self.input_operands)}
+        for k, is_angle in enumerate(self.equations.input_is_angle):
+            have["u", k] = t.binary("add", given["u", k], have["d", k])
+            if is_angle:
+                have["uc", k], have["us", k] = self.write_angle_sum(
+                    given["uc", k], given["us", k], have["dc", k], have["ds", k]
+                )
+        have |= {leaf: load("%state", k, "%stride") for k, leaf in enumerate(self.state_operands())}
+        for k in range(len(self.weighed)):
+            begin = t.add_instruction(f"mul i64 %width, {k}")
+            place = t.add_instruction(f"add i64 {begin}, {first}")
+            pointer = t.double_pointer("%weights", t.add_instruction(f"mul i64 {place}, 2"))
+            have["weight", 2 * k], have["weight", 2 * k + 1] = t.load_pairs(pointer)
