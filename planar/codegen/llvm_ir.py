@@ -17,13 +17,18 @@ LIBRARY_ARGUMENT_COUNTS = {"cos": 1, "sin": 1, "atan": 1, "atan2": 2}
 STACK_ALIGNMENT = 64
 """Bytes: so that each vector that a function keeps on it lies in one line of the cache. Else the widest lie over two
 wherever the caller's stack happens to begin so, and the function takes up to twice as long."""
+LOADS_IN_ORDER = 64
+"""Loads between two labels after which those that follow are held apart from them. LLVM looks, for every load, through
+all that may change places with it, and again after each change: the time grows with the third power of their number."""
+KEEP_ORDER = 'call void asm sideeffect "", ""() nounwind willreturn memory(inaccessiblemem: readwrite)'
+"""No instruction, and nothing in memory is other after it; but loads do not pass it."""
 
 
 class IRWriter:
     """Instructions one after the other, with fresh names."""
 
     def __init__(self, lanes: int):
-        self.lanes, self.count = lanes, 0
+        self.lanes, self.count, self.load_count = lanes, 0, 0
         self.lines: list[str] = []
         self._ahead: list[str] = []
         self._sections = [self.lines]
@@ -49,11 +54,16 @@ class IRWriter:
         """Add an instruction that gives a value; the value's name."""
         self.count += 1
         name = f"%v{self.count}"
+        if text.startswith("load "):
+            self.load_count += 1
+            if self.load_count % LOADS_IN_ORDER == 0:
+                self.lines.append(KEEP_ORDER)
         self.lines.append(f"{name} = {text}")
         return name
 
     def write_label(self, name: str) -> None:
         self.lines.append(f"{name}:")
+        self.load_count = 0
 
     def constant(self, value: float) -> str:
         return f"splat (double {_double_literal(value)})"

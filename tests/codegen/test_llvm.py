@@ -332,3 +332,21 @@ def test_cosines_and_sines_of_lanes_have_all_their_digits():
     for row, (cos, sin) in zip(angles, found.swapaxes(0, 1), strict=True):
         turn(row.ctypes.data, cos.ctypes.data, sin.ctypes.data)
     np.testing.assert_allclose(found, [np.cos(angles), np.sin(angles)], rtol=4e-16, atol=1e-32)
+
+
+def test_many_loads_are_of_groups_and_each_is_where_it_belongs():
+    """Where a text loads hundreds of rows in one go, as of a cam with many pieces, code is still made in a moment."""
+    from planar.codegen.llvm_ir import KEEP_ORDER, LOADS_IN_ORDER, IRWriter
+
+    many, t = 400, IRWriter(16)
+    t.write_line("define void @sum(ptr %rows, ptr %out) {")
+    loaded = [t.load(t.element_pointer("%rows", str(k))) for k in range(many)]
+    weighed = [t.binary("mul", each, t.constant(k + 1.0)) for k, each in enumerate(loaded)]
+    t.store(t.add_all(weighed), "%out")
+    t.write_line("ret void\n}")
+    between = [part.count(" load ") for part in t.module_text().split(KEEP_ORDER)]
+    assert max(between) <= LOADS_IN_ORDER
+    total = llvm_compile.compile_function(t.module_text(), "sum", "array", "array")
+    rows, out = np.random.default_rng(0).integers(-9, 9, (many, 16)).astype(float), np.empty(16)
+    total(rows.ctypes.data, out.ctypes.data)
+    np.testing.assert_array_equal(out, np.arange(1.0, many + 1.0) @ rows)
