@@ -119,6 +119,7 @@ if TYPE_CHECKING:
     from planar.solving.position import solve
     from planar.structures.chain import Chain, ChainMechanism
     from planar.structures.chains import Chains, chains
+    from planar.structures.linkage_store import LinkageSet, generate
     from planar.structures.symmetry import ChainSymmetry
 
 __version__ = "0.16.0"
@@ -194,6 +195,7 @@ __all__ = [
     "LinkLine",
     "LinkMotion",
     "LinkState",
+    "LinkageSet",
     "Load",
     "LockedInterval",
     "MarkedValue",
@@ -284,6 +286,7 @@ __all__ = [
     "force_map",
     "forces",
     "from_dict",
+    "generate",
     "gradient",
     "greatest",
     "harmonics",

@@ -263,8 +263,14 @@ def _solve_some(mechanisms: Sequence[Mechanism], request: SweepRequest) -> Swept
     return SweptList(tuple(found[k] for k in range(len(mechanisms))))
 
 
-def solve_by_blocks(mechanisms: Sequence[Mechanism], request: SweepRequest) -> list[Swept]:
-    """Some mechanisms, in their order, parted into blocks of links; those that cannot be by the general path."""
+def solve_by_blocks(
+    mechanisms: Sequence[Mechanism],
+    request: SweepRequest,
+    solve_general: Callable[[Mechanism, SweepRequest], Swept] | None = None,
+) -> list[Swept]:
+    """Some mechanisms, in their order, parted into blocks of links; what is left open by `solve_general`, the general
+    path if that is left out."""
+    solve_general = solve_general or _solve_with_general_path
     found: dict[int, Swept] = {}
     runner = find_block_runner(request.backend)
     attempts = [each for each in _ATTEMPTS if runner.can_give_extremes or not each.verdict_only]
@@ -279,10 +285,7 @@ def solve_by_blocks(mechanisms: Sequence[Mechanism], request: SweepRequest) -> l
             left = np.array([k for k in left if ready.numbers[k] not in found], dtype=int)
             if not left.size:
                 break
-    return [
-        found[k] if k in found else _solve_with_general_path(mechanism, request)
-        for k, mechanism in enumerate(mechanisms)
-    ]
+    return [found[k] if k in found else solve_general(mechanism, request) for k, mechanism in enumerate(mechanisms)]
 
 
 def _cache_sized_chunks(

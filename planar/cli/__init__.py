@@ -15,6 +15,7 @@ main.modules = {
     "explain": "planar.cli.commands.solve_cycle_explain",
     "forces": "planar.cli.commands.forces_simulate",
     "gallery": "planar.cli.commands.view_gallery",
+    "generate": "planar.cli.commands.design.generate",
     "guide": "planar.cli.commands.guide",
     "harmonics": "planar.cli.commands.centres_harmonics",
     "inspect": "planar.cli.commands.inspect_models_schema_bench",

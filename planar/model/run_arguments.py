@@ -1,4 +1,4 @@
-"""Checks of what a run is asked for: how many steps, from where to where."""
+"""Checks of what is asked for: how many of something, how many steps of a run, from where to where."""
 
 from __future__ import annotations
 
@@ -14,6 +14,19 @@ def check_steps(steps: object) -> int:
     if isinstance(steps, bool) or not isinstance(steps, Integral) or steps < 1 or not steps <= MAX_STEPS:
         raise BadInput("steps", f"a whole number of steps from 1 to {MAX_STEPS} is wanted, not {steps!r:.40}")
     return int(steps)
+
+
+def check_whole_number(name: str, value: object, least: int, most: int | None = None) -> int:
+    """A whole number from `least` on, up to `most` if there is one. Raises BadInput."""
+    if (
+        isinstance(value, bool)
+        or not isinstance(value, Integral)
+        or value < least
+        or (most is not None and value > most)
+    ):
+        to = "on" if most is None else f"to {most}"
+        raise BadInput(name, f"a whole number from {least} {to} is wanted, not {value!r:.40}")
+    return int(value)
 
 
 def check_number(name: str, value: object, most: float, unit: str = "rad or m") -> None:

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import combinations
 from typing import NamedTuple
 
+from planar.foundation.errors import BadInput
+from planar.model.mechanism import Mechanism
+from planar.model.run_arguments import check_whole_number
 from planar.model.wording import count_phrase
 from planar.structures.assur_groups import AssurGroup, assur_groups
 from planar.structures.chain_names import chain_name, inversion_names
@@ -146,6 +149,44 @@ class Chain:
             for drives in combinations(usable, self.freedom)
             if all(drives <= tuple(sorted(each[joint] for joint in drives)) for each in keeping)
         )
+
+    def mechanism(self, frame: int | None = None, drive: int | Sequence[int] | None = None, seed: int = 0) -> Mechanism:
+        """A mechanism of this chain with random dimensions that go together, the same for the same seed.
+
+        `frame` is the number of the fixed link, `drive` that of the driven joint, or of as many as the chain has
+        freedoms; left out, the first that fit. Lengths are in mm; joint k of `edges` is the
+        letter k of the alphabet. A search looks for dimensions with which the first input turns fully, see
+        `planar.structures.linkage_search`; the mechanism's notes say whether it does, or between which positions it
+        runs. Raises BadInput for what does not drive the chain.
+
+        >>> import planar
+        >>> planar.chains(6)[0].mechanism(frame=2, drive=1, seed=1)
+        <Mechanism 'Watt I six-bar': 6 links, 7 pairs, driven at B>
+        """
+        from planar.structures.linkage_dimensions import Linkage
+        from planar.structures.linkage_search import find_linkage
+
+        fixed = range(self.links) if frame is None else (check_whole_number("frame", frame, 0, self.links - 1),)
+        given = None if drive is None else (drive,) if isinstance(drive, int) else tuple(drive)
+        wanted = given and tuple(sorted({check_whole_number("drive", each, 0, self.joints - 1) for each in given}))
+        found = next(self._drivable(fixed, wanted), None)
+        if found is None:
+            usable = next(self._drivable(fixed, None))
+            count = count_phrase(self.freedom, "joint")
+            raise BadInput("drive", f"{count} wanted that drive all links, as {usable[1]} with link {usable[0]} fixed")
+        frame, drives = found
+        name = self.inversion_name(frame) or self.name
+        number = "" if self.number is None else f" {self.number}"
+        name = name or f"Chain{number} of {self.links} links, link {frame} fixed"
+        return find_linkage(Linkage(self.edges, frame, drives), check_whole_number("seed", seed, 0), name)
+
+    def _drivable(self, frames: Iterable[int], wanted: tuple[int, ...] | None) -> Iterator[tuple[int, tuple[int, ...]]]:
+        """Fixed links with joints that drive all links: those that are wanted, else any on the fixed link."""
+        for frame in frames:
+            usable = [number for number, joint in enumerate(self.edges) if frame in joint]
+            for drives in combinations(usable, self.freedom) if wanted is None else (wanted,):
+                if assur_groups(self.links, self.edges, frame, drives) is not None:
+                    yield frame, drives
 
     def describe(self) -> str:
         """A sentence that tells links, joints, loops and freedom."""
