@@ -18,15 +18,12 @@ def check_steps(steps: object) -> int:
 
 def check_whole_number(name: str, value: object, least: int, most: int | None = None) -> int:
     """A whole number from `least` on, up to `most` if there is one. Raises BadInput."""
-    if (
-        isinstance(value, bool)
-        or not isinstance(value, Integral)
-        or value < least
-        or (most is not None and value > most)
-    ):
+    is_whole = isinstance(value, Integral) and not isinstance(value, bool)
+    number = int(value) if isinstance(value, Integral) else least
+    if not is_whole or number < least or (most is not None and number > most):
         to = "on" if most is None else f"to {most}"
         raise BadInput(name, f"a whole number from {least} {to} is wanted, not {value!r:.40}")
-    return int(value)
+    return number
 
 
 def check_number(name: str, value: object, most: float, unit: str = "rad or m") -> None:

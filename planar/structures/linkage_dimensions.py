@@ -17,6 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from planar.foundation.arrays import Array
+from planar.model.pin_linkage import turning_pair_type
 
 SPREADS = 16
 """Random places of all joints, of which those are taken that lie farthest apart."""
@@ -94,7 +95,7 @@ def linkage_document(linkage: Linkage, places: Array, name: str) -> dict[str, An
         named[link], axes[link] = "".join(names[k] for k in own), degrees(atan2(along[1], along[0]))
         links[named[link]] = _link_entry([names[k] for k in own], places[own])
     inputs: list[dict[str, Any]] = []
-    pairs: list[dict[str, Any]] = [{"turning": each} for each in names]
+    pairs: list[dict[str, Any]] = [{turning_pair_type().keyword: each} for each in names]
     for drive in linkage.drives:
         second = linkage.driven_link(drive)
         first = next(each for each in linkage.joints[drive] if each != second)
@@ -134,8 +135,7 @@ def crossings(linkage: Linkage, places: Array) -> int:
     """How often bars cross in a drawing: that of sides of links that share no joint."""
     sides = [pair for link in range(linkage.link_count) for pair in combinations(linkage.joints_of(link), 2)]
     return sum(
-        not {*one} & {*other} and _cross(*places[[*one]], *places[[*other]])  # type: ignore[misc]
-        for one, other in combinations(sides, 2)
+        not {*one} & {*other} and _cross(*places[[*one]], *places[[*other]]) for one, other in combinations(sides, 2)
     )
 
 

@@ -36,8 +36,8 @@ def find_linkage(linkage: Linkage, seed: int, name: str) -> Mechanism:
         places = candidate_places([linkage] * CANDIDATES, random)
         mechanisms = [from_dict(linkage_document(linkage, each, name)) for each in places]
         found = sweep_each(mechanisms, STEPS, pair=mechanisms[0].inputs[0].pair)
-        whole = np.flatnonzero(found.whole)
-        for k in whole[np.argsort([-_merit(found[j], linkage, places[j]) for j in whole], kind="stable")]:
+        whole = np.flatnonzero(found.whole).tolist()
+        for k in sorted(whole, key=lambda j: -_merit(found[j], linkage, places[j])):
             if _range(mechanisms[k]) is None:
                 return _with_note(mechanisms[k], "turns fully")
         shares = [float(np.mean(np.asarray(found[k].status) == 0)) for k in range(len(mechanisms))]

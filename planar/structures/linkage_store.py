@@ -30,18 +30,22 @@ class DataSetPlan(NamedTuple):
     """What a data set holds: the same plan makes the same linkages."""
 
     links: int
-    count: int
+    linkages: int
     steps: int
     seed: int
 
     @property
     def block_count(self) -> int:
         """How many blocks there are."""
-        return -(-self.count // BLOCK_SIZE)
+        return -(-self.linkages // BLOCK_SIZE)
 
     def part(self, block: int) -> slice:
         """The linkages of a block."""
-        return slice(block * BLOCK_SIZE, min((block + 1) * BLOCK_SIZE, self.count))
+        return slice(block * BLOCK_SIZE, min((block + 1) * BLOCK_SIZE, self.linkages))
+
+    def size(self, block: int) -> int:
+        """How many linkages a block has."""
+        return self.part(block).stop - self.part(block).start
 
 
 def generate(  # many: the public signature
@@ -66,6 +70,11 @@ def generate(  # many: the public signature
     goes on where it was interrupted. The same numbers and `seed` give the same linkages, in `workers` threads or by an
     `executor` of concurrent.futures' kind; `progress` is called with how many there are, and how many there will be.
     Raises BadInput where the folder holds something else, and where Zarr is missing.
+
+    >>> import tempfile, planar
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     print(planar.generate(f"{folder}/four-bars.zarr", links=4, count=10, steps=12)[3])
+    <Mechanism 'Linkage 3: chain 0 of 4 links, link 0 fixed, joint 0 driven': 4 links, 4 pairs, driven at P0>
     """
     check_whole_number("links", links, 4, MAX_LINKS)
     check_whole_number("count", count, 1)
@@ -76,33 +85,30 @@ def generate(  # many: the public signature
     threads = thread_count(workers, executor)
     plan = DataSetPlan(int(links), int(count), int(steps), int(seed))
     made = LinkageSet(_open_group(Path(store), plan), plan, Path(store))
-    tasks = ((block, (plan, block)) for block in range(plan.block_count) if not made.has_block(block))
-    done = plan.count - sum(_size(plan, block) for block in range(plan.block_count) if not made.has_block(block))
+    left = [block for block in range(plan.block_count) if not made.has_block(block)]
+    done = plan.linkages - sum(map(plan.size, left))
     if progress:
-        progress(done, plan.count)
-    for block, linkages in run_tasks(threads, executor, solve_block, tasks, lambda _, task: solve_block(task)):
+        progress(done, plan.linkages)
+    for block, linkages in run_tasks(
+        threads, executor, solve_block, ((block, (plan, block)) for block in left), lambda _, task: solve_block(task)
+    ):
         made.write_block(block, linkages)
-        done += _size(plan, block)
+        done += plan.size(block)
         if progress:
-            progress(done, plan.count)
+            progress(done, plan.linkages)
     return made
 
 
 def solve_block(task: tuple[DataSetPlan, int]) -> SolvedLinkages:
     """The linkages of a block, by a plan and the block's number."""
     plan, block = task
-    return random_linkages(plan.links, _size(plan, block), plan.steps, (plan.seed, plan.links, block))
-
-
-def _size(plan: DataSetPlan, block: int) -> int:
-    part = plan.part(block)
-    return part.stop - part.start
+    return random_linkages(plan.links, plan.size(block), plan.steps, (plan.seed, plan.links, block))
 
 
 class LinkageSet(Sequence[Mechanism]):
     """A data set of linkages: one of them, by its number, is a mechanism.
 
-    `chain`, `frame` and `drive` (linkages,) are numbers of `planar.chains(links)` and of links and joints there;
+    `chain_number`, `frame` and `drive` (linkages,) are numbers of `planar.chains(links)` and of links and joints there;
     `start` (linkages, pins, 2) is where the joints stand, in their order, and behind them a coupler point on link
     `coupler_link`; `path` (linkages, steps + 1, pins, 2) all their places over a turn of the crank, in single
     precision. Lengths have no unit: joints lie in a square of side 2 about. Arrays are read from the folder as they are
@@ -114,10 +120,10 @@ class LinkageSet(Sequence[Mechanism]):
 
     def __repr__(self) -> str:
         plan = self._plan
-        return f"<LinkageSet of {plan.count} linkages of {plan.links} links at {plan.steps + 1} positions>"
+        return f"<LinkageSet of {plan.linkages} linkages of {plan.links} links at {plan.steps + 1} positions>"
 
     def __len__(self) -> int:
-        return self._plan.count
+        return self._plan.linkages
 
     @property
     def links(self) -> int:
@@ -125,9 +131,9 @@ class LinkageSet(Sequence[Mechanism]):
         return self._plan.links
 
     @property
-    def chain(self) -> Any:
+    def chain_number(self) -> Any:
         """(linkages,)"""
-        return self._group["chain"]
+        return self._group["chain_number"]
 
     @property
     def frame(self) -> Any:
@@ -162,7 +168,7 @@ class LinkageSet(Sequence[Mechanism]):
         if isinstance(index, slice):
             return tuple(self[k] for k in range(*index.indices(len(self))))
         row = range(len(self))[index]
-        chain, frame, drive = (int(each[row]) for each in (self.chain, self.frame, self.drive))
+        chain, frame, drive = (int(each[row]) for each in (self.chain_number, self.frame, self.drive))
         linkage = next(
             each.linkage
             for each in structures(self.links)
@@ -193,7 +199,7 @@ class LinkageSet(Sequence[Mechanism]):
         part, known = self._plan.part(block), structures(self.links)
         found = [known[k] for k in linkages.structure]
         with reporting_write_errors(self.folder):
-            self._group["chain"][part] = [each.chain for each in found]
+            self._group["chain_number"][part] = [each.chain for each in found]
             self._group["frame"][part] = [each.linkage.frame for each in found]
             self._group["drive"][part] = [each.linkage.drives[0] for each in found]
             self._group["coupler_link"][part] = linkages.coupler_link
@@ -226,7 +232,7 @@ def _open_group(folder: Path, plan: DataSetPlan) -> Any:
     pins = len(first.joints) + 1
     chains = {str(each.chain): each.linkage.joints for each in structures(plan.links)}
     shapes: dict[str, tuple[tuple[int, ...], str]] = {
-        **dict.fromkeys(("chain", "frame", "drive", "coupler_link"), ((), "int32")),
+        **dict.fromkeys(("chain_number", "frame", "drive", "coupler_link"), ((), "int32")),
         "start": ((pins, 2), "float64"),
         "path": ((plan.steps + 1, pins, 2), "float32"),
     }
@@ -235,7 +241,7 @@ def _open_group(folder: Path, plan: DataSetPlan) -> Any:
         for name, (shape, dtype) in shapes.items():
             group.create_array(
                 name,
-                shape=(plan.count, *shape),
+                shape=(plan.linkages, *shape),
                 chunks=(BLOCK_SIZE, *shape),
                 dtype=dtype,
                 compressors=(ZstdCodec(), Crc32cCodec()),

@@ -8,8 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.batch.pinned.whole_turns import run_whole_turns
-from planar.foundation.arrays import Array
+from planar.batch.whole_turns import run_whole_turns
+from planar.foundation.arrays import Array, IntArray
 from planar.foundation.errors import NoAnswer, Outcome
 from planar.model.pin_linkages import PinnedLinkages, pinned_linkages
 from planar.structures.linkage_dimensions import Linkage, candidate_places
@@ -33,9 +33,9 @@ class SolvedLinkages(NamedTuple):
     """Linkages with the numbers of their structures, where their pins stand at the start (linkages, pins, 2), of which
     the last is the coupler point, on which link that is, and the paths of all pins (linkages, steps + 1, pins, 2)."""
 
-    structure: Array
+    structure: IntArray
     start: Array
-    coupler_link: Array
+    coupler_link: IntArray
     path: Array
 
 

@@ -65,7 +65,7 @@ LIBRARIES = {
     "imageio_ffmpeg": {"drawing"},
     "click": {"cli"},
     "pyarrow": {"batch", "reports"},
-    "zarr": {"batch"},
+    "zarr": {"batch", "structures"},
     "xarray": {"reports"},
 }
 MOST_FILES, MOST_LINES, LONGEST_FUNCTION, MOST_PARAMETERS = 16, 400, 60, 8

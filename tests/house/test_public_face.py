@@ -13,6 +13,7 @@ from importlib import import_module
 from importlib.util import find_spec
 from multiprocessing import get_context
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import click
 import numpy as np
@@ -36,6 +37,7 @@ DRAWINGS = {name: getattr(planar.plot, name) for name in planar.plot.__all__}
 CLASSES = {name: each for name in planar.__all__ if inspect.isclass(each := getattr(planar, name))}
 FREE = {
     "chains",
+    "generate",
     "schema",
     "build",
     "pinned",
@@ -122,6 +124,8 @@ def results():
     slopes = planar.sensitivity(motion, "stroke")
     yield from (slopes, slopes.travel, slopes.travel.ends[0], slopes.influences("displacement")[0], slopes.transmission)
     yield from (planar.chains(8), chain := planar.chains(6)[0], chain.mechanisms()[0], chain.symmetry)
+    with TemporaryDirectory() as folder:
+        yield planar.generate(f"{folder}/four-bars.zarr", links=4, count=2, steps=4)
     yield from (planar.BadInput("here", "wrong"), planar.Unknown("no such point"), planar.Outcome.SOLVED)
     yield planar.NoAnswer(planar.Outcome.DEAD_POINT, "it stops", links=["a"])
 

@@ -35,7 +35,7 @@ def test_every_linkage_turns_fully_and_its_paths_are_those_of_its_mechanism(link
 def test_links_keep_their_shapes_and_the_structure_is_that_of_the_chain(linkages):
     chains = planar.chains(6)
     for k in range(0, 60, 7):
-        chain, path = chains[int(linkages.chain[k])], linkages.path[k].astype(float)
+        chain, path = chains[int(linkages.chain_number[k])], linkages.path[k].astype(float)
         for link in range(6):
             own = [joint for joint, edge in enumerate(chain.edges) if link in edge]
             own += [7] * int(link == linkages.coupler_link[k])
@@ -73,7 +73,7 @@ def test_what_was_interrupted_goes_on_and_is_the_same_by_whatever_workers(tmp_pa
         )
     assert begun[0] == (20, 70)
     assert begun[-1] == (70, 70)
-    for name in ("chain", "frame", "drive", "coupler_link", "start", "path"):
+    for name in ("chain_number", "frame", "drive", "coupler_link", "start", "path"):
         np.testing.assert_array_equal(getattr(again, name)[:], getattr(whole, name)[:])
     other = planar.generate(tmp_path / "c.zarr", links=4, count=70, steps=12, seed=3, workers=1)
     assert np.any(other.start[:] != whole.start[:])
