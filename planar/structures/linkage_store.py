@@ -45,7 +45,7 @@ class DataSetPlan(NamedTuple):
 
     def size(self, block: int) -> int:
         """How many linkages a block has."""
-        return self.part(block).stop - self.part(block).start
+        return min(BLOCK_SIZE, self.linkages - block * BLOCK_SIZE)
 
 
 def generate(  # many: the public signature
