@@ -4,7 +4,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from planar.foundation.notebook_display import Displayable
-from planar.foundation.public_names import MODULES
+from planar.foundation.public_names import LAYERS, MODULES
 from planar.model.revision import Revisable
 
 if TYPE_CHECKING:
@@ -340,6 +340,8 @@ Displayable.presenter, Revisable.reviser = _present, _revise
 
 
 def __getattr__(name: str) -> Any:
+    if name in LAYERS:
+        return import_module(f"planar.{name}")
     if name not in MODULES:
         raise AttributeError(f"module 'planar' has no attribute {name!r}")
     module = import_module(f"planar.{MODULES[name]}")

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypedDict
 
 import numpy as np
 
+from planar.batch.design_arrays import design_variables
 from planar.batch.gradients.run_gradient import RunGradient, RunWeights, read_names, read_weights
 from planar.batch.prepare.kept_results import KeptPoints, LateSentences
 from planar.batch.prepare.native_run import NativeRuns, prepare_native_run
@@ -176,6 +177,14 @@ class PreparedSweep:
         )
         every = dict(zip(gradients.names, slopes, strict=True))
         return RunGradient(value, every if of is None else {name: every[name] for name in names}, status)
+
+    @property
+    def derivative_values(self) -> dict[str, float | None]:
+        """The numbers in which `gradient` has derivatives, as the file has them (SI); None those that cannot change
+        alone. Raises BadInput where derivatives are not told of the structure."""
+        known = design_variables(self.mechanism)
+        bound = self._gradients.bound
+        return {name: None if name in bound else known[name].value for name in self._gradients.names if name in known}
 
     @cached_property
     def _gradients(self) -> RunGradients:

@@ -200,3 +200,5 @@ MODULES = {
     "view": "pages.view",
 }
 """The module of a name, behind `planar.`; a name that is a module is its own."""
+LAYERS = ("jax", "torch")
+"""Modules for libraries that are no part of planar's own; each is loaded only when it is asked for."""

@@ -26,7 +26,7 @@ FLOORS = (
     {"structures"},
     {"analysis", "bench"},
     {"drawing", "reports"},
-    {"pages", "plot", "guide"},
+    {"pages", "plot", "guide", "torch", "jax"},
     {"cli"},
     {"__main__"},
 )
@@ -66,6 +66,8 @@ LIBRARIES = {
     "click": {"cli"},
     "pyarrow": {"batch", "reports"},
     "zarr": {"batch", "structures"},
+    "torch": {"torch"},
+    "jax": {"jax"},
     "xarray": {"reports"},
 }
 MOST_FILES, MOST_LINES, LONGEST_FUNCTION, MOST_PARAMETERS = 16, 400, 60, 8

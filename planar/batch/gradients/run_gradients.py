@@ -24,7 +24,8 @@ MAX_KEPT_SUMS = 8
 class RunGradients:
     """Gradients over the positions (steps + 1,) of a run that starts and stops by itself (None) or where it is told.
 
-    `names`: the numbers by which there are derivatives. Raises BadInput where derivatives are not told of a structure.
+    `names`: the numbers by which there are derivatives; `bound`: those that cannot change alone. Raises BadInput where
+    derivatives are not told of a structure.
     """
 
     def __init__(
@@ -41,11 +42,11 @@ class RunGradients:
                 "stop", "a slide runs between limits that change with the design; give start and stop for derivatives"
             )
         self._general = GeneralGradients(reference, points, rates)
-        self.names = self._general.names
+        self.names, self.bound = self._general.names, self._general.bound
         self._positions, self._range = positions, (start, stop)
         self._width = 0
         self._native: dict[tuple[int, ...], NativeRuns | None] = {}
-        self._bound = [k for k, name in enumerate(self.names) if name in self._general.bound]
+        self._bound = [k for k, name in enumerate(self.names) if name in self.bound]
         self._solved = np.zeros(len(positions), dtype=np.int8)
         self._solved.flags.writeable = False
 

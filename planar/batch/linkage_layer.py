@@ -1,0 +1,98 @@
+"""A linkage as a function of some of its numbers with its derivative, for libraries that learn and optimise."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from planar.batch.gradients.run_gradient import ORDERS, read_names
+from planar.batch.prepared import prepared
+from planar.foundation.arrays import Array, BoolArray
+from planar.foundation.errors import BadInput
+
+
+class LayerRange(NamedTuple):
+    """Where the running input starts and stops (rad or m; None: by itself), and its pair; see `planar.prepared`."""
+
+    start: float | None = None
+    stop: float | None = None
+    pair: str | None = None
+
+
+class LinkageLayer:
+    """The runs of one linkage for many designs at once, and the derivatives of weighed sums of what they tell.
+
+    `free`: the numbers that designs differ in, by name; `file_values` (free,) those of the file (SI). `orders`: what is
+    told, positions alone or with velocities and accelerations. Raises BadInput.
+    """
+
+    def __init__(  # many: what a layer is made of
+        self,
+        mechanism: Any,
+        free: Sequence[str] | str,
+        points: Sequence[str] | str | None,
+        steps: int,
+        rates: bool,
+        over: LayerRange,
+    ):
+        self._runs = prepared(mechanism, steps, points, rates=rates, **over._asdict())
+        known = self._runs.derivative_values
+        self.free = read_names(free, known)
+        if not self.free:
+            raise BadInput("free", "name the numbers that are free, as free=['BC.length']")
+        for name in self.free:
+            if known[name] is None:
+                raise BadInput("free", f"{name!r} cannot change alone: others have to go with it")
+        self.file_values = np.array([known[name] for name in self.free])
+        self.points, self.orders = self._runs.points, ORDERS if rates else ORDERS[:1]
+        self.result_shape = (steps + 1, *([len(self.points)] if len(self.points) > 1 else []), 2)
+        "of one design: positions, then points where there are several, then x and y"
+
+    def __repr__(self) -> str:
+        shown = ", ".join(self.free)
+        return f"{self._runs.mechanism.name!r}: {self.result_shape[0]} positions of {', '.join(self.points)} by {shown}"
+
+    def run(self, values: Array) -> tuple[list[Array], BoolArray]:
+        """What the runs of designs (..., free) tell, an array (..., *result_shape) for each order, and which positions
+        are solved (..., steps + 1). What is not solved is 0."""
+        designs = np.asarray(values, dtype=float).reshape(-1, len(self.free))
+        found = np.zeros((len(self.orders), len(designs), self.result_shape[0], len(self.points), 2))
+        solved = np.zeros((len(designs), self.result_shape[0]), dtype=bool)
+        for k, design in enumerate(designs):
+            if np.isfinite(design).all():
+                told = self._runs(self._by_name(design))
+                for order, name in enumerate(self.orders):
+                    for number, point in enumerate(self.points):
+                        found[order, k, :, number] = getattr(told, name)[point]
+                solved[k] = told.status == 0
+        solved &= np.isfinite(found).all(axis=(0, 3, 4))
+        found[:, ~solved] = 0.0
+        lead = np.shape(values)[:-1]
+        return [each.reshape(*lead, *self.result_shape) for each in found], solved.reshape(*lead, self.result_shape[0])
+
+    def pull_back(self, values: Array, weights: Sequence[Array]) -> Array:
+        """The derivatives (..., free) of the sum of what is told times weights, one array for each order as `run` has
+        them. Positions that are not solved bring nothing."""
+        designs = np.asarray(values, dtype=float).reshape(-1, len(self.free))
+        shape = (len(designs), self.result_shape[0], len(self.points), 2)
+        given = [np.asarray(each, dtype=float).reshape(shape) for each in weights]
+        found = np.zeros(designs.shape)
+        for k, design in enumerate(designs):
+            if np.isfinite(design).all():
+                weighed = {
+                    order: {point: each[k, :, number] for number, point in enumerate(self.points)}
+                    for order, each in zip(self.orders, given, strict=True)
+                }
+                slopes = self._runs.gradient(weighed, self._by_name(design)).derivatives
+                found[k] = [slopes[name] for name in self.free]
+        return found.reshape(np.shape(values))
+
+    def check_shape(self, shape: Sequence[int]) -> None:
+        """Refuse values that are not (..., free). Raises BadInput."""
+        if not shape or shape[-1] != len(self.free):
+            raise BadInput("values", f"an array (..., {len(self.free)}) of {', '.join(self.free)} is wanted here")
+
+    def _by_name(self, design: Array) -> Mapping[str, float]:
+        return dict(zip(self.free, design.tolist(), strict=True))
