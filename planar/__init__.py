@@ -120,6 +120,7 @@ if TYPE_CHECKING:
     from planar.structures.chain import Chain, ChainMechanism
     from planar.structures.chains import Chains, chains
     from planar.structures.linkage_store import LinkageSet, generate
+    from planar.structures.recognition import MechanismStructure, chain_of
     from planar.structures.symmetry import ChainSymmetry
 
 __version__ = "0.16.0"
@@ -203,6 +204,7 @@ __all__ = [
     "Mass",
     "MassBalance",
     "Mechanism",
+    "MechanismStructure",
     "Mobility",
     "Mode",
     "Modes",
@@ -270,6 +272,7 @@ __all__ = [
     "centre_of",
     "centres",
     "centrodes",
+    "chain_of",
     "chains",
     "circuits",
     "conflict",

@@ -4,10 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from planar.foundation.errors import BadInput
+
 Counts = tuple[tuple[int, ...], ...]
 """Between each two vertices how many edges there are, symmetric; on the diagonal how many begin and end there."""
 Numbering = tuple[int, ...]
 """The vertices in the order in which they are numbered."""
+
+MAX_NUMBERINGS = 20_000
+"""So many beginnings of a numbering are followed side by side."""
 
 
 def greatest_numberings(counts: Counts, ranks: Sequence[int]) -> tuple[tuple[int, ...], list[Numbering]]:
@@ -17,6 +22,8 @@ def greatest_numberings(counts: Counts, ranks: Sequence[int]) -> tuple[tuple[int
     words compare as those of a dictionary. Any two of the numberings differ by an automorphism that keeps the ranks,
     and every such automorphism is had so. A row fixes the next vertex and parts the others by their edges with it:
     only what begins with the greatest rows is followed.
+
+    Raises BadInput where that are very many, as in graphs of dozens of vertices that are alike.
     """
     cells = tuple(tuple(v for v, own in enumerate(ranks) if own == rank) for rank in sorted({*ranks}, reverse=True))
     states: list[tuple[Numbering, tuple[Numbering, ...]]] = [((), cells)]
@@ -31,6 +38,8 @@ def greatest_numberings(counts: Counts, ranks: Sequence[int]) -> tuple[tuple[int
                     best, following = row, []
                 if row == best:
                     following.append(((*done, vertex), parted))
+        if len(following) > MAX_NUMBERINGS:
+            raise BadInput("links", "the chain has too many links that can stand for one another to be numbered")
         states = following
         word += best
     return tuple(word), [done for done, _ in states]

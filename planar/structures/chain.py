@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from itertools import combinations
+from itertools import combinations, islice
 from typing import NamedTuple
 
 from planar.foundation.errors import BadInput
@@ -15,15 +15,18 @@ from planar.model.run_arguments import check_whole_number
 from planar.model.wording import count_phrase
 from planar.structures.assur_groups import AssurGroup, assur_groups
 from planar.structures.chain_names import chain_name, inversion_names
+from planar.structures.contraction import automorphisms
 from planar.structures.rigid_parts import Joint
 from planar.structures.symmetry import (
     Automorphism,
     ChainSymmetry,
-    automorphisms,
     chain_symmetry,
     joint_exchanges,
     neighbour_sets,
 )
+
+MAX_AUTOMORPHISMS = 20_000
+"""A chain that has more is too regular for its links to be told apart one by one."""
 
 
 class ChainMechanism(NamedTuple):
@@ -101,11 +104,15 @@ class Chain:
     @cached_property
     def symmetry(self) -> ChainSymmetry:
         """Its automorphisms: how many, and which links and which joints they exchange."""
-        return chain_symmetry(self.links, self.edges, self._automorphisms)
+        return chain_symmetry(self.links, self.edges, self.automorphisms)
 
     @cached_property
-    def _automorphisms(self) -> tuple[Automorphism, ...]:
-        return tuple(automorphisms(self.links, self.edges))
+    def automorphisms(self) -> tuple[Automorphism, ...]:
+        """Every exchange of its links that keeps its joints: which link stands in the place of each."""
+        found = tuple(islice(automorphisms(self.links, self.edges), MAX_AUTOMORPHISMS + 1))
+        if len(found) > MAX_AUTOMORPHISMS:
+            raise BadInput("links", f"the chain can be exchanged with itself in more than {MAX_AUTOMORPHISMS} ways")
+        return found
 
     @property
     def inversions(self) -> tuple[int, ...]:
@@ -115,8 +122,8 @@ class Chain:
     def mechanisms(self, moving_drives: bool = False) -> tuple[ChainMechanism, ...]:
         """All choices of a fixed link and of driven joints, as many as the freedom, that differ up to isomorphism.
 
-        Driven joints are on the fixed link; with `moving_drives` they may also be between moving links, as cylinders
-        are. Drives of which one only moves what others move already are left out.
+        Driven joints are on the fixed link; with `moving_drives` those follow in which some are between moving links,
+        as cylinders are. Drives of which one only moves what others move already are left out.
 
         >>> import planar
         >>> for each in planar.chains(6)[0].mechanisms():
@@ -127,11 +134,12 @@ class Chain:
         2 (5,) Watt I six-bar
         """
         found = []
-        for frame in self.inversions:
-            for drives in self._drive_sets(frame, moving_drives):
-                groups = assur_groups(self.links, self.edges, frame, drives)
-                if groups is not None:
-                    found.append(ChainMechanism(frame, drives, self.inversion_name(frame), groups))
+        for moving in (False, True)[: 1 + moving_drives]:
+            for frame in self.inversions:
+                for drives in self._drive_sets(frame, moving):
+                    groups = assur_groups(self.links, self.edges, frame, drives)
+                    if groups is not None:
+                        found.append(ChainMechanism(frame, drives, self.inversion_name(frame), groups))
         return tuple(found)
 
     def inversion_name(self, frame: int) -> str:
@@ -140,15 +148,15 @@ class Chain:
         named = inversion_names(self.edges)
         return next((named[link] for link in orbit if link in named), "")
 
-    def _drive_sets(self, frame: int, moving_drives: bool) -> tuple[tuple[int, ...], ...]:
-        """Sets of joints, as many as the freedom, of those that can stand for one another the first."""
-        usable = [number for number, joint in enumerate(self.edges) if moving_drives or frame in joint]
-        keeping = joint_exchanges((each for each in self._automorphisms if each[frame] == frame), self.edges)
-        return tuple(
-            drives
-            for drives in combinations(usable, self.freedom)
-            if all(drives <= tuple(sorted(each[joint] for joint in drives)) for each in keeping)
-        )
+    def _drive_sets(self, frame: int, moving: bool) -> Iterator[tuple[int, ...]]:
+        """Sets of joints, as many as the freedom, all on the fixed link or not all; of alike ones the first."""
+        usable = [number for number, joint in enumerate(self.edges) if moving or frame in joint]
+        keeping = joint_exchanges((each for each in self.automorphisms if each[frame] == frame), self.edges)
+        for drives in combinations(usable, self.freedom):
+            if moving and all(frame in self.edges[joint] for joint in drives):
+                continue
+            if all(drives <= tuple(sorted(each[joint] for joint in drives)) for each in keeping):
+                yield drives
 
     def mechanism(self, frame: int | None = None, drive: int | Sequence[int] | None = None, seed: int = 0) -> Mechanism:
         """A mechanism of this chain with random dimensions that go together, the same for the same seed.

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import chain as joined
+from itertools import groupby, permutations, product
 from typing import NamedTuple
 
-from planar.structures.canonical_form import greatest_numberings
+from planar.structures.canonical_form import Counts, Numbering, greatest_numberings
 from planar.structures.contracted_graphs import ContractedGraph, vertex_degrees
 from planar.structures.rigid_parts import Joint
-from planar.structures.symmetry import neighbour_sets
+from planar.structures.symmetry import Automorphism, neighbour_sets
 
 
 class CanonicalChain(NamedTuple):
@@ -45,6 +46,39 @@ def _joints_of_paths(paths: Iterable[Sequence[int]]) -> tuple[Joint, ...]:
     return tuple(sorted((min(step), max(step)) for step in steps))
 
 
+class _Contraction(NamedTuple):
+    """The links with three and more joints, how many paths join each two, and those paths, longer ones first.
+
+    A path begins at the end whose place is lower, and holds its ends.
+    """
+
+    many: list[int]
+    counts: Counts
+    paths: dict[Joint, list[list[int]]]
+
+    def bundles(self, numbering: Sequence[int]) -> Iterator[list[list[int]]]:
+        """The paths between each two, in the order of the word for a numbering, from the lower to the higher number."""
+        for k, a in enumerate(numbering):
+            for b in numbering[k:]:
+                found = self.paths.get((min(a, b), max(a, b)), ())
+                yield [path if a <= b else path[::-1] for path in found]
+
+    def row(self, numbering: Sequence[int]) -> list[int]:
+        """How many binary links are on each edge."""
+        return [len(path) - 2 for bundle in self.bundles(numbering) for path in bundle]
+
+    def best_numberings(self) -> tuple[tuple[int, ...], list[Numbering]]:
+        """The greatest word, and those of its numberings that give the greatest row."""
+        word, numberings = greatest_numberings(self.counts, vertex_degrees(self.counts))
+        rows = [self.row(each) for each in numberings]
+        greatest = max(rows)
+        return word, [each for each, row in zip(numberings, rows, strict=True) if row == greatest]
+
+    def link_order(self, numbering: Sequence[int], paths: Iterable[Sequence[int]]) -> list[int]:
+        """All links in the order of their numbers, with the paths in an order that keeps the row."""
+        return [*(self.many[index] for index in numbering), *joined.from_iterable(path[1:-1] for path in paths)]
+
+
 def canonical_chain(links: int, joints: Sequence[Joint]) -> CanonicalChain:
     """A connected chain, each of whose links has two and more joints, in the numbering that all of its kind share.
 
@@ -52,10 +86,57 @@ def canonical_chain(links: int, joints: Sequence[Joint]) -> CanonicalChain:
     such numberings so that the numbers of binary links, edge by edge, make the greatest word.
     """
     beside = neighbour_sets(links, joints)
-    many = [link for link in range(links) if len(beside[link]) > 2]
-    if not many:
+    if max(map(len, beside)) == 2:
         order = _ring_order(beside)
         return CanonicalChain(ring_joints(links), tuple(order.index(link) for link in range(links)))
+    found = _contract(beside)
+    word, (best, *_) = found.best_numberings()
+    order = found.link_order(best, joined.from_iterable(found.bundles(best)))
+    number = {link: index for index, link in enumerate(order)}
+    named = sorted((min(pair), max(pair)) for pair in ((number[a], number[b]) for a, b in joints))
+    return CanonicalChain(tuple(named), tuple(number[link] for link in range(links)), word, tuple(found.row(best)))
+
+
+def automorphisms(links: int, joints: Sequence[Joint]) -> Iterator[Automorphism]:
+    """Every exchange of the links of a connected chain that keeps its joints, first that of none.
+
+    An automorphism of the contracted graph that keeps the row, with any order of paths that are equally long between
+    the same links, and any sense of a path that comes back to its link.
+    """
+    beside = neighbour_sets(links, joints)
+    if max(map(len, beside)) == 2:
+        ring = _ring_order(beside)
+        orders: Iterable[list[int]] = (
+            turned[k:] + turned[:k] for turned in (ring, ring[::-1]) for k in range(len(ring))
+        )
+        first = ring
+    else:
+        found = _contract(beside)
+        _, numberings = found.best_numberings()
+        orders = (
+            found.link_order(each, joined.from_iterable(paths))
+            for each in numberings
+            for paths in product(*map(_arrangements, found.bundles(each)))
+        )
+        first = found.link_order(numberings[0], joined.from_iterable(found.bundles(numberings[0])))
+    place = {link: index for index, link in enumerate(first)}
+    for order in orders:
+        yield tuple(order[place[link]] for link in range(links))
+
+
+def _arrangements(bundle: Sequence[Sequence[int]]) -> list[list[Sequence[int]]]:
+    """Orders and senses of the paths between two links that keep how long they are one after the other."""
+    ways: list[list[Sequence[int]]] = [[]]
+    for _, alike in groupby(bundle, key=len):
+        orders = [*permutations(alike)]
+        if bundle[0][0] == bundle[0][-1]:
+            orders = [turned for order in orders for turned in product(*((path, path[::-1]) for path in order))]
+        ways = [[*way, *order] for way in ways for order in orders]
+    return ways
+
+
+def _contract(beside: Sequence[set[int]]) -> _Contraction:
+    many = [link for link in range(len(beside)) if len(beside[link]) > 2]
     place = {link: index for index, link in enumerate(many)}
     counts = [[0] * len(many) for _ in many]
     paths: dict[Joint, list[list[int]]] = {}
@@ -67,22 +148,7 @@ def canonical_chain(links: int, joints: Sequence[Joint]) -> CanonicalChain:
         paths.setdefault((min(i, j), max(i, j)), []).append(path if i <= j else path[::-1])
     for bundle in paths.values():
         bundle.sort(key=len, reverse=True)
-    table = tuple(map(tuple, counts))
-    word, numberings = greatest_numberings(table, vertex_degrees(table))
-
-    def ordered(numbering: Sequence[int]) -> Iterator[list[int]]:
-        for k, a in enumerate(numbering):
-            for b in numbering[k:]:
-                for path in paths.get((min(a, b), max(a, b)), ()):
-                    yield path if a <= b else path[::-1]
-
-    best = max(numberings, key=lambda numbering: [len(path) for path in ordered(numbering)])
-    first = [many[index] for index in best]
-    order = [*first, *joined.from_iterable(path[1:-1] for path in ordered(best))]
-    number = {link: index for index, link in enumerate(order)}
-    named = sorted((min(pair), max(pair)) for pair in ((number[a], number[b]) for a, b in joints))
-    row = tuple(len(path) - 2 for path in ordered(best))
-    return CanonicalChain(tuple(named), tuple(number[link] for link in range(links)), word, row)
+    return _Contraction(many, tuple(map(tuple, counts)), paths)
 
 
 def _ring_order(beside: Sequence[set[int]]) -> list[int]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 from planar.structures.rigid_parts import Joint
@@ -30,43 +30,6 @@ def neighbour_sets(links: int, joints: Iterable[Joint]) -> list[set[int]]:
         found[a].add(b)
         found[b].add(a)
     return found
-
-
-def automorphisms(links: int, joints: Sequence[Joint]) -> Iterator[Automorphism]:
-    """Every way to exchange the links of a connected chain that keeps its joints.
-
-    Links are mapped one after the other, each beside one that has been, to a neighbour of that one's image with the
-    same joints to all that have been.
-    """
-    beside = neighbour_sets(links, joints)
-    order, earlier = [0], [0]
-    while len(order) < links:
-        link, before = next((end, at) for at in order for end in sorted(beside[at]) if end not in order)
-        order.append(link)
-        earlier.append(before)
-    image: dict[int, int] = {}
-
-    def choices(step: int) -> Iterator[int]:
-        link = order[step]
-        for end in sorted(beside[image[earlier[step]]]) if step else range(links):
-            if len(beside[end]) == len(beside[link]) and end not in image.values():
-                known = {image[each] for each in beside[link] if each in image}
-                if known == {each for each in beside[end] if each in image.values()}:
-                    yield end
-
-    waiting = [choices(0)]
-    while waiting:
-        step = len(waiting) - 1
-        image = {link: image[link] for link in order[:step]}
-        end = next(waiting[-1], None)
-        if end is None:
-            waiting.pop()
-            continue
-        image[order[step]] = end
-        if step + 1 < links:
-            waiting.append(choices(step + 1))
-        else:
-            yield tuple(image[link] for link in range(links))
 
 
 def orbits(size: int, exchanges: Iterable[Sequence[int]]) -> tuple[tuple[int, ...], ...]:

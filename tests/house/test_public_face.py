@@ -126,6 +126,7 @@ def results():
     yield from (planar.chains(8), chain := planar.chains(6)[0], chain.mechanisms()[0], chain.symmetry)
     with TemporaryDirectory() as folder:
         yield planar.generate(f"{folder}/four-bars.zarr", links=4, count=2, steps=4)
+    yield planar.chain_of("four-bar")
     yield from (planar.BadInput("here", "wrong"), planar.Unknown("no such point"), planar.Outcome.SOLVED)
     yield planar.NoAnswer(planar.Outcome.DEAD_POINT, "it stops", links=["a"])
 

@@ -26,6 +26,7 @@ from planar.model.wording import count_phrase, join_all_names
 from planar.results.motion import Motion
 from planar.solving.cycle import cycle
 from planar.solving.position import solve
+from planar.structures.recognition import MechanismStructure, chain_of
 
 LINK_ORDERS = ("single", "unary", "binary", "ternary", "quaternary", "quinary")
 RUN_STEPS = 120
@@ -58,7 +59,8 @@ class Inspection:
 
     `pairs`: of every type the pairs by the numbers of their links, as ("turning", ("O-1", "1-2")); `lower` and `higher`
     how many; `is_mechanism` and `is_linkage` with the reasons. `actions` are its loads, springs and masses; `remarks`
-    say of which of them another link might have been meant. `dimensions` are all numbers of its file, by name, `units`
+    say of which of them another link might have been meant. `structure` is the kinematic chain, None where it is none
+    of lower pairs alone; `structure_reason` then says why. `dimensions` are all numbers of its file, by name, `units`
     the unit in which each kind of quantity is shown, where the file asks for other than metres, newtons and the like.
     """
 
@@ -78,6 +80,8 @@ class Inspection:
     linkage_reason: str
     actions: tuple[ActionDescription, ...]
     remarks: tuple[str, ...]
+    structure: MechanismStructure | None
+    structure_reason: str
     dimensions: dict[str, NumberDescription]
     units: dict[str, str]
 
@@ -110,6 +114,7 @@ def inspect(mechanism: Mechanism) -> Inspection:
     closed = all(orders[link.name] > 1 for link in mechanism.links)
     is_mechanism, why = _judge_mechanism(mechanism, found, trouble)
     words = pair_labels_by_type(mechanism)
+    structure, no_structure = _find_structure(mechanism)
     return Inspection(
         name=mechanism.name,
         names=mechanism_names(mechanism),
@@ -127,9 +132,18 @@ def inspect(mechanism: Mechanism) -> Inspection:
         linkage_reason=_linkage_reason(is_mechanism, higher),
         actions=describe_actions(mechanism),
         remarks=attachment_remarks(mechanism),
+        structure=structure,
+        structure_reason=no_structure,
         dimensions={name: _describe_number(mechanism, each) for name, each in file_dimensions(mechanism).items()},
         units=_shown_units(mechanism),
     )
+
+
+def _find_structure(mechanism: Mechanism) -> tuple[MechanismStructure | None, str]:
+    try:
+        return chain_of(mechanism), ""
+    except BadInput as problem:
+        return None, problem.sentence
 
 
 def _shown_units(mechanism: Mechanism) -> dict[str, str]:

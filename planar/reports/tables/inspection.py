@@ -11,6 +11,7 @@ from planar.analysis.identity.inspection import Inspection
 from planar.model.wording import count_phrase, join_all_names
 from planar.reports.fitted_table import plain_table
 from planar.reports.number_format import paragraphs
+from planar.reports.tables.design.structures import joint_text
 
 
 def inspection_tables(found: Inspection) -> RenderableType:
@@ -21,6 +22,7 @@ def inspection_tables(found: Inspection) -> RenderableType:
     said = [
         ("name", "; ".join(found.names) or "none that the field has for it"),
         ("kinematic chain", "closed" if found.closed else "open: some links have one pair only"),
+        *_structure_facts(found),
         ("mechanism", f"{'yes' if found.is_mechanism else 'no'}: {found.mechanism_reason}"),
         ("linkage", f"{'yes' if found.is_linkage else 'no'}: {found.linkage_reason}"),
         ("links", link_orders_text(found)),
@@ -57,6 +59,35 @@ def _actions_tables(found: Inspection) -> Iterator[RenderableType]:
         yield acting
     if found.remarks:
         yield paragraphs(("-", remark) for remark in found.remarks)
+
+
+def _structure_facts(found: Inspection) -> list[tuple[str, str]]:
+    """Which chain it is of all there are, which link of it is fixed and which joint driven."""
+    known = found.structure
+    if known is None:
+        return [("structure", found.structure_reason)]
+    chain = known.chain
+    number = "" if chain.number is None else f" {chain.number}"
+    named = f" ({chain.name})" if chain.name else ""
+    of = f"{count_phrase(chain.links, 'link')} and freedom {chain.freedom}"
+    driven = join_all_names([joint_text(chain, joint) for joint in known.drives]) if known.drives else "none"
+    which = "" if known.number is None else f": mechanism {known.number} of the chain"
+    facts = [
+        f"chain{number} of those of {of}{named}, {count_phrase(chain.loops, 'loop')}",
+        f"its link {known.frame} is fixed, its joint {driven} driven{which}",
+    ]
+    if known.slides:
+        slides = join_all_names([joint_text(chain, joint) for joint in known.slides])
+        facts.append(f"its joint {slides} slides" if len(known.slides) == 1 else f"its joints {slides} slide")
+    if known.groups:
+        groups = [f"{', '.join(links)}{f' ({kind})' if kind else ''}" for links, kind in known.groups]
+        facts.append(f"Assur groups: {'; '.join(groups)}")
+    if known.multiple_pins:
+        others = [str(each.number) for each in known.others if each.number is not None]
+        more = f"; other choices give chain {join_all_names(others)}" if others else ""
+        pins = join_all_names(known.multiple_pins)
+        facts.append(f"at {pins} one link is taken as pinned to each other one{more}")
+    return [("structure" if not k else " ", fact) for k, fact in enumerate(facts)]
 
 
 def _mobility_facts(found: Inspection) -> list[tuple[str, str]]:
