@@ -73,7 +73,7 @@ def _structure_facts(found: Inspection) -> list[tuple[str, str]]:
     driven = join_all_names([joint_text(chain, joint) for joint in known.drives]) if known.drives else "none"
     which = "" if known.number is None else f": mechanism {known.number} of the chain"
     facts = [
-        f"chain{number} of those of {of}{named}, {count_phrase(chain.loops, 'loop')}",
+        f"kinematic chain{number} of those of {of}{named}, {count_phrase(chain.loops, 'loop')}",
         f"its link {known.frame} is fixed, its joint {driven} driven{which}",
     ]
     if known.slides:
