@@ -14,6 +14,7 @@ from planar.foundation.short_repr import short_repr
 
 ORDERS = ("position", "velocity", "acceleration")
 """What a run tells of its points, in the order of its rows."""
+DOUBLE = np.dtype(float)
 RunWeights = Mapping[str, Mapping[str, Any]]
 
 
@@ -41,14 +42,14 @@ class WeightRows(NamedTuple):
 
 def read_weights(weights: RunWeights, index: Mapping[str, int], rates: bool, count: int) -> WeightRows:
     """The weights (count, 2) of points, `index` the row of each point's x among the positions. Raises BadInput."""
-    if not isinstance(weights, Mapping) or not weights:
+    if not (type(weights) is dict or isinstance(weights, Mapping)) or not weights:
         raise BadInput("weights", "name what is weighed, with an array each, as {'position': {'C': weights}}")
     orders = ORDERS if rates else ORDERS[:1]
     wide, shape = 2 * len(index), (count, 2)
     rows: list[int] = []
     arrays: list[Array] = []
     for order, points in weights.items():
-        if order not in orders or not isinstance(points, Mapping):
+        if order not in orders or not (type(points) is dict or isinstance(points, Mapping)):
             raise _refuse_order(order, orders, rates)
         first = wide * ORDERS.index(order)
         for point, given in points.items():
@@ -57,7 +58,7 @@ def read_weights(weights: RunWeights, index: Mapping[str, int], rates: bool, cou
                 raise BadInput(f"weights[{order!r}]", f"the run was not prepared with the point {point!r:.60}{meant}")
             row = first + index[point]
             rows += (row, row + 1)
-            is_read = type(given) is np.ndarray and given.dtype == np.float64 and given.shape == shape
+            is_read = type(given) is np.ndarray and given.dtype is DOUBLE and given.shape == shape
             arrays.append(given if is_read else _read_array(given, f"weights[{order!r}][{point!r}]", shape))
     if not rows:
         raise BadInput("weights", "name the points that are weighed, with an array each")
