@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from math import pi
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
+import numpy as np
+
 from planar.foundation.geometry import Frame, Vector, direction, frame_at
 from planar.foundation.jets import Scalar
 from planar.model.entry_reader import EntryReader, QuantityWriter
@@ -264,20 +266,19 @@ class ProfiledPair(Pair):
         own, (cam, follower) = [shapes[body] for body in self.bodies], self.links
         at_centre, middle = shapes[cam].position(self.shape.centre), shapes[follower].position(self.point)
         along_face = self._along_face(shapes, all_pairs)
-        profile, face = [], [middle]
-        for k in range(DRAWN_POINTS):
-            angle = 2.0 * pi * k / (DRAWN_POINTS - 1)
-            touching = self.contact(own, angle)
-            assert touching is not None
-            profile.append(at_centre + touching.point.rotate(direction(-(self.start + self.sense * angle))))
-            if along_face is not None:
-                reach = turn_left(touching.normal).dot(touching.point - touching.middle)
-                face.append(middle + along_face * (DRAWN_FACE_RATIO * reach))
+        angles = np.linspace(0.0, 2.0 * pi, DRAWN_POINTS)
+        touching = self.contact(own, angles)
+        assert touching is not None
+        outline = touching.point.rotate(direction(-(self.start + self.sense * angles)))
         if self.profile_by_points is not None:
-            x, y = self.profile_by_points.outline(DRAWN_POINTS).T
-            profile = [at_centre + Vector(float(px), float(py)) for px, py in zip(x, y, strict=True)]
+            outline = Vector(*self.profile_by_points.outline(DRAWN_POINTS).T)
+        profile = [at_centre + each for each in _vectors(outline)]
+        face: list[Vector] = []
+        if along_face is not None:
+            reach = turn_left(touching.normal).dot(touching.point - touching.middle)
+            face = [middle, *(middle + each for each in _vectors(along_face * (DRAWN_FACE_RATIO * reach)))]
         radius = self.shape.roller_radius
-        return (CamMark(self.name, cam, at_centre, tuple(profile), follower, middle, radius, tuple(face[1:] and face)),)
+        return (CamMark(self.name, cam, at_centre, tuple(profile), follower, middle, radius, tuple(face)),)
 
     def _along_face(self, shapes: Mapping[str, LinkShape], all_pairs: Sequence[Pair]) -> Vector | None:
         """The direction of a flat face, to the left of its normal, in the follower's axes; None where it is not."""
@@ -298,6 +299,11 @@ class ProfiledPair(Pair):
         open_by = guide.residual([still] * len(guide.bodies), numbers, [0.0] * len(guide.coordinate_kinds))
         turned = -1.0 * open_by[guide.residual_kinds.index(MeasureKind.ANGLE)]
         return turned if guide.links[0] == self.carrier else -1.0 * turned
+
+
+def _vectors(rows: Vector) -> list[Vector]:
+    """The vectors of arrays of parts."""
+    return [Vector(x, y) for x, y in zip(rows.x.tolist(), rows.y.tolist(), strict=True)]
 
 
 def _is_pinned(pairs: Sequence[Pair], link: str, other: str, point: str) -> bool:
