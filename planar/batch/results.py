@@ -70,6 +70,11 @@ class Sweep:
     (designs, steps + 1, 2) (N), and `reaction_couple` (N m), as of `planar.forces` with inertia. NaN as of points;
     forces also where equilibrium does not tell them.
 
+    `derivatives` of what was asked for in numbers of the file, by names as `position of E by BC.length` (of points
+    (designs, steps + 1, 2)), `angular_velocity of BC by AB.length`, `value of stroke by A.position`: SI per SI. In the
+    position of an input they are those in where it is at a step. NaN at dead points and change points, and in numbers
+    that cannot change alone.
+
     Where all assemblies were asked for each stands as a design of its own: `design` is the number (from 0) of the one
     that was given, and `assembly` that of the assembly in the list of `planar.modes` (from 1; 0 of a design that has
     none), each (designs,).
@@ -97,6 +102,7 @@ class Sweep:
     effort: Mapping[str, Any] = field(default_factory=dict, repr=False)
     reaction: Mapping[str, Any] = field(default_factory=dict, repr=False)
     reaction_couple: Mapping[str, Any] = field(default_factory=dict, repr=False)
+    derivatives: Mapping[str, Any] = field(default_factory=dict, repr=False)
     design: Array | None = field(default=None, repr=False)
     assembly: Array | None = field(default=None, repr=False)
 

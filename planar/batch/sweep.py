@@ -19,6 +19,7 @@ from planar.batch.block import DesignBlock
 from planar.batch.design_arrays import read_designs, split_into_blocks
 from planar.batch.executor import TASKS_PER_WORKER, run_tasks, thread_count, worker_count
 from planar.batch.march.choice import available_backends
+from planar.batch.named_results.design_slopes import design_slopes
 from planar.batch.named_results.result_block import ResultBlock, solve_result_block
 from planar.batch.named_results.result_rows import RequestedResults, select_names
 from planar.batch.named_results.transmission_angles import output_link
@@ -68,6 +69,7 @@ def sweep(  # many: the public signature
     outputs: Sequence[str] | str = (),
     efforts: Sequence[str] | str = (),
     reactions: Sequence[str] | str = (),
+    derivatives: Sequence[str] | str = (),
     assemblies: str = "nearest",
     rates: bool = True,
     start: float | None = None,
@@ -96,6 +98,7 @@ def sweep(  # many: the public signature
     outputs: Sequence[str] | str = (),
     efforts: Sequence[str] | str = (),
     reactions: Sequence[str] | str = (),
+    derivatives: Sequence[str] | str = (),
     assemblies: str = "nearest",
     rates: bool = True,
     start: float | None = None,
@@ -123,6 +126,7 @@ def sweep(  # many: the public signature; # long: its docstring
     outputs: Sequence[str] | str = (),
     efforts: Sequence[str] | str = (),
     reactions: Sequence[str] | str = (),
+    derivatives: Sequence[str] | str = (),
     assemblies: str = "nearest",
     rates: bool = True,
     start: float | None = None,
@@ -156,6 +160,8 @@ def sweep(  # many: the public signature; # long: its docstring
     `rates` their rates too; `outputs` links or pairs at the frame whose transmission angles are; `efforts` inputs and
     `reactions` pairs whose forces are, under loads, weights, springs and inertia: see `Sweep`. A design that comes to a
     dead point or a stop has NaN from there on, `status` says why, `Sweep.dead_point` or `Sweep.stop_position` where.
+    `derivatives` names numbers of the file by which positions, angles and relative motions are derived, and their
+    rates, as `planar.sensitivity` has them: "BC.length" gives `Sweep.derivatives["position of E by BC.length"]`.
 
     `assemblies` "nearest" takes of each design that nearest to the sketch; "all" takes every assembly that it has at
     its own inputs, each as a design of its own: see `Sweep.assembly`.
@@ -202,6 +208,8 @@ def sweep(  # many: the public signature; # long: its docstring
     wanted = asked if reductions is None else reductions.with_results(asked)
     results = _select_results(common, wanted, duration is not None)
     names: tuple[PointName, ...] = () if points is None and any(results) else common.select_points(points)
+    if derivatives:
+        results = _with_derivatives(common, results, names, derivatives, rates)
     if reductions is not None:
         own, rates = reductions.with_points(names, rates)
         names = own or ()
@@ -305,6 +313,20 @@ def _select_results(
         if not is_timed and any(load.varies is not None and load.varies.input is None for load in mechanism.loads):
             raise BadInput("loads", "a load varies with time, which this sweep has not; give it a duration")
     return results
+
+
+def _with_derivatives(
+    common: ReferenceDesign,
+    results: RequestedResults,
+    points: tuple[PointName, ...],
+    derivatives: Sequence[str] | str,
+    rates: bool,
+) -> RequestedResults:
+    """The results with derivatives in these numbers. Raises BadInput."""
+    given = (derivatives,) if isinstance(derivatives, str) else tuple(dict.fromkeys(derivatives))
+    found = results._replace(derivatives=given, derived_points=tuple(str(each) for each in points))
+    design_slopes(common, found, rates)  # refuses what it does not tell
+    return found
 
 
 def _block_size(whole: DesignBlock, width: int, many: int, executor: Executor | None, kept: str) -> int:

@@ -148,18 +148,24 @@ class DesignEquations:
 
     def coordinates_at(self, moving: KinematicResult) -> tuple[list[Array], Array]:
         """z, z', z'' (n, unknowns) and t (n, parameters) at a state or a motion."""
-        parts = [_parts_of(moving, each.owner, each.part, self.solver.pairs) for each in self.equations.coordinates]
         inputs = [moving.inputs[given.pair] for given in self.mechanism.inputs]
         given = [[np.asarray(getattr(each, rate), float) for each in inputs] for rate in INPUT_RATES]
-        many = max((np.size(part) for each in (*parts, *given) for part in each), default=1)
-        w = np.array([[np.broadcast_to(part, (many,)) for part in each] for each in parts]).reshape(-1, 3, many)
-        unknown = list(self.equations.unknowns)
-        z = (w[unknown] / self.solver.scale[unknown, None, None]).transpose(1, 2, 0)
+        z = self.unknowns_at(moving)
+        many = max(len(z[0]), *(np.size(part) for each in given for part in each), 1)
+        z = [np.broadcast_to(each, (many, each.shape[1])) for each in z]
         values = np.array([[np.broadcast_to(part, (many,)) for part in each] for each in given])
         t = np.concatenate(
             [values.reshape(-1, many).T, np.tile([each.value for each in self.dimensions], (many, 1))], 1
         )
-        return list(z), t
+        return z, t
+
+    def unknowns_at(self, moving: KinematicResult) -> list[Array]:
+        """z, z', z'' (n, unknowns) at positions that have rates."""
+        parts = [_parts_of(moving, each.owner, each.part, self.solver.pairs) for each in self.equations.coordinates]
+        many = max((np.size(part) for each in parts for part in each), default=1)
+        w = np.array([[np.broadcast_to(part, (many,)) for part in each] for each in parts]).reshape(-1, 3, many)
+        unknown = list(self.equations.unknowns)
+        return list((w[unknown] / self.solver.scale[unknown, None, None]).transpose(1, 2, 0))
 
 
 def _offset_dimensions(pair: str) -> Iterator[Dimension]:

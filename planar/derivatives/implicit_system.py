@@ -227,12 +227,31 @@ def invert_matrices(matrices: Array) -> tuple[Array, BoolArray]:
     known = np.where(is_known[:, None, None], matrices, 0.0)
     by_row = _nonzero(np.linalg.norm(known, axis=2, keepdims=True))
     by_column = _nonzero(np.linalg.norm(known / by_row, axis=1, keepdims=True))
-    u, s, v = np.linalg.svd(known / by_row / by_column, full_matrices=False)
-    weak: BoolArray = np.asarray(s <= SINGULAR * s[:, :1])
-    kept = np.where(weak, 0.0, 1.0 / np.where(weak, 1.0, s))
-    inverse = (v.transpose(0, 2, 1) * kept[:, None]) @ u.transpose(0, 2, 1)
-    whole = inverse / by_row.transpose(0, 2, 1) / by_column.transpose(0, 2, 1)
-    return whole, weak.any(axis=1) | (rows < columns) | ~is_known
+    scaled = known / by_row / by_column
+    inverse, is_sure = _regular_inverses(scaled)
+    is_singular: BoolArray = ~is_known | (rows < columns)
+    if not is_sure.all():
+        u, s, v = np.linalg.svd(scaled[~is_sure], full_matrices=False)
+        weak: BoolArray = np.asarray(s <= SINGULAR * s[:, :1])
+        kept = np.where(weak, 0.0, 1.0 / np.where(weak, 1.0, s))
+        inverse[~is_sure] = (v.transpose(0, 2, 1) * kept[:, None]) @ u.transpose(0, 2, 1)
+        is_singular[~is_sure] |= weak.any(axis=1)
+    return inverse / by_row.transpose(0, 2, 1) / by_column.transpose(0, 2, 1), is_singular
+
+
+def _regular_inverses(matrices: Array) -> tuple[Array, BoolArray]:
+    """The inverses of matrices (n, rows, columns), and which of them (n,) surely have no weak singular value."""
+    many, rows, columns = matrices.shape
+    found = np.zeros((many, columns, rows))
+    none: BoolArray = np.zeros(many, dtype=bool)
+    if rows != columns:
+        return found, none
+    try:
+        found[:] = np.linalg.inv(matrices)
+    except np.linalg.LinAlgError:  # one of them is singular to the last digit
+        return found, none
+    sizes = np.linalg.norm(matrices, axis=(1, 2)) * np.linalg.norm(found, axis=(1, 2))  # no less than the condition
+    return found, np.asarray(sizes < 1.0 / SINGULAR)
 
 
 def _nonzero(scale: Array) -> Array:

@@ -99,7 +99,7 @@ class SlopeSystem:
     def named_slopes(self, name: str) -> NamedSlopes:
         """The derivatives of all that the result tells of a name."""
         found = self.expressions(name)
-        gaps = self._gaps()
+        gaps = pair_gaps(self.design)
         whole = self.slopes(ca.vertcat(*(each.value for each in found), gaps))
         parts = np.cumsum([each.value.numel() for each in found])
         *each_slopes, open_by = np.split(whole.slopes, parts, axis=1)
@@ -145,14 +145,15 @@ class SlopeSystem:
         ]
         return np.stack(found, axis=1)
 
-    def _gaps(self) -> ca.SX:
-        """What all constraints leave open (sizes, rad), those that the equations do without among them."""
-        frames, own = self.design.placed
-        work, unit = self.design.work, self.design.solver.unit
-        rows = pair_residuals(work.mechanism.pairs, frames, work.numbers, own)
-        scaled = [value / unit if row.kind is MeasureKind.LENGTH else value for row, value in rows]
-        scaled += [pair.contact_gap(work.numbers[pair.name], own[pair.name]) / unit for pair in work.mechanism.pairs]
-        return ca.vertcat(ca.SX(0, 1), *scaled)
+
+def pair_gaps(design: DesignEquations) -> ca.SX:
+    """What all constraints leave open (sizes, rad), those that the equations do without among them."""
+    frames, own = design.placed
+    work, unit = design.work, design.solver.unit
+    rows = pair_residuals(work.mechanism.pairs, frames, work.numbers, own)
+    scaled = [value / unit if row.kind is MeasureKind.LENGTH else value for row, value in rows]
+    scaled += [pair.contact_gap(work.numbers[pair.name], own[pair.name]) / unit for pair in work.mechanism.pairs]
+    return ca.vertcat(ca.SX(0, 1), *scaled)
 
 
 def refuse_stiffness(forces: Forces) -> None:

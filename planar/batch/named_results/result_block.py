@@ -12,6 +12,7 @@ from planar.batch.design_arrays import split_into_blocks, values_of_design, with
 from planar.batch.general_path import link_angles
 from planar.batch.march.prediction import LONGEST_STEP
 from planar.batch.named_results.design_frames import DesignFrames
+from planar.batch.named_results.design_slopes import design_slopes
 from planar.batch.named_results.force_results import find_forces
 from planar.batch.named_results.result_rows import LINK_QUANTITIES, PAIR_QUANTITIES, RequestedResults
 from planar.batch.named_results.timed_block import input_motions, solve_timed_block
@@ -59,13 +60,15 @@ class _ResultBlockSolver:
         self.mechanism, self.arm = self.reference.mechanism, self.reference.unit
         self.design_count = len(next(iter(self.block.designs.values())))
         self.links = self._needed_links()
-        self.rates = self.block.rates or self.results.has_forces or bool(self.results.outputs)
+        self.rates = (
+            self.block.rates or self.results.has_forces or bool(self.results.outputs or self.results.derivatives)
+        )
         self.rows = self.results.rows(self.mechanism, self.block.rates)
 
     def _needed_links(self) -> tuple[str, ...]:
         """The links whose axes are looked at: with those that tell how far they have turned."""
         frame, motions = self.mechanism.frame, self.reference.motions
-        if self.results.outputs or self.results.has_forces:
+        if self.results.outputs or self.results.has_forces or self.results.derivatives:
             found = [link.name for link in self.mechanism.links]
         else:
             found = [*self.results.links, *(link for name in self.results.pairs for link in motions[name].bodies)]
@@ -185,11 +188,22 @@ class _ResultBlockSolver:
         for name in self.results.outputs:
             angles = output_link(self.mechanism, name).angles(frames, part.designs, is_solved)
             found["transmission_angle", name] = angles[None]
+        if self.results.derivatives:
+            slopes = design_slopes(self.reference, self.results, self.block.rates)
+            found |= slopes.find(frames, part.designs, self._input_rates(frames, part), is_solved)
         at = 0
         for row in self.rows:
             whole = np.broadcast_to(found[row.quantity, row.name], (row.width, *frames.design_shape))
             out[:, at : at + row.width] = np.moveaxis(whole, 0, 1)[::refined]
             at += row.width
+
+    def _input_rates(self, frames: DesignFrames, part: _DesignPart) -> Array:
+        """The rates of the inputs (2, inputs, steps + 1, designs), in SI."""
+        if self.duration is not None:
+            return input_motions(self.mechanism, part.designs, part.input)[1:]
+        designs, many = with_design_values(self.mechanism, part.designs), frames.design_shape[1]
+        scaled = np.array(self.reference.inputs(designs, many)[1:]) * self.reference.input_scale[:, None]
+        return np.broadcast_to(scaled[:, :, None], (*scaled.shape[:2], *frames.design_shape))
 
 
 class _DesignPart:

@@ -10,6 +10,7 @@ from planar.foundation.errors import BadInput
 from planar.model.mechanism import Mechanism, relative_motions
 from planar.model.pairs import MeasureKind
 
+POINT_QUANTITIES = ("position", "velocity", "acceleration")
 LINK_QUANTITIES = ("angle", "angular_velocity", "angular_acceleration")
 PAIR_QUANTITIES = ("value", "value_rate", "value_second_rate")
 RATE_UNITS = ("", "/s", "/s^2")
@@ -25,13 +26,16 @@ class ResultRow(NamedTuple):
 
 
 class RequestedResults(NamedTuple):
-    """The results that are asked for beside those of points: of these links, pairs, outputs, inputs and pairs."""
+    """The results that are asked for beside those of points: of these links, pairs, outputs, inputs and pairs; and
+    derivatives of these points, links and pairs in numbers of the file."""
 
     links: tuple[str, ...] = ()
     pairs: tuple[str, ...] = ()
     outputs: tuple[str, ...] = ()
     efforts: tuple[str, ...] = ()
     reactions: tuple[str, ...] = ()
+    derivatives: tuple[str, ...] = ()
+    derived_points: tuple[str, ...] = ()
 
     @property
     def has_forces(self) -> bool:
@@ -57,6 +61,25 @@ class RequestedResults(NamedTuple):
             yield ResultRow("reaction", name, 2, "N")
         for name in self.reactions:
             yield ResultRow("reaction_couple", name, 1, "N m")
+        if self.derivatives:
+            yield from self._derivative_rows(mechanism, orders)
+
+    def _derivative_rows(self, mechanism: Mechanism, orders: int) -> Iterator[ResultRow]:
+        of_kinds = (
+            (POINT_QUANTITIES, self.derived_points, 2),
+            (LINK_QUANTITIES, self.links, 1),
+            (PAIR_QUANTITIES, self.pairs, 1),
+        )
+        for quantities, names, width in of_kinds:
+            for quantity in quantities[:orders]:
+                for name in names:
+                    for number in self.derivatives:
+                        yield ResultRow("derivatives", derivative_name(f"{quantity} of {name}", number), width, "SI")
+
+
+def derivative_name(what: str, number: str) -> str:
+    """What a derivative is called: `position of E by BC.length`."""
+    return f"{what} by {number}"
 
 
 def select_names(place: str, given: Sequence[str] | str, known: Sequence[str]) -> tuple[str, ...]:

@@ -15,7 +15,7 @@ import numpy as np
 
 from planar.batch.assembly.assembly_lists import ListedAssemblies
 from planar.batch.block import DesignBlock, SolvedDesigns
-from planar.batch.named_results.result_rows import RequestedResults, ResultRow
+from planar.batch.named_results.result_rows import POINT_QUANTITIES, RequestedResults, ResultRow
 from planar.batch.results import Sweep, SweepNotes
 from planar.codegen.aligned_arrays import allocate_aligned
 from planar.document.files import to_dict
@@ -26,7 +26,6 @@ Array = np.ndarray
 
 MAX_BYTES_IN_MEMORY = 16 * 2**30
 """Bytes of results that are kept in memory."""
-POINT_QUANTITIES = ("position", "velocity", "acceleration")
 ZARR_PARTIAL_SUFFIX = ".partial"
 """Ending of the files that Zarr has not written whole."""
 STORE_VERSION = 3
