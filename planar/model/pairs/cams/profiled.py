@@ -302,8 +302,10 @@ class ProfiledPair(Pair):
 
 
 def _vectors(rows: Vector) -> list[Vector]:
-    """The vectors of arrays of parts."""
-    return [Vector(x, y) for x, y in zip(rows.x.tolist(), rows.y.tolist(), strict=True)]
+    """The vectors of arrays of parts, of numbers or of symbols."""
+    if isinstance(rows.x, np.ndarray):
+        return [Vector(x, y) for x, y in zip(rows.x.tolist(), rows.y.tolist(), strict=True)]
+    return [Vector(rows.x[row], rows.y[row]) for row in range(rows.x.shape[0])]
 
 
 def _is_pinned(pairs: Sequence[Pair], link: str, other: str, point: str) -> bool:
