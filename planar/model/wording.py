@@ -18,7 +18,8 @@ STEADY_TOLERANCE = 1e-9
 def amount(value: float, kind: str, units: FileUnits) -> str:
     """A quantity (SI) in the unit in which its kind is shown beside those of a mechanism's file, with that unit."""
     name, of = display_unit(kind, units)
-    return f"{of.from_si(value):.6g} {name}"
+    shown = f"{of.from_si(value):.6g}"
+    return shown if name == "1" else f"{shown} {name}"
 
 
 def turning_sense(rate: float, scale: float = 0.0) -> str:

@@ -93,9 +93,7 @@ class DigitSolver:
         }
 
 
-@pytest.mark.parametrize(
-    ("stem", "way"), [(stem, way) for stem, (_, ways) in CASES.items() for way in ways], ids=str
-)
+@pytest.mark.parametrize(("stem", "way"), [(stem, way) for stem, (_, ways) in CASES.items() for way in ways], ids=str)
 def test_slopes_are_those_of_differences_of_fifty_digits(stem, way):
     mechanism, of = MODELS[stem], CASES[stem][0]
     drive = mechanism.inputs[0]

@@ -7,7 +7,7 @@ import numpy as np
 from planar.analysis.sensitivity.sensitivity import INFLUENCE_STEP, Sensitivity
 from planar.drawing.diagrams import axes
 from planar.drawing.diagrams.running_axis import running_axis
-from planar.drawing.paper.picture import Label, Mark, Pen, Picture
+from planar.drawing.paper.picture import Label, Mark, Pen, Picture, Polyline
 from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput
 from planar.model.file_units import display_unit
@@ -20,6 +20,8 @@ MAX_CURVES = 6
 """Numbers of the greatest influence that are drawn."""
 LABEL_SIZE, LABEL_GAP = 7.5, 5.0
 """Points; and mm between the labels of two curves."""
+LEADER_LENGTH = 6.0
+"""mm from the end of a curve to its label, where labels would stand on each other."""
 
 
 def sensitivity_picture(found: Sensitivity, result: str | None = None) -> Picture:
@@ -67,9 +69,20 @@ def _labels(curves: dict[str, Array], up: axes.Axis) -> list[Mark]:
     for number, values in curves.items():
         known = values[np.isfinite(values)]
         ends[number] = float(up.on_paper(known[-1])) if len(known) else 0.0
-    found: list[Mark] = []
+    order = sorted(ends, key=lambda number: ends[number])
+    heights: dict[str, float] = {}
     low = -np.inf
-    for number, height in sorted(ends.items(), key=lambda each: each[1]):
-        low = max(height, low + LABEL_GAP)
-        found.append(Label(number, (DIAGRAM_WIDTH, low), f"label {number}", LABEL_SIZE, 1.2, side=(1, 0)))
-    return found
+    for number in order:
+        heights[number] = low = max(ends[number], low + LABEL_GAP)
+    if heights == ends:
+        return [_label(number, DIAGRAM_WIDTH, ends[number]) for number in order]
+    at = DIAGRAM_WIDTH + LEADER_LENGTH
+    leaders = [
+        Polyline(((DIAGRAM_WIDTH, ends[number]), (at, heights[number])), Pen.LEADER, f"leader {number}")
+        for number in order
+    ]
+    return [*leaders, *(_label(number, at, heights[number]) for number in order)]
+
+
+def _label(number: str, at: float, height: float) -> Label:
+    return Label(number, (at, height), f"label {number}", LABEL_SIZE, 1.2, side=(1, 0))

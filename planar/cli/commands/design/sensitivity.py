@@ -72,7 +72,8 @@ def sensitivity(  # many: options of the command
         moving = run_motion(mechanism, **course) if whole else solve(mechanism, parse_drives(mechanism, at))
         found = derivatives(_forces(moving, static) if with_forces else moving, of)
         if result is not None and result not in found.slopes:
-            raise BadInput("--result", f"of {of!r} are told {', '.join(found.slopes)}, and no {result!r}")
+            limits = "; stroke, swing, time ratio and dead points stand below the table of a motion, with --cycle"
+            raise BadInput("--result", f"of {of!r} are told {', '.join(found.slopes)}, and no {result!r}{limits}")
         told = record(found) if as_json else table(found, result)
     if as_json:
         print_json(told, indent=1)
