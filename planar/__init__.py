@@ -122,6 +122,8 @@ if TYPE_CHECKING:
     from planar.structures.linkage_store import LinkageSet, generate
     from planar.structures.recognition import MechanismStructure, chain_of
     from planar.structures.symmetry import ChainSymmetry
+    from planar.synthesis.cognates.cognate_inputs import CognateInput
+    from planar.synthesis.cognates.cognates import Cognate, Cognates, cognates
 
 __version__ = "0.16.0"
 
@@ -154,6 +156,9 @@ __all__ = [
     "Chains",
     "Circuit",
     "Circuits",
+    "Cognate",
+    "CognateInput",
+    "Cognates",
     "ConditionSet",
     "ConditionTerm",
     "Conflict",
@@ -275,6 +280,7 @@ __all__ = [
     "chain_of",
     "chains",
     "circuits",
+    "cognates",
     "conflict",
     "contact_forces",
     "curvature",

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from planar.dynamics.simulation import Simulation
     from planar.model.mechanism import Mechanism
     from planar.results.motion import Motion, State
+    from planar.synthesis.cognates.cognates import Cognates
 
     Drawing = Figure | list[Figure]
     """One figure, or several sheets."""
@@ -40,6 +41,7 @@ __all__ = [
     "centres",
     "centrodes",
     "circuits",
+    "cognates",
     "diagrams",
     "forces",
     "loci",
@@ -196,6 +198,26 @@ def circuits(found: Circuits | Mechanism, of: str | None = None, assemblies: Mod
     of_all = found if isinstance(found, Circuits) else all_circuits(found)
     here = all_modes(of_all.mechanism, certify=False) if assemblies is None else assemblies
     return circuit_figures(of_all, locate_assemblies(of_all, here), of)
+
+
+@takes_result("Cognates", "Mechanism")
+def cognates(found: Cognates | Mechanism, of: str | None = None, scale: ScaleTexts = None) -> Figure:
+    """A mechanism with all that trace the path of a point as it does: up to three in one picture, else each alone.
+
+    `of` is the point, where a mechanism is given (left out: the first that has cognates). Raises BadInput where no
+    point has any, Unknown for one that is not there, and what `planar.cognates` raises.
+    """
+    from planar.drawing.diagrams.cognate_drawing import cognate_pictures
+    from planar.synthesis.cognates.cognates import Cognates, first_cognates
+    from planar.synthesis.cognates.cognates import cognates as all_cognates
+
+    if not isinstance(found, Cognates):
+        found = first_cognates(found) if of is None else all_cognates(found, of)
+    return draw_pictures(cognate_pictures(found, _length_scale(scale, found)), _cognate_heading(found))
+
+
+def _cognate_heading(found: Cognates) -> str:
+    return f"{found.mechanism.name}: cognates of the path of {found.point}"
 
 
 @takes_result("Forces", "State")

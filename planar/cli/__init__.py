@@ -11,6 +11,7 @@ main.modules = {
     "centres": "planar.cli.commands.centres_harmonics",
     "chains": "planar.cli.commands.design.chains",
     "circuits": "planar.cli.commands.circuits",
+    "cognates": "planar.cli.commands.design.cognates",
     "cycle": "planar.cli.commands.solve_cycle_explain",
     "explain": "planar.cli.commands.solve_cycle_explain",
     "forces": "planar.cli.commands.forces_simulate",

@@ -24,6 +24,7 @@ ResultName = Literal[
     "Calibration",
     "Centres",
     "Circuits",
+    "Cognates",
     "ForceMap",
     "Forces",
     "Modes",

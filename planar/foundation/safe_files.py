@@ -36,6 +36,14 @@ def save_file(path: Path, content: str | bytes) -> None:
         raise write_error(str(path), "the file", problem) from None
 
 
+def make_folder(path: Path) -> None:
+    """Make sure that a folder is there. Raises BadInput where there can be none."""
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as problem:
+        raise write_error(str(path), "the folder", problem, "made") from None
+
+
 def write_error(place: str, what: str, problem: Exception, done: str = "written") -> BadInput:
     """That something cannot be written, as an error: NotWritten where its content found no room, else BadInput."""
     kind = WriteFailure if getattr(problem, "errno", None) in NO_SPACE_ERRORS else BadInput

@@ -12,7 +12,7 @@ import numpy as np
 
 from planar.document.files import read_asset
 from planar.foundation.errors import BadInput, NoAnswer
-from planar.foundation.safe_files import save_file, write_error
+from planar.foundation.safe_files import make_folder, save_file
 from planar.model.mechanism import Mechanism
 from planar.pages.data.dimension_numbers import DimensionNumbers
 from planar.pages.data.scheme_data import frames_of_rows, scheme_data
@@ -49,10 +49,7 @@ def write_gallery(
     Mechanisms that have no position to start from are left out and given back with the reason. `progress` is told
     after each how many are done, of how many. Raises BadInput where the folder or a file cannot be written.
     """
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as problem:
-        raise write_error(str(folder), "the folder", problem, "made") from None
+    make_folder(folder)
     taken, shown, refused = {"index"}, [], []
     for done, (name, mechanism) in enumerate(models, start=1):
         try:

@@ -127,6 +127,7 @@ def results():
     with TemporaryDirectory() as folder:
         yield planar.generate(f"{folder}/four-bars.zarr", links=4, count=2, steps=4)
     yield planar.chain_of("four-bar")
+    yield from (found := planar.cognates("four-bar", "E"), found[1], found[1].inputs[0])
     yield from (planar.BadInput("here", "wrong"), planar.Unknown("no such point"), planar.Outcome.SOLVED)
     yield planar.NoAnswer(planar.Outcome.DEAD_POINT, "it stops", links=["a"])
 
@@ -240,6 +241,7 @@ def test_every_command_of_a_model_takes_set_and_what_is_piped_in(name, tmp_path,
         "cycle": ["--steps", "4"],
         "problem": ["--vary", "2"],
         "mark": ["answers.csv"],
+        "cognates": ["--of", "E"],
         "sensitivity": ["--of", "B"],
         "tolerance": ["--of", "B", "--general", "m"],
         "calibrate": ["measured.csv", "--free", "rod.length"],

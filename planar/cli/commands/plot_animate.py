@@ -35,6 +35,7 @@ if TYPE_CHECKING:
 POSITION_DRAWINGS = ("scheme", "velocity", "acceleration", "centres", "forces")
 ASSEMBLY_DRAWINGS = ("modes",)
 CIRCUIT_DRAWINGS = ("circuits",)
+COGNATE_DRAWINGS = ("cognates",)
 PROFILE_DRAWINGS = tuple(keyword for keyword, kind in pair_types().items() if kind.has_profile)
 MOTION_DRAWINGS = ("positions", "loci", "centrodes", "diagrams", "torque", "bearings", "sensitivity", "tolerance")
 MAP_DRAWINGS = ("force-map",)
@@ -46,6 +47,7 @@ SCALED_DRAWINGS = (
     "tolerance",
     *PROFILE_DRAWINGS,
     *ASSEMBLY_DRAWINGS,
+    *COGNATE_DRAWINGS,
 )
 DRAWN_STEPS = 360
 """Steps of a run that is drawn."""
@@ -63,6 +65,7 @@ DRAWN_STEPS = 360
             *PROFILE_DRAWINGS,
             *ASSEMBLY_DRAWINGS,
             *CIRCUIT_DRAWINGS,
+            *COGNATE_DRAWINGS,
         )
     ),
 )
@@ -76,7 +79,7 @@ DRAWN_STEPS = 360
     "--of",
     "of",
     metavar="NAME",
-    help="Diagrams, circuits, sensitivity or tolerance of this slide, point or link; torque of this input.",
+    help="Diagrams, circuits, cognates, sensitivity or tolerance of this slide, point or link; torque of this input.",
 )
 @click.option("--over", metavar="INPUTS", help="With force-map: the inputs, as 'O,P' or 'O=10deg:50deg,P'.")
 @click.option("--result", metavar="NAME", help="With sensitivity and tolerance: which of its results, as velocity.")
@@ -125,7 +128,11 @@ def plot(  # many: options of a command; # long: each has its line
     steps_told = click.get_current_context().get_parameter_source("steps") is ParameterSource.COMMANDLINE
     for option, told, kinds in (
         ("--point", points, ("positions", "loci")),
-        ("--of", of, ("diagrams", "torque", "sensitivity", "tolerance", *MAP_DRAWINGS, *CIRCUIT_DRAWINGS)),
+        (
+            "--of",
+            of,
+            ("diagrams", "torque", "sensitivity", "tolerance", *MAP_DRAWINGS, *CIRCUIT_DRAWINGS, *COGNATE_DRAWINGS),
+        ),
         ("--over", over, MAP_DRAWINGS),
         ("--result", result, ("sensitivity", "tolerance")),
         ("--pair", pairs, ("bearings", *PROFILE_DRAWINGS)),
@@ -138,7 +145,7 @@ def plot(  # many: options of a command; # long: each has its line
             scales,
             SCALED_DRAWINGS,
         ),
-        ("--mode", mode is not None, (*POSITION_DRAWINGS, *MOTION_DRAWINGS)),
+        ("--mode", mode is not None, (*POSITION_DRAWINGS, *MOTION_DRAWINGS, *COGNATE_DRAWINGS)),
     ):
         if told and what not in kinds:
             raise BadInput(option, f"this is for {' and '.join(kinds)}; {what} would not heed it")
@@ -157,6 +164,11 @@ def plot(  # many: options of a command; # long: each has its line
             if at or len(pairs) > 1:
                 raise BadInput("--at" if at else "--pair", f"a profile of one {what} is drawn, over its whole turn")
             drawn.save(drawn.cam_profile(mechanism, pairs[0] if pairs else None, scales), output)
+            return
+        if what in COGNATE_DRAWINGS:
+            if at:
+                raise BadInput("--at", f"{what} are drawn where the file's inputs stand; change those with --set")
+            drawn.save(drawn.cognates(mechanism, of, scales), output)
             return
         if what in (*ASSEMBLY_DRAWINGS, *CIRCUIT_DRAWINGS):
             from planar.assemblies.circuits.circuits import circuits
@@ -197,8 +209,8 @@ def _refuse_range(what: str, pair: str | None, start: str | None, stop: str | No
     """Raise BadInput for a range that a drawing would not heed."""
     if what in CIRCUIT_DRAWINGS and (start or stop):
         raise BadInput("--from", f"{what} are of the whole range of an input")
-    if (pair or start or stop) and what in (*POSITION_DRAWINGS, *PROFILE_DRAWINGS, *ASSEMBLY_DRAWINGS):
-        told = f"{what} are" if what in ASSEMBLY_DRAWINGS else f"a {what} is"
+    if (pair or start or stop) and what not in (*MOTION_DRAWINGS, *MAP_DRAWINGS, *CIRCUIT_DRAWINGS):
+        told = f"{what} are" if what in (*ASSEMBLY_DRAWINGS, *COGNATE_DRAWINGS) else f"a {what} is"
         raise BadInput("--input", f"{told} of one position; move an input there with --at")
 
 

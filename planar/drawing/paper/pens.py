@@ -53,6 +53,8 @@ PEN_STYLES = {
     Pen.CURVE: PenStyle(0.45, "#000000"),
     Pen.SHARE: PenStyle(0.2, "#0b46a8"),
     Pen.MEAN: PenStyle(0.25, "#333333", (4.0, 0.9, 0.5, 0.9)),
+    Pen.FIRST_COGNATE: PenStyle(0.55, "#1565c0"),
+    Pen.SECOND_COGNATE: PenStyle(0.55, "#c75a00", (3.0, 1.2)),
     Pen.WORST: PenStyle(0.05, "#c9dcf2"),
     Pen.LIKELY: PenStyle(0.1, "#85addc"),
 }

@@ -75,6 +75,8 @@ class Pen(Enum):
     """A part of what a curve is made of."""
     MEAN = "mean"
     """The mean of a curve."""
+    FIRST_COGNATE, SECOND_COGNATE = "first cognate", "second cognate"
+    """The body of a moving link of another linkage that traces the same path."""
     WORST, LIKELY = "worst", "likely"
     """The edge of where something is in the worst case, and nearly always."""
 

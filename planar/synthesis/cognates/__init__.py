@@ -1,0 +1,1 @@
+"""Cognates: other linkages in which a point traces the same path."""

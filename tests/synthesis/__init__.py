@@ -1,0 +1,1 @@
+"""Linkages for what they must do."""
