@@ -1,1 +1,1 @@
-"""Linkages for what they must do: those that trace the same path."""
+"""Linkages for what they must do: those that trace the same path, and catalogues of swept designs."""
