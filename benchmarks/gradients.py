@@ -74,7 +74,7 @@ def case(model: str, rates: bool) -> Case:
         wanted = planar.gradient(motion, {every[-1]: {order: of[every[-1]] for order, of in weights.items()}})
         off = np.array([found.derivatives[key] - each for key, each in wanted.items()])
         error = float(np.nanmax(np.abs(off)) / np.nanmax(np.abs(list(wanted.values()))))
-    native = ready._gradients._native
+    native = ready.run_gradients._native
     is_native = any(each is not None for each in native.values())
     return Case(
         model,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,6 +11,9 @@ from planar.batch.gradients.run_gradient import ORDERS, read_names
 from planar.batch.prepared import prepared
 from planar.foundation.arrays import Array, BoolArray
 from planar.foundation.errors import BadInput
+
+LEAST_SWEPT_DESIGNS = 32
+"""Designs from which on they are swept; fewer run one after the other."""
 
 
 class LayerRange(NamedTuple):
@@ -60,13 +63,20 @@ class LinkageLayer:
         designs = np.asarray(values, dtype=float).reshape(-1, len(self.free))
         found = np.zeros((len(self.orders), len(designs), self.result_shape[0], len(self.points), 2))
         solved = np.zeros((len(designs), self.result_shape[0]), dtype=bool)
-        for k, design in enumerate(designs):
-            if np.isfinite(design).all():
-                told = self._runs(self._by_name(design))
+        known = np.flatnonzero(np.isfinite(designs).all(axis=1))
+        if len(known) < LEAST_SWEPT_DESIGNS:
+            for k in known:
+                told = self._runs(dict(zip(self.free, designs[k].tolist(), strict=True)))
                 for order, name in enumerate(self.orders):
                     for number, point in enumerate(self.points):
                         found[order, k, :, number] = getattr(told, name)[point]
                 solved[k] = told.status == 0
+        else:
+            swept = self._runs.sweep(dict(zip(self.free, designs[known].T, strict=True)))
+            for order, name in enumerate(self.orders):
+                for number, point in enumerate(self.points):
+                    found[order, known, :, number] = getattr(swept, name)[point]
+            solved[known] = np.asarray(swept.status) == 0
         solved &= np.isfinite(found).all(axis=(0, 3, 4))
         found[:, ~solved] = 0.0
         lead = np.shape(values)[:-1]
@@ -77,22 +87,16 @@ class LinkageLayer:
         them. Positions that are not solved bring nothing."""
         designs = np.asarray(values, dtype=float).reshape(-1, len(self.free))
         shape = (len(designs), self.result_shape[0], len(self.points), 2)
-        given = [np.asarray(each, dtype=float).reshape(shape) for each in weights]
-        found = np.zeros(designs.shape)
-        for k, design in enumerate(designs):
-            if np.isfinite(design).all():
-                weighed = {
-                    order: {point: each[k, :, number] for number, point in enumerate(self.points)}
-                    for order, each in zip(self.orders, given, strict=True)
-                }
-                slopes = self._runs.gradient(weighed, self._by_name(design)).derivatives
-                found[k] = [slopes[name] for name in self.free]
+        given = np.stack([np.asarray(each, dtype=float).reshape(shape) for each in weights], axis=1)
+        pairs = given.transpose(0, 1, 3, 2, 4).reshape(len(designs), -1, self.result_shape[0], 2)
+        known = np.isfinite(designs).all(axis=1)
+        every = self._runs.run_gradients
+        wanted = [every.names.index(name) for name in self.free]
+        found, rows = np.zeros(designs.shape), tuple(range(2 * pairs.shape[1]))
+        found[known] = every.slopes_of_designs(rows, self.free, designs[known], pairs[known])[:, wanted]
         return found.reshape(np.shape(values))
 
     def check_shape(self, shape: Sequence[int]) -> None:
         """Refuse values that are not (..., free). Raises BadInput."""
         if not shape or shape[-1] != len(self.free):
             raise BadInput("values", f"an array (..., {len(self.free)}) of {', '.join(self.free)} is wanted here")
-
-    def _by_name(self, design: Array) -> Mapping[str, float]:
-        return dict(zip(self.free, design.tolist(), strict=True))

@@ -15,6 +15,7 @@ from planar.batch.prepare.kept_results import KeptPoints, LateSentences
 from planar.batch.prepare.native_run import NativeRuns, prepare_native_run
 from planar.batch.prepare.run_endings import ALL_SOLVED, STATUS_OF_ENDING, UNSURE
 from planar.batch.reference_design import reference_design
+from planar.batch.results import Sweep
 from planar.batch.sweep import check_range, sweep
 from planar.document.first_argument import takes_mechanism
 from planar.foundation.errors import BadInput
@@ -170,7 +171,7 @@ class PreparedSweep:
         1.131
         """
         values = self._read_values(values)
-        gradients = self._gradients
+        gradients = self.run_gradients
         names = gradients.names if of is None else read_names(of, gradients.names)
         value, slopes, status = gradients.gradient(
             read_weights(weights, self._index, self.rates, self.steps + 1), values
@@ -183,11 +184,14 @@ class PreparedSweep:
         """The numbers in which `gradient` has derivatives, as the file has them (SI); None those that cannot change
         alone. Raises BadInput where derivatives are not told of the structure."""
         known = design_variables(self.mechanism)
-        bound = self._gradients.bound
-        return {name: None if name in bound else known[name].value for name in self._gradients.names if name in known}
+        bound = self.run_gradients.bound
+        return {
+            name: None if name in bound else known[name].value for name in self.run_gradients.names if name in known
+        }
 
     @cached_property
-    def _gradients(self) -> RunGradients:
+    def run_gradients(self) -> RunGradients:
+        """What `gradient` asks. Raises BadInput where derivatives are not told of the structure."""
         from planar.batch.gradients.run_gradients import RunGradients  # derivatives are seldom wanted
 
         ends = self.range["start"], self.range["stop"]
@@ -207,12 +211,16 @@ class PreparedSweep:
         except (KeyError, struct.error, TypeError):
             return np.empty((0, 0)), UNSURE, 0
 
+    def sweep(self, designs: Mapping[str, Any]) -> Sweep:
+        """The same of many designs at once, as `planar.sweep` has it."""
+        return sweep(self.mechanism, designs, self.steps, self.points, rates=self.rates, **self.range)
+
     def _run_as_sweep(self, values: Mapping[str, float]) -> PreparedRun:
         """The same by a sweep of one design, which leaves nothing out."""
         given = values or {
             f"{self.reference.pair}.position": self.reference.mechanism.inputs[self.reference.running_index].position
         }
-        found = sweep(self.mechanism, given, self.steps, self.points, rates=self.rates, **self.range)
+        found = self.sweep(given)
         return PreparedRun(
             _only_design(found.position),
             found.velocity and _only_design(found.velocity),

@@ -55,6 +55,24 @@ def test_what_is_not_solved_is_nothing_and_masked():
     np.testing.assert_array_equal(layer.pull_back(values, [masked]), slopes)
 
 
+@pytest.mark.parametrize("stem", ["crank-rocker", "geared-five-bar", "stephenson-3-five-bar"])
+def test_derivatives_of_many_designs_are_those_of_each(stem):
+    """Some of which go to a dead point, or do not go together."""
+    rng = np.random.default_rng(3)
+    runs = planar.prepared(stem, 30)
+    free = [name for name, value in runs.derivative_values.items() if value and name.endswith("length")]
+    point = runs.points[-1]
+    layer = make(point, 30, stem == "crank-rocker", stem, free)
+    values = layer.file_values * np.exp(0.2 * rng.normal(size=(24, len(free))))
+    weights = rng.normal(size=(len(layer.orders), 24, *layer.result_shape))
+    found = layer.pull_back(values, weights)
+    for design, each, slopes in zip(values, weights.swapaxes(0, 1), found, strict=True):
+        of = {order: {point: one} for order, one in zip(layer.orders, each, strict=True)}
+        told = runs.gradient(of, dict(zip(free, design.tolist(), strict=True))).derivatives
+        wanted = np.array([told[name] for name in free])
+        np.testing.assert_allclose(slopes, wanted, rtol=1e-12, atol=1e-12 * np.abs(wanted).max())
+
+
 def test_one_point_has_no_axis_of_points():
     assert make().result_shape == (25, 2)
     assert make(points=["A", "B"]).result_shape == (25, 2, 2)

@@ -24,24 +24,27 @@ apart; weights (weighed rows, so many, 2); and what is written: the sum, and its
 
 
 class AdjointFunction(NamedTuple):
-    """The function's writer; what the rows of given inputs are; which numbers the sums are derived by, after the sum
-    itself; and how many rows a state has."""
+    """The function's writer; what the rows of given inputs are, and which numbers the sums are derived by, after the
+    sum itself."""
 
     writer: IRWriter
     inputs: tuple[Operand, ...]
     derived: tuple[Operand, ...]
-    state_count: int
 
 
 def write_adjoint(
-    equations: KernelEquations, links: tuple[str, ...], weighed: Sequence[WeighedRow], order: Sequence[Operand]
+    equations: KernelEquations,
+    links: tuple[str, ...],
+    weighed: Sequence[WeighedRow],
+    order: Sequence[Operand],
+    wanted: range,
 ) -> AdjointFunction:
     """The function of a structure for weighed rows of points on these links, which reads a design's numbers in this
-    order. Raises UnsupportedOperation."""
+    order, and the states at the `wanted` ones of their positions. Raises UnsupportedOperation."""
     if equations.has_large_blocks:
         raise UnsupportedOperation("a group has so many unknowns that expressions do not solve it")
     try:
-        return _AdjointWriter(equations, links, weighed, order).write()
+        return _AdjointWriter(equations, links, weighed, order, wanted).write()
     except BareAngle as angle:
         raise UnsupportedOperation(f"an angle counts its turns: {angle.operand}") from None
 
@@ -53,10 +56,11 @@ class _AdjointWriter(KernelWriter):
         links: tuple[str, ...],
         weighed: Sequence[WeighedRow],
         order: Sequence[Operand],
+        wanted: range,
     ):
         invariant = frozenset({"p", "q", "u1", "u2"})
         super().__init__(equations, links, any(row.order for row in weighed), LANES, invariant, frozenset())
-        self.order, self.weighed = order, weighed
+        self.order, self.weighed, self.wanted = order, weighed, wanted
         self.symbols["weight"] = ca.SX.sym("weight", 2 * len(weighed))
 
     def write(self) -> AdjointFunction:
@@ -98,7 +102,7 @@ class _AdjointWriter(KernelWriter):
             t.write_line(f"store double {total}, ptr {t.double_pointer('%sums', str(k))}")
         t.write_line("ret void")
         t.write_line("}")
-        return AdjointFunction(t, self.input_operands, tuple(derived), len(self.state_operands()))
+        return AdjointFunction(t, self.input_operands, tuple(derived))
 
     def _write_given(self, first: str, have: OperandNames) -> None:
         """Where the inputs are, farther than the file has them by as much as the design has; states; and weights."""
@@ -115,9 +119,34 @@ class _AdjointWriter(KernelWriter):
                 have["uc", k], have["us", k] = self.write_angle_sum(
                     given["uc", k], given["us", k], have["dc", k], have["ds", k]
                 )
-        have |= {leaf: load("%state", k, "%stride") for k, leaf in enumerate(self.state_operands())}
+        have |= self._load_states(first)
         for k in range(len(self.weighed)):
             begin = t.add_instruction(f"mul i64 %width, {k}")
             place = t.add_instruction(f"add i64 {begin}, {first}")
             pointer = t.double_pointer("%weights", t.add_instruction(f"mul i64 {place}, 2"))
             have["weight", 2 * k], have["weight", 2 * k + 1] = t.load_pairs(pointer)
+
+    def _load_states(self, first: str) -> OperandNames:
+        """The states at a block of positions; those after the last one are that again."""
+        t, wanted = self.ir, self.wanted
+        rows = {leaf: t.add_instruction(f"mul i64 %stride, {k}") for k, leaf in enumerate(self.state_operands())}
+        places = []
+        for lane in range(LANES if rows else 0):
+            place = t.add_instruction(f"add i64 {first}, {lane}")
+            is_within = t.add_instruction(f"icmp slt i64 {place}, {len(wanted) - 1}")
+            place = t.add_instruction(f"select i1 {is_within}, i64 {place}, i64 {len(wanted) - 1}")
+            place = t.add_instruction(f"mul i64 {place}, {wanted.step}")
+            places.append(t.add_instruction(f"add i64 {place}, {wanted.start}"))
+
+        def load(row: str) -> str:
+            if wanted.step == 1:
+                begin = t.add_instruction(f"add i64 {first}, {wanted.start}")
+                return t.load(t.double_pointer("%state", t.add_instruction(f"add i64 {row}, {begin}")))
+            found = "poison"
+            for lane, place in enumerate(places):
+                pointer = t.double_pointer("%state", t.add_instruction(f"add i64 {row}, {place}"))
+                one = t.add_instruction(f"load double, ptr {pointer}")
+                found = t.add_instruction(f"insertelement {t.vector} {found}, double {one}, i64 {lane}")
+            return found
+
+        return {leaf: load(row) for leaf, row in rows.items()}

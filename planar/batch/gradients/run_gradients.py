@@ -19,6 +19,8 @@ from planar.foundation.errors import BadInput
 
 MAX_KEPT_SUMS = 8
 """Choices of weighed rows whose functions are kept."""
+MAX_BLOCK_NUMBERS = 2**22
+"""Weights that are laid out at once."""
 
 
 class RunGradients:
@@ -63,6 +65,29 @@ class RunGradients:
         value, slopes, status = self._general.gradient(weights, values, *self._range)
         return value, slopes.tolist(), status
 
+    def slopes_of_designs(self, rows: tuple[int, ...], names: tuple[str, ...], designs: Array, weights: Array) -> Array:
+        """The derivatives (designs, `self.names`) of sums of these rows, of many designs (designs, names) with weights
+        (designs, pairs of rows, steps + 1, 2) each. Raises BadInput."""
+        found = np.zeros((len(designs), len(self.names)))
+        many = max(MAX_BLOCK_NUMBERS // max(weights[:1].size, 1), 1)
+        native = self._native_sums(rows)
+        run = None if native is None or native.find_run is None else native.find_run(names)
+        for first in range(0, len(designs), many):
+            block = slice(first, first + many)
+            given, weighed = designs[block], weights[block]
+            sure = np.zeros(len(given), dtype=bool)
+            if run is not None:
+                padded = np.empty((*weighed.shape[:2], self._width, 2))
+                padded[:, :, : weighed.shape[2]] = weighed
+                sums, ending = run.run_designs(names, given, padded)
+                sure = (ending != UNSURE) & np.isfinite(sums).all(axis=1)
+                found[block][sure] = sums[sure, 1:]
+            for k in np.flatnonzero(~sure):
+                values = dict(zip(names, given[k].tolist(), strict=True))
+                found[first + k] = self.gradient(WeightRows(rows, tuple(weighed[k])), values)[1]
+        found[:, self._bound] = np.nan
+        return found
+
     def _run_native(
         self, native: NativeRuns, weights: WeightRows, values: Mapping[str, float]
     ) -> tuple[float, list[float], IntArray] | None:
@@ -87,8 +112,8 @@ class RunGradients:
             status = np.zeros(len(self._positions), dtype=np.int8)
             status[end:] = STATUS_OF_ENDING[ending]
             if not end:
-                found[:] = 0.0
-        value, *slopes = found.tolist()
+                found = [0.0] * len(found)
+        value, *slopes = found
         if not isfinite(sum(slopes, value)):
             return None
         for k in self._bound:

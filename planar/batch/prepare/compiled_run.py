@@ -20,7 +20,7 @@ from planar.batch.prepare.llvm_positions import (
 from planar.batch.prepare.llvm_start import FUNCTION_NAME as START_FUNCTION
 from planar.batch.prepare.llvm_start import write_start
 from planar.batch.prepare.run_endings import ALL_SOLVED, DEAD_POINT, STOP
-from planar.batch.prepare.value_binder import ValueBinder, address_of
+from planar.batch.prepare.value_binder import RunCall, ValueBinder, address_of
 from planar.codegen.instructions import UnsupportedOperation
 from planar.codegen.llvm_compile import compile_function
 from planar.codegen.llvm_ir import IRWriter
@@ -104,7 +104,7 @@ class CompiledRun:
         self._own = design.own_values
         self._context = np.array([self._own.ctypes.data, self._drive.ctypes.data, blocks, len(u)], dtype=np.int64)
         self._context_pointer = self._context.ctypes.data
-        self._shape, self.stride = (layout.rows.row_count + 1, width), width
+        self._shape = layout.rows.row_count + 1, width
         self._told, self._positions, self._ending = layout.rows.told, len(u), layout.rows.row_count * width
         binder = ValueBinder(design.index)
         self.bind, self.bound = binder.bind, binder.bound
@@ -113,14 +113,13 @@ class CompiledRun:
         """See `native_run.NativeRun`."""
         names = tuple(values)
         pack, _, places = self.bound.get(names) or self.bind(names)
-        out, _, ending, end = self.run_bound(places, pack(*values.values()))
-        return out[: self._told, : self._positions], ending, end
-
-    def run_bound(self, places: int, given: bytes) -> tuple[Array, int, float, int]:
-        """The same of values that are bound: an array, the address in it of the rows, `stride` numbers apart, how the
-        run ended, and at which position."""
         out = np.empty(self._shape)
-        address = address_of(out)
-        self._function(self._context_pointer, places, given, address)
+        self._function(self._context_pointer, places, pack(*values.values()), address_of(out))
         ending = out.item(self._ending)
-        return out, address, ending, int(out.item(self._ending + 1)) if ending in (DEAD_POINT, STOP) else 0
+        rows = out[: self._told, : self._positions]
+        return rows, ending, int(out.item(self._ending + 1)) if ending in (DEAD_POINT, STOP) else 0
+
+    def run_call(self) -> RunCall:
+        """How other compiled code runs it."""
+        rows, width = self._shape
+        return RunCall(self._function, self._context_pointer, rows * width, None, self._ending, 0, width)

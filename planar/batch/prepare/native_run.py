@@ -25,16 +25,18 @@ if TYPE_CHECKING:
     from planar.batch.prepare.newton_run import NewtonRun
 
 Array = np.ndarray
-NativeRun = Callable[..., tuple[Array, float, int]]
+NativeRun = Callable[..., tuple[Any, float, int]]
 """From values by name to the rows of the wanted points (rows, positions), which are the caller's own, how the run ended
 (see `run_endings`), and at which position. Raises KeyError for a name that is not there."""
 
 
 class NativeRuns(NamedTuple):
-    """The function for most designs, and the one for designs with a name that the first does not know."""
+    """The function for most designs, and the one for designs with a name that the first does not know; and what finds
+    that of all designs with these names, or None, where pairs have no say in it."""
 
     run: NativeRun
     run_other: NativeRun
+    find_run: Callable[[tuple[str, ...]], Any] | None = None
 
 
 MAX_CHOICES = 8
@@ -80,7 +82,7 @@ def prepare_native(
         return None
     if any(type(pair).find_misfit is not Pair.find_misfit for pair in reference.mechanism.pairs):
         return NativeRuns(FittingPairs(reference, runs.run), FittingPairs(reference, runs.run_other))
-    return NativeRuns(runs.run, runs.run_other)
+    return NativeRuns(runs.run, runs.run_other, runs.find_known_run)
 
 
 def run_design_numbers(
@@ -113,7 +115,7 @@ def compile_run_function(  # many: what a run is made of
             raise UnsupportedOperation("stops are looked for where all groups are in closed form")
         if grid.lead or reference.candidates.counts_turns:
             raise UnsupportedOperation("a group that is not in closed form starts where the file has it, turns or not")
-        return NewtonRun(reference, design, members, rates, grid.u, states)
+        return NewtonRun(reference, design, members, rates, grid.u)  # which holds its states beside the rows
     return CompiledRun(design, tuple(link for link, _ in members), rates, grid.u, states)
 
 
@@ -130,17 +132,27 @@ class RunsByZeros:
         self._others: dict[frozenset[str], NativeRun] = {}
         self._by_names: dict[tuple[str, ...], NativeRun] = {}
 
-    def run_other(self, values: Mapping[str, float], *more: Any) -> tuple[Array, float, int]:
+    def run_other(self, values: Mapping[str, float], *more: Any) -> tuple[Any, float, int]:
         """The run of a design that gives a length a value which the file has as nothing."""
         names = tuple(values)
+        return (self._by_names.get(names) or self.find_run(names))(values, *more)
+
+    def find_known_run(self, names: tuple[str, ...]) -> NativeRun | None:
+        """The run of designs that give these numbers a value; None where there is none."""
+        run = self.find_run(names) if self._names.issuperset(names) else None
+        return None if run is _refuse else run
+
+    def find_run(self, names: tuple[str, ...]) -> NativeRun:
+        """The run of designs that give these numbers a value. Raises KeyError for one that is not there."""
         run = self._by_names.get(names)
         if run is None:
             if not self._names.issuperset(names):
                 raise KeyError(names)
             if len(self._by_names) >= MAX_BOUND_NAMES:
                 self._by_names.clear()
-            run = self._by_names[names] = self._find_other(self._zeros.intersection(names))
-        return run(values, *more)
+            given = self._zeros.intersection(names)
+            run = self._by_names[names] = self._find_other(given) if given else self.run
+        return run
 
     def _find_other(self, given: frozenset[str]) -> NativeRun:
         """The run of designs that give these lengths a value."""
@@ -156,7 +168,7 @@ class RunsByZeros:
         return run
 
 
-def _refuse(_values: Mapping[str, float], *_more: Any) -> tuple[Array, float, int]:
+def _refuse(_values: Mapping[str, float], *_more: Any) -> tuple[Any, float, int]:
     """Of a structure that is not compiled nothing is known."""
     return np.empty((0, 0)), UNSURE, 0
 
@@ -169,7 +181,7 @@ class FittingPairs:
         self._reference, self._run = reference, run
         self._fitting: dict[str, float] = {}
 
-    def __call__(self, values: Mapping[str, float], *more: Any) -> tuple[Array, float, int]:
+    def __call__(self, values: Mapping[str, float], *more: Any) -> tuple[Any, float, int]:
         found = self._run(values, *more)
         return found if self._is_fit(values) else (found[0], UNSURE, 0)
 
@@ -209,14 +221,9 @@ def find_positions(reference: ReferenceDesign, positions: Array) -> RunPositions
     return RunPositions(found, lead, every)
 
 
-def _at_wanted_positions(run: NativeRun, grid: RunPositions, values: Mapping[str, float]) -> tuple[Array, float, int]:
+def _at_wanted_positions(run: NativeRun, grid: RunPositions, values: Mapping[str, float]) -> tuple[Any, float, int]:
     """A run without the positions on its way, on which it must not end, and between."""
     rows, ending, position = run(values)
-    return rows[:, grid.lead :: grid.every], *wanted_end(grid, ending, position)
-
-
-def wanted_end(grid: RunPositions, ending: float, position: int) -> tuple[float, int]:
-    """How a run ends, and at which of its own positions, where it ends at this one of all."""
     if ending in (DEAD_POINT, STOP) and position <= grid.lead:
         ending = UNSURE
-    return ending, max(ceil((position - grid.lead) / grid.every), 0)
+    return rows[:, grid.lead :: grid.every], ending, max(ceil((position - grid.lead) / grid.every), 0)

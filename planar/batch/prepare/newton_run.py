@@ -31,7 +31,7 @@ from planar.batch.prepare.llvm_newton import (
     AssemblyLanes,
     write_newton_run,
 )
-from planar.batch.prepare.value_binder import ValueBinder, address_of
+from planar.batch.prepare.value_binder import RunCall, ValueBinder, address_of
 from planar.batch.reference_design import ReferenceDesign
 from planar.codegen.aligned_arrays import WIDEST_VECTOR_BYTES
 from planar.codegen.instructions import UnsupportedOperation
@@ -62,10 +62,8 @@ class NewtonRun:
         members: Sequence[PointMember],
         rates: bool,
         u: Array,
-        states: bool = False,
     ):
-        """u (positions, inputs): where the inputs are. With `states` the rows are what stands for the unknowns, see
-        `KernelInstructions.unknown_operands`, and not those of points."""
+        """u (positions, inputs): where the inputs are."""
         links, shown = tuple(link for link, _ in members), [link for *_, link, _ in design.sketched]
         blocks, equations = tuple(block for block, *_ in design.sketched), design.equations("q")
         if set(blocks) < {part.block.block_index for part in equations.blocks}:
@@ -95,14 +93,13 @@ class NewtonRun:
         self._context = np.array([numbers[name] for name in CONTEXT], dtype=np.int64)
         self._context_pointer = self._context.ctypes.data
         self._function: Any = compile_function(layout.ir, FUNCTION_NAME, *ARGUMENT_TYPES)
-        self.stride, self._positions = pieces.width, len(u)
+        self._shape, self._positions = (layout.told, pieces.width), len(u)
         marched = (pieces.steps + 1) * kernels[1].output_row_count * LANES
         self._scratch = (
             layout.scratch + len(kernels[1].state) * pieces.width + LANES + marched + WIDEST_VECTOR_BYTES // 8
         )
         self._size = HEADER + layout.told * pieces.width
-        self._state_first = layout.scratch if states else None
-        self._rows = len(kernels[1].state) if states else layout.told
+        self._state_first = layout.scratch
         binder = ValueBinder(design.index)
         self.bind, self.bound = binder.bind, binder.bound
 
@@ -110,21 +107,19 @@ class NewtonRun:
         """See `native_run.NativeRun`."""
         names = tuple(values)
         pack, _, places = self.bound.get(names) or self.bind(names)
-        held, address, ending, end = self.run_bound(places, pack(*values.values()))
-        begin = (address - address_of(held)) // 8
-        rows = held[begin : begin + self._rows * self.stride].reshape(self._rows, self.stride)
-        return rows[:, : self._positions], ending, end
-
-    def run_bound(self, places: int, given: bytes) -> tuple[Array, int, float, int]:
-        """See `CompiledRun.run_bound`."""
         out, scratch = np.empty(self._size), np.empty(self._scratch)
-        first, told = address_of(scratch), address_of(out)
+        first = address_of(scratch)
         # where whole vectors begin
         first += -first % (WIDEST_VECTOR_BYTES)
-        self._function(self._context_pointer, places, given, first, told)
-        if self._state_first is None:
-            return out, told + 8 * HEADER, out.item(0), 0
-        return scratch, first + 8 * self._state_first, out.item(0), 0
+        self._function(self._context_pointer, places, pack(*values.values()), first, address_of(out))
+        rows = out[HEADER:].reshape(self._shape)[:, : self._positions]
+        return rows, out.item(0), 0
+
+    def run_call(self) -> RunCall:
+        """How other compiled code runs it for its states."""
+        room, second = self._scratch + self._size, self._scratch
+        width = self._shape[1]
+        return RunCall(self._function, self._context_pointer, room, second, second, self._state_first, width)
 
 
 class _Pieces:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from ctypes import addressof, c_char
 from struct import Struct
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -21,6 +22,20 @@ _view = c_char.from_buffer
 def address_of(array: Array) -> int:
     """Where an array's numbers begin: what `array.ctypes.data` says, in a fifth of its time."""
     return addressof(_view(array))  # type: ignore[arg-type]
+
+
+class RunCall(NamedTuple):
+    """A compiled run as other compiled code calls it: the function, what it takes first, and how much room (numbers) it
+    writes to, from where whole vectors begin; where in that its second array begins, if it takes two; and where in it
+    the run's ending, with the position after it, and its rows stand, `stride` numbers apart."""
+
+    function: Any
+    context: int
+    room: int
+    second: int | None
+    ending: int
+    rows: int
+    stride: int
 
 
 class ValueBinder:
