@@ -11,6 +11,7 @@ import numpy as np
 from planar.document.files import read_asset
 from planar.model.mechanism import Mechanism
 from planar.pages.data.page_data import page_data
+from planar.pages.data.wanted_data import PageTask, wanted_data
 from planar.pages.drawing_style import pen_styles, symbol_script
 from planar.pages.notebook import pack_scripts
 from planar.pages.overlay_style import overlay_script, overlay_styles
@@ -32,6 +33,7 @@ STYLES = (
     "stage/stage.css",
     "layers/layers.css",
     "controls/dimensions.css",
+    "wanted/wanted.css",
     "print.css",
 )
 SCRIPTS = (
@@ -65,13 +67,17 @@ SCRIPTS = (
     "layers/layers.js",
     "controls/dimensions.js",
     "controls/influence.js",
+    "wanted/wanted_fit.js",
+    "wanted/wanted.js",
+    "wanted/wanted_drawing.js",
+    "wanted/wanted_table.js",
     "controls/assemblies.js",
     "controls/undo.js",
     "controls/saving.js",
 )
 
 
-def page(
+def page(  # many: what is shown, and how
     mechanism: Mechanism,
     z: np.ndarray | None = None,
     window: PageRange | None = None,
@@ -79,16 +85,19 @@ def page(
     back: str | None = None,
     layers: tuple[str, ...] = ("paths",),
     library: bool | None = None,
+    wanted: PageTask | None = None,
 ) -> str:
     """The page of a mechanism at its inputs.
 
     `z` are the unknowns of the assembly, left out that nearest to the sketch; `window` is the range that is run
     through, left out a turn or from limit to limit. `back` is the address of an index that it links to, `layers` are
     shown at first. `library` is of notebooks: the page carries the scripts for others beside it (True), or takes them
-    from one of those (False). Raises NoAnswer where it has no position to start from.
+    from one of those (False). `wanted` is what the page shows under the mechanism, to be dragged. Raises NoAnswer where
+    it has no position to start from, BadInput for something wanted of what it does not have.
     """
     data, functions = page_data(mechanism, z)
     data["window"], data["layers"] = window and window._asdict(), layers
+    data["wanted"] = wanted_data(mechanism, data, wanted)
     styles = "\n".join([overlay_styles(), *map(read_asset, STYLES), pen_styles()])
     scripts = "\n".join([symbol_script(), overlay_script(), *map(read_asset, SCRIPTS)])
     start = f"{functions}\n{START_SCRIPT}"
@@ -127,6 +136,7 @@ def _notes(mechanism: Mechanism) -> str:
 
 START_SCRIPT = r"""
 const page = new Page(JSON.parse(document.getElementById("data").textContent), program);
+page.wanted = Wanted.of(page);
 const svg = document.getElementById("drawing"), drawing = new Drawing(page, svg), dragging = new Dragging(page, svg);
 const controls = new Controls(page, document.getElementById("controls"), svg, drawing, dragging);
 new Courses(page);
@@ -137,6 +147,10 @@ new Saving(page, document.getElementById("saving"), document.getElementById("dra
 page.tolerances = Tolerances.ofFile(page);
 startLayers(page);
 new Influence(page, document.getElementById("dimensions"));
+if (page.wanted !== null) {
+  new WantedDrawing(page, svg, drawing);
+  new WantedTable(page, document.getElementById("wanted"));
+}
 document.getElementById("still").remove(); // what moves stands in its place
 """
 

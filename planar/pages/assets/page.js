@@ -3,14 +3,16 @@
    `take`. Events: "move" (another position), "size" (other dimensions, or another assembly: all that was remembered of
    the motion is void), "said" (a sentence for the reader), "course" (the whole motion is known, or void), "chosen" (other
    points and links are looked at), "shown" (other layers are), "view" (the drawing lies elsewhere on the screen, or is of another size),
-   "tolerance" (dimensions may be off by more or less). */
+   "tolerance" (dimensions may be off by more or less), "wanted" (what is wanted of the mechanism is elsewhere, or is missed
+   by more or less). */
 
 class Page {
   constructor(data, program) {
     this.data = data;
     this.linkage = new Linkage(data, program);
-    this.listeners = { move: [], size: [], said: [], course: [], chosen: [], shown: [], view: [], tolerance: [] };
+    this.listeners = { move: [], size: [], said: [], course: [], chosen: [], shown: [], view: [], tolerance: [], wanted: [] };
     this.running = 0; // which input is moved
+    this.wanted = null; // what is wanted of the mechanism, if anything is
     this.assembly = null; // the number of the assembly that it was moved from, if it is one of those listed
     this.update();
   }
@@ -87,14 +89,25 @@ class Page {
     this.emit("move");
   }
 
-  /** Where the mechanism is, to come back to. */
+  /** Stand where another linkage of the same mechanism stands, with its dimensions. */
+  adopt({ d, u, z }) {
+    const { linkage } = this;
+    Object.assign(linkage, { d: Array.from(d), u: Array.from(u), z: Float64Array.from(z), last: null, stop: null });
+    linkage.measure();
+    this.update();
+    this.emit("size", { reached: 1, open: 0 });
+    this.emit("move");
+  }
+
+  /** Where the mechanism is, and what is wanted of it, to come back to. */
   snapshot() {
     const { linkage: { d, u, z, last, stop }, running, assembly } = this;
-    return { d: Array.from(d), u: Array.from(u), z: Float64Array.from(z), last, stop, of: z, running, assembly };
+    const wanted = this.wanted?.numbers() ?? [];
+    return { d: Array.from(d), u: Array.from(u), z: Float64Array.from(z), last, stop, of: z, running, assembly, wanted };
   }
 
   /** Take the mechanism back to a snapshot. */
-  restore({ d, u, z, last, stop, of, running, assembly }) {
+  restore({ d, u, z, last, stop, of, running, assembly, wanted }) {
     const { linkage } = this;
     Object.assign(linkage, { d: Array.from(d), u: Array.from(u), z: Float64Array.from(z) });
     linkage.measure();
@@ -102,6 +115,7 @@ class Page {
     linkage.last = last && last.to === of ? { ...last, to: linkage.z } : null;
     linkage.stop = stop && stop.to === of ? { ...stop, to: linkage.z } : null;
     Object.assign(this, { running, assembly });
+    this.wanted?.take(wanted);
     this.update();
     this.emit("size", { reached: 1, open: 0 });
     this.emit("move");

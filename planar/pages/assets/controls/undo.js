@@ -12,7 +12,9 @@ class UndoHistory {
     this.redoButton = this.button(bar, "Redo", "Control+Shift+Z Control+Y", () => this.redo());
     // what plays on while a button of these is pressed belongs to the step that it takes back
     const own = ({ target }) => target === this.undoButton || target === this.redoButton;
-    for (const name of ["pointerdown", "click", "change"]) document.addEventListener(name, (event) => { if (!own(event)) this.begin(); }, true);
+    // the click that ends a drag parts it not from what still follows it
+    const follows = ({ type }) => type === "click" && page.wanted?.waits;
+    for (const name of ["pointerdown", "click", "change"]) document.addEventListener(name, (event) => { if (!own(event) && !follows(event)) this.begin(); }, true);
     document.addEventListener("keydown", (event) => {
       if (!event.repeat && !own(event)) this.begin();
       if (event.key === "Enter") this.changed.delete(event.target);
@@ -21,7 +23,7 @@ class UndoHistory {
     // a number that is being typed is the browser's to undo, until it is entered
     document.addEventListener("input", ({ target }) => this.changed.add(target), true);
     for (const event of ["change", "focusout"]) document.addEventListener(event, ({ target }) => this.changed.delete(target), true);
-    for (const event of ["move", "size"]) page.on(event, () => this.note());
+    for (const event of ["move", "size", "wanted"]) page.on(event, () => this.note());
     this.show();
   }
 
@@ -80,8 +82,8 @@ class UndoHistory {
   }
 }
 
-/** Whether two snapshots are of one position of one mechanism. */
+/** Whether two snapshots are of one position of one mechanism, of which the same is wanted. */
 function samePosition(a, b) {
   const alike = (one, other) => one.every((each, k) => each === other[k]);
-  return alike(a.d, b.d) && alike(a.u, b.u) && alike(a.z, b.z);
+  return alike(a.d, b.d) && alike(a.u, b.u) && alike(a.z, b.z) && alike(a.wanted, b.wanted);
 }

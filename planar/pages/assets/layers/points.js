@@ -14,7 +14,8 @@ const paths = {
   still: true,
   label: "Paths of points",
   draw(ink, layers) {
-    const { page } = layers, { course } = page, names = page.chosen.points();
+    // while the dimensions follow what is dragged, the path of just before
+    const { page } = layers, course = page.course ?? (page.wanted?.waits ? page.former : null), names = page.chosen.points();
     if (course === null) return page.data.inputs.length ? "Paths: the motion is being solved" : "Paths: no input runs";
     const { inputs, count } = course, [by] = unitOf(page, page.data.inputs[course.input].slides ? "length" : "angle");
     const range = inputs[count - 1] - inputs[0], step = course.whole ? range / PATH_MARKS : roundUp((range * by) / PATH_MARKS) / by;

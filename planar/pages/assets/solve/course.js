@@ -90,6 +90,7 @@ class Courses {
   constructor(page) {
     this.page = page;
     page.course = null;
+    page.former = null; // the last that was known
     this.work = null;
     page.on("size", () => this.renew());
     page.on("move", () => { if (!this.fits()) this.renew(); });
@@ -111,7 +112,7 @@ class Courses {
     this.running = page.running;
     this.others = Array.from(page.linkage.u);
     const known = page.course !== null;
-    page.course = null;
+    [page.former, page.course] = [page.course ?? page.former, null];
     if (known) page.emit("course");
     this.work = page.data.inputs.length ? this.find() : null;
     this.later();

@@ -11,14 +11,15 @@ class DesignSlopes {
     this.made = page.linkage.copy();
   }
 
-  /** Of each dimension, at unknowns z and inputs u: {plus, minus}, each {frames, sizes} a step aside; null where the
-      dimension cannot change alone, or where nothing is determined. */
-  sides(z, u) {
+  /** Of each dimension, or of those with the numbers `chosen`, at unknowns z and inputs u: {plus, minus}, each
+      {frames, sizes, state, d} a step aside; null where the dimension cannot change alone, or where nothing is determined. */
+  sides(z, u, chosen = null) {
     const { page: { data }, made } = this, { d } = made;
     Object.assign(made, { z: Float64Array.from(z), u: Array.from(u) });
     made.measure();
     const slope = Float64Array.from(made.closure(z, u).slope), why = singularity(made, slope);
-    return data.dimensions.map((each, k) => (why || each.held ? null : this.aside(k, z, u, d, slope)));
+    const left = (k) => chosen !== null && !chosen.includes(k);
+    return data.dimensions.map((each, k) => (why || each.held || left(k) ? null : this.aside(k, z, u, d, slope)));
   }
 
   aside(k, z, u, d, slope) {
@@ -27,6 +28,7 @@ class DesignSlopes {
       const there = Array.from(d);
       there[k] += side * step;
       made.measure(there);
+      return there;
     };
     const opened = (side) => { beside(side); return Float64Array.from(made.closure(z, u).F); };
     const above = opened(1), below = opened(-1), change = above.map((each, i) => (below[i] - each) / 2);
@@ -38,9 +40,10 @@ class DesignSlopes {
       if (!(Math.abs(left) <= TIED * DESIGN_STEP)) return null;
     }
     const side = (sign) => {
-      beside(sign);
+      const there = beside(sign);
       made.z = Float64Array.from(z, (each, i) => each + sign * move[i]);
-      return { frames: this.page.framesOf(made.state()), sizes: Float64Array.from(made.sizes) };
+      const state = made.state();
+      return { frames: this.page.framesOf(state), sizes: Float64Array.from(made.sizes), state, d: there };
     };
     const found = { plus: side(1), minus: side(-1) };
     made.z = Float64Array.from(z);

@@ -39,6 +39,12 @@ class Drawing {
     this.build();
   }
 
+  /** Keep scale and place while something is dragged, or fit what there is now. */
+  hold(held) {
+    this.held = held ? { scale: this.scale, origin: this.origin } : null;
+    if (!held) this.renew();
+  }
+
   /** Make all elements anew, for the sizes and the window that there are now. */
   build() {
     const { page, svg } = this, width = svg.clientWidth, height = svg.clientHeight;
@@ -75,11 +81,15 @@ class Drawing {
         for (const k of [0, 1]) { low[k] = Math.min(low[k], at[k] - r); high[k] = Math.max(high[k], at[k] + r); }
       }
     }
+    for (const at of this.page.wanted?.spots() ?? []) {
+      for (const k of [0, 1]) { low[k] = Math.min(low[k], at[k]); high[k] = Math.max(high[k], at[k]); }
+    }
     for (const k of [0, 1]) { low[k] -= this.slack; high[k] += this.slack; }
     const span = [high[0] - low[0], high[1] - low[1]], room = [width - 2 * MARGIN * mm, height - (2 * MARGIN + FOOT) * mm];
     const scale = Math.min(room[0] / Math.max(span[0], 1e-9), room[1] / Math.max(span[1], 1e-9));
     this.scale = Math.min(scale, (0.6 * Math.min(...room)) / (0.02 * this.page.data.size)); // a single spot is not blown up
-    const origin = [
+    if (this.held) ({ scale: this.scale } = this.held); // what is dragged is not drawn away from the pointer
+    const origin = this.held ? this.held.origin : [
       width / 2 - ((low[0] + high[0]) / 2) * this.scale,
       (height - FOOT * mm) / 2 + ((low[1] + high[1]) / 2) * this.scale,
     ];
@@ -179,7 +189,7 @@ class Drawing {
     for (const { group, link } of this.parts.values()) group.setAttribute("transform", matrices[link]);
     this.springs.place();
     this.avoid();
-    if (!this.inside() && !this.growing) return this.grow();
+    if (!this.inside() && !this.growing && !this.held) return this.grow();
     const settled = this.letters.place(this.spots.map(([link, at]) => this.screen(link, at)), this.avoided, [this.width, this.height], jump);
     if (!settled && !this.settling) {
       this.settling = true;
