@@ -124,8 +124,12 @@ if TYPE_CHECKING:
     from planar.structures.symmetry import ChainSymmetry
     from planar.synthesis.cognates.cognate_inputs import CognateInput
     from planar.synthesis.cognates.cognates import Cognate, Cognates, cognates
+    from planar.synthesis.synthesis import Synthesis, SynthesisedDesign
+    from planar.synthesis.synthesise import synthesise
+    from planar.synthesis.task.synthesis_task import Demands, SynthesisTask, WantedFunction, WantedPath, WantedPoses
+    from planar.synthesis.task.task_reader import read_task
 
-__version__ = "0.16.0"
+__version__ = "0.17.0"
 
 __all__ = [
     "Advantage",
@@ -170,6 +174,7 @@ __all__ = [
     "Course",
     "Curvature",
     "CycloidalRise",
+    "Demands",
     "Distances",
     "Drive",
     "Dwell",
@@ -251,6 +256,9 @@ __all__ = [
     "Sweep",
     "Swept",
     "Swing",
+    "Synthesis",
+    "SynthesisTask",
+    "SynthesisedDesign",
     "TableSegment",
     "TimeRatio",
     "ToleranceBand",
@@ -263,6 +271,9 @@ __all__ = [
     "Unknown",
     "UnknownLoad",
     "Variant",
+    "WantedFunction",
+    "WantedPath",
+    "WantedPoses",
     "WorstCase",
     "advantage",
     "advantage_over",
@@ -315,6 +326,7 @@ __all__ = [
     "plot",
     "prepared",
     "problem_variants",
+    "read_task",
     "schema",
     "self_locking",
     "sensitivity",
@@ -324,6 +336,7 @@ __all__ = [
     "sweep",
     "sweep_each",
     "swing",
+    "synthesise",
     "time_ratio",
     "to_dict",
     "tolerance",

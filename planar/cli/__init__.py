@@ -29,6 +29,7 @@ main.modules = {
     "sensitivity": "planar.cli.commands.design.sensitivity",
     "simulate": "planar.cli.commands.forces_simulate",
     "solve": "planar.cli.commands.solve_cycle_explain",
+    "synthesise": "planar.cli.commands.design.synthesise",
     "tolerance": "planar.cli.commands.design.tolerance",
     "view": "planar.cli.commands.view_gallery",
 }

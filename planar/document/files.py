@@ -30,7 +30,7 @@ def loads(text: str | bytes, place: str = "$") -> Mechanism:
     >>> planar.loads(planar.dumps("four-bar"))
     <Mechanism 'Four-bar chain': 4 links, 4 pairs, driven at A>
     """
-    return read_mechanism(_parse_json(text, place))
+    return read_mechanism(parse_json(text, place))
 
 
 def from_dict(value: Any) -> Mechanism:
@@ -121,7 +121,7 @@ def find_model_file(model: str | Path) -> Path:
     if str(model) in known:
         return known[str(model)]
     for file in known.values():
-        if str(model) in _parse_json(read_limited(file), str(file)).get("ids", ()):
+        if str(model) in parse_json(read_limited(file), str(file)).get("ids", ()):
             return file
     raise BadInput(str(model), _explain_missing(path, known))
 
@@ -186,7 +186,9 @@ def _limited(file: BinaryIO, place: str) -> bytes:
     return content
 
 
-def _parse_json(text: str | bytes, place: str) -> Any:
+def parse_json(text: str | bytes, place: str) -> Any:
+    """The value of a JSON text, with every key once and every number finite. Raises BadInput."""
+
     def constant(word: str) -> Any:
         raise BadInput(place, f"{word} is not a number that a mechanism can have")
 

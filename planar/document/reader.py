@@ -44,7 +44,7 @@ def read_mechanism(value: Any) -> Mechanism:
         raise top.error_at(
             "planar", f"the format is to be the number {FORMAT_VERSION}, not {describe_value(top['planar'].value)}"
         )
-    units = _read_units(top)
+    units = read_units(top)
     top = replace(top, context=FileContext(units, "", {}))
     frame = top["frame"].as_text()
     links = {name: _read_link(name, cursor) for name, cursor in top["links"].members()}
@@ -93,7 +93,8 @@ def read_mechanism(value: Any) -> Mechanism:
     return replace(whole, tolerances=read_tolerances(full["tolerances"], whole))
 
 
-def _read_units(top: Cursor) -> FileUnits:
+def read_units(top: Cursor) -> FileUnits:
+    """The units that a file declares. Raises BadInput."""
     if not top.has("units"):
         return FileUnits()
     units = top.object_at("units")

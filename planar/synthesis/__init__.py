@@ -1,1 +1,1 @@
-"""Linkages for what they must do: those that trace the same path, and catalogues of swept designs."""
+"""Linkages for what they must do: those that do a task best, and those that trace the same path."""

@@ -52,7 +52,7 @@ LIBRARIES = {
         "structures",
         "synthesis",
     },
-    "casadi": {"assemblies", "batch", "codegen", "derivatives", "dynamics", "equations", "pages"},
+    "casadi": {"assemblies", "batch", "codegen", "derivatives", "dynamics", "equations", "pages", "synthesis"},
     "networkx": {"model", "structures"},
     "clarabel": {"dynamics"},
     "flint": {"assemblies"},

@@ -121,6 +121,9 @@ def results():
     measured = {"B": path}
     fitted = planar.calibrate("crank-rocker", measured, ["coupler.length", "rocker.length"])
     yield from (fitted, *fitted.unidentified[:1], *fitted.outliers[:1])
+    wanted = {"point": "E", "through": [["0 mm", "0 mm"], ["20 mm", "12 mm"], ["42 mm", "15 mm"], ["63 mm", "8 mm"]]}
+    found = planar.synthesise({"planar": 1, "start": "four-bar", "wanted": [wanted]}, many=1)
+    yield from (found, found[0], found.task, found.task.wanted[0], found.task.demands)
     slopes = planar.sensitivity(motion, "stroke")
     yield from (slopes, slopes.travel, slopes.travel.ends[0], slopes.influences("displacement")[0], slopes.transmission)
     yield from (planar.chains(8), chain := planar.chains(6)[0], chain.mechanisms()[0], chain.symmetry)

@@ -1,1 +1,1 @@
-"""Many designs of a mechanism, swept and kept on disk, and those of them that come near to what is wanted."""
+"""Many designs of a mechanism with their motion, and those of them that come near to what is wanted."""

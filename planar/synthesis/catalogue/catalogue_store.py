@@ -1,48 +1,31 @@
-"""Catalogues on disk: arrays one behind the other, after a line that says their names, types and shapes."""
+"""Catalogues kept on disk, so that a structure is run through its motions but once."""
 
 from __future__ import annotations
 
-import json
-from collections.abc import Mapping
-from hashlib import sha256
-from typing import Any
+import io
 
 import numpy as np
 
 from planar.foundation.private_cache import PrivateCache
+from planar.synthesis.catalogue.catalogue import Catalogue, build_catalogue, catalogue_key
+from planar.synthesis.fitting.wanted_equations import WantedEquations
+from planar.synthesis.task.starts import FreeNumbers
 
-KEPT_CATALOGUES = PrivateCache("catalogues", ".catalogue", b"planar catalogue\n", 4 * 2**30)
-"""Swept designs of structures; those of a four-bar take some 60 MB."""
-ALIGNMENT = 64
-
-
-def catalogue_key(*told: Any) -> str:
-    """The fingerprint of what a catalogue follows from: of data as JSON has it, arrays among them."""
-    text = json.dumps(told, sort_keys=True, default=lambda each: np.asarray(each).tolist())
-    return sha256(text.encode()).hexdigest()
+CACHE = PrivateCache("catalogues", ".npz", b"planar catalogue 1\n", 2 * 2**30)
 
 
-def keep_arrays(key: str, arrays: Mapping[str, np.ndarray]) -> bool:
-    """Keep arrays by name under a fingerprint; whether that was possible."""
-    about = [[name, each.dtype.str, each.shape] for name, each in arrays.items()]
-    head = json.dumps(about).encode()
-    parts = [head + b" " * (-(len(head) + 1) % ALIGNMENT) + b"\n"]
-    for each in arrays.values():
-        data = np.ascontiguousarray(each).tobytes()
-        parts += [data, bytes(-len(data) % ALIGNMENT)]
-    return KEPT_CATALOGUES.write(key, b"".join(parts))
-
-
-def kept_arrays(key: str) -> dict[str, np.ndarray] | None:
-    """The arrays of a fingerprint, to be read alone; None where none are kept, or where what is kept is not whole."""
-    content = KEPT_CATALOGUES.read(key)
-    if content is None:
-        return None
-    head, _, _ = content.partition(b"\n")
-    at, found = len(head) + 1, {}
-    for name, dtype, shape in json.loads(head):
-        count = int(np.prod(shape))
-        found[name] = np.frombuffer(content, dtype, count, at).reshape(shape)
-        size = found[name].nbytes
-        at += size + -size % ALIGNMENT
+def kept_catalogue(equations: tuple[WantedEquations, ...], free: FreeNumbers, count: int, seed: int) -> Catalogue:
+    """The catalogue of so many draws, from disk where it is kept there, else made and kept."""
+    key = catalogue_key(equations, free, count, seed)
+    content = CACHE.read(key)
+    if content is not None:
+        with np.load(io.BytesIO(content), allow_pickle=False) as file:
+            numbers, unknowns, is_whole = (file[name] for name in ("numbers", "unknowns", "is_whole"))
+        values = tuple(each.values(numbers, unknowns) for each in equations)
+        return Catalogue(numbers, unknowns, values, is_whole)
+    found = build_catalogue(equations, free, count, seed)
+    if CACHE.is_writable():
+        told = io.BytesIO()
+        np.savez(told, numbers=found.numbers, unknowns=found.unknowns, is_whole=found.is_whole)
+        CACHE.write(key, told.getvalue())
     return found

@@ -1,0 +1,96 @@
+"""Designs that synthesis found as text for a terminal, and as JSON values."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+from rich.console import Group, RenderableType
+from rich.text import Text
+
+from planar.document.writer import write_mechanism
+from planar.model.wording import amount, count_phrase
+from planar.reports.fitted_table import FittedTable, plain_table
+from planar.reports.number_format import format_number, paragraphs
+from planar.synthesis.synthesis import Synthesis, SynthesisedDesign
+from planar.synthesis.task.synthesis_task import WantedFunction
+
+MAX_REJECTED = 8
+"""Rejected designs whose defects are listed."""
+
+
+def table(found: Synthesis, files: Sequence[Path]) -> RenderableType:
+    """The designs with their misses, where they are written, and the best of those rejected with the reason."""
+    entries = count_phrase(found.task.entry_count, "entry is wanted", "entries are wanted")
+    parts: list[RenderableType] = [Text(found.task.name, style="bold"), Text(entries), Text()]
+    if len(found):
+        parts += [_designs_table(found, files), Text()]
+    if found.rejected:
+        parts += [_rejected_table(found), Text()]
+    return Group(*parts, paragraphs((" -", sentence) for sentence in _remarks(found)))
+
+
+def _designs_table(found: Synthesis, files: Sequence[Path]) -> FittedTable:
+    rows = plain_table(
+        "Designs", "no.", "start", "greatest miss", "root mean square", "of the extent %", "file", left=(1, 5), keys=1
+    )
+    for number, each in enumerate(found, start=1):
+        rows.add_row(
+            str(number),
+            each.start,
+            *_misses(found, each),
+            str(files[number - 1]) if files else "",
+        )
+    return rows
+
+
+def _rejected_table(found: Synthesis) -> FittedTable:
+    rows = plain_table("Rejected", "start", "greatest miss", "defects", left=(0, 2), keys=1)
+    for each in found.rejected[:MAX_REJECTED]:
+        rows.add_row(each.start, _misses(found, each)[0], "; ".join(each.defects))
+    return rows
+
+
+def _misses(found: Synthesis, design: SynthesisedDesign) -> tuple[str, str, str]:
+    kind, units = _kind(found), found.task.units
+    if design.error != design.error:
+        return "", "", ""
+    whole = found.size if kind == "length" else 1.0
+    share = format_number(100.0 * design.greatest_miss / whole) if kind == "length" else ""
+    return amount(design.greatest_miss, kind, units), amount(design.error, kind, units), share
+
+
+def _kind(found: Synthesis) -> str:
+    return "angle" if all(isinstance(each, WantedFunction) for each in found.task.wanted) else "length"
+
+
+def _remarks(found: Synthesis) -> Iterator[str]:
+    yield "judged by the general path: every entry on one branch of the motion, in its order where that is wanted"
+    if len(found.rejected) > MAX_REJECTED:
+        yield f"{len(found.rejected) - MAX_REJECTED} more were rejected; --json lists them"
+    yield from found.remarks
+
+
+def record(found: Synthesis, files: Sequence[Path]) -> dict[str, Any]:
+    """The designs as JSON values, SI."""
+    return {
+        "task": found.task.name,
+        "size": found.size,
+        "designs": [_design_record(each) | ({"file": str(files[k])} if files else {}) for k, each in enumerate(found)],
+        "rejected": [_design_record(each) for each in found.rejected],
+        "remarks": list(found.remarks),
+    }
+
+
+def _design_record(design: SynthesisedDesign) -> dict[str, Any]:
+    is_known = design.error == design.error
+    return {
+        "start": design.start,
+        "error": design.error if is_known else None,
+        "greatest_miss": design.greatest_miss if is_known else None,
+        "misses": [each.tolist() if is_known else None for each in design.misses],
+        "inputs": [each.tolist() for each in design.inputs],
+        "defects": list(design.defects),
+        "mechanism": write_mechanism(design.mechanism),
+    }

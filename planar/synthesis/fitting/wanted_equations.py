@@ -1,0 +1,260 @@
+"""What is wanted of a mechanism as rows that are to be zero, linear in its free numbers alone.
+
+Wanted entry i has unknowns of its own: z_i of the mechanism, and the position u_i of its running input. They keep
+
+    F(z_i, u_i, d) = 0
+
+and give a result r(z_i, u_i, d), which is to be w_i. To the first order, where K is the Jacobian of F in (z, u) with a
+row c below that keeps it square,
+
+    (dz, du) = -K^-1 (F + F_d dd) + t s,   t = K^-1 (0, 1)
+
+so that r(z, u, d) depends on dd and one number s, how far the entry goes along the path. Where the input is not given
+s is eliminated (Schur's complement), and with c along the path this holds at dead points of the input too. Where the
+input is given c is the input's own row, and s is the same for all: the zero of its scale.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+from typing import NamedTuple
+
+import casadi as ca
+import numpy as np
+
+from planar.derivatives.design_equations import DesignEquations, design_equations
+from planar.equations.casadi_call import BufferedFunction
+from planar.foundation.arrays import Array, BoolArray
+from planar.model.mechanism import Mechanism
+from planar.synthesis.task.synthesis_task import Wanted
+from planar.synthesis.task.wanted_expressions import wanted_expression
+
+DAMPING_ALONG = 1e-12
+"""Of the squared size of the results: how much going along a path counts, where a result does not change along it."""
+
+
+class WantedRows(NamedTuple):
+    """Entries (n) that are wanted of one result (parts), in units in which a miss of one counts alike."""
+
+    wanted: Wanted
+    values: Array
+    "(n, parts) SI"
+    inputs: Array | None
+    "(n,) of the running input (rad or m), where they are given"
+    weights: Array
+    "(n,)"
+    scales: Array
+    "(parts,): what a miss of one is in SI"
+    input_is_free: bool
+    "whether the zero of the given inputs is sought"
+    value_is_free: bool
+    "whether the zero of the values is sought"
+
+
+class LinearRows(NamedTuple):
+    """Rows of designs (designs, ...) to the first order, and what is to be done to each entry's unknowns."""
+
+    residual: Array
+    "(designs, n, parts)"
+    slopes: Array
+    "(designs, n, parts, globals)"
+    along: Array
+    "(designs, n, parts): by s"
+    own: Array
+    "(designs, n, unknowns): what closes the equations"
+    own_slopes: Array
+    "(designs, n, unknowns, globals)"
+    tangent: Array
+    "(designs, n, unknowns)"
+
+
+class WantedEquations:
+    """Rows of one kind of wanted entries of mechanisms that differ in free numbers.
+
+    Unknowns of an entry are y = (z, u); `globals` are the free numbers, then the zeros of scales that are sought.
+    """
+
+    def __init__(self, mechanism: Mechanism, rows: WantedRows, free: Sequence[str], unit: float):
+        self.design: DesignEquations = design_equations(mechanism)
+        self.rows, self.free, self.unit = rows, tuple(free), unit
+        design = self.design
+        self.result = wanted_expression(design, rows.wanted) / ca.DM(rows.scales)
+        self.z_count = design.z.numel()
+        names = [each.name for each in design.dimensions]
+        self.columns = [names.index(name) for name in free]
+        self.base = np.array([each.value for each in design.dimensions])
+        self.scale = np.array([unit if design.dimensions[k].kind == "length" else 1.0 for k in self.columns])
+        "SI of one of each free number"
+        self.input_scale = float(design.input_scale[0])
+        self.zero_count = int(rows.input_is_free) + int(rows.value_is_free)
+        self.target = rows.values / rows.scales
+
+    @property
+    def is_timed(self) -> bool:
+        """Whether the running input is given at every entry."""
+        return self.rows.inputs is not None
+
+    def _in_entries(self, outputs: list[ca.SX]) -> tuple[ca.SX, ca.SX, list[ca.SX]]:
+        """Symbols of an entry's unknowns and of the free numbers, and expressions in them."""
+        design = self.design
+        x = ca.SX.sym("x", len(self.free))
+        y = ca.SX.sym("y", self.z_count + 1)
+        d = ca.SX(ca.DM(self.base))
+        for k, column in enumerate(self.columns):
+            d[column] = x[k] * self.scale[k]
+        u = ca.vertcat(y[-1] * self.input_scale, *(each.position for each in design.mechanism.inputs[1:]))
+        zero = ca.SX.zeros(design.u1.numel())
+        given = [design.z, design.u, design.u1, design.u2, design.d]
+        return y, x, ca.substitute(outputs, given, [y[: self.z_count], u, zero, zero, d])
+
+    def _function(self, outputs: list[ca.SX]) -> BufferedFunction:
+        y, x, (F, *rest) = self._in_entries(outputs)
+        found = [F, ca.jacobian(F, y)]
+        for r in rest:
+            found += [ca.jacobian(F, x), r, ca.jacobian(r, y), ca.jacobian(r, x)]
+        return BufferedFunction(ca.Function("wanted", [y, x], [ca.densify(each) for each in found]))
+
+    @cached_property
+    def closure(self) -> BufferedFunction:
+        """F and its Jacobian in y."""
+        return self._function([self.design.F])
+
+    @cached_property
+    def whole(self) -> BufferedFunction:
+        """Those, F's Jacobian in x, and the result with its Jacobians in y and x."""
+        return self._function([self.design.F, self.result])
+
+    def closure_at(self, x: Array, y: Array) -> tuple[Array, Array]:
+        """The equations (designs, n, unknowns - 1), and their Jacobian in each entry's unknowns."""
+        F, jacobian = self._at(self.closure, x, y)
+        return F, jacobian
+
+    def closure_slopes_at(self, x: Array, y: Array) -> tuple[Array, Array, Array]:
+        """The equations, and their Jacobians in each entry's unknowns and in the free numbers."""
+        F, F_y, F_x, *_ = self._at(self.whole, x, y)
+        return F, F_y, F_x
+
+    def values(self, x: Array, y: Array) -> Array:
+        """The result (designs, n, parts), in units of its scales."""
+        many, entries, unknowns = y.shape
+        told = self._value.evaluate_batch(many * entries, y.reshape(-1, unknowns), np.repeat(x, entries, axis=0))[0]
+        found: Array = told.reshape(many, entries, -1)
+        return found
+
+    @cached_property
+    def _value(self) -> BufferedFunction:
+        y, x, told = self._in_entries([self.result])
+        return BufferedFunction(ca.Function("value", [y, x], [ca.densify(told[0])]))
+
+    def jacobians(self, x: Array, y: Array) -> Array:
+        """Of the equations in each entry's unknowns (designs, n, unknowns - 1, unknowns)."""
+        return self._at(self.closure, x, y)[1]
+
+    def tangents_near(self, x: Array, y: Array, before: Array) -> Array:
+        """The unit vectors along the path (designs, n, unknowns), in the sense of those that are near."""
+        jacobian = self.jacobians(x, y)
+        matrix = np.concatenate([jacobian, before[:, :, None, :]], axis=2)
+        right = np.zeros((*matrix.shape[:3], 1))
+        right[..., -1, 0] = 1.0
+        found = solve_rows(matrix, right)[..., 0]
+        unit: Array = found / np.linalg.norm(found, axis=-1, keepdims=True)
+        return unit
+
+    def close(self, x: Array, y: Array, tangent: Array, steps: int) -> tuple[Array, BoolArray]:
+        """Unknowns (designs, n, unknowns) that keep the equations, near given ones, and which designs have them.
+
+        Newton's steps square to `tangent`, or with the input kept where it is given."""
+        for step in range(steps + 1):
+            F, jacobian = self._at(self.closure, x, y)
+            worst = np.abs(F).max(axis=(1, 2), initial=0.0)
+            if step == steps or bool((worst[np.isfinite(worst)] < CLOSED).all()):
+                break
+            K = self._bordered(jacobian, tangent)
+            right = np.concatenate([F, np.zeros((*F.shape[:2], 1))], axis=2)
+            y = y - np.clip(solve_rows(K, right[..., None])[..., 0], -MAX_CLOSING_STEP, MAX_CLOSING_STEP)
+        return y, np.asarray(worst < CLOSED)
+
+    def residuals(self, x: Array, y: Array, zeros: Array) -> Array:
+        """The rows (designs, n, parts) without derivatives."""
+        _, _, _, r, _, _ = self._at(self.whole, x, y)
+        return (r - self._wanted(zeros)) * self.rows.weights[:, None]
+
+    def _wanted(self, zeros: Array) -> Array:
+        target = np.broadcast_to(self.target, (len(zeros), *self.target.shape))
+        if not self.rows.value_is_free:
+            return target
+        moved: Array = target + zeros[:, -1, None, None]
+        return moved
+
+    def linearise(self, x: Array, y: Array, zeros: Array, tangent: Array) -> LinearRows:
+        """The rows to the first order, at free numbers x (designs, free), unknowns y and zeros of scales."""
+        F, F_y, F_x, r, r_y, r_x = self._at(self.whole, x, y)
+        weights = self.rows.weights[:, None]
+        residual = (r - self._wanted(zeros)) * weights
+        r_y, r_x = r_y * weights[..., None], r_x * weights[..., None]
+        K = self._bordered(F_y, tangent)
+        many, entries, closures = F.shape
+        right = np.zeros((many, entries, closures + 1, 2 + F_x.shape[-1]))
+        right[:, :, :-1, 0], right[:, :, -1, 1], right[:, :, :-1, 2:] = F, 1.0, F_x
+        solved = solve_rows(K, right)
+        own, along, own_slopes = -solved[..., 0], solved[..., 1], -solved[..., 2:]
+        residual = residual + np.einsum("cnpy,cny->cnp", r_y, own)
+        slopes = r_x + r_y @ own_slopes
+        moving = np.einsum("cnpy,cny->cnp", r_y, along)
+        if self.rows.input_is_free:
+            slopes = np.concatenate([slopes, moving[..., None]], axis=-1)
+            own_slopes = np.concatenate([own_slopes, along[..., None]], axis=-1)
+        if self.rows.value_is_free:
+            ones = np.broadcast_to(-weights[..., None], (*moving.shape, 1))
+            slopes = np.concatenate([slopes, ones], axis=-1)
+            own_slopes = np.concatenate([own_slopes, np.zeros((*along.shape, 1))], axis=-1)
+        return LinearRows(residual, slopes, moving, own, own_slopes, along)
+
+    def _bordered(self, jacobian: Array, tangent: Array) -> Array:
+        row = tangent[:, :, None, :]
+        if self.is_timed:
+            row = np.zeros((*jacobian.shape[:2], 1, jacobian.shape[3]))
+            row[..., -1] = 1.0
+        return np.concatenate([jacobian, row], axis=2)
+
+    def _at(self, function: BufferedFunction, x: Array, y: Array) -> list[Array]:
+        """What a function gives (designs, n, rows[, columns])."""
+        many, entries, unknowns = y.shape
+        rows = np.repeat(x, entries, axis=0)
+        told = function.evaluate_batch(many * entries, y.reshape(-1, unknowns), rows)
+        found = []
+        for k, each in enumerate(told):
+            shaped = each.reshape(many, entries, *each.shape[1:]).swapaxes(-1, -2)
+            found.append(shaped[..., 0] if k in VECTORS else shaped)
+        return found
+
+
+CLOSED = 1e-10
+"""Greatest residual of equations that are kept, of the size of the mechanism or a rad."""
+MAX_CLOSING_STEP = 0.5
+"""rad, or of the mechanism's size."""
+VECTORS = (0, 3)
+"""Of what the compiled function gives: vectors; the rest are matrices."""
+
+
+def solve_rows(matrices: Array, right: Array) -> Array:
+    """Solutions of square systems (..., n, n) with right sides (..., n, k); NaN where one is singular."""
+    try:
+        found: Array = np.linalg.solve(matrices, right)
+    except np.linalg.LinAlgError:  # one of them, to the last digit
+        flat, sides = matrices.reshape(-1, *matrices.shape[-2:]), right.reshape(-1, *right.shape[-2:])
+        found = np.full(sides.shape, np.nan)
+        for k, (matrix, side) in enumerate(zip(flat, sides, strict=True)):
+            try:
+                found[k] = np.linalg.solve(matrix, side)
+            except np.linalg.LinAlgError:
+                continue
+        found = found.reshape(right.shape)
+    return found
+
+
+def tangents(jacobians: Array) -> Array:
+    """The unit vectors (..., unknowns) that Jacobians (..., unknowns - 1, unknowns) do not see: along the path."""
+    found: Array = np.linalg.svd(jacobians)[2][..., -1, :]
+    return found

@@ -1,0 +1,1 @@
+"""Whether a design does what is wanted, by the general path."""

@@ -1,0 +1,96 @@
+"""What synthesis finds: designs, the best first, and those that were rejected."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import overload
+
+import numpy as np
+
+from planar.foundation.arrays import Array
+from planar.model.mechanism import Mechanism
+from planar.model.wording import count_phrase
+from planar.synthesis.task.synthesis_task import SynthesisTask
+
+
+@dataclass(frozen=True, eq=False)
+class SynthesisedDesign:
+    """A linkage that does what a task wants, as far as it says.
+
+    `error` is the root mean square of its misses and `greatest_miss` the greatest (m; rad where functions of angles
+    alone are wanted); `misses` (n,) are those of each wanted item and `inputs` (n,) where the input is there. `defects`
+    are sentences, none of an accepted design. `start` names the mechanism that it was made from.
+    """
+
+    mechanism: Mechanism
+    error: float
+    greatest_miss: float
+    misses: tuple[Array, ...] = field(repr=False)
+    inputs: tuple[Array, ...] = field(repr=False)
+    defects: tuple[str, ...]
+    start: str
+
+    def __repr__(self) -> str:
+        told = f", {count_phrase(len(self.defects), 'defect')}" if self.defects else ""
+        return f"<SynthesisedDesign {self.mechanism.name!r}: greatest miss {self.greatest_miss:.3g}{told}>"
+
+
+@dataclass(frozen=True, eq=False)
+class Synthesis(Sequence[SynthesisedDesign]):
+    """The designs that a task leads to, the best first; `rejected` are those with a defect, `remarks` say what to know.
+
+    `size` is the extent of what is wanted (m), beside which misses may be seen.
+    """
+
+    task: SynthesisTask
+    designs: tuple[SynthesisedDesign, ...]
+    rejected: tuple[SynthesisedDesign, ...]
+    size: float
+    remarks: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        best = f", greatest miss of the best {self.designs[0].greatest_miss:.3g}" if self.designs else ""
+        return f"<Synthesis of {self.task.name!r}: {count_phrase(len(self), 'design')}{best}>"
+
+    def __len__(self) -> int:
+        """How many sound designs there are."""
+        return len(self.designs)
+
+    @overload
+    def __getitem__(self, index: int) -> SynthesisedDesign: ...
+    @overload
+    def __getitem__(self, index: slice) -> tuple[SynthesisedDesign, ...]: ...
+    def __getitem__(self, index: int | slice) -> SynthesisedDesign | tuple[SynthesisedDesign, ...]:
+        """A design, or some of them."""
+        return self.designs[index]
+
+    def __iter__(self) -> Iterator[SynthesisedDesign]:
+        """The designs, the best first."""
+        return iter(self.designs)
+
+
+def rank_designs(designs: Sequence[SynthesisedDesign], many: int) -> tuple[SynthesisedDesign, ...]:
+    """The best so many by their error, of those alike one."""
+    found: list[SynthesisedDesign] = []
+    for each in sorted(designs, key=lambda one: (not np.isfinite(one.error), one.error)):
+        if not any(_are_alike(each, other) for other in found):
+            found.append(each)
+        if len(found) == many:
+            break
+    return tuple(found)
+
+
+def _are_alike(one: SynthesisedDesign, other: SynthesisedDesign) -> bool:
+    """Whether two designs are one: of one start, with joints at the same places at their first entry."""
+    if one.start != other.start:
+        return False
+    first, second = ({name: (x, y) for name, x, y in each.mechanism.sketch} for each in (one, other))
+    if first.keys() != second.keys() or not first:
+        return False
+    a, b = (np.array([each[name] for name in first]) for each in (first, second))
+    return bool(np.abs(a - b).max() < ALIKE * max(float(np.ptp(a, axis=0).max()), 1e-12))
+
+
+ALIKE = 2e-3
+"""Of a mechanism's extent: designs whose joints are nearer to each other are one."""

@@ -1,0 +1,166 @@
+"""The mechanisms that a task starts from, with the points that are wanted, and which numbers are sought."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import NamedTuple
+
+import casadi as ca
+import numpy as np
+
+from planar.derivatives.design_equations import design_dimensions, design_equations
+from planar.derivatives.implicit_system import ImplicitSystem, Level
+from planar.foundation.arrays import Array
+from planar.foundation.errors import BadInput
+from planar.model.link_shapes import At, Distances, Link, Point, link_shape
+from planar.model.mechanism import Mechanism, named_points
+from planar.solving.cycle import cycle
+from planar.synthesis.task.synthesis_task import ChainStart, SynthesisTask, WantedFunction, WantedPath
+from planar.synthesis.task.wanted_expressions import influential_numbers, wanted_expression
+
+NO_INFLUENCE = 1e-9
+"""Of the greatest slope: a number with less does not matter."""
+
+
+class FreeNumbers(NamedTuple):
+    """Numbers of a mechanism that are sought, by name, with bounds (SI, infinite where there is none)."""
+
+    names: tuple[str, ...]
+    values: Array
+    lower: Array
+    upper: Array
+    kinds: tuple[str, ...]
+
+
+def start_mechanisms(task: SynthesisTask) -> Iterator[Mechanism]:
+    """Every mechanism that a task starts from, with a point for every path that is wanted, by coordinates in its link.
+
+    Of a chain every choice of a fixed link, an input, and the link that carries a wanted point.
+    """
+    if isinstance(task.starts, ChainStart):
+        yield from _chain_starts(task, task.starts)
+        return
+    for each in task.starts:
+        yield with_wanted_points(each, task, {})
+
+
+def _chain_starts(task: SynthesisTask, start: ChainStart) -> Iterator[Mechanism]:
+    from planar.structures.chains import chains
+
+    paths = [each.point for each in task.wanted if isinstance(each, WantedPath)]
+    if any(not isinstance(each, WantedPath) for each in task.wanted):
+        raise BadInput(
+            "$.start", "chains have no names yet of links and pairs; to start from them, only paths can be wanted"
+        )
+    for links in start.links:
+        for chain in chains(links):
+            for mechanism in chain.mechanisms():
+                found = chain.mechanism(mechanism.frame, mechanism.drives)
+                known = {each.name for each in named_points(found)}
+                names = {point: f"{point}'" if point in known else point for point in paths}
+                for link in _carriers(found):
+                    carried = {point: (link, names[point]) for point in paths}
+                    complete = with_wanted_points(found, task, carried)
+                    if _all_links_matter(complete, task):
+                        yield complete
+
+
+def _all_links_matter(mechanism: Mechanism, task: SynthesisTask) -> bool:
+    """Whether what is wanted depends on every link; else a simpler chain does as well."""
+    design = design_equations(mechanism)
+    z, t = design.coordinates_at(cycle(mechanism, 8, pair=mechanism.inputs[0].pair))
+    results = ca.vertcat(*(wanted_expression(design, each) for each in task.wanted))
+    system = ImplicitSystem([Level(design.z, design.F)], design.t)
+    found = system.slopes(system.result_jacobians(results), [z[0]], t)
+    strength = np.abs(found.slopes[~found.is_singular] * design.scale).max(axis=(0, 1), initial=0.0)
+    first = len(design.names) - len(design.dimensions)
+    by_link = {each.name: 0.0 for each in mechanism.links}
+    for each, own in zip(design.dimensions, strength[first:], strict=True):
+        if each.link in by_link:
+            by_link[each.link] = max(by_link[each.link], float(own))
+    return min(by_link.values()) > NO_INFLUENCE * max(by_link.values())
+
+
+def _carriers(mechanism: Mechanism) -> Iterator[str]:
+    """The links of which a point may describe a curve: those that move and do not turn about a fixed pivot."""
+    beside_frame = {
+        link
+        for pair in mechanism.pairs
+        if mechanism.frame in pair.links
+        for link in pair.links
+        if link != mechanism.frame
+    }
+    for link in mechanism.links:
+        if link.name != mechanism.frame and link.name not in beside_frame:
+            yield link.name
+
+
+def with_wanted_points(mechanism: Mechanism, task: SynthesisTask, carried: dict[str, tuple[str, str]]) -> Mechanism:
+    """The mechanism with its wanted points as coordinates in their link; `carried`: link and name of new ones."""
+    links = {each.name: each for each in mechanism.links}
+    known = {each.name: each for each in named_points(mechanism)}
+    named = (*task.free, *task.within)
+    for each in mechanism.links:  # by distances a point is no longer there where lengths change
+        for own in each.points:
+            is_named = any(name.startswith(f"{each.name}.{own.name}.") for name in named)
+            if isinstance(own.place, Distances) and not is_named:
+                links[each.name] = _by_coordinates(links[each.name], own.name)
+    for path in task.wanted:
+        if not isinstance(path, WantedPath):
+            continue
+        if path.point in known and path.point not in carried:
+            link, point = known[path.point].members[0]
+            links[link] = _by_coordinates(links[link], point)
+            continue
+        link, point = carried.get(path.point, (path.link or "", path.point))
+        if link not in links:
+            raise BadInput(
+                "$.wanted", f"{mechanism.name!r} has no point {path.point!r}; 'on' names the link for a new one"
+            )
+        links[link] = _with_new_point(links[link], point)
+    changed = replace(mechanism, links=tuple(links.values()), published=(), notes=(), tolerances=None)
+    return changed if changed.links != mechanism.links else replace(mechanism, published=(), tolerances=None)
+
+
+def _by_coordinates(link: Link, point: str) -> Link:
+    """The link with a point by its coordinates, where its axes are those in which it was drawn."""
+    if link.axis is not None or point in (link.ends or ()):
+        return link
+    at = link_shape(link).position(point)
+    points = tuple(
+        Point(each.name, At(float(at.x), float(at.y))) if each.name == point else each for each in link.points
+    )
+    return replace(link, points=points)
+
+
+def _with_new_point(link: Link, point: str) -> Link:
+    shape = link_shape(link)
+    places = [shape.position(each) for each in link.names]
+    x, y = (float(np.mean([getattr(each, part) for each in places])) for part in "xy")
+    reach = max((float(np.hypot(one.x - other.x, one.y - other.y)) for one in places for other in places), default=0.0)
+    return replace(link, points=(*link.points, Point(point, At(x, y + 0.5 * reach))))
+
+
+def free_numbers(task: SynthesisTask, mechanism: Mechanism) -> FreeNumbers:
+    """The numbers of a mechanism that a task leaves free, in the order of the file.
+
+    Where it names none these are all of links and pairs that what is wanted depends on, without those that cannot
+    change alone. Raises BadInput for what is no number of it, and NoAnswer where the mechanism cannot move.
+    """
+    known = {each.name: each for each in design_dimensions(mechanism) if each.path[0] in ("links", "pairs")}
+    for name in task.free:
+        if name not in known:
+            raise BadInput("$.free", f"{mechanism.name!r} has no number {name!r} that links and pairs depend on")
+    names = tuple(dict.fromkeys(task.free)) or influential_numbers(mechanism, task.wanted)
+    chosen = [known[name] for name in names]
+    lower, upper = np.array([task.within.get(name, (-np.inf, np.inf)) for name in names]).reshape(-1, 2).T
+    values = np.clip([float(each.value) for each in chosen], lower, upper)
+    return FreeNumbers(names, values, lower, upper, tuple(each.kind for each in chosen))
+
+
+def can_move_whole(task: SynthesisTask, mechanism: Mechanism, free: FreeNumbers) -> bool:
+    """Whether place, size and turn of the whole mechanism are free: all lengths and fixed pivots, without bounds."""
+    if task.within or any(isinstance(each, WantedFunction) for each in task.wanted):
+        return False
+    return not task.free or {*influential_numbers(mechanism, task.wanted)} <= {*free.names}
