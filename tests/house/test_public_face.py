@@ -37,6 +37,8 @@ DRAWINGS = {name: getattr(planar.plot, name) for name in planar.plot.__all__}
 CLASSES = {name: each for name in planar.__all__ if inspect.isclass(each := getattr(planar, name))}
 FREE = {
     "chains",
+    "read_task",
+    "synthesise",
     "generate",
     "schema",
     "build",
@@ -124,6 +126,9 @@ def results():
     wanted = {"point": "E", "through": [["0 mm", "0 mm"], ["20 mm", "12 mm"], ["42 mm", "15 mm"], ["63 mm", "8 mm"]]}
     found = planar.synthesise({"planar": 1, "start": "four-bar", "wanted": [wanted]}, many=1)
     yield from (found, found[0], found.task, found.task.wanted[0], found.task.demands)
+    turned = {"from": "A", "to": "D", "pairs": [["0 deg", "0 deg"], ["20 deg", "31 deg"]]}
+    posed = {"link": "BC", "poses": [{"at": ["0 mm", "1 mm"], "angle": "90 deg"}]}
+    yield from planar.read_task({"planar": 1, "start": "four-bar", "wanted": [turned, posed]}).wanted
     slopes = planar.sensitivity(motion, "stroke")
     yield from (slopes, slopes.travel, slopes.travel.ends[0], slopes.influences("displacement")[0], slopes.transmission)
     yield from (planar.chains(8), chain := planar.chains(6)[0], chain.mechanisms()[0], chain.symmetry)

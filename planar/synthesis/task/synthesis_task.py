@@ -14,7 +14,7 @@ from planar.model.wording import count_phrase
 
 
 class WantedPath(NamedTuple):
-    """Places (n, 2) in the frame's axes (m) that a point is to come to.
+    """`places` (n, 2) in the frame's axes (m) that a `point` is to come to.
 
     `inputs` (n,) are where the running input is there (rad or m), None where that is left open; unless `is_absolute`
     they count by their differences. `in_order`: the places are met one after the other, either way. `is_closed`: they
@@ -42,7 +42,11 @@ class WantedPath(NamedTuple):
 
 
 class WantedPoses(NamedTuple):
-    """Poses that a link is to take: where its origin is (n, 2) in the frame's axes (m), and its angle (n,) (rad)."""
+    """Poses that a `link` is to take: `places` (n, 2) of its origin in the frame's axes (m), and `angles` (n,) (rad).
+
+    `inputs`, `weights`, `in_order`, `is_absolute` and `tolerance` (m) are as of a path; an angle is missed by as much
+    as the length by which it turns the extent of what is wanted.
+    """
 
     link: str
     places: Array
@@ -63,9 +67,10 @@ class WantedPoses(NamedTuple):
 
 
 class WantedFunction(NamedTuple):
-    """Positions of a pair (n,) at positions of the running input (n,), rad or m.
+    """Positions `values` (n,) of the pair `to_pair` at positions `inputs` (n,) of the input `from_pair`, rad or m.
 
-    Unless `is_absolute` both count by their differences, so that the zeros of both scales are free.
+    Unless `is_absolute` both count by their differences, so that the zeros of both scales are free. A miss counts by
+    its `weights` (n,); one greater than the `tolerance` is a defect.
     """
 
     from_pair: str
@@ -111,7 +116,9 @@ class ChainStart(NamedTuple):
 class SynthesisTask:
     """What a linkage must do, and the linkages to start from.
 
-    `free` are names of numbers that are sought, all where it is empty; `within` bounds numbers by name (SI).
+    `wanted` are paths, poses and functions, `starts` mechanisms or chains, `demands` what is to be kept besides, and
+    `units` those of the file. `free` are names of numbers that are sought, all where it is empty; `within` bounds
+    numbers by name (SI).
     """
 
     name: str

@@ -40,7 +40,16 @@ LEAST_CHAIN, GREATEST_CHAIN = 4, 12
 
 
 def read_task(source: Mapping[str, Any] | str | os.PathLike[str] | SynthesisTask) -> SynthesisTask:
-    """The task in a file, or that a JSON value describes. Raises BadInput with the place."""
+    """The task in a file, or that a JSON value describes. Raises BadInput with the place.
+
+    >>> import planar
+    >>> wanted = [{"point": "E", "through": [["0 mm", "0 mm"], ["20 mm", "12 mm"]]}]
+    >>> planar.read_task({"planar": 1, "name": "Lid", "start": "four-bar", "wanted": wanted})
+    <SynthesisTask 'Lid': 2 wanted entries>
+    """
+    if not isinstance(source, SynthesisTask | Mapping | str | os.PathLike):
+        told = f"{type(source).__name__} {source!r:.60}"
+        raise BadInput("task", f"a task's file, or what stands in one, is wanted, not {told}")
     if isinstance(source, SynthesisTask):
         return source
     if isinstance(source, str | os.PathLike):
@@ -48,7 +57,7 @@ def read_task(source: Mapping[str, Any] | str | os.PathLike[str] | SynthesisTask
         if not path.is_file():
             raise BadInput(str(source), "there is no such file; name a task's file (JSON)")
         return _TaskReader(path.parent).read(Cursor(parse_json(read_limited(path), str(path))))
-    return _TaskReader(Path()).read(Cursor(dict(source) if isinstance(source, Mapping) else source))
+    return _TaskReader(Path()).read(Cursor(dict(source)))
 
 
 class _TaskReader:
