@@ -11,17 +11,16 @@ from PIL import Image
 
 import planar
 from planar.assemblies.polynomial.completeness import Completeness
-from planar.document.files import load_models
 from planar.drawing.paper.picture import Circle, Label
 from planar.drawing.paper.scales import parse_scale
 from planar.drawing.scheme import symbol_table
 from planar.drawing.scheme.assemblies import ASSEMBLIES_PER_SHEET, assembly_sheets
-from tests import command
+from tests import command, known
 from tests.builders import bar_linkage, bare_four_bar, tower
 from tests.draws import part
 from tests.linkages import conditioning, determinate, random_linkage
 
-MODELS = [(file.stem, mechanism) for file, mechanism in load_models()]
+MODELS = [*known.MODELS.items()]
 
 
 def meeting(p, q, r, s) -> list[np.ndarray]:

@@ -13,8 +13,9 @@ from typing import Any
 import pytest
 
 import planar
-from planar.document.files import MAX_FILE_BYTES, load_models
+from planar.document.files import MAX_FILE_BYTES
 from tests.command import ROOT, process, run, written
+from tests.known import MODELS
 
 FAR = 1e-12
 """A result printed in full and read again is the same number; one solved again is so to round-off."""
@@ -200,17 +201,16 @@ def test_at_refuses_what_is_no_position_of_an_input(word: str, words: list[str],
 def test_models_lists_every_model_that_comes_along(tmp_path: Path) -> None:
     out = run(tmp_path, "models").done()
     told = json.loads(run(tmp_path, "models", "--json").done())
-    known = list(load_models())
-    assert [each["model"] for each in told] == [file.stem for file, _ in known]
-    for each, (file, mechanism) in zip(told, known, strict=True):
+    assert [each["model"] for each in told] == [*MODELS]
+    for each, (stem, mechanism) in zip(told, MODELS.items(), strict=True):
         assert set(each) == {"model", "ids", "about"}
-        assert file.stem in out
-        assert set(mechanism.ids) <= {file.stem, *each["ids"]}
+        assert stem in out
+        assert set(mechanism.ids) <= {stem, *each["ids"]}
 
 
 def test_a_model_that_comes_along_solves_from_any_folder(tmp_path: Path) -> None:
-    for file, mechanism in list(load_models())[:1]:
-        told = json.loads(run(tmp_path, "solve", file.stem, "--json").done())
+    for stem, mechanism in [*MODELS.items()][:1]:
+        told = json.loads(run(tmp_path, "solve", stem, "--json").done())
         assert told["mechanism"] == mechanism.name
 
 

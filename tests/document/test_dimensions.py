@@ -13,8 +13,7 @@ from planar.document.files import from_dict, to_dict
 from planar.document.schema import schema
 from planar.model.pairs import pair_types
 from planar.model.pairs.turning import TurningPair
-
-MODELS = {file.stem: mechanism for file, mechanism in planar.document.files.load_models()}
+from tests.known import MODELS
 
 
 def numbers_in(value):

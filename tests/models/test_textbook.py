@@ -11,6 +11,7 @@ from planar.document import files
 from planar.model.mechanism import Drive
 from planar.solving.position import PositionSolver
 from tests.closed_forms import piston
+from tests.known import MODELS
 
 TEXTBOOK = [file for file in files.model_files() if file.parent.name == "textbook"]
 IDS = [
@@ -177,5 +178,5 @@ def test_every_model_is_solved_determinate_and_closed(file):
 
 
 def test_names_of_models_and_ids_are_unique():
-    names = [name for file, m in files.load_models() for name in {file.stem, *m.ids}]
+    names = [name for stem, m in MODELS.items() for name in {stem, *m.ids}]
     assert len(names) == len(set(names))

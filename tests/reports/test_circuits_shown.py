@@ -14,7 +14,6 @@ import pytest
 import planar
 from planar.assemblies.polynomial.completeness import Completeness
 from planar.assemblies.selection import with_assembly_number
-from planar.document.files import load_models
 from planar.drawing.circuits.curves import BranchCurve, CircuitChart, InputWindow, MarkedAssembly
 from planar.drawing.circuits.equal_curves import merge_equal_charts
 from planar.drawing.labels.text_metrics import format_tick
@@ -24,6 +23,7 @@ from tests.closed_forms import between
 from tests.draws import part
 from tests.figures import text_boxes
 from tests.fonts import own_fonts  # noqa: F401
+from tests.known import MODELS
 
 pytestmark = pytest.mark.filterwarnings("ignore::planar.foundation.errors.MissingGlyphs")
 """Names that no font here may have."""
@@ -315,7 +315,7 @@ LARGE = ("ten-link", "chain-42", "walschaerts-valve-gear")
 """Models whose assemblies take longer to count than a remark is worth."""
 
 
-@pytest.mark.parametrize("file", part([file.stem for file, _ in load_models() if file.stem not in LARGE], 4))
+@pytest.mark.parametrize("file", part([stem for stem in MODELS if stem not in LARGE], 4))
 def test_the_remark_of_which_assembly_agrees_with_the_list(file):
     given = planar.load(file)
     told = [each for each in with_assembly_number(given).remarks if each not in given.remarks]
