@@ -15,23 +15,28 @@ from planar.foundation.jets import Jet, Scalar
 from planar.foundation.notebook_display import Displayable
 from planar.foundation.safe_files import save_file
 from planar.model.mechanism import Drive, Mechanism, replace_inputs
+from planar.pages.data.wanted_data import apply_task
 from planar.pages.notebook import must_carry_scripts, output_html
 from planar.pages.page import PageRange, page
 from planar.pages.still_picture import still_svg
 from planar.reports.files.html import to_html
 from planar.results.motion import Motion, State
 from planar.solving.position import solved_mechanism
+from planar.synthesis.task.synthesis_task import SynthesisTask
+from planar.synthesis.task.task_reader import TaskSource, read_task
 
 MAX_LISTED_ASSEMBLIES = 12
 """Assemblies of the table that a notebook shows."""
 
 
 @takes_result("Mechanism", "State", "Motion")
-def view(shown: Mechanism | State | Motion, path: str | Path | None = None) -> Path:
+def view(shown: Mechanism | State | Motion, path: str | Path | None = None, *, task: TaskSource | None = None) -> Path:
     """Write the page of a mechanism, of a position, or of a motion, which keeps its range.
 
-    Without a path it is written to a folder of its own and opened in the browser. Gives the file's path. Raises
-    NoAnswer where the mechanism has no position to start from, BadInput where the file cannot be written.
+    Without a path it is written to a folder of its own and opened in the browser. A `task`, as `planar.synthesise`
+    takes it, is shown under the mechanism: what is wanted can be dragged, and the free dimensions follow. Gives the
+    file's path. Raises NoAnswer where the mechanism has no position to start from, BadInput where the file cannot be
+    written, or the task is none of this mechanism.
 
     >>> import planar
     >>> from tempfile import mkdtemp
@@ -40,7 +45,7 @@ def view(shown: Mechanism | State | Motion, path: str | Path | None = None) -> P
     """
     if not isinstance(shown, Mechanism | State | Motion):
         raise BadInput("view", f"a Mechanism, a State or a Motion is wanted, not {type(shown).__name__}")
-    text = page_of(shown)
+    text = page_of(shown, None if task is None else read_task(task))
     if path is not None:
         save_file(Path(path), text)
         return Path(path)
@@ -60,9 +65,13 @@ class PageSubject(NamedTuple):
     window: PageRange | None = None
 
 
-def page_of(shown: Mechanism | State | Motion) -> str:
-    """The text of the page of a mechanism, a position or a motion."""
-    return page(*_page_subject(shown))
+def page_of(shown: Mechanism | State | Motion, task: SynthesisTask | None = None) -> str:
+    """The text of the page of a mechanism, a position or a motion, with what a task wants of it."""
+    subject = _page_subject(shown)
+    if task is None:
+        return page(*subject)
+    mechanism, wanted = apply_task(subject.mechanism, task)
+    return page(mechanism, subject.z, subject.window, wanted=wanted)
 
 
 def _page_subject(shown: Mechanism | State | Motion) -> PageSubject:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,6 +14,8 @@ import planar
 from planar.pages.data.page_data import page_data
 from planar.pages.data.wanted_data import PageTask, wanted_data
 from planar.pages.page import page
+from planar.synthesis.task.synthesis_task import WantedFunction, WantedPath, WantedPoses
+from tests.command import run
 from tests.known import MODELS
 from tests.page_scripts import browser, in_node, needs_node, watched_window
 
@@ -33,6 +37,18 @@ FIT = """
     inputs: fit.entries.map(({ made }) => made.u[0] * made.scale[0]),
   };
 """
+
+
+def wanted_path(point, places, inputs=None, weights=None, **more):
+    """Places that a point is to come to."""
+    given = np.ones(len(places)) if weights is None else weights
+    return WantedPath(point, np.array(places, dtype=float), inputs, given, **more)
+
+
+def wanted_poses(link, motion, origin, rows):
+    """Some poses of a link over a motion."""
+    angles = motion.link(link).angle[rows]
+    return WantedPoses(link, motion.point(origin).position[rows], angles, None, np.ones(len(angles)))
 
 
 def fitted(mechanism, task, go=True):
@@ -62,20 +78,18 @@ def test_lost_dimensions_are_found_again(model, point, factors, every, timed):
     numbers = planar.dimensions(nominal)
     motion = planar.cycle(nominal, 60)
     rows = slice(3, 58, every)
-    wanted = {"point": point, "places": motion.point(point).position[rows], "in_order": True}
-    if timed:
-        given = nominal.inputs[0].pair
-        wanted["inputs"] = motion.inputs[given].position[rows] - 0.3  # the zero is free
+    given = nominal.inputs[0].pair
+    inputs = motion.inputs[given].position[rows] - 0.3 if timed else None  # the zero is free
+    wanted = wanted_path(point, motion.point(point).position[rows], inputs, in_order=True)
     start = nominal.with_values({name: numbers[name] * by for name, by in factors.items()})
     found = fitted(start, PageTask([wanted], dict.fromkeys(factors)))
-    size = np.ptp(wanted["places"])
+    size = np.ptp(wanted.places)
     assert max(miss for miss, _ in found["before"]) > 1e-3 * size
     assert max(miss for miss, _ in found["after"]) < 1e-8 * size
     for name in factors:
         assert found["values"][name] == pytest.approx(numbers[name], rel=1e-6)
     # the general path has the point there, too
-    given = nominal.inputs[0].pair
-    for at, position in [*zip(wanted["places"], found["inputs"], strict=True)][::3]:
+    for at, position in [*zip(wanted.places, found["inputs"], strict=True)][::3]:
         there = planar.solve(nominal.with_values(found["values"]), {given: position}).point(point).position
         assert np.abs(there - at).max() < 1e-7 * size
 
@@ -84,7 +98,7 @@ def test_lost_dimensions_are_found_again(model, point, factors, every, timed):
 def test_misses_are_distances_from_the_path():
     mechanism = MODELS["hoeken-straight-line"]
     places = path_of(mechanism, "P", slice(0, 60, 7)) * 1.04
-    found = fitted(mechanism, PageTask([{"point": "P", "places": places}]), go=False)
+    found = fitted(mechanism, PageTask([wanted_path("P", places)]), go=False)
     dense = planar.cycle(mechanism, 7200).point("P").position
     near = np.hypot(*(places[:, None] - dense[None]).transpose(2, 0, 1)).min(axis=1)
     np.testing.assert_allclose([miss for miss, _ in found["before"]], near, rtol=1e-4)
@@ -104,14 +118,15 @@ def test_what_cannot_be_met_is_missed_as_little_as_scipy_finds(bounds):
     low, high = bounds or (0.0, 1.0)
     limits = [(0.0 if "length" in name else -1.0, 2.0) for name in free]
     limits[0] = (low * own["crank.length"] / 0.075, high * own["crank.length"] / 0.075)
-    wanted = {"point": "P", "places": places, "inputs": inputs, "is_absolute": True, "weights": np.arange(1.0, 11.0)}
+    weights = np.arange(1.0, 11.0)
+    wanted = wanted_path("P", places, inputs, weights, is_absolute=True)
     found = fitted(mechanism, PageTask([wanted], dict(zip(free, limits, strict=True))))
     size = np.ptp(places, axis=0).max()
 
     def residual(values):
         one = planar.sweep(mechanism, {name: [value] for name, value in zip(free, values, strict=True)}, steps=60)
         off = (one.position["P"][0][rows] - places) / size
-        return (np.sqrt(wanted["weights"])[:, None] * off).ravel()
+        return (np.sqrt(weights)[:, None] * off).ravel()
 
     start = np.clip([own[name] for name in free], *np.transpose(limits))
     best = least_squares(residual, start, bounds=np.transpose(limits), xtol=1e-12, ftol=1e-12, gtol=1e-12)
@@ -126,19 +141,15 @@ def test_poses_and_functions_are_met():
     numbers = planar.dimensions(mechanism)
     motion = planar.cycle(mechanism, 30)
     rows = slice(4, 28, 8)
-    poses = {"link": "BC", "places": motion.point("B").position[rows], "angles": motion.link("BC").angle[rows]}
+    poses = wanted_poses("BC", motion, "B", rows)
     start = mechanism.with_values({"AB.length": 0.048, "BC.length": 0.069, "AD.D.x": 0.097})
-    found = fitted(start, PageTask([poses], dict.fromkeys(["AB.length", "BC.length", "AD.D"])))
+    found = fitted(start, PageTask([poses], dict.fromkeys(["AB.length", "BC.length", "AD.D.x", "AD.D.y"])))
     assert max(max(map(abs, each)) for each in found["after"]) < 1e-8
     assert found["values"]["AD.D.x"] == pytest.approx(numbers["AD.D.x"], rel=1e-6)
     rows = slice(2, 29, 3)
     values = motion.pair("D")["relative_angle"][rows]
-    function = {
-        "from_pair": "A",
-        "to_pair": "D",
-        "inputs": motion.inputs["A"].position[rows] + 0.1,
-        "values": values - 2.0,
-    }
+    inputs = motion.inputs["A"].position[rows] + 0.1
+    function = WantedFunction("A", "D", inputs, values - 2.0, np.ones(len(values)))
     start = mechanism.with_values({"DC.length": 0.0575, "BC.length": 0.067})
     found = fitted(start, PageTask([function], dict.fromkeys(["DC.length", "BC.length"])))
     assert found["values"]["DC.length"] == pytest.approx(numbers["DC.length"], rel=1e-5)
@@ -147,24 +158,57 @@ def test_poses_and_functions_are_met():
 
 def test_what_is_not_there_is_refused():
     mechanism = MODELS["four-bar"]
-    data = page_data(mechanism)[0]
-    places = [[0.0, 0.0]]
+    data, one = page_data(mechanism)[0], np.zeros(1)
+    path = wanted_path("E", [[0.0, 0.0]])
     for task, why in (
-        (PageTask([{"point": "Q", "places": places}]), "there is no point 'Q'"),
-        (PageTask([{"link": "AD", "places": places, "angles": [0.0]}]), "no moving link 'AD'"),
-        (PageTask([{"to_pair": "Q", "inputs": [0.0], "values": [0.0]}]), "there is no pair 'Q'"),
-        (PageTask([{"to_pair": "D", "from_pair": "B", "inputs": [0.0], "values": [0.0]}]), "of the input 'A'"),
-        (PageTask([{"point": "E", "places": places}], {"AB.lenth": None}), "no number of that name"),
-        (PageTask([{"point": "E", "places": places, "inputs": [0.0, 1.0]}]), "1 finite entries"),
+        (PageTask([path._replace(point="Q")]), "there is no point 'Q'"),
+        (PageTask([WantedPoses("AD", path.places, one, None, one)]), "no moving link 'AD'"),
+        (PageTask([WantedFunction("A", "Q", one, one, one)]), "there is no pair 'Q'"),
+        (PageTask([WantedFunction("B", "D", one, one, one)]), "of the input 'A'"),
+        (PageTask([path], {"AB.lenth": None}), "no number of that name"),
     ):
         with pytest.raises(planar.BadInput, match=why):
             wanted_data(mechanism, data, task)
     assert wanted_data(mechanism, data, None) is None
-    told = wanted_data(
-        mechanism, data, PageTask([{"point": "E", "places": places}], {"AD.D": None, "A.position": None})
-    )
+    told = wanted_data(mechanism, data, PageTask([path], {"AD.D.x": None, "A.position": None}))
     assert told["unmoved"] == ["A.position"]
-    assert [data["dimensions"][each["k"]]["name"] for each in told["free"]] == ["AD.D.x", "AD.D.y"]
+    assert [data["dimensions"][each["k"]]["name"] for each in told["free"]] == ["AD.D.x"]
+
+
+LID = {
+    "planar": 1,
+    "name": "Lid",
+    "units": {"length": "mm", "angle": "deg"},
+    "start": "four-bar",
+    "wanted": [
+        {"point": "E", "through": [[40, 40], [52, 45], [60, 48]], "in_order": True, "tolerance": 0.5},
+        {"link": "BC", "poses": [{"at": [10, 48], "angle": 10}]},
+        {"from": "A", "to": "D", "pairs": [[50, 90], [60, 97]]},
+    ],
+    "free": ["BC.length", "AD.D", "BC.E"],
+    "within": {"BC.length": [60, 80]},
+}
+
+
+def test_a_task_is_shown_under_a_mechanism(tmp_path):
+    file = tmp_path / "lid.json"
+    file.write_text(json.dumps(LID))
+    made = run(tmp_path, "view", "four-bar", "--task", "lid.json", "-o", "page.html").done().strip()
+    text = (tmp_path / "page.html").read_text(encoding="utf-8")
+    assert made.endswith("page.html")
+    data = json.loads(re.search(r'<script id="data" type="application/json">(.*?)</script>', text, re.DOTALL)[1])
+    wanted = data["wanted"]
+    assert [each["kind"] for each in wanted["items"]] == ["path", "poses", "function"]
+    np.testing.assert_allclose(wanted["items"][0]["places"], [[0.04, 0.04], [0.052, 0.045], [0.06, 0.048]])
+    names = {data["dimensions"][each["k"]]["name"]: (each["low"], each["high"]) for each in wanted["free"]}
+    assert set(names) == {"BC.length", "AD.D.x", "AD.D.y", "BC.E.x", "BC.E.y"}
+    assert names["BC.length"] == pytest.approx((0.06, 0.08))
+    assert planar.view(planar.solve("four-bar"), tmp_path / "again.html", task=LID).is_file()
+    refused = run(tmp_path, "view", "four-bar", "--task", "lid.json", "-o", "lid.html", "--set", "AB.length=1 m")
+    assert refused.status == 1  # it has no position
+    assert run(tmp_path, "view", "slider-crank", "--task", "lid.json", "-o", "lid.html").status == 2
+    with pytest.raises(planar.BadInput, match="no input"):
+        planar.view(replace(planar.load("four-bar"), inputs=()), tmp_path / "page.html", task=LID)
 
 
 @pytest.fixture(scope="module")
@@ -218,6 +262,7 @@ def grip(window, which):
 
 
 HOEKEN = MODELS["hoeken-straight-line"]
+PIVOTS = [f"frame.{name}.{axis}" for name in "OC" for axis in "xy"]
 PLACES = path_of(HOEKEN, "P", slice(0, 60, 15))
 
 
@@ -226,7 +271,7 @@ def misses(window):
 
 
 def test_a_place_is_dragged_and_the_design_follows_and_comes_back(shown):
-    window = shown(HOEKEN, PageTask([{"point": "P", "places": PLACES, "in_order": True, "tolerance": 1e-3}]))
+    window = shown(HOEKEN, PageTask([wanted_path("P", PLACES, in_order=True, tolerance=1e-3)]))
     own = window.evaluate("[...page.linkage.d]")
     assert max(misses(window)) < 1e-9
     x, y = grip(window, "0 2")
@@ -258,7 +303,7 @@ def test_a_place_is_dragged_and_the_design_follows_and_comes_back(shown):
 
 
 def test_arrow_keys_and_numbers_move_a_place(shown):
-    window = shown(HOEKEN, PageTask([{"point": "P", "places": PLACES}]))
+    window = shown(HOEKEN, PageTask([wanted_path("P", PLACES)]))
     one = window.locator('[data-wanted="0 1"]')
     one.focus()
     assert "place 2 wanted of P" in one.get_attribute("aria-label")
@@ -281,7 +326,7 @@ def test_arrow_keys_and_numbers_move_a_place(shown):
 
 
 def test_without_following_only_the_misses_change(shown):
-    window = shown(HOEKEN, PageTask([{"point": "P", "places": PLACES, "tolerance": 1e-3}]))
+    window = shown(HOEKEN, PageTask([wanted_path("P", PLACES, tolerance=1e-3)]))
     window.get_by_label("The dimensions follow").uncheck()
     own = window.evaluate("[...page.linkage.d]")
     window.locator('[data-wanted="0 0"]').focus()
@@ -300,7 +345,7 @@ def test_a_closed_curve_is_dragged_as_a_whole_by_touch(shown):
     turn = np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False)
     middle = np.array([0.2, 0.42])
     places = middle + np.stack([0.2 * np.cos(turn), 0.05 * np.sin(turn)], axis=1)
-    task = PageTask([{"point": "P", "places": places, "is_closed": True}], {"frame.O": None, "frame.C": None})
+    task = PageTask([wanted_path("P", places, is_closed=True)], dict.fromkeys(PIVOTS))
     window = shown(HOEKEN, task, has_touch=True)
     assert window.locator("#drawing .wanted path.curve").count() == 1
     spots = "page.wanted.items[0].places.slice(5, 7).map(page.view.toScreen)"
@@ -323,9 +368,9 @@ def test_a_pose_is_turned_by_its_arm(shown):
     mechanism = planar.load("four-bar")
     motion = planar.cycle(mechanism, 30)
     rows = slice(8, 28, 9)
-    poses = {"link": "BC", "places": motion.point("B").position[rows], "angles": motion.link("BC").angle[rows]}
+    poses = wanted_poses("BC", motion, "B", rows)
     window = shown(mechanism, PageTask([poses]))
-    assert window.locator("#drawing .wanted path.ghost").count() == len(poses["angles"])
+    assert window.locator("#drawing .wanted path.ghost").count() == len(poses.angles)
     x, y = grip(window, "0 1 turn")
     window.mouse.move(x, y)
     window.mouse.down()
@@ -333,17 +378,17 @@ def test_a_pose_is_turned_by_its_arm(shown):
     window.mouse.move(x - 10, y - 15)
     window.mouse.up()
     done(window)
-    turned = window.evaluate("page.wanted.items[0].angles[1]") - poses["angles"][1]
+    turned = window.evaluate("page.wanted.items[0].angles[1]") - poses.angles[1]
     assert 0.1 < turned < 1.0
     assert max(window.evaluate("page.wanted.misses().map(({ turned }) => Math.abs(turned))")) < 1e-4
     window.locator('[data-wanted="0 1 turn"]').focus()
     window.keyboard.press("ArrowUp")
     done(window)
-    assert window.evaluate("page.wanted.items[0].angles[1]") - poses["angles"][1] == pytest.approx(turned + np.pi / 180)
+    assert window.evaluate("page.wanted.items[0].angles[1]") - poses.angles[1] == pytest.approx(turned + np.pi / 180)
 
 
 def test_a_dimension_changed_by_hand_changes_the_misses(shown):
-    window = shown(HOEKEN, PageTask([{"point": "P", "places": PLACES}]))
+    window = shown(HOEKEN, PageTask([wanted_path("P", PLACES)]))
     window.evaluate("page.changeTo(page.linkage.d.map((each, k) => each * (k === 4 ? 1.03 : 1)))")
     done(window)
     values = window.evaluate("Object.fromEntries(page.data.dimensions.map(({ name }, k) => [name, page.linkage.d[k]]))")

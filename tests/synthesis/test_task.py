@@ -124,3 +124,20 @@ def test_chains_are_started_from_with_every_carrier_that_needs_all_links():
         assert {name.split(".")[0] for name in free_numbers(task, start).names} >= {
             each.name for each in start.links if each.name != "frame"
         }
+
+
+def test_a_wanted_point_has_both_coordinates_however_the_start_wrote_it():
+    """E of the model lies at a distance along its coupler, F by two distances."""
+    value = {
+        "planar": 1,
+        "units": {"length": "mm"},
+        "start": "four-bar",
+        "wanted": [{"point": "E", "through": [[0, 0]]}],
+    }
+    task = planar.read_task(value | {"free": ["BC.E", "AD.D"], "within": {"BC.E": [-50, 50]}})
+    assert task.free == ("BC.E.x", "BC.E.y", "AD.D.x", "AD.D.y")
+    assert task.within["BC.E.y"] == pytest.approx((-0.05, 0.05))
+    assert free_numbers(task, next(start_mechanisms(task))).names == task.free
+    assert planar.read_task(value | {"free": ["BC.F"]}).free == ("BC.F.B", "BC.F.C")
+    with pytest.raises(planar.BadInput, match=r"no number 'BC\.E\.distance'"):
+        planar.read_task(value | {"free": ["BC.E.distance"]})

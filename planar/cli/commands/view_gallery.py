@@ -32,7 +32,13 @@ SUFFIXES = (".html", ".htm")
 )
 @at_option
 @mode_option
-def view(model: str, output: Path | None, at: tuple[str, ...], mode: int | None) -> None:
+@click.option(
+    "--task",
+    type=click.Path(exists=True, dir_okay=False, path_type=Path),
+    metavar="TASK",
+    help="Show what a task wants under it, to be dragged: its free dimensions follow.",
+)
+def view(model: str, output: Path | None, at: tuple[str, ...], mode: int | None, task: Path | None) -> None:
     """A page to take hold of it: it moves, with its numbers, and with other dimensions."""
     from planar.pages.view import view as write
     from planar.solving.position import solve
@@ -41,9 +47,11 @@ def view(model: str, output: Path | None, at: tuple[str, ...], mode: int | None)
         raise unknown_format_error(output.suffix, "a page", SUFFIXES)
     mechanism = load_model(model, mode)
     refuse_overwriting(model, output)
+    if task is not None:
+        refuse_overwriting(str(task), output, "the task's own file")
     with show_status(mechanism.name):
         moved = parse_drives(mechanism, at)
-        written = write(solve(mechanism, moved) if moved else mechanism, output)
+        written = write(solve(mechanism, moved) if moved else mechanism, output, task=task)
     click.echo(str(written))
 
 

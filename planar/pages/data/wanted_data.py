@@ -3,29 +3,47 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from planar.document.dimensions import file_dimensions, find_dimension
-from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput, join_names
 from planar.model.mechanism import Mechanism, named_points, relative_motions
 from planar.model.pairs import MeasureKind
+from planar.synthesis.task.starts import free_numbers, with_wanted_points
+from planar.synthesis.task.synthesis_task import SynthesisTask, Wanted, WantedFunction, WantedPoses
+from planar.synthesis.task.wanted_expressions import carried_name
 
 LEAST_LENGTH = 1e-3
 """Of the mechanism's size: a length that follows gets no shorter."""
+FARTHEST = 1e3
+"""Of the mechanism's size: as far go dimensions without bounds."""
 
 
 class PageTask(NamedTuple):
     """What a page shows as wanted of its mechanism, and what of the mechanism follows when that is dragged.
 
-    `wanted` are items of a task: paths of points, poses of links, functions of pairs. `free` are the numbers of the
-    file that follow, by name, each with its bounds (SI) or None; left out, all that a page changes.
+    `free` are the numbers of the file that follow, by name, each with its bounds (SI) or None; left out, all that a
+    page changes.
     """
 
-    wanted: Sequence[Any]
+    wanted: Sequence[Wanted]
     free: Mapping[str, tuple[float, float] | None] | None = None
+
+
+def apply_task(mechanism: Mechanism, task: SynthesisTask) -> tuple[Mechanism, PageTask]:
+    """A mechanism with its wanted points as coordinates in their links, and what its page shows of the task.
+
+    Raises BadInput where it lacks what the task names, or has no input.
+    """
+    if not mechanism.inputs:
+        raise BadInput("task", f"{mechanism.name!r} has no input, so that it comes to no other place")
+    ready = replace(with_wanted_points(mechanism, task, {}), notes=mechanism.notes)
+    free = free_numbers(task, ready)
+    bounds = zip(free.lower.tolist(), free.upper.tolist(), strict=True)
+    return ready, PageTask(task.wanted, dict(zip(free.names, bounds, strict=True)))
 
 
 def wanted_data(mechanism: Mechanism, data: Mapping[str, Any], task: PageTask | None) -> dict[str, Any] | None:
@@ -35,14 +53,12 @@ def wanted_data(mechanism: Mechanism, data: Mapping[str, Any], task: PageTask | 
     """
     if task is None or not task.wanted:
         return None
-    if not mechanism.inputs:
-        raise BadInput("wanted", f"{mechanism.name!r} has no input, so that it comes to no other place")
-    places = [each for item in task.wanted if (each := _array(item, "places")) is not None]
+    places = [each.places for each in task.wanted if not isinstance(each, WantedFunction)]
     extent = float(np.ptp(np.concatenate(places), axis=0).max()) if places else 0.0
     size = extent or float(data["size"])
     free, unmoved = _free_dimensions(mechanism, data, task.free)
     return {
-        "items": [_item(mechanism, item, size, index) for index, item in enumerate(task.wanted)],
+        "items": [_item(mechanism, item, size, f"wanted[{index}]") for index, item in enumerate(task.wanted)],
         "free": free,
         "input": 0,
         "unmoved": unmoved,
@@ -54,91 +70,79 @@ def _free_dimensions(
 ) -> tuple[list[dict[str, Any]], list[str]]:
     """The dimensions of the page that follow, each with its bounds (m), and what the page does not change."""
     known = file_dimensions(mechanism)
-    wanted: dict[str, tuple[float, float] | None] = {}
-    for name, bounds in (free or dict.fromkeys(each["name"] for each in data["dimensions"])).items():
-        both = [f"{name}.{axis}" for axis in "xy"]
-        names = both if name not in known and set(both) <= set(known) else [find_dimension(known, name).name]
-        wanted |= dict.fromkeys(names, bounds)
-    found = []
-    least = LEAST_LENGTH * float(data["size"])
+    given = dict.fromkeys(each["name"] for each in data["dimensions"]) if free is None else free
+    wanted = {find_dimension(known, name).name: bounds for name, bounds in given.items()}
+    size, found = float(data["size"]), []
     for k, each in enumerate(data["dimensions"]):
         if each["name"] not in wanted:
             continue
-        own = wanted.pop(each["name"]) or (-np.inf, np.inf)
-        low, high = (np.inf * sign if end is None else end for sign, end in zip((-1, 1), each["bounds"], strict=True))
-        low = max(low, own[0], least if each["positive"] else -np.inf)
-        far = 1e3 * float(data["size"])
-        found.append({"k": k, "low": max(low, -far), "high": min(high, own[1], far)})
+        low, high = wanted.pop(each["name"]) or (-np.inf, np.inf)
+        below, above = each["bounds"]
+        least = LEAST_LENGTH if each["positive"] else -FARTHEST
+        low = max(low, least * size, -np.inf if below is None else below)
+        high = min(high, FARTHEST * size, np.inf if above is None else above)
+        found.append({"k": k, "low": low, "high": high})
     return found, list(wanted)
 
 
-def _item(mechanism: Mechanism, item: Any, size: float, index: int) -> dict[str, Any]:
-    place = f"wanted[{index}]"
-    if _value(item, "point") is not None:
-        found = {"kind": "path", "of": _point_name(mechanism, item, place), "angular": [False, False]}
-    elif _value(item, "link") is not None:
-        link = _value(item, "link")
-        if link not in {each.name for each in mechanism.links} - {mechanism.frame}:
-            raise BadInput(place, f"there is no moving link {link!r}")
-        found = {"kind": "poses", "of": link, "angular": [False, False, True]}
-    else:
-        found = _function(mechanism, item, place)
-    values = {key: _array(item, key) for key in ("places", "angles", "inputs", "values", "weights")}
-    many = next(len(each) for each in values.values() if each is not None)
-    if values["weights"] is None:
-        values["weights"] = np.ones(many)
-    for key, each in values.items():
-        if each is not None and (len(each) != many or not np.isfinite(each).all()):
-            raise BadInput(f"{place}.{key}", f"{many} finite entries are wanted, as the others have")
-    more = {key: None if each is None else each.tolist() for key, each in values.items()}
-    flags = {key: bool(_value(item, key)) for key in ("in_order", "is_closed", "is_absolute")}
-    tolerance = _value(item, "tolerance")
-    is_function = found["kind"] == "function"
-    return (
-        {"scale": 1.0, "slides": False}
-        | found
-        | more
-        | flags
-        | {
-            "size": size,
-            "tolerance": None if tolerance is None else float(tolerance),
-            "value_is_free": is_function and not flags["is_absolute"],
-        }
-    )
+def _item(mechanism: Mechanism, item: Wanted, size: float, place: str) -> dict[str, Any]:
+    """One item, whatever its kind with all keys that any has."""
+    found: dict[str, Any] = {
+        "of": item.of,
+        "size": size,
+        "scale": 1.0,
+        "slides": False,
+        "places": None,
+        "angles": None,
+        "values": None,
+        "inputs": None if item.inputs is None else item.inputs.tolist(),
+        "weights": item.weights.tolist(),
+        "is_absolute": item.is_absolute,
+        "in_order": False,
+        "is_closed": False,
+        "value_is_free": False,
+        "tolerance": item.tolerance,
+    }
+    if isinstance(item, WantedFunction):
+        return found | _function(mechanism, item, size, place)
+    found |= {"places": item.places.tolist(), "in_order": item.in_order}
+    if isinstance(item, WantedPoses):
+        if item.link not in {each.name for each in mechanism.links} - {mechanism.frame}:
+            raise BadInput(place, f"there is no moving link {item.link!r}")
+        return found | {"kind": "poses", "angles": item.angles.tolist(), "angular": [False, False, True]}
+    name = _point_name(mechanism, carried_name(mechanism, item.point), place)
+    return found | {"kind": "path", "of": name, "is_closed": item.is_closed, "angular": [False, False]}
 
 
-def _point_name(mechanism: Mechanism, item: Any, place: str) -> str:
+def _point_name(mechanism: Mechanism, point: str, place: str) -> str:
     """The name that results give a point."""
-    name = str(_value(item, "point"))
-    for each in named_points(mechanism):
-        if each.name == name or any(f"{link}.{point}" == name for link, point in each.members):
+    every = named_points(mechanism)
+    for each in every:
+        if each.name == point or any(f"{link}.{own}" == point for link, own in each.members):
             return each.name
-    names = [each.name for each in named_points(mechanism)]
-    raise BadInput(place, f"there is no point {name!r}; points are {join_names(names)}")
+    raise BadInput(place, f"there is no point {point!r}; points are {join_names(each.name for each in every)}")
 
 
-def _function(mechanism: Mechanism, item: Any, place: str) -> dict[str, Any]:
+def _function(mechanism: Mechanism, item: WantedFunction, size: float, place: str) -> dict[str, Any]:
     """Which of the numbers that pairs report is that of the pair, and how a miss of it counts."""
-    motions, name = relative_motions(mechanism), _value(item, "to_pair")
-    given, first = _value(item, "from_pair"), mechanism.inputs[0].pair
-    if name not in motions:
-        raise BadInput(place, f"there is no pair {name!r}; pairs are {join_names(motions)}")
-    if given not in (None, first):
-        raise BadInput(place, f"a function of the input {first!r} is wanted, and not of {given!r}")
+    motions, first = relative_motions(mechanism), mechanism.inputs[0].pair
+    if item.to_pair not in motions:
+        raise BadInput(place, f"there is no pair {item.to_pair!r}; pairs are {join_names(motions)}")
+    if item.from_pair != first:
+        raise BadInput(place, f"a function of the input {first!r} is wanted, and not of {item.from_pair!r}")
     at = 0
     for own, pair in motions.items():
-        if own == name:
+        if own == item.to_pair:
             break
         at += sum(each is not None for each in pair.results(0.0, 0.0, 0.0).values())
-    slides = motions[name].input_kind is MeasureKind.LENGTH
-    return {"kind": "function", "of": name, "from": first, "number": at, "slides": slides, "angular": [False]}
-
-
-def _value(item: Any, key: str) -> Any:
-    return item.get(key) if isinstance(item, Mapping) else getattr(item, key, None)
-
-
-def _array(item: Any, key: str) -> Array | None:
-    """A column of an item; of several columns (n, 2)."""
-    value = _value(item, key)
-    return None if value is None else np.asarray(value, dtype=float)
+    slides = motions[item.to_pair].input_kind is MeasureKind.LENGTH
+    return {
+        "kind": "function",
+        "from": first,
+        "number": at,
+        "slides": slides,
+        "scale": size if slides else 1.0,
+        "values": item.values.tolist(),
+        "angular": [item.is_absolute and not slides],
+        "value_is_free": not item.is_absolute,
+    }

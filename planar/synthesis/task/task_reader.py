@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from planar.document.cursor import Cursor, FileContext, describe_value, suggest_name
-from planar.document.dimensions import file_dimensions
+from planar.document.dimensions import Dimension, file_dimensions
 from planar.document.files import find_model_file, load, parse_json, read_limited
 from planar.document.reader import read_mechanism, read_units
 from planar.document.schema import FORMAT_VERSION
@@ -20,6 +20,7 @@ from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput
 from planar.model.mechanism import Mechanism, named_points, relative_motions
 from planar.model.pairs import MeasureKind
+from planar.synthesis.task.starts import with_wanted_points
 from planar.synthesis.task.synthesis_task import (
     ChainStart,
     Demands,
@@ -39,7 +40,11 @@ LEAST_CHAIN, GREATEST_CHAIN = 4, 12
 """Links of chains to start from."""
 
 
-def read_task(source: Mapping[str, Any] | str | os.PathLike[str] | SynthesisTask) -> SynthesisTask:
+TaskSource = Mapping[str, Any] | str | os.PathLike[str] | SynthesisTask
+"""A task, what stands in its file, or the file."""
+
+
+def read_task(source: TaskSource) -> SynthesisTask:
     """The task in a file, or that a JSON value describes. Raises BadInput with the place.
 
     >>> import planar
@@ -282,14 +287,24 @@ class _TaskReader:
         first = self._first
         if first is None:
             raise cursor.error_at(None, "chains have no numbers yet that could be named; leave this out")
-        known = {key: each for key, each in file_dimensions(first).items() if each.path[0] in ("links", "pairs")}
+        known = self._numbers(first)
         if name in known:
             return (name,)
         both = tuple(key for key in known if key.startswith(f"{name}."))
-        paths = (each for each in self.wanted if isinstance(each, WantedPath) and each.link)
-        if both or name in {f"{each.link}.{each.point}" for each in paths}:
-            return both or (f"{name}.x", f"{name}.y")
+        if both:
+            return both
         raise cursor.error_at(None, f"there is no number {name!r}{suggest_name(name, known, 'numbers')}")
+
+    def _numbers(self, first: Mechanism) -> dict[str, Dimension]:
+        """The numbers of links and pairs by name, those of wanted points as coordinates."""
+        paths = tuple(each for each in self.wanted if isinstance(each, WantedPath))
+        ready = with_wanted_points(first, SynthesisTask("", paths, (first,)), {})
+        points = {each.point for each in paths}
+        own = {each.name: each.members for each in named_points(ready)}
+        wanted = tuple(f"{link}.{point}." for name in points for link, point in own.get(name, ()))
+        found = {key: each for key, each in file_dimensions(first).items() if not key.startswith(wanted)}
+        found |= {key: each for key, each in file_dimensions(ready).items() if key.startswith(wanted)}
+        return {key: each for key, each in found.items() if each.path[0] in ("links", "pairs")}
 
     def _read_bounds(self, top: Cursor) -> dict[str, tuple[float, float]]:
         found: dict[str, tuple[float, float]] = {}
@@ -299,8 +314,7 @@ class _TaskReader:
             names = self._find_number(cursor, name)
             first = self._first
             assert first is not None
-            known = file_dimensions(first)
-            kind = known[names[0]].kind if names[0] in known else "length"
+            kind = self._numbers(first)[names[0]].kind
             both = tuple(each.as_number() if kind == "number" else each.as_quantity(kind) for each in cursor.items())
             if len(both) != 2 or not both[0] < both[1]:
                 raise cursor.error_at(None, "a lower and an upper bound are wanted here, as [20, 80], the lower first")

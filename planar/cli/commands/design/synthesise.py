@@ -50,7 +50,8 @@ def synthesise(task: Path, many: int, seed: int, seconds: float | None, output: 
 
         names = [f"{number:02d}" for number in range(1, len(found) + 1)]
         with show_progress(f"{len(found)} pages") as progress:
-            write_gallery([(name, each.mechanism) for name, each in zip(names, found, strict=True)], output, progress)
+            models = [(name, each.mechanism) for name, each in zip(names, found, strict=True)]
+            write_gallery(models, output, progress, wanted)
         for name, each in zip(names, found, strict=True):
             path = output / f"{name}.json"
             save_file(path, dumps(each.mechanism))
