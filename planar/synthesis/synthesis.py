@@ -11,6 +11,7 @@ import numpy as np
 from planar.foundation.arrays import Array
 from planar.model.mechanism import Mechanism
 from planar.model.wording import count_phrase
+from planar.synthesis.cognates.cognates import Cognate
 from planar.synthesis.task.synthesis_task import SynthesisTask
 
 
@@ -20,7 +21,8 @@ class SynthesisedDesign:
 
     `error` is the root mean square of its misses and `greatest_miss` the greatest (m; rad where functions of angles
     alone are wanted); `misses` (n,) are those of each wanted item and `inputs` (n,) where the input is there. `defects`
-    are sentences, none of an accepted design. `start` names the mechanism that it was made from.
+    are sentences, none of an accepted design. `start` names the mechanism that it was made from. `cognates` are other
+    linkages that come to the same places of a point: of a path whose timing is prescribed those that keep it.
     """
 
     mechanism: Mechanism
@@ -30,6 +32,7 @@ class SynthesisedDesign:
     inputs: tuple[Array, ...] = field(repr=False)
     defects: tuple[str, ...]
     start: str
+    cognates: tuple[Cognate, ...] = field(default=(), repr=False)
 
     def __repr__(self) -> str:
         told = f", {count_phrase(len(self.defects), 'defect')}" if self.defects else ""

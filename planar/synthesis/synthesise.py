@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from time import monotonic
 from typing import Any, NamedTuple
 
@@ -13,6 +14,7 @@ from planar.foundation.errors import BadInput, PlanarError
 from planar.model.mechanism import Mechanism
 from planar.model.run_arguments import check_whole_number
 from planar.synthesis.catalogue.catalogue_store import kept_catalogue
+from planar.synthesis.cognates.task_cognates import task_cognates
 from planar.synthesis.design_search import Candidate, DesignSearch
 from planar.synthesis.judgement.judgement import DesignJudge
 from planar.synthesis.judgement.written_design import write_design
@@ -144,7 +146,8 @@ class _TaskSearch:
         remarks = [*self.remarks]
         if self.is_over():
             remarks.append("the time was up before every start had been searched")
-        sound = rank_designs(self.sound, self.many)
+        ranked = rank_designs(self.sound, self.many)
+        sound = tuple(replace(each, cognates=task_cognates(each.mechanism, self.task)) for each in ranked)
         if not sound:
             remarks.append(_refusal(self.rejected))
         return Synthesis(self.task, sound, rank_designs(self.rejected, self.many), self.size, tuple(remarks))

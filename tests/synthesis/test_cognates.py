@@ -13,6 +13,7 @@ import planar
 from planar.drawing.diagrams.cognate_drawing import cognate_pictures
 from planar.model.mechanism import Drive
 from planar.synthesis.cognates.cognates import first_cognates
+from planar.synthesis.cognates.task_cognates import task_cognates
 from tests.command import run
 from tests.draws import draws
 
@@ -226,6 +227,19 @@ def test_what_acts_on_links_that_stay_goes_along():
     assert [each.point for each in first.loads] == ["foot"]
     assert "loads, masses" in first.notes[1]
     assert planar.load("klann-leg").links[2:4] != first.links[2:4]
+
+
+def test_of_a_task_those_cognates_count_that_keep_its_timing():
+    mechanism = planar.load("hoeken-straight-line")
+    value = {"planar": 1, "units": {"length": "mm", "angle": "deg"}, "start": "hoeken-straight-line"}
+    path = {"point": "P", "through": [[0, 400], [100, 400]]}
+    timed = path | {"through": [{"at": at, "input": 10 * k} for k, at in enumerate(path["through"])]}
+    poses = {"link": "coupler", "poses": [{"at": [0, 0], "angle": 0}]}
+    driven = [
+        [each.inputs[0].driven for each in task_cognates(mechanism, planar.read_task(value | {"wanted": wanted}))]
+        for wanted in ([path], [timed], [path, poses], [path | {"point": "A"}])
+    ]
+    assert driven == [["G", "O"], ["G"], [], []]
 
 
 def test_laws_of_inputs_that_keep_the_timing_stay():

@@ -45,6 +45,10 @@ def test_a_path_of_a_mechanism_is_met_within_its_rounding(model, point):
         assert not design.defects
         assert design.greatest_miss < 0.015 * found.size
         check_path(design, found.task.wanted[0])
+        assert len(design.cognates) == {"slider-crank": 1, "four-bar": 2}.get(model, len(design.cognates))
+        own = planar.solve(design.mechanism).point(point).position
+        for each in design.cognates:
+            np.testing.assert_allclose(planar.solve(each.mechanism).point(each.point).position, own, atol=1e-9)
 
 
 def check_path(design, wanted):
@@ -63,6 +67,7 @@ def test_three_poses_of_a_coupler_are_met_exactly():
     assert found[0].greatest_miss < 1e-3 * found.size
     state = planar.solve(found[0].mechanism, {"A": float(found[0].inputs[0][1])})
     np.testing.assert_allclose(state.point("B").position, [0.03, 0.02], atol=1e-3 * found.size)
+    assert found[0].cognates == ()
 
 
 def test_a_function_of_three_pairs_keeps_freudensteins_equation():
@@ -130,4 +135,6 @@ def test_the_command_writes_designs_with_pages(tmp_path):
         written = planar.load(tmp_path / "designs" / f"{number:02d}.json")
         assert planar.dimensions(written) == planar.dimensions(planar.from_dict(design["mechanism"]))
         assert (tmp_path / "designs" / f"{number:02d}.html").exists()
+        for k, each in enumerate(design["cognates"], start=1):
+            assert planar.load(tmp_path / "designs" / f"{number:02d}-cognate-{k}.json").name == each["name"]
     assert (tmp_path / "designs" / "index.html").exists()

@@ -56,6 +56,8 @@ def synthesise(task: Path, many: int, seed: int, seconds: float | None, output: 
             path = output / f"{name}.json"
             save_file(path, dumps(each.mechanism))
             files.append(path)
+            for number, other in enumerate(each.cognates, start=1):
+                save_file(output / f"{name}-cognate-{number}.json", dumps(other.mechanism))
     if as_json:
         print_json(record(found, files))
         return

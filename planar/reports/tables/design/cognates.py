@@ -63,11 +63,12 @@ def record(found: Cognates) -> dict[str, Any]:
         "mechanism": found.mechanism.name,
         "point": found.point,
         "path": found.path.tolist(),
-        "cognates": [_record(each) for each in found],
+        "cognates": [cognate_record(each) for each in found],
     }
 
 
-def _record(cognate: Cognate) -> dict[str, Any]:
+def cognate_record(cognate: Cognate) -> dict[str, Any]:
+    """One of them."""
     return {
         "name": cognate.mechanism.name,
         "point": cognate.point,

@@ -13,6 +13,7 @@ from planar.document.writer import write_mechanism
 from planar.model.wording import amount, count_phrase
 from planar.reports.fitted_table import FittedTable, plain_table
 from planar.reports.number_format import format_number, paragraphs
+from planar.reports.tables.design.cognates import cognate_record
 from planar.synthesis.synthesis import Synthesis, SynthesisedDesign
 from planar.synthesis.task.synthesis_task import WantedFunction
 
@@ -33,13 +34,23 @@ def table(found: Synthesis, files: Sequence[Path]) -> RenderableType:
 
 def _designs_table(found: Synthesis, files: Sequence[Path]) -> FittedTable:
     rows = plain_table(
-        "Designs", "no.", "start", "greatest miss", "root mean square", "of the extent %", "file", left=(1, 5), keys=1
+        "Designs",
+        "no.",
+        "start",
+        "greatest miss",
+        "root mean square",
+        "of the extent %",
+        "cognates",
+        "file",
+        left=(1, 6),
+        keys=1,
     )
     for number, each in enumerate(found, start=1):
         rows.add_row(
             str(number),
             each.start,
             *_misses(found, each),
+            str(len(each.cognates)),
             str(files[number - 1]) if files else "",
         )
     return rows
@@ -77,7 +88,12 @@ def record(found: Synthesis, files: Sequence[Path]) -> dict[str, Any]:
     return {
         "task": found.task.name,
         "size": found.size,
-        "designs": [_design_record(each) | ({"file": str(files[k])} if files else {}) for k, each in enumerate(found)],
+        "designs": [
+            _design_record(each)
+            | {"cognates": [cognate_record(one) for one in each.cognates]}
+            | ({"file": str(files[k])} if files else {})
+            for k, each in enumerate(found)
+        ],
         "rejected": [_design_record(each) for each in found.rejected],
         "remarks": list(found.remarks),
     }
