@@ -83,7 +83,7 @@ def solve_design_block(block: DesignBlock, out: Array | None = None) -> SolvedDe
     """Solve a block, in `out` (steps + 1, rows, designs) if that is given. Raises BadInput only for what holds for all
     designs."""
     with take_turn():
-        return _DesignBlockSolver(block, out).solve()
+        return DesignBlockSolver(block, out).solve()
 
 
 def status_code(outcome: Outcome) -> int:
@@ -91,7 +91,9 @@ def status_code(outcome: Outcome) -> int:
     return OUTCOMES.index(outcome)
 
 
-class _DesignBlockSolver:
+class DesignBlockSolver:
+    """Solves one block, see `solve_design_block`; then `march` is what a backend ran, from where it started."""
+
     def __init__(self, block: DesignBlock, out: Array | None):
         self.block, self.out = block, out
         self.reference: ReferenceDesign = reference_design(block.mechanism, block.pair)
@@ -101,14 +103,14 @@ class _DesignBlockSolver:
         self.u, self.u1, self.u2 = self.reference.inputs(self.all_designs, self.design_count)
         self.u = np.ascontiguousarray(self.u)
         here = self.u[self.reference.running_index] * self.scale
-        self.start = here if block.start is None else np.full(self.design_count, float(block.start))
+        self.start: Array = here if block.start is None else np.full(self.design_count, float(block.start))
         self.has_own_range = self.reference.is_sliding and block.stop is None
         "whether every design has a range of its own, from limit to limit"
         self.solved_steps = np.full(self.design_count, -1)
         "how many steps are solved of a design that was followed to its end, or to a dead point"
         self.general_positions, self.followed_designs = 0, 0
         self.endings: dict[int, tuple[int, str | DesignQuestion | NoAnswer]] = {}
-        self.dead_point, self.stop_position = (np.full(self.design_count, np.nan) for _ in range(2))
+        self.dead_point, self.stop_position = np.full((2, self.design_count), np.nan)
         self.stops: DesignStops | None = None
         self.is_stopped = np.zeros(self.design_count, dtype=bool)
         "which designs are ended by a stop, of those that were followed"
@@ -117,7 +119,8 @@ class _DesignBlockSolver:
         self.failed_block = np.full(self.design_count, -1)
         "the block that cannot be joined, where a design surely cannot be assembled"
         length = FULL_TURN if block.stop is None else block.stop - self.start
-        self.range_length = np.broadcast_to(np.asarray(length, dtype=float), (self.design_count,))
+        self.range_length: Array = np.broadcast_to(length, self.start.shape)
+        self.march: DesignBatch | None = None
 
     def solve(self) -> SolvedDesigns:
         """See `solve_design_block`."""
@@ -127,7 +130,7 @@ class _DesignBlockSolver:
         runs = self.reference.can_run_backend and np.abs(self.range_length).max() <= LARGEST_INPUT_POSITION
         runs = runs and (block.start is None or (same and not self.has_own_range))
         found = self._run_with_backend(same and not self.has_own_range) if runs else None
-        out, good = (self._output_array(), np.zeros(self.design_count, dtype=int)) if found is None else found
+        out, good = found or (self._output_array(), np.zeros(self.design_count, dtype=int))
         if found is None:
             out[:] = np.nan
         ended = (self.solved_steps >= 0) & (good <= block.steps)
@@ -147,13 +150,11 @@ class _DesignBlockSolver:
             int(each): (int(np.sum(code == each)), self._question(int(np.argmax(code == each)), inputs))
             for each in np.unique(code[code != 0])
         }
-        rest = np.flatnonzero((good <= block.steps) & ~ended & ~failed)
+        rest = np.flatnonzero((good <= block.steps) & ~ended & ~failed).tolist()
         for index in rest:
-            self._solve_alone(int(index), out, status, inputs)
-        sent = int(rest.size) + self.followed_designs
-        endings = tuple((each, *self.endings[each]) for each in self.endings)
-        ends = self.dead_point, self.stop_position
-        return SolvedDesigns(out, status, inputs, self.general_positions, sent, endings, *ends)
+            self._solve_alone(index, out, status, inputs)
+        many, ends = (self.general_positions, len(rest) + self.followed_designs), (self.dead_point, self.stop_position)
+        return SolvedDesigns(out, status, inputs, *many, tuple((k, *said) for k, said in self.endings.items()), *ends)
 
     def _input_positions(self, same: bool) -> Array:
         """Where the running input is at each step (steps + 1,), or (designs, steps + 1); unknown yet of own ranges."""
@@ -291,8 +292,8 @@ class _DesignBlockSolver:
     def _run_fit_designs(self, runner: StepRunner, march: DesignBatch, fit: Array) -> tuple[Array, Array, Array]:
         """out, good and candidates of all designs, of which only the fit ones are run."""
         out, candidates = self._own_output(march), np.zeros(self.design_count, dtype=int)
+        self.march, march.u0[:, ~fit] = march, np.nan
         if fit.mean() > RUN_ALL_RATIO:
-            march.u0[:, ~fit] = np.nan
             # where all go together, few stop
             return out, runner.run(march, out, None if fit.all() else candidates), candidates
         out[:] = np.nan

@@ -224,6 +224,7 @@ def sweep(  # many: the public signature; # long: its docstring
     many = len(next(iter(values.values())))
     kept = "reduced" if reduce is not None else "store" if store is not None or any(results) else "memory"
     width = len(names) + 2 * len(mechanism.links) * any(results)
+    width += len(results.derivatives) * (len(names) + len(results.links) + len(results.pairs))
     size = int(block) if block is not None else _block_size(whole, width, many, executor, kept)
     plan = SweepPlan(whole, size, results, listed, duration)
     into = open_store(store, plan) if reductions is None else ReductionStore(plan)

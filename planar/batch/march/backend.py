@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple, Protocol, TypeVar
 
+import casadi as ca
 import numpy as np
 
 from planar.batch.march.stops import StopLimits
@@ -21,6 +22,20 @@ class UnsupportedStructure(Exception):
     """A backend cannot do this structure; the text says why."""
 
 
+class ResultRows(Protocol):
+    """Results that a march tells in place of points: so many rows of them, of further numbers of a design (symbols).
+
+    `write_rows` writes them into the text of a march (a `NewtonBlockWriter`) where numbers stand under these names.
+    """
+
+    row_count: int
+    numbers: ca.SX
+
+    def __hash__(self) -> int: ...
+
+    def write_rows(self, writer: Any, have: dict[tuple[str, int], str]) -> list[str]: ...
+
+
 class DesignBatch(NamedTuple):
     """A block of designs that is to run. Lengths are in units of one size for all, angles in rad.
 
@@ -31,7 +46,8 @@ class DesignBatch(NamedTuple):
     may leave open. `mechanism` has the pairs and inputs; its numbers are not those of the designs. `unit`: the size, m.
     `zeros`: rows of p and q, as ("p", row), that are nothing in all designs and are left out of what is computed.
     `signs` (blocks, designs): of the assemblies of blocks in closed form, 0 where one is not known; None of none.
-    `stops`: those of pairs, which no position of a design passes; None where there are none.
+    `stops`: those of pairs, which no position of a design passes; None where there are none. `results`: what is told in
+    place of the points, by machine code alone; the numbers that it takes stand in q behind those of the points.
     """
 
     functions: EquationFunctions
@@ -50,6 +66,7 @@ class DesignBatch(NamedTuple):
     zeros: frozenset[tuple[str, int]] = frozenset()
     signs: Array | None = None
     stops: StopLimits | None = None
+    results: ResultRows | None = None
 
     @property
     def stop_pairs(self) -> tuple[Pair, ...]:
@@ -63,7 +80,9 @@ class DesignBatch(NamedTuple):
 
     @property
     def output_row_count(self) -> int:
-        """What is told at a step: x and y of each point, then their first, then second rates."""
+        """What is told at a step: x and y of each point, then their first, then second rates; or other results."""
+        if self.results is not None:
+            return self.results.row_count
         return 2 * len(self.links) * (3 if self.rates else 1)
 
     def select(self, designs: Array | slice, z0: Array | None = None) -> DesignBatch:

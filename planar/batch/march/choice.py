@@ -37,6 +37,12 @@ def find_runner(backend: str) -> RunnerLadder:
     return RunnerLadder([*attempts, RunnerAttempt(StartRunner(), False)])
 
 
+def find_native_runner(backend: str) -> RunnerLadder | None:
+    """What runs them by machine code alone; None where the backend has none."""
+    attempts = dict(_available_attempts(backend)).get("native")
+    return None if attempts is None else RunnerLadder(attempts)
+
+
 def _available_attempts(backend: str) -> list[tuple[str, tuple[RunnerAttempt, ...]]]:
     if backend not in ("auto", *BACKENDS):
         raise BadInput("backend", f"there is no backend {backend!r:.40}; choose from auto, {', '.join(BACKENDS)}")

@@ -222,6 +222,8 @@ class KernelInstructions:
         carried: frozenset[Operand],
     ):
         self.equations, self.links, self.rates, self.carried = equations, links, rates, carried
+        self.solves_rates_apart = equations.has_large_blocks
+        "whether the unknowns' rates are solved block after block, so that they are symbols to what is made of them"
         e = equations.equations
         self.symbols: dict[str, ca.SX] = {
             "z": e.z,
@@ -323,7 +325,7 @@ class KernelInstructions:
 
     def rate_systems(self) -> list[RateSystem]:
         """See `KernelEquations.rate_systems`; where all rates are expressions there are none."""
-        if not (self.rates and self.equations.has_large_blocks):
+        if not (self.rates and self.solves_rates_apart):
             return []
         return self.equations.rate_systems(*(self.symbols[name] for name in ("z1", "z2", "u1", "u2")))
 
@@ -346,8 +348,7 @@ class KernelInstructions:
         positions = self.point_coordinates(range(len(self.links)))
         if not self.rates:
             return [positions]
-        # of large blocks the rates are solved in numbers
         symbols = s["z1"], s["z2"]
-        z1, z2 = symbols if self.equations.has_large_blocks else self.equations.rates(s["u1"], s["u2"])
+        z1, z2 = symbols if self.solves_rates_apart else self.equations.rates(s["u1"], s["u2"])
         y, y1, y2 = e.y, ca.vertcat(z1, s["u1"]), ca.vertcat(z2, s["u2"])
         return [positions, *first_and_second_rates(positions, y, y1, y2)]

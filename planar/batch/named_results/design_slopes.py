@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import casadi as ca
 import numpy as np
 
+from planar.batch.gradients.slope_rows import SlopeResults
 from planar.batch.named_results.design_forces import DesignPositions, position_chunks
 from planar.batch.named_results.design_frames import DesignFrames
 from planar.batch.named_results.result_rows import (
@@ -23,8 +24,9 @@ from planar.derivatives.implicit_system import ImplicitSystem
 from planar.derivatives.result_slopes import OPENING, pair_gaps, tied_dimensions
 from planar.document.cursor import suggest_spelling
 from planar.document.dimensions import value_at
+from planar.equations.casadi_call import BufferedFunction
 from planar.equations.elimination import stack_expressions
-from planar.foundation.arrays import Array
+from planar.foundation.arrays import Array, BoolArray
 from planar.foundation.errors import BadInput
 
 Expression = tuple[str, ca.SX]
@@ -47,15 +49,49 @@ class DesignSlopes:
                 raise BadInput("derivatives", f"nothing is derived in {each!r:.60}{meant}")
         self.columns = [names.index(each) for each in results.derivatives]
         self.rest = [k for k in range(len(names)) if k not in self.columns]
+        self.scale = self.design.scale[self.columns]
+
+    @cached_property
+    def is_bound(self) -> BoolArray:
+        """The numbers that cannot change alone (numbers,)."""
+        bound = tied_dimensions(self.reference.mechanism)
+        return np.array([each in bound for each in self.results.derivatives])
+
+    @cached_property
+    def system(self) -> ImplicitSystem:
+        """The equations in the numbers."""
         t = self.design.t
         parameters, constants = (ca.vertcat(ca.SX(0, 1), *(t[k] for k in of)) for of in (self.columns, self.rest))
-        self.system = ImplicitSystem(self.design.kinematics.levels[: self.orders], parameters, constants)
-        self.scale = self.design.scale[self.columns]
-        self.expressions = list(self._expressions())
-        gaps = pair_gaps(self.design)
-        self.jacobians = self.system.result_jacobians(ca.vertcat(*(value for _, value in self.expressions), gaps))
-        bound = tied_dimensions(reference.mechanism)
-        self.is_bound = np.array([each in bound for each in results.derivatives])
+        return ImplicitSystem(self.design.kinematics.levels[: self.orders], parameters, constants)
+
+    @cached_property
+    def expressions(self) -> list[Expression]:
+        """What is derived."""
+        return list(self._expressions())
+
+    @cached_property
+    def jacobians(self) -> BufferedFunction:
+        """Those of the results, and of what pairs leave open."""
+        return self.system.result_jacobians(
+            ca.vertcat(*(value for _, value in self.expressions), pair_gaps(self.design))
+        )
+
+    @cached_property
+    def free(self) -> SlopeResults:
+        """The same in the numbers that can change alone, as machine code has it."""
+        numbers = [each for each, tied in zip(self.results.derivatives, self.is_bound, strict=True) if not tied]
+        of = self.results
+        return SlopeResults(of.derived_points, of.links, of.pairs, tuple(numbers), self.orders > 1)
+
+    def write_free(self, slopes: Array, out: Array) -> None:
+        """Write rows of `free` (steps + 1, rows, designs) into those of all numbers."""
+        if not self.is_bound.any():
+            out[:] = slopes
+            return
+        of_all = self.free._replace(numbers=self.results.derivatives)
+        for whole, part in zip(of_all.split_rows(out), self.free.split_rows(slopes), strict=True):
+            whole[:, :, self.is_bound] = np.nan
+            whole[:, :, ~self.is_bound] = part
 
     def _expressions(self) -> Iterator[Expression]:
         frames, _ = self.design.placed

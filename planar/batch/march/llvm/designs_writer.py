@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from math import inf, nan
 
+from planar.batch.march.backend import ResultRows
 from planar.batch.march.kernel import BareAngle, KernelBlock, KernelEquations, Operand
 from planar.batch.march.llvm.checks import write_closes, write_keeps_apart, write_turns_little
 from planar.batch.march.llvm.kernel_writer import (
@@ -28,6 +29,8 @@ FUNCTION_NAME, _READ_ARRAYS = "march", ("p", "q", "state", "drive", "rate", "tab
 ARGUMENT_TYPES = (*("int",) * 5, *("array",) * 7, *("float",) * 3, *("array",) * 3)
 """Of the function's arguments: blocks, steps, width of the arrays that are read, how far a row and a step of `out` are
 from the next; p, q, state, drives, rates, table, counts; tolerance, astray, scale; out, good, candidates."""
+INVARIANT_KINDS = frozenset({"p", "q", "u1", "u2", "scale", "stop", "number"})
+"""Of operands that are the same at all steps of a design."""
 
 
 def write_designs_kernel(  # many: what a text is written for
@@ -41,6 +44,7 @@ def write_designs_kernel(  # many: what a text is written for
     is_single: bool = False,
     counts_candidates: bool = False,
     start: KernelStart = STATE_GIVEN,
+    results: ResultRows | None = None,
 ) -> DesignsKernelLayout:
     """The function for points on these links, none of which is the frame. Raises UnsupportedOperation.
 
@@ -50,6 +54,7 @@ def write_designs_kernel(  # many: what a text is written for
     `point_blocks`, of the block that places each point, it gives more: x and y of every point in the other assembly of
     its block (infinite where that is not known), the state, and how regular the least regular of the blocks is that
     Newton's method solves. What it gives goes past the caches where it `streams`; where `is_single`, it is rounded.
+    `results` stand in place of the points.
     """
     carried: frozenset[Operand] = frozenset()
     while True:
@@ -57,6 +62,7 @@ def write_designs_kernel(  # many: what a text is written for
             own = start if not carried else STATE_GIVEN
             writer = _DesignsKernelWriter(equations, tuple(links), rates, lanes, point_blocks, carried, own)
             writer.streams, writer.is_single, writer.counts_candidates = streams, is_single, counts_candidates
+            writer.tell(results)
             return writer.write()
         except BareAngle as angle:
             if angle.operand in carried:  # its value is wanted before its own block is solved
@@ -68,6 +74,7 @@ class _DesignsKernelWriter(NewtonBlockWriter):
     streams = True  # whether results are written past the caches
     is_single = False  # whether what a step gives is written in single precision
     counts_candidates = False  # whether what passes the checks of a position by itself is written too
+    results: ResultRows | None = None  # what is told in place of the points
 
     def __init__(
         self,
@@ -79,7 +86,7 @@ class _DesignsKernelWriter(NewtonBlockWriter):
         carried: frozenset[Operand],
         start: KernelStart,
     ):
-        super().__init__(equations, links, rates, lanes, frozenset({"p", "q", "u1", "u2", "scale", "stop"}), carried)
+        super().__init__(equations, links, rates, lanes, INVARIANT_KINDS, carried)
         self.point_blocks = levels
         self.other_points: dict[int, list[str]] = {}
         self.apart_here: list[str] = []  # flags of blocks in closed form: their assemblies are apart at a step
@@ -90,10 +97,16 @@ class _DesignsKernelWriter(NewtonBlockWriter):
         self.input_count = len(equations.input_is_angle)
         self.newton_unknowns = [k for part in equations.blocks if part.closed_form is None for k in part.unknowns]
 
+    def tell(self, results: ResultRows | None) -> None:
+        """Tell these in place of the points."""
+        if results is not None:
+            self.results, self.solves_rates_apart = results, True
+            self.symbols["number"] = results.numbers
+
     def write(self) -> DesignsKernelLayout:
         """The whole function: blocks of designs, in each the steps."""
         t = self.ir
-        rows = 2 * len(self.links) * (3 if self.rates else 1)
+        rows = 2 * len(self.links) * (3 if self.rates else 1) if self.results is None else self.results.row_count
         rows += 0 if self.point_blocks is None else 2 * len(self.links) + len(self.state) + 1
         arrays = ", ".join(f"ptr noalias readonly %{name}" for name in _READ_ARRAYS)
         numbers = ", ".join(f"double %{name}" for name in ("tolerance", "astray", "scale"))
@@ -162,6 +175,11 @@ class _DesignsKernelWriter(NewtonBlockWriter):
         have: OperandNames = {("p", k): t.load(self._row_pointer("%p", k)) for k in range(self.symbols["p"].numel())}
         have |= self.stop_number_names(lambda k: t.load(self._row_pointer("%p", k)))
         have |= {("q", k): t.load(self._row_pointer("%q", k)) for k in range(2 * len(self.links))}
+        if self.results is not None:
+            first = 2 * len(self.links)
+            have |= {
+                ("number", k): t.load(self._row_pointer("%q", first + k)) for k in range(self.results.numbers.numel())
+            }
         if self.rates:
             have |= {(f"u{1 + k // count}", k % count): t.load(self._row_pointer("%rate", k)) for k in range(2 * count)}
         t.mark_hoist_point()
@@ -271,11 +289,12 @@ class _DesignsKernelWriter(NewtonBlockWriter):
 
     def _write_step_end(self, have: OperandNames, flags: list[str]) -> None:
         """The step ends: its results are written, and judged."""
-        t, told = self.ir, [each * self.symbols["scale"] for each in self.output_expressions()]
+        t, results = self.ir, self.results
+        told = [] if results is not None else [each * self.symbols["scale"] for each in self.output_expressions()]
         self.write_rates(have)
         left, counted, *values = self.write_separately([self.equations.residuals(), self.counted_angles(), *told], have)
         flags = [*flags, *write_turns_little(t, counted, self.counted_angle_slots)]
-        many = [each for of in values for each in of]
+        many = [each for of in values for each in of] if results is None else results.write_rows(self, have)
         if self.point_blocks is not None:
             nowhere = [t.constant(inf)] * 2
             many += [part for k in range(len(self.links)) for part in self.other_points.get(k, nowhere)]

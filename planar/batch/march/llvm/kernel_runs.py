@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from planar.batch.march.backend import CorrectedAssemblies, DesignBatch, erase_between
+from planar.batch.march.backend import CorrectedAssemblies, DesignBatch, ResultRows, erase_between
 from planar.batch.march.kernel import KernelEquations, batch_equations
 from planar.batch.march.llvm.designs_writer import (
     ARGUMENT_TYPES,
@@ -45,9 +45,12 @@ def designs_kernel(
     is_single: bool = False,
     start: KernelStart = STATE_GIVEN,
     counts_candidates: bool = False,
+    results: ResultRows | None = None,
 ) -> DesignsKernelLayout:
     """The function for points on links of a structure, see `march`. Raises UnsupportedOperation."""
-    found = _designs_kernel_or_reason(equations, links, rates, point_blocks, is_single, start, counts_candidates)
+    found = _designs_kernel_or_reason(
+        equations, links, rates, point_blocks, is_single, start, counts_candidates, results
+    )
     if isinstance(found, str):
         raise UnsupportedOperation(found)
     return found
@@ -62,11 +65,12 @@ def _designs_kernel_or_reason(
     is_single: bool,
     start: KernelStart,
     counts_candidates: bool,
+    results: ResultRows | None,
 ) -> DesignsKernelLayout | str:
     """The same, or why there is none: every block of a sweep would find that out again."""
     try:
         more = {"is_single": is_single, "counts_candidates": counts_candidates}
-        return write_designs_kernel(equations, links, rates, LANES, point_blocks, start=start, **more)
+        return write_designs_kernel(equations, links, rates, LANES, point_blocks, start=start, results=results, **more)
     except UnsupportedOperation as why:
         return str(why)
 
@@ -86,7 +90,7 @@ def run_designs_kernel(
     signs, common = _known_signs(batch, equations), _common_inputs(batch.u0)
     start = KernelStart(signs is not None, signs is not None and common is not None)
     counts = candidates is not None and not equations.has_newton_blocks
-    kernel = designs_kernel(equations, tuple(batch.links), batch.rates, None, is_single, start, counts)
+    kernel = designs_kernel(equations, tuple(batch.links), batch.rates, None, is_single, start, counts, batch.results)
     table, corrections = step_table(batch.input_offsets, common if kernel.start.has_common_inputs else None)
     tolerances = batch.tolerance, correction_limit(longest), batch.unit
     out, good, found = _run_kernel(
