@@ -18,7 +18,7 @@ from planar.pages.overlay_style import overlay_script
 from planar.pages.page import script_safe_json
 
 NODE = shutil.which("node") or shutil.which("nodejs")
-BROWSERS = ("chromium", "chromium-browser", "google-chrome")
+BROWSERS = ("chromium-headless-shell", "chromium", "chromium-browser", "google-chrome")
 LOGIC = (
     "solve/singular.js",
     "solve/stops.js",
