@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from planar.document.first_argument import takes_mechanism, takes_result
-from planar.drawing.output.matplotlib_figure import draw_on_sheets, draw_pictures, encode_figure
+from planar.drawing.output.figure_files import save
+from planar.drawing.output.matplotlib_figure import draw_on_sheets, draw_pictures
 from planar.drawing.paper.scales import Scale, parse_scales
 from planar.foundation.safe_files import save_file as write
 
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
     from planar.dynamics.simulation import Simulation
     from planar.model.mechanism import Mechanism
     from planar.results.motion import Motion, State
+    from planar.structures.chain import Chain
     from planar.synthesis.cognates.cognates import Cognates
 
     Drawing = Figure | list[Figure]
@@ -40,6 +42,7 @@ __all__ = [
     "cam_profile",
     "centres",
     "centrodes",
+    "chains",
     "circuits",
     "cognates",
     "diagrams",
@@ -167,6 +170,18 @@ def centrodes(
     return draw_pictures([centrodes_picture(motion, link, other, _length_scale(scale, motion))])
 
 
+def chains(found: Chain | Sequence[Chain], mechanisms: bool = False) -> list[Figure]:
+    """Kinematic chains with their numbers, links as bars and plates, twenty on a sheet of A4; beneath each what it is.
+
+    With `mechanisms` every inversion, its fixed link hatched, and black the joints by which its mechanisms are driven.
+    Raises BadInput for anything else than chains.
+    """
+    from planar.drawing.structures.chain_sheets import chain_sheets, draw_chains, inversion_sheets
+
+    drawn = draw_chains(found)
+    return [*(inversion_sheets(drawn) if mechanisms else chain_sheets(drawn))]
+
+
 @takes_result("Modes", "Mechanism")
 def modes(assemblies: Modes | Mechanism, scale: ScaleTexts = None) -> list[Figure]:
     """Every assembly drawn small, numbered, to one scale, the sketch's own marked: sheets of 20, 96 at the most.
@@ -213,11 +228,8 @@ def cognates(found: Cognates | Mechanism, of: str | None = None, scale: ScaleTex
 
     if not isinstance(found, Cognates):
         found = first_cognates(found) if of is None else all_cognates(found, of)
-    return draw_pictures(cognate_pictures(found, _length_scale(scale, found)), _cognate_heading(found))
-
-
-def _cognate_heading(found: Cognates) -> str:
-    return f"{found.mechanism.name}: cognates of the path of {found.point}"
+    heading = f"{found.mechanism.name}: cognates of the path of {found.point}"
+    return draw_pictures(cognate_pictures(found, _length_scale(scale, found)), heading)
 
 
 @takes_result("Forces", "State")
@@ -384,17 +396,3 @@ def animate(
 
     path = Path(file)
     write(path, moving(motion, path.suffix, points, progress))
-
-
-def save(figures: Figure | Sequence[Figure], file: str | Path) -> None:
-    """Write a figure to a .png, .svg or .pdf file; several as pages of one .pdf, or one below the other.
-
-    Raises BadInput for another kind of file, and where it cannot be written.
-    """
-    path = Path(file)
-    if not isinstance(figures, Sequence):
-        write(path, encode_figure(figures, path.suffix))
-        return
-    from planar.drawing.output.solution_pages import encode_sheets
-
-    write(path, encode_sheets(figures, path.suffix))

@@ -121,7 +121,7 @@ def draw_on_sheets(pictures: Sequence[Picture], title: str = "") -> list[Figure]
     for row in _arrange_rows([lay_out_picture(picture) for picture in pictures]):
         if not sheets or _row_height(row) > left:
             sheets.append([])
-            left = PAGE_HEIGHT - _heading_lines(title, PAGE_WIDTH)[1]
+            left = PAGE_HEIGHT - heading_lines(title, PAGE_WIDTH)[1]
         sheets[-1].append(row)
         left -= _row_height(row) + PICTURE_GAP
     return [_draw_sheet(rows, title, PAGE_WIDTH if len(sheets) > 1 else 0.0) for rows in sheets]
@@ -134,7 +134,7 @@ def _draw_sheet(rows: Sequence[Sequence[PictureCell]], title: str, min_width: fl
     from matplotlib.figure import Figure
 
     widest = max(min_width, max(map(_row_width, rows), default=20.0))
-    heading, above = _heading_lines(title, widest)
+    heading, above = heading_lines(title, widest)
     widest = max([widest, *(text_size(line, HEADING_SIZE, heavy=True).width for line in heading)])
     width = widest + 2.0 * SHEET_MARGIN
     height = above + sum(map(_row_height, rows)) + PICTURE_GAP * max(len(rows) - 1, 0) + 2.0 * SHEET_MARGIN
@@ -145,7 +145,7 @@ def _draw_sheet(rows: Sequence[Sequence[PictureCell]], title: str, min_width: fl
         top = height - SHEET_MARGIN
         for line in heading:
             top -= LEADING * MM_PER_POINT * HEADING_SIZE
-            _write_centred(made, line, (width / 2.0, top), HEADING_SIZE)
+            write_centred(made, line, (width / 2.0, top), HEADING_SIZE)
         top = height - SHEET_MARGIN - above
         for row in rows:
             left = (width - _row_width(row)) / 2.0
@@ -157,7 +157,7 @@ def _draw_sheet(rows: Sequence[Sequence[PictureCell]], title: str, min_width: fl
     return made
 
 
-def _heading_lines(title: str, width: float) -> tuple[list[str], float]:
+def heading_lines(title: str, width: float) -> tuple[list[str], float]:
     """The lines of a title above pictures so wide, and what they take (mm)."""
     lines = wrap_text(title, HEADING_SIZE, max(width, MIN_CAPTION_WIDTH), heavy=True)
     return lines, LEADING * MM_PER_POINT * HEADING_SIZE * len(lines) + (3.0 if lines else 0.0)
@@ -220,7 +220,8 @@ def _add_font_fallback(page: bytes) -> bytes:
     return re.sub(rb"(font(?:-family)?: [^;\"]*'DejaVu Sans[^;\"]*')(?=[;\"])", rb"\1, sans-serif", page)
 
 
-def lay_out_picture(picture: Picture) -> PictureCell:
+def lay_out_picture(picture: Picture, caption_width: float = MIN_CAPTION_WIDTH) -> PictureCell:
+    """A picture with its letters placed and the text below broken to its width, or to a greater one (mm)."""
     for mark in picture.marks:
         check_finite(mark)
     letters = place_labels([mark for mark in picture.marks if isinstance(mark, Label)], picture.marks)
@@ -231,7 +232,7 @@ def lay_out_picture(picture: Picture) -> PictureCell:
     corners = corners or [(0.0, 0.0)]
     low = min(x for x, _ in corners) - PICTURE_MARGIN, min(y for _, y in corners) - PICTURE_MARGIN
     high = max(x for x, _ in corners) + PICTURE_MARGIN, max(y for _, y in corners) + PICTURE_MARGIN
-    room = max(high[0] - low[0], MIN_CAPTION_WIDTH)
+    room = max(high[0] - low[0], caption_width)
     text = [(line, TITLE_SIZE) for line in wrap_text(picture.title, TITLE_SIZE, room, heavy=True)]
     text += [(line, NOTE_SIZE) for note in picture.notes for line in wrap_text(note, NOTE_SIZE, room)]
     return PictureCell(picture, letters, low, high, tuple(text))
@@ -252,7 +253,7 @@ def _arrange_rows(cells: Sequence[PictureCell]) -> list[list[PictureCell]]:
     return rows
 
 
-def _write_centred(made: Figure, line: str, at: PaperPoint, size: float) -> None:
+def write_centred(made: Figure, line: str, at: PaperPoint, size: float) -> None:
     """One line of text, centred, on its base line (mm from the sheet's lower left corner)."""
     from planar.drawing.labels.matplotlib_text import draw_text
 
@@ -278,4 +279,4 @@ def draw_cell(made: Figure, cell: PictureCell, corner: PaperPoint) -> None:
     down = corner[1]
     for line, size in cell.text_lines:
         down -= LEADING * MM_PER_POINT * size
-        _write_centred(made, line, (corner[0] + cell.width / 2.0, down), size)
+        write_centred(made, line, (corner[0] + cell.width / 2.0, down), size)

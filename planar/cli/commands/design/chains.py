@@ -3,12 +3,18 @@
 from __future__ import annotations
 
 from itertools import islice
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
-from planar.cli.options import json_option, main, print_or_write, show_status
+from planar.cli.options import json_option, main, print_or_write, show_progress, show_status
 from planar.cli.streams import print_json
 
+if TYPE_CHECKING:
+    from planar.structures.chains import Chains
+
+PICTURES = (".svg", ".pdf", ".png")
 MAX_CHAINS_LISTED = 250
 """Chains that are printed unless more are asked for."""
 
@@ -26,18 +32,48 @@ MAX_CHAINS_LISTED = 250
     default=MAX_CHAINS_LISTED,
     show_default=True,
     metavar="N",
-    help="So many are listed.",
+    help="So many are listed, and drawn.",
+)
+@click.option(
+    "-o",
+    "output",
+    type=click.Path(path_type=Path),
+    metavar="PLACE",
+    help="Draw them: an atlas in a folder, with an index; or sheets in a .pdf, .svg or .png file.",
 )
 @json_option
-def chains(links: int, freedom: int, not_fractionated: bool, mechanisms: bool, limit: int, as_json: bool) -> None:
+def chains(
+    links: int,
+    freedom: int,
+    not_fractionated: bool,
+    mechanisms: bool,
+    limit: int,
+    output: Path | None,
+    as_json: bool,
+) -> None:
     """All kinematic chains of so many LINKS: every structure that a linkage with pins can have."""
     from planar.reports.tables.design.structures import record, table
     from planar.structures.chains import chains as all_chains
 
     found = all_chains(links, freedom, fractionated=not not_fractionated)
+    if output is not None:
+        _draw(found, limit, mechanisms, output)
     if as_json:
         print_json([record(each, mechanisms) for each in found])
         return
     with show_status(f"chains of {links} links"):
         told = table(found, [*islice(found, limit)], mechanisms)
     print_or_write(told, None)
+
+
+def _draw(found: Chains, limit: int, mechanisms: bool, output: Path) -> None:
+    """The first chains on sheets, in a file where its name says so, else in a folder."""
+    from planar import plot
+    from planar.pages.chain_atlas import write_atlas
+
+    shown = [*islice(found, limit)]
+    with show_progress(f"{len(shown)} chains") as progress:
+        if output.suffix.lower() in PICTURES and not output.is_dir():
+            plot.save(plot.chains(shown, mechanisms), output)
+        else:
+            write_atlas(shown, output, mechanisms, len(found), progress)

@@ -1,0 +1,161 @@
+"""Kinematic chains as pictures: bars as lines, other links as plates, joints as circles, links with their numbers."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from planar.drawing.paper.picture import Circle, Fill, Label, Mark, PaperPoint, Pen, Picture, Polyline, paper_point
+from planar.foundation.arrays import Array
+from planar.model.wording import count_phrase
+from planar.structures.chain import Chain, ChainMechanism
+from planar.structures.plane.layout import ChainLayout, lay_out_chain
+
+LONGEST_LINE = 22.0
+"""mm that a line is at most."""
+JOINT_RADIUS = 0.9
+NUMBER_SIZE = 6.0
+"""Points, of the numbers of links."""
+HATCH_PITCH, HATCH_LENGTH = 1.3, 1.6
+"""mm from one stroke of a fixed link's hatching to the next, and of one beside a bar."""
+MAX_DRIVES_SHOWN = 6
+"""Choices of driven joints that are told beneath a picture; of more how many there are."""
+LARGER = "larger"
+"""What is told of a mechanism whose groups have no class."""
+
+
+class DrawnChain(NamedTuple):
+    """A chain with the places of its joints."""
+
+    chain: Chain
+    layout: ChainLayout
+
+
+def draw_chain(chain: Chain) -> DrawnChain:
+    """A chain with places of its joints: without crossings where it has such, else with few."""
+    return DrawnChain(chain, lay_out_chain(chain.links, chain.edges))
+
+
+def chain_picture(drawn: DrawnChain, size: tuple[float, float]) -> Picture:
+    """A chain on so much paper (mm), with what it is beneath."""
+    return Picture(tuple(_marks(drawn, size)), chain_title(drawn.chain), tuple(_chain_notes(drawn)))
+
+
+def inversion_picture(
+    drawn: DrawnChain, frame: int, mechanisms: Sequence[ChainMechanism], size: tuple[float, float]
+) -> Picture:
+    """A chain with a link fixed, which is hatched; black are the joints by which its mechanisms are driven."""
+    driven = {joint for each in mechanisms for joint in each.drives}
+    number = "" if drawn.chain.number is None else f"{drawn.chain.number}, "
+    notes = [drawn.chain.inversion_name(frame) or drawn.chain.name, *_drive_notes(drawn.chain, mechanisms)]
+    return Picture(
+        tuple(_marks(drawn, size, frame, driven)), f"{number}link {frame} fixed", tuple(each for each in notes if each)
+    )
+
+
+def chain_title(chain: Chain) -> str:
+    """Its number, and how many of its links are binary, ternary and so on."""
+    number = "" if chain.number is None else f"{chain.number}: "
+    return f"{number}{' + '.join(map(str, chain.assortment))}"
+
+
+def class_counts(mechanisms: Iterable[ChainMechanism]) -> dict[str, int]:
+    """How many mechanisms have groups of which class at most: II, III, IV, and larger ones."""
+    count = Counter(_class_word(each) for each in mechanisms)
+    return {each: count[each] for each in ("II", "III", "IV", LARGER) if count[each]}
+
+
+def _class_word(mechanism: ChainMechanism) -> str:
+    words = {group.assur_class for group in mechanism.groups}
+    return LARGER if "" in words else max(words, key=("II", "III", "IV").index, default="II")
+
+
+def _chain_notes(drawn: DrawnChain) -> Iterator[str]:
+    chain = drawn.chain
+    if chain.name:
+        yield chain.name
+    yield f"symmetry {chain.symmetry.order}, {count_phrase(len(chain.inversions), 'inversion')}"
+    yield ", ".join(f"{word}: {count}" for word, count in class_counts(chain.mechanisms()).items())
+    told = ["fractionated"] if chain.is_fractionated else []
+    told += [count_phrase(drawn.layout.crossings, "crossing")] if drawn.layout.crossings else []
+    if told:
+        yield ", ".join(told)
+
+
+def _drive_notes(chain: Chain, mechanisms: Sequence[ChainMechanism]) -> Iterator[str]:
+    """What drives it, each joint by its two links, with the class."""
+    if not mechanisms:
+        yield "no joints on it drive all links"
+        return
+    told = [
+        " and ".join("{}-{}".format(*chain.edges[joint]) for joint in each.drives) + f": {_class_word(each)}"
+        for each in mechanisms[:MAX_DRIVES_SHOWN]
+    ]
+    left = len(mechanisms) - len(told)
+    yield "driven " + ", ".join(told) + (f", {left} more" if left else "")
+
+
+def _marks(
+    drawn: DrawnChain, size: tuple[float, float], frame: int | None = None, driven: Iterable[int] = ()
+) -> Iterator[Mark]:
+    layout = drawn.layout
+    ends = np.array([pair for each in layout.rotations for pair in zip(each, (*each[1:], each[0]), strict=True)])
+    longest = np.hypot(*(layout.places[ends[:, 0]] - layout.places[ends[:, 1]]).T).max()
+    span = np.maximum(np.ptp(layout.places, axis=0), 1e-9)
+    places = layout.places * min(size[0] / span[0], size[1] / span[1], LONGEST_LINE / longest)
+    spots = [paper_point(place) for place in places]
+    links = sorted(range(len(layout.rotations)), key=lambda link: (len(layout.rotations[link]) == 2, link))
+    for link in links:
+        corners = tuple(spots[joint] for joint in layout.rotations[link])
+        is_plate = len(corners) > 2
+        fill = Fill.NONE if link == frame or not is_plate else Fill.LINK
+        if link == frame:
+            shape = places[list(layout.rotations[link])]
+            strokes = _plate_hatching(shape) if is_plate else _bar_hatching(shape, places)
+            for stroke in strokes:
+                yield Polyline(stroke, Pen.HATCH, f"link {link} fixed")
+        yield Polyline(corners, Pen.LINK, f"link {link}", closed=is_plate, fill=fill)
+    black = {*driven}
+    for number, spot in enumerate(spots):
+        yield Circle(spot, JOINT_RADIUS, Pen.PIN, f"joint {number}", Fill.SOLID if number in black else Fill.PAPER)
+    for link, joints in enumerate(layout.rotations):
+        middle = paper_point(places[list(joints)].mean(axis=0))
+        yield Label(str(link), middle, f"link {link}", NUMBER_SIZE, clearance=0.3)
+
+
+Segment = tuple[PaperPoint, PaperPoint]
+
+
+def _plate_hatching(corners: Array) -> Iterator[Segment]:
+    """Slanted lines within a plate, whatever its shape."""
+    across, along = np.array([1.0, -1.0]) / np.sqrt(2.0), np.array([1.0, 1.0]) / np.sqrt(2.0)
+    depth, far = corners @ across, corners @ along
+    for level in np.arange(depth.min() + HATCH_PITCH / 2.0, depth.max(), HATCH_PITCH):
+        cuts = []
+        for one, other in zip(range(-1, len(corners) - 1), range(len(corners)), strict=True):
+            if (depth[one] > level) != (depth[other] > level):
+                part = (level - depth[one]) / (depth[other] - depth[one])
+                cuts.append(far[one] + part * (far[other] - far[one]))
+        cuts.sort()
+        for start, stop in zip(cuts[::2], cuts[1::2], strict=True):
+            yield paper_point(level * across + start * along), paper_point(level * across + stop * along)
+
+
+def _bar_hatching(ends: Array, places: Array) -> Iterator[Segment]:
+    """Slanted strokes on that side of a bar on which the nearest joint is farther."""
+    way = ends[1] - ends[0]
+    length = np.hypot(*way)
+    way = way / length
+    left = np.array([-way[1], way[0]])
+    off = places - ends[0]
+    beside = np.abs(off @ way / length - 0.5) < 1.0
+    heights = off[beside] @ left
+    above, below = heights[heights > 1e-6], -heights[heights < -1e-6]
+    side = left if min(above, default=np.inf) >= min(below, default=np.inf) else -left
+    count = max(2, int((length - 2.0 * JOINT_RADIUS) / HATCH_PITCH))
+    for part in (np.arange(count) + 0.7) / count:
+        foot = ends[0] + way * (JOINT_RADIUS + part * (length - 2.0 * JOINT_RADIUS))
+        yield paper_point(foot), paper_point(foot + HATCH_LENGTH / np.sqrt(2.0) * (side - way))

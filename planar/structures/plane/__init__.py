@@ -1,0 +1,1 @@
+"""Where the joints of a chain stand in a drawing of it."""
