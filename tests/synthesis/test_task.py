@@ -1,6 +1,7 @@
 """A task's file: what is read from it, and the sentence about what is wrong in it."""
 
 import json
+from itertools import islice
 from math import pi, radians
 
 import numpy as np
@@ -118,8 +119,8 @@ def test_chains_are_started_from_with_every_carrier_that_needs_all_links():
     task = planar.read_task(
         {"planar": 1, "start": {"chains": [4, 6]}, "wanted": [{"point": "P", "through": [["0 m", "0 m"]]}]}
     )
-    starts = list(start_mechanisms(task))
-    assert [len(each.links) for each in starts].count(4) == 1
+    starts = list(islice(start_mechanisms(task), 4))
+    assert [len(each.links) for each in starts] == [4, 6, 6, 6]
     for start in starts:
         assert {name.split(".")[0] for name in free_numbers(task, start).names} >= {
             each.name for each in start.links if each.name != "frame"
