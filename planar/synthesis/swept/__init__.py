@@ -1,1 +1,0 @@
-"""Random designs of a mechanism with their motions, swept once and kept on disk."""
