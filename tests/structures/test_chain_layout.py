@@ -7,6 +7,7 @@ import pytest
 
 import planar
 from planar.structures.plane.layout import lay_out_chain
+from tests.draws import part
 
 SOME = {
     (4, 1): 1,
@@ -30,7 +31,8 @@ LEAST_ANGLE = 10.0
 def some_chains():
     for (links, freedom), step in SOME.items():
         found = planar.chains(links, freedom)
-        yield from (found[number] for number in range(0, len(found), step))
+        yield from (found[number] for number in part(range(0, len(found), step), 1))
+    yield planar.chains(10)[40]  # not planar
 
 
 @pytest.fixture(scope="module")

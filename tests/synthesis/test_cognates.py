@@ -68,7 +68,7 @@ def pivots(mechanism):
 bars = st.tuples(*[st.floats(0.4, 2.5)] * 4, st.floats(-2.0, 2.0), st.floats(-2.0, 2.0))
 
 
-@settings(max_examples=draws(40))
+@settings(max_examples=draws(16))
 @given(bars)
 def test_of_random_four_bars_all_three_trace_one_curve(sizes):
     a, b, c, d, x, y = sizes

@@ -12,7 +12,7 @@ from tests.command import run
 @pytest.fixture(autouse=True)
 def few_designs(monkeypatch):
     """A small catalogue, which is enough for tasks as easy as these."""
-    monkeypatch.setattr("planar.synthesis.synthesise.DRAWS", 1500)
+    monkeypatch.setattr("planar.synthesis.synthesise.DRAWS", 600)
     monkeypatch.setattr("planar.synthesis.synthesise.ROUNDS", 1)
 
 
