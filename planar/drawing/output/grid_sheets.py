@@ -65,6 +65,7 @@ def _draw_sheet(pictures: Sequence[Picture], heading: str, note: str, height: fl
         made = Figure(figsize=size, dpi=RESOLUTION, facecolor="white")
         top = height - MARGIN - LEADING * MM_PER_POINT * HEADING_SIZE
         write_centred(made, heading, (PAGE_WIDTH / 2.0, top), HEADING_SIZE)
+        spare_columns = max(0, GRID_COLUMNS - len(pictures)) * (height < PAGE_HEIGHT)
         for place, picture in enumerate(pictures):
             row, column = divmod(place, GRID_COLUMNS)
             cell = lay_out_picture(picture, CELL_WIDTH - 2.0)
@@ -72,7 +73,7 @@ def _draw_sheet(pictures: Sequence[Picture], heading: str, note: str, height: fl
             # all titles of a row stand on one line
             spare = (PICTURE_HEIGHT - cell.axes_size[1]) / 2.0
             low, high = (cell.low[0], cell.low[1] - spare), (cell.high[0], cell.high[1] + spare)
-            left = MARGIN + (column + 0.5) * CELL_WIDTH - cell.width / 2.0
+            left = MARGIN + (column + 0.5 * (1 + spare_columns)) * CELL_WIDTH - cell.width / 2.0
             draw_cell(made, cell._replace(low=low, high=high), (left, floor))
         down = MARGIN + FOOT_HEIGHT
         for line in wrap_text(note, NOTE_SIZE, PAGE_WIDTH - 2.0 * MARGIN):

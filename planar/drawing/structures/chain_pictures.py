@@ -17,12 +17,14 @@ from planar.structures.plane.layout import ChainLayout, lay_out_chain
 LONGEST_LINE = 22.0
 """mm that a line is at most."""
 JOINT_RADIUS = 0.9
-NUMBER_SIZE = 6.0
-"""Points, of the numbers of links."""
+NUMBER_SIZE, SMALL_NUMBER_SIZE, SMALL_PLATE = 6.0, 5.0, 1.9
+"""Points, of the numbers of links, and of those in plates within which no larger circle (mm) has room."""
 HATCH_PITCH, HATCH_LENGTH = 1.3, 1.6
 """mm from one stroke of a fixed link's hatching to the next, and of one beside a bar."""
 MAX_DRIVES_SHOWN = 6
 """Choices of driven joints that are told beneath a picture; of more how many there are."""
+GRID_LINES = 40
+"""Either way, of spots within a plate that are looked at for its number."""
 LARGER = "larger"
 """What is told of a mechanism whose groups have no class."""
 
@@ -122,8 +124,27 @@ def _marks(
     for number, spot in enumerate(spots):
         yield Circle(spot, JOINT_RADIUS, Pen.PIN, f"joint {number}", Fill.SOLID if number in black else Fill.PAPER)
     for link, joints in enumerate(layout.rotations):
-        middle = paper_point(places[list(joints)].mean(axis=0))
-        yield Label(str(link), middle, f"link {link}", NUMBER_SIZE, clearance=0.3)
+        corners = places[list(joints)]
+        middle, room = _widest_spot(corners) if len(joints) > 2 else (corners.mean(axis=0), SMALL_PLATE)
+        size = NUMBER_SIZE if room >= SMALL_PLATE else SMALL_NUMBER_SIZE
+        yield Label(str(link), paper_point(middle), f"link {link}", size, clearance=0.3)
+
+
+def _widest_spot(corners: Array) -> tuple[Array, float]:
+    """The middle of the largest circle within a plate, and its radius (mm)."""
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    grid = np.linspace(low, high, GRID_LINES)
+    spots = np.stack(np.meshgrid(*grid.T), axis=-1).reshape(-1, 2)
+    nearest, inside = np.full(len(spots), np.inf), np.zeros(len(spots), dtype=bool)
+    for one, other in zip(np.roll(corners, 1, axis=0), corners, strict=True):
+        way = other - one
+        part = np.clip((spots - one) @ way / (way @ way), 0.0, 1.0)
+        nearest = np.minimum(nearest, np.hypot(*(spots - one - part[:, None] * way).T))
+        if one[1] != other[1]:
+            across = one[0] + (spots[:, 1] - one[1]) / way[1] * way[0]
+            inside ^= ((one[1] > spots[:, 1]) != (other[1] > spots[:, 1])) & (spots[:, 0] < across)
+    best = int(np.argmax(np.where(inside, nearest, 0.0)))
+    return spots[best], float(nearest[best])
 
 
 Segment = tuple[PaperPoint, PaperPoint]

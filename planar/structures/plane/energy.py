@@ -36,7 +36,7 @@ class LayoutEnergy:
         bent: Sequence[tuple[int, int, int]] = (),
         crossing: Sequence[tuple[int, int]] = (),
     ):
-        unit = np.eye(spots)
+        unit = np.eye(spots, dtype=complex)  # as places are, so that products of them are quick
         self.ends = np.array(sides)
         self.along = unit[self.ends[:, 1]] - unit[self.ends[:, 0]]
         self.rest = np.array([HALF_LENGTH if any({*side} <= {*each} for each in bent) else 1.0 for side in sides])

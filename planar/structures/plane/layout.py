@@ -21,7 +21,7 @@ RANDOM_TRIES, SMOOTHINGS = 60, 12
 before them."""
 ALIGNMENT, MIRROR_TOLERANCE = np.radians(4.0), 0.06
 """Lines turned less look level, and joints no farther off, in sizes of the drawing, look like mirror images."""
-MIRROR_WORTH, HEIGHT_WORTH = 6.0, 4.0
+MIRROR_WORTH, HEIGHT_WORTH = 6.0, 8.0
 """How many level lines a mirror image is worth, and how many a drawing is worth less that is as high as it is wide."""
 
 
