@@ -128,6 +128,8 @@ if TYPE_CHECKING:
     from planar.synthesis.synthesise import synthesise
     from planar.synthesis.task.synthesis_task import Demands, SynthesisTask, WantedFunction, WantedPath, WantedPoses
     from planar.synthesis.task.task_reader import read_task
+    from planar.synthesis.task.task_schema import task_schema
+    from planar.synthesis.task.task_writer import write_task
 
 __version__ = "0.17.0"
 
@@ -337,6 +339,7 @@ __all__ = [
     "sweep_each",
     "swing",
     "synthesise",
+    "task_schema",
     "time_ratio",
     "to_dict",
     "tolerance",
@@ -344,6 +347,7 @@ __all__ = [
     "unknown_load",
     "velocity_by_centres",
     "view",
+    "write_task",
 ]
 
 

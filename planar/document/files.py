@@ -84,6 +84,20 @@ def load(model: str | Path) -> Mechanism:
     return loads(content, str(path))
 
 
+def load_value(source: str | os.PathLike[str], what: str) -> Any:
+    """The JSON value in a file of another kind, as "a task's file"; "-" is what is piped in. Raises BadInput."""
+    place = os.fsdecode(source)
+    if place == PIPED:
+        return parse_json(_piped(), "standard input")
+    try:
+        if not Path(place).is_file():
+            raise BadInput(place or "''", f"there is no such file; name {what} (JSON)")
+    except OSError as problem:
+        told = f"{place[:60]}…" if len(place) > 100 else place
+        raise BadInput(told, f"this cannot be the name of a file: {problem.strerror}") from None
+    return parse_json(read_limited(Path(place)), place)
+
+
 def as_mechanism(source: Any) -> Mechanism:
     """The mechanism that is given, or that of a file or of a model's name. Raises BadInput."""
     if isinstance(source, Mechanism):

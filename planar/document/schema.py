@@ -21,22 +21,22 @@ FORBIDDEN_IN_NAMES = ".:,"
 GEOMETRY_SOURCES = ("given", "recovered", "fitted", "underdetermined")
 SENSE_WORDS = ("clockwise", "anticlockwise", "to the left", "to the right", "upwards", "downwards")
 
-_TEXT: Schema = {"type": "string"}
-_TEXTS: Schema = {"type": "array", "items": _TEXT}
+TEXT: Schema = {"type": "string"}
+_TEXTS: Schema = {"type": "array", "items": TEXT}
 _BOUNDED: Schema = {"type": "number", "exclusiveMinimum": -LARGEST_NUMBER, "exclusiveMaximum": LARGEST_NUMBER}
 _FROM_ZERO: Schema = {"type": "number", "minimum": 0, "exclusiveMaximum": LARGEST_NUMBER}
-_ABOVE_ZERO: Schema = {"type": "number", "exclusiveMinimum": 0, "exclusiveMaximum": LARGEST_NUMBER}
+ABOVE_ZERO: Schema = {"type": "number", "exclusiveMinimum": 0, "exclusiveMaximum": LARGEST_NUMBER}
 _POSITIVE_SIZE: Schema = {"type": "number", "minimum": SMALLEST_NUMBER, "exclusiveMaximum": LARGEST_NUMBER}
 _NUMBER_WITH_UNIT = r"([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?\s*(?![eE][+-]?[0-9])[A-Za-zµμΩ°]"
 """A number and the beginning of its unit."""
 
 
-def _quantity_schema(number: Schema, sign: str, such: str) -> Schema:
+def quantity_schema(number: Schema, sign: str, such: str) -> Schema:
     text = {"type": "string", "pattern": rf"^\s*{sign}{_NUMBER_WITH_UNIT}", "maxLength": MAX_QUANTITY_LENGTH}
     return {"anyOf": [number, text], "description": f"a number in the declared unit, or a text such as {such!r}"}
 
 
-def _object_schema(properties: Schema, *required: str, **more: Any) -> Schema:
+def object_schema(properties: Schema, *required: str, **more: Any) -> Schema:
     return {
         "type": "object",
         "properties": properties,
@@ -50,30 +50,30 @@ def _named_values_schema(values: Schema, **more: Any) -> Schema:
     return {"type": "object", "propertyNames": schema_reference("name"), "additionalProperties": values} | more
 
 
-def _vector_schema(kind: str) -> Schema:
+def vector_schema(kind: str) -> Schema:
     return list_schema(kind, 2, 2)
 
 
 UNITS_SCHEMA: Schema = {
-    "length": described(_TEXT, "the unit of bare lengths, as mm; left out: m"),
-    "angle": described(_TEXT, "the unit of bare angles, deg or rad; left out: rad"),
-    "velocity": described(_TEXT, "of bare velocities, as in/s; left out, as those below: SI"),
-    "acceleration": described(_TEXT, "of bare accelerations and gravity, as in/s^2"),
-    "jerk": described(_TEXT, "in which jerks are shown, as in/s^3"),
-    "angular_velocity": described(_TEXT, "of bare angular velocities, as rpm or deg/s"),
-    "angular_acceleration": described(_TEXT, "of bare angular accelerations, as deg/s^2"),
-    "angular_jerk": described(_TEXT, "in which angular jerks are shown, as rad/s^3"),
-    "force": described(_TEXT, "of bare forces, as lbf or kN"),
-    "torque": described(_TEXT, "of bare torques and couples, as lbf in or N mm"),
-    "mass": described(_TEXT, "of bare masses, as lb, slug or g"),
-    "moment_of_inertia": described(_TEXT, "of bare moments of inertia, as lb in^2"),
-    "stiffness": described(_TEXT, "of bare stiffnesses of springs, as lbf/in or N/mm"),
-    "torsional_stiffness": described(_TEXT, "of bare stiffnesses of torsional springs, as lbf in/rad"),
-    "damping": described(_TEXT, "of bare dampings, as lbf s/in"),
-    "torsional_damping": described(_TEXT, "of bare dampings of torsional springs, as lbf in s/rad"),
-    "stress": described(_TEXT, "of bare moduli of elasticity, and of stresses in results, as psi"),
-    "power": described(_TEXT, "in which powers are shown, as hp or kW"),
-    "energy": described(_TEXT, "in which energies are shown, as ft lbf or J"),
+    "length": described(TEXT, "the unit of bare lengths, as mm; left out: m"),
+    "angle": described(TEXT, "the unit of bare angles, deg or rad; left out: rad"),
+    "velocity": described(TEXT, "of bare velocities, as in/s; left out, as those below: SI"),
+    "acceleration": described(TEXT, "of bare accelerations and gravity, as in/s^2"),
+    "jerk": described(TEXT, "in which jerks are shown, as in/s^3"),
+    "angular_velocity": described(TEXT, "of bare angular velocities, as rpm or deg/s"),
+    "angular_acceleration": described(TEXT, "of bare angular accelerations, as deg/s^2"),
+    "angular_jerk": described(TEXT, "in which angular jerks are shown, as rad/s^3"),
+    "force": described(TEXT, "of bare forces, as lbf or kN"),
+    "torque": described(TEXT, "of bare torques and couples, as lbf in or N mm"),
+    "mass": described(TEXT, "of bare masses, as lb, slug or g"),
+    "moment_of_inertia": described(TEXT, "of bare moments of inertia, as lb in^2"),
+    "stiffness": described(TEXT, "of bare stiffnesses of springs, as lbf/in or N/mm"),
+    "torsional_stiffness": described(TEXT, "of bare stiffnesses of torsional springs, as lbf in/rad"),
+    "damping": described(TEXT, "of bare dampings, as lbf s/in"),
+    "torsional_damping": described(TEXT, "of bare dampings of torsional springs, as lbf in s/rad"),
+    "stress": described(TEXT, "of bare moduli of elasticity, and of stresses in results, as psi"),
+    "power": described(TEXT, "in which powers are shown, as hp or kW"),
+    "energy": described(TEXT, "in which energies are shown, as ft lbf or J"),
 }
 ALONG_SCHEMA: Schema = {
     "along": described(
@@ -120,7 +120,7 @@ MOTOR_SCHEMA: Schema = {
     "forces": described(list_schema("quantity", 2, MAX_LAW_ITEMS), "what it supplies at these speeds, at a slide"),
 }
 INPUT_SCHEMA: Schema = {
-    "pair": described(_TEXT, "the pair that is driven; at a pin of several links as B:a,b, link b against a"),
+    "pair": described(TEXT, "the pair that is driven; at a pin of several links as B:a,b, link b against a"),
     "position": described(
         schema_reference("quantity"),
         "the angle of the driven link at a pin on the frame, of the second against the first elsewhere; "
@@ -133,7 +133,7 @@ INPUT_SCHEMA: Schema = {
         "its motion in time: one piece, or a list of pieces, one after the other",
     ),
     "motor": described(
-        _object_schema(
+        object_schema(
             MOTOR_SCHEMA,
             oneOf=[
                 {"required": ["stall", "no_load"]},
@@ -172,7 +172,7 @@ PAIR_SCHEMA: Schema = {
 """What else the entry of any pair may have."""
 DRIVE_SCHEMA: Schema = {key: INPUT_SCHEMA[key] for key in ("position", "velocity", "acceleration")}
 VARIATION_SCHEMA: Schema = {
-    "with": described(_TEXT, "the input's pair whose position it varies with; left out: time"),
+    "with": described(TEXT, "the input's pair whose position it varies with; left out: time"),
     "at": described(
         list_schema("quantity", 2, MAX_LAW_ITEMS), "rising positions or times; one that stands twice is a step"
     ),
@@ -186,18 +186,18 @@ PIN_POINT_NOTE: Schema = {
 }
 """Of the name of a point where something acts."""
 FORCE_SCHEMA: Schema = {
-    "point": _TEXT | PIN_POINT_NOTE,
-    "force": described(_vector_schema("quantity"), "its x and y parts, in the declared unit or N"),
-    "axes": described(_TEXT, "the link in whose axes the force is given, and turns; left out: the frame"),
+    "point": TEXT | PIN_POINT_NOTE,
+    "force": described(vector_schema("quantity"), "its x and y parts, in the declared unit or N"),
+    "axes": described(TEXT, "the link in whose axes the force is given, and turns; left out: the frame"),
     "varies": _VARIES,
 }
 TORQUE_SCHEMA: Schema = {
-    "link": described(_TEXT, "the link on which the torque acts"),
+    "link": described(TEXT, "the link on which the torque acts"),
     "torque": described(schema_reference("quantity"), "the torque, anticlockwise, in the declared unit or N m"),
     "varies": _VARIES,
 }
 EFFORT_SCHEMA: Schema = {
-    "pair": described(_TEXT, "the pair between whose links it acts"),
+    "pair": described(TEXT, "the pair between whose links it acts"),
     "force": described(schema_reference("quantity"), "the force at a slide, positive the way its displacement grows"),
     "torque": described(schema_reference("quantity"), "the torque at a pin or wheel, positive the way its angle grows"),
     "varies": _VARIES,
@@ -217,15 +217,15 @@ TORSION_SPRING_SCHEMA: Schema = {
     "damping": described(schema_reference("amount"), "torque by angular speed, in the declared unit or N m s/rad"),
 }
 MASS_SCHEMA: Schema = {
-    "link": described(_TEXT, "the link that it belongs to; several on a link add up"),
+    "link": described(TEXT, "the link that it belongs to; several on a link add up"),
     "mass": described(schema_reference("amount"), "the mass, in the declared unit or kg"),
     "at": described(schema_reference("spot"), "its centre: a point of the link, or [x, y] in the link's axes"),
     "inertia": described(schema_reference("amount"), "about that centre, in the declared unit or kg m^2; left out: 0"),
 }
 PUBLISHED_SCHEMA: Schema = {
-    "symbol": described(_TEXT, "how the book writes it, as v_C"),
+    "symbol": described(TEXT, "how the book writes it, as v_C"),
     "quantity": described({"enum": list(PUBLISHED_QUANTITIES)}, "what it is"),
-    "of": described(_TEXT, "the point, link, pair or input that it is of"),
+    "of": described(TEXT, "the point, link, pair or input that it is of"),
     "value": described(
         {"anyOf": [{"type": "null"}, schema_reference("quantity")]}, "what the book prints; null where it prints none"
     ),
@@ -233,12 +233,12 @@ PUBLISHED_SCHEMA: Schema = {
         {"type": "number", "minimum": 0, "exclusiveMaximum": LARGEST_NUMBER},
         "the part of the exact value by which a drawing may be off; left out: 0.02",
     ),
-    "relative_to": described(_TEXT, "the point or link against which it is told; left out: the frame"),
+    "relative_to": described(TEXT, "the point or link against which it is told; left out: the frame"),
     "component": described({"enum": ["x", "y"]}, "which part of a vector; left out: its size"),
     "sense": described({"enum": list(SENSE_WORDS)}, "the sense that the book gives it"),
-    "case": described(_TEXT, "which of the book's cases it belongs to"),
-    "note": described(_TEXT, "what there is to say of it"),
-    "slip": described(_TEXT, "why the printed value is wrong, where it is"),
+    "case": described(TEXT, "which of the book's cases it belongs to"),
+    "note": described(TEXT, "what there is to say of it"),
+    "slip": described(TEXT, "why the printed value is wrong, where it is"),
     "inputs": described(schema_reference("drives"), "inputs that are changed for it, by their pairs"),
     "from": described(schema_reference("drives"), "inputs at the position from which a displacement counts"),
 }
@@ -248,7 +248,7 @@ TOLERANCE_SCHEMA: Schema = {
         "the general tolerances of lengths and angles of links and pairs that have none of their own",
     ),
     "clearance": described(
-        _named_values_schema({"anyOf": [schema_reference("amount"), _TEXT]}),
+        _named_values_schema({"anyOf": [schema_reference("amount"), TEXT]}),
         "by pins how far the centres of pin and hole may stand apart, as 0.03 mm, or their fit, as H7/g6",
     ),
 }
@@ -256,9 +256,9 @@ _LOADS: Schema = {
     "type": "array",
     "items": {
         "anyOf": [
-            _object_schema(FORCE_SCHEMA, "point", "force"),
-            _object_schema(TORQUE_SCHEMA, "link", "torque"),
-            _object_schema(EFFORT_SCHEMA, "pair", oneOf=[{"required": ["force"]}, {"required": ["torque"]}]),
+            object_schema(FORCE_SCHEMA, "point", "force"),
+            object_schema(TORQUE_SCHEMA, "link", "torque"),
+            object_schema(EFFORT_SCHEMA, "pair", oneOf=[{"required": ["force"]}, {"required": ["torque"]}]),
         ]
     },
 }
@@ -266,36 +266,36 @@ _SPRINGS: Schema = {
     "type": "array",
     "items": {
         "anyOf": [
-            _object_schema(kind, ends, anyOf=[{"required": ["stiffness"]}, {"required": ["damping"]}])
+            object_schema(kind, ends, anyOf=[{"required": ["stiffness"]}, {"required": ["damping"]}])
             for kind, ends in ((SPRING_SCHEMA, "points"), (TORSION_SPRING_SCHEMA, "links"))
         ]
     },
 }
 FILE_SCHEMA: Schema = {
     "planar": described({"const": FORMAT_VERSION}, "the version of this form of file"),
-    "name": described(_TEXT, "the mechanism's name, as titles have it"),
+    "name": described(TEXT, "the mechanism's name, as titles have it"),
     "ids": described(_TEXTS, "other names under which a model is found"),
-    "about": described(_TEXT, "what it does, in a sentence"),
-    "source": described(_TEXT, "the book or drawing that it is from"),
+    "about": described(TEXT, "what it does, in a sentence"),
+    "source": described(TEXT, "the book or drawing that it is from"),
     "geometry": described(
         {"enum": list(GEOMETRY_SOURCES)}, "whether its dimensions are given there, or were recovered"
     ),
     "notes": described(_TEXTS, "remarks that are shown with its results"),
-    "units": described(_object_schema(UNITS_SCHEMA), "the units of bare numbers in this file, and of results"),
-    "frame": described(_TEXT, "the link that stands still"),
+    "units": described(object_schema(UNITS_SCHEMA), "the units of bare numbers in this file, and of results"),
+    "frame": described(TEXT, "the link that stands still"),
     "links": described(_named_values_schema(schema_reference("link"), minProperties=1), "the links by their names"),
     "pairs": described({"type": "array", "items": schema_reference("pair")}, "what joins the links"),
     "inputs": described(
-        {"type": "array", "items": _object_schema(INPUT_SCHEMA, "pair", "position")},
+        {"type": "array", "items": object_schema(INPUT_SCHEMA, "pair", "position")},
         "what is driven: as many as the mechanism has freedoms",
     ),
     "loads": described(_LOADS, "forces and torques that act on it"),
     "springs": described(_SPRINGS, "springs and dampers, between two points or two links"),
     "masses": described(
-        {"type": "array", "items": _object_schema(MASS_SCHEMA, "link", "mass", "at")}, "the masses of its links"
+        {"type": "array", "items": object_schema(MASS_SCHEMA, "link", "mass", "at")}, "the masses of its links"
     ),
     "gravity": described(
-        _vector_schema("quantity"), "the acceleration of weights, as [0, -9.81], in the declared unit or m/s^2"
+        vector_schema("quantity"), "the acceleration of weights, as [0, -9.81], in the declared unit or m/s^2"
     ),
     "closes_within": described(
         schema_reference("size"),
@@ -303,17 +303,17 @@ FILE_SCHEMA: Schema = {
         "are rounded: it takes the position of least misfit; left out: it has to close",
     ),
     "tolerances": described(
-        _object_schema(TOLERANCE_SCHEMA)
+        object_schema(TOLERANCE_SCHEMA)
         | {"additionalProperties": {"anyOf": [schema_reference("quantity"), list_schema("quantity", 2, 2)]}},
         "how far numbers of the file may be off, by their names as `planar inspect` lists them: 0.05, plus and minus, "
         'or the lower and upper deviation, as ["-0.02 mm", "0.05 mm"]',
     ),
     "sketch": described(
-        {"type": "object", "additionalProperties": _vector_schema("length")},
+        {"type": "object", "additionalProperties": vector_schema("length")},
         "roughly where some points are, in the frame's axes: the assembly nearest to them is taken",
     ),
     "published": described(
-        {"type": "array", "items": _object_schema(PUBLISHED_SCHEMA, "symbol", "quantity", "of")},
+        {"type": "array", "items": object_schema(PUBLISHED_SCHEMA, "symbol", "quantity", "of")},
         "values that the source prints, which are shown beside the exact ones",
     ),
 }
@@ -334,31 +334,31 @@ def schema() -> dict[str, Any]:
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": "A planar mechanism",
-        **_object_schema(FILE_SCHEMA, "planar", "frame", "links", "pairs"),
+        **object_schema(FILE_SCHEMA, "planar", "frame", "links", "pairs"),
         "$defs": {
             "name": {
                 "type": "string",
                 "pattern": rf"^[^{FORBIDDEN_IN_NAMES}]*[^\s{FORBIDDEN_IN_NAMES}][^{FORBIDDEN_IN_NAMES}]*$",
                 "description": f"contains none of {' '.join(FORBIDDEN_IN_NAMES)}",
             },
-            "text": _TEXT,
+            "text": TEXT,
             "number": _BOUNDED,
-            "quantity": _quantity_schema(_BOUNDED, "[+−-]?", "10.5 rad/s"),
-            "length": _quantity_schema(_BOUNDED, "[+−-]?", "50 mm"),
-            "amount": _quantity_schema(_FROM_ZERO, "[+]?", "2 kg"),
-            "size": _quantity_schema(_POSITIVE_SIZE, "[+]?", "50 mm"),
-            "angle": _quantity_schema(_BOUNDED, "[+−-]?", "60 deg"),
-            "spot": {"anyOf": [_TEXT, _vector_schema("length")], "description": "a point of the link, or [x, y]"},
+            "quantity": quantity_schema(_BOUNDED, "[+−-]?", "10.5 rad/s"),
+            "length": quantity_schema(_BOUNDED, "[+−-]?", "50 mm"),
+            "amount": quantity_schema(_FROM_ZERO, "[+]?", "2 kg"),
+            "size": quantity_schema(_POSITIVE_SIZE, "[+]?", "50 mm"),
+            "angle": quantity_schema(_BOUNDED, "[+−-]?", "60 deg"),
+            "spot": {"anyOf": [TEXT, vector_schema("length")], "description": "a point of the link, or [x, y]"},
             "place": {
                 "anyOf": [
-                    _vector_schema("length"),
-                    _object_schema(ALONG_SCHEMA, "along", "distance"),
-                    _object_schema(
+                    vector_schema("length"),
+                    object_schema(ALONG_SCHEMA, "along", "distance"),
+                    object_schema(
                         DISTANCES_SCHEMA, "distances", oneOf=[{"required": ["left_of"]}, {"required": ["right_of"]}]
                     ),
                 ]
             },
-            "link": _object_schema(
+            "link": object_schema(
                 LINK_SCHEMA,
                 dependentRequired={"length": ["ends"], "ends": ["length"]},
                 anyOf=[
@@ -367,12 +367,12 @@ def schema() -> dict[str, Any]:
                 ],
                 **{"not": {"required": ["ends", "axis"]}},
             ),
-            "varies": _object_schema(VARIATION_SCHEMA, "at", "factors"),
-            "time": _quantity_schema(_ABOVE_ZERO, "[+]?", "0.5 s"),
+            "varies": object_schema(VARIATION_SCHEMA, "at", "factors"),
+            "time": quantity_schema(ABOVE_ZERO, "[+]?", "0.5 s"),
             "piece": {"oneOf": [_segment_schema(kind) for kind in SEGMENT_TYPES.values()]},
             "lift": lift_schema(),
             "nose": nose_schema(),
-            "drives": {"type": "object", "additionalProperties": _object_schema(DRIVE_SCHEMA)},
+            "drives": {"type": "object", "additionalProperties": object_schema(DRIVE_SCHEMA)},
             "pair": {"oneOf": [_pair_schema(kind) for kind in pair_types().values()]},
         },
     }
@@ -382,7 +382,7 @@ def _pair_schema(kind: type[Pair]) -> Schema:
     own = {kind.keyword: described(schema_reference("name"), kind.entry_description), **kind.entry_schemas}
     dependent = {"dependentRequired": {"restitution": ["stops"]}}
     properties = {**own, **STOP_SCHEMA, **PAIR_SCHEMA}
-    return _object_schema(properties, kind.keyword, *kind.required_keys) | dict(kind.entry_rule) | dependent
+    return object_schema(properties, kind.keyword, *kind.required_keys) | dict(kind.entry_rule) | dependent
 
 
 def _segment_schema(kind: type[LawSegment]) -> Schema:
@@ -394,4 +394,4 @@ def _segment_schema(kind: type[LawSegment]) -> Schema:
         properties[name] = described(
             list_schema("quantity", 2, MAX_LAW_ITEMS) if key.is_list else value, key.description
         )
-    return _object_schema(properties, "motion", *(name for name, key in kind.keys.items() if key.is_required))
+    return object_schema(properties, "motion", *(name for name, key in kind.keys.items() if key.is_required))

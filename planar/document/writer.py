@@ -26,7 +26,7 @@ from planar.model.pairs import Pair, QuantityWriter
 
 def write_mechanism(mechanism: Mechanism) -> dict[str, Any]:
     """The mechanism as a file has it, in its own units; each number reads back to the last bit."""
-    quantity, motions = _quantity_writer(mechanism), relative_motions(mechanism)
+    quantity, motions = quantity_writer(mechanism.units), relative_motions(mechanism)
     value: dict[str, Any] = {"planar": FORMAT_VERSION, "name": mechanism.name}
     value |= _nonempty_fields(
         ids=list(mechanism.ids),
@@ -56,8 +56,8 @@ def write_mechanism(mechanism: Mechanism) -> dict[str, Any]:
     return value
 
 
-def _quantity_writer(mechanism: Mechanism) -> QuantityWriter:
-    units = mechanism.units
+def quantity_writer(units: FileUnits) -> QuantityWriter:
+    """Writes SI numbers in the units that a file declares, so that each reads back to the last bit."""
 
     def quantity(value: float, kind: str) -> float | str:
         value = float(value)  # a number of numpy would write its type

@@ -206,6 +206,7 @@ MODULES = {
     "sweep_each": "batch.sweep_mechanisms",
     "swing": "analysis.motion.extremes",
     "synthesise": "synthesis.synthesise",
+    "task_schema": "synthesis.task.task_schema",
     "time_ratio": "analysis.motion.time_ratio",
     "to_dict": "document.files",
     "tolerance": "analysis.tolerance.tolerance",
@@ -213,6 +214,7 @@ MODULES = {
     "unknown_load": "analysis.efforts.unknown_load",
     "velocity_by_centres": "analysis.centres.velocities",
     "view": "pages.view",
+    "write_task": "synthesis.task.task_writer",
 }
 """The module of a name, behind `planar.`; a name that is a module is its own."""
 LAYERS = ("jax", "torch")

@@ -1,4 +1,4 @@
-"""The page of all keys of a mechanism file, made from the schema."""
+"""The pages of all keys of mechanism files and of tasks, made from their schemas."""
 
 from __future__ import annotations
 
@@ -31,6 +31,8 @@ KIND_WORDS = {
     "nose": "a circle",
     "varies": "a variation",
     "drives": "inputs by their pairs",
+    "mechanism": "a mechanism",
+    "positive": "a quantity above 0",
 }
 """What a page calls the kinds of values that the schema defines."""
 TYPE_WORDS = {
@@ -45,6 +47,16 @@ HEAD = """# Every key of a file
 Made from the schema that `planar schema` prints. A *quantity* is a number in the declared unit, or a text with its own,
 such as `"210 rpm"`; [Writing a mechanism](writing.md) shows how the keys are used. Keys in **bold** are always there.
 Beneath a picture stands what it shows.
+"""
+TASK_HEAD = """# Every key of a task
+
+Made from the schema that `planar schema --task` prints, which editors take as that of mechanisms. A *quantity* is a
+number in the declared unit, or a text with its own; units are those of mechanism files. [Linkages for a
+task](synthesis.md) shows how the keys are used. Keys in **bold** are always there.
+
+```sh
+planar schema --task > planar-task-schema.json
+```
 """
 
 
@@ -104,6 +116,33 @@ def key_sections() -> tuple[KeySection, ...]:
 def keys_page() -> str:
     """The whole page, in Markdown."""
     return "\n".join([HEAD, *(line for each in key_sections() for line in _section_lines(each))])
+
+
+def task_keys_page() -> str:
+    """The page of the keys of a task, in Markdown."""
+    from planar.synthesis.task.task_schema import task_schema  # a terminal shows other pages more often
+
+    whole = task_schema()["properties"]
+    starts = tuple(each for each in whole["start"]["anyOf"] if "properties" in each)
+    path, poses, function = whole["wanted"]["items"]["anyOf"]
+    demands = tuple(each for each in whole["demands"]["items"]["anyOf"] if "properties" in each)
+    sections = (
+        KeySection("The file", (task_schema(),), ""),
+        KeySection("Chains to start from", starts, ""),
+        KeySection("A path", (path,), ""),
+        KeySection("A place of a path, with more than its coordinates", _entries(path["properties"]["through"]), ""),
+        KeySection("Poses of a link", (poses,), ""),
+        KeySection("A pose", (poses["properties"]["poses"]["items"],), ""),
+        KeySection("A function of the input", (function,), ""),
+        KeySection("A pair of positions with a weight", _entries(function["properties"]["pairs"]), ""),
+        KeySection("A demand that is no word", demands, ""),
+    )
+    return "\n".join([TASK_HEAD, *(line for each in sections for line in _section_lines(each))])
+
+
+def _entries(values: Schema) -> tuple[Schema, ...]:
+    """The objects that a list may hold."""
+    return tuple(each for each in values["items"]["anyOf"] if "properties" in each)
 
 
 def read_example(name: str) -> dict[str, Any]:

@@ -15,7 +15,8 @@ from planar.synthesis.catalogue.moved_numbers import moved_numbers
 from planar.synthesis.fitting.design_fit import DesignFit, FittedDesigns
 from planar.synthesis.fitting.wanted_equations import WantedEquations, tangents
 from planar.synthesis.fitting.wanted_rows import wanted_rows, wanted_size
-from planar.synthesis.task.starts import FreeNumbers, can_move_whole, free_numbers
+from planar.synthesis.task.freedom import can_move_whole
+from planar.synthesis.task.starts import FreeNumbers, free_numbers
 from planar.synthesis.task.synthesis_task import SynthesisTask, WantedPath
 
 GUARD_POSITIONS = 24

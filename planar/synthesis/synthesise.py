@@ -19,6 +19,7 @@ from planar.synthesis.design_search import Candidate, DesignSearch
 from planar.synthesis.judgement.judgement import DesignJudge
 from planar.synthesis.judgement.written_design import write_design
 from planar.synthesis.synthesis import Synthesis, SynthesisedDesign, rank_designs
+from planar.synthesis.task.freedom import count_freedom
 from planar.synthesis.task.starts import start_mechanisms
 from planar.synthesis.task.synthesis_task import SynthesisTask
 from planar.synthesis.task.task_reader import read_task
@@ -87,6 +88,8 @@ class _TaskSearch:
         self.task, self.many, self.seed, self.end = task, many, seed, end
         self.sound: list[SynthesisedDesign] = []
         self.rejected: list[SynthesisedDesign] = []
+        self.starts: dict[str, Mechanism] = {}
+        "those that designs were made from"
         self.remarks: list[str] = []
         self.size = 1.0
 
@@ -108,6 +111,7 @@ class _TaskSearch:
             self.remarks.append(f"{mechanism.name} is no start: {problem}")
             return
         self.size = search.size
+        self.starts[mechanism.name] = mechanism
         judge = DesignJudge(self.task, search.size)
         before = len(self.sound)
         for turn in range(ROUNDS):
@@ -141,6 +145,10 @@ class _TaskSearch:
         )
         (self.rejected if found.defects else self.sound).append(told)
 
+    def _freedom(self, start: str) -> str:
+        """What of the task a start can meet exactly."""
+        return f"{start}: {count_freedom(self.task, self.starts[start]).sentence}"
+
     def result(self) -> Synthesis:
         """All that was found."""
         remarks = [*self.remarks]
@@ -148,6 +156,7 @@ class _TaskSearch:
             remarks.append("the time was up before every start had been searched")
         ranked = rank_designs(self.sound, self.many)
         sound = tuple(replace(each, cognates=task_cognates(each.mechanism, self.task)) for each in ranked)
+        remarks += [self._freedom(each.start) for each in (sound or self.rejected)[:1]]
         if not sound:
             remarks.append(_refusal(self.rejected))
         return Synthesis(self.task, sound, rank_designs(self.rejected, self.many), self.size, tuple(remarks))

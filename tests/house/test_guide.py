@@ -23,7 +23,7 @@ from planar import plot
 from planar.cli import main
 from planar.foundation.errors import BadInput
 from planar.guide import reference, site
-from planar.guide.keys_page import key_sections, keys_page, read_example
+from planar.guide.keys_page import key_sections, keys_page, read_example, task_keys_page
 from planar.guide.reference import reference_names
 from planar.guide.topics import FIRST_PAGE, find_topic, guide_topics, read_page
 from planar.model.file_units import FileUnits
@@ -142,6 +142,7 @@ def test_every_page_is_listed_once_and_begins_with_its_title():
 
 def test_the_page_of_keys_is_that_of_the_schema():
     assert PAGES["begin/keys"] == keys_page()
+    assert PAGES["design/task"] == task_keys_page()
 
 
 def keys_of(value) -> set[str]:
@@ -212,7 +213,7 @@ def test_every_page_of_an_answer_shows_how_and_says_where_its_theory_is_from():
         assert re.search(r"^\*Sources?\*: ", PAGES[page], re.MULTILINE) or page in WITHOUT_THEORY, page
 
 
-WITHOUT_THEORY = {"answers/pages", "answers/classroom"}
+WITHOUT_THEORY = {"answers/pages", "answers/classroom", "design/task"}
 """Pages on what shows answers and has none of its own."""
 
 

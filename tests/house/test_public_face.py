@@ -39,6 +39,8 @@ FREE = {
     "chains",
     "read_task",
     "synthesise",
+    "task_schema",
+    "write_task",
     "generate",
     "schema",
     "build",

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 import planar
-from planar.synthesis.task.starts import can_move_whole, free_numbers, start_mechanisms
+from planar.synthesis.task.freedom import can_move_whole
+from planar.synthesis.task.starts import free_numbers, start_mechanisms
 from tests.command import run
 
 TASK = {

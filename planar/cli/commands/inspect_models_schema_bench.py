@@ -37,9 +37,13 @@ def inspect(model: str, as_json: bool) -> None:
 
 
 @main.command()
-def schema() -> None:
+@click.option("--task", is_flag=True, help="That of tasks, which `planar synthesise` takes.")
+def schema(task: bool) -> None:
     """The JSON schema of mechanism files, which editors can use."""
-    from planar.document.schema import schema as published
+    if task:
+        from planar.synthesis.task.task_schema import task_schema as published
+    else:
+        from planar.document.schema import schema as published
 
     print_json(published(), indent=2)
 

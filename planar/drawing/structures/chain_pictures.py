@@ -126,8 +126,8 @@ def _marks(
     for link, joints in enumerate(layout.rotations):
         corners = places[list(joints)]
         middle, room = _widest_spot(corners) if len(joints) > 2 else (corners.mean(axis=0), SMALL_PLATE)
-        size = NUMBER_SIZE if room >= SMALL_PLATE else SMALL_NUMBER_SIZE
-        yield Label(str(link), paper_point(middle), f"link {link}", size, clearance=0.3)
+        number_size = NUMBER_SIZE if room >= SMALL_PLATE else SMALL_NUMBER_SIZE
+        yield Label(str(link), paper_point(middle), f"link {link}", number_size, clearance=0.3)
 
 
 def _widest_spot(corners: Array) -> tuple[Array, float]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -11,13 +11,21 @@ import numpy as np
 
 from planar.derivatives.design_equations import design_dimensions, design_equations
 from planar.derivatives.implicit_system import ImplicitSystem, Level
+from planar.derivatives.result_slopes import tied_dimensions
+from planar.document.dimensions import Dimension
 from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput
 from planar.model.link_shapes import At, Distances, Link, Point, link_shape
 from planar.model.mechanism import Mechanism, named_points
 from planar.solving.cycle import cycle
-from planar.synthesis.task.synthesis_task import ChainStart, SynthesisTask, WantedFunction, WantedPath
-from planar.synthesis.task.wanted_expressions import influential_numbers, wanted_expression
+from planar.synthesis.task.synthesis_task import ChainStart, SynthesisTask, WantedPath
+from planar.synthesis.task.wanted_expressions import (
+    carried_name,
+    depended_numbers,
+    influential_numbers,
+    set_apart,
+    wanted_expression,
+)
 
 NO_INFLUENCE = 1e-9
 """Of the greatest slope: a number with less does not matter."""
@@ -49,16 +57,12 @@ def _chain_starts(task: SynthesisTask, start: ChainStart) -> Iterator[Mechanism]
     from planar.structures.chains import chains
 
     paths = [each.point for each in task.wanted if isinstance(each, WantedPath)]
-    if any(not isinstance(each, WantedPath) for each in task.wanted):
-        raise BadInput(
-            "$.start", "chains have no names yet of links and pairs; to start from them, only paths can be wanted"
-        )
     for links in start.links:
         for chain in chains(links):
             for mechanism in chain.mechanisms():
                 found = chain.mechanism(mechanism.frame, mechanism.drives)
                 known = {each.name for each in named_points(found)}
-                names = {point: f"{point}'" if point in known else point for point in paths}
+                names = {point: set_apart(point) if point in known else point for point in paths}
                 for link in _carriers(found):
                     carried = {point: (link, names[point]) for point in paths}
                     complete = with_wanted_points(found, task, carried)
@@ -109,8 +113,9 @@ def with_wanted_points(mechanism: Mechanism, task: SynthesisTask, carried: dict[
     for path in task.wanted:
         if not isinstance(path, WantedPath):
             continue
-        if path.point in known and path.point not in carried:
-            link, point = known[path.point].members[0]
+        there = known.get(carried_name(mechanism, path.point))
+        if there is not None and path.point not in carried:
+            link, point = there.members[0]
             links[link] = _by_coordinates(links[link], point)
             continue
         link, point = carried.get(path.point, (path.link or "", path.point))
@@ -118,7 +123,8 @@ def with_wanted_points(mechanism: Mechanism, task: SynthesisTask, carried: dict[
             raise BadInput(
                 "$.wanted", f"{mechanism.name!r} has no point {path.point!r}; 'on' names the link for a new one"
             )
-        links[link] = _with_new_point(links[link], point)
+        if point not in links[link].names:  # else wanted twice
+            links[link] = _with_new_point(links[link], point, max(map(_reach, mechanism.links)))
     changed = replace(mechanism, links=tuple(links.values()), published=(), notes=(), tolerances=None)
     return changed if changed.links != mechanism.links else replace(mechanism, published=(), tolerances=None)
 
@@ -134,24 +140,30 @@ def _by_coordinates(link: Link, point: str) -> Link:
     return replace(link, points=points)
 
 
-def _with_new_point(link: Link, point: str) -> Link:
+def _with_new_point(link: Link, point: str, size: float) -> Link:
+    """The link with a point more, beside the middle of its others; `size` is that of the greatest link."""
     shape = link_shape(link)
     places = [shape.position(each) for each in link.names]
     x, y = (float(np.mean([getattr(each, part) for each in places])) for part in "xy")
-    reach = max((float(np.hypot(one.x - other.x, one.y - other.y)) for one in places for other in places), default=0.0)
-    return replace(link, points=(*link.points, Point(point, At(x, y + 0.5 * reach))))
+    return replace(link, points=(*link.points, Point(point, At(x, y + 0.5 * (_reach(link) or size or 1.0)))))
+
+
+def _reach(link: Link) -> float:
+    """The greatest distance between points of a link."""
+    shape = link_shape(link)
+    x, y = (np.array([getattr(shape.position(each), part) for each in link.names]) for part in "xy")
+    return float(np.hypot(x[:, None] - x, y[:, None] - y).max())
 
 
 def free_numbers(task: SynthesisTask, mechanism: Mechanism) -> FreeNumbers:
     """The numbers of a mechanism that a task leaves free, in the order of the file.
 
-    Where it names none these are all of links and pairs that what is wanted depends on, without those that cannot
-    change alone. Raises BadInput for what is no number of it, and NoAnswer where the mechanism cannot move.
+    Where it names none these are all lengths and angles of links and pairs that what is wanted depends on, without
+    those that cannot change alone. Values beyond bounds are the bounds. Raises BadInput for what is no number of it,
+    cannot change alone, or changes nothing that is wanted, and NoAnswer where the mechanism cannot move.
     """
     known = {each.name: each for each in design_dimensions(mechanism) if each.path[0] in ("links", "pairs")}
-    for name in task.free:
-        if name not in known:
-            raise BadInput("$.free", f"{mechanism.name!r} has no number {name!r} that links and pairs depend on")
+    _check_free_names(task, mechanism, known)
     names = tuple(dict.fromkeys(task.free)) or influential_numbers(mechanism, task.wanted)
     chosen = [known[name] for name in names]
     lower, upper = np.array([task.within.get(name, (-np.inf, np.inf)) for name in names]).reshape(-1, 2).T
@@ -159,8 +171,16 @@ def free_numbers(task: SynthesisTask, mechanism: Mechanism) -> FreeNumbers:
     return FreeNumbers(names, values, lower, upper, tuple(each.kind for each in chosen))
 
 
-def can_move_whole(task: SynthesisTask, mechanism: Mechanism, free: FreeNumbers) -> bool:
-    """Whether place, size and turn of the whole mechanism are free: all lengths and fixed pivots, without bounds."""
-    if task.within or any(isinstance(each, WantedFunction) for each in task.wanted):
-        return False
-    return not task.free or {*influential_numbers(mechanism, task.wanted)} <= {*free.names}
+def _check_free_names(task: SynthesisTask, mechanism: Mechanism, known: Mapping[str, Dimension]) -> None:
+    """Refuse numbers by name that cannot be sought."""
+    if not task.free:
+        return
+    used, tied = depended_numbers(mechanism, task.wanted), {*tied_dimensions(mechanism)}
+    for name in task.free:
+        if name not in known:
+            raise BadInput("$.free", f"{mechanism.name!r} has no number {name!r} that links and pairs depend on")
+        if name in tied:
+            told = f"{name!r} of {mechanism.name!r} cannot change alone, as others have to go with it; leave it out"
+            raise BadInput("$.free", told)
+        if name not in used:
+            raise BadInput("$.free", f"nothing that is wanted depends on {name!r} of {mechanism.name!r}; leave it out")

@@ -33,20 +33,34 @@ def wanted_expression(design: DesignEquations, wanted: Wanted) -> ca.SX:
     return design.in_link_coordinates(ca.vertcat(*design.work.relative_positions([wanted.to_pair])))
 
 
+def set_apart(point: str) -> str:
+    """What a wanted point of a chain is called where a joint of it bears its name."""
+    return f"{point} wanted"
+
+
 def carried_name(mechanism: Mechanism, point: str) -> str:
-    """The name of a wanted point in a mechanism: one of a chain has it with a prime where a joint bears it already."""
-    primed = f"{point}'"
-    return primed if any(each.name == primed for each in named_points(mechanism)) else point
+    """The name of a wanted point in a mechanism, which may be one of a chain where it is set apart from a joint."""
+    apart = set_apart(point)
+    return apart if any(each.name == apart for each in named_points(mechanism)) else point
 
 
-def influential_numbers(mechanism: Mechanism, wanted: tuple[Wanted, ...]) -> tuple[str, ...]:
-    """The numbers of links and pairs that what is wanted, or how the mechanism closes, depends on, and that can change
-    alone."""
-    design, tied = design_equations(mechanism), {*tied_dimensions(mechanism)}
+def depended_numbers(mechanism: Mechanism, wanted: tuple[Wanted, ...]) -> tuple[str, ...]:
+    """The numbers of links and pairs that what is wanted, or how the mechanism closes, depends on."""
+    design = design_equations(mechanism)
     depends = ca.vertcat(design.F, *(wanted_expression(design, each) for each in wanted))
     used = ca.which_depends(depends, design.d, 1, False)
     return tuple(
         each.name
         for each, is_used in zip(design.dimensions, used, strict=True)
-        if is_used and each.path[0] in ("links", "pairs") and each.name not in tied and each.kind in ("length", "angle")
+        if is_used and each.path[0] in ("links", "pairs")
+    )
+
+
+def influential_numbers(mechanism: Mechanism, wanted: tuple[Wanted, ...]) -> tuple[str, ...]:
+    """The lengths and angles among them that can change alone."""
+    used, tied = {*depended_numbers(mechanism, wanted)}, {*tied_dimensions(mechanism)}
+    return tuple(
+        each.name
+        for each in design_equations(mechanism).dimensions
+        if each.name in used - tied and each.kind in ("length", "angle")
     )

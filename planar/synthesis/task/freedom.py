@@ -1,0 +1,211 @@
+"""How much of what a task wants its free numbers can meet, and whether they move a mechanism as a whole.
+
+Both are ranks. An entry's result r depends on the free numbers d and, along its path, on the input; where the input is
+not given the part along the path is left out. Zeros of scales that are sought are unknowns beside d.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import casadi as ca
+import numpy as np
+
+from planar.analysis.calibration.identifiability import unseen_changes
+from planar.derivatives.design_equations import design_equations
+from planar.derivatives.implicit_system import ImplicitSystem, Level
+from planar.document.revised.changed_numbers import with_values
+from planar.foundation.arrays import Array
+from planar.foundation.errors import PlanarError
+from planar.model.mechanism import Mechanism
+from planar.model.wording import count_phrase
+from planar.solving.cycle import cycle
+from planar.synthesis.task.starts import FreeNumbers, free_numbers
+from planar.synthesis.task.synthesis_task import SynthesisTask, Wanted, WantedFunction, WantedPath
+from planar.synthesis.task.task_numbers import motion_kind
+from planar.synthesis.task.wanted_expressions import wanted_expression
+
+MOVED = 1e-6
+"""Of a move: what free numbers leave of it is none."""
+GENERIC_CHANGE = 0.01
+"""Of a number, or of the size: by as much a start is changed that may be a special one."""
+SPREAD = 0.6180339887498949
+"""Of the motion: how far it is from one entry to the next, so that any number of them lies well spread."""
+
+
+LEAST_POSITIONS = 24
+"""Of a motion, at which derivatives are taken."""
+MOVES = 4
+"""Along x, along y, a turn, growth."""
+
+
+class FreedomCount(NamedTuple):
+    """How many independent unknowns a task leaves free, zeros of scales included, how many conditions what is wanted
+    sets beyond inputs that are not given, and how many of these can be met exactly."""
+
+    free: int
+    demanded: int
+    met: int
+
+    @property
+    def excess(self) -> int:
+        """How many conditions more are set than can be met exactly."""
+        return self.demanded - self.met
+
+    @property
+    def sentence(self) -> str:
+        """The count in words."""
+        sets = f"what is wanted sets {count_phrase(self.demanded, 'condition')}"
+        free = f"{count_phrase(self.free, 'independent number is', 'independent numbers are')} free"
+        left = self.free - self.met
+        told = [f"{self.excess} more than can be met exactly"] if self.excess else []
+        told += [f"{count_phrase(left, 'stays', 'stay')} open"] if left else []
+        return f"{sets}, and {free}: {' and '.join(told) or 'as many'}"
+
+
+class _ResultRows(NamedTuple):
+    """Results (n, parts) of a wanted item at n positions, with their derivatives by the free numbers (n, parts, free)
+    and by the input (n, parts); lengths in units of the mechanism."""
+
+    wanted: Wanted
+    values: Array
+    slopes: Array
+    along: Array
+
+    @property
+    def is_timed(self) -> bool:
+        """Whether the input is given at every entry."""
+        return self.wanted.inputs is not None
+
+    def spread(self, count: int) -> _ResultRows:
+        """So many of the positions, which lie well spread over the motion."""
+        many = len(self.values)
+        if count >= many:
+            return self
+        at = np.argsort(np.argsort(np.modf(SPREAD * np.arange(1, many + 1))[0]))[:count]
+        return _ResultRows(self.wanted, *(each[at] for each in self[1:]))
+
+    def project(self, rows: Array) -> Array:
+        """Rows (n, parts, ...) without their part along the path, where the input is not given."""
+        if self.is_timed:
+            return rows
+        unit = self.along / np.maximum(np.linalg.norm(self.along, axis=1, keepdims=True), np.finfo(float).tiny)
+        found: Array = rows - unit[:, :, None] * np.einsum("np,npk->nk", unit, rows)[:, None]
+        return found
+
+    def zeros(self) -> Array:
+        """The derivatives (n, parts, zeros) by the zeros of scales that are sought."""
+        if self.wanted.is_absolute or not self.is_timed:
+            return np.zeros((*self.values.shape, 0))
+        of_values = [np.ones_like(self.along)] if isinstance(self.wanted, WantedFunction) else []
+        return np.stack([self.along, *of_values], axis=2)
+
+    @property
+    def condition_count(self) -> int:
+        """How many conditions its wanted entries set."""
+        parts = int(self.values.shape[1])
+        return len(self.wanted.weights) * (parts if self.is_timed else parts - 1)
+
+
+def count_freedom(task: SynthesisTask, mechanism: Mechanism) -> FreedomCount:
+    """The free unknowns of a start (see `start_mechanisms`) beside the conditions of what is wanted, by rank.
+
+    A four-bar whose coupler point comes to places at any input meets nine of them exactly, a function five pairs.
+    Raises NoAnswer where the start cannot move.
+    """
+    free = free_numbers(task, mechanism)
+    items = _result_rows(_generic(mechanism, free), task.wanted, free)
+    every, own = (
+        unseen_changes(_stack([each.spread(count) for each, count in zip(items, counts, strict=True)]))[2]
+        for counts in ([len(each.values) for each in items], [len(each.weights) for each in task.wanted])
+    )
+    return FreedomCount(every, sum(each.condition_count for each in items), own)
+
+
+def can_move_whole(task: SynthesisTask, mechanism: Mechanism, free: FreeNumbers) -> bool:
+    """Whether free numbers without bounds bring what is wanted of the mechanism to any place, size and turn."""
+    is_bounded = bool(np.isfinite(free.lower).any() or np.isfinite(free.upper).any())
+    if is_bounded or any(isinstance(each, WantedFunction) for each in task.wanted):
+        return False
+    items = _result_rows(mechanism, task.wanted, free)
+    matrix = _stack(items)
+    right = np.concatenate([each.project(_moves(each)).reshape(-1, MOVES) for each in items])
+    left = right - matrix @ np.linalg.lstsq(matrix, right, rcond=None)[0]
+    return bool((np.linalg.norm(left, axis=0) <= MOVED * np.linalg.norm(right, axis=0)).all())
+
+
+def _moves(item: _ResultRows) -> Array:
+    """How results change where the mechanism moves along x, along y, turns about the origin and grows (n, parts, 4)."""
+    found = np.zeros((*item.values.shape, MOVES))
+    x, y = item.values[:, 0], item.values[:, 1]
+    found[:, 0, 0] = found[:, 1, 1] = 1.0
+    found[:, 0, 2], found[:, 1, 2] = -y, x
+    found[:, 0, 3], found[:, 1, 3] = x, y
+    if not isinstance(item.wanted, WantedPath):
+        found[:, 2, 2] = 1.0
+    return found
+
+
+def _stack(items: Sequence[_ResultRows]) -> Array:
+    """The derivatives (rows, unknowns) of all results by the free numbers and by each item's own zeros."""
+    zeros = [each.zeros() for each in items]
+    total = sum(each.shape[2] for each in zeros)
+    rows, first = [], 0
+    for item, own in zip(items, zeros, strict=True):
+        wide = np.zeros((*own.shape[:2], total))
+        wide[..., first : first + own.shape[2]] = own
+        first += own.shape[2]
+        both = item.project(np.concatenate([item.slopes, wide], axis=2))
+        rows.append(both.reshape(-1, both.shape[2]))
+    return np.concatenate(rows)
+
+
+def _result_rows(mechanism: Mechanism, wanted: Sequence[Wanted], free: FreeNumbers) -> list[_ResultRows]:
+    """What is wanted over the motion of a mechanism, where it is determined, with its derivatives."""
+    design = design_equations(mechanism)
+    motion = cycle(mechanism, max(LEAST_POSITIONS, 2 * len(free.names)), pair=mechanism.inputs[0].pair)
+    z, t = design.coordinates_at(motion)
+    results = [wanted_expression(design, each) for each in wanted]
+    system = ImplicitSystem([Level(design.z, design.F)], design.t)
+    whole = ca.vertcat(*results)
+    found = system.slopes(system.result_jacobians(whole), [z[0]], t)
+    regular = ~found.is_singular
+    values = np.array(ca.Function("values", [design.z, design.t], [whole])(z[0][regular].T, t[regular].T)).T
+    units = [
+        design.solver.unit if _is_length(mechanism, each, part) else 1.0
+        for each, own in zip(wanted, results, strict=True)
+        for part in range(own.numel())
+    ]
+    slopes = found.slopes[regular] * design.scale / np.array(units)[:, None]
+    columns = [design.names.index(name) for name in free.names]
+    ends = np.cumsum([0, *(each.numel() for each in results)])
+    return [
+        _ResultRows(
+            each,
+            (values / units)[:, first:last],
+            slopes[:, first:last][..., columns],
+            slopes[:, first:last, 0],
+        )
+        for each, first, last in zip(wanted, ends[:-1], ends[1:], strict=True)
+    ]
+
+
+def _is_length(mechanism: Mechanism, wanted: Wanted, part: int) -> bool:
+    if isinstance(wanted, WantedFunction):
+        return motion_kind(mechanism, wanted.to_pair) == "length"
+    return part < 2
+
+
+def _generic(mechanism: Mechanism, free: FreeNumbers) -> Mechanism:
+    """A mechanism near a start, which may be a special one; the start itself, where that does not go together."""
+    size = float(np.abs(free.values[np.array(free.kinds) == "length"]).max(initial=0.0)) or 1.0
+    way = np.cos(1.0 + np.arange(len(free.names)))
+    scale = np.where(np.array(free.kinds) == "length", size, 1.0)
+    values = np.clip(free.values + GENERIC_CHANGE * way * scale, free.lower, free.upper)
+    try:
+        changed = with_values(mechanism, dict(zip(free.names, values.tolist(), strict=True)))
+        cycle(changed, LEAST_POSITIONS, pair=mechanism.inputs[0].pair)
+    except PlanarError:
+        return mechanism
+    return changed
