@@ -208,26 +208,35 @@ class EquationFunctions:
 
     def third_rate_remainder(self, y: Array, y1: Array, y2: Array, p: Array) -> Array:
         """The third time derivative of F (rows,), that of y left out."""
-        return self._third_rate_function(y, y1, y2, p).full().ravel()
+        return self._third_rate_call(y, y1, y2, p)[0][0]
 
     @cached_property
-    def _second_derivative_functions(self) -> tuple[ca.Function, ca.Function]:
+    def _third_rate_call(self) -> BufferedFunction:
+        return BufferedFunction(self._third_rate_function)
+
+    @kept_function
+    def _second_derivative_function(self) -> ca.Function:
         e = self.equations
-        y, way, rows = e.y, ca.SX.sym("way", e.y.numel()), ca.SX.sym("l", e.F.numel())
-        along = ca.jacobian(ca.jtimes(e.F, y, way), y)
-        weighed = ca.jacobian(ca.jtimes(e.F, y, rows, True), y)
-        return (
-            ca.Function("along", [y, way, e.p], [ca.densify(along)]),
-            ca.Function("weighed", [y, rows, e.p], [ca.densify(weighed)]),
-        )
+        y, way = e.y, ca.SX.sym("way", e.y.numel())
+        return ca.Function("along", [y, way, e.p], [ca.densify(ca.jacobian(ca.jtimes(e.F, y, way), y))])
+
+    @kept_function
+    def _weighted_hessian_function(self) -> ca.Function:
+        e = self.equations
+        y, rows = e.y, ca.SX.sym("l", e.F.numel())
+        return ca.Function("weighed", [y, rows, e.p], [ca.densify(ca.jacobian(ca.jtimes(e.F, y, rows, True), y))])
+
+    @cached_property
+    def _second_derivative_calls(self) -> tuple[BufferedFunction, BufferedFunction]:
+        return BufferedFunction(self._second_derivative_function), BufferedFunction(self._weighted_hessian_function)
 
     def second_derivative_along(self, y: Array, direction: Array, p: Array) -> Array:
         """The second derivatives of F with one direction filled in (rows, y): the Jacobian of (dF/dy) direction."""
-        return self._second_derivative_functions[0](y, direction, p).full()
+        return self._second_derivative_calls[0](y, direction, p)[0].T
 
     def weighted_hessian(self, y: Array, weights: Array, p: Array) -> Array:
         """The second derivatives (y, y) of the sum of the rows of F, each times its number."""
-        return self._second_derivative_functions[1](y, weights, p).full()
+        return self._second_derivative_calls[1](y, weights, p)[0].T
 
     @kept_function
     def _deflated_function(self) -> ca.Function:
@@ -243,8 +252,12 @@ class EquationFunctions:
         A. Leykin, J. Verschelde, A. Zhao, Newton's method with deflation for isolated singularities, Theor. Comp. Sci.
         359, 2006.
         """
-        both, slopes = self._deflated_function(z, z1, u, u1, p)
-        return both.full().ravel(), slopes.full()
+        both, slopes = self._deflated_call(z, z1, u, u1, p)
+        return both[0], slopes.T
+
+    @cached_property
+    def _deflated_call(self) -> BufferedFunction:
+        return BufferedFunction(self._deflated_function)
 
     def kinematics(self, y: Array, y1: Array, y2: Array, p: Array) -> EquationRates:
         """Everything at one position, y = (z, u) with its first and second derivatives, or at samples (samples, y)."""

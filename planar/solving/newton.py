@@ -242,7 +242,8 @@ def settle(
     for _ in range(max_steps):
         left, slope = residual_function(y)
         step = solve_step(slope, left)
-        if not np.all(np.isfinite(step)) or greatest_size(step) > longest_step:
+        size = greatest_size(step)
+        if not size < np.inf or size > longest_step:
             return y, False
         y = y + step
         if greatest_size(step[:leading]) < settled_step:

@@ -13,7 +13,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from planar.foundation.arrays import Array
+from planar.foundation.arrays import Array, append_number, greatest_size, length_of, stack_row
 from planar.solving.checks.singular_values import SINGULAR_TOLERANCE
 from planar.solving.newton import settle, shortest_step
 
@@ -30,18 +30,18 @@ MAX_REFINEMENTS, CONVERGED_STEP = 12, 1e-13
 
 def nearest_direction(forms: Array, c: Array, tolerance: float = EXACT_FORM_TOLERANCE) -> Array | None:
     """The direction (k,) of length one next to c in which all quadratic forms (forms, k, k) vanish."""
-    scale = float(np.max(np.abs(forms), initial=0.0))
+    scale = greatest_size(forms)
     if scale < SINGULAR_TOLERANCE:
         return None
     forms = forms / scale
 
     def of_length_one(c: Array) -> tuple[Array, Array]:
-        left = np.append(np.einsum("fij,i,j->f", forms, c, c), 0.5 * (c @ c - 1.0))
-        return left, np.vstack([2.0 * forms @ c, c])
+        rows = forms @ c
+        return append_number(rows @ c, 0.5 * (c @ c - 1.0)), stack_row(2.0 * rows, c)
 
-    start = c / np.linalg.norm(c)
+    start = c / length_of(c)
     c, _ = settle(of_length_one, shortest_step(1e-10), start, MAX_REFINEMENTS, (len(c), CONVERGED_STEP))
-    vanishes = np.max(np.abs(np.einsum("fij,i,j->f", forms, c, c))) < tolerance
+    vanishes = greatest_size(forms @ c @ c) < tolerance
     return c if vanishes and abs(c @ c - 1.0) < SAME_DIRECTION_TOLERANCE else None
 
 
@@ -65,7 +65,7 @@ def branch_directions(forms: Array, tolerance: float = EXACT_FORM_TOLERANCE) -> 
 
 def is_same_direction(c: Array, other: Array) -> bool:
     """Whether two directions of length one are one, whichever sense they have."""
-    return bool(min(np.linalg.norm(c - other), np.linalg.norm(c + other)) <= SAME_DIRECTION_TOLERANCE)
+    return min(length_of(c - other), length_of(c + other)) <= SAME_DIRECTION_TOLERANCE
 
 
 def solve_third_order(condition: Callable[[Array], Array], count: int, tolerance: float = np.inf) -> Array | None:

@@ -143,6 +143,7 @@ class SolutionCurve(ImplicitCurve):
 
     def __init__(self, solver: CurveSolver, p: Array, start: Array, way: Array):
         self.solver, self.functions, self.p, self.start, self.input_direction = solver, solver.functions, p, start, way
+        self._is_along_input = len(way) == 1 and way[0] == 1.0
 
     def inputs(self, y: Array) -> Array:
         """The inputs (inputs,) at a point, or at points (points, inputs)."""
@@ -164,6 +165,8 @@ class SolutionCurve(ImplicitCurve):
     def residuals_and_jacobian(self, y: Array) -> tuple[Array, Array]:
         """F (rows,) and J (rows, n + 1)."""
         left, slope = self.functions.residuals_and_jacobian(y[:-1], self.inputs(y), self.p)
+        if self._is_along_input:
+            return left, slope
         many = len(y) - 1
         narrow = np.empty((len(slope), many + 1))
         narrow[:, :many] = slope[:, :many]
