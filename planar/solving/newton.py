@@ -27,8 +27,13 @@ StepSolver = Callable[[Array, Array], Array]
 CLOSED_TOLERANCE = 1e-11
 """A group counts as closed below this (lengths of the mechanism's size); the gate asks for more afterwards."""
 STALLED_COST_RATIO = 1e-10
+STALLED_COST = 1e-8
+"""Below such squares of residuals a start may yet close, however slowly it comes nearer."""
+SETTLED_STEP = 1e-13
 FIRST_DAMPING = 1e-3
 """The damping from which steps start anywhere, for squares of singular values in parts of the greatest one's."""
+MIN_DAMPING_RATIO, MIN_DAMPING, MAX_DAMPING = 0.1, 1e-17, 1e12
+"""To so small a part the damping falls at each step, and between these it stays."""
 ROUNDED_COST = 1e-31
 """Where the squares of residuals come to less, on average, no step makes them any better."""
 MAX_SMALL_UNKNOWNS, MIN_ROUGH_DAMPING = 24, 1e-12
@@ -62,8 +67,9 @@ def damped_newton(
 ) -> NewtonResult:
     """Solve from every start by Levenberg's and Marquardt's damping of Gauss and Newton's method.
 
-    The damping falls with every step that succeeds, so convergence at a simple root is quadratic; blocks with more
-    constraints than unknowns are solved in the sense of least squares, singular ones by the shortest step.
+    The damping falls with every step that does what the linear system foresees, so convergence at a simple root is
+    quadratic; where nothing closes it stays as high as the bending asks. Blocks with more constraints than unknowns are
+    solved in the sense of least squares, singular ones by the shortest step.
     K. Madsen, H. B. Nielsen, O. Tingleff, Methods for Non-Linear Least Squares Problems, 2nd ed., 2004, sec. 3.2.
     """
     z = np.array(starts, dtype=float)
@@ -71,28 +77,39 @@ def damped_newton(
     left, slope = residual_function(z)
     if unknowns == 0:
         return _newton_result(z, left, tolerance)
-    cost = np.sum(left * left, axis=1)
+    cost = np.add.reduce(left * left, axis=1)
     damping, growth = np.full(count, first_damping), np.full(count, 2.0)
-    busy = np.arange(count)
+    ended_at, ended_with, busy = z.copy(), left.copy(), np.arange(count)
     for _ in range(MAX_NEWTON_STEPS):
-        if busy.size == 0:
-            break
-        step = _damped_step(left[busy], slope[busy], damping[busy])
-        tried = z[busy] + step
+        step = _damped_step(left, slope, damping)
+        tried = z + step
         new_left, new_slope = residual_function(tried)
-        new_cost = np.sum(new_left * new_left, axis=1)
-        better = new_cost < cost[busy]
-        taken = busy[better]
-        z[taken], left[taken], slope[taken] = tried[better], new_left[better], new_slope[better]
-        small = np.max(np.abs(step), axis=1) < 1e-13
-        # far from closed and hardly coming closer: a start that ends where nothing closes
-        small |= better & (cost[busy] - new_cost < STALLED_COST_RATIO * cost[busy]) & (new_cost > 1e-8)
-        settled = small | (better & (new_cost <= ROUNDED_COST * left.shape[1])) | (damping[busy] > 1e12)
-        cost[taken] = new_cost[better]
-        damping[busy] = np.where(better, np.maximum(damping[busy] * 0.1, 1e-17), damping[busy] * growth[busy])
-        growth[busy] = np.where(better, 2.0, growth[busy] * 2.0)
-        busy = busy[~settled]
-    return _newton_result(z, left, tolerance)
+        new_cost = np.add.reduce(new_left * new_left, axis=1)
+        gain, better = cost - new_cost, new_cost < cost
+        settled = (np.maximum.reduce(np.abs(step), axis=1) < SETTLED_STEP) | (damping > MAX_DAMPING)
+        # closed, or far from closed and hardly coming closer: a start that ends where nothing closes
+        stalled = (gain < STALLED_COST_RATIO * cost) & (new_cost > STALLED_COST)
+        settled |= better & (stalled | (new_cost <= ROUNDED_COST * left.shape[1]))
+        foreseen = left + np.matmul(slope, step[:, :, None])[:, :, 0]
+        foreseen_gain = np.maximum(cost - np.add.reduce(foreseen * foreseen, axis=1), 1e-300)
+        ratio = np.where(better, np.minimum(gain / foreseen_gain, 1.0), 0.0)
+        lower = np.maximum(damping * np.maximum(1.0 - (2.0 * ratio - 1.0) ** 3, MIN_DAMPING_RATIO), MIN_DAMPING)
+        damping, growth = np.where(better, lower, damping * growth), np.where(better, 2.0, 2.0 * growth)
+        if better.all():
+            z, left, slope, cost = tried, new_left, new_slope, new_cost
+        elif better.any():
+            z, left = np.where(better[:, None], tried, z), np.where(better[:, None], new_left, left)
+            slope, cost = np.where(better[:, None, None], new_slope, slope), np.where(better, new_cost, cost)
+        if settled.any():
+            ended_at[busy[settled]], ended_with[busy[settled]] = z[settled], left[settled]
+            on = ~settled
+            busy, z, left, slope, cost, damping, growth = (
+                each[on] for each in (busy, z, left, slope, cost, damping, growth)
+            )
+            if not busy.size:
+                break
+    ended_at[busy], ended_with[busy] = z, left
+    return _newton_result(ended_at, ended_with, tolerance)
 
 
 def _damped_step(residuals: Array, jacobian: Array, damping: Array) -> Array:

@@ -37,7 +37,7 @@ def nearest_direction(forms: Array, c: Array, tolerance: float = EXACT_FORM_TOLE
 
     def of_length_one(c: Array) -> tuple[Array, Array]:
         rows = forms @ c
-        return append_number(rows @ c, 0.5 * (c @ c - 1.0)), stack_row(2.0 * rows, c)
+        return append_number(rows @ c, 0.5 * float(c @ c - 1.0)), stack_row(2.0 * rows, c)
 
     start = c / length_of(c)
     c, _ = settle(of_length_one, shortest_step(1e-10), start, MAX_REFINEMENTS, (len(c), CONVERGED_STEP))
