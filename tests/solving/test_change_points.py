@@ -9,8 +9,11 @@ from planar.foundation.errors import NoAnswer, Outcome
 from tests.builders import bar_document, block_slider_crank, four_bar
 from tests.checks import passes_residual_check, same_angles
 from tests.closed_forms import PARALLELOGRAM, TURN, antiparallelogram, coupler, rates, rocker
+from tests.draws import part
 
-GRIDS = [(0.0, 4), (0.0, 60), (0.3, 1), (0.3, 7), (0.3, 61), (np.pi, 6), (-1.0, 45), (np.pi - 1e-6, 12), (1e-9, 8)]
+GRIDS = part(
+    [(0.0, 4), (0.0, 60), (0.3, 1), (0.3, 7), (0.3, 61), (np.pi, 6), (-1.0, 45), (np.pi - 1e-6, 12), (1e-9, 8)], 1
+)
 """Starts and steps of a turn: some hit the flat positions at 0 and pi, some step over them, some come very near."""
 
 
@@ -83,7 +86,7 @@ def test_no_other_motion_leads_from_the_flat_positions_of_three_cranks():
     assert not any("branches of the motion cross" in each for each in motion.remarks)
 
 
-@pytest.mark.parametrize(("start", "steps"), [(0.3, 4), (0.3, 13), (0.0, 4), (0.0, 12), (-1.0, 45)])
+@pytest.mark.parametrize(("start", "steps"), part([(0.3, 4), (0.3, 13), (0.0, 4), (0.0, 12), (-1.0, 45)], 1))
 def test_the_other_branch_at_a_flat_position_is_taken_where_it_is_asked_for(start, steps):
     """Parallel up to the change point where 2 is asked for, crossed beyond, and the other way round at the next."""
     for branches, parts in (
@@ -114,7 +117,7 @@ def test_on_a_change_point_where_it_goes_over_a_row_has_the_rates_of_the_branch_
     np.testing.assert_allclose(motion.link("DC").angular_velocity, [2, 2, 2, -1.2, -6], atol=1e-10)
 
 
-@pytest.mark.parametrize("steps", [4, 12, 37])
+@pytest.mark.parametrize("steps", part([4, 12, 37], 1, 1))
 def test_a_rhombus_stays_one_and_its_folded_branch_can_be_taken(steps):
     """At pi its crank lies on its frame: C may fall on A, and then BC lies on AB and DC stands still for good."""
     motion = planar.cycle(four_bar(1, 1, 1, 1, 0.5), steps)
@@ -147,7 +150,7 @@ def test_a_kite_goes_through_its_flat_position_by_its_own_motion(steps):
     same_rates(motion, "BC", beta1, beta2, clear)
 
 
-@pytest.mark.parametrize(("start", "steps"), [(1.0, 12), (0.0, 4), (0.0, 12), (1.0, 7), (1.5, 360)])
+@pytest.mark.parametrize(("start", "steps"), part([(1.0, 12), (0.0, 4), (0.0, 12), (1.0, 7), (1.5, 360)], 1))
 def test_a_slider_crank_of_equal_lengths_passes_the_cranks_pin_or_stays_on_it(start, steps):
     mechanism = block_slider_crank(0.05, 0.05, 0.0, 1.0)
     motion = planar.cycle(mechanism, steps, start, start + TURN)
@@ -241,7 +244,9 @@ def test_a_range_up_to_a_dead_point_that_was_told_is_solved():
 
 # starts on a change point
 
-LINES = {"forth": (0.0, 1.0), "back": (0.0, -1.0), "both ways": (-1.0, 1.0), "a turn": (0.0, TURN)}
+LINES = dict(
+    part({"forth": (0.0, 1.0), "back": (0.0, -1.0), "both ways": (-1.0, 1.0), "a turn": (0.0, TURN)}.items(), 1, 2)
+)
 
 
 @pytest.mark.parametrize("away", LINES.values(), ids=LINES)

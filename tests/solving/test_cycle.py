@@ -278,7 +278,7 @@ def test_a_start_beyond_the_limit_is_refused_with_the_limit():
 # where runs end, and that they never jump
 
 
-@pytest.mark.parametrize("steps", [1, 2, 7, 37, 360])
+@pytest.mark.parametrize("steps", part([1, 2, 7, 37, 360], 1))
 @pytest.mark.parametrize("stop", [1.4, 2.5, 5.0])
 def test_a_run_past_a_limit_stops_there_and_keeps_its_rows(steps, stop):
     limit = between(0.9, 1.5, 1.55)
@@ -299,8 +299,8 @@ def test_a_run_past_a_limit_stops_there_and_keeps_its_rows(steps, stop):
     assert passes_residual_check(mechanism, motion)
 
 
-@pytest.mark.parametrize("steps", [1, 2, 3, 10, 45, 360, 361])
-@pytest.mark.parametrize("start", [0.0, 0.3, 1.0, 2.9, np.pi])
+@pytest.mark.parametrize("steps", part([1, 2, 3, 10, 45, 360, 361], 1, 2))
+@pytest.mark.parametrize("start", part([0.0, 0.3, 1.0, 2.9, np.pi], 1))
 def test_a_parallelogram_stays_one_through_its_flat_positions(start, steps):
     """Its bars go on parallel, never crossed, whichever grid hits the flat positions or steps over them."""
     mechanism = four_bar(*PARALLELOGRAM, 0.3, 1)
@@ -318,7 +318,8 @@ def test_a_parallelogram_stays_one_through_its_flat_positions(start, steps):
 
 
 @pytest.mark.parametrize(
-    ("start", "steps"), [(20, 36), (20, 90), (20.25, 360), (20.7, 90), (21.5, 90), (33, 90), (57.75, 90), (70.1, 7)]
+    ("start", "steps"),
+    part([(20, 36), (20, 90), (20.25, 360), (20.7, 90), (21.5, 90), (33, 90), (57.75, 90), (70.1, 7)], 1, 1),
 )
 def test_a_slider_crank_of_equal_lengths_goes_on_where_it_could_change_over(start, steps):
     """Its slide goes on through the crank's centre; at 90 deg the rod could as well turn with the crank there."""

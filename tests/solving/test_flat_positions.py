@@ -7,6 +7,7 @@ import planar
 from planar.document import files
 from planar.foundation.errors import NoAnswer, Outcome
 from tests.builders import four_bar_document
+from tests.draws import part
 
 
 def cranks_on_one_rod(turn, places, omega=3.0, alpha=2.0, frame=0.0, shift=0j, unit="m", radius=1.0, heights=None):
@@ -55,9 +56,9 @@ def translates(state, turn, omega, alpha):
 
 @pytest.mark.parametrize("turn", [0.0, np.pi])
 @pytest.mark.parametrize(
-    "places", [(0, 2, 0.8), (0, 1, 2), (0, 2, -1), (0, 1, 5), (0, 2, 0.8, 1.3), (0, 0.3, 0.6, 0.9, 1.2)]
+    "places", part([(0, 2, 0.8), (0, 1, 2), (0, 2, -1), (0, 1, 5), (0, 2, 0.8, 1.3), (0, 0.3, 0.6, 0.9, 1.2)], 1)
 )
-@pytest.mark.parametrize(("omega", "alpha"), [(3.0, 2.0), (-40.0, 1000.0), (1.0, 0.0), (0.2, -5.0)])
+@pytest.mark.parametrize(("omega", "alpha"), part([(3.0, 2.0), (-40.0, 1000.0), (1.0, 0.0), (0.2, -5.0)], 1, 1))
 def test_cranks_in_line_are_solved_to_round_off_where_they_lie_flat(turn, places, omega, alpha):
     state = planar.solve(cranks_on_one_rod(turn, places, omega, alpha))
     assert state.mobility == 1
@@ -74,7 +75,7 @@ def test_cranks_in_line_are_solved_to_round_off_where_they_lie_flat(turn, places
 @pytest.mark.parametrize("turn", [0.0, np.pi])
 @pytest.mark.parametrize(
     ("unit", "radius", "shift", "frame"),
-    [("mm", 50.0, 0j, 0.0), ("km", 0.002, 0j, 0.0), ("m", 1.0, 3 - 4j, 0.7), ("mm", 8.0, 70 + 10j, -2.5)],
+    part([("mm", 50.0, 0j, 0.0), ("km", 0.002, 0j, 0.0), ("m", 1.0, 3 - 4j, 0.7), ("mm", 8.0, 70 + 10j, -2.5)], 1, 3),
 )
 def test_flat_cranks_in_any_unit_place_and_direction(turn, unit, radius, shift, frame):
     state = planar.solve(cranks_on_one_rod(turn, (0, 2, 0.8), unit=unit, radius=radius, shift=shift, frame=frame))
@@ -82,7 +83,7 @@ def test_flat_cranks_in_any_unit_place_and_direction(turn, unit, radius, shift, 
 
 
 @pytest.mark.parametrize("turn", [0.0, np.pi])
-@pytest.mark.parametrize("beside", [1e-8, 1e-6, 1e-4, 1e-2])
+@pytest.mark.parametrize("beside", part([1e-8, 1e-6, 1e-4, 1e-2], 1, 2))
 def test_beside_the_flat_position_no_rate_is_wrong(turn, beside):
     """So near to it that rounding hides which branch it is, it may be refused."""
     try:

@@ -12,6 +12,7 @@ from planar.solving.continuation.predictor_corrector import ArcBudget
 from tests import ranges
 from tests.builders import block_slider_crank, four_bar
 from tests.closed_forms import PARALLELOGRAM, ROCKER, TRIPLE, TURN, between, rocker
+from tests.draws import draws, part
 
 EPS = float(np.finfo(float).eps)
 
@@ -38,7 +39,7 @@ def modulo(places, start):
 @pytest.mark.parametrize("kind", list(ranges.KINDS))
 def test_the_range_of_a_random_linkage_is_that_of_its_closed_form(kind):
     """More of them: `python -m tests.ranges 1000`."""
-    some, left_out = ranges.cases(kind, 30)
+    some, left_out = ranges.cases(kind, draws(30))
     assert left_out < 5
     for case in some:
         turns = case.ends[1] - case.ends[0] == TURN
@@ -47,7 +48,7 @@ def test_the_range_of_a_random_linkage_is_that_of_its_closed_form(kind):
 
 @pytest.mark.parametrize("kind", list(ranges.KINDS))
 def test_the_limits_of_a_random_linkage_are_the_ends_of_its_range_and_typed(kind):
-    for case in ranges.cases(kind, 6)[0]:
+    for case in ranges.cases(kind, draws(6))[0]:
         motion = planar.cycle(case.mechanism, 7)
         dead = places(motion, DEAD)
         if case.ends[1] - case.ends[0] == TURN:
@@ -74,7 +75,7 @@ def test_a_full_turn_is_kept_where_the_range_misses_a_dead_point_by_little_and_l
             np.testing.assert_allclose(places(motion, DEAD), [-limit, limit], atol=1e-12)
 
 
-@pytest.mark.parametrize("short", [1e-9, 1e-10, 3e-11, 1e-11, 1e-12])
+@pytest.mark.parametrize("short", part([1e-9, 1e-10, 3e-11, 1e-11, 1e-12], 1))
 def test_both_dead_points_of_a_slider_crank_that_all_but_turns_are_told(short):
     """l = r - short: the rod reaches its line up to sin(theta) = l / r."""
     for r, theta in ((1.0, 1.0), (1.0, -0.3), (0.7, 0.4)):
@@ -89,7 +90,7 @@ def test_a_motion_whose_reason_names_dead_points_has_them_among_its_limits():
     """Four-bars beside change-point linkages, where a dead point lies within the rounding of a regular place."""
     rng = np.random.default_rng(8)
     looked_at = 0
-    while looked_at < 4:
+    while looked_at < draws(4):
         drawn = ranges.beside(rng)
         if drawn is None:
             continue
@@ -190,7 +191,7 @@ def lever(rail, off=0.0, through=(1.0, 0.0)):
     )
 
 
-@pytest.mark.parametrize(("rail", "off"), [(90, 0.0), (63, 0.3), (124, -0.4)])
+@pytest.mark.parametrize(("rail", "off"), part([(90, 0.0), (63, 0.3), (124, -0.4)], 1, 1))
 def test_where_lines_become_parallel_both_ends_are_told_where_that_is(rail, off):
     mechanism = lever(rail, off)
     motion = planar.cycle(mechanism, 12)
@@ -202,7 +203,7 @@ def test_where_lines_become_parallel_both_ends_are_told_where_that_is(rail, off)
     assert places(motion, DEAD) == []
 
 
-@pytest.mark.parametrize("through", [(1.0, 0.0), (1e-3, 0.0), (30.0, 0.0)])
+@pytest.mark.parametrize("through", part([(1.0, 0.0), (1e-3, 0.0), (30.0, 0.0)], 1))
 def test_short_of_where_lines_become_parallel_a_position_and_a_run_agree(through):
     mechanism = lever(90, 0.0, through)
     for degrees in (-89.9, 89.99):
@@ -249,7 +250,9 @@ def slides_in_a_ring(face, lift, reach, through):
 
 
 @pytest.mark.parametrize("reach", [0.0, 0.1])
-@pytest.mark.parametrize(("face", "lift", "through"), [(30, 90, (0.0, 0.0)), (30, 60, (1.0, 0.0)), (5, 80, (0.3, 0.2))])
+@pytest.mark.parametrize(
+    ("face", "lift", "through"), part([(30, 90, (0.0, 0.0)), (30, 60, (1.0, 0.0)), (5, 80, (0.3, 0.2))], 1, 2)
+)
 def test_slides_without_an_end_have_no_limit(face, lift, through, reach):
     mechanism = slides_in_a_ring(face, lift, reach, through)
     up = np.exp(1j * np.radians(lift))
@@ -449,7 +452,7 @@ def test_the_swing_of_a_rocker(closed):
 
 @pytest.mark.parametrize("start", [0.0, 1.0, np.pi])
 @pytest.mark.parametrize("steps", [4, 90])
-@pytest.mark.parametrize("offset", [0.0, 0.1, -0.3])
+@pytest.mark.parametrize("offset", part([0.0, 0.1, -0.3], 1, 2))
 def test_top_and_bottom_dead_centre_of_a_slider_crank(start, steps, offset):
     """Crank and rod in line: the block is l + r, and l - r, from the crank's pin."""
     r, rod = 0.48, 1.6
@@ -512,7 +515,7 @@ def test_there_and_back_tells_every_limit_once():
 # change points
 
 
-@pytest.mark.parametrize(("steps", "start"), [(12, 0.3), (7, 0.3), (4, 0.0), (360, 2.0)])
+@pytest.mark.parametrize(("steps", "start"), part([(12, 0.3), (7, 0.3), (4, 0.0), (360, 2.0)], 1, 2))
 def test_change_points_of_a_parallelogram(steps, start):
     motion = planar.cycle(four_bar(*PARALLELOGRAM, 0.3), steps, start, start + TURN)
     found = motion.limits
@@ -576,7 +579,7 @@ def exact(part: int, by: float):
 
 
 @pytest.mark.parametrize(
-    ("part", "by"), [(part, by) for part in range(4) for by in (1e-9, -1e-9, 1e-6 * (-1) ** (part // 2))]
+    ("part", "by"), part([(part, by) for part in range(4) for by in (1e-9, -1e-9, 1e-6 * (-1) ** (part // 2))], 1)
 )
 def test_a_parallelogram_a_little_off_has_true_limits(part, by):
     """It turns round, or turns back on one side or on both, as its lengths say; and how near it comes is said.

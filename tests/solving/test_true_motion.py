@@ -13,7 +13,7 @@ from planar.solving.position import PositionSolver
 from tests.builders import bar_document
 from tests.checks import passes_residual_check
 from tests.closed_forms import TURN, rocker
-from tests.draws import draws
+from tests.draws import draws, part
 from tests.linkages import conditioning, random_linkage, seeds, shares
 
 few = settings(
@@ -71,12 +71,12 @@ def true_limits(reach, theta=0.8):
 
 
 @pytest.mark.parametrize("side", [1, -1])
-@pytest.mark.parametrize("part", [0.4, 0.8, 0.95, 0.999])
-def test_a_six_bar_turns_back_where_its_second_loop_can_reach_no_further(part, side):
+@pytest.mark.parametrize("share", part([0.4, 0.8, 0.95, 0.999], 1, 2))
+def test_a_six_bar_turns_back_where_its_second_loop_can_reach_no_further(share, side):
     """Its crank could turn round; the dyad on the rocker, which reaches a part of the way, cannot follow."""
     grid = np.linspace(0.0, TURN, 2001)
     least, most = apart(grid).min(), apart(grid).max()
-    reach = max(least + part * (most - least), apart(0.8) * 1.001)
+    reach = max(least + share * (most - least), apart(0.8) * 1.001)
     mechanism = watt(reach, side)
     motion = planar.cycle(mechanism, 30)
     assert motion.outcome is Outcome.SOLVED
