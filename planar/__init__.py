@@ -118,7 +118,8 @@ if TYPE_CHECKING:
     from planar.solving.cycle import cycle
     from planar.solving.position import solve
     from planar.structures.chain import Chain, ChainMechanism
-    from planar.structures.chains import Chains, chains
+    from planar.structures.enumeration.chains import chains
+    from planar.structures.enumeration.pin_chains import Chains
     from planar.structures.linkage_store import LinkageSet, generate
     from planar.structures.recognition import MechanismStructure, chain_of
     from planar.structures.symmetry import ChainSymmetry

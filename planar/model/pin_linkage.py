@@ -220,3 +220,9 @@ def turning_pair_type() -> type[Pair]:
     """The pair that keeps a point of one link on a point of another."""
     two = (MeasureKind.LENGTH, MeasureKind.LENGTH)
     return next(each for each in pair_types().values() if each.residual_kinds == two and not each.coordinate_kinds)
+
+
+@lru_cache
+def sliding_pair_type() -> type[Pair]:
+    """The pair that keeps a point of one link on a line of another, and the angle between the two."""
+    return next(each for each in pair_types().values() if each.is_lower_pair and each.input_kind is MeasureKind.LENGTH)

@@ -51,6 +51,7 @@ def write_atlas(
     whole = {
         "links": drawn[0].chain.links,
         "freedom": drawn[0].chain.freedom,
+        "slides": len(drawn[0].chain.slides),
         "count": len(drawn) if count is None else count,
         "drawn": len(drawn),
         "sheets": [*names, *inversion_names],

@@ -1,4 +1,4 @@
-"""A kinematic chain: links joined by pins, none of them fixed yet."""
+"""A kinematic chain: links joined by pins and slides, none of them fixed yet."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from planar.model.wording import count_phrase
 from planar.structures.assur_groups import AssurGroup, assur_groups
 from planar.structures.chain_names import chain_name, inversion_names
 from planar.structures.contraction import automorphisms
+from planar.structures.general_position import GeneralPosition
 from planar.structures.rigid_parts import Joint
 from planar.structures.symmetry import (
     Automorphism,
@@ -45,22 +46,31 @@ class ChainMechanism(NamedTuple):
 
 @dataclass(frozen=True)
 class Chain:
-    """A kinematic chain of links and pins, in the numbering of links that all chains of its kind share.
+    """A kinematic chain of links and joints, in the numbering of links that all chains of its kind share.
 
     `links` is how many there are, numbered from 0: those with most joints first, binary ones last. `edges` are the
-    joints, each by its two links, in order; a joint's number is its place among them. `number` is that among all
-    chains of so many links and this freedom, see `planar.chains`; None where these are too many to be counted for it.
+    joints, each by its two links, in order; a joint's number is its place among them. `slides` are the numbers of those
+    that are sliding pairs, the others are pins. `number` is that among all chains of so many links and slides and this
+    freedom, see `planar.chains`, and `pin_number` that which it has with pins in place of its slides; None where these
+    are too many to be counted for it.
     """
 
     links: int
     freedom: int
     edges: tuple[Joint, ...]
     number: int | None = field(default=None, compare=False)
+    slides: tuple[int, ...] = ()
+    pin_number: int | None = field(default=None, compare=False)
+
+    def __post_init__(self) -> None:
+        if not self.slides:
+            object.__setattr__(self, "pin_number", self.number)
 
     def __repr__(self) -> str:
         number = "" if self.number is None else f" {self.number}"
+        slides = f", {count_phrase(len(self.slides), 'slide')}" if self.slides else ""
         name = f", {self.name}" if self.name else ""
-        return f"<Chain{number} of {self.links} links, freedom {self.freedom}{name}>"
+        return f"<Chain{number} of {self.links} links{slides}, freedom {self.freedom}{name}>"
 
     @property
     def joints(self) -> int:
@@ -98,8 +108,17 @@ class Chain:
 
     @property
     def name(self) -> str:
-        """What the field calls the chain, or nothing."""
-        return chain_name(self.edges)
+        """What the field calls the chain, or nothing; with slides else what it calls the chain of pins."""
+        return chain_name(self.edges, self.slides) or chain_name(self.edges)
+
+    @cached_property
+    def pin_chain(self) -> Chain:
+        """The chain with pins in place of its slides; itself where it has none."""
+        return Chain(self.links, self.freedom, self.edges, self.pin_number) if self.slides else self
+
+    def with_slides(self, slides: tuple[int, ...], number: int | None = None) -> Chain:
+        """This chain of pins with slides in place of some: their numbers, of those that are alike the first."""
+        return Chain(self.links, self.freedom, self.edges, number, slides, self.number) if slides else self
 
     @cached_property
     def symmetry(self) -> ChainSymmetry:
@@ -108,7 +127,12 @@ class Chain:
 
     @cached_property
     def automorphisms(self) -> tuple[Automorphism, ...]:
-        """Every exchange of its links that keeps its joints: which link stands in the place of each."""
+        """Every exchange of its links that keeps pins and slides: which link stands in the place of each."""
+        if self.slides:
+            every = self.pin_chain.automorphisms
+            moved = joint_exchanges(every, self.edges)
+            kept = ({own[k] for k in self.slides} == {*self.slides} for own in moved)
+            return tuple(each for each, is_kept in zip(every, kept, strict=True) if is_kept)
         found = tuple(islice(automorphisms(self.links, self.edges), MAX_AUTOMORPHISMS + 1))
         if len(found) > MAX_AUTOMORPHISMS:
             raise BadInput("links", f"the chain can be exchanged with itself in more than {MAX_AUTOMORPHISMS} ways")
@@ -137,16 +161,29 @@ class Chain:
         for moving in (False, True)[: 1 + moving_drives]:
             for frame in self.inversions:
                 for drives in self._drive_sets(frame, moving):
-                    groups = assur_groups(self.links, self.edges, frame, drives)
+                    groups = self.assur_groups(frame, drives)
                     if groups is not None:
                         found.append(ChainMechanism(frame, drives, self.inversion_name(frame), groups))
         return tuple(found)
 
+    def assur_groups(self, frame: int, drives: Sequence[int]) -> tuple[AssurGroup, ...] | None:
+        """The Assur groups of the mechanism with this link fixed and these joints driven, in an order in which they can
+        be placed; None where the drives are not as many as the freedom, or one only moves what others move already."""
+        if self.slides and not self._position.is_driven(self.slides, drives):
+            return None
+        return assur_groups(self.links, self.edges, frame, drives)
+
+    @cached_property
+    def _position(self) -> GeneralPosition:
+        return GeneralPosition(self.links, self.edges)
+
     def inversion_name(self, frame: int) -> str:
-        """What the field calls the mechanisms with this link fixed, or nothing."""
+        """What the field calls the mechanisms with this link fixed, or nothing; with slides that of the chain of pins,
+        where they have none themselves."""
         orbit = next(each for each in self.symmetry.link_orbits if frame in each)
-        named = inversion_names(self.edges)
-        return next((named[link] for link in orbit if link in named), "")
+        named = inversion_names(self.edges, self.slides)
+        own = next((named[link] for link in orbit if link in named), "")
+        return own or (self.pin_chain.inversion_name(frame) if self.slides else "")
 
     def _drive_sets(self, frame: int, moving: bool) -> Iterator[tuple[int, ...]]:
         """Sets of joints, as many as the freedom, all on the fixed link or not all; of alike ones the first."""
@@ -162,10 +199,10 @@ class Chain:
         """A mechanism of this chain with random dimensions that go together, the same for the same seed.
 
         `frame` is the number of the fixed link, `drive` that of the driven joint, or of as many as the chain has
-        freedoms; left out, the first that fit. Lengths are in mm; joint k of `edges` is the
-        letter k of the alphabet. A search looks for dimensions with which the first input turns fully, see
-        `planar.structures.linkage_search`; the mechanism's notes say whether it does, or between which positions it
-        runs. Raises BadInput for what does not drive the chain.
+        freedoms; left out, the first that fit, pins before slides. Lengths are in mm; joint k of `edges` is the
+        letter k of the alphabet. A search looks for dimensions with which the first input turns fully, or slides far,
+        see `planar.structures.linkage_search`; the mechanism's notes say whether it turns fully, or between which
+        positions it runs. Raises BadInput for what does not drive the chain.
 
         >>> import planar
         >>> planar.chains(6)[0].mechanism(frame=2, drive=1, seed=1)
@@ -183,29 +220,40 @@ class Chain:
             count = count_phrase(self.freedom, "joint")
             raise BadInput("drive", f"{count} wanted that drive all links, as {usable[1]} with link {usable[0]} fixed")
         frame, drives = found
-        name = self.inversion_name(frame) or self.name
+        return find_linkage(
+            Linkage(self.edges, frame, drives, self.slides),
+            check_whole_number("seed", seed, 0),
+            self._mechanism_name(frame),
+        )
+
+    def _mechanism_name(self, frame: int) -> str:
+        """What the field calls it, else its number in the chains; with slides that the name does not tell."""
         number = "" if self.number is None else f" {self.number}"
-        name = name or f"Chain{number} of {self.links} links, link {frame} fixed"
-        return find_linkage(Linkage(self.edges, frame, drives), check_whole_number("seed", seed, 0), name)
+        name = self.inversion_name(frame) or self.name
+        is_told = not self.slides or inversion_names(self.edges, self.slides)
+        sliding = "" if is_told else f" with {count_phrase(len(self.slides), 'slide')}"
+        return f"{name}{sliding}" if name else f"Chain{number} of {self.links} links{sliding}, link {frame} fixed"
 
     def _drivable(self, frames: Iterable[int], wanted: tuple[int, ...] | None) -> Iterator[tuple[int, tuple[int, ...]]]:
         """Fixed links with joints that drive all links: those that are wanted, else any on the fixed link."""
         for frame in frames:
             usable = [number for number, joint in enumerate(self.edges) if frame in joint]
+            usable.sort(key=lambda number: number in self.slides)  # cranks before pistons
             for drives in combinations(usable, self.freedom) if wanted is None else (wanted,):
-                if assur_groups(self.links, self.edges, frame, drives) is not None:
+                if self.assur_groups(frame, drives) is not None:
                     yield frame, drives
 
     def describe(self) -> str:
-        """A sentence that tells links, joints, loops and freedom."""
+        """A sentence that tells links, joints, slides, loops and freedom."""
         kinds = ("binary", "ternary", "quaternary", "quinary")
         words = [
             f"{count} {kinds[k] if k < len(kinds) else f'with {k + 2} joints'}"
             for k, count in enumerate(self.assortment)
             if count
         ]
+        slides = f" ({count_phrase(len(self.slides), 'slide')})" if self.slides else ""
         return (
-            f"{count_phrase(self.links, 'link')} ({', '.join(words)}), {count_phrase(self.joints, 'joint')}, "
+            f"{count_phrase(self.links, 'link')} ({', '.join(words)}), {count_phrase(self.joints, 'joint')}{slides}, "
             f"{count_phrase(self.loops, 'loop')}, freedom {self.freedom}"
         )
 

@@ -1,11 +1,12 @@
-"""Names that the field has for chains, and for six-bars by their fixed link."""
+"""Names that the field has for chains, and for six-bars and four links with slides by their fixed link."""
 
 from __future__ import annotations
 
 from functools import cache
 
-from planar.structures.contraction import canonical_chain, ring_joints
+from planar.structures.contraction import automorphisms, canonical_chain, ring_joints
 from planar.structures.rigid_parts import Joint
+from planar.structures.symmetry import first_alike, joint_exchanges
 
 WATT = "ab bc cd de ex xa ad"
 """Two ternary links, a and d, joined to one another: two loops of four."""
@@ -33,39 +34,62 @@ EIGHT_BARS = (
 three links. G. Pennock and A. Hasan, J. of Mechanical Design 124, 2002; D. Foster and G. Pennock, ASME DETC 2004;
 G. Pennock and D. Raje, Mechanism and Machine Theory 39, 2004. Which of the two fliers is which is inferred from their
 structure: see the models' notes."""
+_RING = "ab bc cd ad"
+FOUR_LINKS_WITH_SLIDES = (
+    ("slider-crank", _RING, "ad", "a"),
+    ("inverted slider-crank", _RING, "ad", "b"),
+    ("elliptical trammel", _RING, "cd ad", "d"),
+    ("Scotch yoke", _RING, "cd ad", "a"),
+    ("Oldham coupling", _RING, "cd ad", "b"),
+    ("Rapson's slide", _RING, "bc ad", "a"),
+)
+"""Four links in a ring, the joints that slide, and the fixed link: of one slide a link on it, or one of the two others;
+of two at one link that link, one that slides on it, or the fourth; of two apart any. F. Reuleaux, The Kinematics of
+Machinery, 1876, on the slider-crank chains; R. Norton, Design of Machinery, on inversion."""
 _CHAINS = (("Watt chain", WATT), ("Stephenson chain", STEPHENSON))
+_RINGS_WITH_SLIDES = (("slider-crank chain", "ad"), ("double slider-crank chain", "cd ad"))
 _RINGS = {4: "four-bar chain", 5: "five-bar chain"}
 
 
-def chain_name(joints: tuple[Joint, ...]) -> str:
+Structure = tuple[tuple[Joint, ...], tuple[int, ...]]
+"""The joints of a chain, and the numbers of those that slide."""
+
+
+def chain_name(joints: tuple[Joint, ...], slides: tuple[int, ...] = ()) -> str:
     """The name of a chain in its own numbering, or nothing."""
-    return _names().get(joints, "")
+    return _names().get((joints, slides), "")
 
 
-def inversion_names(joints: tuple[Joint, ...]) -> dict[int, str]:
+def inversion_names(joints: tuple[Joint, ...], slides: tuple[int, ...] = ()) -> dict[int, str]:
     """The names of a chain's inversions, of one link of each orbit that has a name."""
-    return _inversions().get(joints, {})
+    return _inversions().get((joints, slides), {})
 
 
 @cache
-def _names() -> dict[tuple[Joint, ...], str]:
-    named = {ring_joints(links): name for links, name in _RINGS.items()}
+def _names() -> dict[Structure, str]:
+    named: dict[Structure, str] = {(ring_joints(links), ()): name for links, name in _RINGS.items()}
     for name, letters in (*_CHAINS, *((name, text) for name, text in EIGHT_BARS if max(map(len, text.split())) == 2)):
-        named[_canonical(letters)[0]] = name
-    return named
+        named[_structure(letters)[0]] = name
+    return named | {_structure(_RING, sliding)[0]: name for name, sliding in _RINGS_WITH_SLIDES}
 
 
 @cache
-def _inversions() -> dict[tuple[Joint, ...], dict[int, str]]:
-    found: dict[tuple[Joint, ...], dict[int, str]] = {}
-    for name, letters, frame in SIX_BARS:
-        joints, numbers = _canonical(letters)
-        found.setdefault(joints, {})[numbers[frame]] = name
+def _inversions() -> dict[Structure, dict[int, str]]:
+    found: dict[Structure, dict[int, str]] = {}
+    for name, letters, sliding, frame in (*((*each[:2], "", each[2]) for each in SIX_BARS), *FOUR_LINKS_WITH_SLIDES):
+        structure, numbers = _structure(letters, sliding)
+        found.setdefault(structure, {})[numbers[frame]] = name
     return found
 
 
-def _canonical(letters: str) -> tuple[tuple[Joint, ...], dict[str, int]]:
-    """A chain written as the letters of the links that meet in each joint; the number of each letter."""
+def _structure(letters: str, sliding: str = "") -> tuple[Structure, dict[str, int]]:
+    """A chain written as the letters of the links that meet in each joint, and in those that slide; the number of each
+    letter."""
     links = sorted({*letters} - {" "})
     found = canonical_chain(len(links), [(links.index(pin[0]), links.index(pin[1])) for pin in letters.split()])
-    return found.joints, dict(zip(links, found.numbers, strict=True))
+    number = dict(zip(links, found.numbers, strict=True))
+    place = {joint: index for index, joint in enumerate(found.joints)}
+    slides = [place[min(own), max(own)] for own in ([number[link] for link in pin] for pin in sliding.split())]
+    every = [*automorphisms(len(links), found.joints)]
+    best, slides_there = first_alike(slides, joint_exchanges(every, found.joints))
+    return (found.joints, slides_there), {link: every[best][index] for link, index in number.items()}

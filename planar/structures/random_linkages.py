@@ -42,7 +42,7 @@ class SolvedLinkages(NamedTuple):
 @cache
 def structures(links: int) -> tuple[Structure, ...]:
     """All chains of freedom 1, with all fixed links and driven joints that differ."""
-    from planar.structures.chains import chains
+    from planar.structures.enumeration.chains import chains
 
     return tuple(
         Structure(number, Linkage(chain.edges, each.frame, each.drives))

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import lru_cache
 from itertools import islice, product
 from math import comb
 from typing import NamedTuple
@@ -14,12 +15,12 @@ from planar.foundation.short_repr import short_repr
 from planar.model.link_graph import pin_pair_trees, unconnected_links
 from planar.model.mechanism import Mechanism, pair_entries, relative_motions
 from planar.model.pairs import MeasureKind, Pair
-from planar.structures.assur_groups import assur_groups
 from planar.structures.chain import Chain
-from planar.structures.chains import Chains
 from planar.structures.contraction import canonical_chain
+from planar.structures.enumeration.chains_with_slides import ChainsWithSlides
+from planar.structures.enumeration.pin_chains import Chains
 from planar.structures.rigid_parts import Joint, has_rigid_part
-from planar.structures.symmetry import joint_exchanges
+from planar.structures.symmetry import first_alike, joint_exchanges
 
 MAX_NUMBERED_LOOPS = 5
 """Of a chain of more loops the number is not looked for: with six there are hundreds of thousands and more."""
@@ -27,6 +28,9 @@ MAX_PIN_LINKS = 6
 """Of a pin of more links one choice of pairs alone is looked at."""
 MAX_PIN_CHOICES = 1000
 """So many choices of pairs at multiple pins are looked at."""
+MAX_SLIDE_SETS, MAX_SLIDE_CHAINS = 1000, 300
+"""Of a chain with more sets of as many joints as slide, or with so many chains before it, the number with slides is not
+looked for."""
 MAX_DRIVE_SETS = 10000
 """Of a chain with more sets of joints that could be driven, mechanisms are not numbered."""
 
@@ -40,7 +44,8 @@ class MechanismStructure:
     do not drive it definitely. `links` and `joints` are the numbers of the mechanism's own links and pairs, `slides`
     the joints that are sliding pairs, `groups` the Assur groups by names of links. Where pins hold more than two links
     `multiple_pins` names them, and `others` are the chains that other choices of pairs there give; of chains of more
-    than five loops these are not looked for.
+    than five loops these are not looked for. `inversions` are links that, fixed in place of the frame, give other
+    mechanisms of the same chain, one for each of those, with the field's name for it, or nothing.
     """
 
     chain: Chain
@@ -53,6 +58,7 @@ class MechanismStructure:
     groups: tuple[tuple[tuple[str, ...], str], ...]
     multiple_pins: tuple[str, ...]
     others: tuple[Chain, ...]
+    inversions: dict[str, str]
 
     __repr__ = short_repr
 
@@ -71,7 +77,7 @@ class MechanismStructure:
 def chain_of(mechanism: Mechanism) -> MechanismStructure:
     """Which chain a mechanism is made of, and which inversion and input of it.
 
-    Its structure alone matters, no dimension. A sliding pair is a joint as a pin is. A pin of n links is n - 1 joints:
+    Its structure alone matters, no dimension. A pin of n links is n - 1 joints:
     of its first link (the frame, where that is among them) with each of the others, or of other pairs of them where
     an input is between two others, or the first choice has a rigid part.
 
@@ -156,23 +162,38 @@ def _joint_between(joints: Sequence[NamedJoint], ends: Joint) -> int | None:
     return next((number for number, joint in enumerate(joints) if {*joint.links} == {*ends}), None)
 
 
-def _known_chain(links: int, joints: Sequence[NamedJoint]) -> tuple[Chain, tuple[int, ...]]:
-    """A chain with its number, and the number of each link in it."""
-    found = canonical_chain(links, [joint.links for joint in joints])
-    chain = Chain(links, 3 * (links - 1) - 2 * len(joints), found.joints)
+def _known_chain(links: int, joints: Sequence[NamedJoint]) -> tuple[Chain, tuple[int, ...], tuple[int, ...]]:
+    """A chain with its number, the number of each link in it, and that of each joint."""
+    canonical = canonical_chain(links, [joint.links for joint in joints])
+    chain = Chain(links, 3 * (links - 1) - 2 * len(joints), canonical.joints)
+    place = {joint: number for number, joint in enumerate(chain.edges)}
+    numbers = canonical.numbers
+    own = [place[min(numbers[a], numbers[b]), max(numbers[a], numbers[b])] for _, (a, b), _ in joints]
+    exchanges = joint_exchanges(chain.automorphisms, chain.edges)
+    best, slides = first_alike((own[k] for k, joint in enumerate(joints) if joint.slides), exchanges)
+    numbers = tuple(chain.automorphisms[best][link] for link in numbers)
+    number = pin_number = None
     if chain.loops <= MAX_NUMBERED_LOOPS:
-        number = Chains(links, chain.freedom, True).number_of(chain)
-        chain = Chain(links, chain.freedom, found.joints, number)
-    return chain, found.numbers
+        pin_number = Chains(links, chain.freedom, True).number_of(chain)
+    if not slides:
+        number = pin_number
+    elif comb(len(joints), len(slides)) <= MAX_SLIDE_SETS and pin_number is not None and pin_number < MAX_SLIDE_CHAINS:
+        number = chains_with_slides(links, chain.freedom, len(slides)).number_of(replace(chain, slides=slides))
+    chain = Chain(links, chain.freedom, chain.edges, number, slides, pin_number)
+    return chain, numbers, tuple(exchanges[best][joint] for joint in own)
+
+
+@lru_cache(maxsize=16)
+def chains_with_slides(links: int, freedom: int, slides: int) -> ChainsWithSlides:
+    """Those of some number of links, freedom and slides, whose numbers are counted once."""
+    return ChainsWithSlides(links, freedom, True, slides)
 
 
 def _describe(
     mechanism: Mechanism, joints: Sequence[NamedJoint], drives: Sequence[int], others: Sequence[Chain]
 ) -> MechanismStructure:
     """What is found, in that one of the equal numberings of the chain that all mechanisms of this structure have."""
-    chain, numbers = _known_chain(len(mechanism.links), joints)
-    place = {joint: number for number, joint in enumerate(chain.edges)}
-    own = [place[min(numbers[a], numbers[b]), max(numbers[a], numbers[b])] for _, (a, b), _ in joints]
+    chain, numbers, own = _known_chain(len(mechanism.links), joints)
     frame = numbers[[link.name for link in mechanism.links].index(mechanism.frame)]
 
     def chosen(exchange: tuple[int, ...], moved: tuple[int, ...]) -> tuple[int, tuple[int, ...]]:
@@ -183,7 +204,8 @@ def _describe(
     fixed, driven = chosen(exchange, moved)
     links = {link.name: exchange[numbers[index]] for index, link in enumerate(mechanism.links)}
     named = {number: name for name, number in links.items()}
-    groups = assur_groups(chain.links, chain.edges, fixed, driven) or ()
+    groups = chain.assur_groups(fixed, driven) or ()
+    (alike,) = (orbit for orbit in chain.symmetry.link_orbits if fixed in orbit)
     return MechanismStructure(
         chain,
         fixed,
@@ -191,10 +213,11 @@ def _describe(
         _mechanism_number(chain, fixed, driven) if groups else None,
         links,
         {joint.name: moved[own[k]] for k, joint in enumerate(joints)},
-        tuple(sorted(moved[own[k]] for k, joint in enumerate(joints) if joint.slides)),
+        chain.slides,
         tuple((tuple(named[link] for link in each.links), each.assur_class) for each in groups),
         tuple(group[0].entry_name() for group in pair_entries(mechanism) if len(group) > 1),
         tuple(sorted((each for each in others if each != chain), key=lambda each: each.number or 0)),
+        {named[link]: chain.inversion_name(link) for link in chain.inversions if link not in alike},
     )
 
 

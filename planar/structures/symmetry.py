@@ -51,6 +51,13 @@ def joint_exchanges(exchanges: Iterable[Automorphism], joints: Sequence[Joint]) 
     return [tuple(place[min(e[a], e[b]), max(e[a], e[b])] for a, b in joints) for e in exchanges]
 
 
+def first_alike(joints: Iterable[int], exchanges: Iterable[Sequence[int]]) -> tuple[int, tuple[int, ...]]:
+    """Of the sets of joints that exchanges take a set to the first, and which exchange does so."""
+    every = [*joints]
+    slides, place = min((tuple(sorted(each[k] for k in every)), place) for place, each in enumerate(exchanges))
+    return place, slides
+
+
 def chain_symmetry(links: int, joints: Sequence[Joint], group: Sequence[Automorphism]) -> ChainSymmetry:
     """The symmetry of a chain whose automorphisms are given, all of them."""
     return ChainSymmetry(len(group), orbits(links, group), orbits(len(joints), joint_exchanges(group, joints)))

@@ -118,8 +118,8 @@ def test_two_drives_of_one_loop_fit_no_chain_of_two_loops():
 
 def test_inspect_tells_the_chain_in_words_and_as_json(tmp_path):
     said = run(tmp_path, "inspect", "toggle-press").done()
-    assert "chain 1 of those of 6 links and freedom 1 (Stephenson chain), 2 loops" in said
-    assert "other choices give chain 0" in said
+    assert "chain 3 of those of 6 links, 1 slide and freedom 1 (Stephenson chain), 2 loops" in said
+    assert "other choices give chain 1 and 4" in said
     told = json.loads(run(tmp_path, "inspect", "double-butterfly", "--json").done())["structure"]
     assert (told["chain"]["number"], told["frame"], told["drives"]) == (8, 0, [1])
     told = json.loads(run(tmp_path, "inspect", "gear-reducer", "--json").done())

@@ -1,4 +1,4 @@
-"""Kinematic chains as pictures: bars as lines, other links as plates, joints as circles, links with their numbers."""
+"""Kinematic chains as pictures: bars as lines, other links as plates, pins as circles, slides as blocks, numbers."""
 
 from __future__ import annotations
 
@@ -17,6 +17,8 @@ from planar.structures.plane.layout import ChainLayout, lay_out_chain
 LONGEST_LINE = 22.0
 """mm that a line is at most."""
 JOINT_RADIUS = 0.9
+BLOCK_SIZE = (3.2, 1.9)
+"""mm, of a slide, along and across."""
 NUMBER_SIZE, SMALL_NUMBER_SIZE, SMALL_PLATE = 6.0, 5.0, 1.9
 """Points, of the numbers of links, and of those in plates within which no larger circle (mm) has room."""
 HATCH_PITCH, HATCH_LENGTH = 1.3, 1.6
@@ -122,12 +124,30 @@ def _marks(
         yield Polyline(corners, Pen.LINK, f"link {link}", closed=is_plate, fill=fill)
     black = {*driven}
     for number, spot in enumerate(spots):
-        yield Circle(spot, JOINT_RADIUS, Pen.PIN, f"joint {number}", Fill.SOLID if number in black else Fill.PAPER)
+        fill = Fill.SOLID if number in black else Fill.PAPER
+        if number in drawn.chain.slides:
+            block = _block(number, drawn.chain.edges[number], layout.rotations, places)
+            yield Polyline(block, Pen.PIN, f"joint {number}", closed=True, fill=fill)
+        else:
+            yield Circle(spot, JOINT_RADIUS, Pen.PIN, f"joint {number}", fill)
     for link, joints in enumerate(layout.rotations):
         corners = places[list(joints)]
         middle, room = _widest_spot(corners) if len(joints) > 2 else (corners.mean(axis=0), SMALL_PLATE)
         number_size = NUMBER_SIZE if room >= SMALL_PLATE else SMALL_NUMBER_SIZE
         yield Label(str(link), paper_point(middle), f"link {link}", number_size, clearance=0.3)
+
+
+def _block(
+    joint: int, ends: tuple[int, int], rotations: Sequence[Sequence[int]], places: Array
+) -> tuple[PaperPoint, ...]:
+    """The corners of a slide, which lies along that of its links that has fewer joints."""
+    link = min(ends, key=lambda each: len(rotations[each]))
+    others = [each for each in rotations[link] if each != joint]
+    way = places[others].mean(axis=0) - places[joint]
+    way = way / max(float(np.hypot(*way)), 1e-9) * 0.5
+    along, across = BLOCK_SIZE[0] * way, BLOCK_SIZE[1] * np.array([-way[1], way[0]])
+    corners = (along + across, across - along, -along - across, along - across)
+    return tuple(paper_point(places[joint] + each) for each in corners)
 
 
 def _widest_spot(corners: Array) -> tuple[Array, float]:

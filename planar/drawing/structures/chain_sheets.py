@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from planar.drawing.output.grid_sheets import GRID_PICTURE_SIZE, draw_grid
 from planar.drawing.structures.chain_pictures import DrawnChain, chain_picture, draw_chain, inversion_picture
 from planar.foundation.errors import BadInput
+from planar.model.wording import count_phrase
 from planar.structures.chain import Chain
 
 if TYPE_CHECKING:
@@ -17,6 +18,7 @@ CHAIN_NOTE = (
     "Number: links with two joints, with three, and so on. Symmetry: in how many ways links can be exchanged. II, III, "
     "IV: mechanisms whose Assur groups are of this class at most; larger: that have one of more than four links."
 )
+SLIDE_NOTE = " Circles are pins, blocks slides."
 INVERSION_NOTE = (
     "Hatched: the fixed link. Black: the joints that are driven, each told by its two links, with the highest class "
     "of the Assur groups; larger: of more than four links. What differs only by an exchange of links is left out."
@@ -42,7 +44,7 @@ def draw_chains(found: Any, progress: Callable[[int, int], None] | None = None) 
 def chain_sheets(drawn: Sequence[DrawnChain]) -> Iterator[Figure]:
     """Sheets of twenty chains each, in order, with their numbers. Raises BadInput without matplotlib."""
     pictures = [chain_picture(each, GRID_PICTURE_SIZE) for each in drawn]
-    return draw_grid(pictures, _heading(drawn, "Kinematic chains"), CHAIN_NOTE)
+    return draw_grid(pictures, _heading(drawn, "Kinematic chains"), CHAIN_NOTE + _slide_note(drawn))
 
 
 def inversion_sheets(drawn: Sequence[DrawnChain]) -> Iterator[Figure]:
@@ -53,12 +55,17 @@ def inversion_sheets(drawn: Sequence[DrawnChain]) -> Iterator[Figure]:
         for frame in each.chain.inversions:
             own = [one for one in mechanisms if one.frame == frame]
             pictures.append(inversion_picture(each, frame, own, GRID_PICTURE_SIZE))
-    return draw_grid(pictures, _heading(drawn, "Inversions of kinematic chains"), INVERSION_NOTE)
+    return draw_grid(pictures, _heading(drawn, "Inversions of kinematic chains"), INVERSION_NOTE + _slide_note(drawn))
 
 
 def _heading(drawn: Sequence[DrawnChain], what: str) -> str:
-    kinds = {(each.chain.links, each.chain.freedom) for each in drawn}
+    kinds = {(each.chain.links, each.chain.freedom, len(each.chain.slides)) for each in drawn}
     if len(kinds) > 1:
         return what
-    links, freedom = next(iter(kinds))
-    return f"{what} of {links} links, freedom {freedom}"
+    links, freedom, slides = next(iter(kinds))
+    sliding = f" with {count_phrase(slides, 'slide')}" if slides else ""
+    return f"{what} of {links} links{sliding}, freedom {freedom}"
+
+
+def _slide_note(drawn: Sequence[DrawnChain]) -> str:
+    return SLIDE_NOTE if any(each.chain.slides for each in drawn) else ""

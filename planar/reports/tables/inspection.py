@@ -69,7 +69,8 @@ def _structure_facts(found: Inspection) -> list[tuple[str, str]]:
     chain = known.chain
     number = "" if chain.number is None else f" {chain.number}"
     named = f" ({chain.name})" if chain.name else ""
-    of = f"{count_phrase(chain.links, 'link')} and freedom {chain.freedom}"
+    sliding = f", {count_phrase(len(chain.slides), 'slide')}" if chain.slides else ""
+    of = f"{count_phrase(chain.links, 'link')}{sliding} and freedom {chain.freedom}"
     driven = join_all_names([joint_text(chain, joint) for joint in known.drives]) if known.drives else "none"
     which = "" if known.number is None else f": mechanism {known.number} of the chain"
     facts = [
@@ -82,6 +83,9 @@ def _structure_facts(found: Inspection) -> list[tuple[str, str]]:
     if known.groups:
         groups = [f"{', '.join(links)}{f' ({kind})' if kind else ''}" for links, kind in known.groups]
         facts.append(f"Assur groups: {'; '.join(groups)}")
+    named_inversions = [f"{link} ({name})" for link, name in known.inversions.items() if name]
+    if named_inversions:
+        facts.append(f"others of the same chain: by fixing {', '.join(named_inversions)}")
     if known.multiple_pins:
         others = [str(each.number) for each in known.others if each.number is not None]
         more = f"; other choices give chain {join_all_names(others)}" if others else ""

@@ -54,7 +54,7 @@ def start_mechanisms(task: SynthesisTask) -> Iterator[Mechanism]:
 
 
 def _chain_starts(task: SynthesisTask, start: ChainStart) -> Iterator[Mechanism]:
-    from planar.structures.chains import chains
+    from planar.structures.enumeration.chains import chains
 
     paths = [each.point for each in task.wanted if isinstance(each, WantedPath)]
     for links in start.links:

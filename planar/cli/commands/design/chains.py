@@ -10,9 +10,10 @@ import click
 
 from planar.cli.options import json_option, main, print_or_write, show_progress, show_status
 from planar.cli.streams import print_json
+from planar.foundation.errors import BadInput
 
 if TYPE_CHECKING:
-    from planar.structures.chains import Chains
+    from planar.structures.enumeration.pin_chains import Chains
 
 PICTURES = (".svg", ".pdf", ".png")
 MAX_CHAINS_LISTED = 250
@@ -23,6 +24,9 @@ MAX_CHAINS_LISTED = 250
 @click.argument("links", type=int)
 @click.option(
     "--freedom", type=int, default=1, show_default=True, metavar="F", help="How many joints have to be driven."
+)
+@click.option(
+    "--slides", type=int, default=0, show_default=True, metavar="N", help="So many joints are sliding pairs, not pins."
 )
 @click.option("--not-fractionated", is_flag=True, help="Leave out chains that a single link parts.")
 @click.option("--mechanisms", is_flag=True, help="Also what differs by the fixed link and by the driven joints on it.")
@@ -45,17 +49,18 @@ MAX_CHAINS_LISTED = 250
 def chains(
     links: int,
     freedom: int,
+    slides: int,
     not_fractionated: bool,
     mechanisms: bool,
     limit: int,
     output: Path | None,
     as_json: bool,
 ) -> None:
-    """All kinematic chains of so many LINKS: every structure that a linkage with pins can have."""
+    """All kinematic chains of so many LINKS: every structure that a linkage with pins and slides can have."""
     from planar.reports.tables.design.structures import record, table
-    from planar.structures.chains import chains as all_chains
+    from planar.structures.enumeration.chains import chains as all_chains
 
-    found = all_chains(links, freedom, fractionated=not not_fractionated)
+    found = all_chains(links, freedom, slides=slides, fractionated=not not_fractionated)
     if output is not None:
         _draw(found, limit, mechanisms, output)
     if as_json:
@@ -72,6 +77,8 @@ def _draw(found: Chains, limit: int, mechanisms: bool, output: Path) -> None:
     from planar.pages.chain_atlas import write_atlas
 
     shown = [*islice(found, limit)]
+    if not shown:
+        raise BadInput("--slides", f"of the chains of {found.links} links none moves with so many slides")
     with show_progress(f"{len(shown)} chains") as progress:
         if output.suffix.lower() in PICTURES and not output.is_dir():
             plot.save(plot.chains(shown, mechanisms), output)

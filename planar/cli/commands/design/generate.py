@@ -18,6 +18,9 @@ DATA_SET, FILE = ".zarr", ".json"
 @click.option("--steps", type=int, metavar="N", help="Of a data set: parts of a turn.  [default: 100]")
 @click.option("--chain", type=int, metavar="K", help="Of one linkage: its chain by the number that `chains` tells.")
 @click.option("--freedom", type=int, default=1, show_default=True, metavar="F", help="Of one linkage.")
+@click.option(
+    "--slides", type=int, default=0, show_default=True, metavar="N", help="Of one linkage: joints that slide."
+)
 @click.option("--frame", type=int, metavar="LINK", help="Of one linkage: the link that is fixed.")
 @click.option("--drive", "drives", type=int, multiple=True, metavar="JOINT", help="Of one linkage: a driven joint.")
 @click.option("--seed", type=int, default=0, show_default=True, metavar="S", help="The same gives the same linkages.")
@@ -34,6 +37,7 @@ def generate(  # many: options of the command
     steps: int | None,
     chain: int | None,
     freedom: int,
+    slides: int,
     frame: int | None,
     drives: tuple[int, ...],
     seed: int,
@@ -42,7 +46,7 @@ def generate(  # many: options of the command
     """Random linkages of given structure, whose crank turns fully: one as a file, or many as a data set."""
     of_one = {"--chain": chain is not None, "--frame": frame is not None, "--drive": bool(drives)}
     of_many = {"--count": count is not None, "--steps": steps is not None}
-    of_one["--freedom"] = freedom != 1
+    of_one |= {"--freedom": freedom != 1, "--slides": slides != 0}
     if output.suffix == DATA_SET:
         for option in (name for name, is_given in of_one.items() if is_given):
             raise BadInput(
@@ -56,10 +60,12 @@ def generate(  # many: options of the command
         raise BadInput(option, "this is for a data set; write -o FOLDER.zarr")
     from planar.document.files import dumps
     from planar.foundation.safe_files import save_file
-    from planar.structures.chains import chains
+    from planar.structures.enumeration.chains import chains
 
     with show_status("a linkage"):
-        found = chains(links, freedom)
+        found = chains(links, freedom, slides=slides)
+        if not found:
+            raise BadInput("--slides", f"of the chains of {links} links none moves with so many slides")
         if chain is not None and not 0 <= chain < len(found):
             raise BadInput("--chain", f"chains of {links} links have numbers from 0 to {len(found) - 1}, not {chain}")
         mechanism = found[chain or 0].mechanism(frame, drives or None, seed)

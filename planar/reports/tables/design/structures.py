@@ -12,7 +12,7 @@ from planar.model.wording import count_phrase, join_all_names
 from planar.reports.fitted_table import FittedTable, plain_table
 from planar.reports.number_format import paragraphs
 from planar.structures.chain import Chain, ChainMechanism
-from planar.structures.chains import Chains
+from planar.structures.enumeration.pin_chains import Chains
 
 
 def table(found: Chains, shown: Sequence[Chain], with_mechanisms: bool) -> RenderableType:
@@ -25,15 +25,19 @@ def table(found: Chains, shown: Sequence[Chain], with_mechanisms: bool) -> Rende
         beside = f", {parted} of them fractionated"
     else:
         beside = ", fractionated ones left out"
-    head = Text(
-        f"{count_phrase(len(found), 'kinematic chain')} of {found.links} links, freedom {found.freedom}{beside}",
-        style="bold",
-    )
-    rows = plain_table(None, "no.", "assortment", "symmetry", "inversions", "planar", "name", left=(1, 4, 5), keys=1)
+    sliding = f" with {count_phrase(found.slides, 'slide')}" if found.slides else ""
+    many = count_phrase(len(found), "kinematic chain")
+    head = Text(f"{many} of {found.links} links{sliding}, freedom {found.freedom}{beside}", style="bold")
+    if not shown:
+        return Group(head, Text(), paragraphs([(" -", "with so many slides some joint of each would not move")]))
+    heads = ["no.", "assortment", *(["slides"] if found.slides else []), "symmetry", "inversions", "planar", "name"]
+    left = (1, 2, 5, 6) if found.slides else (1, 4, 5)
+    rows = plain_table(None, *heads, left=left, keys=1)
     for each in shown:
         rows.add_row(
             str(each.number),
             assortment_text(each.assortment),
+            *([", ".join(joint_text(each, joint) for joint in each.slides)] if found.slides else []),
             str(each.symmetry.order),
             str(len(each.inversions)),
             "yes" if each.is_planar else "no",
@@ -41,6 +45,7 @@ def table(found: Chains, shown: Sequence[Chain], with_mechanisms: bool) -> Rende
         )
     told = [
         "assortment: links with two joints, with three, and so on",
+        *(["slides: the joints that slide, each by its two links"] if found.slides else []),
         "symmetry: in how many ways links can be exchanged",
     ]
     if not whole:
@@ -86,6 +91,8 @@ def record(chain: Chain, with_mechanisms: bool) -> dict[str, Any]:
         "links": chain.links,
         "freedom": chain.freedom,
         "joints": [list(joint) for joint in chain.edges],
+        "slides": list(chain.slides),
+        "pin_number": chain.pin_number,
         "loops": chain.loops,
         "assortment": list(chain.assortment),
         "symmetry": {

@@ -1,0 +1,1 @@
+"""All kinematic chains of so many links."""

@@ -1,0 +1,90 @@
+"""All kinematic chains of so many links of which so many joints slide, in a fixed order."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import combinations
+from typing import Any
+
+from planar.structures.chain import Chain
+from planar.structures.contraction import canonical_chain
+from planar.structures.enumeration.pin_chains import Chains
+from planar.structures.general_position import GeneralPosition
+from planar.structures.symmetry import first_alike, joint_exchanges
+
+
+class ChainsWithSlides(Chains):
+    """All chains of some number of links and freedom of which so many joints slide; see `planar.chains`.
+
+    The order: by the chain of pins that it is but for its slides, then by the numbers of the joints that slide. Of sets
+    of joints that an exchange of links takes to each other the first counts.
+    """
+
+    def __init__(self, links: int, freedom: int, fractionated: bool, slides: int):
+        super().__init__(links, freedom, fractionated)
+        self.slides = slides
+        self._pin_chains = iter(Chains(links, freedom, fractionated))
+        self._found: list[tuple[Chain, list[tuple[int, ...]]]] = []
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return ChainsWithSlides, (self.links, self.freedom, self.fractionated, self.slides)
+
+    def __len__(self) -> int:
+        return sum(len(sets) for _, sets in self._slide_sets())
+
+    def __iter__(self) -> Iterator[Chain]:
+        number = 0
+        for chain, sets in self._slide_sets():
+            for slides in sets:
+                yield chain.with_slides(slides, number)
+                number += 1
+
+    def number_of(self, chain: Chain) -> int | None:
+        if (chain.links, chain.freedom, len(chain.slides)) != (self.links, self.freedom, self.slides):
+            return None
+        wanted = canonical_chain(chain.links, chain.edges)
+        before = 0
+        for each, sets in self._slide_sets():
+            if each.edges == wanted.joints:
+                place = {joint: number for number, joint in enumerate(each.edges)}
+                ends = ([wanted.numbers[link] for link in chain.edges[k]] for k in chain.slides)
+                exchanges = joint_exchanges(each.automorphisms, each.edges)
+                _, slides = first_alike((place[min(own), max(own)] for own in ends), exchanges)
+                return before + sets.index(slides) if slides in sets else None
+            before += len(sets)
+        return None
+
+    def _at(self, place: int) -> Chain | None:
+        number = place
+        for chain, sets in self._slide_sets():
+            if place < len(sets):
+                return chain.with_slides(sets[place], number)
+            place -= len(sets)
+        return None
+
+    def _slide_sets(self) -> Iterator[tuple[Chain, list[tuple[int, ...]]]]:
+        """Each chain of pins with the sets of its joints that may slide, made where they are not yet."""
+        k = 0
+        while True:
+            if k == len(self._found):
+                chain = next(self._pin_chains, None)
+                if chain is None:
+                    return
+                self._found.append((chain, slide_sets(chain, self.slides)))
+            yield self._found[k]
+            k += 1
+
+
+def slide_sets(chain: Chain, slides: int) -> list[tuple[int, ...]]:
+    """The sets of so many joints of a chain of pins that may slide: of those that are alike the first.
+
+    With them the chain has the freedom that it has by count, wherever its joints stand but for special places, and all
+    its joints move.
+    """
+    position = GeneralPosition(chain.links, chain.edges)
+    exchanges = joint_exchanges(chain.automorphisms, chain.edges)
+    return [
+        chosen
+        for chosen in combinations(range(chain.joints), slides)
+        if chosen == first_alike(chosen, exchanges)[1] and position.moves_as_counted(chosen)
+    ]
