@@ -136,6 +136,7 @@ PICTURES: dict[str, Callable[[], object]] = {
     "design/sensitivity": lambda: plot.sensitivity("whitworth", "slot"),
     "design/tolerances": lambda: plot.tolerance("hoeken-straight-line", "P"),
     "design/chains": lambda: plot.chains(planar.chains(8))[0],
+    "design/multiple-pins": lambda: plot.chains(planar.chains(8, multiple_pins=2))[0],
     "design/cognates": lambda: plot.cognates("four-bar", "F"),
     "bodies": lambda: plot.forces(planar.forces(planar.solve("two-stroke-engine"))),
     "forces/stick-slip": lambda: plot.diagrams(planar.simulate("stick-slip", 5.0), "block"),

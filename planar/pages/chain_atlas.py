@@ -16,6 +16,7 @@ from planar.foundation.errors import BadInput
 from planar.foundation.safe_files import make_folder, save_file, write_error
 from planar.reports.tables.design.structures import record
 from planar.structures.chain import Chain
+from planar.structures.multiple_pins import extra_links
 
 INDEX = "chains.json"
 SUFFIXES = (".svg", ".png")
@@ -52,6 +53,7 @@ def write_atlas(
         "links": drawn[0].chain.links,
         "freedom": drawn[0].chain.freedom,
         "slides": len(drawn[0].chain.slides),
+        "multiple_pins": extra_links(drawn[0].chain.pins),
         "count": len(drawn) if count is None else count,
         "drawn": len(drawn),
         "sheets": [*names, *inversion_names],

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import combinations, islice
 from typing import NamedTuple
@@ -15,8 +15,8 @@ from planar.model.run_arguments import check_whole_number
 from planar.model.wording import count_phrase
 from planar.structures.assur_groups import AssurGroup, assur_groups
 from planar.structures.chain_names import chain_name, inversion_names
-from planar.structures.contraction import automorphisms
 from planar.structures.general_position import GeneralPosition
+from planar.structures.multiple_pins import Pin, extra_links, joint_kinds_phrase, pin_automorphisms, pin_trees
 from planar.structures.rigid_parts import Joint
 from planar.structures.symmetry import (
     Automorphism,
@@ -53,6 +53,9 @@ class Chain:
     that are sliding pairs, the others are pins. `number` is that among all chains of so many links and slides and this
     freedom, see `planar.chains`, and `pin_number` that which it has with pins in place of its slides; None where these
     are too many to be counted for it.
+
+    `pins` are the joints, each by all its links: of several links on one pin, any two are a joint of `edges`, and all
+    but one of the links count, so that there are fewer `joints` than edges.
     """
 
     links: int
@@ -61,31 +64,39 @@ class Chain:
     number: int | None = field(default=None, compare=False)
     slides: tuple[int, ...] = ()
     pin_number: int | None = field(default=None, compare=False)
+    pins: tuple[Pin, ...] = ()
 
     def __post_init__(self) -> None:
         if not self.slides:
             object.__setattr__(self, "pin_number", self.number)
+        if not self.pins:
+            object.__setattr__(self, "pins", self.edges)
 
     def __repr__(self) -> str:
         number = "" if self.number is None else f" {self.number}"
-        slides = f", {count_phrase(len(self.slides), 'slide')}" if self.slides else ""
+        beside = joint_kinds_phrase(len(self.slides), extra_links(self.pins))
         name = f", {self.name}" if self.name else ""
-        return f"<Chain{number} of {self.links} links{slides}, freedom {self.freedom}{name}>"
+        return f"<Chain{number} of {self.links} links{beside}, freedom {self.freedom}{name}>"
 
     @property
     def joints(self) -> int:
-        """How many joints there are."""
-        return len(self.edges)
+        """How many joints there are, a pin of n links as n - 1."""
+        return sum(len(pin) - 1 for pin in self.pins)
+
+    @property
+    def multiple_pins(self) -> tuple[Pin, ...]:
+        """The pins of three and more links, each by these."""
+        return tuple(pin for pin in self.pins if len(pin) > 2)
 
     @property
     def loops(self) -> int:
         """How many independent loops there are: joints - links + 1."""
-        return len(self.edges) - self.links + 1
+        return self.joints - self.links + 1
 
     @cached_property
     def degrees(self) -> tuple[int, ...]:
-        """How many joints each link has."""
-        return tuple(map(len, neighbour_sets(self.links, self.edges)))
+        """How many pins and slides each link has."""
+        return tuple(sum(link in pin for pin in self.pins) for link in range(self.links))
 
     @property
     def assortment(self) -> tuple[int, ...]:
@@ -104,7 +115,8 @@ class Chain:
         """Whether it can be drawn so that no two links cross, whatever their shapes."""
         from networkx import Graph, check_planarity
 
-        return bool(check_planarity(Graph(self.edges))[0])
+        ends = ((("pin", number), link) for number, pin in enumerate(self.pins) for link in pin)
+        return bool(check_planarity(Graph(ends))[0])
 
     @property
     def name(self) -> str:
@@ -114,11 +126,11 @@ class Chain:
     @cached_property
     def pin_chain(self) -> Chain:
         """The chain with pins in place of its slides; itself where it has none."""
-        return Chain(self.links, self.freedom, self.edges, self.pin_number) if self.slides else self
+        return replace(self, number=self.pin_number, slides=()) if self.slides else self
 
     def with_slides(self, slides: tuple[int, ...], number: int | None = None) -> Chain:
         """This chain of pins with slides in place of some: their numbers, of those that are alike the first."""
-        return Chain(self.links, self.freedom, self.edges, number, slides, self.number) if slides else self
+        return replace(self, number=number, slides=slides, pin_number=self.number) if slides else self
 
     @cached_property
     def symmetry(self) -> ChainSymmetry:
@@ -133,7 +145,7 @@ class Chain:
             moved = joint_exchanges(every, self.edges)
             kept = ({own[k] for k in self.slides} == {*self.slides} for own in moved)
             return tuple(each for each, is_kept in zip(every, kept, strict=True) if is_kept)
-        found = tuple(islice(automorphisms(self.links, self.edges), MAX_AUTOMORPHISMS + 1))
+        found = tuple(islice(pin_automorphisms(self.links, self.pins), MAX_AUTOMORPHISMS + 1))
         if len(found) > MAX_AUTOMORPHISMS:
             raise BadInput("links", f"the chain can be exchanged with itself in more than {MAX_AUTOMORPHISMS} ways")
         return found
@@ -169,13 +181,22 @@ class Chain:
     def assur_groups(self, frame: int, drives: Sequence[int]) -> tuple[AssurGroup, ...] | None:
         """The Assur groups of the mechanism with this link fixed and these joints driven, in an order in which they can
         be placed; None where the drives are not as many as the freedom, or one only moves what others move already."""
-        if self.slides and not self._position.is_driven(self.slides, drives):
-            return None
-        return assur_groups(self.links, self.edges, frame, drives)
+        if self.slides or self.multiple_pins:
+            if not self._position.is_driven(self.slides, drives):
+                return None
+        elif len(self.pins) == len(self.edges):
+            return assur_groups(self.links, self.edges, frame, drives)
+        driven = [self.edges[k] for k in drives]
+        found = []
+        for joints in pin_trees(self.pins, driven):
+            groups = assur_groups(self.links, joints, frame, [joints.index(each) for each in driven])
+            if groups is not None:
+                found.append(groups)
+        return max(found, key=len, default=None)
 
     @cached_property
     def _position(self) -> GeneralPosition:
-        return GeneralPosition(self.links, self.edges)
+        return GeneralPosition(self.links, self.edges, self.multiple_pins)
 
     def inversion_name(self, frame: int) -> str:
         """What the field calls the mechanisms with this link fixed, or nothing; with slides that of the chain of pins,
@@ -199,7 +220,7 @@ class Chain:
         """A mechanism of this chain with random dimensions that go together, the same for the same seed.
 
         `frame` is the number of the fixed link, `drive` that of the driven joint, or of as many as the chain has
-        freedoms; left out, the first that fit, pins before slides. Lengths are in mm; joint k of `edges` is the
+        freedoms; left out, the first that fit, pins before slides. Lengths are in mm; joint k of `pins` is the
         letter k of the alphabet. A search looks for dimensions with which the first input turns fully, or slides far,
         see `planar.structures.linkage_search`; the mechanism's notes say whether it turns fully, or between which
         positions it runs. Raises BadInput for what does not drive the chain.
@@ -213,26 +234,33 @@ class Chain:
 
         fixed = range(self.links) if frame is None else (check_whole_number("frame", frame, 0, self.links - 1),)
         given = None if drive is None else (drive,) if isinstance(drive, int) else tuple(drive)
-        wanted = given and tuple(sorted({check_whole_number("drive", each, 0, self.joints - 1) for each in given}))
+        wanted = given and tuple(sorted({check_whole_number("drive", each, 0, len(self.edges) - 1) for each in given}))
         found = next(self._drivable(fixed, wanted), None)
         if found is None:
-            usable = next(self._drivable(fixed, None))
+            usable = next(self._drivable(fixed, None), None)
+            if usable is None:
+                raise BadInput("frame", f"no joints on link {frame} drive all links; fix another one")
             count = count_phrase(self.freedom, "joint")
             raise BadInput("drive", f"{count} wanted that drive all links, as {usable[1]} with link {usable[0]} fixed")
         frame, drives = found
+        ends = tuple(self.edges[joint] for joint in drives)
         return find_linkage(
-            Linkage(self.edges, frame, drives, self.slides),
+            Linkage(self.pins, frame, tuple(map(self.pin_of, drives)), tuple(map(self.pin_of, self.slides)), ends),
             check_whole_number("seed", seed, 0),
             self._mechanism_name(frame),
         )
+
+    def pin_of(self, joint: int) -> int:
+        """On which of `pins` a joint of `edges` is, by its number."""
+        return next(number for number, pin in enumerate(self.pins) if {*self.edges[joint]} <= {*pin})
 
     def _mechanism_name(self, frame: int) -> str:
         """What the field calls it, else its number in the chains; with slides that the name does not tell."""
         number = "" if self.number is None else f" {self.number}"
         name = self.inversion_name(frame) or self.name
         is_told = not self.slides or inversion_names(self.edges, self.slides)
-        sliding = "" if is_told else f" with {count_phrase(len(self.slides), 'slide')}"
-        return f"{name}{sliding}" if name else f"Chain{number} of {self.links} links{sliding}, link {frame} fixed"
+        beside = "" if name and is_told else joint_kinds_phrase(len(self.slides), extra_links(self.pins))
+        return f"{name}{beside}" if name else f"Chain{number} of {self.links} links{beside}, link {frame} fixed"
 
     def _drivable(self, frames: Iterable[int], wanted: tuple[int, ...] | None) -> Iterator[tuple[int, tuple[int, ...]]]:
         """Fixed links with joints that drive all links: those that are wanted, else any on the fixed link."""

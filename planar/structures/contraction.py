@@ -49,12 +49,13 @@ def _joints_of_paths(paths: Iterable[Sequence[int]]) -> tuple[Joint, ...]:
 class _Contraction(NamedTuple):
     """The links with three and more joints, how many paths join each two, and those paths, longer ones first.
 
-    A path begins at the end whose place is lower, and holds its ends.
+    A path begins at the end whose place is lower, and holds its ends. What is marked stands for no other.
     """
 
     many: list[int]
     counts: Counts
     paths: dict[Joint, list[list[int]]]
+    marked: tuple[bool, ...]
 
     def bundles(self, numbering: Sequence[int]) -> Iterator[list[list[int]]]:
         """The paths between each two, in the order of the word for a numbering, from the lower to the higher number."""
@@ -69,7 +70,9 @@ class _Contraction(NamedTuple):
 
     def best_numberings(self) -> tuple[tuple[int, ...], list[Numbering]]:
         """The greatest word, and those of its numberings that give the greatest row."""
-        word, numberings = greatest_numberings(self.counts, vertex_degrees(self.counts))
+        degrees = vertex_degrees(self.counts)
+        ranks = [2 * degree + mark for degree, mark in zip(degrees, self.marked, strict=True)]
+        word, numberings = greatest_numberings(self.counts, ranks)
         rows = [self.row(each) for each in numberings]
         greatest = max(rows)
         return word, [each for each, row in zip(numberings, rows, strict=True) if row == greatest]
@@ -79,17 +82,18 @@ class _Contraction(NamedTuple):
         return [*(self.many[index] for index in numbering), *joined.from_iterable(path[1:-1] for path in paths)]
 
 
-def canonical_chain(links: int, joints: Sequence[Joint]) -> CanonicalChain:
+def canonical_chain(links: int, joints: Sequence[Joint], marked: int = 0) -> CanonicalChain:
     """A connected chain, each of whose links has two and more joints, in the numbering that all of its kind share.
 
     The links with three and more joints are numbered so that the word of the contracted graph is greatest, and of
-    such numberings so that the numbers of binary links, edge by edge, make the greatest word.
+    such numberings so that the numbers of binary links, edge by edge, make the greatest word. The last ones are
+    `marked`, so many, each with three joints or more: they are told from others, and stand before those with as many.
     """
     beside = neighbour_sets(links, joints)
     if max(map(len, beside)) == 2:
         order = _ring_order(beside)
         return CanonicalChain(ring_joints(links), tuple(order.index(link) for link in range(links)))
-    found = _contract(beside)
+    found = _contract(beside, marked)
     word, (best, *_) = found.best_numberings()
     order = found.link_order(best, joined.from_iterable(found.bundles(best)))
     number = {link: index for index, link in enumerate(order)}
@@ -97,8 +101,8 @@ def canonical_chain(links: int, joints: Sequence[Joint]) -> CanonicalChain:
     return CanonicalChain(tuple(named), tuple(number[link] for link in range(links)), word, tuple(found.row(best)))
 
 
-def automorphisms(links: int, joints: Sequence[Joint]) -> Iterator[Automorphism]:
-    """Every exchange of the links of a connected chain that keeps its joints, first that of none.
+def automorphisms(links: int, joints: Sequence[Joint], marked: int = 0) -> Iterator[Automorphism]:
+    """Every exchange of the links of a connected chain that keeps its joints and the last, `marked` ones, first none.
 
     An automorphism of the contracted graph that keeps the row, with any order of paths that are equally long between
     the same links, and any sense of a path that comes back to its link.
@@ -111,7 +115,7 @@ def automorphisms(links: int, joints: Sequence[Joint]) -> Iterator[Automorphism]
         )
         first = ring
     else:
-        found = _contract(beside)
+        found = _contract(beside, marked)
         _, numberings = found.best_numberings()
         orders = (
             found.link_order(each, joined.from_iterable(paths))
@@ -135,7 +139,7 @@ def _arrangements(bundle: Sequence[Sequence[int]]) -> list[list[Sequence[int]]]:
     return ways
 
 
-def _contract(beside: Sequence[set[int]]) -> _Contraction:
+def _contract(beside: Sequence[set[int]], marked: int) -> _Contraction:
     many = [link for link in range(len(beside)) if len(beside[link]) > 2]
     place = {link: index for index, link in enumerate(many)}
     counts = [[0] * len(many) for _ in many]
@@ -148,7 +152,7 @@ def _contract(beside: Sequence[set[int]]) -> _Contraction:
         paths.setdefault((min(i, j), max(i, j)), []).append(path if i <= j else path[::-1])
     for bundle in paths.values():
         bundle.sort(key=len, reverse=True)
-    return _Contraction(many, tuple(map(tuple, counts)), paths)
+    return _Contraction(many, tuple(map(tuple, counts)), paths, tuple(link >= len(beside) - marked for link in many))
 
 
 def _ring_order(beside: Sequence[set[int]]) -> list[int]:

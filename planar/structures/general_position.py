@@ -22,14 +22,20 @@ TOLERANCE = 1e-9
 class GeneralPosition:
     """The joints of a chain at random places, each with a random way along which it slides where it is a slide.
 
-    A motion has three rates for each link: of its point at the origin, in x and y, and its angular velocity.
+    A motion has three rates for each link: of its point at the origin, in x and y, and its angular velocity. A multiple
+    pin, given by its links, is at one place; `joints` are then any two of its links.
     """
 
-    def __init__(self, links: int, joints: Sequence[Joint]):
+    def __init__(self, links: int, joints: Sequence[Joint], multiple_pins: Sequence[Sequence[int]] = ()):
         random = np.random.default_rng(SEED)
         count = len(joints)
-        self.freedom = MOTIONS * (links - 1) - 2 * count
         (x, y), angle = random.uniform(-1.0, 1.0, (2, count)), random.uniform(0.0, np.pi, count)
+        self._independent = [*range(count)]
+        for pin in multiple_pins:
+            own = [k for k, ends in enumerate(joints) if {*ends} <= {*pin}]
+            x[own], y[own] = x[own[0]], y[own[0]]
+            self._independent = [k for k in self._independent if k not in own or pin[0] in joints[k]]
+        self.freedom = MOTIONS * (links - 1) - 2 * len(self._independent)
         velocity = np.zeros((count, 2, MOTIONS * links))  # of the second link against the first, at the joint
         turning = np.zeros((count, MOTIONS * links))
         for k, (first, second) in enumerate(joints):
@@ -61,7 +67,7 @@ class GeneralPosition:
         pins, sliding = self._held
         rows = pins.copy()
         rows[list(slides)] = sliding[list(slides)]
-        _, sizes, motions = np.linalg.svd(rows.reshape(-1, rows.shape[-1]))
+        _, sizes, motions = np.linalg.svd(rows[self._independent].reshape(-1, rows.shape[-1]))
         found: Array = motions[int(np.sum(sizes > TOLERANCE * sizes[0])) :]
         return found
 

@@ -36,13 +36,14 @@ SLIDE_LENGTH = 120.0
 
 
 class Linkage(NamedTuple):
-    """A structure as a linkage: of each joint the two links that it joins; the fixed link, and the driven joints; which
-    joints slide."""
+    """A structure as a linkage: of each joint the links that it joins, two or, on a pin, more; the fixed link, and the
+    driven joints; which joints slide. `drive_ends` are the two links of each drive where joints have more."""
 
-    joints: tuple[tuple[int, int], ...]
+    joints: tuple[tuple[int, ...], ...]
     frame: int
     drives: tuple[int, ...]
     slides: tuple[int, ...] = ()
+    drive_ends: tuple[tuple[int, int], ...] = ()
 
     @property
     def link_count(self) -> int:
@@ -54,9 +55,14 @@ class Linkage(NamedTuple):
         return [k for k, links in enumerate(self.joints) if link in links]
 
     def driven_link(self, drive: int) -> int:
-        """The link that a joint drives: that which is not the frame, between moving links the second."""
-        first, second = self.joints[drive]
-        return first if second == self.frame else second
+        """The link that an input drives, by its place among the drives."""
+        return self.ends_of(drive)[1]
+
+    def ends_of(self, drive: int) -> tuple[int, int]:
+        """The link against which an input drives, and that which it drives: not the frame, between moving links the
+        second."""
+        first, second = self.drive_ends[drive] if self.drive_ends else self.joints[self.drives[drive]]
+        return (second, first) if second == self.frame else (first, second)
 
     def pin_beside(self, slide: int) -> tuple[int, int] | None:
         """A link that has nothing but this slide and a pin, if there is one, and that pin: the pin stands for both."""
@@ -86,7 +92,7 @@ def candidate_places(linkages: Sequence[Linkage], random: np.random.Generator) -
         pivot = np.array([each.drives[k] for each in linkages])
         driven = np.zeros((many, joints), dtype=bool)
         for row, each in enumerate(linkages):
-            driven[row, each.joints_of(each.driven_link(each.drives[k]))] = True
+            driven[row, each.joints_of(each.driven_link(k))] = True
         off = places - places[every, pivot][:, None]
         reach = np.where(driven, np.linalg.norm(off, axis=-1), 0.0).max(axis=1)
         shorter = places[every, pivot][:, None] + off * (sizes / reach)[:, None, None]
@@ -118,7 +124,7 @@ def linkage_document(linkage: Linkage, places: Array, name: str, ways: Sequence[
     for each in slides:
         spots[each.guide].setdefault(each.through, each.start)
         spots[each.block].setdefault(each.point, each.place)
-    links, cranks = {}, {linkage.driven_link(drive): names[drive] for drive in linkage.drives}
+    links, cranks = {}, {linkage.driven_link(k): names[drive] for k, drive in enumerate(linkage.drives)}
     named, axes = {linkage.frame: "frame"}, {linkage.frame: 0.0}
     for link, own in spots.items():
         if link == linkage.frame:
@@ -212,19 +218,23 @@ def _inputs(
     axes: dict[int, float],
     slid: dict[str, float],
 ) -> list[dict[str, Any]]:
-    """What the file says of the inputs, which are where they are drawn; the first runs. Pins between moving links are
-    given their links in order."""
+    """What the file says of the inputs, which are where they are drawn; the first runs. Pins between moving links, and
+    those of several links, are given their links in order."""
     inputs: list[dict[str, Any]] = []
-    for drive, name in zip(
-        linkage.drives, (next(iter(pairs[drive].values())) for drive in linkage.drives), strict=True
-    ):
-        second = linkage.driven_link(drive)
-        first = next(each for each in linkage.joints[drive] if each != second)
-        if first != linkage.frame and name not in slid:
-            pairs[drive]["links"] = [named[first], named[second]]
-        position = slid[name] if name in slid else _between(axes[first], axes[second])
-        velocity = {"velocity": SLIDING_VELOCITY if name in slid else VELOCITY}
-        inputs.append({"pair": name, "position": position} | ({} if inputs else velocity))
+    for k, drive in enumerate(linkage.drives):
+        pair: str = next(iter(pairs[drive].values()))
+        first, second = linkage.ends_of(k)
+        position = slid[pair] if pair in slid else _between(axes[first], axes[second])
+        velocity = {"velocity": SLIDING_VELOCITY if pair in slid else VELOCITY}
+        on_pin = linkage.joints[drive]
+        if len(on_pin) > 2 or (first != linkage.frame and pair not in slid):
+            others = [named[link] for link in on_pin if link not in (first, second)]
+            pairs[drive].setdefault("links", [named[first], named[second], *others])
+        if len(on_pin) > 2:
+            order: list[str] = pairs[drive]["links"]
+            ends = sorted((named[first], named[second]), key=order.index)
+            pair = f"{pair}:{','.join(ends)}"
+        inputs.append({"pair": pair, "position": position} | ({} if inputs else velocity))
     return inputs
 
 

@@ -42,7 +42,9 @@ def find_linkage(linkage: Linkage, seed: int, name: str) -> Mechanism:
     greatest acceleration and whose bars cross least; else, of all, that which turns farthest, and its range is said in
     the mechanism's notes. Where a slide is driven, that of one round is taken whose stroke is nearest to 400 mm.
     """
-    random = np.random.default_rng([seed, *linkage.drives, linkage.frame, *np.ravel(linkage.joints), *linkage.slides])
+    random = np.random.default_rng(
+        [seed, *linkage.drives, linkage.frame, *(link for links in linkage.joints for link in links), *linkage.slides]
+    )
     if linkage.drives[0] in linkage.slides:
         return _with_a_stroke(_candidates(linkage, random, name)[0])
     farthest: tuple[float, Mechanism] | None = None

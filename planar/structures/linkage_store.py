@@ -177,7 +177,7 @@ class LinkageSet(Sequence[Mechanism]):
         places, coupler = np.asarray(self.start[row]), int(self.coupler_link[row])
         moving = [link for link in range(self.links) if link != frame]
         bars = [linkage.joints_of(link) + [len(linkage.joints)] * (link == coupler) for link in moving]
-        crank = moving.index(linkage.driven_link(drive))
+        crank = moving.index(linkage.driven_link(0))
         name = f"Linkage {row}: chain {chain} of {self.links} links, link {frame} fixed, joint {drive} driven"
         return pinned(places, bars, linkage.joints_of(frame), crank, name=name)
 

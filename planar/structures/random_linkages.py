@@ -102,7 +102,7 @@ def _draw(linkages: Sequence[Linkage], random: np.random.Generator) -> tuple[Arr
     cranks = np.empty(many, dtype=np.int64)
     for row, (each, coupler) in enumerate(zip(linkages, couplers.tolist(), strict=True)):
         moving = [link for link in range(links) if link != each.frame]
-        cranks[row] = moving.index(each.driven_link(each.drives[0]))
+        cranks[row] = moving.index(each.driven_link(0))
         for k, link in enumerate(moving):
             pins = each.joints_of(link) + [joints] * (link == coupler)
             bars[row, k, : len(pins)] = pins
@@ -117,5 +117,5 @@ def _couplers(linkage: Linkage) -> list[int]:
     pivoted = {link for links in linkage.joints if linkage.frame in links for link in links}
     moving = [link for link in range(linkage.link_count) if link != linkage.frame]
     return [link for link in moving if link not in pivoted] or [
-        link for link in moving if link != linkage.driven_link(linkage.drives[0])
+        link for link in moving if link != linkage.driven_link(0)
     ]

@@ -186,7 +186,7 @@ def _known_chain(links: int, joints: Sequence[NamedJoint]) -> tuple[Chain, tuple
 @lru_cache(maxsize=16)
 def chains_with_slides(links: int, freedom: int, slides: int) -> ChainsWithSlides:
     """Those of some number of links, freedom and slides, whose numbers are counted once."""
-    return ChainsWithSlides(links, freedom, True, slides)
+    return ChainsWithSlides(Chains(links, freedom, True), slides)
 
 
 def _describe(

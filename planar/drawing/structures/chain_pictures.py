@@ -40,7 +40,7 @@ class DrawnChain(NamedTuple):
 
 def draw_chain(chain: Chain) -> DrawnChain:
     """A chain with places of its joints: without crossings where it has such, else with few."""
-    return DrawnChain(chain, lay_out_chain(chain.links, chain.edges))
+    return DrawnChain(chain, lay_out_chain(chain.links, chain.pins))
 
 
 def chain_picture(drawn: DrawnChain, size: tuple[float, float]) -> Picture:
@@ -52,7 +52,7 @@ def inversion_picture(
     drawn: DrawnChain, frame: int, mechanisms: Sequence[ChainMechanism], size: tuple[float, float]
 ) -> Picture:
     """A chain with a link fixed, which is hatched; black are the joints by which its mechanisms are driven."""
-    driven = {joint for each in mechanisms for joint in each.drives}
+    driven = {drawn.chain.pin_of(joint) for each in mechanisms for joint in each.drives}
     number = "" if drawn.chain.number is None else f"{drawn.chain.number}, "
     notes = [drawn.chain.inversion_name(frame) or drawn.chain.name, *_drive_notes(drawn.chain, mechanisms)]
     return Picture(
@@ -123,10 +123,11 @@ def _marks(
                 yield Polyline(stroke, Pen.HATCH, f"link {link} fixed")
         yield Polyline(corners, Pen.LINK, f"link {link}", closed=is_plate, fill=fill)
     black = {*driven}
+    slides = {drawn.chain.pin_of(joint) for joint in drawn.chain.slides}
     for number, spot in enumerate(spots):
         fill = Fill.SOLID if number in black else Fill.PAPER
-        if number in drawn.chain.slides:
-            block = _block(number, drawn.chain.edges[number], layout.rotations, places)
+        if number in slides:
+            block = _block(number, drawn.chain.pins[number], layout.rotations, places)
             yield Polyline(block, Pen.PIN, f"joint {number}", closed=True, fill=fill)
         else:
             yield Circle(spot, JOINT_RADIUS, Pen.PIN, f"joint {number}", fill)
@@ -138,7 +139,7 @@ def _marks(
 
 
 def _block(
-    joint: int, ends: tuple[int, int], rotations: Sequence[Sequence[int]], places: Array
+    joint: int, ends: Sequence[int], rotations: Sequence[Sequence[int]], places: Array
 ) -> tuple[PaperPoint, ...]:
     """The corners of a slide, which lies along that of its links that has fewer joints."""
     link = min(ends, key=lambda each: len(rotations[each]))

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 from planar.drawing.output.grid_sheets import GRID_PICTURE_SIZE, draw_grid
 from planar.drawing.structures.chain_pictures import DrawnChain, chain_picture, draw_chain, inversion_picture
 from planar.foundation.errors import BadInput
-from planar.model.wording import count_phrase
 from planar.structures.chain import Chain
+from planar.structures.multiple_pins import extra_links, joint_kinds_phrase
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -59,12 +59,12 @@ def inversion_sheets(drawn: Sequence[DrawnChain]) -> Iterator[Figure]:
 
 
 def _heading(drawn: Sequence[DrawnChain], what: str) -> str:
-    kinds = {(each.chain.links, each.chain.freedom, len(each.chain.slides)) for each in drawn}
+    chains = [each.chain for each in drawn]
+    kinds = {(each.links, each.freedom, len(each.slides), extra_links(each.pins)) for each in chains}
     if len(kinds) > 1:
         return what
-    links, freedom, slides = next(iter(kinds))
-    sliding = f" with {count_phrase(slides, 'slide')}" if slides else ""
-    return f"{what} of {links} links{sliding}, freedom {freedom}"
+    links, freedom, slides, multiple_pins = next(iter(kinds))
+    return f"{what} of {links} links{joint_kinds_phrase(slides, multiple_pins)}, freedom {freedom}"
 
 
 def _slide_note(drawn: Sequence[DrawnChain]) -> str:

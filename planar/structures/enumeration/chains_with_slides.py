@@ -7,9 +7,9 @@ from itertools import combinations
 from typing import Any
 
 from planar.structures.chain import Chain
-from planar.structures.contraction import canonical_chain
 from planar.structures.enumeration.pin_chains import Chains
 from planar.structures.general_position import GeneralPosition
+from planar.structures.multiple_pins import canonical_pins
 from planar.structures.symmetry import first_alike, joint_exchanges
 
 
@@ -20,14 +20,14 @@ class ChainsWithSlides(Chains):
     of joints that an exchange of links takes to each other the first counts.
     """
 
-    def __init__(self, links: int, freedom: int, fractionated: bool, slides: int):
-        super().__init__(links, freedom, fractionated)
-        self.slides = slides
-        self._pin_chains = iter(Chains(links, freedom, fractionated))
+    def __init__(self, pins: Chains, slides: int):
+        super().__init__(pins.links, pins.freedom, pins.fractionated)
+        self.pins, self.slides, self.multiple_pins = pins, slides, pins.multiple_pins
+        self._pin_chains = iter(pins)
         self._found: list[tuple[Chain, list[tuple[int, ...]]]] = []
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return ChainsWithSlides, (self.links, self.freedom, self.fractionated, self.slides)
+        return ChainsWithSlides, (self.pins, self.slides)
 
     def __len__(self) -> int:
         return sum(len(sets) for _, sets in self._slide_sets())
@@ -42,12 +42,12 @@ class ChainsWithSlides(Chains):
     def number_of(self, chain: Chain) -> int | None:
         if (chain.links, chain.freedom, len(chain.slides)) != (self.links, self.freedom, self.slides):
             return None
-        wanted = canonical_chain(chain.links, chain.edges)
+        pins, numbers = canonical_pins(chain.links, chain.pins)
         before = 0
         for each, sets in self._slide_sets():
-            if each.edges == wanted.joints:
+            if each.pins == pins:
                 place = {joint: number for number, joint in enumerate(each.edges)}
-                ends = ([wanted.numbers[link] for link in chain.edges[k]] for k in chain.slides)
+                ends = ([numbers[link] for link in chain.edges[k]] for k in chain.slides)
                 exchanges = joint_exchanges(each.automorphisms, each.edges)
                 _, slides = first_alike((place[min(own), max(own)] for own in ends), exchanges)
                 return before + sets.index(slides) if slides in sets else None
@@ -81,10 +81,11 @@ def slide_sets(chain: Chain, slides: int) -> list[tuple[int, ...]]:
     With them the chain has the freedom that it has by count, wherever its joints stand but for special places, and all
     its joints move.
     """
-    position = GeneralPosition(chain.links, chain.edges)
+    position = GeneralPosition(chain.links, chain.edges, chain.multiple_pins)
     exchanges = joint_exchanges(chain.automorphisms, chain.edges)
+    pins_of_two = [number for number, ends in enumerate(chain.edges) if ends in chain.pins]
     return [
         chosen
-        for chosen in combinations(range(chain.joints), slides)
+        for chosen in combinations(pins_of_two, slides)
         if chosen == first_alike(chosen, exchanges)[1] and position.moves_as_counted(chosen)
     ]

@@ -13,6 +13,7 @@ from planar.structures.chain import Chain
 from planar.structures.contracted_graphs import ContractedGraph, contracted_graphs
 from planar.structures.contraction import canonical_chain, expand_graph, ring_joints
 from planar.structures.enumeration.binary_links import distribute_binary_links
+from planar.structures.multiple_pins import joint_kinds_phrase
 
 
 class Chains(Sequence[Chain]):
@@ -25,15 +26,16 @@ class Chains(Sequence[Chain]):
     """
 
     def __init__(self, links: int, freedom: int, fractionated: bool):
-        self.links, self.freedom, self.fractionated, self.slides = links, freedom, fractionated, 0
+        self.links, self.freedom, self.fractionated = links, freedom, fractionated
+        self.slides = self.multiple_pins = 0
         loops = (links - 1 - freedom) // 2
         # a chain of freedom 1 that a link parts would have parts of freedom 0
         self._graphs = contracted_graphs(loops, fractionated and freedom > 1) if loops > 1 else ()
         self._rows: list[Array] = []
 
     def __repr__(self) -> str:
-        slides = f", {count_phrase(self.slides, 'slide')}" if self.slides else ""
-        return f"<Chains of {self.links} links{slides}, freedom {self.freedom}>"
+        beside = joint_kinds_phrase(self.slides, self.multiple_pins)
+        return f"<Chains of {self.links} links{beside}, freedom {self.freedom}>"
 
     def __reduce__(self) -> tuple[Any, ...]:
         return Chains, (self.links, self.freedom, self.fractionated)
@@ -76,7 +78,7 @@ class Chains(Sequence[Chain]):
 
     def number_of(self, chain: Chain) -> int | None:
         """The number of a chain, whatever the numbers of its links; None where it is none of these."""
-        if (chain.links, chain.freedom, chain.slides) != (self.links, self.freedom, ()):
+        if (chain.links, chain.freedom, chain.slides, chain.multiple_pins) != (self.links, self.freedom, (), ()):
             return None
         wanted = canonical_chain(chain.links, chain.edges)
         if not self._graphs:

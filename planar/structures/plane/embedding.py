@@ -51,7 +51,7 @@ class PlaneEmbedding(NamedTuple):
         return sorted(found)
 
 
-def plane_embeddings(links: int, joints: Sequence[Joint], count: int) -> Iterator[PlaneEmbedding]:
+def plane_embeddings(links: int, joints: Sequence[Sequence[int]], count: int) -> Iterator[PlaneEmbedding]:
     """Some embeddings of a chain, with as few crossings of bars as there are choices of; nothing where it has none.
 
     The chain's nodes are given in other orders each time, so that where it has several embeddings others may be found.
@@ -68,9 +68,9 @@ def plane_embeddings(links: int, joints: Sequence[Joint], count: int) -> Iterato
             return
 
 
-def _crossing_choices(links: int, joints: Sequence[Joint], count: int) -> Iterator[Crossings]:
+def _crossing_choices(links: int, joints: Sequence[Sequence[int]], count: int) -> Iterator[Crossings]:
     """So many choices of two bars without a common joint; where a bar has several crossings in all their orders."""
-    known = {*joints}
+    known = {pair for joint in joints for pair in combinations(joint, 2)}
     bars = [link for link in range(links) if sum(link in joint for joint in joints) == 2]
     pairs = [pair for pair in combinations(bars, 2) if pair not in known]
     for chosen in combinations(pairs, count):
@@ -78,7 +78,7 @@ def _crossing_choices(links: int, joints: Sequence[Joint], count: int) -> Iterat
         yield from permutations(chosen) if several else (chosen,)
 
 
-def _nodes_and_edges(joints: Sequence[Joint], crossings: Crossings) -> list[tuple[Node, Node]]:
+def _nodes_and_edges(joints: Sequence[Sequence[int]], crossings: Crossings) -> list[tuple[Node, Node]]:
     """Links and joints as nodes; where bars cross is one, too."""
     found: list[tuple[Node, Node]] = []
     crossed = {link for both in crossings for link in both}
@@ -92,13 +92,13 @@ def _nodes_and_edges(joints: Sequence[Joint], crossings: Crossings) -> list[tupl
     return found
 
 
-def _is_planar(joints: Sequence[Joint], crossings: Crossings) -> bool:
+def _is_planar(joints: Sequence[Sequence[int]], crossings: Crossings) -> bool:
     from networkx import Graph, check_planarity
 
     return bool(check_planarity(Graph(_nodes_and_edges(joints, crossings)))[0])
 
 
-def _embed(links: int, joints: Sequence[Joint], crossings: Crossings, random: Random) -> PlaneEmbedding:
+def _embed(links: int, joints: Sequence[Sequence[int]], crossings: Crossings, random: Random) -> PlaneEmbedding:
     """One embedding of a chain that has one."""
     from networkx import Graph, check_planarity
 
@@ -126,7 +126,7 @@ def _embed(links: int, joints: Sequence[Joint], crossings: Crossings, random: Ra
     return PlaneEmbedding(tuple(rotations), tuple(faces), ties, crossings)
 
 
-def _ties_over_bridges(graph: Any, joints: Sequence[Joint]) -> tuple[Joint, ...]:
+def _ties_over_bridges(graph: Any, joints: Sequence[Sequence[int]]) -> tuple[Joint, ...]:
     """For each joint that alone joins two parts, two joints beside it, one of each part."""
     from networkx import articulation_points
 

@@ -39,7 +39,7 @@ class _Try(NamedTuple):
     embedding: PlaneEmbedding
 
 
-def lay_out_chain(links: int, joints: Sequence[Joint]) -> ChainLayout:
+def lay_out_chain(links: int, joints: Sequence[Sequence[int]]) -> ChainLayout:
     """Places of all joints. Lines that cross are those of two bars, where the chain cannot be drawn without.
 
     W. Tutte, How to Draw a Graph, Proc. London Math. Soc. 13 (1963) 743, gives places without crossings from a face
@@ -60,7 +60,7 @@ def lay_out_chain(links: int, joints: Sequence[Joint]) -> ChainLayout:
     return ChainLayout(places, best.embedding.rotations, len(best.embedding.crossings))
 
 
-def _starts(links: int, joints: Sequence[Joint]) -> list[_Try]:
+def _starts(links: int, joints: Sequence[Sequence[int]]) -> list[_Try]:
     """Drawings without more crossings than there are spots for, of each embedding with each of its faces outside."""
     tries: list[_Try] = []
     known: set[tuple[object, ...]] = set()
@@ -135,7 +135,7 @@ def _without_crossing_spots(found: _Try, joints: int) -> list[_Try]:
     return [_Try(energies[0], ends[0], embedding)]
 
 
-def _tangled_layout(links: int, joints: Sequence[Joint]) -> ChainLayout:
+def _tangled_layout(links: int, joints: Sequence[Sequence[int]]) -> ChainLayout:
     """The drawing with the fewest crossings that random starts end with; joints of a link in their order about it."""
     random = np.random.default_rng(0)
     own = [[k for k, joint in enumerate(joints) if link in joint] for link in range(links)]

@@ -28,6 +28,14 @@ MAX_CHAINS_LISTED = 250
 @click.option(
     "--slides", type=int, default=0, show_default=True, metavar="N", help="So many joints are sliding pairs, not pins."
 )
+@click.option(
+    "--multiple-pins",
+    type=int,
+    default=0,
+    show_default=True,
+    metavar="N",
+    help="Pins hold so many links beyond two each: one of three links counts once.",
+)
 @click.option("--not-fractionated", is_flag=True, help="Leave out chains that a single link parts.")
 @click.option("--mechanisms", is_flag=True, help="Also what differs by the fixed link and by the driven joints on it.")
 @click.option(
@@ -46,10 +54,11 @@ MAX_CHAINS_LISTED = 250
     help="Draw them: an atlas in a folder, with an index; or sheets in a .pdf, .svg or .png file.",
 )
 @json_option
-def chains(
+def chains(  # many: options of the command
     links: int,
     freedom: int,
     slides: int,
+    multiple_pins: int,
     not_fractionated: bool,
     mechanisms: bool,
     limit: int,
@@ -60,7 +69,7 @@ def chains(
     from planar.reports.tables.design.structures import record, table
     from planar.structures.enumeration.chains import chains as all_chains
 
-    found = all_chains(links, freedom, slides=slides, fractionated=not not_fractionated)
+    found = all_chains(links, freedom, slides=slides, multiple_pins=multiple_pins, fractionated=not not_fractionated)
     if output is not None:
         _draw(found, limit, mechanisms, output)
     if as_json:
@@ -75,10 +84,12 @@ def _draw(found: Chains, limit: int, mechanisms: bool, output: Path) -> None:
     """The first chains on sheets, in a file where its name says so, else in a folder."""
     from planar import plot
     from planar.pages.chain_atlas import write_atlas
+    from planar.structures.multiple_pins import joint_kinds_phrase
 
     shown = [*islice(found, limit)]
     if not shown:
-        raise BadInput("--slides", f"of the chains of {found.links} links none moves with so many slides")
+        told = joint_kinds_phrase(found.slides, found.multiple_pins)
+        raise BadInput("command line", f"of the chains of {found.links} links none{told} moves")
     with show_progress(f"{len(shown)} chains") as progress:
         if output.suffix.lower() in PICTURES and not output.is_dir():
             plot.save(plot.chains(shown, mechanisms), output)

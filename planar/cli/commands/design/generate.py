@@ -21,6 +21,14 @@ DATA_SET, FILE = ".zarr", ".json"
 @click.option(
     "--slides", type=int, default=0, show_default=True, metavar="N", help="Of one linkage: joints that slide."
 )
+@click.option(
+    "--multiple-pins",
+    type=int,
+    default=0,
+    show_default=True,
+    metavar="N",
+    help="Of one linkage: links on pins beyond two each.",
+)
 @click.option("--frame", type=int, metavar="LINK", help="Of one linkage: the link that is fixed.")
 @click.option("--drive", "drives", type=int, multiple=True, metavar="JOINT", help="Of one linkage: a driven joint.")
 @click.option("--seed", type=int, default=0, show_default=True, metavar="S", help="The same gives the same linkages.")
@@ -38,6 +46,7 @@ def generate(  # many: options of the command
     chain: int | None,
     freedom: int,
     slides: int,
+    multiple_pins: int,
     frame: int | None,
     drives: tuple[int, ...],
     seed: int,
@@ -46,7 +55,7 @@ def generate(  # many: options of the command
     """Random linkages of given structure, whose crank turns fully: one as a file, or many as a data set."""
     of_one = {"--chain": chain is not None, "--frame": frame is not None, "--drive": bool(drives)}
     of_many = {"--count": count is not None, "--steps": steps is not None}
-    of_one |= {"--freedom": freedom != 1, "--slides": slides != 0}
+    of_one |= {"--freedom": freedom != 1, "--slides": slides != 0, "--multiple-pins": multiple_pins != 0}
     if output.suffix == DATA_SET:
         for option in (name for name, is_given in of_one.items() if is_given):
             raise BadInput(
@@ -61,11 +70,13 @@ def generate(  # many: options of the command
     from planar.document.files import dumps
     from planar.foundation.safe_files import save_file
     from planar.structures.enumeration.chains import chains
+    from planar.structures.multiple_pins import joint_kinds_phrase
 
     with show_status("a linkage"):
-        found = chains(links, freedom, slides=slides)
+        found = chains(links, freedom, slides=slides, multiple_pins=multiple_pins)
         if not found:
-            raise BadInput("--slides", f"of the chains of {links} links none moves with so many slides")
+            told = joint_kinds_phrase(slides, multiple_pins)
+            raise BadInput("command line", f"of the chains of {links} links none{told} moves")
         if chain is not None and not 0 <= chain < len(found):
             raise BadInput("--chain", f"chains of {links} links have numbers from 0 to {len(found) - 1}, not {chain}")
         mechanism = found[chain or 0].mechanism(frame, drives or None, seed)

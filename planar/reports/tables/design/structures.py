@@ -13,6 +13,7 @@ from planar.reports.fitted_table import FittedTable, plain_table
 from planar.reports.number_format import paragraphs
 from planar.structures.chain import Chain, ChainMechanism
 from planar.structures.enumeration.pin_chains import Chains
+from planar.structures.multiple_pins import joint_kinds_phrase
 
 
 def table(found: Chains, shown: Sequence[Chain], with_mechanisms: bool) -> RenderableType:
@@ -25,18 +26,20 @@ def table(found: Chains, shown: Sequence[Chain], with_mechanisms: bool) -> Rende
         beside = f", {parted} of them fractionated"
     else:
         beside = ", fractionated ones left out"
-    sliding = f" with {count_phrase(found.slides, 'slide')}" if found.slides else ""
+    kinds = f"{found.links} links{joint_kinds_phrase(found.slides, found.multiple_pins)}"
     many = count_phrase(len(found), "kinematic chain")
-    head = Text(f"{many} of {found.links} links{sliding}, freedom {found.freedom}{beside}", style="bold")
+    head = Text(f"{many} of {kinds}, freedom {found.freedom}{beside}", style="bold")
     if not shown:
-        return Group(head, Text(), paragraphs([(" -", "with so many slides some joint of each would not move")]))
-    heads = ["no.", "assortment", *(["slides"] if found.slides else []), "symmetry", "inversions", "planar", "name"]
-    left = (1, 2, 5, 6) if found.slides else (1, 4, 5)
+        return Group(head, Text(), paragraphs([(" -", "with such joints some joint of each would not move")]))
+    more = [name for name, is_there in (("pins", found.multiple_pins), ("slides", found.slides)) if is_there]
+    heads = ["no.", "assortment", *more, "symmetry", "inversions", "planar", "name"]
+    left = (*range(1, 2 + len(more)), 4 + len(more), 5 + len(more))
     rows = plain_table(None, *heads, left=left, keys=1)
     for each in shown:
         rows.add_row(
             str(each.number),
             assortment_text(each.assortment),
+            *([", ".join("-".join(map(str, pin)) for pin in each.multiple_pins)] if found.multiple_pins else []),
             *([", ".join(joint_text(each, joint) for joint in each.slides)] if found.slides else []),
             str(each.symmetry.order),
             str(len(each.inversions)),
@@ -45,6 +48,7 @@ def table(found: Chains, shown: Sequence[Chain], with_mechanisms: bool) -> Rende
         )
     told = [
         "assortment: links with two joints, with three, and so on",
+        *(["pins: those of several links, each by these"] if found.multiple_pins else []),
         *(["slides: the joints that slide, each by its two links"] if found.slides else []),
         "symmetry: in how many ways links can be exchanged",
     ]
@@ -91,6 +95,7 @@ def record(chain: Chain, with_mechanisms: bool) -> dict[str, Any]:
         "links": chain.links,
         "freedom": chain.freedom,
         "joints": [list(joint) for joint in chain.edges],
+        "pins": [list(pin) for pin in chain.pins],
         "slides": list(chain.slides),
         "pin_number": chain.pin_number,
         "loops": chain.loops,
