@@ -17,13 +17,17 @@ from planar.model.mechanism import Mechanism, pair_entries, relative_motions
 from planar.model.pairs import MeasureKind, Pair
 from planar.structures.chain import Chain
 from planar.structures.contraction import canonical_chain
-from planar.structures.enumeration.chains_with_slides import ChainsWithSlides
+from planar.structures.enumeration.chains import chains
+from planar.structures.enumeration.chains_with_multiple_pins import has_movable_pins
 from planar.structures.enumeration.pin_chains import Chains
+from planar.structures.multiple_pins import canonical_pins, extra_links, link_pairs
 from planar.structures.rigid_parts import Joint, has_rigid_part
 from planar.structures.symmetry import first_alike, joint_exchanges
 
 MAX_NUMBERED_LOOPS = 5
 """Of a chain of more loops the number is not looked for: with six there are hundreds of thousands and more."""
+MAX_PINNED_LOOPS = 3
+"""Of a chain of more loops with pins of several links the number is not looked for."""
 MAX_PIN_LINKS = 6
 """Of a pin of more links one choice of pairs alone is looked at."""
 MAX_PIN_CHOICES = 1000
@@ -44,8 +48,9 @@ class MechanismStructure:
     do not drive it definitely. `links` and `joints` are the numbers of the mechanism's own links and pairs, `slides`
     the joints that are sliding pairs, `groups` the Assur groups by names of links. Where pins hold more than two links
     `multiple_pins` names them, and `others` are the chains that other choices of pairs there give; of chains of more
-    than five loops these are not looked for. `inversions` are links that, fixed in place of the frame, give other
-    mechanisms of the same chain, one for each of those, with the field's name for it, or nothing.
+    than five loops these are not looked for; `pinned_chain` is the chain that has these pins as they are. `inversions`
+    are links that, fixed in place of the frame, give other mechanisms of the same chain, one for each of those, with
+    the field's name for it, or nothing.
     """
 
     chain: Chain
@@ -58,6 +63,7 @@ class MechanismStructure:
     groups: tuple[tuple[tuple[str, ...], str], ...]
     multiple_pins: tuple[str, ...]
     others: tuple[Chain, ...]
+    pinned_chain: Chain | None
     inversions: dict[str, str]
 
     __repr__ = short_repr
@@ -178,15 +184,37 @@ def _known_chain(links: int, joints: Sequence[NamedJoint]) -> tuple[Chain, tuple
     if not slides:
         number = pin_number
     elif comb(len(joints), len(slides)) <= MAX_SLIDE_SETS and pin_number is not None and pin_number < MAX_SLIDE_CHAINS:
-        number = chains_with_slides(links, chain.freedom, len(slides)).number_of(replace(chain, slides=slides))
+        number = all_chains(links, chain.freedom, len(slides)).number_of(replace(chain, slides=slides))
     chain = Chain(links, chain.freedom, chain.edges, number, slides, pin_number)
     return chain, numbers, tuple(exchanges[best][joint] for joint in own)
 
 
+def _pinned_chain(mechanism: Mechanism) -> Chain | None:
+    """The chain with pins of several links as they are, and its number where chains have three loops at most; None
+    where no pin is of more than two links, or a part is rigid."""
+    place = {link.name: index for index, link in enumerate(mechanism.links)}
+    groups = pair_entries(mechanism)
+    held = [tuple(sorted({place[link] for pair in group for link in pair.links})) for group in groups]
+    sliding = [pin for pin, group in zip(held, groups, strict=True) if group[0].input_kind is MeasureKind.LENGTH]
+    links = len(place)
+    if max(map(len, held)) == 2 or not has_movable_pins(links, tuple(held)):
+        return None
+    pins, numbers = canonical_pins(links, held)
+    freedom = 3 * (links - 1) - 2 * sum(len(pin) - 1 for pin in pins)
+    chain = Chain(links, freedom, link_pairs(pins), pins=pins)
+    ends = [tuple(sorted(numbers[link] for link in pin)) for pin in sliding]
+    exchanges = joint_exchanges(chain.automorphisms, chain.edges)
+    _, slides = first_alike((chain.edges.index((a, b)) for a, b in ends), exchanges)
+    chain = replace(chain, slides=slides)
+    if chain.loops > MAX_PINNED_LOOPS:
+        return chain
+    return replace(chain, number=all_chains(links, freedom, len(slides), extra_links(pins)).number_of(chain))
+
+
 @lru_cache(maxsize=16)
-def chains_with_slides(links: int, freedom: int, slides: int) -> ChainsWithSlides:
-    """Those of some number of links, freedom and slides, whose numbers are counted once."""
-    return ChainsWithSlides(Chains(links, freedom, True), slides)
+def all_chains(links: int, freedom: int, slides: int, multiple_pins: int = 0) -> Chains:
+    """Those of some number of links, slides and links on pins beyond two, whose numbers are counted once."""
+    return chains(links, freedom, slides=slides, multiple_pins=multiple_pins)
 
 
 def _describe(
@@ -217,6 +245,7 @@ def _describe(
         tuple((tuple(named[link] for link in each.links), each.assur_class) for each in groups),
         tuple(group[0].entry_name() for group in pair_entries(mechanism) if len(group) > 1),
         tuple(sorted((each for each in others if each != chain), key=lambda each: each.number or 0)),
+        _pinned_chain(mechanism),
         {named[link]: chain.inversion_name(link) for link in chain.inversions if link not in alike},
     )
 

@@ -130,8 +130,18 @@ def test_a_linkage_has_the_pins_of_its_chain_and_goes_together(
     for graph, fixed in ((own, [link.name for link in mechanism.links].index("frame")), (wanted, frame)):
         graph.nodes[fixed]["kind"] = "frame"
     assert nx.is_isomorphic(own, wanted, node_match=lambda a, b: a == b)
+    known = planar.chain_of(mechanism).pinned_chain
+    assert (known, known.number) == (chain, number)
     rates = [each.get("relative_angular_velocity", each.get("velocity")) for each in state.pairs.values()]
     assert np.abs(rates).min() > 1e-6
+
+
+def test_models_with_such_pins_are_known():
+    found = planar.chain_of("toggle-press").pinned_chain
+    assert found in planar.chains(6, slides=1, multiple_pins=1)
+    assert planar.chain_of("watt-six-bar").pinned_chain is None
+    pinned = planar.chain_of("peaucellier-lipkin").pinned_chain
+    assert planar.chains(8, multiple_pins=4)[pinned.number] == pinned
 
 
 def test_the_commands_list_draw_and_make_them(tmp_path):

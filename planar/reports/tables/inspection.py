@@ -12,6 +12,7 @@ from planar.model.wording import count_phrase, join_all_names
 from planar.reports.fitted_table import plain_table
 from planar.reports.number_format import paragraphs
 from planar.reports.tables.design.structures import joint_text
+from planar.structures.multiple_pins import extra_links, joint_kinds_phrase
 
 
 def inspection_tables(found: Inspection) -> RenderableType:
@@ -91,6 +92,10 @@ def _structure_facts(found: Inspection) -> list[tuple[str, str]]:
         more = f"; other choices give chain {join_all_names(others)}" if others else ""
         pins = join_all_names(known.multiple_pins)
         facts.append(f"at {pins} one link is taken as pinned to each other one{more}")
+    pinned = known.pinned_chain
+    if pinned is not None and pinned.number is not None:
+        kinds = joint_kinds_phrase(len(pinned.slides), extra_links(pinned.pins))
+        facts.append(f"taken as it is: chain {pinned.number} of those of {count_phrase(pinned.links, 'link')}{kinds}")
     return [("structure" if not k else " ", fact) for k, fact in enumerate(facts)]
 
 
