@@ -13,7 +13,6 @@ import numpy as np
 from planar.foundation.errors import BadInput, PlanarError
 from planar.model.mechanism import Mechanism
 from planar.model.run_arguments import check_whole_number
-from planar.synthesis.catalogue.catalogue_store import kept_catalogue
 from planar.synthesis.cognates.task_cognates import task_cognates
 from planar.synthesis.design_search import Candidate, DesignSearch
 from planar.synthesis.judgement.judgement import DesignJudge
@@ -115,7 +114,7 @@ class _TaskSearch:
         judge = DesignJudge(self.task, search.size)
         before = len(self.sound)
         for turn in range(ROUNDS):
-            catalogue = kept_catalogue(search.equations, search.free, DRAWS, self.seed + 1000 * turn)
+            catalogue = search.catalogue(DRAWS, self.seed + 1000 * turn)
             candidates = search.fit(catalogue, search.matches(catalogue, MATCHES), KEPT_SHARE * self.many)
             for each in candidates:
                 self._judge(search, judge, each)

@@ -10,6 +10,7 @@ import numpy as np
 
 from planar.document.writer import write_mechanism
 from planar.foundation.arrays import Array, BoolArray
+from planar.model.mechanism import Mechanism
 from planar.synthesis.catalogue.branch_tracking import follow_branches
 from planar.synthesis.catalogue.design_samples import draw_designs
 from planar.synthesis.fitting.wanted_equations import WantedEquations
@@ -49,10 +50,12 @@ def build_catalogue(equations: tuple[WantedEquations, ...], free: FreeNumbers, c
     return Catalogue(x, unknowns, told, is_whole)
 
 
-def catalogue_key(equations: tuple[WantedEquations, ...], free: FreeNumbers, count: int, seed: int) -> str:
+def catalogue_key(
+    start: Mechanism, equations: tuple[WantedEquations, ...], free: FreeNumbers, count: int, seed: int
+) -> str:
     """What tells one catalogue from another: the file, what is wanted of it, free numbers, bounds, count and seed."""
     told = [
-        write_mechanism(equations[0].design.mechanism),
+        write_mechanism(start),
         [str(each.rows.wanted.of) for each in equations],
         [*free.names],
         [*map(repr, (*free.lower, *free.upper))],
