@@ -12,8 +12,9 @@ from planar.foundation.arrays import Array
 from planar.model.mechanism import Mechanism
 from planar.synthesis.catalogue.catalogue import Catalogue
 from planar.synthesis.catalogue.catalogue_store import kept_catalogue
-from planar.synthesis.catalogue.matches import Match, WantedItem, find_matches
+from planar.synthesis.catalogue.matches import Match, find_matches
 from planar.synthesis.catalogue.moved_numbers import moved_numbers
+from planar.synthesis.catalogue.step_choices import WantedItem
 from planar.synthesis.fitting.design_fit import DesignFit, FittedDesigns
 from planar.synthesis.fitting.wanted_equations import WantedEquations, tangents
 from planar.synthesis.fitting.wanted_rows import wanted_rows, wanted_size

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from planar.document.writer import write_mechanism
-from planar.foundation.arrays import Array, BoolArray
+from planar.foundation.arrays import Array, BoolArray, IntArray
 from planar.model.mechanism import Mechanism
 from planar.synthesis.catalogue.branch_tracking import follow_branches
 from planar.synthesis.catalogue.design_samples import draw_designs
@@ -36,6 +36,11 @@ class Catalogue:
     def __len__(self) -> int:
         """How many designs there are."""
         return len(self.numbers)
+
+    def take(self, designs: IntArray) -> Catalogue:
+        """Those designs (n,) of it."""
+        values = tuple(each[designs] for each in self.values)
+        return Catalogue(self.numbers[designs], self.unknowns[designs], values, self.is_whole[designs])
 
 
 def build_catalogue(equations: tuple[WantedEquations, ...], free: FreeNumbers, count: int, seed: int = 0) -> Catalogue:
