@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
 
@@ -25,10 +24,9 @@ HATCH_PITCH, HATCH_LENGTH = 1.3, 1.6
 """mm from one stroke of a fixed link's hatching to the next, and of one beside a bar."""
 MAX_DRIVES_SHOWN = 6
 """Choices of driven joints that are told beneath a picture; of more how many there are."""
+NO_BREAK = "\N{NO-BREAK SPACE}"
 GRID_LINES = 40
 """Either way, of spots within a plate that are looked at for its number."""
-LARGER = "larger"
-"""What is told of a mechanism whose groups have no class."""
 
 
 class DrawnChain(NamedTuple):
@@ -66,23 +64,12 @@ def chain_title(chain: Chain) -> str:
     return f"{number}{' + '.join(map(str, chain.assortment))}"
 
 
-def class_counts(mechanisms: Iterable[ChainMechanism]) -> dict[str, int]:
-    """How many mechanisms have groups of which class at most: II, III, IV, and larger ones."""
-    count = Counter(_class_word(each) for each in mechanisms)
-    return {each: count[each] for each in ("II", "III", "IV", LARGER) if count[each]}
-
-
-def _class_word(mechanism: ChainMechanism) -> str:
-    words = {group.assur_class for group in mechanism.groups}
-    return LARGER if "" in words else max(words, key=("II", "III", "IV").index, default="II")
-
-
 def _chain_notes(drawn: DrawnChain) -> Iterator[str]:
     chain = drawn.chain
     if chain.name:
         yield chain.name
     yield f"symmetry {chain.symmetry.order}, {count_phrase(len(chain.inversions), 'inversion')}"
-    yield ", ".join(f"{word}: {count}" for word, count in class_counts(chain.mechanisms()).items())
+    yield chain.describe_classes().replace(": ", f":{NO_BREAK}")
     told = ["fractionated"] if chain.is_fractionated else []
     told += [count_phrase(drawn.layout.crossings, "crossing")] if drawn.layout.crossings else []
     if told:
@@ -95,7 +82,7 @@ def _drive_notes(chain: Chain, mechanisms: Sequence[ChainMechanism]) -> Iterator
         yield "no joints on it drive all links"
         return
     told = [
-        " and ".join("{}-{}".format(*chain.edges[joint]) for joint in each.drives) + f": {_class_word(each)}"
+        " and ".join("{}-{}".format(*chain.edges[joint]) for joint in each.drives) + f":{NO_BREAK}{each.assur_class}"
         for each in mechanisms[:MAX_DRIVES_SHOWN]
     ]
     left = len(mechanisms) - len(told)
