@@ -1,0 +1,74 @@
+"""What a task wants, as marks on paper: places, curves, poses and regions."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+
+from planar.drawing.paper.picture import Arrow, Label, Mark, Pen, Polyline, paper_point
+from planar.foundation.arrays import Array
+from planar.model.link_shapes import LinkShape
+from planar.synthesis.task.synthesis_task import SynthesisTask, WantedFunction, WantedPath, WantedPoses
+
+CROSS = 1.0
+"""mm: half of the cross at a place."""
+POSE_ARM = 6.0
+"""mm of the arrow along a pose's x-axis."""
+MAX_NUMBERED = 12
+"""Entries that have their numbers beside them; of more the drawing would be full of them."""
+NUMBER_SIZE = 6.5
+
+
+def wanted_places(task: SynthesisTask) -> Array:
+    """All places (n, 2) that are wanted of points and links (m)."""
+    own = [each.places for each in task.wanted if not isinstance(each, WantedFunction)]
+    return np.concatenate([np.empty((0, 2)), *own])
+
+
+def wanted_marks(task: SynthesisTask, per_mm: float) -> Iterator[Mark]:
+    """What is wanted, as crosses joined in their order where there is one, and poses as crosses with arrows; the region
+    in which all is to stay. `per_mm` (m) is the scale."""
+    if task.demands.inside is not None:
+        corners = tuple(paper_point(each) for each in task.demands.inside / per_mm)
+        yield Polyline(corners, Pen.CONSTRUCTION, "region", closed=True)
+    for wanted in task.wanted:
+        if isinstance(wanted, WantedFunction):
+            continue
+        spots = wanted.places / per_mm
+        if isinstance(wanted, WantedPath) and (wanted.in_order or wanted.is_closed):
+            points = tuple(map(paper_point, spots))
+            yield Polyline(points, Pen.WANTED, f"wanted curve of {wanted.of}", closed=wanted.is_closed)
+        for number, spot in enumerate(spots, start=1):
+            about = f"wanted {wanted.of} {number}"
+            yield from _cross(spot, about)
+            if isinstance(wanted, WantedPoses):
+                angle = wanted.angles[number - 1]
+                tip = spot + POSE_ARM * np.array([np.cos(angle), np.sin(angle)])
+                yield Arrow(paper_point(spot), paper_point(tip), Pen.WANTED, about)
+            if len(spots) <= MAX_NUMBERED:
+                yield Label(str(number), paper_point(spot), about, NUMBER_SIZE)
+
+
+def pose_outlines(task: SynthesisTask, shapes: Mapping[str, LinkShape], per_mm: float) -> Iterator[Polyline]:
+    """The link at every pose that is wanted of it."""
+    for wanted in task.wanted:
+        if isinstance(wanted, WantedPoses) and wanted.link in shapes:
+            poses = np.column_stack([wanted.places, wanted.angles])
+            yield from link_outlines(shapes[wanted.link], poses, per_mm, Pen.WANTED, f"pose of {wanted.link}")
+
+
+def link_outlines(shape: LinkShape, poses: Array, per_mm: float, pen: Pen, about: str) -> Iterator[Polyline]:
+    """The line round a link's points in poses (n, 3): the place of its origin (m) and its angle (rad)."""
+    own = np.array([paper_point(each) for each in shape.points.values()]).reshape(-1, 2)
+    if len(own) < 2:
+        return
+    for number, (x, y, angle) in enumerate(poses, start=1):
+        turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+        corners = tuple(paper_point(each) for each in ((x, y) + own @ turn.T) / per_mm)
+        yield Polyline(corners, pen, f"{about} {number}", closed=len(corners) > 2)
+
+
+def _cross(spot: Array, about: str) -> Iterator[Polyline]:
+    for step in ((CROSS, CROSS), (CROSS, -CROSS)):
+        yield Polyline((paper_point(spot - step), paper_point(spot + step)), Pen.WANTED, about)

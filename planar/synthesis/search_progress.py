@@ -1,0 +1,22 @@
+"""How far a search for designs is."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+
+class SearchProgress(NamedTuple):
+    """How far a search is: at which start, the `number`-th of `count` (None: not known), and what is done there.
+
+    `stage` is "catalogue", "matches", "fit", "judgement" or "cognates" of the `round`-th catalogue of the start.
+    `best` is the least error of a sound design so far (m, or rad where functions of angles alone are wanted; infinite
+    where there is none) and `best_share` the same beside the extent of what is wanted.
+    """
+
+    start: str
+    number: int
+    count: int | None
+    round: int
+    stage: str
+    best: float
+    best_share: float
