@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from planar.results.motion import Motion, State
     from planar.structures.chain import Chain
     from planar.synthesis.cognates.cognates import Cognates
+    from planar.synthesis.synthesis import Synthesis
 
     Drawing = Figure | list[Figure]
     """One figure, or several sheets."""
@@ -45,6 +46,7 @@ __all__ = [
     "chains",
     "circuits",
     "cognates",
+    "designs",
     "diagrams",
     "forces",
     "loci",
@@ -180,6 +182,17 @@ def chains(found: Chain | Sequence[Chain], mechanisms: bool = False) -> list[Fig
 
     drawn = draw_chains(found)
     return [*(inversion_sheets(drawn) if mechanisms else chain_sheets(drawn))]
+
+
+def designs(found: Synthesis) -> list[Figure]:
+    """What `planar.synthesise` found, the best first: each design with its paths over what is wanted, and of functions
+    diagrams of what is wanted and made, with the error, on sheets of A4 on its side.
+
+    Raises BadInput for anything else, and where no design is sound.
+    """
+    from planar.drawing.designs.design_sheets import design_sheets
+
+    return design_sheets(found)
 
 
 @takes_result("Modes", "Mechanism")

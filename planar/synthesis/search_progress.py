@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 
 class SearchProgress(NamedTuple):
-    """How far a search is: at which start, the `number`-th of `count` (None: not known), and what is done there.
+    """How far a search is: at which start, by its number from 1 and of how many (None: not known), and at what.
 
     `stage` is "catalogue", "matches", "fit", "judgement" or "cognates" of the `round`-th catalogue of the start.
     `best` is the least error of a sound design so far (m, or rad where functions of angles alone are wanted; infinite
@@ -14,8 +14,8 @@ class SearchProgress(NamedTuple):
     """
 
     start: str
-    number: int
-    count: int | None
+    start_number: int
+    start_count: int | None
     round: int
     stage: str
     best: float

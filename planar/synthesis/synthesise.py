@@ -154,7 +154,7 @@ class TaskSearch:
         return True
 
     def _search_round(self, search: DesignSearch, turn: int, before: int) -> None:
-        """The designs of one more catalogue; they are kept when all are judged. `before` this start so many are sound."""
+        """The designs of one more catalogue, kept when all are judged; so many were sound `before` this start."""
         first = len(self.sound), len(self.rejected)
         self._tell("catalogue")
         catalogue = kept_catalogue(search.equations, search.free, DRAWS, self.seed + 1000 * turn)

@@ -6,7 +6,13 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from planar.drawing.designs.wanted_marks import link_outlines, pose_outlines, wanted_marks, wanted_places
+from planar.drawing.designs.wanted_marks import (
+    link_outlines,
+    pose_outlines,
+    wanted_marks,
+    wanted_outlines,
+    wanted_places,
+)
 from planar.drawing.diagrams.drawn_run import DrawnRun, closed_run, steady_run
 from planar.drawing.diagrams.positions import JOINT_RADIUS, MIN_PATH_STEPS
 from planar.drawing.paper.picture import Circle, Fill, Label, Mark, Pen, Picture, Polyline, paper_point
@@ -45,10 +51,11 @@ def design_picture(
         return Picture(tuple(wanted_marks(task, scale.per_mm)), title)
     paths = {each.of: _path(run, mechanism, each) for each in task.wanted if not isinstance(each, WantedFunction)}
     places = [np.array([each.position for each in state.points.values()]), wanted_places(task), *paths.values()]
+    places.append(wanted_outlines(task, state.shapes))
     scale = _fitting_scale(places, mechanism, room)
     drawn = scheme(state, scale, len(state.points) <= MAX_LETTERED_POINTS, numbers=False, travel=run.slide_ranges)
     strokes = [mark for mark in drawn.marks if not isinstance(mark, Label)]
-    letters = [mark for mark in drawn.marks if isinstance(mark, Label)]
+    letters = [mark for mark in drawn.marks if isinstance(mark, Label) and not mark.about.startswith("input ")]
     below = [*wanted_marks(task, scale.per_mm), *pose_outlines(task, state.shapes, scale.per_mm)]
     numbers = [mark for mark in below if isinstance(mark, Label)]
     marks: list[Mark] = [mark for mark in below if not isinstance(mark, Label)]

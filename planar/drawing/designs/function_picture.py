@@ -20,8 +20,10 @@ from planar.synthesis.synthesis import SynthesisedDesign
 from planar.synthesis.task.synthesis_task import SynthesisTask, WantedFunction
 from planar.synthesis.task.task_numbers import motion_kind
 
-WIDTH, HEIGHT, ERROR_HEIGHT, GAP = 66.0, 34.0, 16.0, 16.0
-"""mm of the diagrams, and between them."""
+ROOM = (84.0, 66.0)
+"""mm that both diagrams take."""
+ERROR_SHARE, GAP, NUMBER_ROOM = 0.3, 12.0, 18.0
+"""Of the height that the error takes; mm between the diagrams for numbers and a name, and beside them."""
 CURVE_STEPS = 60
 
 
@@ -34,7 +36,9 @@ class MadeFunction(NamedTuple):
     errors: Array
 
 
-def function_picture(design: SynthesisedDesign, task: SynthesisTask, item: int) -> Picture | None:
+def function_picture(
+    design: SynthesisedDesign, task: SynthesisTask, item: int, room: tuple[float, float] = ROOM
+) -> Picture | None:
     """The diagram of the item of this number, None where the design does not come to all its entries."""
     wanted = task.wanted[item]
     if not isinstance(wanted, WantedFunction):
@@ -48,8 +52,10 @@ def function_picture(design: SynthesisedDesign, task: SynthesisTask, item: int) 
     x, y, errors = x_unit.from_si(made.x), y_unit.from_si(made.y), y_unit.from_si(made.errors)
     wanted_x, wanted_y = x_unit.from_si(wanted.inputs), y_unit.from_si(wanted.values)
     of_angles = [kind == "angle" and name == "°" for kind, name in zip(kinds, (x_name, y_name), strict=True)]
-    across = fit_axis(np.concatenate([x, wanted_x]), WIDTH, f"{wanted.from_pair} ({x_name})", degrees=of_angles[0])
-    up = fit_axis(np.concatenate([y, wanted_y]), HEIGHT, f"{wanted.to_pair} ({y_name})", 8.0, degrees=of_angles[1])
+    width, height = room[0] - NUMBER_ROOM, room[1] - GAP
+    names = f"{wanted.from_pair} ({x_name})", f"{wanted.to_pair} ({y_name})"
+    across = fit_axis(np.concatenate([x, wanted_x]), width, names[0], degrees=of_angles[0])
+    up = fit_axis(np.concatenate([y, wanted_y]), (1.0 - ERROR_SHARE) * height, names[1], 8.0, degrees=of_angles[1])
     marks: list[Mark] = [*axes_frame(across, up)]
     for own_x, own_y in zip(wanted_x, wanted_y, strict=True):
         at = point_on_paper(own_x, own_y, across, up)
@@ -57,12 +63,14 @@ def function_picture(design: SynthesisedDesign, task: SynthesisTask, item: int) 
             ends = (at[0] - CROSS, at[1] - rise), (at[0] + CROSS, at[1] + rise)
             marks.append(Polyline(ends, Pen.WANTED, f"wanted {wanted.of}"))
     marks += curve_strokes(x, y, across, up, Pen.PATH, f"made {wanted.of}")
-    below = fit_axis(np.append(errors, 0.0), ERROR_HEIGHT, f"error ({y_name})", 5.0)
+    below = fit_axis(np.append(errors, 0.0), ERROR_SHARE * height, f"error ({y_name})", 5.0)
     error_marks: list[Mark] = [*axes_frame(across, below)]
     for own_x, error in zip(wanted_x, errors, strict=True):
         ends = point_on_paper(own_x, 0.0, across, below), point_on_paper(own_x, error, across, below)
         error_marks.append(Polyline(ends, Pen.ACCELERATION, f"error of {wanted.of}"))
-    return Picture((*marks, *_lowered(error_marks, GAP + ERROR_HEIGHT)), f"{wanted.to_pair} over {wanted.from_pair}")
+    return Picture(
+        (*marks, *_lowered(error_marks, GAP + ERROR_SHARE * height)), f"{wanted.to_pair} over {wanted.from_pair}"
+    )
 
 
 def _made_function(design: SynthesisedDesign, wanted: WantedFunction, item: int) -> MadeFunction:

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from math import hypot
 
 import numpy as np
 
 from planar.drawing.paper.picture import Arrow, Label, Mark, Pen, Polyline, paper_point
+from planar.drawing.scheme.link_bodies import RELATIVE_TOLERANCE, convex_hull
 from planar.foundation.arrays import Array
+from planar.foundation.geometry import Vector
 from planar.model.link_shapes import LinkShape
 from planar.synthesis.task.synthesis_task import SynthesisTask, WantedFunction, WantedPath, WantedPoses
 
@@ -24,6 +27,15 @@ def wanted_places(task: SynthesisTask) -> Array:
     """All places (n, 2) that are wanted of points and links (m)."""
     own = [each.places for each in task.wanted if not isinstance(each, WantedFunction)]
     return np.concatenate([np.empty((0, 2)), *own])
+
+
+def wanted_outlines(task: SynthesisTask, shapes: Mapping[str, LinkShape]) -> Array:
+    """All corners (n, 2) of links in the poses that are wanted of them (m)."""
+    found: list[Array] = [np.empty((0, 2))]
+    for wanted in task.wanted:
+        if isinstance(wanted, WantedPoses) and wanted.link in shapes:
+            found += placed_outline(shapes[wanted.link], np.column_stack([wanted.places, wanted.angles]))
+    return np.concatenate(found)
 
 
 def wanted_marks(task: SynthesisTask, per_mm: float) -> Iterator[Mark]:
@@ -60,13 +72,20 @@ def pose_outlines(task: SynthesisTask, shapes: Mapping[str, LinkShape], per_mm: 
 
 def link_outlines(shape: LinkShape, poses: Array, per_mm: float, pen: Pen, about: str) -> Iterator[Polyline]:
     """The line round a link's points in poses (n, 3): the place of its origin (m) and its angle (rad)."""
-    own = np.array([paper_point(each) for each in shape.points.values()]).reshape(-1, 2)
-    if len(own) < 2:
-        return
-    for number, (x, y, angle) in enumerate(poses, start=1):
+    for number, places in enumerate(placed_outline(shape, poses), start=1):
+        if len(places) > 1:
+            yield Polyline(tuple(map(paper_point, places / per_mm)), pen, f"{about} {number}", closed=len(places) > 2)
+
+
+def placed_outline(shape: LinkShape, poses: Array) -> Iterator[Array]:
+    """The corners (m,) of the line round a link's points in each of its poses (n, 3)."""
+    points = [Vector(*paper_point(each)) for each in shape.points.values()]
+    reach = max((hypot(*(one - points[0])) for one in points), default=0.0)
+    # nothing where they lie on one line
+    own: Array = np.array((convex_hull(points, RELATIVE_TOLERANCE * reach) if reach else ()) or points).reshape(-1, 2)
+    for x, y, angle in poses:
         turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
-        corners = tuple(paper_point(each) for each in ((x, y) + own @ turn.T) / per_mm)
-        yield Polyline(corners, pen, f"{about} {number}", closed=len(corners) > 2)
+        yield (x, y) + own @ turn.T
 
 
 def _cross(spot: Array, about: str) -> Iterator[Polyline]:

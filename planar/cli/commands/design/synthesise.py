@@ -85,7 +85,7 @@ def progress_text(done: SearchProgress, task: SynthesisTask) -> str:
     from planar.model.wording import amount
     from planar.synthesis.task.task_numbers import miss_kind
 
-    number = f"start {done.number} of {done.count}" if done.count else f"start {done.number}"
+    number = f"start {done.start_number}" + (f" of {done.start_count}" if done.start_count else "")
     where = f"{number} ({done.start}), catalogue {done.round}: {done.stage}"
     if done.best == float("inf"):
         return where
