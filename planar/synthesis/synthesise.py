@@ -134,6 +134,7 @@ class TaskSearch:
             kept = None if self.folder is None else self.folder.read(number, turn + 1)
             if kept is not None:
                 self.size, designs = kept
+                self.starts[mechanism.name] = mechanism
                 self.sound += [each for each in designs if not each.defects]
                 self.rejected += [each for each in designs if each.defects]
             elif self.is_over():
@@ -147,8 +148,8 @@ class TaskSearch:
                     self.remarks.append(f"{mechanism.name} is no start: {problem}")
                     return True
                 self.size = search.size
+                self.starts[mechanism.name] = mechanism
                 self._search_round(search, turn, before)
-            self.starts[mechanism.name] = mechanism
             if min((each.error for each in self.sound[before:]), default=np.inf) <= GOOD * self.size:
                 break
         return True
@@ -216,7 +217,7 @@ class TaskSearch:
             for each in rank_designs(self.rejected, self.many)
         )
         remarks += [self._freedom(each.start) for each in (sound or rejected)[:1]]
-        if not sound:
+        if not sound and (self.rejected or self.is_finished):
             remarks.append(_refusal(self.rejected))
         return Synthesis(self.task, sound, rejected, self.size, tuple(remarks), self.seed, self.is_finished)
 
