@@ -15,7 +15,7 @@ from planar.pages.design_cards import GalleryCard, gallery_page
 from planar.pages.page import page
 from planar.reports.tables.design.design_columns import design_columns, design_csv
 from planar.synthesis.search_folder import claim_folder
-from planar.synthesis.synthesis import Synthesis
+from planar.synthesis.synthesis import Synthesis, check_synthesis
 from planar.synthesis.task.synthesis_task import SynthesisTask
 
 INDEX, TABLE = "index.html", "designs.csv"
@@ -38,7 +38,7 @@ def write_designs(found: Synthesis, folder: str | Path, *, progress: Callable[[i
     >>> planar.write_designs(planar.synthesise(task, many=1), mkdtemp()).name
     'index.html'
     """
-    place = Path(folder)
+    found, place = check_synthesis(found), Path(folder)
     claim_folder(place, found.task)
     cards = []
     files = {}

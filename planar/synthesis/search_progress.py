@@ -6,9 +6,9 @@ from typing import NamedTuple
 
 
 class SearchProgress(NamedTuple):
-    """How far a search is: at which start, by its number from 1 and of how many (None: not known), and at what.
+    """How far a search is: at which `start`, the `start_number`-th (from 1) of `start_count` (None: not known).
 
-    `stage` is "catalogue", "matches", "fit", "judgement" or "cognates" of the `round`-th catalogue of the start.
+    `stage` is "catalogue", "matches", "fit" or "judgement" of the `round`-th catalogue of the start.
     `best` is the least error of a sound design so far (m, or rad where functions of angles alone are wanted; infinite
     where there is none) and `best_share` the same beside the extent of what is wanted.
     """

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple, overload
+from typing import Any, NamedTuple, overload
 
 import numpy as np
 
 from planar.analysis.motion.output import Extreme
 from planar.foundation.arrays import Array
+from planar.foundation.errors import BadInput
 from planar.foundation.short_repr import short_repr
 from planar.model.mechanism import Mechanism
 from planar.model.wording import count_phrase
@@ -101,6 +102,13 @@ class Synthesis(Sequence[SynthesisedDesign]):
     def __iter__(self) -> Iterator[SynthesisedDesign]:
         """The designs, the best first."""
         return iter(self.designs)
+
+
+def check_synthesis(found: Any) -> Synthesis:
+    """What `planar.synthesise` found, as it is. Raises BadInput for anything else."""
+    if not isinstance(found, Synthesis):
+        raise BadInput("found", f"what planar.synthesise found is wanted, not {found!r:.60}")
+    return found
 
 
 def rank_designs(designs: Sequence[SynthesisedDesign], many: int) -> tuple[SynthesisedDesign, ...]:

@@ -10,7 +10,7 @@ from planar.drawing.output.matplotlib_figure import draw_on_sheets
 from planar.drawing.paper.picture import Picture
 from planar.foundation.errors import BadInput
 from planar.model.wording import amount
-from planar.synthesis.synthesis import Synthesis
+from planar.synthesis.synthesis import check_synthesis
 from planar.synthesis.task.synthesis_task import WantedFunction
 from planar.synthesis.task.task_numbers import miss_kind
 
@@ -27,8 +27,7 @@ def design_sheets(found: Any) -> list[Figure]:
 
     Raises BadInput for anything else, and where there is none.
     """
-    if not isinstance(found, Synthesis):
-        raise BadInput("found", f"what planar.synthesise found is wanted, not {found!r:.60}")
+    found = check_synthesis(found)
     if not len(found):
         raise BadInput("found", "there is no design without a defect, and so nothing to draw")
     kind, units = miss_kind(found.task), found.task.units
