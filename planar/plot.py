@@ -344,7 +344,7 @@ def diagrams(
     that is farthest along. A slide on the frame is measured from its top dead centre, where the run starts. `width`
     is the length of the time axis in mm on paper; `chords` adds graphical differentiation over so many intervals
     (Machine Elements, 1.3.6 (iii)). Where the file gives no speed, rates are per radian (or metre) of the input.
-    Of a simulation the intervals are shaded in which friction holds the pair that is drawn, or else any. Raises BadInput
+    Of a simulation the intervals are shaded in which friction holds the pair drawn, or else any. Raises BadInput
     for a name that is not there, NoAnswer where there is no motion.
     """
     from planar.drawing.diagrams.kinematic_diagrams import diagrams as drawn

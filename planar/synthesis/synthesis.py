@@ -19,7 +19,7 @@ from planar.synthesis.task.synthesis_task import SynthesisTask
 
 
 class DesignMotion(NamedTuple):
-    """How a design moves: its input `pair` goes from `low` to `high` (rad or m), or turns fully.
+    """How a design moves: its input `pair` goes from `low` to `high` (rad or m), `is_whole_turn`: it turns fully.
 
     `transmission` has the least transmission angle (rad) of every output that has one, by its pair, with the input
     there: over the whole turn, else between the first and the last entry of what is wanted.
