@@ -16,7 +16,6 @@ from planar.document.dimensions import file_dimensions
 from planar.foundation.errors import BadInput, PlanarError
 from planar.model.mechanism import Mechanism
 from planar.model.run_arguments import check_whole_number
-from planar.synthesis.catalogue.catalogue_store import kept_catalogue
 from planar.synthesis.cognates.task_cognates import task_cognates
 from planar.synthesis.design_motion import design_motion
 from planar.synthesis.design_search import Candidate, DesignSearch
@@ -39,6 +38,11 @@ ROUNDS = 4
 """Catalogues at most, each of other designs, where those before led to nothing sound or good."""
 GOOD = 2e-3
 """Root mean square of the misses beside the extent of what is wanted, at which no other catalogue is looked at."""
+SETTLED, SAME = 3, 1e-3
+"""Fits that lead to the best design, to this part of its error, at which no other catalogue is looked at: where several
+of many starts at random lead to the best of their optima, a better one is not likely to have been missed (C. G. E.
+Boender, A. H. G. Rinnooy Kan, Bayesian stopping rules for multistart global optimization methods, Mathematical
+Programming 37 (1987) 59)."""
 ALIKE_SPARE = 4
 """Sound designs beyond those wanted after which no more are judged: some turn out to be alike."""
 KEPT_SHARE = 4
@@ -150,15 +154,21 @@ class TaskSearch:
                 self.size = search.size
                 self.starts[mechanism.name] = mechanism
                 self._search_round(search, turn, before)
-            if min((each.error for each in self.sound[before:]), default=np.inf) <= GOOD * self.size:
+            if self._is_settled(before):
                 break
         return True
+
+    def _is_settled(self, before: int) -> bool:
+        """Whether no other catalogue is looked at: the best design of a start is good, or several fits led to it."""
+        errors = np.array([each.error for each in self.sound[before:]])
+        best = float(errors.min(initial=np.inf))
+        return best <= GOOD * self.size or int(np.sum(errors <= (1.0 + SAME) * best)) >= SETTLED
 
     def _search_round(self, search: DesignSearch, turn: int, before: int) -> None:
         """The designs of one more catalogue, kept when all are judged; so many were sound `before` this start."""
         first = len(self.sound), len(self.rejected)
         self._tell("catalogue")
-        catalogue = kept_catalogue(search.equations, search.free, DRAWS, self.seed + 1000 * turn)
+        catalogue = search.catalogue(DRAWS, self.seed + 1000 * turn)
         self._tell("matches")
         matches = search.matches(catalogue, MATCHES)
         self._tell("fit")
@@ -236,8 +246,9 @@ class TaskSearch:
 
 def _plan(many: int, seed: int) -> dict[str, Any]:
     """What makes a search what it is, beside its task."""
-    settings = {"draws": DRAWS, "matches": MATCHES, "rounds": ROUNDS, "good": GOOD, "spare": ALIKE_SPARE}
-    return {"version": __version__, "many": many, "seed": seed, "settings": settings | {"kept": KEPT_SHARE}}
+    settings = {"draws": DRAWS, "matches": MATCHES, "rounds": ROUNDS, "good": GOOD, "settled": SETTLED, "same": SAME}
+    settings |= {"spare": ALIKE_SPARE, "kept": KEPT_SHARE}
+    return {"version": __version__, "many": many, "seed": seed, "settings": settings}
 
 
 def _refusal(rejected: list[SynthesisedDesign]) -> str:

@@ -16,7 +16,7 @@ import planar
 from planar.synthesis.judgement.judgement import DesignJudge
 from tests.command import ROOT, run
 
-SETTINGS = {"DRAWS": 100, "MATCHES": 4, "ROUNDS": 2, "GOOD": 0.0}
+SETTINGS = {"DRAWS": 100, "MATCHES": 4, "ROUNDS": 2, "GOOD": 0.0, "SETTLED": 99}
 TASK = {
     "planar": 1,
     "name": "Lid",
