@@ -10,7 +10,7 @@ from urllib.parse import quote
 
 from planar.document.dimensions import file_dimensions
 from planar.document.files import read_asset
-from planar.drawing.designs.design_picture import design_picture
+from planar.drawing.designs.design_picture import closeup_picture, design_picture
 from planar.drawing.designs.function_picture import function_picture
 from planar.drawing.output.svg import pen_variable, svg
 from planar.drawing.paper.pens import PEN_STYLES
@@ -104,7 +104,12 @@ def _card(found: Synthesis, card: GalleryCard) -> str:
 def _figures(found: Synthesis, design: SynthesisedDesign) -> Iterator[str]:
     """The drawing of a design, and the diagrams of its functions."""
     name = design.mechanism.name
-    yield f"<figure>{svg(design_picture(design, found.task), name)}</figure>"
+    drawing = design_picture(design, found.task)
+    yield f"<figure>{svg(drawing, name)}</figure>"
+    closeup = closeup_picture(design, found.task, drawing)
+    if closeup is not None:
+        told = "What is wanted, enlarged"
+        yield f'<figure class="closeup">{svg(closeup, told)}<figcaption>{told}</figcaption></figure>'
     for item, wanted in enumerate(found.task.wanted):
         if not isinstance(wanted, WantedFunction):
             continue
@@ -119,7 +124,7 @@ def _facts(found: Synthesis, design: SynthesisedDesign) -> Iterator[tuple[str, s
     kind, units = miss_kind(found.task), found.task.units
     if not isnan(design.error):
         share = f", {100.0 * design.greatest_miss / found.size:.3g} % of the size"
-        yield "greatest miss", amount(design.greatest_miss, kind, units) + (share if kind == "length" else "")
+        yield "greatest miss", amount(design.greatest_miss, kind, units) + (share if found.task.wants_places else "")
         yield "root mean square", amount(design.error, kind, units)
     if design.motion is None:
         return

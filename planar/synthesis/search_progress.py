@@ -10,7 +10,8 @@ class SearchProgress(NamedTuple):
 
     `stage` is "catalogue", "matches", "fit" or "judgement" of the `round`-th catalogue of the start.
     `best` is the least error of a sound design so far (m, or rad where functions of angles alone are wanted; infinite
-    where there is none) and `best_share` the same beside the extent of what is wanted.
+    where there is none) and `best_share` the same beside the extent of
+    the places that are wanted, where there are some.
     """
 
     start: str

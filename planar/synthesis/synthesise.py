@@ -27,7 +27,6 @@ from planar.synthesis.synthesis import Synthesis, SynthesisedDesign, rank_design
 from planar.synthesis.task.freedom import count_freedom
 from planar.synthesis.task.starts import start_mechanisms
 from planar.synthesis.task.synthesis_task import ChainStart, SynthesisTask
-from planar.synthesis.task.task_numbers import miss_kind
 from planar.synthesis.task.task_reader import read_task
 
 DRAWS = 6000
@@ -188,7 +187,7 @@ class TaskSearch:
         if self.progress is not None:
             start, number, turn = self._at
             best = self.best_error()
-            share = best if miss_kind(self.task) == "angle" else best / self.size
+            share = best / self.size if self.task.wants_places else best
             self.progress(SearchProgress(start, number, self.count, turn, stage, best, share))
 
     def _judge(self, search: DesignSearch, judge: DesignJudge, candidate: Candidate) -> None:

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import planar
-from planar.drawing.designs.design_picture import design_picture
+from planar.drawing.designs.design_picture import closeup_picture, design_picture
 from planar.drawing.designs.function_picture import function_picture
 from planar.drawing.paper.picture import Circle, Label, Pen, Polyline
 from planar.synthesis.design_motion import design_motion
@@ -127,7 +127,7 @@ def test_each_design_is_drawn_and_said(path, folder):
     text = (folder / "index.html").read_text()
     cards = re.findall(r'<li id="([^"]+)">(.*?)<ul class="files">', text, re.DOTALL)
     assert [name for name, _ in cards] == ["01", "rejected-01", "rejected-02"]
-    assert all(card.count("<svg") == 1 for _, card in cards)
+    assert all(card.count("<svg") == 2 for _, card in cards), "the places of E once more, enlarged"
     own = cards[0][1]
     assert "0.4 mm, 0.8 % of the size" in own, "the third entry, of a size of 50 mm"
     low, high = np.degrees(path[0].motion[1:3])
@@ -190,6 +190,26 @@ def test_the_drawing_is_to_one_scale_with_what_is_wanted(path):
     assert width <= 84.0 + 1e-9 and height <= 66.0 + 1e-9
 
 
+def test_a_small_curve_is_shown_once_more_enlarged(path):
+    task = planar.read_task(planar.write_task(path.task))
+    own = path.task.wanted[0].places
+    turned = 5e-3 * np.column_stack([np.cos(np.arange(30.0)), np.sin(np.arange(30.0))])
+    many = task.wanted[0]._replace(places=own[0] + turned, weights=np.ones(30))
+    design = replace(path[0], inputs=(np.full(30, path[0].inputs[0][0]),))
+    task = replace(task, wanted=(many,))
+    drawn = design_picture(design, task)
+    assert not [each for each in drawn.marks if each.about.startswith(("wanted E", "entry"))], "the curve alone"
+    closeup = closeup_picture(design, task, drawn)
+    (curve,) = (each for each in closeup.marks if each.about == "wanted curve of E")
+    width, height = np.ptp(np.array(curve.points), axis=0)
+    assert max(width / 84.0, height / 50.0) == pytest.approx(1.0)
+    lines = [each for each in closeup.marks if each.about == "path E"]
+    assert lines
+    low, high = np.array(curve.points).min(axis=0) - 8.0 - 1e-6, np.array(curve.points).max(axis=0) + 8.0 + 1e-6
+    every = np.concatenate([each.points for each in lines])
+    assert (every >= low).all() and (every <= high).all()
+
+
 def test_poses_are_drawn_as_their_link():
     motion = planar.cycle("four-bar", 90)
     link = motion.link("BC")
@@ -198,6 +218,7 @@ def test_poses_are_drawn_as_their_link():
     found = designed([{"link": "BC", "poses": poses}], [own], "Poses")
     assert found[0].greatest_miss < 1e-9
     drawn = design_picture(found[0], found.task)
+    assert closeup_picture(found[0], found.task, drawn) is None, "large enough"
     wanted = [each for each in drawn.marks if each.about.startswith("pose of BC")]
     made = [each for each in drawn.marks if each.about.startswith("link BC ") and each.pen is Pen.POSITION]
     assert len(wanted) == len(made) == len(ROWS)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 
 from planar.drawing.designs.wanted_marks import (
+    MAX_NUMBERED,
+    REGION,
     link_outlines,
     pose_outlines,
     wanted_marks,
@@ -15,7 +17,8 @@ from planar.drawing.designs.wanted_marks import (
 )
 from planar.drawing.diagrams.drawn_run import DrawnRun, closed_run, steady_run
 from planar.drawing.diagrams.positions import JOINT_RADIUS, MIN_PATH_STEPS
-from planar.drawing.paper.picture import Circle, Fill, Label, Mark, Pen, Picture, Polyline, paper_point
+from planar.drawing.paper.clipping import clip_homogeneous_curve
+from planar.drawing.paper.picture import Circle, Fill, Label, Mark, Pen, Picture, Polyline, extent, paper_point
 from planar.drawing.paper.scales import Scale
 from planar.drawing.scheme.scheme import scheme
 from planar.foundation.arrays import Array
@@ -31,6 +34,9 @@ from planar.synthesis.task.wanted_expressions import carried_name
 
 ROOM = (84.0, 66.0)
 """mm that the strokes of one among many take at the most."""
+CLOSEUP_ROOM, CLOSEUP_SHARE, CLOSEUP_MARGIN = (84.0, 50.0), 0.4, 8.0
+"""mm of what is wanted, enlarged; drawn where it takes less than this part of a drawing; mm about it."""
+CLOSEUP_STEPS = 1440
 MAX_LETTERED_POINTS = 12
 """Points: of more a small drawing would be full of letters."""
 
@@ -65,6 +71,38 @@ def design_picture(
     return Picture((*marks, *strokes, *letters, *numbers), title)
 
 
+def closeup_picture(
+    design: SynthesisedDesign, task: SynthesisTask, drawn: Picture, room: tuple[float, float] = CLOSEUP_ROOM
+) -> Picture | None:
+    """What is wanted with the paths there, enlarged; None where the drawing of the design shows it large enough."""
+    wanted = [mark for mark in drawn.marks if isinstance(mark, Polyline) and mark.pen is Pen.WANTED]
+    places = wanted_places(task)
+    if not wanted or len(places) < 2 or _greatest_side(wanted) > CLOSEUP_SHARE * _greatest_side(drawn.marks):
+        return None
+    mechanism = design.mechanism
+    scale = _fitting_scale([places], mechanism, room)
+    marks = [mark for mark in wanted_marks(task, scale.per_mm) if mark.about != REGION]
+    try:
+        run = closed_run(steady_run(mechanism, steps=CLOSEUP_STEPS))
+    except (NoAnswer, BadInput):
+        return None
+    margin = CLOSEUP_MARGIN * scale.per_mm
+    low, high = places.min(axis=0) - margin, places.max(axis=0) + margin
+    for each in task.wanted:
+        if isinstance(each, WantedFunction):
+            continue
+        path = _path(run, mechanism, each)
+        for piece in clip_homogeneous_curve(np.column_stack([path, np.ones(len(path))]), low, high):
+            marks.append(Polyline(tuple(map(paper_point, piece / scale.per_mm)), Pen.PATH, f"path {each.of}"))
+    return Picture((*marks, *_entry_marks(design, task, scale, with_links=False)), "Enlarged")
+
+
+def _greatest_side(marks: Iterable[Mark]) -> float:
+    """The longer side of the box about marks (mm)."""
+    low, high = extent(marks)
+    return max(high[0] - low[0], high[1] - low[1])
+
+
 def _fitting_scale(places: list[Array], mechanism: Mechanism, room: tuple[float, float]) -> Scale:
     """The scale at which places (n, 2) take a room (mm)."""
     every = np.concatenate([np.empty((0, 2)), *places])
@@ -88,7 +126,9 @@ def link_poses(motion: Motion, link: str) -> Array:
     return found
 
 
-def _entry_marks(design: SynthesisedDesign, task: SynthesisTask, scale: Scale) -> Iterator[Mark]:
+def _entry_marks(
+    design: SynthesisedDesign, task: SynthesisTask, scale: Scale, with_links: bool = True
+) -> Iterator[Mark]:
     """Where the design is at each entry: a circle on its path; of a pose also its link there."""
     for wanted, inputs in zip(task.wanted, design.inputs, strict=True):
         if isinstance(wanted, WantedFunction):
@@ -103,7 +143,10 @@ def _entry_marks(design: SynthesisedDesign, task: SynthesisTask, scale: Scale) -
             poses = link_poses(motion, wanted.link)
             places = poses[:, :2]
             about = f"link {wanted.link}"
-            yield from link_outlines(motion.shapes[wanted.link], poses, scale.per_mm, Pen.POSITION, about)
+            if with_links:
+                yield from link_outlines(motion.shapes[wanted.link], poses, scale.per_mm, Pen.POSITION, about)
+        if len(places) > MAX_NUMBERED:
+            continue  # circles would hide the curve
         for number, at in enumerate(places / scale.per_mm, start=1):
             about = f"entry {number} of {wanted.of}"
             yield Circle(paper_point(at), JOINT_RADIUS, Pen.PATH, about, Fill.PAPER)

@@ -19,8 +19,10 @@ CROSS = 1.0
 POSE_ARM = 6.0
 """mm of the arrow along a pose's x-axis."""
 MAX_NUMBERED = 12
-"""Entries that have their numbers beside them; of more the drawing would be full of them."""
+"""Entries that have crosses with their numbers; of more the drawing would be full of them."""
 NUMBER_SIZE = 6.5
+REGION = "region"
+"""What the mark of the region is about in which all is to stay."""
 
 
 def wanted_places(task: SynthesisTask) -> Array:
@@ -43,7 +45,7 @@ def wanted_marks(task: SynthesisTask, per_mm: float) -> Iterator[Mark]:
     in which all is to stay. `per_mm` (m) is the scale."""
     if task.demands.inside is not None:
         corners = tuple(paper_point(each) for each in task.demands.inside / per_mm)
-        yield Polyline(corners, Pen.CONSTRUCTION, "region", closed=True)
+        yield Polyline(corners, Pen.CONSTRUCTION, REGION, closed=True)
     for wanted in task.wanted:
         if isinstance(wanted, WantedFunction):
             continue
@@ -51,6 +53,8 @@ def wanted_marks(task: SynthesisTask, per_mm: float) -> Iterator[Mark]:
         if isinstance(wanted, WantedPath) and (wanted.in_order or wanted.is_closed):
             points = tuple(map(paper_point, spots))
             yield Polyline(points, Pen.WANTED, f"wanted curve of {wanted.of}", closed=wanted.is_closed)
+        if len(spots) > MAX_NUMBERED and isinstance(wanted, WantedPath) and (wanted.in_order or wanted.is_closed):
+            continue  # the curve alone: crosses would hide it
         for number, spot in enumerate(spots, start=1):
             about = f"wanted {wanted.of} {number}"
             yield from _cross(spot, about)

@@ -89,8 +89,8 @@ def progress_text(done: SearchProgress, task: SynthesisTask) -> str:
     where = f"{number} ({done.start}), catalogue {done.round}: {done.stage}"
     if done.best == float("inf"):
         return where
-    is_length = miss_kind(task) == "length"
-    best = f"{100.0 * done.best_share:.3g} % of the size" if is_length else amount(done.best, "angle", task.units)
+    share = f"{100.0 * done.best_share:.3g} % of the size"
+    best = share if task.wants_places else amount(done.best, miss_kind(task), task.units)
     return f"{where}; best error so far {best}"
 
 

@@ -38,7 +38,7 @@ def design_columns(found: Synthesis, names: Sequence[str]) -> Iterator[DesignCol
     kind = miss_kind(found.task)
     yield _quantities(found, "root mean square", kind, [each.error for each in every])
     yield _quantities(found, "greatest miss", kind, [each.greatest_miss for each in every])
-    if kind == "length":
+    if found.task.wants_places:
         shares = [100.0 * each.greatest_miss / found.size for each in every]
         yield DesignColumn("of the extent", "%", _finite(shares))
     motions = [each.motion for each in every]

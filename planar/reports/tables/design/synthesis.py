@@ -71,8 +71,7 @@ def _misses(found: Synthesis, design: SynthesisedDesign) -> tuple[str, str, str]
     kind, units = miss_kind(found.task), found.task.units
     if design.error != design.error:
         return "", "", ""
-    whole = found.size if kind == "length" else 1.0
-    share = format_number(100.0 * design.greatest_miss / whole) if kind == "length" else ""
+    share = format_number(100.0 * design.greatest_miss / found.size) if found.task.wants_places else ""
     return amount(design.greatest_miss, kind, units), amount(design.error, kind, units), share
 
 
