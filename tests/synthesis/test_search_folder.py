@@ -112,6 +112,19 @@ def test_what_was_stopped_goes_on_to_the_same_designs(whole, tmp_path, monkeypat
     assert texts(tmp_path / "designs") == texts(folder)
 
 
+def test_what_is_in_the_way_is_told_alike_after_an_interrupt(tmp_path, monkeypatch):
+    task = TASK | {"start": "slider-crank", "demands": [{"inside": [[-1, -1], [1, 1]]}]}
+    with monkeypatch.context() as patch:
+        stop_at(patch, None, judged := [])
+        whole = planar.synthesise(task, many=1)
+    with monkeypatch.context() as patch:
+        stop_at(patch, len(judged) - 1, [])
+        with pytest.raises(KeyboardInterrupt):
+            planar.synthesise(task, many=1, folder=tmp_path)
+    assert_same(planar.synthesise(task, many=1, folder=tmp_path), whole)
+    assert not len(whole) and len(whole.remarks) > 1
+
+
 def test_a_process_that_is_killed_leaves_nothing_broken(whole, tmp_path):
     found, folder, _ = whole
     copied(folder, tmp_path / "designs", leave_out=("00002-2.json",))
