@@ -12,7 +12,7 @@ from planar.foundation.safe_files import save_file
 from planar.model.mechanism import Mechanism
 from planar.pages.data.wanted_data import apply_task
 from planar.pages.design_cards import GalleryCard, gallery_page
-from planar.pages.page import page
+from planar.pages.page import PageLink, page
 from planar.reports.tables.design.design_columns import design_columns, design_csv
 from planar.synthesis.search_folder import claim_folder
 from planar.synthesis.synthesis import Synthesis, check_synthesis
@@ -76,7 +76,7 @@ def _page(mechanism: Mechanism, task: SynthesisTask) -> str | None:
     """The page of a design, None where it has no position to start from."""
     try:
         ready, wanted = apply_task(mechanism, task)
-        return page(ready, back=INDEX, wanted=wanted)
+        return page(ready, back=PageLink(INDEX, "All designs"), wanted=wanted)
     except NoAnswer:
         return None
 

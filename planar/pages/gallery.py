@@ -19,7 +19,7 @@ from planar.pages.data.scheme_data import frames_of_rows, scheme_data
 from planar.pages.drawing_style import pen_styles, symbol_script
 from planar.pages.gallery_kinds import KINDS, kind_and_search_text
 from planar.pages.overlay_style import round_value_script
-from planar.pages.page import fill_template, page, script_safe_json
+from planar.pages.page import PageLink, fill_template, page, script_safe_json
 from planar.results.motion import Motion
 from planar.solving.cycle import cycle
 from planar.solving.position import solved_mechanism
@@ -55,7 +55,7 @@ def write_gallery(
     taken, shown, refused = {"index"}, [], []
     for done, (name, mechanism) in enumerate(models, start=1):
         try:
-            text, moving = page(mechanism, back="index.html"), small_picture_data(mechanism)
+            text, moving = page(mechanism, back=PageLink("index.html", "All mechanisms")), small_picture_data(mechanism)
         except NoAnswer as problem:
             refused.append((name, problem))
             continue

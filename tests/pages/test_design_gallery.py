@@ -264,4 +264,6 @@ def test_the_gallery_in_a_browser(folder):
             assert colour == {"light": "rgb(194, 24, 91)", "dark": "rgb(255, 138, 180)"}[scheme]
             window.get_by_role("link", name="Page").click()
             window.locator("#drawing .wanted path.cross").first.wait_for()
+            window.get_by_role("link", name="All designs").click()
+            window.locator("#designs").wait_for()
             assert wrong == []
