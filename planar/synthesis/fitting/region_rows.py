@@ -1,0 +1,85 @@
+"""How far inside a polygon the points of a mechanism are, with slopes, at positions of many designs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+
+import casadi as ca
+import numpy as np
+
+from planar.derivatives.design_equations import design_equations
+from planar.equations.casadi_call import BufferedFunction
+from planar.equations.elimination import stack_expressions
+from planar.foundation.arrays import Array
+from planar.model.mechanism import Mechanism, named_points
+from planar.synthesis.fitting.wanted_equations import in_entries
+
+
+class RegionRows:
+    """Depths (of a size in m) at positions y of designs x (see `in_entries`), a column for each named point."""
+
+    def __init__(self, mechanism: Mechanism, corners: Array, size: float, free: Sequence[str], scale: Array):
+        self.mechanism, self.corners, self.size = mechanism, corners / size, size
+        self.free, self.scale = tuple(free), scale
+        self.points = named_points(mechanism)
+
+    def __len__(self) -> int:
+        """How many columns there are."""
+        return len(self.points)
+
+    @cached_property
+    def _places(self) -> tuple[BufferedFunction, BufferedFunction]:
+        """(y, x) -> places of all points (x and y of each in turn), and the same with their Jacobians in y and x."""
+        design = design_equations(self.mechanism)
+        frames, _ = design.placed
+        parts = []
+        for each in self.points:
+            link, at = each.members[0]
+            parts += list(frames[link].to_world(design.work.shapes[link].position(at)))
+        y, x, (places,) = in_entries(design, self.free, self.scale, [stack_expressions(parts) / self.size])
+        told = [places], [places, ca.jacobian(places, y), ca.jacobian(places, x)]
+        value, slopes = (ca.Function("places", [y, x], [ca.densify(each) for each in found]) for found in told)
+        return BufferedFunction(value), BufferedFunction(slopes)
+
+    def values(self, x: Array, y: Array) -> Array:
+        """The depths (positions, points), of positions y (positions, unknowns) of designs x (positions, free)."""
+        places = self._places[0].evaluate_batch(len(y), y, x)[0]
+        return polygon_depths(places.reshape(-1, 2), self.corners)[0].reshape(len(y), -1)
+
+    def linearise(self, x: Array, y: Array) -> tuple[Array, Array, Array]:
+        """The depths, and their slopes in y (positions, points, unknowns) and x (positions, points, free), each with
+        the other held."""
+        places, by_y, by_x = self._places[1].evaluate_batch(len(y), y, x)
+        depths, ways = polygon_depths(places.reshape(-1, 2), self.corners)
+        ways = ways.reshape(len(y), -1, 2)
+        slopes = (
+            np.einsum("npa,npai->npi", ways, each.swapaxes(1, 2).reshape(len(y), len(self), 2, -1))
+            for each in (by_y, by_x)
+        )
+        return (depths.reshape(len(y), -1), *slopes)  # type: ignore[return-value]
+
+
+def polygon_depths(places: Array, corners: Array) -> tuple[Array, Array]:
+    """How far places (n, 2) are from the border of a polygon (corners, 2), below zero outside; and in which direction
+    (n, 2) that grows the most."""
+    first, second = corners, np.roll(corners, -1, axis=0)
+    along = second - first
+    x, y = places[:, 0, None], places[:, 1, None]
+    crosses = (first[:, 1] > y) != (second[:, 1] > y)
+    rise = np.where(crosses, along[:, 1], 1.0)
+    right = first[:, 0] + (y - first[:, 1]) / rise * along[:, 0]
+    is_inside = np.sum(crosses & (x < right), axis=1) % 2 == 1
+    share = np.clip(np.sum((places[:, None] - first) * along, axis=2) / np.sum(along**2, axis=1), 0.0, 1.0)
+    off = places[:, None] - first - share[..., None] * along
+    distance = np.linalg.norm(off, axis=2)
+    distance = np.where(np.isfinite(distance), distance, np.inf)
+    nearest = np.argmin(distance, axis=1)
+    every = np.arange(len(places))
+    least, off, side = distance[every, nearest], off[every, nearest], along[nearest]
+    turned = 1.0 if np.sum(first[:, 0] * second[:, 1] - second[:, 0] * first[:, 1]) > 0.0 else -1.0
+    inward = turned * np.stack([-side[:, 1], side[:, 0]], axis=1) / np.linalg.norm(side, axis=1, keepdims=True)
+    sense = np.where(is_inside, 1.0, -1.0)
+    apart = least > 1e-9 * np.ptp(corners, axis=0).max()
+    ways = np.where(apart[:, None], sense[:, None] * off / np.where(apart, least, 1.0)[:, None], inward)
+    return np.where(np.isfinite(places).all(axis=1), sense * least, np.nan), ways
