@@ -12,15 +12,13 @@ from planar.model.mechanism import Mechanism
 from planar.synthesis.catalogue.catalogue import Catalogue, build_catalogue
 from planar.synthesis.catalogue.matches import Match, WantedItem, find_matches
 from planar.synthesis.catalogue.moved_numbers import moved_numbers
+from planar.synthesis.fitting.demanded_rows import GUARD_POSITIONS, demand_guards
 from planar.synthesis.fitting.design_fit import DesignFit, FittedDesigns
 from planar.synthesis.fitting.wanted_equations import WantedEquations, tangents
 from planar.synthesis.fitting.wanted_rows import wanted_rows, wanted_size
 from planar.synthesis.task.freedom import can_move_whole
 from planar.synthesis.task.starts import FreeNumbers, free_numbers
 from planar.synthesis.task.synthesis_task import SynthesisTask, WantedPath
-
-GUARD_POSITIONS = 24
-"""Round a turn, at which a design that is to turn fully must go together all the time."""
 
 
 class Candidate(NamedTuple):
@@ -31,6 +29,8 @@ class Candidate(NamedTuple):
     unknowns: tuple[Array, ...]
     "of each wanted item (n, unknowns)"
     squares: float
+    lack: float = 0.0
+    "by how much a demand is missed, rad or of the extent of what is wanted"
 
 
 class DesignSearch:
@@ -49,8 +49,7 @@ class DesignSearch:
         self.moves = moved_numbers(self.equations[0], self.free)
         closed = any(isinstance(each, WantedPath) and each.is_closed for each in task.wanted)
         self.needs_whole_turn = task.demands.whole_turn or closed
-        guard = rows[0]._replace(inputs=np.zeros(GUARD_POSITIONS))
-        self.guard = WantedEquations(mechanism, guard, self.free.names, own) if self.needs_whole_turn else None
+        self.guards = demand_guards(task, self.equations[0], rows[0], self.free, self.size)
 
     def catalogue(self, count: int, seed: int) -> Catalogue:
         """Random designs of this start with their motion."""
@@ -70,10 +69,17 @@ class DesignSearch:
         return find_matches(catalogue, items, self.can_move, many, self.needs_whole_turn)
 
     def fit(self, catalogue: Catalogue, matches: list[Match], keep: int) -> list[Candidate]:
-        """The matches fitted, the best so many."""
-        if not matches:
-            return []
-        guarded: list[Array] = []
+        """The matches fitted, the best so many; of those that turn fully, and of others, where demands are kept."""
+        guarded_turn = self.needs_whole_turn or self.guards is not None
+        is_whole = [bool(guarded_turn and catalogue.is_whole[each.design]) for each in matches]
+        found: list[Candidate] = []
+        for over_turn in (True, False):
+            own = [each for each, whole in zip(matches, is_whole, strict=True) if whole is over_turn]
+            found += self._fit_alike(catalogue, own, keep, over_turn) if own else []
+        return sorted(found, key=lambda each: (each.lack > 0.0, each.squares))[:keep]
+
+    def _fit_alike(self, catalogue: Catalogue, matches: list[Match], keep: int, over_turn: bool) -> list[Candidate]:
+        """Matches fitted that all turn fully, or are all seen between their entries only."""
         numbers, unknowns = [], [[] for _ in self.equations]  # type: ignore[var-annotated]
         for match in matches:
             x = catalogue.numbers[match.design]
@@ -83,21 +89,29 @@ class DesignSearch:
                 moved, own = self.moves.move(x, y, match.factor, match.offset / self.ratio)
                 unknowns[k].append(own)
             numbers.append(moved if self.can_move else x)
-            if self.guard is not None:
-                guarded.append(self._turn(catalogue, match))
         x, ys = np.array(numbers), [np.array(each) for each in unknowns]
         zeros = self._zeros(x, ys)
         scale = self.equations[0].scale
-        fit = DesignFit(self.equations, self.free.lower / scale, self.free.upper / scale, self.guard)
-        found: FittedDesigns = fit.fit(x, ys, zeros, keep, np.array(guarded) if guarded else None)
+        guard = self.guards[over_turn] if self.guards is not None else None
+        fit = DesignFit(self.equations, self.free.lower / scale, self.free.upper / scale, guard)
+        shares = np.broadcast_to(np.linspace(0.0, 1.0, GUARD_POSITIONS + 1), (len(x), GUARD_POSITIONS + 1))
+        positions = [self._guard_positions(catalogue, match, over_turn, ys, k) for k, match in enumerate(matches)]
+        found = fit.fit(x, ys, zeros, keep, (np.array(positions), shares) if guard is not None else None)
         return [self._candidate(found, k) for k in range(len(found.squares)) if np.isfinite(found.squares[k])]
 
-    def _turn(self, catalogue: Catalogue, match: Match) -> Array:
-        """The unknowns of a match at positions all round its turn."""
+    def _guard_positions(
+        self, catalogue: Catalogue, match: Match, over_turn: bool, unknowns: list[Array], k: int
+    ) -> Array:
+        """The unknowns of a match at positions all round its turn, or between its entries (design k of these)."""
         own = catalogue.unknowns[match.design]
         own = own[np.isfinite(own).all(axis=1)]
-        own = own[np.linspace(0, len(own) - 1, GUARD_POSITIONS, endpoint=False).astype(int)]
-        return self.moves.move(catalogue.numbers[match.design], own, match.factor, match.offset / self.ratio)[1]
+        moved = self.moves.move(catalogue.numbers[match.design], own, match.factor, match.offset / self.ratio)[1]
+        if over_turn:
+            return moved[np.linspace(0, len(own) - 1, GUARD_POSITIONS + 1).astype(int)]
+        ends = np.concatenate([each[k][:, -1] for each in unknowns])
+        wanted = np.linspace(ends.min(), ends.max(), GUARD_POSITIONS + 1)
+        found: Array = np.stack([np.interp(wanted, moved[:, -1], part) for part in moved.T], axis=1)
+        return found
 
     def most_regular(self, candidate: Candidate) -> Array:
         """The unknowns of that entry which is farthest from a dead point: there the assemblies lie apart."""
@@ -139,4 +153,5 @@ class DesignSearch:
             dict(zip(self.free.names, map(float, numbers), strict=True)),
             tuple(each[k] for each in found.unknowns),
             float(found.squares[k]),
+            float(found.lacks[k]),
         )

@@ -61,12 +61,12 @@ class TransmissionRows:
             ],
         )
         y, x, (acting, angle) = in_entries(design, self.free, self.scale, [acting, angle])
-        l = balance.unknowns
+        forces = balance.unknowns
         w = ca.SX.sym("w", acting.numel())
-        A, b = ca.jacobian(acting, l), ca.substitute(acting, l, ca.SX.zeros(l.numel()))
+        A, b = ca.jacobian(acting, forces), ca.substitute(acting, forces, ca.SX.zeros(forces.numel()))
         adjoint = angle - ca.dot(w, acting)
-        told = ([y, x], [A, b]), ([y, x, l], [angle, ca.jacobian(angle, l)])
-        slopes = [y, x, l, w], [ca.jacobian(adjoint, y), ca.jacobian(adjoint, x)]
+        told = ([y, x], [A, b]), ([y, x, forces], [angle, ca.jacobian(angle, forces)])
+        slopes = [y, x, forces, w], [ca.jacobian(adjoint, y), ca.jacobian(adjoint, x)]
         return _OutputFunctions(
             *(
                 BufferedFunction(ca.Function("output", given, [ca.densify(each) for each in found]))

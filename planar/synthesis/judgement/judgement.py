@@ -7,9 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planar.analysis.motion.transmission_angle import transmission
 from planar.foundation.arrays import Array, BoolArray
-from planar.foundation.errors import BadInput, NoAnswer, PlanarError
+from planar.foundation.errors import BadInput, NoAnswer
 from planar.foundation.jets import TURN, Scalar, value_and_rates
 from planar.model.mechanism import Mechanism, relative_motions
 from planar.model.pairs import MeasureKind
@@ -17,6 +16,7 @@ from planar.model.wording import amount
 from planar.results.motion import Motion
 from planar.solving.cycle import cycle
 from planar.solving.grids.grid_motion import motion_over_input
+from planar.synthesis.judgement.output_transmissions import output_transmissions
 from planar.synthesis.task.synthesis_task import SynthesisTask, Wanted, WantedFunction, WantedPath
 from planar.synthesis.task.wanted_expressions import carried_name
 
@@ -166,21 +166,12 @@ class DesignJudge:
 
 def _transmission_defects(motion: Motion, least: float) -> Iterator[str]:
     mechanism = motion.mechanism
-    outputs = [
-        pair.name
-        for pair in mechanism.pairs
-        if mechanism.frame in pair.links and pair.name not in {each.pair for each in mechanism.inputs}
-    ]
-    for name in outputs:
-        try:
-            found = transmission(motion, name)
-        except PlanarError:
-            continue  # nothing is transmitted to it by one force
+    for found in output_transmissions(motion):
         if found.least is not None and found.least.value < least:
             at = amount(found.least.input, _input_kind(mechanism), mechanism.units)
             angle, wanted = (amount(each, "angle", mechanism.units) for each in (found.least.value, least))
             where = f"{mechanism.inputs[0].pair} = {at}"
-            yield f"the transmission angle at {name} falls to {angle} at {where}, below {wanted}"
+            yield f"the transmission angle at {found.pair} falls to {angle} at {where}, below {wanted}"
 
 
 def _region_defects(motion: Motion, corners: Array) -> Iterator[str]:

@@ -115,7 +115,7 @@ def count_freedom(task: SynthesisTask, mechanism: Mechanism) -> FreedomCount:
     Raises NoAnswer where the start cannot move.
     """
     free = free_numbers(task, mechanism)
-    items = _result_rows(_generic(mechanism, free), task.wanted, free)
+    items = _result_rows(generic_start(mechanism, free), task.wanted, free)
     every, own = (
         unseen_changes(_stack([each.spread(count) for each, count in zip(items, counts, strict=True)]))[2]
         for counts in ([len(each.values) for each in items], [len(each.weights) for each in task.wanted])
@@ -197,7 +197,7 @@ def _is_length(mechanism: Mechanism, wanted: Wanted, part: int) -> bool:
     return part < 2
 
 
-def _generic(mechanism: Mechanism, free: FreeNumbers) -> Mechanism:
+def generic_start(mechanism: Mechanism, free: FreeNumbers) -> Mechanism:
     """A mechanism near a start, which may be a special one; the start itself, where that does not go together."""
     size = float(np.abs(free.values[np.array(free.kinds) == "length"]).max(initial=0.0)) or 1.0
     way = np.cos(1.0 + np.arange(len(free.names)))
