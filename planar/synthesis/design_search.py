@@ -12,7 +12,7 @@ from planar.model.mechanism import Mechanism
 from planar.synthesis.catalogue.catalogue import Catalogue, build_catalogue
 from planar.synthesis.catalogue.matches import Match, WantedItem, find_matches
 from planar.synthesis.catalogue.moved_numbers import moved_numbers
-from planar.synthesis.fitting.demanded_rows import GUARD_POSITIONS, demand_guards
+from planar.synthesis.fitting.demanded_rows import demand_guards
 from planar.synthesis.fitting.design_fit import DesignFit, FittedDesigns
 from planar.synthesis.fitting.wanted_equations import WantedEquations, tangents
 from planar.synthesis.fitting.wanted_rows import wanted_rows, wanted_size
@@ -94,22 +94,24 @@ class DesignSearch:
         scale = self.equations[0].scale
         guard = self.guards[over_turn] if self.guards is not None else None
         fit = DesignFit(self.equations, self.free.lower / scale, self.free.upper / scale, guard)
-        shares = np.broadcast_to(np.linspace(0.0, 1.0, GUARD_POSITIONS + 1), (len(x), GUARD_POSITIONS + 1))
-        positions = [self._guard_positions(catalogue, match, over_turn, ys, k) for k, match in enumerate(matches)]
+        many = 0 if guard is None else guard.position_count
+        shares = np.broadcast_to(np.linspace(0.0, 1.0, many), (len(x), many))
+        positions = [self._guard_positions(catalogue, match, many, over_turn, ys, k) for k, match in enumerate(matches)]
         found = fit.fit(x, ys, zeros, keep, (np.array(positions), shares) if guard is not None else None)
         return [self._candidate(found, k) for k in range(len(found.squares)) if np.isfinite(found.squares[k])]
 
     def _guard_positions(
-        self, catalogue: Catalogue, match: Match, over_turn: bool, unknowns: list[Array], k: int
+        self, catalogue: Catalogue, match: Match, many: int, over_turn: bool, unknowns: list[Array], k: int
     ) -> Array:
         """The unknowns of a match at positions all round its turn, or between its entries (design k of these)."""
         own = catalogue.unknowns[match.design]
         own = own[np.isfinite(own).all(axis=1)]
         moved = self.moves.move(catalogue.numbers[match.design], own, match.factor, match.offset / self.ratio)[1]
         if over_turn:
-            return moved[np.linspace(0, len(own) - 1, GUARD_POSITIONS + 1).astype(int)]
+            turned: Array = moved[np.linspace(0, len(own) - 1, many).astype(int)]
+            return turned
         ends = np.concatenate([each[k][:, -1] for each in unknowns])
-        wanted = np.linspace(ends.min(), ends.max(), GUARD_POSITIONS + 1)
+        wanted = np.linspace(ends.min(), ends.max(), many)
         found: Array = np.stack([np.interp(wanted, moved[:, -1], part) for part in moved.T], axis=1)
         return found
 

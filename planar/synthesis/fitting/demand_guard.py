@@ -49,6 +49,11 @@ class DemandGuard:
     over_range: bool = False
 
     @property
+    def position_count(self) -> int:
+        """How many positions are spread over the motion."""
+        return 0 if self.equations.rows.inputs is None else len(self.equations.rows.inputs)
+
+    @property
     def row_count(self) -> int:
         """How many slacks a position has."""
         return sum(len(each) for each in self.rows)
@@ -61,6 +66,8 @@ class DemandGuard:
     def close(self, numbers: Array, before: Array, shares: Array, unknowns: Sequence[Array]) -> tuple[Array, BoolArray]:
         """Unknowns of the positions (designs, positions, unknowns) of changed designs near those before, and which
         designs go together at all of them."""
+        if not before.shape[1]:
+            return before, np.ones(len(before), bool)
         tried = before
         if self.over_range:
             low, high = self.ends(unknowns)
@@ -70,13 +77,13 @@ class DemandGuard:
         return found, is_closed & (np.abs(found - before).max(axis=(1, 2), initial=0.0) < MAX_GUARD_MOVE)
 
     def slacks(self, numbers: Array, y: Array) -> Array:
-        """What is left of every demand (designs, positions, rows), rad or of the size; below zero it is not kept."""
+        """What is left of every demand (designs, positions * rows), rad or of the size; below zero it is not kept."""
         many, positions, unknowns = y.shape
         if not self.rows:
-            return np.zeros((many, positions, 0))
+            return np.zeros((many, 0))
         flat, x = y.reshape(-1, unknowns), np.repeat(numbers, positions, axis=0)
         parts = [each.values(x, flat) - least for each, least in zip(self.rows, self.least, strict=True)]
-        found = np.concatenate(parts, axis=1).reshape(many, positions, -1) - MARGIN
+        found = np.concatenate(parts, axis=1).reshape(many, positions * self.row_count) - MARGIN
         return np.where(np.isfinite(found), found, UNKNOWN_SLACK)
 
     def slopes(self, numbers: Array, y: Array, is_near: BoolArray) -> DemandSlopes:

@@ -9,14 +9,16 @@ from __future__ import annotations
 
 import numpy as np
 
-from planar.foundation.arrays import Array
-from planar.synthesis.fitting.kept_demands import KEPT
+from planar.foundation.arrays import Array, BoolArray
+from planar.synthesis.fitting.kept_demands import KEPT, lacks
 from planar.synthesis.fitting.moving_designs import MovingDesigns
 from planar.synthesis.fitting.normal_equations import damped_matrices
 
 POLISHING_STEPS = 20
 LEAST_SLACKS = 24
 """Of a design, that a step regards."""
+NEAR = 1e-3
+"""A slack that is less may bear on what is best."""
 SWEEPS = 120
 FIRST_DAMPING, GREATEST_DAMPING = 1e-6, 1e6
 ENOUGH_DROP = 0.8
@@ -32,15 +34,15 @@ def polish_demands(state: MovingDesigns) -> None:
     demands.relocate(state.numbers, state.unknowns)
     many = len(state.numbers)
     squares = state.misses(state.numbers, state.unknowns, state.zeros)
-    damping, is_moving = np.full(many, FIRST_DAMPING), np.ones(many, bool)
+    damping, is_moving = np.full(many, FIRST_DAMPING), np.asarray(demands.slack.min(axis=1) < NEAR)
     for _ in range(POLISHING_STEPS):
         rows = np.flatnonzero(is_moving)
         if not len(rows):
             break
         lines, normal, slope = state.linearise(rows)
-        changes = state.range_changes(rows, lines)
+        changes = state.input_changes(rows, lines)
         numbers, size = state.numbers[rows], slope.shape[1]
-        slack, slopes = demands.least_rows(numbers, changes, size, rows, LEAST_SLACKS)
+        slack, slopes = demands.least_rows(numbers, changes, rows, LEAST_SLACKS)
         ends, ways = _bounds(state, numbers, size)
         change = constrained_step(
             damped_matrices(normal, damping[rows]),
@@ -49,7 +51,7 @@ def polish_demands(state: MovingDesigns) -> None:
             np.concatenate([slopes, np.broadcast_to(ways, (len(rows), *ways.shape))], axis=1),
         )
         trial = state.tried(rows, lines, change)
-        lack = np.maximum(-trial.slack, 0.0).max(axis=(1, 2), initial=0.0)
+        lack = lacks(trial.slack)
         after, before = state.misses(trial.numbers, trial.unknowns, trial.zeros), demands.lack[rows]
         is_kept = lack <= KEPT
         is_better = trial.is_good & np.where(
@@ -78,7 +80,7 @@ def constrained_step(normal: Array, slope: Array, slack: Array, slopes: Array) -
     """The steps dx (designs, size) that make 1/2 dx^T N dx + g^T dx least with h + H dx >= 0; NaN where N has none.
 
     N (designs, size, size), g (designs, size), h (designs, k), H (designs, k, size)."""
-    is_known = np.isfinite(normal).all(axis=(1, 2)) & np.isfinite(slope).all(axis=1)
+    is_known: BoolArray = np.asarray(np.isfinite(normal).all(axis=(1, 2)) & np.isfinite(slope).all(axis=1))
     normal = np.where(is_known[:, None, None], normal, np.eye(normal.shape[1]))
     right = np.concatenate([slope[:, :, None], slopes.swapaxes(1, 2)], axis=2)
     try:

@@ -34,9 +34,10 @@ def demand_guards(
         kept.append((_transmission_rows(equations, free), demands.transmission))
     if demands.inside is not None:
         kept.append((RegionRows(mechanism, demands.inside, size, equations.free, equations.scale), 0.0))
-    if not (kept or demands.whole_turn or closed):
+    is_guarded = bool(kept or demands.whole_turn or demands.one_branch or closed)
+    if not (is_guarded or any(getattr(each, "in_order", False) for each in task.wanted)):
         return None
-    positions = rows._replace(inputs=np.zeros(GUARD_POSITIONS + 1))
+    positions = rows._replace(inputs=np.zeros(GUARD_POSITIONS + 1 if is_guarded else 0))
     guarded = WantedEquations(mechanism, positions, equations.free, equations.unit)
     kept = [each for each in kept if len(each[0])]
     told = tuple(each for each, _ in kept), tuple(least for _, least in kept)

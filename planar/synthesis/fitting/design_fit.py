@@ -65,7 +65,7 @@ class DesignFit:
                 state.keep_best(max(keep, FEW, (len(state.numbers) + 1) // 2))
 
         state.run(MAX_STEPS, halve)
-        if state.demands is not None and state.demands.guard.rows:
+        if state.demands is not None and state.demands.can_lack:
             state.keep_best(max(keep, FEW))
             for _ in range(PRESSINGS):
                 if not state.press():

@@ -11,13 +11,14 @@ import numpy as np
 
 from planar.foundation.arrays import Array, BoolArray, IntArray
 from planar.synthesis.fitting.demand_guard import DemandGuard
+from planar.synthesis.fitting.entry_order import EntryOrder
 from planar.synthesis.fitting.kept_demands import KeptDemands
 from planar.synthesis.fitting.normal_equations import (
     GlobalNumbers,
-    RangeChanges,
+    InputChanges,
     entry_moves,
+    input_changes,
     normal_equations,
-    range_changes,
     solve_damped,
 )
 from planar.synthesis.fitting.wanted_equations import LinearRows, WantedEquations, tangents
@@ -95,7 +96,8 @@ class MovingDesigns:
             is_closed &= own
         self.demands: KeptDemands | None = None
         if fit.guard is not None and guarded is not None:
-            self.demands = KeptDemands(fit.guard, self.numbers, self.unknowns, *guarded)
+            order = EntryOrder(fit.equations, self.unknowns, not fit.guard.over_range)
+            self.demands = KeptDemands(fit.guard, order, self.numbers, self.unknowns, *guarded)
             is_closed &= self.demands.is_closed
         self.squares = np.full(len(numbers), np.inf)
         self.damping = np.full(len(numbers), FIRST_DAMPING)
@@ -131,8 +133,8 @@ class MovingDesigns:
         assert self.demands is not None
         before = self.demands.multipliers
         self.demands.press()
-        changed = np.abs(self.demands.multipliers - before).max(axis=(1, 2), initial=0.0)
-        self.is_moving = changed > SETTLED * self.demands.multipliers.max(axis=(1, 2), initial=0.0)
+        changed = np.abs(self.demands.multipliers - before).max(axis=1, initial=0.0)
+        self.is_moving = changed > SETTLED * self.demands.multipliers.max(axis=1, initial=0.0)
         self.damping[self.is_moving], self.idle[self.is_moving] = FIRST_DAMPING, 0
         self.squares = self.merits()
         return bool(self.is_moving.any())
@@ -162,10 +164,10 @@ class MovingDesigns:
             lines.append(line if each.is_timed else self._held_at_dead_points(line, self.headings[k][rows]))
         return lines, *normal_equations(fit.equations, lines, fit.globals)
 
-    def range_changes(self, rows: IntArray, lines: Sequence[LinearRows]) -> RangeChanges:
-        """How the ends of the range of all entries' inputs change in a step."""
+    def input_changes(self, rows: IntArray, lines: Sequence[LinearRows]) -> InputChanges:
+        """How the inputs of all entries change in a step."""
         unknowns = [each[rows] for each in self.unknowns]
-        return range_changes(self.fit.equations, lines, unknowns, self.fit.globals)
+        return input_changes(self.fit.equations, lines, unknowns, self.fit.globals)
 
     def advance(self) -> None:
         """One step of every design that still moves; one that wins nothing is taken back."""
@@ -173,7 +175,7 @@ class MovingDesigns:
         numbers = self.numbers[rows]
         lines, normal, slope = self.linearise(rows)
         if self.demands is not None:
-            self.demands.add_rows(normal, slope, numbers, self.range_changes(rows, lines), rows)
+            self.demands.add_rows(normal, slope, numbers, self.input_changes(rows, lines), rows)
         change = solve_damped(normal, slope, self.damping[rows], numbers, self.fit.lower, self.fit.upper)
         trial = self.tried(rows, lines, change)
         squares = self.misses(trial.numbers, trial.unknowns, trial.zeros)
@@ -202,7 +204,9 @@ class MovingDesigns:
         shortened = self._shortening(change, moves)
         after = np.clip(self.numbers[rows] + shortened[:, None] * change[:, : fit.globals.free], fit.lower, fit.upper)
         is_good: BoolArray = np.asarray(np.isfinite(change).all(axis=1))
-        unknowns, zeros, ways = [], [], []
+        unknowns: list[Array] = []
+        zeros: list[Array] = []
+        ways: list[Array] = []
         for k, each in enumerate(fit.equations):
             before = self.tangents[k][rows]
             moved = self.unknowns[k][rows] + shortened[:, None, None] * moves[k]
@@ -214,7 +218,8 @@ class MovingDesigns:
             unknowns.append(y)
             zeros.append(self.zeros[k][rows] + shortened[:, None] * change[:, fit.globals.zero_columns[k]])
             ways.append(way)
-        guarded = slack = np.zeros((len(rows), 0, 1))
+        guarded: Array = np.zeros((len(rows), 0))
+        slack = guarded
         if self.demands is not None:
             guarded, slack, is_closed = self.demands.place(after, unknowns, rows)
             is_good = np.asarray(is_good & is_closed)

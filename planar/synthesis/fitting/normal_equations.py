@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.foundation.arrays import Array, IntArray
+from planar.foundation.arrays import Array, BoolArray, IntArray
 from planar.synthesis.fitting.wanted_equations import DAMPING_ALONG, LinearRows, WantedEquations
 
 
@@ -27,18 +27,22 @@ class GlobalNumbers:
         return np.concatenate([np.arange(self.free), self.zero_columns[k]])
 
 
-class RangeChanges(NamedTuple):
-    """How the first and the last input of a design's entries change in a step: by themselves, and with the globals."""
+class InputChanges(NamedTuple):
+    """How the inputs of all entries, one kind of rows after the other, change in a step: by themselves, and with the
+    globals; and which are the least and the greatest."""
 
     own: Array
-    "(designs, 2)"
+    "(designs, n)"
     slopes: Array
-    "(designs, 2, globals)"
+    "(designs, n, globals)"
+    ends: IntArray
+    "(designs, 2)"
 
     def between(self, design: IntArray, share: Array) -> tuple[Array, Array]:
         """The same (k,) and (k, globals) at shares (k,) of the range of designs (k,)."""
-        parts = np.stack([1.0 - share, share], axis=1)
-        return np.sum(parts * self.own[design], axis=1), np.einsum("ke,kei->ki", parts, self.slopes[design])
+        parts, at = np.stack([1.0 - share, share], axis=1), self.ends[design]
+        own, slopes = self.own[design[:, None], at], self.slopes[design[:, None], at]
+        return np.sum(parts * own, axis=1), np.einsum("ke,kei->ki", parts, slopes)
 
 
 def normal_equations(
@@ -72,13 +76,13 @@ def entry_moves(equations: WantedEquations, line: LinearRows, change: Array) -> 
     return moves
 
 
-def range_changes(
+def input_changes(
     equations: Sequence[WantedEquations],
     lines: Sequence[LinearRows],
     unknowns: Sequence[Array],
     numbers: GlobalNumbers,
-) -> RangeChanges:
-    """How the ends of the range change that the inputs of all entries lie in; see `entry_moves`."""
+) -> InputChanges:
+    """How the inputs of entries change; see `entry_moves`."""
     owns, slopes = [], []
     for k, (each, line) in enumerate(zip(equations, lines, strict=True)):
         own, slope = line.own[..., -1], line.own_slopes[..., -1, :]
@@ -90,18 +94,16 @@ def range_changes(
         wide[..., numbers.columns(k)] = slope
         owns.append(own)
         slopes.append(wide)
-    own, slope = np.concatenate(owns, axis=1), np.concatenate(slopes, axis=1)
     inputs = np.concatenate([each[..., -1] for each in unknowns], axis=1)
     ends = np.stack([np.argmin(inputs, axis=1), np.argmax(inputs, axis=1)], axis=1)
-    every = np.arange(len(inputs))[:, None]
-    return RangeChanges(own[every, ends], slope[every, ends])
+    return InputChanges(np.concatenate(owns, axis=1), np.concatenate(slopes, axis=1), ends)
 
 
 def solve_damped(normal: Array, slope: Array, damping: Array, numbers: Array, lower: Array, upper: Array) -> Array:
     """The change of the globals; a number on its bound that would leave it stays. NaN where nothing is known."""
     free, size = numbers.shape[1], slope.shape[1]
     held = np.zeros(slope.shape, bool)
-    bad = ~(np.isfinite(normal).all(axis=(1, 2)) & np.isfinite(slope).all(axis=1))
+    bad: BoolArray = np.asarray(~(np.isfinite(normal).all(axis=(1, 2)) & np.isfinite(slope).all(axis=1)))
     normal, slope = np.where(bad[:, None, None], np.eye(size), normal), np.where(bad[:, None], 0.0, slope)
     damped = damped_matrices(normal, damping)
     for _ in range(2):

@@ -53,11 +53,11 @@ class RegionRows:
         places, by_y, by_x = self._places[1].evaluate_batch(len(y), y, x)
         depths, ways = polygon_depths(places.reshape(-1, 2), self.corners)
         ways = ways.reshape(len(y), -1, 2)
-        slopes = (
+        y_slopes, x_slopes = (
             np.einsum("npa,npai->npi", ways, each.swapaxes(1, 2).reshape(len(y), len(self), 2, -1))
             for each in (by_y, by_x)
         )
-        return (depths.reshape(len(y), -1), *slopes)  # type: ignore[return-value]
+        return depths.reshape(len(y), -1), y_slopes, x_slopes
 
 
 def polygon_depths(places: Array, corners: Array) -> tuple[Array, Array]:
