@@ -9,6 +9,7 @@ import numpy as np
 from planar.derivatives.design_equations import design_equations
 from planar.foundation.arrays import Array
 from planar.model.mechanism import Mechanism
+from planar.synthesis.catalogue.branch_tracking import follow_branches
 from planar.synthesis.catalogue.catalogue import Catalogue, build_catalogue
 from planar.synthesis.catalogue.matches import Match, WantedItem, find_matches
 from planar.synthesis.catalogue.moved_numbers import moved_numbers
@@ -31,6 +32,15 @@ class Candidate(NamedTuple):
     squares: float
     lack: float = 0.0
     "by how much a demand is missed, rad or of the extent of what is wanted"
+
+
+class _FitStart(NamedTuple):
+    """From where a design is fitted: its numbers, the unknowns at entries, and at positions that are guarded."""
+
+    numbers: Array
+    unknowns: list[Array]
+    guarded: Array
+    over_turn: bool
 
 
 class DesignSearch:
@@ -69,51 +79,70 @@ class DesignSearch:
         return find_matches(catalogue, items, self.can_move, many, self.needs_whole_turn)
 
     def fit(self, catalogue: Catalogue, matches: list[Match], keep: int) -> list[Candidate]:
-        """The matches fitted, the best so many; of those that turn fully, and of others, where demands are kept."""
-        guarded_turn = self.needs_whole_turn or self.guards is not None
-        is_whole = [bool(guarded_turn and catalogue.is_whole[each.design]) for each in matches]
+        """The matches fitted, the best so many; of those that turn fully, and of others, where demands are kept.
+
+        What comes to turn fully is fitted once more, since its demands are kept all round the turn then."""
+        groups = self._fit_starts(catalogue, matches)
         found: list[Candidate] = []
-        for over_turn in (True, False):
-            own = [each for each, whole in zip(matches, is_whole, strict=True) if whole is over_turn]
-            found += self._fit_alike(catalogue, own, keep, over_turn) if own else []
+        for over_turn in (False, True):
+            own = [each for each in groups if each.over_turn is over_turn]
+            if not own:
+                continue
+            fitted = self._fit_alike(own, keep, over_turn)
+            turned: dict[int, _FitStart] = {}
+            if not over_turn and self.guards is not None and self.guards[True].rows:
+                turned = self._turned(fitted)
+            groups += turned.values()
+            known = np.flatnonzero(np.isfinite(fitted.squares)).tolist()
+            found += [self._candidate(fitted, k) for k in known if k not in turned]
         return sorted(found, key=lambda each: (each.lack > 0.0, each.squares))[:keep]
 
-    def _fit_alike(self, catalogue: Catalogue, matches: list[Match], keep: int, over_turn: bool) -> list[Candidate]:
-        """Matches fitted that all turn fully, or are all seen between their entries only."""
-        numbers, unknowns = [], [[] for _ in self.equations]  # type: ignore[var-annotated]
+    def _fit_starts(self, catalogue: Catalogue, matches: list[Match]) -> list[_FitStart]:
+        """Matches as they lie, with the positions at which each is guarded."""
+        found = []
         for match in matches:
-            x = catalogue.numbers[match.design]
-            ys = [catalogue.unknowns[match.design][steps] for steps in match.steps]
-            for k, y in enumerate(ys):
-                # places of the catalogue are in units of what is wanted, numbers in those of the mechanism
-                moved, own = self.moves.move(x, y, match.factor, match.offset / self.ratio)
-                unknowns[k].append(own)
-            numbers.append(moved if self.can_move else x)
-        x, ys = np.array(numbers), [np.array(each) for each in unknowns]
+            x, own = catalogue.numbers[match.design], catalogue.unknowns[match.design]
+            # places of the catalogue are in units of what is wanted, numbers in those of the mechanism
+            moved, y = self.moves.move(x, own, match.factor, match.offset / self.ratio)
+            ys = [y[steps] for steps in match.steps]
+            over_turn = self.guards is not None and bool(catalogue.is_whole[match.design])
+            branch = y[np.isfinite(y).all(axis=1)]
+            found.append(_FitStart(moved if self.can_move else x, ys, self._guarded(branch, ys, over_turn), over_turn))
+        return found
+
+    def _guarded(self, branch: Array, unknowns: list[Array], over_turn: bool) -> Array:
+        """The unknowns at positions of a branch (steps, unknowns) all round its turn, or between entries."""
+        many = 0 if self.guards is None else self.guards[over_turn].position_count
+        if over_turn:
+            turned: Array = branch[np.linspace(0, len(branch) - 1, many).astype(int)]
+            return turned
+        ends = np.concatenate([each[:, -1] for each in unknowns])
+        wanted = np.linspace(ends.min(), ends.max(), many)
+        found: Array = np.stack([np.interp(wanted, branch[:, -1], part) for part in branch.T], axis=1)
+        return found
+
+    def _fit_alike(self, starts: list[_FitStart], keep: int, over_turn: bool) -> FittedDesigns:
+        """Designs fitted that all turn fully, or are all seen between their entries only."""
+        x = np.array([each.numbers for each in starts])
+        ys = [np.array(each) for each in zip(*(each.unknowns for each in starts), strict=True)]
         zeros = self._zeros(x, ys)
         scale = self.equations[0].scale
-        guard = self.guards[over_turn] if self.guards is not None else None
+        guard = None if self.guards is None else self.guards[over_turn]
         fit = DesignFit(self.equations, self.free.lower / scale, self.free.upper / scale, guard)
-        many = 0 if guard is None else guard.position_count
-        shares = np.broadcast_to(np.linspace(0.0, 1.0, many), (len(x), many))
-        positions = [self._guard_positions(catalogue, match, many, over_turn, ys, k) for k, match in enumerate(matches)]
-        found = fit.fit(x, ys, zeros, keep, (np.array(positions), shares) if guard is not None else None)
-        return [self._candidate(found, k) for k in range(len(found.squares)) if np.isfinite(found.squares[k])]
+        positions = np.array([each.guarded for each in starts])
+        shares = np.broadcast_to(np.linspace(0.0, 1.0, positions.shape[1]), positions.shape[:2])
+        return fit.fit(x, ys, zeros, keep, (positions, shares) if guard is not None else None)
 
-    def _guard_positions(
-        self, catalogue: Catalogue, match: Match, many: int, over_turn: bool, unknowns: list[Array], k: int
-    ) -> Array:
-        """The unknowns of a match at positions all round its turn, or between its entries (design k of these)."""
-        own = catalogue.unknowns[match.design]
-        own = own[np.isfinite(own).all(axis=1)]
-        moved = self.moves.move(catalogue.numbers[match.design], own, match.factor, match.offset / self.ratio)[1]
-        if over_turn:
-            turned: Array = moved[np.linspace(0, len(own) - 1, many).astype(int)]
-            return turned
-        ends = np.concatenate([each[k][:, -1] for each in unknowns])
-        wanted = np.linspace(ends.min(), ends.max(), many)
-        found: Array = np.stack([np.interp(wanted, moved[:, -1], part) for part in moved.T], axis=1)
-        return found
+    def _turned(self, found: FittedDesigns) -> dict[int, _FitStart]:
+        """Those of fitted designs that turn fully, by their number."""
+        if not len(found.numbers):
+            return {}
+        branches, is_whole = follow_branches(self.equations[0], found.numbers, found.unknowns[0][:, 0])
+        told = {}
+        for k in np.flatnonzero(is_whole & np.isfinite(found.squares)).tolist():
+            branch, ys = branches[k][np.isfinite(branches[k]).all(axis=1)], [each[k] for each in found.unknowns]
+            told[k] = _FitStart(found.numbers[k], ys, self._guarded(branch, ys, True), True)
+        return told
 
     def most_regular(self, candidate: Candidate) -> Array:
         """The unknowns of that entry which is farthest from a dead point: there the assemblies lie apart."""
