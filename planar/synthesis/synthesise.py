@@ -10,18 +10,20 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from planar.foundation.errors import BadInput, PlanarError
+from planar.foundation.errors import BadInput, NoAnswer, PlanarError
 from planar.model.mechanism import Mechanism
 from planar.model.run_arguments import check_whole_number
 from planar.synthesis.catalogue.catalogue_store import kept_catalogue
 from planar.synthesis.cognates.task_cognates import task_cognates
 from planar.synthesis.design_search import Candidate, DesignSearch
+from planar.synthesis.judgement.defects import Defect
 from planar.synthesis.judgement.judgement import DesignJudge
-from planar.synthesis.judgement.written_design import write_design
+from planar.synthesis.judgement.refusal import refusal
+from planar.synthesis.judgement.written_design import DIGITS, EXACT_DIGITS, write_design
 from planar.synthesis.synthesis import Synthesis, SynthesisedDesign, rank_designs
-from planar.synthesis.task.freedom import count_freedom
+from planar.synthesis.task.freedom import count_freedom, exactness_in_excess
 from planar.synthesis.task.starts import start_mechanisms
-from planar.synthesis.task.synthesis_task import SynthesisTask
+from planar.synthesis.task.synthesis_task import ChainStart, SynthesisTask
 from planar.synthesis.task.task_reader import read_task
 
 DRAWS = 6000
@@ -73,6 +75,7 @@ def synthesise(
     known = read_task(task)
     count = check_whole_number("many", many, 1, 1000)
     end = None if time_limit is None else monotonic() + time_limit
+    _refuse_excess(known)
     search = _TaskSearch(known, count, check_whole_number("seed", seed, 0), end)
     for done, start in enumerate(start_mechanisms(known)):
         if search.is_over():
@@ -83,11 +86,25 @@ def synthesise(
     return search.result()
 
 
+def _refuse_excess(task: SynthesisTask) -> None:
+    """Refuse what no start can meet exactly."""
+    if isinstance(task.starts, ChainStart) or not task.exact:
+        return
+    try:
+        told = [exactness_in_excess(task, start) for start in start_mechanisms(task)]
+    except NoAnswer:
+        return  # a start that cannot move is told of in the search
+    if told[0] is not None and None not in told:
+        raise BadInput("$.wanted", told[0])
+
+
 class _TaskSearch:
     def __init__(self, task: SynthesisTask, many: int, seed: int, end: float | None):
         self.task, self.many, self.seed, self.end = task, many, seed, end
         self.sound: list[SynthesisedDesign] = []
         self.rejected: list[SynthesisedDesign] = []
+        self.defects: list[tuple[Defect, ...]] = []
+        "of those that were rejected"
         self.starts: dict[str, Mechanism] = {}
         "those that designs were made from"
         self.remarks: list[str] = []
@@ -105,10 +122,14 @@ class _TaskSearch:
         """Search the designs of one start."""
         try:
             search = DesignSearch(self.task, mechanism)
+            excess = exactness_in_excess(self.task, mechanism)
         except BadInput:
             raise
         except PlanarError as problem:
             self.remarks.append(f"{mechanism.name} is no start: {problem}")
+            return
+        if excess is not None:
+            self.remarks.append(f"{mechanism.name} is no start: {excess}")
             return
         self.size = search.size
         self.starts[mechanism.name] = mechanism
@@ -134,16 +155,17 @@ class _TaskSearch:
         values = [search.shown(k, candidate) for k in range(len(search.equations))]
         y = search.most_regular(candidate)
         try:
-            mechanism = write_design(design, candidate.numbers, y, float(y[-1] * search.equations[0].input_scale), name)
+            at, digits = float(y[-1] * search.equations[0].input_scale), EXACT_DIGITS if self.task.exact else DIGITS
+            mechanism = write_design(design, candidate.numbers, y, at, name, digits)
         except BadInput:
             return  # no file could say it
         found = judge.judge(mechanism, inputs, values)
         every = np.concatenate(found.misses)
         error, worst = float(np.sqrt(np.mean(every**2))), float(every.max())
-        told = SynthesisedDesign(
-            mechanism, error, worst, found.misses, found.inputs, found.defects, search.mechanism.name
-        )
+        sentences = tuple(each.sentence for each in found.defects)
+        told = SynthesisedDesign(mechanism, error, worst, found.misses, found.inputs, sentences, search.mechanism.name)
         (self.rejected if found.defects else self.sound).append(told)
+        self.defects += [found.defects] if found.defects else []
 
     def _freedom(self, start: str) -> str:
         """What of the task a start can meet exactly."""
@@ -158,18 +180,5 @@ class _TaskSearch:
         sound = tuple(replace(each, cognates=task_cognates(each.mechanism, self.task)) for each in ranked)
         remarks += [self._freedom(each.start) for each in (sound or self.rejected)[:1]]
         if not sound:
-            remarks.append(_refusal(self.rejected))
+            remarks.append(refusal(self.defects, self.task.units))
         return Synthesis(self.task, sound, rank_designs(self.rejected, self.many), self.size, tuple(remarks))
-
-
-def _refusal(rejected: list[SynthesisedDesign]) -> str:
-    """Which demand is in the way."""
-    if not rejected:
-        return "no design comes near: another start, or more free numbers, may"
-    kinds: dict[str, int] = {}
-    for each in rejected:
-        for sentence in each.defects:
-            kind = sentence.split(":")[0] if "defect" in sentence or "turn" in sentence else sentence.split(" of ")[0]
-            kinds[kind] = kinds.get(kind, 0) + 1
-    worst = max(kinds, key=lambda kind: kinds[kind])
-    return f"no design without a defect: {kinds[worst]} of {len(rejected)} have this one: {worst}"

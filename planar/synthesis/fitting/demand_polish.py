@@ -12,15 +12,18 @@ import numpy as np
 from planar.foundation.arrays import Array, BoolArray
 from planar.synthesis.fitting.kept_demands import KEPT, lacks
 from planar.synthesis.fitting.moving_designs import MovingDesigns
-from planar.synthesis.fitting.normal_equations import damped_matrices
+from planar.synthesis.fitting.normal_equations import damped_matrices, exact_rows
 
 POLISHING_STEPS = 20
 LEAST_SLACKS = 24
 """Of a design, that a step regards."""
 NEAR = 1e-3
 """A slack that is less may bear on what is best."""
-SWEEPS = 120
+SWEEPS, SETTLED = 60, 1e-9
+"""At most, and of the greatest multiplier: a change that is less is none."""
 FIRST_DAMPING, GREATEST_DAMPING = 1e-6, 1e6
+EXACT = 1e-11
+"""Of the size, or rad: what is missed by no more is met exactly."""
 ENOUGH_DROP = 0.8
 """Of what is lacking: a step that leaves more is taken back."""
 ENOUGH_GAIN = 1e-7
@@ -28,34 +31,35 @@ ENOUGH_GAIN = 1e-7
 
 
 def polish_demands(state: MovingDesigns) -> None:
-    """Designs that keep their demands, where that is to be had near by."""
+    """Designs that keep their demands, where that is to be had near by, and meet what is to be met exactly."""
     demands = state.demands
     assert demands is not None
     demands.relocate(state.numbers, state.unknowns)
-    many = len(state.numbers)
     squares = state.misses(state.numbers, state.unknowns, state.zeros)
-    damping, is_moving = np.full(many, FIRST_DAMPING), np.asarray(demands.slack.min(axis=1) < NEAR)
+    short = _shortage(demands.slack, state.inexactness(state.numbers, state.unknowns, state.zeros))
+    is_exact = any(each.rows.wanted.tolerance == 0.0 for each in state.fit.equations)
+    damping = np.full(len(squares), FIRST_DAMPING)
+    is_moving: BoolArray = np.asarray(is_exact | (demands.slack < NEAR).any(axis=1))
     for _ in range(POLISHING_STEPS):
         rows = np.flatnonzero(is_moving)
         if not len(rows):
             break
         lines, normal, slope = state.linearise(rows)
-        changes = state.input_changes(rows, lines)
         numbers, size = state.numbers[rows], slope.shape[1]
-        slack, slopes = demands.least_rows(numbers, changes, rows, LEAST_SLACKS)
+        slack, slopes = demands.least_rows(numbers, state.input_changes(rows, lines), rows, LEAST_SLACKS)
         ends, ways = _bounds(state, numbers, size)
         change = constrained_step(
             damped_matrices(normal, damping[rows]),
             slope,
             np.concatenate([slack, ends], axis=1),
             np.concatenate([slopes, np.broadcast_to(ways, (len(rows), *ways.shape))], axis=1),
+            *exact_rows(state.fit.equations, lines, state.fit.globals),
         )
         trial = state.tried(rows, lines, change)
-        lack = lacks(trial.slack)
-        after, before = state.misses(trial.numbers, trial.unknowns, trial.zeros), demands.lack[rows]
-        is_kept = lack <= KEPT
+        tried = trial.numbers, trial.unknowns, trial.zeros
+        after, left, before = state.misses(*tried), _shortage(trial.slack, state.inexactness(*tried)), short[rows]
         is_better = trial.is_good & np.where(
-            before > KEPT, is_kept | (lack < ENOUGH_DROP * before), is_kept & (after < squares[rows])
+            before > KEPT, (left <= KEPT) | (left < ENOUGH_DROP * before), (left <= KEPT) & (after < squares[rows])
         )
         is_last = is_better & (before <= KEPT) & (squares[rows] - after <= ENOUGH_GAIN * squares[rows])
         state.accept(rows, is_better, trial)
@@ -63,6 +67,13 @@ def polish_demands(state: MovingDesigns) -> None:
         damping[rows] *= np.where(is_better, 0.3, 8.0)
         is_moving[rows] = ~is_last & (damping[rows] < GREATEST_DAMPING)
         demands.relocate(state.numbers, state.unknowns)
+        short = _shortage(demands.slack, state.inexactness(state.numbers, state.unknowns, state.zeros))
+
+
+def _shortage(slack: Array, inexactness: Array) -> Array:
+    """What designs are short of by slacks, or by what is to be met exactly (designs,); KEPT where that is enough."""
+    found: Array = np.maximum(lacks(slack), inexactness * (KEPT / EXACT))
+    return found
 
 
 def _bounds(state: MovingDesigns, numbers: Array, size: int) -> tuple[Array, Array]:
@@ -76,17 +87,38 @@ def _bounds(state: MovingDesigns, numbers: Array, size: int) -> tuple[Array, Arr
     return np.concatenate(far, axis=1), ways
 
 
-def constrained_step(normal: Array, slope: Array, slack: Array, slopes: Array) -> Array:
-    """The steps dx (designs, size) that make 1/2 dx^T N dx + g^T dx least with h + H dx >= 0; NaN where N has none.
+def constrained_step(normal: Array, slope: Array, slack: Array, slopes: Array, rows: Array, ways: Array) -> Array:
+    """The steps dx (designs, size) that make 1/2 dx^T N dx + g^T dx least with h + H dx >= 0 and r + R dx = 0, or as
+    near as can be; NaN where N has none.
 
-    N (designs, size, size), g (designs, size), h (designs, k), H (designs, k, size)."""
+    N (designs, size, size), g (designs, size), h (designs, k), H (designs, k, size), r (designs, m), R (designs, m,
+    size)."""
     is_known: BoolArray = np.asarray(np.isfinite(normal).all(axis=(1, 2)) & np.isfinite(slope).all(axis=1))
-    normal = np.where(is_known[:, None, None], normal, np.eye(normal.shape[1]))
+    normal, slope = np.where(is_known[:, None, None], normal, np.eye(normal.shape[1])), np.nan_to_num(slope)
+    first = np.zeros_like(slope)
+    if rows.shape[1]:
+        rows, ways = np.nan_to_num(rows), np.nan_to_num(ways)
+        inverse = np.linalg.pinv(ways, rcond=1e-10)
+        first = -np.einsum("cik,ck->ci", inverse, rows)
+        held = inverse @ ways  # dx = first + (1 - held) of what is free
+        free = np.eye(normal.shape[1]) - held
+        slope = np.einsum("cij,cj->ci", free, slope + np.einsum("cij,cj->ci", normal, first))
+        slack = slack + np.einsum("cki,ci->ck", slopes, first)
+        slopes = slopes @ free
+        scale = np.einsum("cii->c", normal) / normal.shape[1]
+        normal = free @ normal @ free + scale[:, None, None] * held
+    found = first + _step_within(normal, slope, slack, slopes)
+    found[~is_known] = np.nan
+    return found
+
+
+def _step_within(normal: Array, slope: Array, slack: Array, slopes: Array) -> Array:
+    """The same without equations."""
     right = np.concatenate([slope[:, :, None], slopes.swapaxes(1, 2)], axis=2)
     try:
-        solved = np.linalg.solve(normal, np.nan_to_num(right))
+        solved = np.linalg.solve(normal, right)
     except np.linalg.LinAlgError:
-        solved = np.linalg.pinv(normal, rcond=1e-14, hermitian=True) @ np.nan_to_num(right)
+        solved = np.linalg.pinv(normal, rcond=1e-14, hermitian=True) @ right
     free, ways = solved[..., 0], solved[..., 1:]
     matrix = slopes @ ways
     wanted = np.einsum("cki,ci->ck", slopes, free) - slack
@@ -94,9 +126,12 @@ def constrained_step(normal: Array, slope: Array, slack: Array, slopes: Array) -
     diagonal = np.maximum(diagonal, 1e-12 * diagonal.max(axis=1, initial=0.0, keepdims=True)) + np.finfo(float).tiny
     multipliers = np.zeros_like(slack)
     for _ in range(SWEEPS):
+        before = multipliers.copy()
         for k in range(slack.shape[1]):
-            left = wanted[:, k] - np.einsum("cj,cj->c", matrix[:, k], multipliers)
+            left = wanted[:, k] - (matrix[:, k] * multipliers).sum(axis=1)
             multipliers[:, k] = np.maximum(multipliers[:, k] + left / diagonal[:, k], 0.0)
+        change, most = np.abs(multipliers - before), np.abs(multipliers).max(axis=1, initial=0.0, keepdims=True)
+        if (change <= SETTLED * most).all():
+            break
     found: Array = np.einsum("cik,ck->ci", ways, multipliers) - free
-    found[~is_known] = np.nan
     return found

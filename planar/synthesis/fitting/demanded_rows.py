@@ -8,11 +8,11 @@ import numpy as np
 
 from planar.foundation.errors import PlanarError
 from planar.solving.cycle import cycle
+from planar.synthesis.demands.output_transmissions import output_transmissions
 from planar.synthesis.fitting.demand_guard import DemandGuard
 from planar.synthesis.fitting.region_rows import RegionRows
 from planar.synthesis.fitting.transmission_rows import TransmissionRows
 from planar.synthesis.fitting.wanted_equations import WantedEquations, WantedRows
-from planar.synthesis.judgement.output_transmissions import output_transmissions
 from planar.synthesis.task.freedom import generic_start
 from planar.synthesis.task.starts import FreeNumbers
 from planar.synthesis.task.synthesis_task import SynthesisTask
@@ -35,7 +35,8 @@ def demand_guards(
     if demands.inside is not None:
         kept.append((RegionRows(mechanism, demands.inside, size, equations.free, equations.scale), 0.0))
     is_guarded = bool(kept or demands.whole_turn or demands.one_branch or closed)
-    if not (is_guarded or any(getattr(each, "in_order", False) for each in task.wanted)):
+    is_bound = bool(task.exact) or any(getattr(each, "in_order", False) for each in task.wanted)
+    if not (is_guarded or is_bound):
         return None
     positions = rows._replace(inputs=np.zeros(GUARD_POSITIONS + 1 if is_guarded else 0))
     guarded = WantedEquations(mechanism, positions, equations.free, equations.unit)

@@ -17,7 +17,7 @@ MAX_STEPS = 150
 HALVING_STEPS = (10, 20, 40)
 """Steps after which only the better half goes on, where there are many."""
 FEW = 4
-PRESSINGS, PRESSED_STEPS = 10, 20
+PRESSINGS, PRESSED_STEPS = 4, 15
 """How often multipliers of demands are changed, and steps between."""
 
 
@@ -65,9 +65,9 @@ class DesignFit:
                 state.keep_best(max(keep, FEW, (len(state.numbers) + 1) // 2))
 
         state.run(MAX_STEPS, halve)
-        if state.demands is not None and state.demands.can_lack:
+        if state.demands is not None:
             state.keep_best(max(keep, FEW))
-            for _ in range(PRESSINGS):
+            for _ in range(PRESSINGS if state.demands.can_lack else 0):
                 if not state.press():
                     break
                 state.run(PRESSED_STEPS)

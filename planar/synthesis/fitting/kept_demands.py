@@ -123,6 +123,8 @@ class KeptDemands:
         """The least slacks of designs (designs, many), and their slopes in the globals (designs, many, globals)."""
         slack = self.slack[rows]
         many = min(many, slack.shape[1])
+        if not many:
+            return np.zeros((len(rows), 0)), np.zeros((len(rows), 0, changes.slopes.shape[2]))
         is_near = np.zeros(slack.shape, bool)
         np.put_along_axis(is_near, np.argpartition(slack, many - 1, axis=1)[:, :many], True, axis=1)
         design, which, moved, whole = self._slopes(numbers, changes, rows, is_near)

@@ -106,6 +106,15 @@ class MovingDesigns:
         self.squares[is_closed] = self.merits()[is_closed]
         self.take(np.flatnonzero(is_closed))
 
+    def inexactness(self, numbers: Array, unknowns: Sequence[Array], zeros: Sequence[Array]) -> Array:
+        """The greatest part of a miss (designs,) of what is to be met exactly."""
+        found = np.zeros(len(numbers))
+        for each, y, zero in zip(self.fit.equations, unknowns, zeros, strict=True):
+            if each.rows.wanted.tolerance == 0.0:
+                off = np.abs(each.residuals(numbers, y, zero)).max(axis=(1, 2), initial=0.0)
+                found = np.maximum(found, np.where(np.isfinite(off), off, np.inf))
+        return found
+
     def run(self, steps: int, before_step: Callable[[int], None] | None = None) -> None:
         """So many steps, or until none wins anything more."""
         for step in range(steps):

@@ -66,6 +66,31 @@ def normal_equations(
     return normal, slope
 
 
+def exact_rows(
+    equations: Sequence[WantedEquations], lines: Sequence[LinearRows], numbers: GlobalNumbers
+) -> tuple[Array, Array]:
+    """Rows (designs, k) and slopes (designs, k, globals) of what is to be met exactly, without their part along."""
+    many = len(lines[0].residual)
+    rows, slopes = [np.zeros((many, 0))], [np.zeros((many, 0, numbers.size))]
+    for k, (each, line) in enumerate(zip(equations, lines, strict=True)):
+        if each.rows.wanted.tolerance != 0.0:
+            continue
+        both = np.concatenate([line.residual[..., None], line.slopes], axis=-1)
+        if not each.is_timed:
+            size_along = np.sum(line.along**2, axis=-1) + DAMPING_ALONG
+            both = (
+                both
+                - line.along[..., None]
+                * np.einsum("cnp,cnpi,cn->cni", line.along, both, 1.0 / size_along, optimize=True)[:, :, None]
+            )
+        both = both.reshape(many, -1, both.shape[-1])
+        wide = np.zeros((*both.shape[:2], numbers.size))
+        wide[..., numbers.columns(k)] = both[..., 1:]
+        rows.append(both[..., 0])
+        slopes.append(wide)
+    return np.concatenate(rows, axis=1), np.concatenate(slopes, axis=1)
+
+
 def entry_moves(equations: WantedEquations, line: LinearRows, change: Array) -> Array:
     """How each entry's unknowns change (designs, n, unknowns) with the globals of its rows (designs, own)."""
     moves: Array = line.own + np.einsum("cnyi,ci->cny", line.own_slopes, change)

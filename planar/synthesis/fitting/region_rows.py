@@ -13,6 +13,7 @@ from planar.equations.casadi_call import BufferedFunction
 from planar.equations.elimination import stack_expressions
 from planar.foundation.arrays import Array
 from planar.model.mechanism import Mechanism, named_points
+from planar.synthesis.demands.polygon import polygon_depths
 from planar.synthesis.fitting.wanted_equations import in_entries
 
 
@@ -58,28 +59,3 @@ class RegionRows:
             for each in (by_y, by_x)
         )
         return depths.reshape(len(y), -1), y_slopes, x_slopes
-
-
-def polygon_depths(places: Array, corners: Array) -> tuple[Array, Array]:
-    """How far places (n, 2) are from the border of a polygon (corners, 2), below zero outside; and in which direction
-    (n, 2) that grows the most."""
-    first, second = corners, np.roll(corners, -1, axis=0)
-    along = second - first
-    x, y = places[:, 0, None], places[:, 1, None]
-    crosses = (first[:, 1] > y) != (second[:, 1] > y)
-    rise = np.where(crosses, along[:, 1], 1.0)
-    right = first[:, 0] + (y - first[:, 1]) / rise * along[:, 0]
-    is_inside = np.sum(crosses & (x < right), axis=1) % 2 == 1
-    share = np.clip(np.sum((places[:, None] - first) * along, axis=2) / np.sum(along**2, axis=1), 0.0, 1.0)
-    off = places[:, None] - first - share[..., None] * along
-    distance = np.linalg.norm(off, axis=2)
-    distance = np.where(np.isfinite(distance), distance, np.inf)
-    nearest = np.argmin(distance, axis=1)
-    every = np.arange(len(places))
-    least, off, side = distance[every, nearest], off[every, nearest], along[nearest]
-    turned = 1.0 if np.sum(first[:, 0] * second[:, 1] - second[:, 0] * first[:, 1]) > 0.0 else -1.0
-    inward = turned * np.stack([-side[:, 1], side[:, 0]], axis=1) / np.linalg.norm(side, axis=1, keepdims=True)
-    sense = np.where(is_inside, 1.0, -1.0)
-    apart = least > 1e-9 * np.ptp(corners, axis=0).max()
-    ways = np.where(apart[:, None], sense[:, None] * off / np.where(apart, least, 1.0)[:, None], inward)
-    return np.where(np.isfinite(places).all(axis=1), sense * least, np.nan), ways

@@ -16,8 +16,10 @@ from planar.model.wording import amount
 from planar.results.motion import Motion
 from planar.solving.cycle import cycle
 from planar.solving.grids.grid_motion import motion_over_input
-from planar.synthesis.judgement.output_transmissions import output_transmissions
+from planar.synthesis.judgement.defects import Defect
+from planar.synthesis.judgement.motion_demands import region_defects, transmission_defects
 from planar.synthesis.task.synthesis_task import SynthesisTask, Wanted, WantedFunction, WantedPath
+from planar.synthesis.task.task_numbers import task_motion_kind
 from planar.synthesis.task.wanted_expressions import carried_name
 
 STEPS = 90
@@ -25,6 +27,9 @@ SAME = 1e-6
 """Of the extent of what is wanted, or rad: an entry that is missed by no more beside the fit is met as fitted."""
 FEET, FOOT_POSITIONS = 4, 13
 """How often, and at how many positions of the input, the nearest one to an entry is looked for."""
+EXACT = 1e-9
+"""The same of what is to be met exactly."""
+REACH = "the reach"
 OTHER_ASSEMBLY = 0.01
 """Of the extent of what is wanted, or rad: what misses an entry by so much more than the fit is another assembly."""
 ON_END = 1e-6
@@ -37,7 +42,7 @@ class Judgement:
 
     misses: tuple[Array, ...]
     inputs: tuple[Array, ...]
-    defects: tuple[str, ...]
+    defects: tuple[Defect, ...]
 
 
 class DesignJudge:
@@ -52,7 +57,7 @@ class DesignJudge:
         try:
             motion = cycle(mechanism, STEPS, pair=running)
         except NoAnswer as problem:
-            return self._unreached(inputs, f"it cannot be solved: {problem}")
+            return self._unreached(inputs, Defect(REACH, f"it cannot be solved: {problem}"))
         given = motion.inputs[running].position
         is_whole = _turns(mechanism) and float(np.ptp(given)) > TURN * (1.0 - 1e-9)
         defects = [*self._branch_defects(mechanism, motion, is_whole, inputs)]
@@ -62,7 +67,7 @@ class DesignJudge:
         try:
             shown = _results(mechanism, self.task.wanted, there)
         except NoAnswer as problem:
-            return self._unreached(inputs, f"it does not reach what is wanted: {problem}")
+            return self._unreached(inputs, Defect(REACH, f"it does not reach what is wanted: {problem}"))
         misses = []
         for k, (wanted, own, fitted) in enumerate(zip(self.task.wanted, shown, values, strict=True)):
             off, fit_off = _misses(wanted, own, self.size), _misses(wanted, fitted, self.size)
@@ -73,7 +78,8 @@ class DesignJudge:
             more = off - fit_off
             if float(more.max(initial=0.0)) > OTHER_ASSEMBLY * scale:
                 entry = int(np.argmax(more))
-                defects.append(f"circuit defect: {wanted.of} meets entry {entry + 1} in another assembly only")
+                told = f"circuit defect: {wanted.of} meets entry {entry + 1} in another assembly only"
+                defects.append(Defect("one circuit", told))
             misses.append(off)
         defects += [*self._order_defects(mechanism, there, is_whole)]
         defects += [*self._tolerance_defects(misses)]
@@ -81,7 +87,8 @@ class DesignJudge:
             low, high = (
                 amount(float(each), _input_kind(mechanism), mechanism.units) for each in (given.min(), given.max())
             )
-            defects.append(f"no whole turn: {running} goes from {low} to {high} only")
+            told = f"no whole turn: {running} goes from {low} to {high} only"
+            defects.append(Defect("the whole turn", told, float(np.ptp(given)), TURN))
         defects += [*self._motion_defects(mechanism, motion, there, is_whole)]
         return Judgement(tuple(misses), tuple(there), tuple(defects))
 
@@ -100,12 +107,12 @@ class DesignJudge:
             tried = np.linspace(*around, FOOT_POSITIONS)
         return nearest
 
-    def _unreached(self, inputs: Sequence[Array], *sentences: str) -> Judgement:
-        return Judgement(tuple(np.full(len(each), np.nan) for each in inputs), tuple(inputs), sentences)
+    def _unreached(self, inputs: Sequence[Array], *defects: Defect) -> Judgement:
+        return Judgement(tuple(np.full(len(each), np.nan) for each in inputs), tuple(inputs), defects)
 
     def _branch_defects(
         self, mechanism: Mechanism, motion: Motion, is_whole: bool, inputs: Sequence[Array]
-    ) -> Iterator[str]:
+    ) -> Iterator[Defect]:
         if is_whole:
             return
         running = mechanism.inputs[0].pair
@@ -117,12 +124,13 @@ class DesignJudge:
             if beyond.any():
                 entry = int(np.argmax(beyond))
                 ends = " to ".join(amount(each, _input_kind(mechanism), mechanism.units) for each in (low, high))
-                yield (
+                yield Defect(
+                    "one branch",
                     f"branch defect: entry {entry + 1} of {wanted.of} lies beyond a dead point; the branch of the "
-                    f"first goes from {running} = {ends}"
+                    f"first goes from {running} = {ends}",
                 )
 
-    def _order_defects(self, mechanism: Mechanism, inputs: Sequence[Array], is_whole: bool) -> Iterator[str]:
+    def _order_defects(self, mechanism: Mechanism, inputs: Sequence[Array], is_whole: bool) -> Iterator[Defect]:
         for wanted, own in zip(self.task.wanted, inputs, strict=True):
             if isinstance(wanted, WantedFunction) or not wanted.in_order or len(own) < 3:
                 continue
@@ -134,19 +142,26 @@ class DesignJudge:
                 steps = np.diff(own)
                 is_ordered = bool((steps > -1e-9).all() or (steps < 1e-9).all())
             if not is_ordered:
-                yield f"order defect: {wanted.of} does not meet its entries in their order"
+                yield Defect("the order", f"order defect: {wanted.of} does not meet its entries in their order")
 
-    def _tolerance_defects(self, misses: Sequence[Array]) -> Iterator[str]:
+    def _tolerance_defects(self, misses: Sequence[Array]) -> Iterator[Defect]:
         for wanted, own in zip(self.task.wanted, misses, strict=True):
-            if wanted.tolerance is not None and float(own.max(initial=0.0)) > wanted.tolerance:
-                kind = "angle" if isinstance(wanted, WantedFunction) else "length"
+            scale = 1.0 if isinstance(wanted, WantedFunction) else self.size
+            spared = (SAME if wanted.tolerance else EXACT) * scale  # for what rounding of a file takes
+            if wanted.tolerance is not None and float(own.max(initial=0.0)) > wanted.tolerance + spared:
+                kind = self._miss_kind(wanted)
                 entry, units = int(np.argmax(own)), self.task.units
                 off, most = (amount(each, kind, units) for each in (float(own[entry]), wanted.tolerance))
-                yield f"entry {entry + 1} of {wanted.of} is missed by {off}, more than the tolerance of {most}"
+                told = f"entry {entry + 1} of {wanted.of} is missed by {off}, more than the tolerance of {most}"
+                demand = f"the tolerance of {wanted.of}"
+                yield Defect(demand, told, float(own[entry]), wanted.tolerance, kind, more=False, verb="misses by")
+
+    def _miss_kind(self, wanted: Wanted) -> str:
+        return task_motion_kind(self.task, wanted.to_pair) if isinstance(wanted, WantedFunction) else "length"
 
     def _motion_defects(
         self, mechanism: Mechanism, motion: Motion, inputs: Sequence[Array], is_whole: bool
-    ) -> Iterator[str]:
+    ) -> Iterator[Defect]:
         demands = self.task.demands
         if demands.transmission is None and demands.inside is None:
             return
@@ -156,47 +171,12 @@ class DesignJudge:
             try:
                 motion = cycle(mechanism, STEPS, float(every.min()), float(every.max()), running)
             except (NoAnswer, BadInput) as problem:
-                yield f"it does not run through what is wanted: {problem}"
+                yield Defect(REACH, f"it does not run through what is wanted: {problem}")
                 return
         if demands.transmission is not None:
-            yield from _transmission_defects(motion, demands.transmission)
+            yield from transmission_defects(motion, demands.transmission)
         if demands.inside is not None:
-            yield from _region_defects(motion, demands.inside)
-
-
-def _transmission_defects(motion: Motion, least: float) -> Iterator[str]:
-    mechanism = motion.mechanism
-    for found in output_transmissions(motion):
-        if found.least is not None and found.least.value < least:
-            at = amount(found.least.input, _input_kind(mechanism), mechanism.units)
-            angle, wanted = (amount(each, "angle", mechanism.units) for each in (found.least.value, least))
-            where = f"{mechanism.inputs[0].pair} = {at}"
-            yield f"the transmission angle at {found.pair} falls to {angle} at {where}, below {wanted}"
-
-
-def _region_defects(motion: Motion, corners: Array) -> Iterator[str]:
-    for name in motion.point_names:
-        places = np.atleast_2d(motion.point(name).position)
-        outside = ~_are_inside(places, corners)
-        if outside.any():
-            at = places[int(np.argmax(outside))]
-            x, y = (amount(float(each), "length", motion.mechanism.units) for each in at)
-            yield f"{name} leaves the region at x = {x}, y = {y}"
-
-
-def _are_inside(places: Array, corners: Array) -> BoolArray:
-    """Which places (n, 2) lie in a polygon, its border included by a hair."""
-    first, second = corners, np.roll(corners, -1, axis=0)
-    x, y = places[:, 0, None], places[:, 1, None]
-    crosses = (first[:, 1] > y) != (second[:, 1] > y)
-    rise = np.where(crosses, second[:, 1] - first[:, 1], 1.0)
-    right = first[:, 0] + (y - first[:, 1]) / rise * (second[:, 0] - first[:, 0])
-    inside: BoolArray = np.asarray(np.sum(crosses & (x < right), axis=1) % 2 == 1)
-    along = second - first
-    share = np.clip(np.sum((places[:, None] - first) * along, axis=2) / np.sum(along**2, axis=1), 0.0, 1.0)
-    off = np.linalg.norm(places[:, None] - first - share[..., None] * along, axis=2).min(axis=1)
-    found: BoolArray = inside | np.asarray(off < 1e-9 * float(np.ptp(corners, axis=0).max()))
-    return found
+            yield from region_defects(motion, demands.inside)
 
 
 def _results(mechanism: Mechanism, wanted: Sequence[Wanted], inputs: Sequence[Array]) -> list[Array]:
