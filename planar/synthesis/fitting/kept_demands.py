@@ -14,8 +14,8 @@ import numpy as np
 
 from planar.foundation.arrays import Array, BoolArray, IntArray
 from planar.synthesis.fitting.demand_guard import MARGIN, DemandGuard
-from planar.synthesis.fitting.entry_order import EntryOrder
 from planar.synthesis.fitting.normal_equations import InputChanges
+from planar.synthesis.fitting.order_slacks import OrderSlacks
 
 FIRST_WEIGHT, GREATEST_WEIGHT, WEIGHT_GROWTH = 1.0, 1e5, 5.0
 """Of a slack of one rad, or of the size, beside a miss of the size."""
@@ -33,7 +33,7 @@ class KeptDemands:
     """The guard's positions of designs, with all slacks, those of positions first, their multipliers and weights."""
 
     def __init__(
-        self, guard: DemandGuard, order: EntryOrder, numbers: Array, unknowns: Sequence[Array], y: Array, shares: Array
+        self, guard: DemandGuard, order: OrderSlacks, numbers: Array, unknowns: Sequence[Array], y: Array, shares: Array
     ):
         self.guard, self.order, self.shares, self.spread_count = guard, order, shares, y.shape[1]
         every = np.arange(len(y))

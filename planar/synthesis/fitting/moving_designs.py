@@ -11,7 +11,6 @@ import numpy as np
 
 from planar.foundation.arrays import Array, BoolArray, IntArray
 from planar.synthesis.fitting.demand_guard import DemandGuard
-from planar.synthesis.fitting.entry_order import EntryOrder
 from planar.synthesis.fitting.kept_demands import KeptDemands
 from planar.synthesis.fitting.normal_equations import (
     GlobalNumbers,
@@ -21,6 +20,7 @@ from planar.synthesis.fitting.normal_equations import (
     normal_equations,
     solve_damped,
 )
+from planar.synthesis.fitting.order_slacks import OrderSlacks
 from planar.synthesis.fitting.wanted_equations import LinearRows, WantedEquations, tangents
 
 FIRST_DAMPING, LEAST_DAMPING, GREATEST_DAMPING = 1e-2, 1e-14, 1e8
@@ -96,7 +96,7 @@ class MovingDesigns:
             is_closed &= own
         self.demands: KeptDemands | None = None
         if fit.guard is not None and guarded is not None:
-            order = EntryOrder(fit.equations, self.unknowns, not fit.guard.over_range)
+            order = OrderSlacks(fit.equations, self.unknowns, not fit.guard.over_range)
             self.demands = KeptDemands(fit.guard, order, self.numbers, self.unknowns, *guarded)
             is_closed &= self.demands.is_closed
         self.squares = np.full(len(numbers), np.inf)

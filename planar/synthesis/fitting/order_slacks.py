@@ -15,7 +15,7 @@ LEAST_ORDERED = 3
 """Entries that have an order; two come one after the other, either way."""
 
 
-class EntryOrder:
+class OrderSlacks:
     """Slacks of designs whose entries of some items are met in their order, either way; in one turn, if they turn.
 
     The sense of each design, and over which entries a new turn begins, is as it is at first.
