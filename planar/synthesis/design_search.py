@@ -54,7 +54,7 @@ class DesignSearch:
         own = design_equations(mechanism).solver.unit
         self.size = wanted_size(task, own)
         self.can_move = can_move_whole(task, mechanism, free_numbers(task, mechanism))
-        if self.can_move:  # its scale is that of what is wanted, however large its file is
+        if self.can_move and not task.within:  # its scale is that of what is wanted, however large its file is
             mechanism = similar_mechanism(mechanism, self.size / own)
             own = design_equations(mechanism).solver.unit
         self.mechanism = mechanism
@@ -83,7 +83,13 @@ class DesignSearch:
             )
             for each in self.equations
         ]
-        return find_matches(catalogue, items, self.can_move, many, self.needs_whole_turn)
+        factors = self._factors(catalogue) if self.can_move else None
+        return find_matches(catalogue, items, factors, many, self.needs_whole_turn)
+
+    def _factors(self, catalogue: Catalogue) -> Array | None:
+        """By how much the designs of a catalogue may grow."""
+        scale = self.equations[0].scale
+        return self.moves.factors(catalogue.numbers, self.free.lower / scale, self.free.upper / scale)
 
     def fit(self, catalogue: Catalogue, matches: list[Match], keep: int) -> list[Candidate]:
         """The matches fitted, the best so many; of those that turn fully, and of others, where demands are kept.
@@ -114,7 +120,7 @@ class DesignSearch:
             ys = [y[steps] for steps in match.steps]
             over_turn = self.guards is not None and bool(catalogue.is_whole[match.design])
             branch = y[np.isfinite(y).all(axis=1)]
-            found.append(_FitStart(moved if self.can_move else x, ys, self._guarded(branch, ys, over_turn), over_turn))
+            found.append(_FitStart(moved, ys, self._guarded(branch, ys, over_turn), over_turn))
         return found
 
     def _guarded(self, branch: Array, unknowns: list[Array], over_turn: bool) -> Array:

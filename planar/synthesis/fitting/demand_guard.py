@@ -15,7 +15,7 @@ from planar.synthesis.fitting.wanted_equations import WantedEquations, solve_row
 
 GUARD_STEPS, MAX_GUARD_MOVE = 6, 0.7
 """Newton's steps, and how far unknowns may go in them: farther is another assembly."""
-MARGIN = 1e-5
+MARGIN = 2e-5
 """rad, or of the size: by so much a demand is more than kept, for what rounding of a file takes."""
 UNKNOWN_SLACK = -1.0
 """Of what is not determined, as at a limit."""

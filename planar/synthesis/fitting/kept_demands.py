@@ -21,7 +21,7 @@ FIRST_WEIGHT, GREATEST_WEIGHT, WEIGHT_GROWTH = 1.0, 1e5, 5.0
 """Of a slack of one rad, or of the size, beside a miss of the size."""
 ENOUGH_DROP = 0.3
 """Of what is lacking: where more is left after a change of the multipliers the weight grows."""
-KEPT = 0.5 * MARGIN
+KEPT = 0.25 * MARGIN
 """What may lack of a slack, margin included, that is kept."""
 REFINEMENT = 4
 """Positions for one of those spread over a motion, among which the least slacks are looked for."""

@@ -139,9 +139,8 @@ def exactness_in_excess(task: SynthesisTask, mechanism: Mechanism) -> str | None
 
 
 def can_move_whole(task: SynthesisTask, mechanism: Mechanism, free: FreeNumbers) -> bool:
-    """Whether free numbers without bounds bring what is wanted of the mechanism to any place, size and turn."""
-    is_bounded = bool(np.isfinite(free.lower).any() or np.isfinite(free.upper).any())
-    if is_bounded or any(isinstance(each, WantedFunction) for each in task.wanted):
+    """Whether free numbers, but for their bounds, bring what is wanted of the mechanism to any place, size and turn."""
+    if any(isinstance(each, WantedFunction) for each in task.wanted):
         return False
     items = _result_rows(mechanism, task.wanted, free)
     matrix = _stack(items)
