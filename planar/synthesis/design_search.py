@@ -18,6 +18,7 @@ from planar.synthesis.catalogue.moved_numbers import moved_numbers
 from planar.synthesis.catalogue.step_choices import WantedItem
 from planar.synthesis.fitting.demanded_rows import demand_guards
 from planar.synthesis.fitting.design_fit import DesignFit, FittedDesigns
+from planar.synthesis.fitting.kept_demands import lacks
 from planar.synthesis.fitting.wanted_equations import WantedEquations, tangents
 from planar.synthesis.fitting.wanted_rows import wanted_rows, wanted_size
 from planar.synthesis.task.freedom import can_move_whole
@@ -35,6 +36,11 @@ class Candidate(NamedTuple):
     squares: float
     lack: float = 0.0
     "by how much a demand is missed, rad or of the extent of what is wanted"
+
+
+DEMANDING, LACK_WEIGHT = 6, 0.3
+"""Where something is demanded of the motion, so many times as many matches as are fitted are looked at, and what they
+lack (rad, or of the extent of what is wanted) counts so much beside their distance."""
 
 
 class _FitStart(NamedTuple):
@@ -84,7 +90,22 @@ class DesignSearch:
             for each in self.equations
         ]
         factors = self._factors(catalogue) if self.can_move else None
-        return find_matches(catalogue, items, factors, many, self.needs_whole_turn)
+        if self.guards is None or not self.guards[True].rows:
+            return find_matches(catalogue, items, factors, many, self.needs_whole_turn)
+        found = find_matches(catalogue, items, factors, DEMANDING * many, self.needs_whole_turn)
+        scores = np.hypot([each.distance for each in found], LACK_WEIGHT * self._lacks(catalogue, found))
+        return [found[k] for k in np.argsort(scores, kind="stable")[:many]]
+
+    def _lacks(self, catalogue: Catalogue, matches: list[Match]) -> Array:
+        """By how much matches miss what is demanded of their motion (matches,)."""
+        assert self.guards is not None
+        starts, found = self._fit_starts(catalogue, matches), np.zeros(len(matches))
+        for over_turn, guard in self.guards.items():
+            rows = [k for k, each in enumerate(starts) if each.over_turn is over_turn]
+            if rows:
+                x, y = (np.array([getattr(starts[k], name) for k in rows]) for name in ("numbers", "guarded"))
+                found[rows] = lacks(guard.slacks(x, y))
+        return found
 
     def _factors(self, catalogue: Catalogue) -> Array | None:
         """By how much the designs of a catalogue may grow."""

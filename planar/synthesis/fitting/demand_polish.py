@@ -2,7 +2,7 @@
 
 Sequential quadratic programmes (R. B. Wilson, A Simplicial Algorithm for Concave Programming, Harvard 1963): a step dx
 makes 1/2 dx^T N dx + g^T dx least, of the normal equations, with h + H dx >= 0 for the least slacks h. Its dual in the
-multipliers l >= 0 is solved by projected relaxation (C. Hildreth, Naval Research Logistics Quarterly 4 (1957) 79).
+multipliers l >= 0 is solved by their active set.
 """
 
 from __future__ import annotations
@@ -19,8 +19,9 @@ LEAST_SLACKS = 24
 """Of a design, that a step regards."""
 NEAR = 1e-3
 """A slack that is less may bear on what is best."""
-SWEEPS, SETTLED = 60, 1e-9
-"""At most, and of the greatest multiplier: a change that is less is none."""
+SETTLED, REGULAR = 1e-12, 1e-12
+"""Of the greatest: a number that is less is none; and of a matrix: what keeps rows apart that are alike."""
+TINY = float(np.finfo(float).tiny)
 FIRST_DAMPING, GREATEST_DAMPING = 1e-6, 1e6
 EXACT = 1e-11
 """Of the size, or rad: what is missed by no more is met exactly."""
@@ -120,18 +121,37 @@ def _step_within(normal: Array, slope: Array, slack: Array, slopes: Array) -> Ar
     except np.linalg.LinAlgError:
         solved = np.linalg.pinv(normal, rcond=1e-14, hermitian=True) @ right
     free, ways = solved[..., 0], solved[..., 1:]
-    matrix = slopes @ ways
-    wanted = np.einsum("cki,ci->ck", slopes, free) - slack
-    diagonal = np.einsum("ckk->ck", matrix)
-    diagonal = np.maximum(diagonal, 1e-12 * diagonal.max(axis=1, initial=0.0, keepdims=True)) + np.finfo(float).tiny
-    multipliers = np.zeros_like(slack)
-    for _ in range(SWEEPS):
-        before = multipliers.copy()
-        for k in range(slack.shape[1]):
-            left = wanted[:, k] - (matrix[:, k] * multipliers).sum(axis=1)
-            multipliers[:, k] = np.maximum(multipliers[:, k] + left / diagonal[:, k], 0.0)
-        change, most = np.abs(multipliers - before), np.abs(multipliers).max(axis=1, initial=0.0, keepdims=True)
-        if (change <= SETTLED * most).all():
+    matrices, wanted = slopes @ ways, np.einsum("cki,ci->ck", slopes, free) - slack
+    multipliers = np.array([least_multipliers(*each) for each in zip(matrices, wanted, strict=True)])
+    found: Array = np.einsum("cik,ck->ci", ways, multipliers.reshape(slack.shape)) - free
+    return found
+
+
+def least_multipliers(matrix: Array, wanted: Array) -> Array:
+    """The l >= 0 (k,) with M l >= w, and M l = w where l > 0: C. L. Lawson, R. J. Hanson, Solving Least Squares
+    Problems, Prentice-Hall 1974, ch. 23, by the normal equations."""
+    count = len(wanted)
+    scale = max(float(np.trace(matrix)), TINY)
+    matrix = matrix + REGULAR * scale * np.eye(count)
+    found, bears = np.zeros(count), np.zeros(count, bool)
+    most = float(np.abs(wanted).max(initial=0.0))
+    for _ in range(3 * count):
+        short = np.where(bears, -np.inf, wanted - matrix @ found)
+        k = int(np.argmax(short)) if count else 0
+        if not count or not short[k] > SETTLED * most:
             break
-    found: Array = np.einsum("cik,ck->ci", ways, multipliers) - free
+        bears[k] = True
+        while bears.any():
+            own = np.flatnonzero(bears)
+            tried = np.linalg.solve(matrix[np.ix_(own, own)], wanted[own])
+            if (tried > 0.0).all():
+                found[own] = tried
+                break
+            out = tried <= 0.0
+            share = float((found[own][out] / np.maximum(found[own][out] - tried[out], TINY)).min())
+            found[own] += share * (tried - found[own])
+            bears[own[out & (found[own] <= SETTLED * np.abs(found).max())]] = False
+            if share == 0.0:
+                bears[own[out]] = False
+            found[~bears] = 0.0
     return found

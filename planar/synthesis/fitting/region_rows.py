@@ -46,16 +46,16 @@ class RegionRows:
     def values(self, x: Array, y: Array) -> Array:
         """The depths (positions, points), of positions y (positions, unknowns) of designs x (positions, free)."""
         places = self._places[0].evaluate_batch(len(y), y, x)[0]
-        return polygon_depths(places.reshape(-1, 2), self.corners)[0].reshape(len(y), -1)
+        return polygon_depths(places.reshape(-1, 2), self.corners)[0].reshape(len(y), len(self))
 
     def linearise(self, x: Array, y: Array) -> tuple[Array, Array, Array]:
         """The depths, and their slopes in y (positions, points, unknowns) and x (positions, points, free), each with
         the other held."""
         places, by_y, by_x = self._places[1].evaluate_batch(len(y), y, x)
         depths, ways = polygon_depths(places.reshape(-1, 2), self.corners)
-        ways = ways.reshape(len(y), -1, 2)
+        ways = ways.reshape(len(y), len(self), 2)
         y_slopes, x_slopes = (
-            np.einsum("npa,npai->npi", ways, each.swapaxes(1, 2).reshape(len(y), len(self), 2, -1))
+            np.einsum("npa,npai->npi", ways, each.swapaxes(1, 2).reshape(len(y), len(self), 2, each.shape[1]))
             for each in (by_y, by_x)
         )
-        return depths.reshape(len(y), -1), y_slopes, x_slopes
+        return depths.reshape(len(y), len(self)), y_slopes, x_slopes
