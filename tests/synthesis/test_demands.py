@@ -78,7 +78,7 @@ def test_slacks_change_as_their_slopes_say(model, point):
 @pytest.mark.parametrize(("model", "point"), STARTS)
 def test_transmission_angles_of_the_fit_are_those_of_the_general_path(model, point):
     own = search(model, point, demands=[{"transmission": 30}])
-    (rows,) = own.guards[True].rows
+    rows = own.guards[True].rows[0]
     motion = planar.cycle(own.mechanism, 17)
     z, _ = own.equations[0].design.coordinates_at(motion)
     inputs = motion.inputs[own.mechanism.inputs[0].pair].position / own.equations[0].input_scale
@@ -144,13 +144,14 @@ def test_slacks_of_an_order_are_steps_of_the_input_in_its_sense():
 
 
 PATHS = {
-    "four-bar": [[64, 134], [88, 127], [135, 108], [157, 98], [162, 109], [158, 126], [147, 142], [130, 154]]
-    + [[109, 161], [88, 160], [71, 154], [62, 143]],
-    "slider-crank": [[-34, -69], [-56, -53], [-70, -28], [-72, 0], [-64, 21], [-62, 25], [-71, 8], [-75, -20]]
-    + [[-65, -47], [-45, -67], [-22, -75], [-16, -75]],
-    "stephenson-3-five-bar": [[445, -118], [416, -104], [393, -87], [377, -71], [367, -58], [362, -51], [363, -51]]
-    + [[368, -60], [380, -74], [401, -94], [435, -114], [462, -124]],
+    "four-bar": (64, 134, 88, 127, 135, 108, 157, 98, 162, 109, 158, 126, 147, 142, 130, 154, 109, 161, 88, 160)
+    + (71, 154, 62, 143),
+    "slider-crank": (-34, -69, -56, -53, -70, -28, -72, 0, -64, 21, -62, 25, -71, 8, -75, -20, -65, -47, -45, -67)
+    + (-22, -75, -16, -75),
+    "stephenson-3-five-bar": (445, -118, 416, -104, 393, -87, 377, -71, 367, -58, 362, -51, 363, -51, 368, -60)
+    + (380, -74, 401, -94, 435, -114, 462, -124),
 }
+"""x and y of each place, closed curves."""
 
 
 def least_transmissions(design, outputs):
@@ -161,12 +162,12 @@ def least_transmissions(design, outputs):
 
 @pytest.mark.parametrize(
     ("model", "outputs", "least"),
-    [("four-bar", ["D"], 35), ("slider-crank", ["stroke"], 35), ("stephenson-3-five-bar", ["P", "Q"], 40)],
+    [("four-bar", ["D"], 35), ("slider-crank", ["stroke"], 30), ("stephenson-3-five-bar", ["P", "Q"], 40)],
 )
 def test_a_transmission_angle_is_kept_all_round_the_turn(few_designs, model, outputs, least):
-    wanted = {"point": "E", "through": PATHS[model], "closed": True}
+    wanted = {"point": "E", "through": np.reshape(PATHS[model], (-1, 2)).tolist(), "closed": True}
     free = planar.synthesise(task(model, wanted), many=1)[0]
-    assert min(least_transmissions(free, outputs)) < 31  # what is best without the demand
+    assert min(least_transmissions(free, outputs)) < least - 2  # what is best without the demand
     found = planar.synthesise(task(model, wanted, demands=[{"transmission": least}]), many=1)
     assert min(least_transmissions(found[0], outputs)) >= least
     assert found[0].greatest_miss < 0.08 * found.size

@@ -9,8 +9,8 @@ from typing import NamedTuple
 import numpy as np
 
 from planar.foundation.arrays import Array, BoolArray, IntArray
+from planar.synthesis.fitting.adjoint_rows import AdjointRows
 from planar.synthesis.fitting.region_rows import RegionRows
-from planar.synthesis.fitting.transmission_rows import TransmissionRows
 from planar.synthesis.fitting.wanted_equations import WantedEquations, solve_rows
 
 GUARD_STEPS, MAX_GUARD_MOVE = 6, 0.7
@@ -44,7 +44,7 @@ class DemandGuard:
     """
 
     equations: WantedEquations
-    rows: tuple[TransmissionRows | RegionRows, ...] = ()
+    rows: tuple[AdjointRows | RegionRows, ...] = ()
     least: tuple[float, ...] = ()
     over_range: bool = False
 

@@ -9,7 +9,9 @@ import numpy as np
 from planar.foundation.errors import PlanarError
 from planar.solving.cycle import cycle
 from planar.synthesis.demands.output_transmissions import output_transmissions
+from planar.synthesis.fitting.adjoint_rows import AdjointRows
 from planar.synthesis.fitting.demand_guard import DemandGuard
+from planar.synthesis.fitting.rate_rows import RateRows
 from planar.synthesis.fitting.region_rows import RegionRows
 from planar.synthesis.fitting.transmission_rows import TransmissionRows
 from planar.synthesis.fitting.wanted_equations import WantedEquations, WantedRows
@@ -19,6 +21,8 @@ from planar.synthesis.task.synthesis_task import SynthesisTask
 
 GUARD_POSITIONS = 24
 """Between which a motion is divided, all round a turn or from the first entry to the last."""
+LEAST_RATE = 0.01
+"""Of the input beside all unknowns, along the path: where it is less a dead point is near."""
 SAMPLES = 24
 """Positions of a start, from which the outputs are known that one force drives, and by which pairs."""
 
@@ -29,11 +33,13 @@ def demand_guards(
     """The guards of designs that turn fully (True), and of others; None where nothing is demanded of the motion."""
     demands, mechanism = task.demands, equations.design.mechanism
     closed = any(getattr(each, "is_closed", False) for each in task.wanted)
-    kept: list[tuple[TransmissionRows | RegionRows, float]] = []
+    kept: list[tuple[AdjointRows | RegionRows, float]] = []
     if demands.transmission is not None:
         kept.append((_transmission_rows(equations, free), demands.transmission))
     if demands.inside is not None:
         kept.append((RegionRows(mechanism, demands.inside, size, equations.free, equations.scale), 0.0))
+    if demands.whole_turn or kept:
+        kept.append((RateRows(mechanism, equations.free, equations.scale), LEAST_RATE))
     is_guarded = bool(kept or demands.whole_turn or demands.one_branch or closed)
     is_bound = bool(task.exact) or any(getattr(each, "in_order", False) for each in task.wanted)
     if not (is_guarded or is_bound):

@@ -17,6 +17,8 @@ MAX_STEPS = 150
 HALVING_STEPS = (10, 20, 40)
 """Steps after which only the better half goes on, where there are many."""
 FEW = 4
+WATCH_STEPS = 10
+"""Steps after which it is looked anew where demands are kept least."""
 PRESSINGS, PRESSED_STEPS = 4, 15
 """How often multipliers of demands are changed, and steps between."""
 
@@ -61,6 +63,8 @@ class DesignFit:
         state = MovingDesigns(self.problem, numbers, list(unknowns), list(zeros), guarded)
 
         def halve(step: int) -> None:
+            if state.demands is not None and step and step % WATCH_STEPS == 0 and state.demands.guard.rows:
+                state.relocate_demands()
             if step in HALVING_STEPS:
                 state.keep_best(max(keep, FEW, (len(state.numbers) + 1) // 2))
 

@@ -139,16 +139,17 @@ class KeptDemands:
         self.weight = np.where(slow, np.minimum(self.weight * WEIGHT_GROWTH, GREATEST_WEIGHT), self.weight)
         self.lack_before = lack
 
-    def relocate(self, numbers: Array, unknowns: Sequence[Array]) -> None:
-        """Positions where slacks are least beside those spread over the motion, and multipliers anew."""
+    def relocate(self, numbers: Array, unknowns: Sequence[Array]) -> BoolArray:
+        """Positions where slacks are least beside those spread over the motion, and multipliers anew; which designs go
+        together everywhere between."""
         if not self.guard.rows:
-            return
+            return np.ones(len(numbers), bool)
         every = np.linspace(0, self.spread_count - 1, REFINEMENT * (self.spread_count - 1) + 1)
         y, shares = (
             _between(self.y[:, : self.spread_count], every),
             _between(self.shares[:, : self.spread_count, None], every),
         )
-        y, _ = self.guard.close(numbers, y, shares[..., 0], unknowns)
+        y, is_whole = self.guard.close(numbers, y, shares[..., 0], unknowns)
         at = _least_places(self.guard.slacks(numbers, y).reshape(len(y), -1, self.guard.row_count))
         near = np.concatenate([_between(each, at) for each in (y, shares)], axis=2)
         own, is_closed = self.guard.close(numbers, near[..., :-1], near[..., -1], unknowns)
@@ -158,6 +159,7 @@ class KeptDemands:
         self.shares = np.concatenate([self.shares[:, : self.spread_count], near[..., -1]], axis=1)
         self.slack = self._slacks(numbers, self.y, unknowns, np.arange(len(numbers)))
         self.multipliers = np.zeros_like(self.slack)
+        return is_whole
 
 
 def lacks(slack: Array) -> Array:

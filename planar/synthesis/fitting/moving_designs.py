@@ -137,6 +137,13 @@ class MovingDesigns:
         """Only the best so many go on."""
         self.take(np.argsort(self.squares, kind="stable")[:many])
 
+    def relocate_demands(self) -> None:
+        """Watch designs where they keep demands least; those that do not go together there are out."""
+        assert self.demands is not None
+        is_whole = self.demands.relocate(self.numbers, self.unknowns)
+        self.squares = np.where(is_whole, self.merits(), np.inf)
+        self.is_moving &= is_whole
+
     def press(self) -> bool:
         """Begin anew with multipliers by which demands are kept better; whether there is anything to be won."""
         assert self.demands is not None
