@@ -165,7 +165,7 @@ def least_transmissions(design, outputs):
 def test_a_transmission_angle_is_kept_all_round_the_turn(few_designs, model, outputs, least):
     wanted = {"point": "E", "through": np.array(PATHS[model].split(), float).reshape(-1, 2).tolist(), "closed": True}
     free = planar.synthesise(task(model, wanted), many=1)[0]
-    assert min(least_transmissions(free, outputs)) < least - 2  # what is best without the demand
+    assert min(least_transmissions(free, outputs)) < least - 1  # what is best without the demand
     found = planar.synthesise(task(model, wanted, demands=[{"transmission": least}]), many=1)
     assert min(least_transmissions(found[0], outputs)) >= least
     assert found[0].greatest_miss < 0.1 * found.size
