@@ -7,14 +7,14 @@ from collections.abc import Sequence
 import numpy as np
 
 from planar.analysis.motion.output import Extreme
-from planar.analysis.motion.transmission_angle import transmission
 from planar.foundation.arrays import Array
-from planar.foundation.errors import BadInput, NoAnswer, PlanarError
+from planar.foundation.errors import BadInput, NoAnswer
 from planar.foundation.jets import TURN
 from planar.model.mechanism import Mechanism, relative_motions
 from planar.model.pairs import MeasureKind
 from planar.results.motion import Motion
 from planar.solving.cycle import cycle
+from planar.synthesis.demands.output_transmissions import output_transmissions
 from planar.synthesis.synthesis import DesignMotion
 
 STEPS = 90
@@ -43,16 +43,4 @@ def design_motion(mechanism: Mechanism, inputs: Sequence[Array]) -> DesignMotion
 
 def least_transmissions(motion: Motion) -> dict[str, Extreme]:
     """The least transmission angle (rad) over a motion at every output that has one, by its pair."""
-    mechanism = motion.mechanism
-    driven = {each.pair for each in mechanism.inputs}
-    found = {}
-    for pair in mechanism.pairs:
-        if mechanism.frame not in pair.links or pair.name in driven:
-            continue
-        try:
-            least = transmission(motion, pair.name).least
-        except PlanarError:
-            continue  # nothing is transmitted to it by one force
-        if least is not None:
-            found[pair.name] = least
-    return found
+    return {each.pair: each.least for each in output_transmissions(motion) if each.least is not None}
