@@ -256,7 +256,7 @@ def test_more_than_can_be_met_exactly_is_refused_with_both_counts():
 @pytest.mark.parametrize(
     ("demand", "words"),
     [
-        ({"inside": [[-1, -1], [1, 1]]}, ("the region", "E comes nowhere near")),
+        ({"inside": [[-1, -1], [1, 1]]}, ("the region: the best design leaves it by", "mm")),
         ({"transmission": 89.99}, ("the transmission angle of 89.99 deg: the best design reaches", "deg less")),
     ],
 )

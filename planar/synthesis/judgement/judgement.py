@@ -93,14 +93,14 @@ class DesignJudge:
                 defects.append(Defect("one circuit", told))
             misses.append(off)
         defects += [*self._put_in_order(motion, is_whole, there, misses)]
-        defects += [*self._tolerance_defects(misses), *self._rest_defects(misses)]
+        defects += [*self._tolerance_defects(misses)]
         if self.task.needs_whole_turn and not is_whole:
             low, high = (
                 amount(float(each), _input_kind(mechanism), mechanism.units) for each in (given.min(), given.max())
             )
             told = f"no whole turn: {running} goes from {low} to {high} only"
             defects.append(Defect("the whole turn", told, float(np.ptp(given)), TURN))
-        defects += [*self._motion_defects(mechanism, motion, there, is_whole)]
+        defects += [*self._motion_defects(mechanism, motion, there, is_whole), *self._rest_defects(misses)]
         return Judgement(tuple(misses), tuple(there), tuple(defects))
 
     def _nearest_on_branch(self, motion: Motion, item: int, entry: int) -> tuple[float, float]:

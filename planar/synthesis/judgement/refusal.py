@@ -16,7 +16,7 @@ def refusal(designs: Sequence[Sequence[Defect]], units: FileUnits) -> str:
     fewest defects, is short of."""
     if not designs:
         return "no design comes near: another start, or more free numbers, may"
-    short = [{each.demand for each in own} for own in designs]
+    short = [dict.fromkeys(each.demand for each in own) for own in designs]
     count = {demand: sum(demand in own for own in short) for own in short for demand in own}
     fewest = min(range(len(designs)), key=lambda k: len(short[k]))
     demand = max(count, key=lambda name: (count[name], name in short[fewest]))
