@@ -8,17 +8,17 @@ from functools import partial
 
 import numpy as np
 
-from planar.foundation.arrays import Array, BoolArray
+from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput, NoAnswer
 from planar.foundation.jets import TURN, Scalar, value_and_rates
 from planar.model.mechanism import Mechanism, relative_motions
-from planar.model.pairs import MeasureKind
 from planar.model.wording import amount
 from planar.results.motion import Motion
 from planar.solving.cycle import cycle
 from planar.solving.grids.grid_motion import motion_over_input
 from planar.synthesis.judgement.defects import Defect
 from planar.synthesis.judgement.entry_order import ordered_inputs
+from planar.synthesis.judgement.input_range import InputRange, input_range
 from planar.synthesis.judgement.misses import entry_misses, repeat_entry, resting_misses
 from planar.synthesis.judgement.motion_demands import region_defects, transmission_defects
 from planar.synthesis.task.synthesis_task import SynthesisTask, Wanted, WantedFunction, WantedPath
@@ -37,8 +37,6 @@ OTHER_ASSEMBLY = 0.01
 """Of the extent of what is wanted, or rad: what misses an entry by so much more than the fit is another assembly."""
 NOWHERE_NEAR = 0.5
 """Of the root mean square of what one at rest misses: a design that misses more does not do what is wanted."""
-ON_END = 1e-6
-"""rad, or of the range: an entry so little beyond the end of a branch is on it."""
 
 
 @dataclass(frozen=True)
@@ -69,12 +67,11 @@ class DesignJudge:
             motion = cycle(mechanism, STEPS, pair=running)
         except NoAnswer as problem:
             return self._unreached(inputs, Defect(REACH, f"it cannot be solved: {problem}"))
-        given = motion.inputs[running].position
-        is_whole = _turns(mechanism) and float(np.ptp(given)) > TURN * (1.0 - 1e-9)
-        defects = [*self._branch_defects(mechanism, motion, is_whole, inputs)]
+        reach = input_range(motion, inputs)
+        defects = [*self._branch_defects(mechanism, reach, inputs)]
         if defects:
             return self._unreached(inputs, *defects)
-        there = [_brought_into(each, given, is_whole) for each in inputs]
+        there = [reach.bring(each) for each in inputs]
         try:
             shown = _results(mechanism, self.task.wanted, there)
         except NoAnswer as problem:
@@ -85,30 +82,26 @@ class DesignJudge:
             scale = 1.0 if isinstance(wanted, WantedFunction) else self.size
             for entry in np.flatnonzero(off > fit_off + SAME * scale).tolist():
                 if not isinstance(wanted, WantedFunction) and wanted.inputs is None:
-                    there[k][entry], off[entry] = self._nearest_on_branch(motion, k, entry)
+                    there[k][entry], off[entry] = self._nearest_on_branch(motion, reach, k, entry)
             more = off - fit_off
             if float(more.max(initial=0.0)) > OTHER_ASSEMBLY * scale:
                 entry = int(np.argmax(more))
                 told = f"circuit defect: {wanted.of} meets entry {entry + 1} in another assembly only"
                 defects.append(Defect("one circuit", told))
             misses.append(off)
-        defects += [*self._put_in_order(motion, is_whole, there, misses)]
+        defects += [*self._put_in_order(motion, reach, there, misses)]
         defects += [*self._tolerance_defects(misses)]
-        if self.task.needs_whole_turn and not is_whole:
-            low, high = (
-                amount(float(each), _input_kind(mechanism), mechanism.units) for each in (given.min(), given.max())
-            )
+        if self.task.needs_whole_turn and not reach.is_whole_turn:
+            low, high = (amount(each, reach.kind, mechanism.units) for each in (reach.low, reach.high))
             told = f"no whole turn: {running} goes from {low} to {high} only"
-            defects.append(Defect("the whole turn", told, float(np.ptp(given)), TURN))
-        defects += [*self._motion_defects(mechanism, motion, there, is_whole), *self._rest_defects(misses)]
+            defects.append(Defect("the whole turn", told, reach.high - reach.low, TURN))
+        defects += [*self._motion_defects(motion, reach, there), *self._rest_defects(misses)]
         return Judgement(tuple(misses), tuple(there), tuple(defects))
 
-    def _nearest_on_branch(self, motion: Motion, item: int, entry: int) -> tuple[float, float]:
+    def _nearest_on_branch(self, motion: Motion, reach: InputRange, item: int, entry: int) -> tuple[float, float]:
         """Where the input is nearest to an entry, and how far off that is; a fit beyond a dead point tells neither."""
         wanted = self.task.wanted[item]
-        given = np.sort(motion.inputs[motion.mechanism.inputs[0].pair].position)
-        margin = ON_END * float(np.ptp(given))
-        tried = np.clip(given, given[0] + margin, given[-1] - margin)
+        tried = np.linspace(reach.low + reach.margin, reach.high - reach.margin, len(motion))
         for _ in range(FEET):
             shown = _results(motion.mechanism, [wanted], [tried])[0]
             off = entry_misses(repeat_entry(wanted, entry, len(tried)), shown, self.size)
@@ -121,39 +114,29 @@ class DesignJudge:
     def _unreached(self, inputs: Sequence[Array], *defects: Defect) -> Judgement:
         return Judgement(tuple(np.full(len(each), np.nan) for each in inputs), tuple(inputs), defects)
 
-    def _branch_defects(
-        self, mechanism: Mechanism, motion: Motion, is_whole: bool, inputs: Sequence[Array]
-    ) -> Iterator[Defect]:
-        if is_whole:
-            return
-        running = mechanism.inputs[0].pair
-        given = motion.inputs[running].position
-        low, high = float(given.min()), float(given.max())
-        margin = ON_END * max(high - low, 1e-3)
+    def _branch_defects(self, mechanism: Mechanism, reach: InputRange, inputs: Sequence[Array]) -> Iterator[Defect]:
         for wanted, own in zip(self.task.wanted, inputs, strict=True):
-            beyond: BoolArray = np.asarray((own < low - margin) | (own > high + margin))
+            beyond = reach.are_beyond(own)
             if beyond.any():
                 entry = int(np.argmax(beyond))
-                ends = " to ".join(amount(each, _input_kind(mechanism), mechanism.units) for each in (low, high))
+                ends = " to ".join(amount(each, reach.kind, mechanism.units) for each in (reach.low, reach.high))
                 yield Defect(
                     "one branch",
                     f"branch defect: entry {entry + 1} of {wanted.of} lies beyond a dead point; the branch of the "
-                    f"first goes from {running} = {ends}",
+                    f"first goes from {reach.pair} = {ends}",
                 )
 
     def _put_in_order(
-        self, motion: Motion, is_whole: bool, inputs: list[Array], misses: list[Array]
+        self, motion: Motion, reach: InputRange, inputs: list[Array], misses: list[Array]
     ) -> Iterator[Defect]:
         """Entries that are wanted in their order are met so, where that costs hardly anything; else a defect."""
-        given = motion.inputs[motion.mechanism.inputs[0].pair].position
-        low, high = float(given.min()), float(given.max())
-        margin = 0.0 if is_whole else ON_END * (high - low)
         for k, wanted in enumerate(self.task.wanted):
-            if isinstance(wanted, WantedFunction) or not wanted.in_order or _is_in_order(inputs[k], is_whole):
+            if isinstance(wanted, WantedFunction) or not wanted.in_order or reach.is_in_order(inputs[k]):
                 continue
             off = np.full(len(inputs[k]), np.inf)
             if wanted.inputs is None:
-                own = ordered_inputs(partial(self._every_miss, motion, wanted), low + margin, high - margin, is_whole)
+                ends = reach.low + reach.margin, reach.high - reach.margin
+                own = ordered_inputs(partial(self._every_miss, motion, wanted), *ends, reach.is_cyclic)
                 off = np.diag(self._every_miss(motion, wanted, own))
             if float((off - misses[k]).max()) > OTHER_ASSEMBLY * self.size:
                 yield Defect("the order", f"order defect: {wanted.of} does not meet its entries in their order")
@@ -203,17 +186,14 @@ class DesignJudge:
     def _miss_kind(self, wanted: Wanted) -> str:
         return task_motion_kind(self.task, wanted.to_pair) if isinstance(wanted, WantedFunction) else "length"
 
-    def _motion_defects(
-        self, mechanism: Mechanism, motion: Motion, inputs: Sequence[Array], is_whole: bool
-    ) -> Iterator[Defect]:
+    def _motion_defects(self, motion: Motion, reach: InputRange, inputs: Sequence[Array]) -> Iterator[Defect]:
         demands = self.task.demands
         if demands.transmission is None and demands.inside is None:
             return
-        running = mechanism.inputs[0].pair
-        if not is_whole:
+        if not reach.is_whole_turn:
             every = np.concatenate(inputs)
             try:
-                motion = cycle(mechanism, STEPS, float(every.min()), float(every.max()), running)
+                motion = cycle(motion.mechanism, STEPS, float(every.min()), float(every.max()), reach.pair)
             except (NoAnswer, BadInput) as problem:
                 yield Defect(REACH, f"it does not run through what is wanted: {problem}")
                 return
@@ -221,18 +201,6 @@ class DesignJudge:
             yield from transmission_defects(motion, demands.transmission)
         if demands.inside is not None:
             yield from region_defects(motion, demands.inside)
-
-
-def _is_in_order(inputs: Array, is_whole: bool) -> bool:
-    """Whether inputs (n,) rise or fall all the way; of a whole turn once round at most."""
-    if len(inputs) < 3:
-        return True
-    steps = np.diff(inputs)
-    if not is_whole:
-        return bool((steps > -1e-9).all() or (steps < 1e-9).all())
-    forward = np.mod(steps, TURN)
-    rounds = float(forward.sum()) / TURN, float(np.mod(-steps, TURN).sum()) / TURN
-    return min(rounds) < 1.0 + 1e-9
 
 
 def _results(mechanism: Mechanism, wanted: Sequence[Wanted], inputs: Sequence[Array]) -> list[Array]:
@@ -262,20 +230,3 @@ def _pair_result(mechanism: Mechanism, name: str) -> str:
 def _values(jet: Scalar, many: int) -> Array:
     value = np.asarray(value_and_rates(jet)[0], float)
     return np.broadcast_to(value, (many,))
-
-
-def _brought_into(inputs: Array, given: Array, is_whole: bool) -> Array:
-    """Positions of an input by whole turns in the range that runs."""
-    low, high = float(given.min()), float(given.max())
-    if not is_whole:
-        return np.clip(inputs, low, high)
-    found: Array = low + np.mod(inputs - low, TURN)
-    return np.minimum(found, high)
-
-
-def _turns(mechanism: Mechanism) -> bool:
-    return relative_motions(mechanism)[mechanism.inputs[0].pair].input_kind is not MeasureKind.LENGTH
-
-
-def _input_kind(mechanism: Mechanism) -> str:
-    return "angle" if _turns(mechanism) else "length"
