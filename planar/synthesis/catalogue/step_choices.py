@@ -18,6 +18,8 @@ ARC_STARTS, ARC_SHARES = 24, (0.12, 0.18, 0.25, 0.35, 0.5, 0.7, 0.85, 1.0)
 """Of a branch: where arcs begin, and how much of it they are."""
 MOST_ORDERS = 4
 """In which entries without an order are tried."""
+POSE_STRIDE, MAX_TURN_MISS = 3, 0.3
+"""Steps from one first pose that is tried to the next; rad that a pose may be off there."""
 TURN_WEIGHT = 0.3
 """Of a turn by a rad beside a way as long as what is wanted, along a row of poses."""
 
@@ -53,6 +55,9 @@ def step_choices(catalogue: Catalogue, item: WantedItem, values: Array, most: in
         given = item.inputs[entries]
         yield StepChoices(entries, _timed_steps(catalogue.unknowns[..., -1], given, item, catalogue.is_whole))
         return
+    if isinstance(item.wanted, WantedPoses):
+        entries = _evenly(len(item.target), most)
+        yield StepChoices(entries, _turned_steps(values[..., 2], item.target[entries, 2]))
     along = _lengths_along(values[..., 0] + 1j * values[..., 1])
     for order in _entry_orders(item):
         few = _evenly(len(order), most)
@@ -90,6 +95,21 @@ def _timed_steps(inputs: Array, given: Array, item: WantedItem, is_whole: BoolAr
         at = np.where(nearer, at - 1, at) + first[k]
         inside = (wanted[k] >= low[k] - 0.1) & (wanted[k] <= high[k] + 0.1)
         steps[k] = np.where(inside, at, -1)
+    return steps
+
+
+def _turned_steps(angles: Array, wanted: Array) -> IntArray:
+    """Where a link is turned from every so many a step as it is to turn from pose to pose: that is alike however the
+    linkage lies and however large it is."""
+    starts = np.arange(0, angles.shape[1], POSE_STRIDE)
+    steps = np.full((len(angles), len(starts), len(wanted)), -1)
+    for k, turn in enumerate(wanted - wanted[0]):
+        off = angles[:, None, :] - (angles[:, starts, None] + turn)
+        off = np.abs(off - TURN * np.round(off / TURN))
+        off = np.where(np.isfinite(off), off, np.inf)
+        nearest = np.argmin(off, axis=2)
+        is_near = np.take_along_axis(off, nearest[..., None], axis=2)[..., 0] < MAX_TURN_MISS
+        steps[..., k] = np.where(is_near, nearest, -1)
     return steps
 
 
