@@ -112,6 +112,7 @@ if TYPE_CHECKING:
     from planar.model.pin_linkages import PinnedLinkages, pinned_linkages
     from planar.model.stops import Stops
     from planar.pages.view import view
+    from planar.reports.files.converted import Conversion, convert
     from planar.reports.files.xarray_dataset import dataset
     from planar.results.motion import Motion, State
     from planar.results.records import Limit, LinkMotion, LinkState, PointMotion, PointState, RelativeState
@@ -172,6 +173,7 @@ __all__ = [
     "ConstantAccelerationSegment",
     "ConstantSpeedSegment",
     "ContactForce",
+    "Conversion",
     "Counterweight",
     "CounterweightLimit",
     "Course",
@@ -297,6 +299,7 @@ __all__ = [
     "cognates",
     "conflict",
     "contact_forces",
+    "convert",
     "curvature",
     "cycle",
     "dataset",
