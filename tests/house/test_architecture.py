@@ -72,6 +72,7 @@ LIBRARIES = {
     "torch": {"torch"},
     "jax": {"jax"},
     "xarray": {"reports"},
+    "xlsxwriter": {"reports"},
 }
 MOST_FILES, MOST_LINES, LONGEST_FUNCTION, MOST_PARAMETERS = 16, 400, 60, 8
 MOST_MODULES_TO_SOLVE, MOST_OTHERS_TO_SOLVE = 106, 40
