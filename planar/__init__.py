@@ -113,6 +113,7 @@ if TYPE_CHECKING:
     from planar.model.stops import Stops
     from planar.pages.design_gallery import write_designs
     from planar.pages.view import view
+    from planar.reports.files.converted import Conversion, convert
     from planar.reports.files.xarray_dataset import dataset
     from planar.results.motion import Motion, State
     from planar.results.records import Limit, LinkMotion, LinkState, PointMotion, PointState, RelativeState
@@ -174,6 +175,7 @@ __all__ = [
     "ConstantAccelerationSegment",
     "ConstantSpeedSegment",
     "ContactForce",
+    "Conversion",
     "Counterweight",
     "CounterweightLimit",
     "Course",
@@ -301,6 +303,7 @@ __all__ = [
     "cognates",
     "conflict",
     "contact_forces",
+    "convert",
     "curvature",
     "cycle",
     "dataset",

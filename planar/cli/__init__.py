@@ -12,6 +12,7 @@ main.modules = {
     "chains": "planar.cli.commands.design.chains",
     "circuits": "planar.cli.commands.circuits",
     "cognates": "planar.cli.commands.design.cognates",
+    "convert": "planar.cli.commands.convert",
     "cycle": "planar.cli.commands.solve_cycle_explain",
     "explain": "planar.cli.commands.solve_cycle_explain",
     "forces": "planar.cli.commands.forces_simulate",

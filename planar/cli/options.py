@@ -33,7 +33,8 @@ wait for each other longer than they work."""
 def main() -> None:
     """How any planar linkage moves.
 
-    MODEL is a mechanism file (JSON), the name of a model that comes along, or - for what is piped in.
+    MODEL is a mechanism file (JSON), a file or link of another program (see `planar convert --formats`), the name of a
+    model that comes along, or - for what is piped in.
 
     Ends with status 0 when all is done, 1 where the mechanism has no answer, 2 on bad input, 3 where the result cannot
     be written, as on a full disk.
@@ -98,7 +99,11 @@ def read_model(model: str) -> Mechanism:
     """The mechanism of a file, or of a model's name, with the numbers that `--set` changes."""
     from planar.document.files import load
 
-    mechanism = load(model)
+    return apply_settings(load(model))
+
+
+def apply_settings(mechanism: Mechanism) -> Mechanism:
+    """The mechanism with the numbers that `--set` changes."""
     settings = click.get_current_context().meta.get(SETTINGS, ())
     if not settings:
         return mechanism

@@ -15,6 +15,8 @@ from planar.document import read_mechanism
 from planar.foundation.errors import BadInput
 from planar.model.mechanism import Mechanism
 
+OWN_FORMAT = "planar"
+"""The name of planar's own form of file, among those of other programs."""
 PIPED = "-"
 """What stands for the input of the process in place of a file's name."""
 MAX_FILES_SEARCHED = 10_000
@@ -76,12 +78,61 @@ def load(model: str | Path) -> Mechanism:
     """
     if str(model) == PIPED:
         return loads(_piped(), "standard input")
-    path = find_model_file(model)
-    content = read_limited(path)
-    if path.suffix.lower() not in ("", ".json") and not content.lstrip(b"\xef\xbb\xbf \t\r\n").startswith((b"{", b"[")):
-        told = "name a JSON file that describes a mechanism, or a model that comes along by its name"
-        raise BadInput(str(path), f"this is a {path.suffix} file and no mechanism; {told}")
-    return loads(content, str(path))
+    return read_source(model)[0]
+
+
+def read_source(
+    model: str | os.PathLike[str], kind: str | None = None
+) -> tuple[Mechanism, str | None, tuple[str, ...]]:
+    """The mechanism of a file, of another program's file, of a link, or of a model's name.
+
+    With it the name of the other program's format, None for planar's own, and what could not be taken over; `kind`
+    names the format that is not to be recognised. Raises BadInput.
+    """
+    place = os.fsdecode(model)
+    if place == PIPED:
+        place, content = "standard input", _piped()
+    elif place.startswith(("http://", "https://")):
+        content = place.encode()  # the mechanism is in the address, which is not opened
+    else:
+        path = find_model_file(place)
+        place, content = str(path), read_limited(path)
+    if (
+        kind in (None, OWN_FORMAT)
+        and content.lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"{")
+        and b'"planar"' in content
+    ):
+        return loads(content, place), None, ()
+    return _read_foreign(content, place, kind)
+
+
+def _read_foreign(content: bytes, place: str, kind: str | None) -> tuple[Mechanism, str | None, tuple[str, ...]]:
+    """The mechanism of another program's text."""
+    from planar.formats.known_formats import foreign_text, named_format, recognised_format
+
+    ending = Path(place).suffix
+    told = "name a JSON file that describes a mechanism, another program's file of one, or a model that comes along"
+    if b"\0" in content and ending.lower() not in ("", ".json"):
+        raise BadInput(place, f"this is a {ending} file and no mechanism; {told}")
+    opens = content.lstrip(b"\xef\xbb\xbf \t\r\n")[:1]
+    value, problem = None, None
+    if opens in (b"{", b"["):
+        try:
+            value = parse_json(content, place)
+        except BadInput as found_problem:  # other forms open with a brace, too
+            problem = found_problem
+    source = foreign_text(content, place, value)
+    found = named_format(kind, OWN_FORMAT) if kind not in (None, OWN_FORMAT) else recognised_format(source)
+    if found is not None:
+        read = found.read(source)
+        return read_mechanism(read.document), found.name, read.notes
+    if problem is not None:
+        raise problem
+    if value is not None:
+        return read_mechanism(value), None, ()
+    if ending.lower() in ("", ".json"):
+        return loads(content, place), None, ()
+    raise BadInput(place, f"this is a {ending} file and no mechanism; {told}")
 
 
 def load_value(source: str | os.PathLike[str], what: str) -> Any:

@@ -72,7 +72,7 @@ ONE_DESTINATION = "results go to a file or are printed with --json; give one of 
 )
 @motion_options
 @output_option(
-    "Write the tables to a .txt, .svg or .html file; with --cycle every position to .csv, .json, .npz or .parquet."
+    "Write the tables to a .txt, .svg or .html file; with --cycle every position to .csv, .xlsx, .json, .npz, .parquet."
 )
 # many: options of the command
 def forces(
@@ -251,7 +251,7 @@ def _forces_over_motion(
     help="Draw displacement, velocity and acceleration over time, what friction holds shaded.",
 )
 @click.option("--of", metavar="NAME", help="With --diagrams: the slide, link, point or pair that is drawn.")
-@output_option("Write positions, velocities, accelerations and energies to a .csv, .json, .npz or .parquet file.")
+@output_option("Write positions, velocities, accelerations, energies to a .csv, .xlsx, .json, .npz or .parquet file.")
 # many: options of the command
 def simulate(
     model: str,

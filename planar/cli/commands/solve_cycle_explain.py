@@ -197,7 +197,7 @@ def _solve_model(
     metavar="NAME",
     help="Also what is asked of a pair, link or point: stroke or swing, greatest speed, time ratio, dwells, area, ...",
 )
-@output_option("Write positions, velocities and accelerations to a .csv, .json, .npz or .parquet file.")
+@output_option("Write positions, velocities and accelerations to a .csv, .xlsx, .json, .npz or .parquet file.")
 def cycle(
     model: str,
     as_json: bool,

@@ -1,4 +1,4 @@
-"""A run of positions as the content of a file, by its suffix: CSV, npz, Parquet, or JSON, which is made here."""
+"""A run of positions as the content of a file, by its suffix: CSV, npz, Parquet, a workbook, or JSON, made here."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import numpy as np
 from planar.foundation.arrays import Array
 from planar.foundation.errors import unknown_format_error
 from planar.reports.columns import ReportedSeries, reported_series, run_header
-from planar.reports.files import csv, npz, parquet
+from planar.reports.files import csv, npz, parquet, workbook
 from planar.results.motion import Motion
 from planar.results.records import Limit
 
@@ -25,6 +25,8 @@ def check_writable(suffix: str) -> None:
         raise unknown_format_error(suffix, "a run", _FORMATS)
     if suffix.lower() == ".parquet":
         parquet.require_pyarrow()
+    if suffix.lower() == ".xlsx":
+        workbook.require_xlsxwriter()
 
 
 def encode_run(
@@ -93,4 +95,5 @@ _FORMATS: dict[str, Callable[..., bytes]] = {
     ".json": _encode_json,
     ".npz": npz.encode_npz,
     ".parquet": parquet.encode_parquet,
+    ".xlsx": workbook.encode_workbook,
 }

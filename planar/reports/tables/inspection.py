@@ -1,13 +1,15 @@
-"""What `inspect` and `models` say, as text for a terminal."""
+"""What `inspect`, `models` and `convert --formats` say, as text for a terminal."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from typing import Any
 
 from rich.console import Group, RenderableType
 from rich.text import Text
 
 from planar.analysis.identity.inspection import Inspection
+from planar.formats.known_formats import file_formats
 from planar.model.wording import count_phrase, join_all_names
 from planar.reports.fitted_table import plain_table
 from planar.reports.number_format import paragraphs
@@ -123,3 +125,26 @@ def models_table(rows: Iterable[tuple[str, str, str]]) -> RenderableType:
     for row in rows:
         table.add_row(*row)
     return table
+
+
+def formats_table() -> RenderableType:
+    """By name: the program, the endings of its files, whether they are written and how exactly."""
+    table = plain_table(None, "format", "program", "endings", "written", left=(0, 1, 2, 3))
+    for each in file_formats().values():
+        table.add_row(each.name, each.title, " ".join(each.suffixes), f"in {each.precision}" if each.write else "no")
+    return table
+
+
+def format_records() -> list[dict[str, Any]]:
+    """The same for programs, with the source of each form."""
+    return [
+        {
+            "format": each.name,
+            "program": each.title,
+            "endings": list(each.suffixes),
+            "written": each.write is not None,
+            "precision": each.precision or None,
+            "source": each.source,
+        }
+        for each in file_formats().values()
+    ]

@@ -1,0 +1,1 @@
+"""Other programs' files: each kind is one file of the folder `kinds`, found by looking there."""

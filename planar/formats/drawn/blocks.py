@@ -1,0 +1,53 @@
+"""Sliding blocks that carry one pin and nothing else, as the slots that most programs have in their place."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import hypot
+
+from planar.formats.drawn.drawn_linkage import DrawnLinkage, Joint, PinJoint, Place, SlideJoint, SlotJoint, joined_links
+
+
+def slots_for_blocks(linkage: DrawnLinkage) -> DrawnLinkage:
+    """The same motion of all other links, with a pin in a slot where a block slid that only carried this pin.
+
+    A block stays whose slide or pin is driven, or that has a point, a mass or a load of its own.
+    """
+    joints = linkage.joints
+    for slide in linkage.joints_of(SlideJoint):
+        assert isinstance(slide, SlideJoint)
+        pin = _pin_of_block(replace(linkage, joints=joints), slide)
+        if pin is not None:
+            joints = tuple(made for each in joints for made in _replaced(each, slide, pin))
+    return replace(linkage, joints=joints)
+
+
+def _pin_of_block(linkage: DrawnLinkage, slide: SlideJoint) -> PinJoint | None:
+    """The one pin of what slides, where there is nothing else to it."""
+    others = [each for each in linkage.joints if slide.slider in joined_links(each) and each != slide]
+    own = [each.link for each in linkage.tracers]
+    own += [each.link for each in linkage.masses] + [each.link for each in linkage.forces]
+    driven = {each.joint for each in linkage.inputs}
+    if len(others) != 1 or slide.slider in own:
+        return None
+    pin = others[0]
+    if not isinstance(pin, PinJoint) or not near(pin.at, slide.at) or driven & {slide.name, pin.name}:
+        return None
+    return pin
+
+
+def _replaced(joint: Joint, slide: SlideJoint, pin: PinJoint) -> tuple[Joint, ...]:
+    if joint == slide:
+        return ()
+    if joint != pin:
+        return (joint,)
+    riders = tuple(each for each in pin.links if each != slide.slider)
+    slot = SlotJoint(
+        pin.name if len(riders) == 1 else slide.name, slide.guide, riders[0], pin.at, slide.angle, slide.through
+    )
+    return (slot,) if len(riders) == 1 else (pin._replace(links=riders), slot)
+
+
+def near(one: Place, other: Place) -> bool:
+    """Whether two places are one but for rounding."""
+    return hypot(one[0] - other[0], one[1] - other[1]) <= 1e-9 * (1.0 + hypot(*one))

@@ -1,0 +1,226 @@
+"""A drawn linkage to the value of a planar file: each link carries its points where they were drawn."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from math import atan2, cos, degrees, hypot, radians, sin
+from typing import Any
+
+from planar.formats.drawn.drawn_linkage import (
+    DrawnInput,
+    DrawnLinkage,
+    Joint,
+    PinJoint,
+    Place,
+    SlideJoint,
+    SlotJoint,
+    Tracer,
+    WheelJoint,
+    joined_links,
+)
+from planar.formats.drawn.file_format import ReadDocument
+from planar.foundation.errors import BadInput
+
+COINCIDENT = 1e-9
+"""Of the drawing's size: points that are nearer to each other give no direction."""
+
+
+def drawn_document(linkage: DrawnLinkage, place: str) -> ReadDocument:
+    """The planar file of a linkage, in its own coordinates, its position as drawn. Raises BadInput.
+
+    A link's angle is the direction from its first point to its second in the drawing; that of one with a single point
+    is 0 as drawn, as is the frame's. What the linkage has to say of what was left out stands in the file's notes.
+    """
+    whole = _with_links_held(linkage)
+    if not whole.joints:
+        raise BadInput(place, "there is no joint in this file, so nothing moves")
+    return _Writer(whole).write()
+
+
+def _with_links_held(linkage: DrawnLinkage) -> DrawnLinkage:
+    """The linkage without pins of one link, which are points of it."""
+    single = [each for each in linkage.joints if isinstance(each, PinJoint) and len(each.links) < 2]
+    tracers = (*linkage.tracers, *(Tracer(each.name, each.links[0], each.at) for each in single if each.links))
+    return replace(linkage, joints=tuple(each for each in linkage.joints if each not in single), tracers=tracers)
+
+
+class _Writer:
+    """One linkage on its way into a file."""
+
+    def __init__(self, linkage: DrawnLinkage) -> None:
+        self.linkage = linkage
+        self.points = _points_of_links(linkage)
+        self.axes = {link: axis for link in self.points if (axis := self._axis(link))}
+
+    def _axis(self, link: str) -> tuple[str, str] | None:
+        """Two points of a moving link that are apart."""
+        points = self.points[link]
+        if link == self.linkage.frame or not points:
+            return None
+        places = [at for each in self.points.values() for at in each.values()]
+        size = max(hypot(x - places[0][0], y - places[0][1]) for x, y in places)
+        (first, start), *others = points.items()
+        apart = (name for name, (x, y) in others if hypot(x - start[0], y - start[1]) > COINCIDENT * size)
+        second = next(apart, None)
+        return (first, second) if second is not None else None
+
+    def angle(self, link: str) -> float:
+        """The link's angle as drawn (degrees)."""
+        if link not in self.axes:
+            return 0.0
+        first, second = (self.points[link][name] for name in self.axes[link])
+        return degrees(atan2(second[1] - first[1], second[0] - first[0]))
+
+    def write(self) -> ReadDocument:
+        linkage = self.linkage
+        value: dict[str, Any] = {"planar": 1, "name": linkage.title or "mechanism"}
+        if linkage.notes:
+            value["notes"] = list(linkage.notes)
+        value |= {"units": {"length": linkage.length, "angle": "deg"}, "frame": linkage.frame}
+        value["links"] = {link: self._link(link) for link in self.points}
+        value["pairs"] = [self._pair(joint) for joint in linkage.joints]
+        if linkage.inputs:
+            value["inputs"] = [self._input(each) for each in linkage.inputs]
+        value |= self._acting()
+        value["sketch"] = self._sketch()
+        return ReadDocument(value, linkage.notes)
+
+    def _link(self, link: str) -> dict[str, Any]:
+        found: dict[str, Any] = {"points": {name: list(at) for name, at in self.points[link].items()}}
+        return found | ({"axis": list(self.axes[link])} if link in self.axes else {})
+
+    def _pair(self, joint: Joint) -> dict[str, Any]:
+        if isinstance(joint, PinJoint):
+            return {"turning": joint.name, "links": list(joint.links)}
+        if isinstance(joint, SlideJoint):
+            entry = {"sliding": joint.name, "links": [joint.guide, joint.slider], **self._line(joint)}
+            return entry | {"turn": self.angle(joint.slider) - joint.angle}
+        if isinstance(joint, SlotJoint):
+            return {"slot": joint.name, "links": [joint.guide, joint.rider], **self._line(joint)}
+        return self._wheels(joint)
+
+    def _line(self, joint: SlideJoint | SlotJoint) -> dict[str, Any]:
+        through = joint.at if joint.through is None else joint.through
+        line = {"through": list(through), "angle": joint.angle - self.angle(joint.guide)}
+        return {"line": line, "point": joint.name}
+
+    def _wheels(self, joint: WheelJoint) -> dict[str, Any]:
+        sizes = joint.sizes[0] if joint.size_kind == "ratio" else list(joint.sizes)
+        entry: dict[str, Any] = {joint.kind: joint.name, "links": list(joint.wheels), "carrier": joint.carrier}
+        entry[joint.size_kind] = sizes
+        if joint.crossed:
+            entry["crossed"] = True
+        mesh = {wheel: self.angle(wheel) - self.angle(joint.carrier) for wheel in joint.wheels}
+        return entry | ({"mesh": mesh} if any(mesh.values()) else {})
+
+    def _input(self, given: DrawnInput) -> dict[str, Any]:
+        joint = next(each for each in self.linkage.joints if each.name == given.joint)
+        if isinstance(joint, PinJoint):
+            return self._pin_input(given, joint)
+        entry: dict[str, Any] = {"pair": joint.name, "position": 0}
+        if isinstance(joint, SlideJoint | SlotJoint) and joint.through is not None:
+            way = radians(joint.angle)
+            x, y = joint.at[0] - joint.through[0], joint.at[1] - joint.through[1]
+            entry["position"] = x * cos(way) + y * sin(way)
+        return entry | _rate(given.velocity, given.unit or f"{self.linkage.length}/s") | _law(given, entry["position"])
+
+    def _pin_input(self, given: DrawnInput, joint: PinJoint) -> dict[str, Any]:
+        """At a pin on the frame the angle of the other link, elsewhere of the later link against the earlier one."""
+        first, second = sorted(given.links, key=joint.links.index)
+        if self.linkage.frame in given.links:
+            other = first if second == self.linkage.frame else second
+            position, forwards = self.angle(other), given.links[1] == other
+        else:
+            position, forwards = self.angle(second) - self.angle(first), given.links[1] == second
+        name = joint.name if len(joint.links) == 2 else f"{joint.name}:{first},{second}"
+        rate = _rate(given.velocity if forwards else -given.velocity, given.unit or "rad/s")
+        turned = given if forwards else given._replace(table=_reversed(given))
+        return {"pair": name, "position": position} | rate | _law(turned, position, degrees)
+
+    def _acting(self) -> dict[str, Any]:
+        """Masses, loads and gravity, each in SI."""
+        linkage, found = self.linkage, dict[str, Any]()
+        if linkage.masses:
+            found["masses"] = [
+                {"link": each.link, "mass": f"{each.mass!r} kg", "at": list(each.at)}
+                | ({"inertia": f"{each.inertia!r} kg m^2"} if each.inertia else {})
+                for each in linkage.masses
+            ]
+        if linkage.forces:
+            found["loads"] = [self._force(index) for index in range(len(linkage.forces))]
+        if any(linkage.gravity):
+            found["gravity"] = [f"{each!r} m/s^2" for each in linkage.gravity]
+        return found
+
+    def _force(self, index: int) -> dict[str, Any]:
+        given = self.linkage.forces[index]
+        point = next(name for name, at in self.points[given.link].items() if at == given.at)
+        x, y = given.force
+        if not given.turns or given.link == self.linkage.frame:
+            return {"point": f"{given.link}.{point}", "force": [f"{x!r} N", f"{y!r} N"]}
+        back = radians(-self.angle(given.link))
+        turned = (cos(back) * x - sin(back) * y, sin(back) * x + cos(back) * y)
+        return {"point": f"{given.link}.{point}", "force": [f"{e!r} N" for e in turned], "axes": given.link}
+
+    def _sketch(self) -> dict[str, list[float]]:
+        """Where the moving joints and points are: exactly where they were drawn."""
+        frame = self.points[self.linkage.frame]
+        return {
+            name: list(at)
+            for link, points in self.points.items()
+            if link != self.linkage.frame
+            for name, at in points.items()
+            if name not in frame
+        }
+
+
+def _rate(velocity: float, unit: str) -> dict[str, str]:
+    """The velocity of an input as a text; nothing where it rests."""
+    return {"velocity": f"{velocity!r} {unit}"} if velocity else {}
+
+
+def _law(given: DrawnInput, position: float, unit: Callable[[float], float] = float) -> dict[str, Any]:
+    """The course of an input in time from its position on; nothing where it is even."""
+    if given.table is None:
+        return {}
+    times, moved = given.table
+    positions = [position + unit(each) for each in moved]
+    return {"law": [{"motion": "table", "times": list(times), "positions": positions}]}
+
+
+def _reversed(given: DrawnInput) -> tuple[tuple[float, ...], tuple[float, ...]] | None:
+    return None if given.table is None else (given.table[0], tuple(-each for each in given.table[1]))
+
+
+def _points_of_links(linkage: DrawnLinkage) -> dict[str, dict[str, Place]]:
+    """The points that each link carries; links that nothing holds are not among them."""
+    order = dict.fromkeys((linkage.frame, *linkage.links, *(link for j in linkage.joints for link in joined_links(j))))
+    held = {linkage.frame, *(link for joint in linkage.joints for link in joined_links(joint))}
+    points: dict[str, dict[str, Place]] = {link: {} for link in order if link in held}
+    for joint in linkage.joints:
+        if isinstance(joint, PinJoint):
+            for link in joint.links:
+                points[link][joint.name] = joint.at
+        elif isinstance(joint, SlideJoint | SlotJoint):
+            points[joint.slider if isinstance(joint, SlideJoint) else joint.rider][joint.name] = joint.at
+    for tracer in linkage.tracers:
+        if tracer.link in points:
+            points[tracer.link][tracer.name] = tracer.at
+    taken = {name for each in points.values() for name in each}
+    for number, force in enumerate(linkage.forces, 1):
+        if force.link in points and force.at not in points[force.link].values():
+            name = next(n for n in (f"F{number}", f"F{number}_", f"F{number}__") if n not in taken)
+            points[force.link][name] = force.at
+    for link, own in points.items():
+        if not own:  # the frame of one that is held by slides alone, or a wheel on its carrier
+            own[_origin_name(link, taken)] = (0.0, 0.0)
+    return points
+
+
+def _origin_name(link: str, taken: set[str]) -> str:
+    name = f"origin_{link}"
+    while name in taken:
+        name += "_"
+    taken.add(name)
+    return name

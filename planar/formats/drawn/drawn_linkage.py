@@ -1,0 +1,177 @@
+"""A linkage as most programs save one: a list of joints where they were drawn, each with the links that it joins."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import NamedTuple
+
+from planar.foundation.errors import join_names
+
+Place = tuple[float, float]
+"""x and y in the drawing, in the linkage's unit of length; y upwards."""
+
+
+class PinJoint(NamedTuple):
+    """Links that turn about one point."""
+
+    name: str
+    links: tuple[str, ...]
+    at: Place
+
+
+class SlideJoint(NamedTuple):
+    """A link that slides along a line of another without turning against it.
+
+    `angle` is the line's direction in the drawing (degrees); how far the slider is counts from `through`, from where it
+    was drawn if that is None.
+    """
+
+    name: str
+    guide: str
+    slider: str
+    at: Place
+    angle: float
+    through: Place | None = None
+
+
+class SlotJoint(NamedTuple):
+    """A pin of the link `rider` in a straight slot of the link `guide`, which leaves the turning free; as a slide."""
+
+    name: str
+    guide: str
+    rider: str
+    at: Place
+    angle: float
+    through: Place | None = None
+
+
+class WheelJoint(NamedTuple):
+    """Two wheels tied to each other, seen from the carrier on which both turn; as drawn they are in mesh.
+
+    `kind` is one of "gear", "belt" and "chain"; `size_kind` says what `sizes` are: two "radii" (an internal wheel's is
+    negative) or numbers of "teeth", or one signed "ratio".
+    """
+
+    name: str
+    kind: str
+    wheels: tuple[str, str]
+    carrier: str
+    size_kind: str
+    sizes: tuple[float, ...]
+    crossed: bool = False
+
+
+Joint = PinJoint | SlideJoint | SlotJoint | WheelJoint
+
+
+class Tracer(NamedTuple):
+    """A point of a link where nothing is joined."""
+
+    name: str
+    link: str
+    at: Place
+
+
+class DrawnInput(NamedTuple):
+    """A driven joint: at a pin the second of `links` against the first, at a slide along its line.
+
+    `velocity` is in `unit` where one is named, else in rad/s or the unit of length per second.
+    """
+
+    joint: str
+    links: tuple[str, str]
+    velocity: float = 0.0
+    unit: str = ""
+    table: tuple[tuple[float, ...], tuple[float, ...]] | None = None
+    """Times (s), and how far the input has moved by then, smoothly (rad, or the unit of length)."""
+
+
+class DrawnMass(NamedTuple):
+    """A mass of a link (kg) about a place of the drawing, with its moment of inertia there (kg m^2)."""
+
+    link: str
+    mass: float
+    at: Place
+    inertia: float = 0.0
+
+
+class DrawnForce(NamedTuple):
+    """A force (N) on a link at a place of the drawing; it may turn with the link."""
+
+    link: str
+    at: Place
+    force: Place
+    turns: bool = False
+
+
+@dataclass(frozen=True)
+class DrawnLinkage:
+    """Joints in drawn, assembled coordinates; no assembly has to be searched.
+
+    `length` is the unit of its coordinates; `notes` tell what could not be taken over.
+    """
+
+    title: str
+    frame: str
+    joints: tuple[Joint, ...]
+    tracers: tuple[Tracer, ...] = ()
+    inputs: tuple[DrawnInput, ...] = ()
+    masses: tuple[DrawnMass, ...] = ()
+    forces: tuple[DrawnForce, ...] = ()
+    gravity: Place = (0.0, 0.0)
+    length: str = "mm"
+    links: tuple[str, ...] = ()
+    """In the order in which they are to stand; those that no joint holds are left out."""
+    notes: tuple[str, ...] = field(default=())
+
+    def with_notes(self, *notes: str) -> DrawnLinkage:
+        """The same linkage with more to say of it."""
+        return replace(self, notes=(*self.notes, *notes))
+
+    def without_frame_points(self) -> DrawnLinkage:
+        """The same without the frame's points where nothing is joined, and a note of them."""
+        found = [each.name for each in self.tracers if each.link == self.frame]
+        if not found:
+            return self
+        kept = tuple(each for each in self.tracers if each.link != self.frame)
+        told = f"points of the frame where nothing is joined are left out: {join_names(found)}"
+        return replace(self, tracers=kept).with_notes(told)
+
+    def joints_of(self, kind: type[Joint]) -> tuple[Joint, ...]:
+        """Its joints of one kind."""
+        return tuple(each for each in self.joints if isinstance(each, kind))
+
+
+def joined_links(joint: Joint) -> tuple[str, ...]:
+    """The links that a joint holds, the carrier of wheels among them."""
+    if isinstance(joint, PinJoint):
+        return joint.links
+    if isinstance(joint, SlideJoint):
+        return joint.guide, joint.slider
+    if isinstance(joint, SlotJoint):
+        return joint.guide, joint.rider
+    return (*joint.wheels, joint.carrier)
+
+
+def joint_phrase(joint: Joint) -> str:
+    """The joint in a sentence: "the gear 'mesh'"."""
+    if isinstance(joint, WheelJoint):
+        return f"the {joint.kind} {joint.name!r}"
+    kinds = {PinJoint: "pin", SlideJoint: "slide", SlotJoint: "slot"}
+    return f"the {kinds[type(joint)]} {joint.name!r}"
+
+
+def renamed_links(joint: Joint, names: dict[str, str]) -> Joint:
+    """The joint with other names for its links; of a pin each stands once."""
+
+    def name(link: str) -> str:
+        return names.get(link, link)
+
+    if isinstance(joint, PinJoint):
+        return joint._replace(links=tuple(dict.fromkeys(map(name, joint.links))))
+    if isinstance(joint, SlideJoint):
+        return joint._replace(guide=name(joint.guide), slider=name(joint.slider))
+    if isinstance(joint, SlotJoint):
+        return joint._replace(guide=name(joint.guide), rider=name(joint.rider))
+    first, second = joint.wheels
+    return joint._replace(wheels=(name(first), name(second)), carrier=name(joint.carrier))

@@ -1,0 +1,177 @@
+"""A mechanism where it stands as a drawn linkage, for formats that save joints in drawn coordinates."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from math import degrees
+
+from planar.formats.drawn.drawn_linkage import (
+    DrawnForce,
+    DrawnInput,
+    DrawnLinkage,
+    DrawnMass,
+    Joint,
+    PinJoint,
+    Place,
+    SlideJoint,
+    SlotJoint,
+    Tracer,
+    WheelJoint,
+)
+from planar.formats.drawn.file_format import cannot_say
+from planar.foundation.geometry import Frame, Vector
+from planar.foundation.units import parse_unit
+from planar.model.link_shapes import LinkShape
+from planar.model.mechanism import Mechanism, named_points, pair_entries, relative_motions
+from planar.model.pairs.base import MeasureKind, Pair
+from planar.model.pairs.belt import BeltPair, ChainPair
+from planar.model.pairs.gear import GearPair
+from planar.model.pairs.sliding import SlidingPair
+from planar.model.pairs.slot import SlotPair
+from planar.model.pairs.turning import TurningPair
+
+WHEELS = {GearPair: "gear", BeltPair: "belt", ChainPair: "chain"}
+LENGTHS = ("mm", "cm", "m", "in")
+"""Units of length that drawn linkages have; any other is written as mm."""
+
+
+def drawn_mechanism(mechanism: Mechanism, frames: Mapping[str, Frame], title: str) -> DrawnLinkage:
+    """The mechanism as a linkage where its links have these frames, in its own unit of length.
+
+    `title` is the format's, for BadInput where a pair is of a type that no drawn linkage has. What a drawn linkage
+    cannot say beside the motion stands in its notes.
+    """
+    return _Drawing(mechanism, frames, title).linkage()
+
+
+class _Drawing:
+    """One mechanism on its way to a linkage."""
+
+    def __init__(self, mechanism: Mechanism, frames: Mapping[str, Frame], title: str) -> None:
+        from planar.model.link_shapes import link_shape
+
+        self.mechanism, self.frames, self.title = mechanism, frames, title
+        self.shapes: dict[str, LinkShape] = {link.name: link_shape(link) for link in mechanism.links}
+        self.length = mechanism.units.length if mechanism.units.length in LENGTHS else "mm"
+        self.unit = parse_unit(self.length)
+
+    def linkage(self) -> DrawnLinkage:
+        mechanism = self.mechanism
+        if mechanism.closes_within is not None:
+            raise cannot_say(self.title, "the misfit that 'closes_within' allows", "its pairs close exactly")
+        joints = tuple(self._joint(group) for group in pair_entries(mechanism))
+        return DrawnLinkage(
+            mechanism.name,
+            mechanism.frame,
+            joints,
+            tuple(self._tracers(joints)),
+            tuple(self._inputs()),
+            tuple(self._masses()),
+            tuple(self._forces()),
+            mechanism.gravity,
+            self.length,
+            tuple(link.name for link in mechanism.links),
+            tuple(self._notes()),
+        )
+
+    def _place(self, at: Vector) -> Place:
+        return float(self.unit.from_si(at.x)), float(self.unit.from_si(at.y))
+
+    def _world(self, link: str, point: str) -> Place:
+        return self._place(self.frames[link].to_world(self.shapes[link].position(point)))
+
+    def _joint(self, group: Sequence[Pair]) -> Joint:
+        pair = group[0]
+        if isinstance(pair, TurningPair):
+            links = (pair.links[0], *(each.links[1] for each in group))
+            return PinJoint(pair.entry_name(), links, self._world(pair.links[0], pair.points[0]))
+        if isinstance(pair, SlidingPair | SlotPair):
+            guide, rider = pair.links
+            frame, shape = self.frames[guide], self.shapes[guide]
+            angle = degrees(frame.angle + pair.line.direction_angle(shape))
+            x, y, *_ = pair.line.measure_line(shape)
+            through = self._place(frame.to_world(Vector(x, y)))
+            kind = SlideJoint if isinstance(pair, SlidingPair) else SlotJoint
+            return kind(pair.name, guide, rider, self._world(rider, pair.point), _plain(angle), through)
+        for known, kind_name in WHEELS.items():
+            if isinstance(pair, known):
+                sizes = pair.sizes
+                if pair.size_kind == "radii":
+                    sizes = tuple(float(self.unit.from_si(each)) for each in sizes)
+                crossed = bool(getattr(pair, "crossed", False))
+                return WheelJoint(pair.name, kind_name, pair.links, pair.carrier, pair.size_kind, sizes, crossed)
+        raise cannot_say(self.title, f"the {pair.keyword} {pair.name!r}")
+
+    def _tracers(self, joints: Sequence[Joint]) -> list[Tracer]:
+        """Points of links where nothing is joined, by the names that results give them."""
+        ridden = {ride[0] for pair in self.mechanism.pairs if (ride := pair.point_on_line())}
+        found = []
+        for each in named_points(self.mechanism):
+            link, point = each.members[0]
+            pinned = any((link, point) in pair.coincident_points() for pair in self.mechanism.pairs)
+            if not pinned and (link, point) not in ridden:
+                found.append(Tracer(each.name.replace(".", "_"), link, self._world(link, point)))
+        taken = {joint.name for joint in joints}
+        return [each._replace(name=f"{each.name}_point") if each.name in taken else each for each in found]
+
+    def _inputs(self) -> list[DrawnInput]:
+        motions = relative_motions(self.mechanism)
+        found = []
+        for given in self.mechanism.inputs:
+            pair, links = motions[given.pair], motions[given.pair].links
+            if pair.input_kind is MeasureKind.TURNS:
+                raise cannot_say(self.title, f"the input at {given.pair!r}", "its inputs are at pins and slides")
+            if links[1] == self.mechanism.frame and isinstance(pair, TurningPair):
+                links = (links[1], links[0])
+            length = pair.input_kind is MeasureKind.LENGTH
+            velocity = float(self.unit.from_si(given.velocity)) if length else float(given.velocity)
+            found.append(DrawnInput(pair.entry_name(), links, velocity))
+        return found
+
+    def _masses(self) -> list[DrawnMass]:
+        found = []
+        for each in self.mechanism.masses:
+            at = self._place(self.frames[each.link].to_world(self.shapes[each.link].position(each.at)))
+            found.append(DrawnMass(each.link, float(each.mass), at, float(each.inertia)))
+        return found
+
+    def _forces(self) -> list[DrawnForce]:
+        named = {each.name: each.members[0] for each in named_points(self.mechanism)}
+        found = []
+        for load in self.mechanism.loads:
+            if load.point is None or load.force is None or load.varies is not None:
+                continue
+            link, _, point = load.point.rpartition(".")
+            member = (link, point) if link else named.get(load.point)
+            if member is None or load.axes not in (None, self.mechanism.frame, member[0]):
+                continue
+            force = Vector(*load.force)
+            turned = self.frames[load.axes].rotate_to_world(force) if load.axes else force
+            found.append(
+                DrawnForce(member[0], self._world(*member), (float(turned.x), float(turned.y)), bool(load.axes))
+            )
+        return found
+
+    def _notes(self) -> list[str]:
+        """What of the mechanism no drawn linkage says."""
+        mechanism = self.mechanism
+        held = {
+            "springs and dampers": bool(mechanism.springs),
+            "stops": bool(mechanism.stops),
+            "friction": any(pair.has_friction for pair in mechanism.pairs),
+            "laws of inputs": any(given.law for given in mechanism.inputs),
+            "motors": any(given.motor for given in mechanism.inputs),
+            "accelerations of inputs": any(given.acceleration and not given.law for given in mechanism.inputs),
+            "tolerances": mechanism.tolerances is not None,
+            "stiffness of pairs": bool(mechanism.pair_stiffness),
+            "published values": bool(mechanism.published),
+            "torques, and loads that vary": len(self._forces()) < len(mechanism.loads),
+        }
+        return [f"{what} are left out: the format has none" for what, there in held.items() if there]
+
+
+def _plain(angle: float) -> float:
+    """An angle (degrees) between -180 and 180, without the last digits of a sum of radians."""
+    turned = (angle + 180.0) % 360.0 - 180.0
+    near = round(turned * 2.0) / 2.0
+    return near if abs(turned - near) < 1e-12 else turned

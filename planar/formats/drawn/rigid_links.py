@@ -1,0 +1,105 @@
+"""Links that cannot move against each other, as one: those that are welded, or that share two pins."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from itertools import combinations
+from math import hypot
+
+from planar.formats.drawn.drawn_linkage import (
+    DrawnLinkage,
+    Joint,
+    PinJoint,
+    Tracer,
+    WheelJoint,
+    joined_links,
+    renamed_links,
+)
+
+
+def merge_links(linkage: DrawnLinkage, groups: Iterable[Sequence[str]]) -> DrawnLinkage:
+    """The linkage with the links of each group as one, the frame where that is among them.
+
+    A pin that then holds one link only is a point of it; a slide of a link in itself holds nothing and is left out.
+    """
+    parent: dict[str, str] = {}
+
+    def root(link: str) -> str:
+        while link in parent:
+            link = parent[link]
+        return link
+
+    for group in groups:
+        for other in group[1:]:
+            one, two = root(group[0]), root(other)
+            if one != two:
+                kept, gone = (two, one) if two == root(linkage.frame) else (one, two)
+                parent[gone] = kept
+    if not parent:
+        return linkage
+    names = {link: root(link) for link in parent}
+    joints: list[Joint] = []
+    tracers: list[Tracer] = []
+    for joint in linkage.joints:
+        renamed = renamed_links(joint, names)
+        if isinstance(renamed, PinJoint) and len(renamed.links) == 1:
+            tracers.append(Tracer(renamed.name, renamed.links[0], renamed.at))
+        elif isinstance(renamed, WheelJoint) or len(set(joined_links(renamed))) > 1:
+            joints.append(renamed)
+    return replace(
+        linkage,
+        frame=names.get(linkage.frame, linkage.frame),
+        joints=tuple(joints),
+        tracers=(*(t._replace(link=names.get(t.link, t.link)) for t in linkage.tracers), *tracers),
+        inputs=tuple(
+            each._replace(links=(names.get(each.links[0], each.links[0]), names.get(each.links[1], each.links[1])))
+            for each in linkage.inputs
+        ),
+        masses=tuple(each._replace(link=names.get(each.link, each.link)) for each in linkage.masses),
+        forces=tuple(each._replace(link=names.get(each.link, each.link)) for each in linkage.forces),
+        links=tuple(dict.fromkeys(names.get(link, link) for link in linkage.links)),
+    )
+
+
+def merge_links_of_two_pins(linkage: DrawnLinkage) -> DrawnLinkage:
+    """The linkage with links that share two pins apart from each other as one, with a note of each such case."""
+    while True:
+        shared: dict[tuple[str, str], list[PinJoint]] = {}
+        for joint in linkage.joints:
+            if isinstance(joint, PinJoint):
+                for two in combinations(joint.links, 2):
+                    shared.setdefault((min(two), max(two)), []).append(joint)
+        rigid = [two for two, pins in shared.items() if _apart(pins)]
+        if not rigid:
+            return linkage
+        told = tuple(f"links {a!r} and {b!r} share two pins and are one link here" for a, b in rigid)
+        linkage = merge_links(linkage, rigid).with_notes(*told)
+
+
+def without_loose_links(linkage: DrawnLinkage) -> DrawnLinkage:
+    """The linkage without what is joined to the frame by nothing, with a note of each such link."""
+    reached, joints = {linkage.frame}, [set(joined_links(joint)) for joint in linkage.joints]
+    while grown := [each for each in joints if each & reached and not each <= reached]:
+        reached = reached.union(*grown)
+    held = dict.fromkeys((*linkage.links, *(link for joint in linkage.joints for link in joined_links(joint))))
+    loose = [link for link in held if link not in reached]
+    if not loose:
+        return linkage
+    return replace(
+        linkage,
+        joints=tuple(joint for joint in linkage.joints if set(joined_links(joint)) <= reached),
+        tracers=tuple(each for each in linkage.tracers if each.link in reached),
+        inputs=tuple(each for each in linkage.inputs if set(each.links) <= reached),
+        masses=tuple(each for each in linkage.masses if each.link in reached),
+        forces=tuple(each for each in linkage.forces if each.link in reached),
+        links=tuple(link for link in linkage.links if link in reached),
+        notes=(*linkage.notes, *(f"link {link!r} is joined to nothing that is held and is left out" for link in loose)),
+    )
+
+
+def _apart(pins: Sequence[PinJoint]) -> bool:
+    """Whether two of them are apart."""
+    return any(
+        hypot(a.at[0] - b.at[0], a.at[1] - b.at[1]) > 1e-9 * (1.0 + hypot(*a.at)) for a, b in combinations(pins, 2)
+    )

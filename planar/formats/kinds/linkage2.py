@@ -1,0 +1,294 @@
+"""Files of the program Linkage (D. M. Rector): connectors where they are drawn, and the Links that carry them."""
+
+from __future__ import annotations
+
+from math import atan2, degrees, hypot
+from xml.etree.ElementTree import Element
+
+from planar.formats.drawn.drawn_document import drawn_document
+from planar.formats.drawn.drawn_linkage import (
+    DrawnInput,
+    DrawnLinkage,
+    Joint,
+    PinJoint,
+    SlideJoint,
+    SlotJoint,
+    Tracer,
+    WheelJoint,
+)
+from planar.formats.drawn.file_format import FileFormat, ForeignText, ReadDocument
+from planar.formats.drawn.rigid_links import merge_links, merge_links_of_two_pins, without_loose_links
+from planar.formats.kinds.parts.linkage2_text import PIXELS_PER_MILLIMETRE, write
+from planar.formats.texts.names import NameBook
+from planar.formats.texts.xml_text import number_attribute, parse_xml
+from planar.foundation.errors import BadInput
+
+MECHANISM_LAYER = 16
+"""The bit of `layer` that is set on what moves; other layers are drawings."""
+DEFAULT_RATE = 15.0
+"""rpm, or strokes to and fro in a minute, where none is written."""
+FRAME = "frame"
+
+
+def recognise(source: ForeignText) -> bool:
+    """Whether it is the XML of Linkage."""
+    return source.value is None and "<linkage2" in source.text[:4000]
+
+
+def read(source: ForeignText) -> ReadDocument:
+    """The mechanism of a file of Linkage. Raises BadInput."""
+    root = parse_xml(source.text, source.place)
+    if root.tag != "linkage2":
+        raise BadInput(source.place, f"the outermost element is {root.tag!r:.40}, and not 'linkage2'")
+    linkage, welds = _Reader(root, source).read()
+    linkage = merge_links_of_two_pins(merge_links(linkage, welds))
+    return drawn_document(without_loose_links(linkage), source.place)
+
+
+class _Reader:
+    """One file on its way to a linkage."""
+
+    def __init__(self, root: Element, source: ForeignText) -> None:
+        self.root, self.source = root, source
+        self.book = NameBook({FRAME})
+        self.notes: list[str] = []
+        self.joints: list[Joint] = []
+        self.inputs: list[DrawnInput] = []
+        self.tracers: list[Tracer] = []
+        self.welds: list[tuple[str, str]] = []
+        self.connectors = {self._id(each): each for each in root.iter() if each in [*root] and each.tag == "connector"}
+        self.elements = [each for each in root if each.tag in ("Link", "element") and self._moves(each, "a link")]
+        if not self.connectors:
+            raise BadInput(source.place, "there is no connector in this file")
+        self.names = {key: self._connector_name(key) for key in self.connectors}
+        self.places = {key: self._place(key) for key in self.connectors}
+        self.links: dict[str, list[str]] = {}
+        self.named: dict[str, str] = {}
+        for each in self.elements:
+            self._add_link(each)
+
+    def read(self) -> tuple[DrawnLinkage, list[tuple[str, str]]]:
+        for key, element in self.connectors.items():
+            if not self._moves(element, ""):
+                continue
+            self._join(key, element)
+        for each in self.elements:
+            self._fasten(each)
+        self._wheels()
+        linkage = DrawnLinkage(
+            self.source.title,
+            FRAME,
+            tuple(self.joints),
+            tuple(self.tracers),
+            tuple(self.inputs),
+            length="mm",
+            links=(FRAME, *self.links),
+            notes=tuple(dict.fromkeys(self.notes)),
+        )
+        return linkage, self.welds
+
+    def _id(self, element: Element) -> str:
+        key = element.get("id")
+        if key is None:
+            raise BadInput(self.source.place, f"an element {element.tag!r} has no 'id'")
+        return key.strip()
+
+    def _moves(self, element: Element, what: str) -> bool:
+        """Whether an element is of the mechanism, and no drawing and no measurement."""
+        layer = element.get("layer", "").strip()
+        drawn = layer.isdecimal() and int(layer) not in (0,) and not int(layer) & MECHANISM_LAYER
+        if (drawn or element.get("measurementelement") == "true") and what:
+            self.notes.append("drawings and measurements of the file are left out")
+        return not drawn and element.get("measurementelement") != "true"
+
+    def _connector_name(self, key: str) -> str:
+        wanted = self.connectors[key].get("name", "").strip() or _letters(key)
+        return self.book.fresh(wanted, "point")
+
+    def _place(self, key: str) -> tuple[float, float]:
+        told = f"{self.source.place}, connector {key}"
+        x, y = (number_attribute(self.connectors[key], name, told) for name in ("x", "y"))
+        return x / PIXELS_PER_MILLIMETRE, y / PIXELS_PER_MILLIMETRE
+
+    def _add_link(self, element: Element) -> None:
+        key = self._id(element)
+        name = self.book.fresh(element.get("name", "").strip() or f"L{key}", "link")
+        keys = [self._id(each) for each in element if each.tag == "connector"]
+        for each in keys:
+            if each not in self.connectors:
+                raise BadInput(f"{self.source.place}, Link {key}", f"there is no connector {each!r} in this file")
+        keys = list(dict.fromkeys(keys))
+        if key not in self.named:
+            self.named[key] = name
+        if element.get("actuator") == "true" and len(keys) >= 2:
+            self._actuator(element, name, keys)
+            return
+        self.links[name] = keys
+
+    def _actuator(self, element: Element, name: str, keys: list[str]) -> None:
+        """Two halves, of which the second is driven along the line of its two ends."""
+        first, second = keys[:2]
+        rod = self.book.fresh(f"{name}_rod")
+        self.links |= {name: [first, *keys[2:]], rod: [second]}
+        (x, y), (u, v) = self.places[first], self.places[second]
+        joint = self.book.fresh(f"{name}_stroke")
+        self.joints.append(
+            SlideJoint(joint, name, rod, (u, v), degrees(atan2(v - y, u - x)), through=(x, y)),
+        )
+        told = f"{self.source.place}, Link {element.get('id')}"
+        throw = number_attribute(element, "throw", told, 0.0) / PIXELS_PER_MILLIMETRE
+        cpm = number_attribute(element, "cpm", told, DEFAULT_RATE)
+        self.inputs.append(DrawnInput(joint, (name, rod), 2.0 * throw * cpm / 60.0))
+        self.notes.append(
+            f"the actuator {name!r} goes to and fro by {throw:.6g} mm, "
+            f"{cpm:g} times a minute; here it runs at that mean speed"
+        )
+
+    def _join(self, key: str, element: Element) -> None:
+        """The joint at a connector: a pin of its Links, and where it slides a pin in a slot."""
+        holders = [name for name, keys in self.links.items() if key in keys]
+        anchored = element.get("anchor") == "true"
+        at, name = self.places[key], self.names[key]
+        limits = [self._id(each) for each in element if each.tag == "slidelimit"]
+        if element.get("slider") == "true" and len(limits) >= 2:
+            if number_attribute(element, "slideradius", f"{self.source.place}, connector {key}", 0.0) > 0.0:
+                raise BadInput(
+                    f"{self.source.place}, connector {key}", "its slot is curved, for which planar has no pair"
+                )
+            if self._slide(key, holders, anchored, limits[0], limits[1]):
+                return
+        members = ([FRAME] if anchored else []) + holders
+        fastened = element.get("fastenlink") or element.get("fasten")
+        if fastened and not members:
+            self.tracers.append(Tracer(name, self.named.get(fastened, FRAME), at))
+            return
+        if not members:
+            self.notes.append(f"connector {name!r} is on no link and is left out")
+            return
+        self.joints.append(PinJoint(name, tuple(members), at))
+        if element.get("input") == "true":
+            self._drive(key, element, holders if anchored else members)
+
+    def _slide(self, key: str, holders: list[str], anchored: bool, start: str, end: str) -> bool:
+        """A pin in the slot between two connectors; whether there is one link, or the frame, that has this slot."""
+        for each in (start, end):
+            if each not in self.places:
+                raise BadInput(
+                    f"{self.source.place}, connector {key}", f"there is no connector {each!r} that limits its slide"
+                )
+        carriers = [n for n, keys in self.links.items() if start in keys and end in keys and key not in keys]
+        fixed = all(self.connectors[each].get("anchor") == "true" for each in (start, end))
+        guide = FRAME if fixed else next(iter(carriers), None)
+        riders = [FRAME, *holders] if anchored else holders
+        riders = [each for each in riders if each != guide]
+        if guide is None or not riders:
+            told = "no one link carries both ends of its slot" if guide is None else "no link slides there"
+            self.notes.append(f"connector {self.names[key]!r} does not slide here: {told}")
+            return False
+        (x, y), (u, v) = self.places[start], self.places[end]
+        if (x, y) == (u, v):
+            raise BadInput(
+                f"{self.source.place}, connector {key}", "the ends of its slot coincide, so it has no direction"
+            )
+        at, name = self.places[key], self.names[key]
+        along = self.book.fresh(f"{name}_slot") if len(riders) > 1 else name
+        if len(riders) > 1:
+            self.joints.append(PinJoint(name, tuple(riders), at))
+        self.joints.append(SlotJoint(along, guide, riders[0], at, degrees(atan2(v - y, u - x)), through=(x, y)))
+        return True
+
+    def _drive(self, key: str, element: Element, members: list[str]) -> None:
+        """The input of a connector: it turns the Link there that is not held elsewhere against the frame."""
+        anchors = {each for each, c in self.connectors.items() if c.get("anchor") == "true"}
+        turning = [name for name in members if not set(self.links[name]) - {key} & anchors]
+        if element.get("anchor") != "true":
+            self.notes.append(f"the input at {self.names[key]!r} is on no anchor and is left out")
+            return
+        if not turning:
+            self.notes.append(f"the input at {self.names[key]!r} turns no link and is left out")
+            return
+        if len(turning) > 1:
+            told = f"the input at {self.names[key]!r} drives {turning[0]!r} alone of its links"
+            self.notes.append(told)
+        rate = number_attribute(element, "rpm", f"{self.source.place}, connector {key}", DEFAULT_RATE)
+        self.inputs.append(DrawnInput(self.names[key], (FRAME, turning[0]), -rate, "rpm"))
+
+    def _fasten(self, element: Element) -> None:
+        own = self.named[self._id(element)]
+        others = [element.get("fastenlink")] if element.get("fastenlink") else []
+        for each in others:
+            if each in self.named and self.named[each] != own:
+                self.welds.append((own, self.named[each]))
+        held = [element.get("fastenconnector"), *(each.get("id") for each in element if each.tag == "fastenconnector")]
+        for key in filter(None, held):
+            if key in self.places and not any(key in keys for keys in self.links.values()):
+                self.tracers.append(Tracer(self.book.fresh(f"{self.names[key]}_on_{own}"), own, self.places[key]))
+            elif key in self.places:
+                self.welds += [(own, name) for name, keys in self.links.items() if key in keys and name != own]
+
+    def _wheels(self) -> None:
+        for ratio in (each for group in self.root.iter("ratios") for each in group if each.tag == "ratio"):
+            parts = [each for each in ratio if each.tag == "link"]
+            told = f"{self.source.place}, ratios"
+            if len(parts) != 2:
+                raise BadInput(told, f"a ratio is of two links, not of {len(parts)}")
+            keys = [self._id(each) for each in parts]
+            if not all(key in self.named for key in keys):
+                raise BadInput(told, f"there is no Link {next(k for k in keys if k not in self.named)!r} in this file")
+            sizes = [number_attribute(each, "size", told) for each in parts]
+            if min(sizes) <= 0.0:
+                raise BadInput(told, "the sizes of wheels are above zero")
+            self._wheel_joint(ratio, (self.named[keys[0]], self.named[keys[1]]), (sizes[0], sizes[1]))
+
+    def _wheel_joint(self, ratio: Element, wheels: tuple[str, str], sizes: tuple[float, float]) -> None:
+        centres = [self._centre(wheel) for wheel in wheels]
+        (x, y), (u, v) = (self.places[each] for each in centres)
+        apart = hypot(u - x, v - y)
+        carriers = [n for n, keys in self.links.items() if set(centres) <= set(keys)]
+        fixed = all(self.connectors[each].get("anchor") == "true" for each in centres)
+        if not fixed and not carriers:
+            raise BadInput(
+                f"{self.source.place}, ratios", f"the wheels {wheels[0]!r} and {wheels[1]!r} have no common carrier"
+            )
+        carrier = FRAME if fixed else carriers[0]
+        name = self.book.fresh(f"{wheels[0]}_{wheels[1]}")
+        if ratio.get("type") == "gears":
+            total = sizes[0] + sizes[1]
+            by = (
+                ("radii", (apart * sizes[0] / total, apart * sizes[1] / total))
+                if apart
+                else ("ratio", (-sizes[0] / sizes[1],))
+            )
+            self.joints.append(WheelJoint(name, "gear", wheels, carrier, *by))
+        else:
+            self.joints.append(WheelJoint(name, "chain", wheels, carrier, "ratio", (sizes[0] / sizes[1],)))
+
+    def _centre(self, wheel: str) -> str:
+        """The connector about which a wheel turns: an anchor of it, or its first."""
+        keys = self.links[wheel]
+        if not keys:
+            raise BadInput(f"{self.source.place}, ratios", f"the wheel {wheel!r} has no connector to turn about")
+        return next((each for each in keys if self.connectors[each].get("anchor") == "true"), keys[0])
+
+
+def _letters(key: str) -> str:
+    """The letters by which Linkage shows a connector's number: 0 is A, 25 Z, 26 AA."""
+    if not key.isdecimal() or int(key) > 10**6:
+        return key
+    number, found = int(key) + 1, ""
+    while number:
+        number, rest = divmod(number - 1, 26)
+        found = chr(65 + rest) + found
+    return found
+
+
+FORMAT = FileFormat(
+    name="linkage2",
+    title="Linkage (Rector)",
+    suffixes=(".linkage2",),
+    source="the reader and writer of Linkage, LinkageDoc.cpp, and files that its users saved",
+    recognise=recognise,
+    read=read,
+    write=write,
+    precision="double precision",
+)

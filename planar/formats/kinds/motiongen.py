@@ -1,0 +1,226 @@
+"""Files of MotionGen Pro, and its models as records of others have them: joints, links, slots, cylinders, actuators."""
+
+from __future__ import annotations
+
+from math import atan2, degrees, hypot
+
+from planar.formats.drawn.drawn_document import drawn_document
+from planar.formats.drawn.drawn_linkage import (
+    DrawnInput,
+    DrawnLinkage,
+    Joint,
+    PinJoint,
+    Place,
+    SlideJoint,
+    SlotJoint,
+    Tracer,
+)
+from planar.formats.drawn.file_format import FileFormat, ForeignText, ReadDocument
+from planar.formats.drawn.rigid_links import merge_links, merge_links_of_two_pins, without_loose_links
+from planar.formats.texts.foreign_value import ForeignValue
+from planar.formats.texts.names import NameBook
+
+FRAME = "ground"
+
+
+def recognise(source: ForeignText) -> bool:
+    """Whether it is an object with joints and links, those of MotionGen among them."""
+    value = source.value
+    if not isinstance(value, dict):
+        return False
+    body = value.get("mechanism", value)
+    if (
+        not isinstance(body, dict)
+        or not isinstance(body.get("joints"), list)
+        or not isinstance(body.get("links"), list)
+    ):
+        return False
+    return "motiongen" in str(value.get("name", "")) or ("actuators" in body and "slots" in body)
+
+
+def read(source: ForeignText) -> ReadDocument:
+    """The mechanism of a file. Raises BadInput at a JSON path."""
+    top = ForeignValue(source.value)
+    body = top.at("mechanism") if top.has("mechanism") else top
+    linkage, welds = _Reader(body, source.title).read()
+    whole = without_loose_links(merge_links_of_two_pins(merge_links(linkage, welds)))
+    return drawn_document(whole, source.place)
+
+
+class _Reader:
+    """One file on its way to a linkage."""
+
+    def __init__(self, body: ForeignValue, title: str) -> None:
+        self.body, self.title = body, title
+        self.book = NameBook({FRAME})
+        self.notes: list[str] = []
+        self.found: list[Joint] = []
+        self.inputs: list[DrawnInput] = []
+        self.places: dict[str, Place] = {}
+        self.names: dict[str, str] = {}
+        self.welded: set[str] = set()
+        for number, each in enumerate(body.items("joints")):
+            key = each.text("id")
+            if key in self.places:
+                raise each.at("id").error(f"there are two joints {key!r:.60}")
+            self.places[key] = each.number("x"), each.number("y")
+            short = key if len(key) < 12 else _letters(number)
+            self.names[key] = self.book.fresh(each.text("name", "") or short, "joint")
+            if each.flag("isWelded"):
+                self.welded.add(key)
+        self.links: dict[str, list[str]] = {}
+        self.slotted: dict[str, str] = {}
+        self.frames: list[str] = []
+        for each in body.items("links"):
+            self._add_link(each)
+
+    def _add_link(self, given: ForeignValue) -> None:
+        keys = [each.text() for each in given.items("jointIds" if given.has("jointIds") else "joints")]
+        for index, key in enumerate(keys):
+            if key not in self.places:
+                raise given.error(f"link joint {index + 1} is {key!r:.60}, which is no joint of this file")
+        if given.flag("isGround"):
+            name = FRAME if not self.frames else self.book.fresh(FRAME)
+            self.frames.append(name)
+        else:
+            name = self.book.fresh(given.text("name", "") or "".join(self.names[key] for key in keys)[:40], "link")
+        self.links[name] = keys
+        for slot in given.items("slotIds" if given.has("slotIds") else "slots", optional=True):
+            self.slotted[slot.text()] = name
+
+    def read(self) -> tuple[DrawnLinkage, list[tuple[str, ...]]]:
+        riders = self._slots()
+        welds: list[tuple[str, ...]] = [(FRAME, name) for name in self.frames[1:]]
+        tracers = []
+        for key, at in self.places.items():
+            members = tuple(name for name, keys in self.links.items() if key in keys)
+            if key in self.welded and len(members) > 1:
+                welds.append(members)
+            held = tuple(each for each in members if each != riders.get(key))
+            if len(held) > 1:
+                self.found.append(PinJoint(self.names[key], held, at))
+            elif len(held) == 1 and key not in riders:
+                tracers.append(Tracer(self.names[key], held[0], at))
+        self._cylinders()
+        for each in self.body.items("actuators", optional=True):
+            self._actuator(each)
+        for key in ("measurements", "forces", "torques"):
+            if self.body.has(key) and self.body.value[key]:
+                self.notes.append(f"{key} of the file are left out")
+        linkage = DrawnLinkage(
+            self.title,
+            FRAME,
+            tuple(self.found),
+            tuple(tracers),
+            tuple(self.inputs),
+            length="in",
+            links=(FRAME, *(name for name in self.links if name != FRAME)),
+            notes=tuple(self.notes),
+        )
+        return linkage, welds
+
+    def _slots(self) -> dict[str, str]:
+        """Joints that ride in slots, by the bar of the slot; each is a pin in the slot of that bar."""
+        found = {}
+        for slot in self.body.items("slots", optional=True):
+            ends = [each.text() for each in slot.items("ends" if slot.has("ends") else "jointIds")][:2]
+            bar = self.slotted.get(slot.text("id"))
+            if bar is None or len(ends) < 2 or any(each not in self.places for each in ends):
+                raise slot.error("the slot is on no link, or not between two joints of this file")
+            (x, y), (u, v) = self.places[ends[0]], self.places[ends[1]]
+            if (x, y) == (u, v):
+                raise slot.error("the ends of the slot coincide, so it has no direction")
+            for each in slot.items("riders" if slot.has("riders") else "riderIds", optional=True):
+                key = each.text()
+                if key not in self.places:
+                    raise each.error(f"{key!r:.60} is no joint of this file")
+                holders = [name for name, keys in self.links.items() if key in keys and name != bar]
+                if not holders:
+                    self.notes.append(f"joint {self.names[key]!r} rides in a slot but is on no link, and is left out")
+                    continue
+                name = self.book.fresh(f"{self.names[key]}_slot")
+                self.found.append(
+                    SlotJoint(name, bar, holders[0], self.places[key], degrees(atan2(v - y, u - x)), (x, y))
+                )
+                found[key] = bar
+        return found
+
+    def _cylinders(self) -> None:
+        """A barrel and a rod for each, which slide on the line of its two joints."""
+        self.strokes: dict[frozenset[str], SlideJoint] = {}
+        for each in self.body.items("cylinders", optional=True):
+            keys = [item.text() for item in each.items("joints" if each.has("joints") else "jointIds")]
+            if len(keys) != 2 or any(key not in self.places for key in keys):
+                raise each.error("a cylinder is between two joints of this file")
+            (x, y), (u, v) = self.places[keys[0]], self.places[keys[1]]
+            if hypot(u - x, v - y) == 0.0:
+                raise each.error("the joints of the cylinder coincide, so it has no direction")
+            halves = [self.book.fresh("barrel"), self.book.fresh("rod")]
+            name = self.book.fresh(f"{self.names[keys[0]]}{self.names[keys[1]]}_stroke")
+            slide = SlideJoint(name, halves[0], halves[1], (u, v), degrees(atan2(v - y, u - x)), (x, y))
+            self.found.append(slide)
+            self.strokes[frozenset(keys)] = slide
+            for key, half in zip(keys, halves, strict=True):
+                self._attach(key, half)
+            if each.has("stroke"):
+                self.notes.append(
+                    f"the cylinder {name!r} has a stroke of {each.number('stroke'):.6g} in, which is left out"
+                )
+
+    def _attach(self, key: str, half: str) -> None:
+        """Join a half of a cylinder at a joint: to its pin, or rigidly to its link where the joint is welded."""
+        pin = next((each for each in self.found if isinstance(each, PinJoint) and each.name == self.names[key]), None)
+        holders = tuple(name for name, keys in self.links.items() if key in keys)
+        if pin is not None:
+            self.found[self.found.index(pin)] = pin._replace(links=(*pin.links, half))
+        elif holders and key in self.welded:
+            self._rename_half(half, holders[0])
+        elif holders:
+            self.found.append(PinJoint(self.names[key], (holders[0], half), self.places[key]))
+
+    def _rename_half(self, half: str, link: str) -> None:
+        """A half of a cylinder that is one with a link."""
+        for keys, slide in self.strokes.items():
+            if half in (slide.guide, slide.slider):
+                guide, slider = (link if part == half else part for part in (slide.guide, slide.slider))
+                self.strokes[keys] = slide._replace(guide=guide, slider=slider)
+                self.found[self.found.index(slide)] = self.strokes[keys]
+
+    def _actuator(self, given: ForeignValue) -> None:
+        at, start = (
+            given.text("at" if given.has("at") else "atId"),
+            given.text("from" if given.has("from") else "fromId"),
+        )
+        rate = given.number("velocity", 0.0)
+        if given.text("type", "rotary") != "rotary":
+            slide = self.strokes.get(frozenset((at, start)))
+            if slide is None:
+                self.notes.append("a linear actuator that is on no cylinder is left out")
+                return
+            self.inputs.append(DrawnInput(slide.name, (slide.guide, slide.slider), rate))
+            return
+        to = given.text("to")
+        against, turned = (
+            next((name for name, keys in self.links.items() if at in keys and other in keys), None)
+            for other in (start, to)
+        )
+        pin = next(
+            (each for each in self.found if isinstance(each, PinJoint) and each.name == self.names.get(at)), None
+        )
+        if pin is None or against is None or turned is None or not {against, turned} <= set(pin.links):
+            raise given.error("a rotary actuator turns one link against another at a joint that both have")
+        self.inputs.append(DrawnInput(pin.name, (against, turned), rate, "deg/s"))
+
+
+def _letters(number: int) -> str:
+    return chr(65 + number % 26) + (str(number // 26) if number >= 26 else "")
+
+
+FORMAT = FileFormat(
+    name="motiongen",
+    title="MotionGen Pro",
+    suffixes=(".motiongen",),
+    source="reference-data/motiongen-library of PMKS-Web/PMKS_Verification, a file of MotionGen and two of its models",
+    recognise=recognise,
+    read=read,
+)

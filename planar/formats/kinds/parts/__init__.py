@@ -1,0 +1,1 @@
+"""What the kinds of files need beside their one file each."""

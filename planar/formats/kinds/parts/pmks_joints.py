@@ -1,0 +1,128 @@
+"""The joints of PMKS, which its texts and its `.pmks` files have in common, to a linkage."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from planar.formats.drawn.drawn_document import drawn_document
+from planar.formats.drawn.drawn_linkage import DrawnInput, DrawnLinkage, Joint, PinJoint, SlideJoint, SlotJoint, Tracer
+from planar.formats.drawn.file_format import ForeignText, ReadDocument
+from planar.formats.drawn.rigid_links import merge_links_of_two_pins, without_loose_links
+from planar.formats.drawn.wheels import meshing_gears
+from planar.formats.texts.names import NameBook
+from planar.foundation.errors import BadInput
+
+FRAME = "ground"
+UNIT_NOTE = "the file names no unit of length; its numbers are taken as mm"
+
+
+class PmksJoint(NamedTuple):
+    """A joint of PMKS: R, P, RP or G, with an angle in degrees; of P and RP the first link has the slot."""
+
+    links: tuple[str, ...]
+    kind: str
+    x: float
+    y: float
+    angle: float
+    driven: bool
+
+
+def pmks_document(
+    source: ForeignText, given: list[PmksJoint], notes: tuple[str, ...] = (), velocity: float = 0.0
+) -> ReadDocument:
+    """The planar file of these joints. Raises BadInput where one cannot be."""
+    book = NameBook({FRAME})
+    joints: list[Joint] = []
+    tracers: list[Tracer] = []
+    drives: list[DrawnInput] = []
+    pins = _merged_pins([each._replace(links=_link_names(each.links, book)) for each in given])
+    letters = iter(_letters())
+    for number, each in enumerate(pins, 1):
+        place, at = f"{source.place}, joint {number}", (each.x, each.y)
+        name = book.fresh(next(letters))
+        if len(each.links) == 1:
+            if each.kind != "R":
+                raise BadInput(place, f"a joint of type {each.kind} joins two links, not {each.links[0]!r} alone")
+            tracers.append(Tracer(name, each.links[0], at))
+            continue
+        if each.kind == "R":
+            joints.append(PinJoint(name, each.links, at))
+        elif each.kind == "G":
+            joints.append(meshing_gears(name, (each.links[0], each.links[1]), at, _pin_joints(pins), place))
+        else:
+            joints += _sliding(name, each, book)
+        if each.driven and each.kind in ("R", "P"):
+            drives.append(_drive(name, each, velocity))
+        elif each.driven:
+            raise BadInput(place, f"a joint of type {each.kind} cannot be driven; that is one of type R or P")
+    if not drives:
+        drives = _first_drive(joints, velocity)
+    linkage = DrawnLinkage(source.title, FRAME, tuple(joints), tuple(tracers), tuple(drives[:1]), notes=notes)
+    if len(drives) > 1:
+        linkage = linkage.with_notes(f"the input at {drives[1].joint!r} is left out: the first drives alone")
+    whole = without_loose_links(merge_links_of_two_pins(linkage.with_notes(UNIT_NOTE)))
+    return drawn_document(whole, source.place)
+
+
+def _link_names(links: tuple[str, ...], book: NameBook) -> tuple[str, ...]:
+    """The links of a joint, each once; what is called ground stands still."""
+    found = (FRAME if each.lower() in ("ground", "gnd") else book.name("link", each) for each in links)
+    return tuple(dict.fromkeys(found))
+
+
+def _merged_pins(given: list[PmksJoint]) -> list[PmksJoint]:
+    """The joints, those pins as one that lie on one another and share a link."""
+    found: list[PmksJoint] = []
+    for each in given:
+        same = [
+            index
+            for index, other in enumerate(found)
+            if each.kind == other.kind == "R"
+            and (each.x, each.y) == (other.x, other.y)
+            and set(each.links) & set(other.links)
+            and min(len(each.links), len(other.links)) > 1
+        ]
+        if same:
+            other = found[same[0]]
+            links = tuple(dict.fromkeys((*other.links, *each.links)))
+            found[same[0]] = other._replace(links=links, driven=other.driven or each.driven)
+        else:
+            found.append(each)
+    return found
+
+
+def _pin_joints(given: list[PmksJoint]) -> list[Joint]:
+    return [PinJoint("", each.links, (each.x, each.y)) for each in given if each.kind == "R" and len(each.links) > 1]
+
+
+def _sliding(name: str, given: PmksJoint, book: NameBook) -> list[Joint]:
+    """A slide, or a pin in a slot; further links are on the same block, or on the same pin."""
+    guide, first, *others = given.links
+    at = (given.x, given.y)
+    if given.kind == "P":
+        more = [SlideJoint(book.fresh(f"{name}_{each}"), guide, each, at, given.angle) for each in others]
+        return [SlideJoint(name, guide, first, at, given.angle), *more]
+    pin = [PinJoint(book.fresh(f"{name}_pin"), (first, *others), at)] if others else []
+    return [*pin, SlotJoint(name, guide, first, at, given.angle)]
+
+
+def _drive(name: str, given: PmksJoint, velocity: float) -> DrawnInput:
+    """What a driven joint turns or moves: against the ground where that is there, else the second link."""
+    if FRAME in given.links and given.kind == "R":
+        other = next(each for each in given.links if each != FRAME)
+        return DrawnInput(name, (FRAME, other), velocity)
+    return DrawnInput(name, (given.links[0], given.links[1]), velocity)
+
+
+def _first_drive(joints: list[Joint], velocity: float) -> list[DrawnInput]:
+    """The first pin on the ground, which drives where no joint says that it does."""
+    pins = [each for each in joints if isinstance(each, PinJoint) and FRAME in each.links]
+    return [
+        DrawnInput(each.name, (FRAME, next(link for link in each.links if link != FRAME)), velocity)
+        for each in pins[:1]
+    ]
+
+
+def _letters() -> list[str]:
+    """A to Z, then with numbers."""
+    return [chr(65 + n % 26) + (str(n // 26) if n >= 26 else "") for n in range(6000)]

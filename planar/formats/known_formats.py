@@ -1,0 +1,64 @@
+"""The kinds of files that are known: by name, by ending, and recognised by what stands in a file."""
+
+from __future__ import annotations
+
+from functools import cache
+from importlib import import_module
+from pathlib import PurePath
+from pkgutil import iter_modules
+from typing import Any
+
+from planar.formats.drawn.file_format import FileFormat, ForeignText
+from planar.foundation.errors import BadInput, join_names
+
+
+@cache
+def file_formats() -> dict[str, FileFormat]:
+    """Every kind of file of other programs, by its name."""
+    from planar.formats import kinds
+
+    modules = [
+        import_module(f"{kinds.__name__}.{each.name}") for each in iter_modules(kinds.__path__) if not each.ispkg
+    ]
+    return {each.name: each for each in (module.FORMAT for module in modules)}
+
+
+def named_format(name: str | None, own: str) -> FileFormat:
+    """The format of a name. Raises BadInput, and tells the names that there are, that of planar's `own` among them."""
+    known = file_formats()
+    if name not in known:
+        raise BadInput(name or "''", f"there is no such format; formats are {join_names(sorted((*known, own)))}")
+    return known[name]
+
+
+def format_by_ending(name: str) -> FileFormat | None:
+    """The format that is written to files with this name's ending; None where it is planar's own, or nobody's."""
+    suffix = PurePath(name).suffix.lower()
+    return next((each for each in file_formats().values() if each.write and suffix in each.suffixes), None)
+
+
+def writable_endings() -> list[str]:
+    """The endings of files by which a format is chosen that can be written."""
+    return sorted({suffix for each in file_formats().values() if each.write for suffix in each.suffixes})
+
+
+def foreign_text(content: bytes, place: str, value: Any) -> ForeignText:
+    """A file's content as a text, beside its value where it is JSON. Raises BadInput where it is no text."""
+    text = _decoded(content, place)
+    title = "linkage" if place.startswith(("http://", "https://", "standard input")) else PurePath(place).stem
+    return ForeignText(text, value, place, title)
+
+
+def _decoded(content: bytes, place: str) -> str:
+    """The characters of a file; Linkage saves names in the code page of its Windows."""
+    try:
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError as problem:
+        if b"<linkage2" not in content[:4000]:
+            raise BadInput(place, f"the file is not UTF-8 text (byte {problem.start})") from None
+    return content.decode("latin-1")
+
+
+def recognised_format(source: ForeignText) -> FileFormat | None:
+    """The format that a text is of, if any."""
+    return next((each for each in file_formats().values() if each.recognise(source)), None)

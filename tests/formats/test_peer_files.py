@@ -1,0 +1,62 @@
+"""Files that other programs' projects publish, unchanged: a folder of them is named by PLANAR_PEER_FILES."""
+
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import planar
+
+FOLDER = os.environ.get("PLANAR_PEER_FILES")
+FILES = sorted(path for path in Path(FOLDER).rglob("*") if path.is_file()) if FOLDER else []
+pytestmark = pytest.mark.skipif(not FILES, reason="PLANAR_PEER_FILES names no folder of other programs' files")
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda each: each.name)
+def test_it_is_read_and_closes_as_it_was_drawn_or_says_why_not(path):
+    try:
+        mechanism = planar.load(path)
+    except planar.BadInput as problem:
+        assert "move in space" in str(problem) or "apart" in str(problem) or "no mechanism" in str(problem), problem
+        return
+    try:
+        assert planar.solve(mechanism).residual < 1e-9
+    except planar.NoAnswer as problem:
+        assert problem.outcome in (planar.Outcome.TOO_FEW_INPUTS, planar.Outcome.DEAD_POINT)
+
+
+def series(path: Path) -> tuple[list[float], dict[str, dict[str, np.ndarray]]]:
+    """The results that an assembly's file holds: times, and of each part what is told over them."""
+    lines = path.read_text(errors="replace").splitlines()
+    start = next((number for number, line in enumerate(lines) if line.startswith("TimeSeries")), None)
+    parts: dict[str, dict[str, np.ndarray]] = {}
+    if start is None:
+        return [], parts
+    times, current = [float(each) for each in lines[start + 2].split("\t")[2:] if each.strip()], None
+    for line in lines[start + 3 :]:
+        if line.startswith("PartSeries"):
+            current = parts.setdefault(line.rpartition("/")[2].strip(), {})
+        elif "/" in line:
+            current = None
+        elif current is not None:
+            name, _, *values = line.split("\t")
+            current[name] = np.array([float(each) for each in values if each.strip()])
+    return times, parts
+
+
+@pytest.mark.parametrize("path", [each for each in FILES if each.suffix == ".asmt"], ids=lambda each: each.name)
+def test_parts_of_an_assembly_turn_as_its_own_solver_found(path):
+    times, parts = series(path)
+    try:
+        mechanism = planar.load(path)
+    except planar.BadInput:
+        return
+    if not times or len(mechanism.inputs) != 1 or mechanism.inputs[0].law or times[-1] != 1.0:
+        pytest.skip("its results are of no even turn in a second")
+    motion = planar.cycle(mechanism, steps=len(times) - 1)
+    for name in set(parts) & {link.name for link in mechanism.links}:
+        turned = np.unwrap(np.atleast_1d(motion.link(name).angle))
+        published = np.unwrap(parts[name]["Bryantz"])
+        assert np.allclose(turned - turned[0], published - published[0], atol=1e-9)
+        assert np.allclose(motion.link(name).angular_velocity, parts[name]["OmegaZ"], atol=1e-8)

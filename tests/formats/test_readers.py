@@ -1,0 +1,156 @@
+"""Other programs' files are read: points go where circles and lines say, rates, units and masses are theirs."""
+
+import json
+from dataclasses import replace
+from math import asin, pi
+
+import pytest
+
+import planar
+from planar.formats.known_formats import file_formats
+from planar.model.mechanism import Drive, Input
+from planar.solving.rest_position import rest_position
+from tests.foreign_samples import (
+    FOUR_BARS,
+    LINKAGE_SIM,
+    PIXEL,
+    SLIDER_CRANKS,
+    base64,
+    coupler_point,
+    linkage2,
+    pmksplus,
+    slider_place,
+)
+from tests.round_trips import read_document, read_text
+
+ROUNDED = 1e-12
+TURNS = (0.4, -1.1)
+
+
+def points_after(mechanism, turn):
+    given = mechanism.inputs[0]
+    state = rest_position(mechanism, [Drive(given.pair, given.position + turn)])
+    return [1000.0 * point.position for point in state.points.values()]
+
+
+def nearest(points, place):
+    return min(abs(x - place[0]) + abs(y - place[1]) for x, y in points)
+
+
+@pytest.mark.parametrize("name", FOUR_BARS)
+def test_a_four_bar_moves_as_circles_meet(name):
+    mechanism = read_text(FOUR_BARS[name])
+    for turn in TURNS:
+        assert nearest(points_after(mechanism, turn), coupler_point(turn)) < 1e-9
+
+
+@pytest.mark.parametrize("name", SLIDER_CRANKS)
+def test_a_slider_crank_moves_as_a_circle_meets_a_line(name):
+    mechanism = read_text(SLIDER_CRANKS[name])
+    for turn in TURNS:
+        assert nearest(points_after(mechanism, turn), slider_place(turn)) < 1e-9
+
+
+def test_every_format_has_a_sample():
+    assert set(FOUR_BARS) | {"linkage_sim"} == set(file_formats())
+
+
+def test_rates_are_those_of_each_program():
+    rates = {name: read_text(text).inputs[0].velocity for name, text in FOUR_BARS.items()}
+    turn = 2.0 * pi  # once a second
+    wanted = {"linkage2": turn, "pmks-file": turn, "motiongen": turn, "ondsel": turn, "pmks": 0.0, "pyslvs": 0.0}
+    assert rates == pytest.approx(wanted | {"pylinkage": 0.1, "pmksplus": 20.0 * turn / 60.0})
+
+
+def test_a_motion_by_a_sine_is_a_table_of_it():
+    document = read_document(SLIDER_CRANKS["ondsel"])
+    (piece,) = document["inputs"][0]["law"]
+    assert piece["positions"][50] - piece["positions"][0] == pytest.approx(70.0)  # degrees, a quarter of a second on
+
+
+def test_linkage_sim_gives_its_own_published_positions():
+    """Of data/benchmarks/golden/slidercrank_kinematics.json: the crank at 15 degrees."""
+    mechanism = read_text(json.dumps(LINKAGE_SIM))
+    assert mechanism.inputs == ()
+    state = planar.solve(replace(mechanism, inputs=(Input("J1", 0.2617993877991494, 1.0),), sketch=(("J3", 3.9, 0.0),)))
+    assert state.point("J3").position[0] == pytest.approx(3.954740424401875, abs=ROUNDED)
+    assert state.link("conrod").angle == pytest.approx(-0.08638039723801787, abs=ROUNDED)
+    assert state.link("conrod").angular_velocity == pytest.approx(-0.32318024239408183, abs=1e-11)
+    assert state.link("conrod").angle == pytest.approx(-asin(state.point("J2").position[1] / 3.0))
+
+
+def test_bodies_fixed_to_one_another_are_one_link_with_both_masses():
+    mechanism = read_text(json.dumps(LINKAGE_SIM))
+    assert [link.name for link in mechanism.links] == ["ground", "crank", "conrod", "slider"]
+    masses = {mass.link: mass for mass in mechanism.masses}
+    assert masses["slider"].at == pytest.approx((0.0, -0.1))  # the cap's origin, turned by a right angle about its q
+    assert masses["crank"].inertia == 0.01
+
+
+def test_what_is_left_out_stands_in_the_notes():
+    told = " ".join(read_document(FOUR_BARS["pylinkage"])["notes"])
+    assert "0.1 rad in a step" in told and "taken as mm" in told
+    assert "driver 'D1'" in " ".join(read_document(json.dumps(LINKAGE_SIM))["notes"])
+    loose = linkage2('A 0 0 anchor="true" input="true"\nB 10 0\nX 50 50\nY 60 50', "A B\nX Y")
+    assert "'L1' is joined to nothing" in " ".join(read_document(loose)["notes"])
+
+
+def test_a_link_on_two_anchors_stands_still():
+    assert [link.name for link in read_text(SLIDER_CRANKS["linkage2"]).links] == ["frame", "L0", "L1"]
+
+
+def test_an_actuator_is_a_driven_slide():
+    text = linkage2(
+        'A 0 0 anchor="true"\nB 100 0\nC 130 -60 anchor="true"',
+        f'A B actuator="true" throw="{20 / PIXEL}" cpm="15"\nB C',
+    )
+    mechanism = read_text(text)
+    (given,) = mechanism.inputs
+    assert given.position == pytest.approx(0.1) and given.velocity == pytest.approx(0.01)  # 20 mm, 30 times a minute
+    longer = rest_position(mechanism, [Drive(given.pair, 0.11)]).points
+    assert nearest([1000.0 * p.position for p in longer.values()], (0, 0)) == 0.0
+    lengths = [float((point.position[0] ** 2 + point.position[1] ** 2) ** 0.5) for point in longer.values()]
+    assert min(abs(each - 0.11) for each in lengths) < 1e-12
+
+
+def test_gears_of_linkage_turn_by_their_sizes_and_chains_the_same_way():
+    wheels = 'A 0 0 anchor="true" input="true"\nB 90 0 anchor="true"\nP 10 0\nQ 100 0'
+    for kind, ratio in (("gears", -0.5), ("chain", 0.5)):
+        more = f'<ratios><ratio type="{kind}"><link id="0" size="10"/><link id="1" size="20"/></ratio></ratios>'
+        state = planar.solve(read_text(linkage2(wheels, 'A P gear="true"\nB Q gear="true"', more)))
+        one, other = (state.link(name).angular_velocity for name in ("L0", "L1"))
+        assert other / one == pytest.approx(ratio)
+
+
+def test_gears_of_pmks_follow_from_where_they_touch():
+    """A ring of 7, a sun of 5, a planet of 1 on an arm: Willis' formula."""
+    text = "ground,sun,arm,R,0,0\narm,planet,R,6,0\nsun,planet,G,5,0\nplanet,gnd,G,7,0\nplanet,R,6,1\n"
+    mechanism = read_text(text)
+    given = mechanism.inputs[0]._replace(velocity=1.0)
+    state = planar.solve(replace(mechanism, inputs=(given,)))
+    arm, planet = (state.link(name).angular_velocity for name in ("arm", "planet"))
+    assert arm == pytest.approx(5 / 12)
+    assert planet - arm == pytest.approx(-5 * (1 - arm))
+
+
+def test_a_rounded_upright_rail_of_pmksplus_is_upright():
+    body = (
+        SLIDER_CRANKS["pmksplus"].partition("?")[2][:-1].replace(f"5P,P,{base64(15)},0,0.", f"5P,P,{base64(15)},0,OZ.")
+    )
+    assert "OZ" in body  # 1.571 rad
+    slot = next(pair for pair in read_document(pmksplus(body))["pairs"] if "line" in pair)
+    assert slot["line"]["angle"] == 90.0
+
+
+def test_coaxial_pins_of_pmks_are_one():
+    text = "ground,arm,R,0,0\narm,gears,R,1,0\ngears,ground,G,44,0\ngears,output,G,46,0\nground,output,R,0,0\n"
+    mechanism = read_text(text)
+    assert len(mechanism.links) == 4
+    state = planar.solve(replace(mechanism, inputs=(mechanism.inputs[0]._replace(velocity=1.0),)))
+    assert state.link("output").angular_velocity == pytest.approx(1 - (44 / 43) * (45 / 46))
+
+
+def test_the_compact_form_of_a_pyslvs_project_is_read_alike():
+    joints = "M[J[R, P[0, 0], L[ground, a]], J[R, P[1, 0], L[a]]]"
+    text = f"{{input: [[0, 1]], algorithm: [{{input: [[2, 1]]}}], mechanism: '{joints}'}}"
+    assert read_document(text)["inputs"][0]["pair"] == "P0"
