@@ -7,11 +7,14 @@ from typing import NamedTuple
 import numpy as np
 
 from planar.derivatives.design_equations import design_equations
+from planar.document.revised.similar_mechanism import similar_mechanism
 from planar.foundation.arrays import Array
 from planar.model.mechanism import Mechanism
-from planar.synthesis.catalogue.catalogue import Catalogue, build_catalogue
-from planar.synthesis.catalogue.matches import Match, WantedItem, find_matches
+from planar.synthesis.catalogue.catalogue import Catalogue
+from planar.synthesis.catalogue.catalogue_store import kept_catalogue
+from planar.synthesis.catalogue.matches import Match, find_matches
 from planar.synthesis.catalogue.moved_numbers import moved_numbers
+from planar.synthesis.catalogue.step_choices import WantedItem
 from planar.synthesis.fitting.design_fit import DesignFit, FittedDesigns
 from planar.synthesis.fitting.wanted_equations import WantedEquations, tangents
 from planar.synthesis.fitting.wanted_rows import wanted_rows, wanted_size
@@ -37,11 +40,15 @@ class DesignSearch:
     """The search over one start."""
 
     def __init__(self, task: SynthesisTask, mechanism: Mechanism):
-        self.task, self.mechanism = task, mechanism
-        self.free: FreeNumbers = free_numbers(task, mechanism)
+        self.task, self.start = task, mechanism
         own = design_equations(mechanism).solver.unit
         self.size = wanted_size(task, own)
-        self.can_move = can_move_whole(task, mechanism, self.free)
+        self.can_move = can_move_whole(task, mechanism, free_numbers(task, mechanism))
+        if self.can_move:  # its scale is that of what is wanted, however large its file is
+            mechanism = similar_mechanism(mechanism, self.size / own)
+            own = design_equations(mechanism).solver.unit
+        self.mechanism = mechanism
+        self.free: FreeNumbers = free_numbers(task, mechanism)
         rows = wanted_rows(task, self.size)
         self.equations = tuple(WantedEquations(mechanism, each, self.free.names, own) for each in rows)
         self.ratio = own / self.size
@@ -53,8 +60,8 @@ class DesignSearch:
         self.guard = WantedEquations(mechanism, guard, self.free.names, own) if self.needs_whole_turn else None
 
     def catalogue(self, count: int, seed: int) -> Catalogue:
-        """Random designs of this start with their motion."""
-        return build_catalogue(self.equations, self.free, count, seed)
+        """Random designs of this start with their motion, from disk where they were kept."""
+        return kept_catalogue(self.start, self.equations, self.free, count, seed)
 
     def matches(self, catalogue: Catalogue, many: int) -> list[Match]:
         """The designs of the catalogue nearest to what is wanted."""

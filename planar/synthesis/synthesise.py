@@ -13,7 +13,6 @@ import numpy as np
 from planar.foundation.errors import BadInput, PlanarError
 from planar.model.mechanism import Mechanism
 from planar.model.run_arguments import check_whole_number
-from planar.synthesis.catalogue.catalogue_store import kept_catalogue
 from planar.synthesis.cognates.task_cognates import task_cognates
 from planar.synthesis.design_search import Candidate, DesignSearch
 from planar.synthesis.judgement.judgement import DesignJudge
@@ -32,6 +31,11 @@ ROUNDS = 4
 """Catalogues at most, each of other designs, where those before led to nothing sound or good."""
 GOOD = 2e-3
 """Root mean square of the misses beside the extent of what is wanted, at which no other catalogue is looked at."""
+SETTLED, SAME = 3, 1e-3
+"""Fits that lead to the best design, to this part of its error, at which no other catalogue is looked at: where several
+of many starts at random lead to the best of their optima, a better one is not likely to have been missed (C. G. E.
+Boender, A. H. G. Rinnooy Kan, Bayesian stopping rules for multistart global optimization methods, Mathematical
+Programming 37 (1987) 59)."""
 ALIKE_SPARE = 4
 """Sound designs beyond those wanted after which no more are judged: some turn out to be alike."""
 KEPT_SHARE = 4
@@ -115,15 +119,16 @@ class _TaskSearch:
         judge = DesignJudge(self.task, search.size)
         before = len(self.sound)
         for turn in range(ROUNDS):
-            catalogue = kept_catalogue(search.equations, search.free, DRAWS, self.seed + 1000 * turn)
+            catalogue = search.catalogue(DRAWS, self.seed + 1000 * turn)
             candidates = search.fit(catalogue, search.matches(catalogue, MATCHES), KEPT_SHARE * self.many)
             for each in candidates:
                 self._judge(search, judge, each)
                 if len(self.sound) - before >= (self.many + ALIKE_SPARE) * (turn + 1):
                     break
-            own = self.sound[before:]
-            best = min((each.error for each in own), default=np.inf)
-            if best <= GOOD * search.size or self.is_over():
+            errors = np.array([each.error for each in self.sound[before:]])
+            best = float(errors.min(initial=np.inf))
+            is_settled = int(np.sum(errors <= (1.0 + SAME) * best)) >= SETTLED
+            if best <= GOOD * search.size or is_settled or self.is_over():
                 break
 
     def _judge(self, search: DesignSearch, judge: DesignJudge, candidate: Candidate) -> None:

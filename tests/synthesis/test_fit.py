@@ -86,11 +86,9 @@ def test_a_path_of_the_start_is_found_back_from_changed_numbers(model, point):
     z, _ = equations.design.coordinates_at(planar.cycle(found.mechanism, 48))
     u = motion.inputs[mechanism.inputs[0].pair].position[:48:2, None] / equations.input_scale
     y = np.concatenate([z[0][:48:2], u], axis=1)
-    x = (
-        found.free.values
-        / equations.scale
-        * (1.0 + 0.01 * np.random.default_rng(4).normal(size=(6, len(found.free.names))))
-    )
+    factor = design_equations(mechanism).solver.unit / design_equations(found.mechanism).solver.unit
+    x, y = found.moves.move(found.free.values / equations.scale, y, complex(factor), 0j)  # as large as the file says
+    x = x * (1.0 + 0.01 * np.random.default_rng(4).normal(size=(6, len(x))))
     fit = DesignFit([equations], np.full(x.shape[1], -np.inf), np.full(x.shape[1], np.inf))
     best = fit.fit(x, [np.broadcast_to(y, (6, *y.shape)).copy()], [np.zeros((6, 0))], 2)
     assert np.sqrt(best.squares[0] / 24) < 1e-4

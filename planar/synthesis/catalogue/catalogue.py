@@ -9,7 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from planar.document.writer import write_mechanism
-from planar.foundation.arrays import Array, BoolArray
+from planar.foundation.arrays import Array, BoolArray, IntArray
+from planar.model.mechanism import Mechanism
 from planar.synthesis.catalogue.branch_tracking import follow_branches
 from planar.synthesis.catalogue.design_samples import draw_designs
 from planar.synthesis.fitting.wanted_equations import WantedEquations
@@ -36,6 +37,11 @@ class Catalogue:
         """How many designs there are."""
         return len(self.numbers)
 
+    def take(self, designs: IntArray) -> Catalogue:
+        """Those designs (n,) of it."""
+        values = tuple(each[designs] for each in self.values)
+        return Catalogue(self.numbers[designs], self.unknowns[designs], values, self.is_whole[designs])
+
 
 def build_catalogue(equations: tuple[WantedEquations, ...], free: FreeNumbers, count: int, seed: int = 0) -> Catalogue:
     """A catalogue from so many draws, the same for the same seed."""
@@ -49,10 +55,12 @@ def build_catalogue(equations: tuple[WantedEquations, ...], free: FreeNumbers, c
     return Catalogue(x, unknowns, told, is_whole)
 
 
-def catalogue_key(equations: tuple[WantedEquations, ...], free: FreeNumbers, count: int, seed: int) -> str:
+def catalogue_key(
+    start: Mechanism, equations: tuple[WantedEquations, ...], free: FreeNumbers, count: int, seed: int
+) -> str:
     """What tells one catalogue from another: the file, what is wanted of it, free numbers, bounds, count and seed."""
     told = [
-        write_mechanism(equations[0].design.mechanism),
+        write_mechanism(start),
         [str(each.rows.wanted.of) for each in equations],
         [*free.names],
         [*map(repr, (*free.lower, *free.upper))],

@@ -7,6 +7,7 @@ import io
 import numpy as np
 
 from planar.foundation.private_cache import PrivateCache
+from planar.model.mechanism import Mechanism
 from planar.synthesis.catalogue.catalogue import Catalogue, build_catalogue, catalogue_key
 from planar.synthesis.fitting.wanted_equations import WantedEquations
 from planar.synthesis.task.starts import FreeNumbers
@@ -14,9 +15,13 @@ from planar.synthesis.task.starts import FreeNumbers
 CACHE = PrivateCache("catalogues", ".npz", b"planar catalogue 1\n", 2 * 2**30)
 
 
-def kept_catalogue(equations: tuple[WantedEquations, ...], free: FreeNumbers, count: int, seed: int) -> Catalogue:
-    """The catalogue of so many draws, from disk where it is kept there, else made and kept."""
-    key = catalogue_key(equations, free, count, seed)
+def kept_catalogue(
+    start: Mechanism, equations: tuple[WantedEquations, ...], free: FreeNumbers, count: int, seed: int
+) -> Catalogue:
+    """The catalogue of so many draws, from disk where it is kept there, else made and kept.
+
+    The `equations` may be of a mechanism similar to the `start`: a catalogue is without a size."""
+    key = catalogue_key(start, equations, free, count, seed)
     content = CACHE.read(key)
     if content is not None:
         with np.load(io.BytesIO(content), allow_pickle=False) as file:

@@ -136,11 +136,12 @@ class WantedEquations:
         return F, F_y, F_x
 
     def values(self, x: Array, y: Array) -> Array:
-        """The result (designs, n, parts), in units of its scales."""
-        many, entries, unknowns = y.shape
-        told = self._value.evaluate_batch(many * entries, y.reshape(-1, unknowns), np.repeat(x, entries, axis=0))[0]
-        found: Array = told.reshape(many, entries, -1)
-        return found
+        """The result (designs, n, parts), in units of its scales; NaN where unknowns are."""
+        many, entries, _ = y.shape
+        known = np.isfinite(y).all(axis=2)
+        values = np.full((many, entries, len(self.rows.scales)), np.nan)
+        values[known] = self._value.evaluate_batch(int(known.sum()), y[known], x[np.nonzero(known)[0]])[0][:, 0]
+        return values
 
     @cached_property
     def _value(self) -> BufferedFunction:

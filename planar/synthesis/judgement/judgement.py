@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from planar.model.wording import amount
 from planar.results.motion import Motion
 from planar.solving.cycle import cycle
 from planar.solving.grids.grid_motion import motion_over_input
+from planar.synthesis.judgement.entry_order import ordered_inputs
 from planar.synthesis.task.synthesis_task import SynthesisTask, Wanted, WantedFunction, WantedPath
 from planar.synthesis.task.wanted_expressions import carried_name
 
@@ -75,7 +77,7 @@ class DesignJudge:
                 entry = int(np.argmax(more))
                 defects.append(f"circuit defect: {wanted.of} meets entry {entry + 1} in another assembly only")
             misses.append(off)
-        defects += [*self._order_defects(mechanism, there, is_whole)]
+        defects += [*self._put_in_order(motion, is_whole, there, misses)]
         defects += [*self._tolerance_defects(misses)]
         if self.task.demands.whole_turn and not is_whole:
             low, high = (
@@ -122,19 +124,28 @@ class DesignJudge:
                     f"first goes from {running} = {ends}"
                 )
 
-    def _order_defects(self, mechanism: Mechanism, inputs: Sequence[Array], is_whole: bool) -> Iterator[str]:
-        for wanted, own in zip(self.task.wanted, inputs, strict=True):
-            if isinstance(wanted, WantedFunction) or not wanted.in_order or len(own) < 3:
+    def _put_in_order(self, motion: Motion, is_whole: bool, inputs: list[Array], misses: list[Array]) -> Iterator[str]:
+        """Entries that are wanted in their order are met so, where that costs hardly anything; else a defect."""
+        given = motion.inputs[motion.mechanism.inputs[0].pair].position
+        low, high = float(given.min()), float(given.max())
+        margin = 0.0 if is_whole else ON_END * (high - low)
+        for k, wanted in enumerate(self.task.wanted):
+            if isinstance(wanted, WantedFunction) or not wanted.in_order or _is_in_order(inputs[k], is_whole):
                 continue
-            if is_whole:
-                steps = np.mod(np.diff(own), TURN)
-                rounds = float(steps.sum()) / TURN, float((TURN - steps).sum()) / TURN
-                is_ordered = min(rounds) < 1.0 + 1e-9
-            else:
-                steps = np.diff(own)
-                is_ordered = bool((steps > -1e-9).all() or (steps < 1e-9).all())
-            if not is_ordered:
+            off = np.full(len(inputs[k]), np.inf)
+            if wanted.inputs is None:
+                own = ordered_inputs(partial(self._every_miss, motion, wanted), low + margin, high - margin, is_whole)
+                off = np.diag(self._every_miss(motion, wanted, own))
+            if float((off - misses[k]).max()) > OTHER_ASSEMBLY * self.size:
                 yield f"order defect: {wanted.of} does not meet its entries in their order"
+            else:
+                inputs[k], misses[k] = own, off
+
+    def _every_miss(self, motion: Motion, wanted: Wanted, inputs: Array) -> Array:
+        """How far each of n entries is missed at m positions of the input (m, n)."""
+        shown = _results(motion.mechanism, [wanted], [inputs])[0]
+        every = [_misses(_at_entry(wanted, k, len(inputs)), shown, self.size) for k in range(len(wanted.weights))]
+        return np.stack(every, axis=1)
 
     def _tolerance_defects(self, misses: Sequence[Array]) -> Iterator[str]:
         for wanted, own in zip(self.task.wanted, misses, strict=True):
@@ -162,6 +173,18 @@ class DesignJudge:
             yield from _transmission_defects(motion, demands.transmission)
         if demands.inside is not None:
             yield from _region_defects(motion, demands.inside)
+
+
+def _is_in_order(inputs: Array, is_whole: bool) -> bool:
+    """Whether inputs (n,) rise or fall all the way; of a whole turn once round at most."""
+    if len(inputs) < 3:
+        return True
+    steps = np.diff(inputs)
+    if not is_whole:
+        return bool((steps > -1e-9).all() or (steps < 1e-9).all())
+    forward = np.mod(steps, TURN)
+    rounds = float(forward.sum()) / TURN, float(np.mod(-steps, TURN).sum()) / TURN
+    return min(rounds) < 1.0 + 1e-9
 
 
 def _transmission_defects(motion: Motion, least: float) -> Iterator[str]:
