@@ -48,7 +48,7 @@ class _ArraysAlone(pickle.Unpickler):
 
     def find_class(self, module: str, name: str) -> Any:
         """Of numpy, by the last part of its module's name, which differs from version to version."""
-        if module.split(".")[0] != "numpy" or (module.split(".")[-1], name) not in ALLOWED:
+        if module.split(".", maxsplit=1)[0] != "numpy" or (module.rsplit(".", maxsplit=1)[-1], name) not in ALLOWED:
             raise pickle.UnpicklingError(f"{module}.{name} is no array")
         return np.empty(0).__reduce__()[0] if name == "_reconstruct" else getattr(np, name)
 

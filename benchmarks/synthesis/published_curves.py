@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from time import perf_counter
+from time import process_time
 from typing import NamedTuple
 
 import numpy as np
@@ -53,7 +53,10 @@ START_EXTENT = 100.0
 
 
 class CurveResult(NamedTuple):
-    """Misses in % of the places' extent: of the published linkage, where there is one, and of the best design found."""
+    """Misses in % of the places' extent: of the published linkage, where there is one, and of the best design found.
+
+    `seconds` are of the processor, on one core.
+    """
 
     name: str
     places: int
@@ -82,9 +85,9 @@ def published_misses(places: Array, parameters: data.Parameters) -> Misses:
 def measure(name: str, places: Array, closed: bool, parameters: data.Parameters | None) -> CurveResult:
     """A target searched with the model `four-bar`, and judged from the file of the best design."""
     shown = places * (START_EXTENT / float(np.ptp(places, axis=0).max()))
-    begun = perf_counter()
+    begun = process_time()
     found = planar.synthesise(path_task(name, shown, closed, "four-bar"), many=3)
-    seconds = perf_counter() - begun
+    seconds = process_time() - begun
     published = None if parameters is None else published_misses(places, parameters)
     if not found:
         return CurveResult(name, len(places), published, None, seconds, ())

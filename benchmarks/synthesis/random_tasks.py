@@ -5,7 +5,7 @@ The search is given another linkage of the same structure, of other random dimen
 
 from __future__ import annotations
 
-from time import perf_counter
+from time import process_time
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -111,14 +111,17 @@ def measure(kind: str, seed: int) -> dict[str, Any]:
     """What the search makes of a task: its best design's misses beside the size, time, and faults found anew."""
     task = random_task(kind, seed)
     size = float(np.ptp(task.places, axis=0).max())
-    begun = perf_counter()
+    begun = process_time()
     try:
         found = planar.synthesise(task.value, many=3)
     except planar.PlanarError as problem:
-        return _record(kind, seed, task, perf_counter() - begun) | {"refused": str(problem)}
-    record = _record(kind, seed, task, perf_counter() - begun)
+        return _record(kind, seed, task, process_time() - begun) | {"refused": str(problem)}
+    record = _record(kind, seed, task, process_time() - begun)
     if not found:
-        return record | {"remarks": list(found.remarks), "rejected": [list(each.defects) for each in found.rejected[:3]]}
+        return record | {
+            "remarks": list(found.remarks),
+            "rejected": [list(each.defects) for each in found.rejected[:3]],
+        }
     best = min(found, key=lambda each: each.greatest_miss)
     faults = [design_faults(each.mechanism, POINT, task.places, each.greatest_miss, task.closed) for each in found]
     return record | {

@@ -33,8 +33,12 @@ def shapes() -> list[Shape]:
         shape("double loop (limacon), winds twice", np.stack([loop * c, loop * s], axis=1), True),
         shape("double circle, winds twice", _double_circle(), True),
         shape("letter D", rounded([(0, 0), (0.45, 0), (0.7, 0.3), (0.7, 0.7), (0.45, 1), (0, 1)], 0.12, True), True),
-        shape("letter L, round it", rounded([(0, 0), (0.7, 0), (0.7, 0.3), (0.3, 0.3), (0.3, 1), (0, 1)], 0.1, True), True),
-        shape("letter S", rounded([(0.6, 0.9), (0.1, 1), (0, 0.6), (0.6, 0.45), (0.6, 0), (0, 0.1)], 0.25, False), False),
+        shape(
+            "letter L, round it", rounded([(0, 0), (0.7, 0), (0.7, 0.3), (0.3, 0.3), (0.3, 1), (0, 1)], 0.1, True), True
+        ),
+        shape(
+            "letter S", rounded([(0.6, 0.9), (0.1, 1), (0, 0.6), (0.6, 0.45), (0.6, 0), (0, 0.1)], 0.25, False), False
+        ),
         shape("letter U", rounded([(0, 1), (0, 0), (0.6, 0), (0.6, 1)], 0.25, False), False),
         shape("foot: straight step, round return", _foot(), True),
     ]

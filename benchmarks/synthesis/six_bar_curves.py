@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from time import process_time
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -19,7 +19,8 @@ from benchmarks.synthesis.judged import design_faults
 from benchmarks.synthesis.misses import Misses, misses, path_of
 from benchmarks.synthesis.shapes import Shape, shape, shapes
 
-POINT = "E"
+POINT, NEW_POINT = "E", "wanted"
+"Of the model `four-bar`, and of a chain."
 FOUR_BAR = "four-bar"
 SIX_BARS = {
     "Watt I": (0, "Watt I six-bar"),
@@ -28,8 +29,9 @@ SIX_BARS = {
     "Stephenson III": (1, "Stephenson III six-bar"),
 }
 """By name the number of the chain and what its mechanism is called."""
-TIME = 120.0
-"""Seconds that a start may take."""
+STRUCTURES = (FOUR_BAR, *SIX_BARS)
+TIME = 300.0
+"""Seconds after which nothing new is begun, shared by the starts of a kind."""
 
 
 class ShapeResult(NamedTuple):
@@ -65,39 +67,34 @@ def six_bar_starts(name: str) -> Iterator[tuple[planar.Mechanism, str]]:
                 yield mechanism, link.name
 
 
-def curve_task(target: Shape, start: object, carrier: str | None) -> dict[str, object]:
-    """The task of a curve; `carrier` is the link of the point, where the start has none of that name."""
-    wanted: dict[str, object] = {"point": POINT, "through": target.places.tolist(), "in_order": True}
-    if carrier is not None:
-        wanted["on"] = carrier
+def curve_task(target: Shape, start: object, carrier: str | None) -> dict[str, Any]:
+    """The task of a curve; `carrier` is the link of a new point, left out where the start has the point."""
+    wanted: dict[str, Any] = {"point": POINT, "through": target.places.tolist(), "in_order": True}
+    if carrier is not None:  # a pin of the chain may have the letter
+        wanted |= {"point": NEW_POINT, "on": carrier}
     if target.closed:
         wanted["closed"] = True
     units = {"length": "mm", "angle": "deg"}
     return {"planar": 1, "name": target.name, "units": units, "start": start, "wanted": [wanted]}
 
 
-def measure_four_bar(target: Shape) -> ShapeResult:
-    """The best four-bar."""
-    return _measure(target, FOUR_BAR, curve_task(target, FOUR_BAR, None), POINT)
+def measure(target: Shape, structure: str) -> ShapeResult:
+    """The best four-bar, or the best six-bar of a kind with any input and any link that may carry the point."""
+    if structure == FOUR_BAR:
+        return _measure(target, structure, [curve_task(target, FOUR_BAR, None)])
+    starts = six_bar_starts(structure)
+    return _measure(target, structure, [curve_task(target, planar.to_dict(each), link) for each, link in starts])
 
 
-def measure_six_bars(target: Shape, name: str) -> Iterator[ShapeResult]:
-    """The best of every input and carrier of a kind of six-bar."""
-    for mechanism, carrier in six_bar_starts(name):
-        # a pin of the chain may have the letter of the point
-        task = curve_task(target, planar.to_dict(mechanism), carrier)
-        task["wanted"][0]["point"] = "wanted"  # type: ignore[index]
-        yield _measure(target, f"{name}, {carrier} from {mechanism.inputs[0].pair}", task, "wanted")
-
-
-def _measure(target: Shape, structure: str, task: dict[str, object], point: str) -> ShapeResult:
+def _measure(target: Shape, structure: str, tasks: list[dict[str, Any]]) -> ShapeResult:
     begun = process_time()
-    found = planar.synthesise(task, many=3, time_limit=TIME)
+    searches = [planar.synthesise(task, many=1, time_limit=TIME / len(tasks)) for task in tasks]
     seconds = process_time() - begun
-    if not found:
-        return ShapeResult(target.name, structure, None, seconds, tuple(found.remarks))
+    sound = [(found[0], task["wanted"][0]["point"]) for found, task in zip(searches, tasks, strict=True) if found]
+    if not sound:
+        return ShapeResult(target.name, structure, None, seconds, ())
+    best, point = min(sound, key=lambda each: each[0].error)
     places = target.places * 1e-3
-    best = found[0]
     faults = design_faults(best.mechanism, point, places, best.greatest_miss, target.closed)
     own = misses(path_of(planar.loads(planar.dumps(best.mechanism)), point), places)
     return ShapeResult(target.name, structure, own, seconds, tuple(faults))
