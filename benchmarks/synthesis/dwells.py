@@ -1,4 +1,4 @@
-"""Linkages that stand still while the crank goes on: a function by six-bars, and an arc of a path with a dyad behind it.
+"""Linkages that stand still while the crank goes on: a function by six-bars, and an arc with a dyad behind it.
 
 The dwell's error is the greatest departure of the output from where it stands, in % of all that it moves.
 """
@@ -58,10 +58,9 @@ def function_starts() -> Iterator[tuple[planar.Mechanism, str]]:
 def far_outputs(mechanism: planar.Mechanism) -> Iterator[str]:
     """The pairs at the frame whose link is no neighbour of a neighbour of the driven link."""
     driven = mechanism.inputs[0].pair
-    links = {
-        pair.name: set(pair.links) - {mechanism.frame} for pair in mechanism.pairs if mechanism.frame in pair.links
-    }
-    inner = [set(pair.links) for pair in mechanism.pairs if mechanism.frame not in pair.links]
+    frame = mechanism.frame
+    links = {pair.name: set(pair.links) - {frame} for pair in mechanism.pairs if frame in pair.links}
+    inner = [set(pair.links) for pair in mechanism.pairs if frame not in pair.links]
     near = {link for pair in inner if pair & links[driven] for link in pair}
     reach = {link for pair in inner if pair & near for link in pair}
     for name, own in links.items():
@@ -96,10 +95,8 @@ def measure_function(mechanism: planar.Mechanism, output: str, time_limit: float
 def dwell_error(mechanism: planar.Mechanism, output: str, start: float, stop: float) -> float:
     """The departure of an output from the middle of where it is between two positions of the input (rad)."""
     again, running = planar.loads(planar.dumps(mechanism)), mechanism.inputs[0].pair
-    still = np.unwrap(
-        np.asarray(planar.cycle(again, 120, pair=running, start=start, stop=stop).pair(output)["relative_angle"])
-    )
-    whole = np.unwrap(np.asarray(planar.cycle(again, 720, pair=running).pair(output)["relative_angle"]))
+    motions = (planar.cycle(again, 120, pair=running, start=start, stop=stop), planar.cycle(again, 720, pair=running))
+    still, whole = (np.unwrap(np.asarray(each.pair(output)["relative_angle"])) for each in motions)
     return 50.0 * float(np.ptp(still)) / float(np.ptp(whole))
 
 

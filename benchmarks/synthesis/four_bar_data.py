@@ -1,8 +1,8 @@
-"""Published target curves and four-bars, from a copy of KmolYuan/four-bar-rs in the folder that FOUR_BAR_FOLDER names.
+"""Published curves and four-bars, from a copy of KmolYuan/four-bar-rs in the folder that FOUR_BAR_FOLDER names.
 
-Its folder test-fb has curves as rows of x, y and four-bars as named numbers, each with the paper it comes from: the crank
-l2 turns at p1, the ground l1 lies at the angle a, the coupler is l3, the rocker l4, and the point lies at l5 from the
-crank's end, turned by g from the coupler. They are read, not kept here.
+Its folder test-fb has curves as rows of x, y and four-bars as named numbers, each with the paper it comes from: the
+crank l2 turns at p1, the ground l1 lies at the angle a, the coupler is l3, the rocker l4, and the point lies at l5 from
+the crank's end, turned by g from the coupler. They are read, not kept here.
 """
 
 from __future__ import annotations
@@ -55,8 +55,8 @@ def parse_parameters(text: str) -> Parameters:
 def four_bar(parameters: Parameters, unit: str = "mm") -> planar.Mechanism:
     """The mechanism of published numbers, in the middle of the branch that they name.
 
-    >>> numbers = {"p1x": 0, "p1y": 0, "a": 0, "l1": 90, "l2": 35, "l3": 70, "l4": 70, "l5": 45, "g": 0.5, "stat": "c1b1"}
-    >>> four_bar(numbers)
+    >>> lengths = {"l1": 90, "l2": 35, "l3": 70, "l4": 70, "l5": 45}
+    >>> four_bar({"p1x": 0, "p1y": 0, "a": 0, "g": 0.5, "stat": "c1b1", **lengths})
     <Mechanism 'four-bar': 4 links, 4 pairs, driven at A>
     """
     p = parameters

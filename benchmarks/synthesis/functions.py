@@ -1,7 +1,7 @@
 """Four-bars that make functions, beside three precision points at Chebyshev's spacing.
 
-The structural error is the greatest difference between the output's angle and the wanted one, both zeros being free, in
-% of the output's swing. Beside it stands the method of textbooks, with its error computed in the same way: Freudenstein's
+The structural error is the greatest difference between the output's angle and the wanted one, both zeros being free,
+in % of the output's swing. Beside it stands the method of textbooks, its error computed in the same way: Freudenstein's
 equation at three points at Chebyshev's spacing, at the best of all starting angles by steps of 5 degrees.
 
 F. Freudenstein, *Approximate Synthesis of Four-Bar Linkages*, Transactions of the ASME 77 (1955) 853; R. S. Hartenberg,
@@ -125,10 +125,10 @@ def three_points_error(wanted: WantedFunction, first: float, second: float) -> f
     if abs(np.linalg.det(rows)) < 1e-9:
         return np.nan
     k1, k2, k3 = np.linalg.solve(rows, np.cos(phi - psi))
-    return _freudenstein_error(wanted, first + turned, second + wanted_turned, (float(k1), float(k2), float(k3)))
+    return _freudenstein_error(wanted, first + turned, (float(k1), float(k2), float(k3)))
 
 
-def _freudenstein_error(wanted: WantedFunction, phi: Array, psi: Array, k: tuple[float, float, float]) -> float:
+def _freudenstein_error(wanted: WantedFunction, phi: Array, k: tuple[float, float, float]) -> float:
     """The structural error of a four-bar by its three ratios, on one branch all the way."""
     # (k1 - cos phi) cos psi - sin phi sin psi = k2 cos phi - k3
     a, b, c = k[0] - np.cos(phi), -np.sin(phi), k[1] * np.cos(phi) - k[2]
