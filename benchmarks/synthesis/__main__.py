@@ -12,7 +12,7 @@ from rich.markdown import Markdown
 
 from benchmarks.processes import ROOT
 from benchmarks.synthesis import measured_page
-from benchmarks.synthesis.parts import PARTS, Record, Wish
+from benchmarks.synthesis.parts import PARTS, Record, Wish, measurements
 from benchmarks.synthesis.random_tasks import KINDS
 from benchmarks.synthesis.records import append_record, read_records
 
@@ -42,7 +42,7 @@ def main() -> None:
 def measure_part(part: str, wish: Wish, results: Path, end: float, console: Console) -> None:
     """Measure what of a part is not among the results, and add it to them."""
     there = {(record["part"], record["name"]) for record in read_records(results)}
-    for name, measure in PARTS[part](wish):
+    for name, measure in measurements(part, wish):
         if (part, name) in there:
             continue
         if monotonic() > end:

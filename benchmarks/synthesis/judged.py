@@ -28,9 +28,8 @@ def design_faults(mechanism: planar.Mechanism, point: str, places: Array, told: 
     size = float(np.ptp(places, axis=0).max())
     off = chord_distances(path, places)
     allowed = told + ROUNDING * size
-    faults = (
-        [] if off.min(axis=1).max() <= allowed else [f"it misses by {off.min(axis=1).max() / size:.2%} of the size"]
-    )
+    greatest = float(off.min(axis=1).max())
+    faults = [] if greatest <= allowed else [f"it misses by {greatest / size:.2%} of the size"]
     if closed and not whole:
         faults.append("it makes no whole turn")
     if not faults and not any(are_in_order(way, allowed, whole) for way in (off, off[::-1])):

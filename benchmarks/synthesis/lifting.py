@@ -13,6 +13,8 @@ from planar.foundation.jets import value_and_rates
 from planar.solving.grids.grid_motion import motion_over_input
 
 LINK = "BC"
+GARAGE = [[0, 0, 90], [20, 70, 68], [60, 130, 32], [130, 150, 0]]
+OVEN = [[0, 0, 90], [8, -3, 72], [22, -12, 48], [36, -28, 22], [44, -46, 0]]
 
 
 class Lift(NamedTuple):
@@ -37,22 +39,14 @@ def lifts() -> list[Lift]:
     """All of them."""
     share = np.linspace(0.0, 1.0, 7)
     quarter = np.radians(90.0 * share)
+    level = [70.0 * np.sin(quarter), 70.0 * (1.0 - np.cos(quarter)), 0.0 * share]
+    dumper = [60.0 * share**2, 100.0 * share, -60.0 * share]
     return [
         Lift("tailgate: up and over, 3 poses", np.array([[0, 0, 0], [60, 90, 50], [20, 180, 95]], float)),
-        Lift(
-            "garage door: upright to flat, 4 poses",
-            np.array([[0, 0, 90], [20, 70, 68], [60, 130, 32], [130, 150, 0]], float),
-        ),
-        Lift(
-            "oven door: 5 poses", np.array([[0, 0, 90], [8, -3, 72], [22, -12, 48], [36, -28, 22], [44, -46, 0]], float)
-        ),
-        Lift(
-            "load kept level, 7 poses",
-            np.stack([70.0 * np.sin(quarter), 70.0 * (1.0 - np.cos(quarter)), 0.0 * share], axis=1),
-        ),
-        Lift(
-            "dumper: turned as it is lifted, 7 poses", np.stack([60.0 * share**2, 100.0 * share, -60.0 * share], axis=1)
-        ),
+        Lift("garage door: upright to flat, 4 poses", np.array(GARAGE, float)),
+        Lift("oven door, 5 poses", np.array(OVEN, float)),
+        Lift("load kept level, 7 poses", np.stack(level, axis=1)),
+        Lift("dumper: turned as it is lifted, 7 poses", np.stack(dumper, axis=1)),
     ]
 
 

@@ -29,7 +29,7 @@ class Wish(NamedTuple):
     kinds: tuple[str, ...] = tuple(random_tasks.KINDS)
 
 
-def _published(wish: Wish) -> Iterator[Measurement]:
+def _published() -> Iterator[Measurement]:
     if not four_bar_data.is_there():
         return
     for name, places, closed, parameters in published_curves.targets():
@@ -39,7 +39,7 @@ def _published(wish: Wish) -> Iterator[Measurement]:
         )
 
 
-def _shapes(wish: Wish) -> Iterator[Measurement]:
+def _shapes() -> Iterator[Measurement]:
     for target in six_bar_curves.targets():
         for structure in six_bar_curves.STRUCTURES:
             yield (
@@ -54,43 +54,49 @@ def _random(wish: Wish) -> Iterator[Measurement]:
         yield f"{kind} {seed}", lambda given=(kind, seed): random_tasks.measure(*given)
 
 
-def _functions(wish: Wish) -> Iterator[Measurement]:
+def _functions() -> Iterator[Measurement]:
     for each in functions.FUNCTIONS:
         yield each.name, lambda each=each: functions.measure(each)._asdict()
 
 
-def _lifting(wish: Wish) -> Iterator[Measurement]:
+def _lifting() -> Iterator[Measurement]:
     for each in lifting.lifts():
         yield each.name, lambda each=each: lifting.measure(each)._asdict()
 
 
-def _dwells(wish: Wish) -> Iterator[Measurement]:
+def _dwells() -> Iterator[Measurement]:
     yield "arc with a dyad", lambda: dwells.measure_arc()._asdict()
     for mechanism, output in dwells.function_starts():
         name = f"{mechanism.name}, from {mechanism.inputs[0].pair} to {output}"
         yield name, lambda given=(mechanism, output): dwells.measure_function(*given)._asdict()
 
 
-def _lines(wish: Wish) -> Iterator[Measurement]:
+def _lines() -> Iterator[Measurement]:
     for name in straight_lines.FAMOUS:
         yield name, lambda name=name: straight_lines.measure(name)._asdict()
 
 
-def _beside(wish: Wish) -> Iterator[Measurement]:
+def _beside() -> Iterator[Measurement]:
     for name in pylinkage_beside.TASKS:
         yield f"{name}, planar", lambda name=name: pylinkage_beside.by_planar(name)._asdict()
         if pylinkage_beside.is_there():
             yield f"{name}, pylinkage", lambda name=name: pylinkage_beside.by_pylinkage(name)._asdict()
 
 
-PARTS: dict[str, Callable[[Wish], Iterator[Measurement]]] = {
+PARTS: dict[str, Callable[[], Iterator[Measurement]] | None] = {
     "published": _published,
     "curves": _shapes,
-    "random": _random,
+    "random": None,
     "functions": _functions,
     "lifting": _lifting,
     "dwells": _dwells,
     "lines": _lines,
     "beside": _beside,
 }
-"""In the order of the page."""
+"""In the order of the page; none where what is measured depends on what is wanted."""
+
+
+def measurements(part: str, wish: Wish) -> Iterator[Measurement]:
+    """What is measured of a part."""
+    of_part = PARTS[part]
+    return _random(wish) if of_part is None else of_part()

@@ -1,4 +1,4 @@
-"""pylinkage's synthesis beside planar's: a four-bar through four and through five points, both measured by their paths."""
+"""pylinkage's synthesis beside planar's: a four-bar through four and five points, both measured by their paths."""
 
 from __future__ import annotations
 

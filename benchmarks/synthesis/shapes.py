@@ -13,6 +13,10 @@ SIZE = 100.0
 """mm, the greater side of a curve's bounding box."""
 MANY = 40
 """Places of a curve at equal ways along it."""
+D = ((0, 0), (0.45, 0), (0.7, 0.3), (0.7, 0.7), (0.45, 1), (0, 1))
+L = ((0, 0), (0.7, 0), (0.7, 0.3), (0.3, 0.3), (0.3, 1), (0, 1))
+S = ((0.6, 0.9), (0.1, 1), (0, 0.6), (0.6, 0.45), (0.6, 0), (0, 0.1))
+U = ((0, 1), (0, 0), (0.6, 0), (0.6, 1))
 
 
 class Shape(NamedTuple):
@@ -32,14 +36,10 @@ def shapes() -> list[Shape]:
         shape("figure eight (Gerono)", np.stack([s * c, s], axis=1), True),
         shape("double loop (limacon), winds twice", np.stack([loop * c, loop * s], axis=1), True),
         shape("double circle, winds twice", _double_circle(), True),
-        shape("letter D", rounded([(0, 0), (0.45, 0), (0.7, 0.3), (0.7, 0.7), (0.45, 1), (0, 1)], 0.12, True), True),
-        shape(
-            "letter L, round it", rounded([(0, 0), (0.7, 0), (0.7, 0.3), (0.3, 0.3), (0.3, 1), (0, 1)], 0.1, True), True
-        ),
-        shape(
-            "letter S", rounded([(0.6, 0.9), (0.1, 1), (0, 0.6), (0.6, 0.45), (0.6, 0), (0, 0.1)], 0.25, False), False
-        ),
-        shape("letter U", rounded([(0, 1), (0, 0), (0.6, 0), (0.6, 1)], 0.25, False), False),
+        shape("letter D", rounded(D, 0.12, True), True),
+        shape("letter L, round it", rounded(L, 0.1, True), True),
+        shape("letter S", rounded(S, 0.25, False), False),
+        shape("letter U", rounded(U, 0.25, False), False),
         shape("foot: straight step, round return", _foot(), True),
     ]
 
@@ -51,7 +51,7 @@ def shape(name: str, curve: Array, closed: bool, many: int = MANY) -> Shape:
 
 
 def along(curve: Array, many: int, closed: bool) -> Array:
-    """So many places (n, 2) at equal ways along a dense curve (m, 2); of a closed one the first not again at its end."""
+    """So many places (n, 2) at equal ways along a dense curve (m, 2); of a closed one the first not again."""
     if closed and np.hypot(*(curve[-1] - curve[0])) > 0.0:
         curve = np.concatenate([curve, curve[:1]])
     way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(curve, axis=0).T))])

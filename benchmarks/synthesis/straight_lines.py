@@ -1,4 +1,4 @@
-"""Straight lines beside the famous ones: of each the longest stretch that is straight to 0.1 %, and a line as long anew.
+"""Straight lines beside the famous ones: the longest stretch of each that is straight to 0.1 %, and a line as long.
 
 The line is sought by a four-bar with links no longer than the famous one's longest. Both are measured in the same way:
 the greatest distance of the path from the line of least distance, in % of its length.
