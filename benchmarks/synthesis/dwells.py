@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 import planar
-from benchmarks.synthesis.misses import Array
+from benchmarks.synthesis.misses import Array, is_whole_turn
 
 MANY = 36
 """Pairs of a function, round the turn."""
@@ -21,6 +21,8 @@ SWING, RISE = 40.0, 120.0
 RADIUS, ARC = 40.0, 60.0
 """mm and degrees of the arc that a point is to follow."""
 ARC_PLACES = 9
+DIRECTION = 15.0
+"""Degrees between the directions of the dyad's pivot that are tried."""
 POINT = "E"
 TIME = 120.0
 """Seconds after which nothing new is begun."""
@@ -93,9 +95,12 @@ def measure_function(mechanism: planar.Mechanism, output: str, time_limit: float
 
 
 def dwell_error(mechanism: planar.Mechanism, output: str, start: float, stop: float) -> float:
-    """The departure of an output from the middle of where it is between two positions of the input (rad)."""
+    """The departure of an output from the middle of where it is between two positions of the input (rad); infinite
+    where the input makes no whole turn."""
     again, running = planar.loads(planar.dumps(mechanism)), mechanism.inputs[0].pair
-    motions = (planar.cycle(again, 120, pair=running, start=start, stop=stop), planar.cycle(again, 720, pair=running))
+    motions = (planar.cycle(again, 120, pair=running, start=start, stop=stop), planar.cycle(again, 360, pair=running))
+    if not is_whole_turn(again, motions[1]):
+        return np.inf
     still, whole = (np.unwrap(np.asarray(each.pair(output)["relative_angle"])) for each in motions)
     return 50.0 * float(np.ptp(still)) / float(np.ptp(whole))
 
@@ -127,26 +132,32 @@ def measure_arc() -> DwellResult:
     best = found[0]
     inputs = np.unwrap(best.inputs[0])
     first, last = float(inputs[0]), float(inputs[-1])
-    error = dwell_error(with_dyad(best.mechanism), "G", first, last)
+    error = best_dyad_error(best.mechanism, first, last)
     return DwellResult(name, error, abs(float(np.degrees(last - first))), seconds, best.defects)
 
 
-def with_dyad(mechanism: planar.Mechanism) -> planar.Mechanism:
-    """The linkage with a dyad from its point to a pivot so far off that it turns with the crank; its pin begins at the
-    arc's centre, the origin."""
-    value = planar.to_dict(mechanism)
-    unit = "m"
+def best_dyad_error(mechanism: planar.Mechanism, first: float, last: float) -> float | None:
+    """The least dwell's error of a dyad whose pivot lies in any direction, of those that let the crank turn fully."""
     path = planar.cycle(mechanism, 180, pair=mechanism.inputs[0].pair).point(POINT).position
-    middle = path.mean(axis=0)
-    farthest = float(np.hypot(*path.T).max())
-    # across the way that the pin goes when the point leaves the arc
-    across = np.array([-middle[1], middle[0]]) / (float(np.hypot(*middle)) or 1.0)
-    arm = 2.0 * farthest
-    pivot = across * arm
-    frame = value["frame"]
-    value["links"][frame]["points"]["G"] = [f"{each} {unit}" for each in pivot.tolist()]
+    arm = 2.0 * float(np.hypot(*path.T).max())
+    errors = []
+    for direction in np.radians(np.arange(0.0, 360.0, DIRECTION)):
+        pivot = arm * np.array([np.cos(direction), np.sin(direction)])
+        try:
+            errors.append(dwell_error(with_dyad(mechanism, pivot), "G", first, last))
+        except planar.PlanarError:
+            continue  # the crank is stopped on the arc
+    least = min(errors, default=np.inf)
+    return least if np.isfinite(least) else None
+
+
+def with_dyad(mechanism: planar.Mechanism, pivot: Array) -> planar.Mechanism:
+    """The linkage with a dyad from its point to a pivot (m); its pin is in the arc's centre, the origin."""
+    value = planar.to_dict(mechanism)
+    x, y = pivot.tolist()
+    value["links"][value["frame"]]["points"]["G"] = [f"{x} m", f"{y} m"]
     value["links"]["EF"] = {"ends": [POINT, "F"], "length": f"{RADIUS} mm"}
-    value["links"]["GF"] = {"ends": ["G", "F"], "length": f"{arm} {unit}"}
+    value["links"]["GF"] = {"ends": ["G", "F"], "length": f"{float(np.hypot(x, y))} m"}
     value["pairs"] += [{"turning": name} for name in (POINT, "F", "G")]
-    value["sketch"] = value.get("sketch", {}) | {"F": ["0 m", "0 m"]}
+    value["sketch"] = value.get("sketch", {}) | {"F": [0, 0]}
     return planar.from_dict(value)
