@@ -18,12 +18,14 @@ MANY = 36
 """Pairs of a function, round the turn."""
 SWING, RISE = 40.0, 120.0
 """Degrees of the output, and of the crank to rise and to return."""
-RADIUS, ARC = 40.0, 60.0
-"""mm and degrees of the arc that a point is to follow."""
-ARC_PLACES = 9
-DIRECTION = 15.0
+RADIUS, ARC, DEPTH = 40.0, 60.0, 15.0
+"""mm and degrees of the arc that a point is to follow, and by how much it comes back nearer to the centre (mm)."""
+ARC_PLACES, BACK_PLACES, BACK_WEIGHT = 12, 6, 0.02
+DIRECTION = 5.0
 """Degrees between the directions of the dyad's pivot that are tried."""
-POINT = "E"
+MOST_OPEN = 0.97
+"""The cosine of the angle that the dyad keeps from being stretched or folded."""
+POINT, PIN, PIVOT = "E", "dyad pin", "dyad pivot"
 TIME = 120.0
 """Seconds after which nothing new is begun."""
 
@@ -105,20 +107,23 @@ def dwell_error(mechanism: planar.Mechanism, output: str, start: float, stop: fl
     return 50.0 * float(np.ptp(still)) / float(np.ptp(whole))
 
 
+def arc_places() -> Array:
+    """Places (n, 2) in mm of a closed curve: an arc about the origin, and a way back nearer to it."""
+    out = np.radians(np.linspace(-0.5 * ARC, 0.5 * ARC, ARC_PLACES))
+    back = np.linspace(-1.0, 1.0, BACK_PLACES + 2)[1:-1]
+    turned = np.concatenate([out, -np.radians(0.5 * ARC) * back])
+    radius = np.concatenate([np.full(ARC_PLACES, RADIUS), RADIUS - DEPTH * (1.0 - back**2)])
+    return radius[:, None] * np.stack([np.cos(turned), np.sin(turned)], axis=1)
+
+
 def arc_task() -> dict[str, Any]:
-    """The task of a four-bar one of whose points follows an arc."""
-    turned = np.radians(np.linspace(-0.5 * ARC, 0.5 * ARC, ARC_PLACES))
-    places = (RADIUS * np.stack([np.cos(turned), np.sin(turned)], axis=1)).tolist()
-    wanted = [{"point": POINT, "through": places, "in_order": True}]
+    """The task of a four-bar one of whose points follows the arc; the way back counts little."""
+    weights = [1.0] * ARC_PLACES + [BACK_WEIGHT] * BACK_PLACES
+    through = [{"at": at, "weight": weight} for at, weight in zip(arc_places().tolist(), weights, strict=True)]
+    wanted = [{"point": POINT, "through": through, "in_order": True, "closed": True}]
     units = {"length": "mm", "angle": "deg"}
-    return {
-        "planar": 1,
-        "name": "arc",
-        "units": units,
-        "start": "four-bar",
-        "wanted": wanted,
-        "demands": ["whole turn"],
-    }
+    told = {"planar": 1, "name": "arc", "units": units, "start": "four-bar", "wanted": wanted}
+    return told | {"demands": ["whole turn"]}
 
 
 def measure_arc() -> DwellResult:
@@ -130,34 +135,55 @@ def measure_arc() -> DwellResult:
     if not found:
         return DwellResult(name, None, 0.0, seconds, found.remarks)
     best = found[0]
-    inputs = np.unwrap(best.inputs[0])
-    first, last = float(inputs[0]), float(inputs[-1])
-    error = best_dyad_error(best.mechanism, first, last)
-    return DwellResult(name, error, abs(float(np.degrees(last - first))), seconds, best.defects)
+    inputs = np.unwrap(best.inputs[0][:ARC_PLACES])
+    crank = abs(float(np.degrees(inputs[-1] - inputs[0])))
+    path = planar.cycle(best.mechanism, 180, pair=best.mechanism.inputs[0].pair).point(POINT).position
+    pivot = best_pivot(path, RADIUS * 1e-3)
+    if pivot is None:
+        return DwellResult(name, None, crank, seconds, ("no dyad lets the crank turn fully",))
+    error = dwell_error(with_dyad(best.mechanism, pivot), PIVOT, float(inputs[0]), float(inputs[-1]))
+    return DwellResult(name, error, crank, seconds, best.defects)
 
 
-def best_dyad_error(mechanism: planar.Mechanism, first: float, last: float) -> float | None:
-    """The least dwell's error of a dyad whose pivot lies in any direction, of those that let the crank turn fully."""
-    path = planar.cycle(mechanism, 180, pair=mechanism.inputs[0].pair).point(POINT).position
-    arm = 2.0 * float(np.hypot(*path.T).max())
-    errors = []
-    for direction in np.radians(np.arange(0.0, 360.0, DIRECTION)):
-        pivot = arm * np.array([np.cos(direction), np.sin(direction)])
-        try:
-            errors.append(dwell_error(with_dyad(mechanism, pivot), "G", first, last))
-        except planar.PlanarError:
-            continue  # the crank is stopped on the arc
-    least = min(errors, default=np.inf)
-    return least if np.isfinite(least) else None
+def best_pivot(path: Array, radius: float) -> Array | None:
+    """The pivot (2,) about which a dyad swings most, whose pin is in the origin while the point of a path (n, 2) is at
+    `radius` from it; none where each stops the motion."""
+    best, most = None, 0.0
+    for arm in radius * np.geomspace(1.0, 8.0, 12):
+        for direction in np.radians(np.arange(0.0, 360.0, DIRECTION)):
+            pivot = arm * np.array([np.cos(direction), np.sin(direction)])
+            apart = path - pivot
+            far = np.hypot(*apart.T)
+            opening = (arm**2 + far**2 - radius**2) / (2.0 * arm * far)
+            if np.abs(opening).max() > MOST_OPEN:
+                continue
+            swing = max(
+                float(np.ptp(np.unwrap(np.arctan2(*apart.T[::-1]) + side * np.arccos(opening)))) for side in (1.0, -1.0)
+            )
+            if swing > most:
+                best, most = pivot, swing
+    return best
 
 
 def with_dyad(mechanism: planar.Mechanism, pivot: Array) -> planar.Mechanism:
-    """The linkage with a dyad from its point to a pivot (m); its pin is in the arc's centre, the origin."""
+    """The linkage with a dyad from its point to a pivot (m); its pin is in the origin while the point is on the arc,
+    whose middle lies in the x-axis."""
     value = planar.to_dict(mechanism)
-    x, y = pivot.tolist()
-    value["links"][value["frame"]]["points"]["G"] = [f"{x} m", f"{y} m"]
-    value["links"]["EF"] = {"ends": [POINT, "F"], "length": f"{RADIUS} mm"}
-    value["links"]["GF"] = {"ends": ["G", "F"], "length": f"{float(np.hypot(x, y))} m"}
-    value["pairs"] += [{"turning": name} for name in (POINT, "F", "G")]
-    value["sketch"] = value.get("sketch", {}) | {"F": [0, 0]}
+    arm, radius = float(np.hypot(*pivot)), RADIUS * 1e-3
+    at = planar.solve(mechanism).point(POINT).position
+    pin = circle_crossings(at, radius, pivot, arm)[0 if pivot[1] > 0.0 else 1]
+    value["links"][value["frame"]]["points"][PIVOT] = [f"{each} m" for each in pivot.tolist()]
+    value["links"]["first bar"] = {"ends": [POINT, PIN], "length": f"{radius} m"}
+    value["links"]["second bar"] = {"ends": [PIVOT, PIN], "length": f"{arm} m"}
+    value["pairs"] += [{"turning": name} for name in (POINT, PIN, PIVOT)]
+    value["sketch"] = value.get("sketch", {}) | {PIN: [f"{each} m" for each in pin.tolist()]}
     return planar.from_dict(value)
+
+
+def circle_crossings(one: Array, radius: float, other: Array, arm: float) -> list[Array]:
+    """Where circles about two centres (2,) cross: on the left of the way from one to the other, and on the right."""
+    apart = other - one
+    far = float(np.hypot(*apart))
+    along = (radius**2 - arm**2 + far**2) / (2.0 * far)
+    across = np.sqrt(max(radius**2 - along**2, 0.0)) * np.array([-apart[1], apart[0]]) / far
+    return [one + along * apart / far + side * across for side in (1.0, -1.0)]

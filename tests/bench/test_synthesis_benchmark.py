@@ -158,10 +158,26 @@ def test_a_dyad_behind_an_arc_stands_still_with_its_pin_in_the_centre():
     # the crank's own end goes round an arc of its length: the dyad's pin stays in the crank's pivot
     linkage = CRANK_ROCKER | {"p1x": 0.0, "p1y": 0.0, "l5": 0.0, "stat": "c1b1"}
     scaled = {key: 40.0 / 3.5 * value if key.startswith("l") else value for key, value in linkage.items()}
-    moved = dwells.with_dyad(four_bar_data.four_bar(scaled), np.array([0.2, 0.1]))
-    motion = planar.cycle(moved, 24, pair="A")
-    assert np.ptp(motion.pair("G")["relative_angle"]) < 1e-9
-    assert np.abs(motion.point("F").position).max() < 1e-9
+    moved = dwells.with_dyad(four_bar_data.four_bar(scaled), np.array([-0.1, 0.2]))
+    motion = planar.cycle(moved, 24, pair="A", start=1.6, stop=2.2)
+    assert np.ptp(motion.pair(dwells.PIVOT)["relative_angle"]) < 1e-9
+    assert np.abs(motion.point(dwells.PIN).position).max() < 1e-9
+    assert dwells.arc_task()["wanted"][0]["closed"]
+    assert np.hypot(*dwells.arc_places()[: dwells.ARC_PLACES].T) == pytest.approx(dwells.RADIUS)
+
+
+def test_circles_cross_at_their_radii_from_both_centres():
+    one, other = np.array([0.0, 0.0]), np.array([3.0, 4.0])
+    for each in dwells.circle_crossings(one, 4.0, other, 3.0):
+        assert [np.hypot(*(each - centre)) for centre in (one, other)] == pytest.approx([4.0, 3.0])
+
+
+def test_a_pivot_is_chosen_about_which_the_dyad_swings():
+    turned = np.linspace(0.0, 2.0 * np.pi, 181)
+    path = np.stack([1.0 + 0.3 * np.cos(turned), 0.2 * np.sin(turned)], axis=1)
+    arm = float(np.hypot(*dwells.best_pivot(path, 1.0)))
+    assert 1.0 <= arm <= 8.0
+    assert dwells.best_pivot(path * 9.0, 1.0) is None
 
 
 def test_other_things_than_arrays_are_not_unpickled(tmp_path):
