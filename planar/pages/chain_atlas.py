@@ -10,7 +10,7 @@ from typing import Any
 
 from planar.drawing.output.grid_sheets import GRID_COUNT
 from planar.drawing.output.matplotlib_figure import encode_figure
-from planar.drawing.structures.chain_pictures import DrawnChain, class_counts
+from planar.drawing.structures.chain_pictures import DrawnChain
 from planar.drawing.structures.chain_sheets import chain_sheets, draw_chains, inversion_sheets
 from planar.foundation.errors import BadInput
 from planar.foundation.safe_files import make_folder, save_file, write_error
@@ -101,7 +101,6 @@ def _index_record(drawn: DrawnChain, sheet: str, inversion_sheets_of: dict[str, 
     """Everything about a chain as JSON values: its places, too, and on which sheets it stands."""
     found = record(drawn.chain, with_mechanisms=True)
     found |= {
-        "classes": class_counts(drawn.chain.mechanisms()),
         "crossings": drawn.layout.crossings,
         "places": [[round(float(each), PLACE_DIGITS) for each in place] for place in drawn.layout.places],
         "outlines": [list(each) for each in drawn.layout.rotations],

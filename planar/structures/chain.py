@@ -26,6 +26,8 @@ from planar.structures.symmetry import (
     neighbour_sets,
 )
 
+ASSUR_CLASSES = ("II", "III", "IV", "larger")
+"""Of mechanisms, by their greatest group; larger: of more than four links."""
 MAX_AUTOMORPHISMS = 20_000
 """A chain that has more is too regular for its links to be told apart one by one."""
 
@@ -42,6 +44,11 @@ class ChainMechanism(NamedTuple):
     drives: tuple[int, ...]
     name: str
     groups: tuple[AssurGroup, ...]
+
+    @property
+    def assur_class(self) -> str:
+        """The highest class of its groups, one of ASSUR_CLASSES."""
+        return max((group.assur_class or ASSUR_CLASSES[-1] for group in self.groups), key=ASSUR_CLASSES.index)
 
 
 @dataclass(frozen=True)
@@ -177,6 +184,21 @@ class Chain:
                     if groups is not None:
                         found.append(ChainMechanism(frame, drives, self.inversion_name(frame), groups))
         return tuple(found)
+
+    def class_counts(self) -> dict[str, int]:
+        """How many of its mechanisms that are driven on the fixed link are of which of ASSUR_CLASSES.
+
+        >>> import planar
+        >>> planar.chains(6)[1].class_counts()
+        {'II': 2, 'III': 2, 'IV': 1}
+        """
+        count = Counter(each.assur_class for each in self.mechanisms())
+        return {each: count[each] for each in ASSUR_CLASSES if count[each]}
+
+    def describe_classes(self) -> str:
+        """How many mechanisms are of which class, in words."""
+        told = [f"{each}: {count}" for each, count in self.class_counts().items()]
+        return ", ".join(told) or "no one link drives it"
 
     def assur_groups(self, frame: int, drives: Sequence[int]) -> tuple[AssurGroup, ...] | None:
         """The Assur groups of the mechanism with this link fixed and these joints driven, in an order in which they can

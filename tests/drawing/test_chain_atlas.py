@@ -34,6 +34,7 @@ def test_the_index_tells_every_fact_of_every_chain(atlas):
         assert own["crossings"] == 0
         assert [*map(int, own["inversion_sheets"])] == [*chain.inversions]
     assert told["chains"][1]["classes"] == {"II": 2, "III": 2, "IV": 1}
+    assert [each["class"] for each in told["chains"][0]["mechanisms"]] == ["II"] * 4
 
 
 def test_every_sheet_of_the_index_is_there_and_nothing_else(atlas):
@@ -96,7 +97,7 @@ def test_an_inversion_has_its_fixed_link_hatched_and_its_driven_joints_black():
         assert hatched == {f"link {frame} fixed"}
         black = {mark.about for mark in picture.marks if isinstance(mark, Circle) and mark.fill is Fill.SOLID}
         assert black == {f"joint {joint}" for each in own for joint in each.drives}
-        assert len(re.findall(r"\d-\d: II", " ".join(picture.notes))) == len(own)
+        assert len(re.findall(r"\d-\d:\sII", " ".join(picture.notes))) == len(own)
 
 
 def test_figures_are_a_sheet_for_twenty_chains():

@@ -245,3 +245,12 @@ def test_lines_are_broken_at_spaces_and_within_words_that_are_too_long():
     assert all(text_size(line, 8.5).width <= 40.0 for line in lines + broken)
     assert wrap_text("W", 8.5, 0.1) == ["W"]
     assert wrap_text("  ", 8.5, 40.0) == []
+
+
+def test_no_line_ends_at_a_no_break_space():
+    pieces = [f"{k}-{k + 1}:\N{NO-BREAK SPACE}II," for k in range(20)]
+    for width in (14.0, 25.0, 33.0):
+        lines = wrap_text(" ".join(pieces), 8.5, width)
+        assert len(lines) > 1
+        assert " ".join(lines) == " ".join(pieces).replace("\N{NO-BREAK SPACE}", " ")
+        assert all(line.endswith("II,") for line in lines)

@@ -119,7 +119,9 @@ def test_two_drives_of_one_loop_fit_no_chain_of_two_loops():
 def test_inspect_tells_the_chain_in_words_and_as_json(tmp_path):
     said = run(tmp_path, "inspect", "toggle-press").done()
     assert "chain 3 of those of 6 links, 1 slide and freedom 1 (Stephenson chain), 2 loops" in said
-    assert "other choices give chain 1 and 4" in said
+    assert "other choices give chains 1 and 4" in said
+    said = " ".join(run(tmp_path, "inspect", "jansen-leg").done().split())
+    assert "others of the same chain: by fixing k, shank, c at Y, A" in said  # that the field has no name for
     told = json.loads(run(tmp_path, "inspect", "double-butterfly", "--json").done())["structure"]
     assert (told["chain"]["number"], told["frame"], told["drives"]) == (8, 0, [1])
     told = json.loads(run(tmp_path, "inspect", "gear-reducer", "--json").done())

@@ -169,6 +169,7 @@ def test_the_commands_list_draw_and_make_them(tmp_path):
     said = run(tmp_path, "chains", "4", "--slides", "2", "--mechanisms").done()
     assert "2 kinematic chains of 4 links with 2 slides, freedom 1" in said
     assert all(name in said for name in ("elliptical trammel", "Scotch yoke", "Oldham coupling", "Rapson's slide"))
+    assert "II: 4" in said  # the class of its mechanisms, beside each chain
     (first, _) = json.loads(run(tmp_path, "chains", "4", "--slides", "2", "--json").done())
     assert (first["slides"], first["pin_number"], first["name"]) == ([0, 1], 0, "double slider-crank chain")
     run(tmp_path, "chains", "4", "--slides", "1", "-o", "atlas").done()

@@ -66,7 +66,10 @@ def test_three_poses_of_a_coupler_are_met_exactly():
     found = planar.synthesise(task("four-bar", {"link": "BC", "poses": poses}), many=2)
     assert found[0].greatest_miss < 1e-3 * found.size
     state = planar.solve(found[0].mechanism, {"A": float(found[0].inputs[0][1])})
-    np.testing.assert_allclose(state.point("B").position, [0.03, 0.02], atol=1e-3 * found.size)
+    numbers = planar.dimensions(found[0].mechanism)
+    own = complex(numbers["BC.B.x"], numbers["BC.B.y"]) * np.exp(1j * state.link("BC").angle)
+    origin = state.point("B").position - [own.real, own.imag]
+    np.testing.assert_allclose(origin, [0.03, 0.02], atol=1e-3 * found.size)
     assert found[0].cognates == ()
 
 
@@ -138,3 +141,18 @@ def test_the_command_writes_designs_with_pages(tmp_path):
         for k, each in enumerate(design["cognates"], start=1):
             assert planar.load(tmp_path / "designs" / f"{number:02d}-cognate-{k}.json").name == each["name"]
     assert (tmp_path / "designs" / "index.html").exists()
+
+
+def test_five_poses_are_met_by_pins_that_lie_off_the_origin_of_the_posed_link():
+    """L. Burmester: a plane that takes five poses has pins for them; they do not lie where its axes begin."""
+    poses = [([0, 0], 0), ([30, 20], 25), ([70, 25], 60), ([95, 5], 80), ([110, -20], 95)]
+    wanted = {"link": "BC", "poses": [{"at": at, "angle": angle} for at, angle in poses]}
+    found = planar.synthesise(task("four-bar", wanted), many=1)
+    assert found[0].greatest_miss < 1e-3 * found.size
+    for at, (_, angle) in zip(found[0].inputs[0], poses, strict=True):
+        state = planar.solve(found[0].mechanism, {"A": float(at)})
+        off = np.degrees(state.link("BC").angle) - angle
+        assert abs(off - 360.0 * round(off / 360.0)) < 0.1
+    link = next(each for each in found[0].mechanism.links if each.name == "BC")
+    assert link.ends is None
+    assert found[0].mechanism.source is None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from bisect import bisect_left
 from collections.abc import Callable
 from functools import lru_cache
@@ -12,6 +13,7 @@ from planar.drawing.labels.text_line import text_line
 from planar.drawing.paper.pens import MM_PER_POINT, require_matplotlib
 from planar.drawing.paper.picture import Label
 
+BREAKING_SPACES = re.compile(r"[^\S\N{NO-BREAK SPACE}]+")
 MAX_LABEL_LENGTH = 60
 """Characters of a plain letter that are shown; of longer ones the middle is left out."""
 
@@ -68,7 +70,10 @@ def _fitting_length(word: str, most: int, fits: Callable[[str], bool]) -> int:
 
 
 def wrap_text(text: str, points: float, width: float, heavy: bool = False) -> list[str]:
-    """A plain text as lines of at most so many mm, broken at spaces and within a word that is too long by itself."""
+    """A plain text as lines of at most so many mm, broken at spaces and within a word that is too long by itself.
+
+    No line ends at a no-break space.
+    """
 
     def fits(part: str) -> bool:
         return text_size(part, points, heavy=heavy).width <= width
@@ -76,7 +81,7 @@ def wrap_text(text: str, points: float, width: float, heavy: bool = False) -> li
     # no letter is narrower than a fifth of the font's size
     most = max(1, int(width / (0.2 * MM_PER_POINT * points)))
     lines, line = [], ""
-    for word in printable_text(text, heavy=heavy).split():
+    for word in (printable_text(each, heavy=heavy) for each in BREAKING_SPACES.split(text)):
         if len(word) <= most and fits(f"{line} {word}".strip()):
             line = f"{line} {word}".strip()
             continue

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
 
@@ -19,16 +18,18 @@ LONGEST_LINE = 22.0
 JOINT_RADIUS = 0.9
 BLOCK_SIZE = (3.2, 1.9)
 """mm, of a slide, along and across."""
-NUMBER_SIZE, SMALL_NUMBER_SIZE, SMALL_PLATE = 6.0, 5.0, 1.9
-"""Points, of the numbers of links, and of those in plates within which no larger circle (mm) has room."""
+NUMBER_SIZE, SMALL_NUMBER_SIZES, WIDE_PLATE = 6.0, (3.8, 5.0), 1.9
+"""Points, of the numbers of links, and of those in plates in which a circle of this radius (mm) has no room."""
+BESIDE_BAR, BAR_PARTS, GOOD_ROOM = 1.7, (0.5, 0.38, 0.62), 2.4
+"""Where the number of a bar may stand: so far from it (mm), at these parts of its length; and how far from all else
+there is room enough (mm)."""
 HATCH_PITCH, HATCH_LENGTH = 1.3, 1.6
 """mm from one stroke of a fixed link's hatching to the next, and of one beside a bar."""
 MAX_DRIVES_SHOWN = 6
 """Choices of driven joints that are told beneath a picture; of more how many there are."""
+NO_BREAK = "\N{NO-BREAK SPACE}"
 GRID_LINES = 40
 """Either way, of spots within a plate that are looked at for its number."""
-LARGER = "larger"
-"""What is told of a mechanism whose groups have no class."""
 
 
 class DrawnChain(NamedTuple):
@@ -66,23 +67,12 @@ def chain_title(chain: Chain) -> str:
     return f"{number}{' + '.join(map(str, chain.assortment))}"
 
 
-def class_counts(mechanisms: Iterable[ChainMechanism]) -> dict[str, int]:
-    """How many mechanisms have groups of which class at most: II, III, IV, and larger ones."""
-    count = Counter(_class_word(each) for each in mechanisms)
-    return {each: count[each] for each in ("II", "III", "IV", LARGER) if count[each]}
-
-
-def _class_word(mechanism: ChainMechanism) -> str:
-    words = {group.assur_class for group in mechanism.groups}
-    return LARGER if "" in words else max(words, key=("II", "III", "IV").index, default="II")
-
-
 def _chain_notes(drawn: DrawnChain) -> Iterator[str]:
     chain = drawn.chain
     if chain.name:
         yield chain.name
     yield f"symmetry {chain.symmetry.order}, {count_phrase(len(chain.inversions), 'inversion')}"
-    yield ", ".join(f"{word}: {count}" for word, count in class_counts(chain.mechanisms()).items())
+    yield chain.describe_classes().replace(": ", f":{NO_BREAK}")
     told = ["fractionated"] if chain.is_fractionated else []
     told += [count_phrase(drawn.layout.crossings, "crossing")] if drawn.layout.crossings else []
     if told:
@@ -95,7 +85,7 @@ def _drive_notes(chain: Chain, mechanisms: Sequence[ChainMechanism]) -> Iterator
         yield "no joints on it drive all links"
         return
     told = [
-        " and ".join("{}-{}".format(*chain.edges[joint]) for joint in each.drives) + f": {_class_word(each)}"
+        " and ".join("{}-{}".format(*chain.edges[joint]) for joint in each.drives) + f":{NO_BREAK}{each.assur_class}"
         for each in mechanisms[:MAX_DRIVES_SHOWN]
     ]
     left = len(mechanisms) - len(told)
@@ -131,11 +121,51 @@ def _marks(
             yield Polyline(block, Pen.PIN, f"joint {number}", closed=True, fill=fill)
         else:
             yield Circle(spot, JOINT_RADIUS, Pen.PIN, f"joint {number}", fill)
-    for link, joints in enumerate(layout.rotations):
-        corners = places[list(joints)]
-        middle, room = _widest_spot(corners) if len(joints) > 2 else (corners.mean(axis=0), SMALL_PLATE)
-        number_size = NUMBER_SIZE if room >= SMALL_PLATE else SMALL_NUMBER_SIZE
-        yield Label(str(link), paper_point(middle), f"link {link}", number_size, clearance=0.3)
+    yield from _numbers(layout.rotations, places)
+
+
+def _numbers(rotations: Sequence[Sequence[int]], places: Array) -> Iterator[Label]:
+    """The numbers of links: of plates within them, of bars beside them on the side where there is more room."""
+    shapes = [places[list(joints)] for joints in rotations]
+    sides = [
+        (link, *pair) for link, each in enumerate(shapes) for pair in zip(np.roll(each, 1, axis=0), each, strict=True)
+    ]
+    spots: dict[int, Array] = {}
+    rooms = dict.fromkeys(range(len(shapes)), WIDE_PLATE)
+    for link, corners in enumerate(shapes):
+        if len(corners) > 2:
+            spots[link], rooms[link] = _widest_spot(corners)
+    for link, corners in enumerate(shapes):
+        if len(corners) == 2:
+            beside = _spots_beside(corners[0], corners[1], places.mean(axis=0))
+            room = np.full(len(beside), GOOD_ROOM)
+            for other, one, two in sides:
+                if other != link:
+                    room = np.minimum(room, _distances(beside, one, two))
+            for spot in spots.values():
+                room = np.minimum(room, np.hypot(*(beside - spot).T) - 0.5 * GOOD_ROOM)
+            spots[link] = beside[int(np.argmax(room))]
+    for link, spot in sorted(spots.items()):
+        share = rooms[link] / WIDE_PLATE
+        size = NUMBER_SIZE if share >= 1.0 else float(np.clip(share * NUMBER_SIZE, *SMALL_NUMBER_SIZES))
+        yield Label(str(link), paper_point(spot), f"link {link}", size, clearance=0.3)
+
+
+def _spots_beside(one: Array, other: Array, middle: Array) -> Array:
+    """Spots (n, 2) near a bar, at its middle first, on that side first that is farther from the middle of all."""
+    way = other - one
+    out = np.array([-way[1], way[0]]) / np.hypot(*way)
+    if out @ (0.5 * (one + other) - middle) < 0.0:
+        out = -out
+    return np.array([one + part * way + side * BESIDE_BAR * out for part in BAR_PARTS for side in (1.0, -1.0)])
+
+
+def _distances(spots: Array, one: Array, other: Array) -> Array:
+    """How far spots (n, 2) are from a line from one point to another (n,)."""
+    way = other - one
+    part = np.clip((spots - one) @ way / (way @ way), 0.0, 1.0)
+    distances: Array = np.hypot(*(spots - one - part[:, None] * way).T)
+    return distances
 
 
 def _block(
@@ -158,11 +188,9 @@ def _widest_spot(corners: Array) -> tuple[Array, float]:
     spots = np.stack(np.meshgrid(*grid.T), axis=-1).reshape(-1, 2)
     nearest, inside = np.full(len(spots), np.inf), np.zeros(len(spots), dtype=bool)
     for one, other in zip(np.roll(corners, 1, axis=0), corners, strict=True):
-        way = other - one
-        part = np.clip((spots - one) @ way / (way @ way), 0.0, 1.0)
-        nearest = np.minimum(nearest, np.hypot(*(spots - one - part[:, None] * way).T))
+        nearest = np.minimum(nearest, _distances(spots, one, other))
         if one[1] != other[1]:
-            across = one[0] + (spots[:, 1] - one[1]) / way[1] * way[0]
+            across = one[0] + (spots[:, 1] - one[1]) / (other - one)[1] * (other - one)[0]
             inside ^= ((one[1] > spots[:, 1]) != (other[1] > spots[:, 1])) & (spots[:, 0] < across)
     best = int(np.argmax(np.where(inside, nearest, 0.0)))
     return spots[best], float(nearest[best])

@@ -84,12 +84,13 @@ def _structure_facts(found: Inspection) -> list[tuple[str, str]]:
     if known.groups:
         groups = [f"{', '.join(links)}{f' ({kind})' if kind else ''}" for links, kind in known.groups]
         facts.append(f"Assur groups: {'; '.join(groups)}")
-    named_inversions = [f"{link} ({name})" for link, name in known.inversions.items() if name]
-    if named_inversions:
-        facts.append(f"others of the same chain: by fixing {', '.join(named_inversions)}")
+    if known.inversions:
+        inversions = [f"{link} ({name})" if name else link for link, name in known.inversions.items()]
+        facts.append(f"others of the same chain: by fixing {', '.join(inversions)}")
     if known.multiple_pins:
         others = [str(each.number) for each in known.others if each.number is not None]
-        more = f"; other choices give chain {join_all_names(others)}" if others else ""
+        kind = "chains " if len(others) > 1 else "chain "
+        more = f"; other choices give {kind}{join_all_names(others)}" if others else ""
         pins = join_all_names(known.multiple_pins)
         facts.append(f"at {pins} one link is taken as pinned to each other one{more}")
     pinned = known.pinned_chain

@@ -37,7 +37,8 @@ def write_design(
     for each, at in zip(joints, places, strict=True):
         x, y_own = (_rounded(part, "length", units, size) for part in at)
         sketch.append((each.name, x, y_own))
-    return with_values(replace(start, sketch=tuple(sketch), name=name, published=(), ids=()), told)
+    made = replace(start, sketch=tuple(sketch), name=name, about=None, source=None, published=(), ids=())
+    return with_values(made, told)
 
 
 def _moves(mechanism: Mechanism, point: NamedPoint) -> bool:

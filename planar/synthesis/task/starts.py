@@ -18,7 +18,7 @@ from planar.foundation.errors import BadInput
 from planar.model.link_shapes import At, Distances, Link, Point, link_shape
 from planar.model.mechanism import Mechanism, named_points
 from planar.solving.cycle import cycle
-from planar.synthesis.task.synthesis_task import ChainStart, SynthesisTask, WantedPath
+from planar.synthesis.task.synthesis_task import ChainStart, SynthesisTask, WantedPath, WantedPoses
 from planar.synthesis.task.wanted_expressions import (
     carried_name,
     depended_numbers,
@@ -101,7 +101,10 @@ def _carriers(mechanism: Mechanism) -> Iterator[str]:
 
 
 def with_wanted_points(mechanism: Mechanism, task: SynthesisTask, carried: dict[str, tuple[str, str]]) -> Mechanism:
-    """The mechanism with its wanted points as coordinates in their link; `carried`: link and name of new ones."""
+    """The mechanism with its wanted points as coordinates in their link; `carried`: link and name of new ones.
+
+    Links that are to take poses have coordinates throughout, so that their origin is not held to a pin.
+    """
     links = {each.name: each for each in mechanism.links}
     known = {each.name: each for each in named_points(mechanism)}
     named = (*task.free, *task.within)
@@ -110,6 +113,10 @@ def with_wanted_points(mechanism: Mechanism, task: SynthesisTask, carried: dict[
             is_named = any(name.startswith(f"{each.name}.{own.name}.") for name in named)
             if isinstance(own.place, Distances) and not is_named:
                 links[each.name] = _by_coordinates(links[each.name], own.name)
+    for posed in task.wanted:
+        if isinstance(posed, WantedPoses) and posed.link in links:
+            is_named = any(name.startswith(f"{posed.link}.") for name in named)
+            links[posed.link] = links[posed.link] if is_named else _with_free_axes(links[posed.link])
     for path in task.wanted:
         if not isinstance(path, WantedPath):
             continue
@@ -138,6 +145,15 @@ def _by_coordinates(link: Link, point: str) -> Link:
         Point(each.name, At(float(at.x), float(at.y))) if each.name == point else each for each in link.points
     )
     return replace(link, points=points)
+
+
+def _with_free_axes(link: Link) -> Link:
+    """The link with all of its points by coordinates in its own axes, which then lie anywhere beside its pins."""
+    if link.ends is None and link.axis is None:
+        return link
+    shape = link_shape(link)
+    places = {name: shape.position(name) for name in link.names}
+    return Link(link.name, tuple(Point(name, At(float(at.x), float(at.y))) for name, at in places.items()))
 
 
 def _with_new_point(link: Link, point: str, size: float) -> Link:

@@ -73,7 +73,9 @@ def chains(  # many: options of the command
     if output is not None:
         _draw(found, limit, mechanisms, output)
     if as_json:
-        print_json([record(each, mechanisms) for each in found])
+        with show_status(f"chains of {links} links"):
+            records = [record(each, mechanisms) for each in found]
+        print_json(records)
         return
     with show_status(f"chains of {links} links"):
         told = table(found, [*islice(found, limit)], mechanisms)
@@ -86,7 +88,8 @@ def _draw(found: Chains, limit: int, mechanisms: bool, output: Path) -> None:
     from planar.pages.chain_atlas import write_atlas
     from planar.structures.multiple_pins import joint_kinds_phrase
 
-    shown = [*islice(found, limit)]
+    with show_status(f"chains of {found.links} links"):
+        shown, count = [*islice(found, limit)], len(found)
     if not shown:
         told = joint_kinds_phrase(found.slides, found.multiple_pins)
         raise BadInput("command line", f"of the chains of {found.links} links none{told} moves")
@@ -94,4 +97,4 @@ def _draw(found: Chains, limit: int, mechanisms: bool, output: Path) -> None:
         if output.suffix.lower() in PICTURES and not output.is_dir():
             plot.save(plot.chains(shown, mechanisms), output)
         else:
-            write_atlas(shown, output, mechanisms, len(found), progress)
+            write_atlas(shown, output, mechanisms, count, progress)

@@ -32,8 +32,8 @@ def table(found: Chains, shown: Sequence[Chain], with_mechanisms: bool) -> Rende
     if not shown:
         return Group(head, Text(), paragraphs([(" -", "with such joints some joint of each would not move")]))
     more = [name for name, is_there in (("pins", found.multiple_pins), ("slides", found.slides)) if is_there]
-    heads = ["no.", "assortment", *more, "symmetry", "inversions", "planar", "name"]
-    left = (*range(1, 2 + len(more)), 4 + len(more), 5 + len(more))
+    heads = ["no.", "assortment", *more, "symmetry", "inversions", "Assur classes", "planar", "name"]
+    left = (*range(1, 2 + len(more)), *range(4 + len(more), 7 + len(more)))
     rows = plain_table(None, *heads, left=left, keys=1)
     for each in shown:
         rows.add_row(
@@ -43,6 +43,7 @@ def table(found: Chains, shown: Sequence[Chain], with_mechanisms: bool) -> Rende
             *([", ".join(joint_text(each, joint) for joint in each.slides)] if found.slides else []),
             str(each.symmetry.order),
             str(len(each.inversions)),
+            each.describe_classes(),
             "yes" if each.is_planar else "no",
             each.name or ("fractionated" if each.is_fractionated else ""),
         )
@@ -51,6 +52,7 @@ def table(found: Chains, shown: Sequence[Chain], with_mechanisms: bool) -> Rende
         *(["pins: those of several links, each by these"] if found.multiple_pins else []),
         *(["slides: the joints that slide, each by its two links"] if found.slides else []),
         "symmetry: in how many ways links can be exchanged",
+        "Assur classes: how many mechanisms have groups of which class at most; larger: of more than four links",
     ]
     if not whole:
         told.append(f"the first {len(shown)} are listed; --limit lists more, --json all")
@@ -111,7 +113,7 @@ def record(chain: Chain, with_mechanisms: bool) -> dict[str, Any]:
         "name": chain.name or None,
     }
     if with_mechanisms:
-        found["mechanisms"] = [*_mechanism_records(chain)]
+        found |= {"classes": chain.class_counts(), "mechanisms": [*_mechanism_records(chain)]}
     return found
 
 
@@ -121,5 +123,6 @@ def _mechanism_records(chain: Chain) -> Iterator[dict[str, Any]]:
             "frame": each.frame,
             "drives": list(each.drives),
             "name": each.name or None,
+            "class": each.assur_class,
             "groups": [{"links": list(links), "class": assur_class or None} for links, assur_class in each.groups],
         }
