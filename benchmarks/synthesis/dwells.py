@@ -23,8 +23,8 @@ RADIUS, ARC, DEPTH = 40.0, 60.0, 15.0
 ARC_PLACES, BACK_PLACES, BACK_WEIGHT = 12, 6, 0.02
 DIRECTION = 5.0
 """Degrees between the directions of the dyad's pivot that are tried."""
-MOST_OPEN = 0.97
-"""The cosine of the angle that the dyad keeps from being stretched or folded."""
+MOST_OPEN = 0.94
+"""The greatest cosine of the angle between the dyad's bars, either way: it stays 20 degrees from its dead points."""
 POINT, PIN, PIVOT = "E", "dyad pin", "dyad pivot"
 TIME = 120.0
 """Seconds after which nothing new is begun."""
@@ -134,15 +134,22 @@ def measure_arc() -> DwellResult:
     name = f"arc of {ARC:g} deg by a four-bar, with a dyad"
     if not found:
         return DwellResult(name, None, 0.0, seconds, found.remarks)
-    best = found[0]
-    inputs = np.unwrap(best.inputs[0][:ARC_PLACES])
+    return min(
+        (_arc_result(name, each, seconds) for each in found),
+        key=lambda each: np.inf if each.error is None else each.error,
+    )
+
+
+def _arc_result(name: str, design: planar.SynthesisedDesign, seconds: float) -> DwellResult:
+    """A design with the dyad that swings most."""
+    mechanism, inputs = design.mechanism, np.unwrap(design.inputs[0][:ARC_PLACES])
     crank = abs(float(np.degrees(inputs[-1] - inputs[0])))
-    path = planar.cycle(best.mechanism, 180, pair=best.mechanism.inputs[0].pair).point(POINT).position
+    path = planar.cycle(mechanism, 180, pair=mechanism.inputs[0].pair).point(POINT).position
     pivot = best_pivot(path, RADIUS * 1e-3)
     if pivot is None:
         return DwellResult(name, None, crank, seconds, ("no dyad lets the crank turn fully",))
-    error = dwell_error(with_dyad(best.mechanism, pivot), PIVOT, float(inputs[0]), float(inputs[-1]))
-    return DwellResult(name, error, crank, seconds, best.defects)
+    error = dwell_error(with_dyad(mechanism, pivot), PIVOT, float(inputs[0]), float(inputs[-1]))
+    return DwellResult(name, error, crank, seconds, design.defects)
 
 
 def best_pivot(path: Array, radius: float) -> Array | None:
@@ -154,9 +161,10 @@ def best_pivot(path: Array, radius: float) -> Array | None:
             pivot = arm * np.array([np.cos(direction), np.sin(direction)])
             apart = path - pivot
             far = np.hypot(*apart.T)
-            opening = (arm**2 + far**2 - radius**2) / (2.0 * arm * far)
-            if np.abs(opening).max() > MOST_OPEN:
+            at_pin = (radius**2 + arm**2 - far**2) / (2.0 * radius * arm)
+            if np.abs(at_pin).max() > MOST_OPEN:
                 continue
+            opening = (arm**2 + far**2 - radius**2) / (2.0 * arm * far)
             swing = max(
                 float(np.ptp(np.unwrap(np.arctan2(*apart.T[::-1]) + side * np.arccos(opening)))) for side in (1.0, -1.0)
             )

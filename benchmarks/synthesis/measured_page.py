@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.synthesis.random_tasks import ALLOWED, KINDS, is_met
+from benchmarks.synthesis.six_bar_curves import STRUCTURES
 from benchmarks.versions import planar_versions
 
 Record = dict[str, Any]
@@ -76,7 +77,7 @@ def _published(records: Sequence[Record]) -> list[str]:
 
 
 def _curves(records: Sequence[Record]) -> list[str]:
-    structures = list(dict.fromkeys(each["structure"] for each in records))
+    structures = [name for name in STRUCTURES if any(each["structure"] == name for each in records)]
     by_curve: dict[str, dict[str, Record]] = {}
     for each in records:
         by_curve.setdefault(each["curve"], {})[each["structure"]] = each

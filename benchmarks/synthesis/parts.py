@@ -40,8 +40,8 @@ def _published() -> Iterator[Measurement]:
 
 
 def _shapes() -> Iterator[Measurement]:
-    for target in six_bar_curves.targets():
-        for structure in six_bar_curves.STRUCTURES:
+    for structure in six_bar_curves.STRUCTURES:
+        for target in six_bar_curves.targets():
             yield (
                 f"{target.name}, {structure}",
                 lambda given=(target, structure): six_bar_curves.measure(*given)._asdict(),

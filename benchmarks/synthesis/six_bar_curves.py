@@ -23,10 +23,10 @@ POINT, NEW_POINT = "E", "wanted"
 "Of the model `four-bar`, and of a chain."
 FOUR_BAR = "four-bar"
 SIX_BARS = {
-    "Watt I": (0, "Watt I six-bar"),
-    "Stephenson I": (1, "Stephenson I six-bar"),
-    "Stephenson II": (1, "Stephenson II six-bar"),
     "Stephenson III": (1, "Stephenson III six-bar"),
+    "Watt I": (0, "Watt I six-bar"),
+    "Stephenson II": (1, "Stephenson II six-bar"),
+    "Stephenson I": (1, "Stephenson I six-bar"),
 }
 """By name the number of the chain and what its mechanism is called."""
 STRUCTURES = (FOUR_BAR, *SIX_BARS)
