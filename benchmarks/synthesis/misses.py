@@ -36,16 +36,22 @@ def extent(places: Array) -> float:
 def path_of(mechanism: planar.Mechanism, point: str, steps: int = STEPS) -> Array:
     """The path (n, 2) of a point over all of the motion that the first input makes, from end to end on one branch.
 
-    Between dead points the positions of the input stand close at both ends, where the point is fast beside it.
+    So many positions stand at equal ways along it, where it is fast beside the input, too; half as many are even in the
+    input, for its cusps.
     """
     running = mechanism.inputs[0].pair
-    coarse = planar.cycle(mechanism, 90, pair=running)
-    given = coarse.inputs[running].position
-    low, high = float(given.min()), float(given.max())
-    if is_whole_turn(mechanism, coarse):
-        return np.asarray(planar.cycle(mechanism, steps, pair=running).point(point).position)
-    between = low + (high - low) * 0.5 * (1.0 - np.cos(np.linspace(0.0, np.pi, steps + 1)))
-    return np.asarray(motion_over_input(mechanism, between[1:-1]).point(point).position)
+    motion = planar.cycle(mechanism, steps // 2, pair=running)
+    given, path = motion.inputs[running].position, np.asarray(motion.point(point).position)
+    if not is_whole_turn(mechanism, motion):  # close at both ends, which are dead points
+        low, high = float(given.min()), float(given.max())
+        given = low + (high - low) * 0.5 * (1.0 - np.cos(np.linspace(0.0, np.pi, steps // 2 + 1)))[1:-1]
+        path = np.asarray(motion_over_input(mechanism, given).point(point).position)
+    way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(path, axis=0).T))])
+    if way[-1] == 0.0:
+        return path
+    fast = np.interp(np.linspace(0.0, way[-1], steps + 1)[1:-1], way, given)
+    every = np.unique(np.concatenate([given, fast]))
+    return np.asarray(motion_over_input(mechanism, every).point(point).position)
 
 
 def is_whole_turn(mechanism: planar.Mechanism, motion: planar.Motion) -> bool:
