@@ -111,6 +111,7 @@ if TYPE_CHECKING:
     from planar.model.pin_linkage import pinned
     from planar.model.pin_linkages import PinnedLinkages, pinned_linkages
     from planar.model.stops import Stops
+    from planar.pages.design_gallery import write_designs
     from planar.pages.view import view
     from planar.reports.files.xarray_dataset import dataset
     from planar.results.motion import Motion, State
@@ -125,7 +126,8 @@ if TYPE_CHECKING:
     from planar.structures.symmetry import ChainSymmetry
     from planar.synthesis.cognates.cognate_inputs import CognateInput
     from planar.synthesis.cognates.cognates import Cognate, Cognates, cognates
-    from planar.synthesis.synthesis import Synthesis, SynthesisedDesign
+    from planar.synthesis.search_progress import SearchProgress
+    from planar.synthesis.synthesis import DesignMotion, Synthesis, SynthesisedDesign
     from planar.synthesis.synthesise import synthesise
     from planar.synthesis.task.synthesis_task import Demands, SynthesisTask, WantedFunction, WantedPath, WantedPoses
     from planar.synthesis.task.task_reader import read_task
@@ -178,6 +180,7 @@ __all__ = [
     "Curvature",
     "CycloidalRise",
     "Demands",
+    "DesignMotion",
     "Distances",
     "Drive",
     "Dwell",
@@ -246,6 +249,7 @@ __all__ = [
     "RelativeState",
     "RubbingPair",
     "RunGradient",
+    "SearchProgress",
     "Sensitivity",
     "Shaking",
     "Simulation",
@@ -348,6 +352,7 @@ __all__ = [
     "unknown_load",
     "velocity_by_centres",
     "view",
+    "write_designs",
     "write_task",
 ]
 

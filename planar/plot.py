@@ -29,9 +29,9 @@ if TYPE_CHECKING:
     from planar.results.motion import Motion, State
     from planar.structures.chain import Chain
     from planar.synthesis.cognates.cognates import Cognates
+    from planar.synthesis.synthesis import Synthesis
 
-    Drawing = Figure | list[Figure]
-    """One figure, or several sheets."""
+    Drawing = Figure | list[Figure]  # one figure, or several sheets
 
 __all__ = [
     "acceleration",
@@ -45,6 +45,7 @@ __all__ = [
     "chains",
     "circuits",
     "cognates",
+    "designs",
     "diagrams",
     "forces",
     "loci",
@@ -134,9 +135,8 @@ def cam_profile(mechanism: Mechanism, pair: str | None = None, scale: ScaleTexts
     from planar.analysis.cams.cam_profile import cam_profile as profile_of
     from planar.drawing.diagrams.cam_drawing import cam_pictures
 
-    found = profile_of(mechanism, pair)
-    pictures = cam_pictures(found, mechanism.units, parse_scales(scale, ["length"]).get("length"))
-    return draw_pictures(pictures, mechanism.name)
+    used = parse_scales(scale, ["length"]).get("length")
+    return draw_pictures(cam_pictures(profile_of(mechanism, pair), mechanism.units, used), mechanism.name)
 
 
 @takes_result("Motion", "Mechanism")
@@ -178,8 +178,14 @@ def chains(found: Chain | Sequence[Chain], mechanisms: bool = False) -> list[Fig
     """
     from planar.drawing.structures.chain_sheets import chain_sheets, draw_chains, inversion_sheets
 
-    drawn = draw_chains(found)
-    return [*(inversion_sheets(drawn) if mechanisms else chain_sheets(drawn))]
+    return [*(inversion_sheets if mechanisms else chain_sheets)(draw_chains(found))]
+
+
+def designs(found: Synthesis) -> list[Figure]:
+    """Sheets of what `planar.synthesise` found, over what is wanted. Raises BadInput where no design is sound."""
+    from planar.drawing.designs.design_sheets import design_sheets
+
+    return design_sheets(found)
 
 
 @takes_result("Modes", "Mechanism")
@@ -299,8 +305,7 @@ def sensitivity(moving: Motion | Forces | Mechanism, of: str | None = None, resu
     from planar.solving.cycle import cycle
 
     run = cycle(moving) if isinstance(moving, Mechanism) else moving
-    mechanism = run.mechanism
-    name = of or next(iter(mechanism.inputs)).pair
+    name = of or next(iter(run.mechanism.inputs)).pair
     return draw_pictures([sensitivity_picture(derivatives(run, name), result)])
 
 
@@ -323,11 +328,9 @@ def tolerance(
     from planar.model.mechanism import Mechanism
     from planar.solving.cycle import cycle
 
-    if isinstance(moving, ToleranceBand):
-        band = moving
-    else:
-        run = cycle(moving) if isinstance(moving, Mechanism) else moving
-        band = find_band(run, of or next(iter(run.mechanism.inputs)).pair, result=result)
+    band = cycle(moving) if isinstance(moving, Mechanism) else moving
+    if not isinstance(band, ToleranceBand):
+        band = find_band(band, of or next(iter(band.mechanism.inputs)).pair, result=result)
     return draw_pictures(tolerance_pictures(band, _length_scale(scale, band.moving)))
 
 
@@ -341,8 +344,8 @@ def diagrams(
     that is farthest along. A slide on the frame is measured from its top dead centre, where the run starts. `width`
     is the length of the time axis in mm on paper; `chords` adds graphical differentiation over so many intervals
     (Machine Elements, 1.3.6 (iii)). Where the file gives no speed, rates are per radian (or metre) of the input.
-    Of a simulation the intervals are shaded in which friction holds the pair that is drawn, or else any.
-    Raises BadInput for a name that is not there, NoAnswer where there is no motion.
+    Of a simulation the intervals are shaded in which friction holds the pair drawn, or else any. Raises BadInput
+    for a name that is not there, NoAnswer where there is no motion.
     """
     from planar.drawing.diagrams.kinematic_diagrams import diagrams as drawn
 
@@ -394,5 +397,4 @@ def animate(
     """
     from planar.drawing.output.animation import animate as moving
 
-    path = Path(file)
-    write(path, moving(motion, path.suffix, points, progress))
+    write(Path(file), moving(motion, Path(file).suffix, points, progress))

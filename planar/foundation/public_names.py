@@ -44,6 +44,7 @@ MODULES = {
     "Curvature": "analysis.centres.curvature",
     "CycloidalRise": "model.input_laws.cam_rises",
     "Demands": "synthesis.task.synthesis_task",
+    "DesignMotion": "synthesis.synthesis",
     "Distances": "model.mechanism",
     "Drive": "model.mechanism",
     "Dwell": "analysis.motion.dwells",
@@ -112,6 +113,7 @@ MODULES = {
     "RelativeState": "results.records",
     "RubbingPair": "dynamics.in_time.friction_record",
     "RunGradient": "batch.gradients.run_gradient",
+    "SearchProgress": "synthesis.search_progress",
     "Sensitivity": "analysis.sensitivity.sensitivity",
     "Shaking": "dynamics.balancing.balance",
     "Simulation": "dynamics.simulation",
@@ -214,6 +216,7 @@ MODULES = {
     "unknown_load": "analysis.efforts.unknown_load",
     "velocity_by_centres": "analysis.centres.velocities",
     "view": "pages.view",
+    "write_designs": "pages.design_gallery",
     "write_task": "synthesis.task.task_writer",
 }
 """The module of a name, behind `planar.`; a name that is a module is its own."""

@@ -16,15 +16,13 @@ from planar.foundation.safe_files import make_folder, save_file
 from planar.model.mechanism import Mechanism
 from planar.pages.data.dimension_numbers import DimensionNumbers
 from planar.pages.data.scheme_data import frames_of_rows, scheme_data
-from planar.pages.data.wanted_data import apply_task
 from planar.pages.drawing_style import pen_styles, symbol_script
 from planar.pages.gallery_kinds import KINDS, kind_and_search_text
 from planar.pages.overlay_style import round_value_script
-from planar.pages.page import fill_template, page, script_safe_json
+from planar.pages.page import PageLink, fill_template, page, script_safe_json
 from planar.results.motion import Motion
 from planar.solving.cycle import cycle
 from planar.solving.position import solved_mechanism
-from planar.synthesis.task.synthesis_task import SynthesisTask
 
 SCRIPTS = (
     "stage/plane.js",
@@ -47,20 +45,17 @@ def write_gallery(
     models: Sequence[tuple[str, Mechanism]],
     folder: Path,
     progress: Callable[[int, int], None] | None = None,
-    task: SynthesisTask | None = None,
 ) -> tuple[Path, list[tuple[str, NoAnswer]]]:
     """Write a page for each mechanism under its name, and the index; gives the index's path.
 
     Mechanisms that have no position to start from are left out and given back with the reason. `progress` is told
-    after each how many are done, of how many. What a `task` wants is shown under each. Raises BadInput where the folder
-    or a file cannot be written, or the task is none of a mechanism.
+    after each how many are done, of how many. Raises BadInput where the folder or a file cannot be written.
     """
     make_folder(folder)
     taken, shown, refused = {"index"}, [], []
     for done, (name, mechanism) in enumerate(models, start=1):
         try:
-            ready, wanted = (mechanism, None) if task is None else apply_task(mechanism, task)
-            text, moving = page(ready, back="index.html", wanted=wanted), small_picture_data(mechanism)
+            text, moving = page(mechanism, back=PageLink("index.html", "All mechanisms")), small_picture_data(mechanism)
         except NoAnswer as problem:
             refused.append((name, problem))
             continue

@@ -44,7 +44,7 @@ LAYER_COLOURS = {
     "centrode": ("#00695c", "#63d2bf"),
     "reaction": ("#1b7a3d", "#7bd88f"),
     "load": ("#99117c", "#ff94dd"),
-    "wanted": ("#c2185b", "#ff8ab4"),
+    "wanted": (PEN_STYLES[Pen.WANTED].colour, "#ff8ab4"),
 }
 """Of layers, where the page is light and where it is dark. Centrodes, reactions and loads have others than on paper, as
 a page lays them over velocities and accelerations."""

@@ -18,6 +18,13 @@ from planar.pages.overlay_style import overlay_script, overlay_styles
 from planar.pages.still_picture import still_svg
 
 
+class PageLink(NamedTuple):
+    """A link to another page, by its address and in words."""
+
+    address: str
+    words: str
+
+
 class PageRange(NamedTuple):
     """The part of an input's range that a page runs through: the number of the input, and both ends (rad or m)."""
 
@@ -82,7 +89,7 @@ def page(  # many: what is shown, and how
     z: np.ndarray | None = None,
     window: PageRange | None = None,
     *,
-    back: str | None = None,
+    back: PageLink | None = None,
     layers: tuple[str, ...] = ("paths",),
     library: bool | None = None,
     wanted: PageTask | None = None,
@@ -90,7 +97,7 @@ def page(  # many: what is shown, and how
     """The page of a mechanism at its inputs.
 
     `z` are the unknowns of the assembly, left out that nearest to the sketch; `window` is the range that is run
-    through, left out a turn or from limit to limit. `back` is the address of an index that it links to, `layers` are
+    through, left out a turn or from limit to limit. `back` leads to an index, `layers` are
     shown at first. `library` is of notebooks: the page carries the scripts for others beside it (True), or takes them
     from one of those (False). `wanted` is what the page shows under the mechanism, to be dragged. Raises NoAnswer where
     it has no position to start from, BadInput for something wanted of what it does not have.
@@ -108,7 +115,7 @@ def page(  # many: what is shown, and how
         scripts, start = read_asset("shared.js"), f"shareScripts({json.dumps(key)}, {carrying}, () => {{\n{start}\n}});"
     parts = {
         "title": escape(mechanism.name),
-        "back": f'<a class="back" href="{escape(back)}">All mechanisms</a>' if back else "",
+        "back": f'<a class="back" href="{escape(back.address)}">{escape(back.words)}</a>' if back else "",
         "about": _about(mechanism),
         "still": still_svg(mechanism, z),
         "notes": _notes(mechanism),

@@ -2,17 +2,42 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import overload
+from typing import Any, NamedTuple, overload
 
 import numpy as np
 
+from planar.analysis.motion.output import Extreme
 from planar.foundation.arrays import Array
+from planar.foundation.errors import BadInput
+from planar.foundation.short_repr import short_repr
 from planar.model.mechanism import Mechanism
 from planar.model.wording import count_phrase
 from planar.synthesis.cognates.cognates import Cognate
 from planar.synthesis.task.synthesis_task import SynthesisTask
+
+
+class DesignMotion(NamedTuple):
+    """How a design moves: its input `pair` goes from `low` to `high` (rad or m), `is_whole_turn`: it turns fully.
+
+    `transmission` has the least transmission angle (rad) of every output that has one, by its pair, with the input
+    there: over the whole turn, else between the first and the last entry of what is wanted.
+    """
+
+    pair: str
+    low: float
+    high: float
+    is_whole_turn: bool
+    transmission: Mapping[str, Extreme]
+
+    @property
+    def least_transmission(self) -> Extreme | None:
+        """The least transmission angle of all outputs, None where there is none."""
+        return min(self.transmission.values(), key=lambda each: each.value, default=None)
+
+    def __repr__(self) -> str:
+        return short_repr(self)
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,8 +46,9 @@ class SynthesisedDesign:
 
     `error` is the root mean square of its misses and `greatest_miss` the greatest (m; rad where functions of angles
     alone are wanted); `misses` (n,) are those of each wanted item and `inputs` (n,) where the input is there. `defects`
-    are sentences, none of an accepted design. `start` names the mechanism that it was made from. `cognates` are other
-    linkages that come to the same places of a point: of a path whose timing is prescribed those that keep it.
+    are sentences, none of an accepted design. `start` names the mechanism that it was made from; `numbers` are those
+    that were sought, by name (SI). `motion` says how it moves, None where it does not. `cognates` are other linkages
+    that come to the same places of a point: of a path whose timing is prescribed those that keep it.
     """
 
     mechanism: Mechanism
@@ -32,6 +58,8 @@ class SynthesisedDesign:
     inputs: tuple[Array, ...] = field(repr=False)
     defects: tuple[str, ...]
     start: str
+    numbers: Mapping[str, float] = field(repr=False)
+    motion: DesignMotion | None = field(default=None, repr=False)
     cognates: tuple[Cognate, ...] = field(default=(), repr=False)
 
     def __repr__(self) -> str:
@@ -43,7 +71,8 @@ class SynthesisedDesign:
 class Synthesis(Sequence[SynthesisedDesign]):
     """The designs that a task leads to, the best first; `rejected` are those with a defect, `remarks` say what to know.
 
-    `size` is the extent of what is wanted (m), beside which misses may be seen.
+    `size` is the extent of what is wanted (m), beside which misses may be seen; `seed` gave them. `is_finished` says
+    whether every start was searched: an interrupt and a limit of time leave some.
     """
 
     task: SynthesisTask
@@ -51,6 +80,8 @@ class Synthesis(Sequence[SynthesisedDesign]):
     rejected: tuple[SynthesisedDesign, ...]
     size: float
     remarks: tuple[str, ...] = ()
+    seed: int = 0
+    is_finished: bool = True
 
     def __repr__(self) -> str:
         best = f", greatest miss of the best {self.designs[0].greatest_miss:.3g}" if self.designs else ""
@@ -71,6 +102,13 @@ class Synthesis(Sequence[SynthesisedDesign]):
     def __iter__(self) -> Iterator[SynthesisedDesign]:
         """The designs, the best first."""
         return iter(self.designs)
+
+
+def check_synthesis(found: Any) -> Synthesis:
+    """What `planar.synthesise` found, as it is. Raises BadInput for anything else."""
+    if not isinstance(found, Synthesis):
+        raise BadInput("found", f"what planar.synthesise found is wanted, not {found!r:.60}")
+    return found
 
 
 def rank_designs(designs: Sequence[SynthesisedDesign], many: int) -> tuple[SynthesisedDesign, ...]:

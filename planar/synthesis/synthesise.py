@@ -5,22 +5,28 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from pathlib import Path
 from time import monotonic
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
+from planar import __version__
+from planar.document.dimensions import file_dimensions
 from planar.foundation.errors import BadInput, PlanarError
 from planar.model.mechanism import Mechanism
 from planar.model.run_arguments import check_whole_number
 from planar.synthesis.cognates.task_cognates import task_cognates
+from planar.synthesis.design_motion import design_motion
 from planar.synthesis.design_search import Candidate, DesignSearch
 from planar.synthesis.judgement.judgement import DesignJudge
 from planar.synthesis.judgement.written_design import write_design
+from planar.synthesis.search_folder import SearchFolder
+from planar.synthesis.search_progress import SearchProgress
 from planar.synthesis.synthesis import Synthesis, SynthesisedDesign, rank_designs
 from planar.synthesis.task.freedom import count_freedom
 from planar.synthesis.task.starts import start_mechanisms
-from planar.synthesis.task.synthesis_task import SynthesisTask
+from planar.synthesis.task.synthesis_task import ChainStart, SynthesisTask
 from planar.synthesis.task.task_reader import read_task
 
 DRAWS = 6000
@@ -42,20 +48,13 @@ KEPT_SHARE = 4
 """Of each start so many times as many designs as are wanted are judged."""
 
 
-class SearchProgress(NamedTuple):
-    """How far a search is: starts done, of how many (None: not known), and the best error so far (m or rad)."""
-
-    start: str
-    done: int
-    best: float
-
-
-def synthesise(
+def synthesise(  # many: the public signature
     task: Mapping[str, Any] | str | os.PathLike[str] | SynthesisTask,
     *,
     many: int = 10,
     seed: int = 0,
     time_limit: float | None = None,
+    folder: str | os.PathLike[str] | None = None,
     progress: Callable[[SearchProgress], None] | None = None,
 ) -> Synthesis:
     """The linkages that do best what a task wants, each judged by the general path.
@@ -63,9 +62,11 @@ def synthesise(
     `task` is a file, what stands in one as a dict, or a SynthesisTask. Of each start designs are drawn at random and
     run through their motions (kept on disk); those nearest to what is wanted, wherever, however large and however
     turned they are, are fitted by least squares on exact derivatives. `many` is how many designs are told; the same
-    `seed` gives the same ones. A search that has taken the `time_limit` (s) begins nothing new.
+    `seed` gives the same ones. A search that has taken the `time_limit` (s) begins nothing new. In a `folder` what is
+    done is kept: the same call goes on where it was interrupted, or its time was up, to the same designs. `progress`
+    is told what is being done.
 
-    Raises BadInput with the place in the task's file.
+    Raises BadInput with the place in the task's file, and for a folder that holds something else.
 
     >>> import planar
     >>> task = {"planar": 1, "units": {"length": "mm", "angle": "deg"}, "start": "four-bar", "wanted": [{"point": "E",
@@ -75,27 +76,49 @@ def synthesise(
     (True, ())
     """
     known = read_task(task)
-    count = check_whole_number("many", many, 1, 1000)
-    end = None if time_limit is None else monotonic() + time_limit
-    search = _TaskSearch(known, count, check_whole_number("seed", seed, 0), end)
-    for done, start in enumerate(start_mechanisms(known)):
-        if search.is_over():
-            break
-        search.add_start(start)
-        if progress is not None:
-            progress(SearchProgress(start.name, done + 1, search.best_error()))
+    check_whole_number("many", many, 1, 1000)
+    check_whole_number("seed", seed, 0)
+    search = TaskSearch(known, many, seed, time_limit, None if folder is None else Path(folder), progress)
+    search.run()
     return search.result()
 
 
-class _TaskSearch:
-    def __init__(self, task: SynthesisTask, many: int, seed: int, end: float | None):
-        self.task, self.many, self.seed, self.end = task, many, seed, end
+class TaskSearch:
+    """The search for designs for a task, start after start; `result` may be asked for at any time.
+
+    `folder` keeps each round that is done, and gives those done before. Raises BadInput where it holds something else.
+    """
+
+    def __init__(  # many: what a search is made of
+        self,
+        task: SynthesisTask,
+        many: int,
+        seed: int,
+        time_limit: float | None = None,
+        folder: Path | None = None,
+        progress: Callable[[SearchProgress], None] | None = None,
+    ):
+        self.task, self.many, self.seed, self.time_limit = task, many, seed, time_limit
+        self.end = None if time_limit is None else monotonic() + time_limit
+        self.folder = None if folder is None else SearchFolder(folder, task, _plan(many, seed))
+        self.progress = progress
+        self.count = None if isinstance(task.starts, ChainStart) else len(task.starts)
         self.sound: list[SynthesisedDesign] = []
         self.rejected: list[SynthesisedDesign] = []
         self.starts: dict[str, Mechanism] = {}
         "those that designs were made from"
         self.remarks: list[str] = []
         self.size = 1.0
+        self.is_finished = False
+        self._at = "", 0, 0
+        "the start, its number, and the round"
+
+    def run(self) -> None:
+        """Search every start, as far as the time goes."""
+        for number, start in enumerate(start_mechanisms(self.task), start=1):
+            if not self.add_start(start, number):
+                return
+        self.is_finished = True
 
     def is_over(self) -> bool:
         """Whether the time is up."""
@@ -105,31 +128,67 @@ class _TaskSearch:
         """The least error of a sound design."""
         return min((each.error for each in self.sound), default=float("inf"))
 
-    def add_start(self, mechanism: Mechanism) -> None:
-        """Search the designs of one start."""
-        try:
-            search = DesignSearch(self.task, mechanism)
-        except BadInput:
-            raise
-        except PlanarError as problem:
-            self.remarks.append(f"{mechanism.name} is no start: {problem}")
-            return
-        self.size = search.size
-        self.starts[mechanism.name] = mechanism
-        judge = DesignJudge(self.task, search.size)
+    def add_start(self, mechanism: Mechanism, number: int) -> bool:
+        """Search the designs of one start; whether that was finished."""
+        search: DesignSearch | None = None
         before = len(self.sound)
         for turn in range(ROUNDS):
-            catalogue = search.catalogue(DRAWS, self.seed + 1000 * turn)
-            candidates = search.fit(catalogue, search.matches(catalogue, MATCHES), KEPT_SHARE * self.many)
-            for each in candidates:
-                self._judge(search, judge, each)
-                if len(self.sound) - before >= (self.many + ALIKE_SPARE) * (turn + 1):
-                    break
-            errors = np.array([each.error for each in self.sound[before:]])
-            best = float(errors.min(initial=np.inf))
-            is_settled = int(np.sum(errors <= (1.0 + SAME) * best)) >= SETTLED
-            if best <= GOOD * search.size or is_settled or self.is_over():
+            self._at = mechanism.name, number, turn + 1
+            kept = None if self.folder is None else self.folder.read(number, turn + 1)
+            if kept is not None:
+                self.size, designs = kept
+                self.starts[mechanism.name] = mechanism
+                self.sound += [each for each in designs if not each.defects]
+                self.rejected += [each for each in designs if each.defects]
+            elif self.is_over():
+                return False
+            else:
+                try:
+                    search = DesignSearch(self.task, mechanism) if search is None else search
+                except BadInput:
+                    raise
+                except PlanarError as problem:
+                    self.remarks.append(f"{mechanism.name} is no start: {problem}")
+                    return True
+                self.size = search.size
+                self.starts[mechanism.name] = mechanism
+                self._search_round(search, turn, before)
+            if self._is_settled(before):
                 break
+        return True
+
+    def _is_settled(self, before: int) -> bool:
+        """Whether no other catalogue is looked at: the best design of a start is good, or several fits led to it."""
+        errors = np.array([each.error for each in self.sound[before:]])
+        best = float(errors.min(initial=np.inf))
+        return best <= GOOD * self.size or int(np.sum(errors <= (1.0 + SAME) * best)) >= SETTLED
+
+    def _search_round(self, search: DesignSearch, turn: int, before: int) -> None:
+        """The designs of one more catalogue, kept when all are judged; so many were sound `before` this start."""
+        first = len(self.sound), len(self.rejected)
+        self._tell("catalogue")
+        catalogue = search.catalogue(DRAWS, self.seed + 1000 * turn)
+        self._tell("matches")
+        matches = search.matches(catalogue, MATCHES)
+        self._tell("fit")
+        candidates = search.fit(catalogue, matches, KEPT_SHARE * self.many)
+        judge = DesignJudge(self.task, search.size)
+        for each in candidates:
+            self._tell("judgement")
+            self._judge(search, judge, each)
+            if len(self.sound) - before >= (self.many + ALIKE_SPARE) * (turn + 1):
+                break
+        if self.folder is not None:
+            designs = [*self.sound[first[0] :], *self.rejected[first[1] :]]
+            self.folder.write(self._at[1], turn + 1, search.size, designs)
+
+    def _tell(self, stage: str) -> None:
+        """Say what is being done."""
+        if self.progress is not None:
+            start, number, turn = self._at
+            best = self.best_error()
+            share = best / self.size if self.task.wants_places else best
+            self.progress(SearchProgress(start, number, self.count, turn, stage, best, share))
 
     def _judge(self, search: DesignSearch, judge: DesignJudge, candidate: Candidate) -> None:
         design = search.equations[0].design
@@ -145,8 +204,10 @@ class _TaskSearch:
         found = judge.judge(mechanism, inputs, values)
         every = np.concatenate(found.misses)
         error, worst = float(np.sqrt(np.mean(every**2))), float(every.max())
+        written = file_dimensions(mechanism)
+        numbers = {each: float(written[each].value) for each in candidate.numbers}
         told = SynthesisedDesign(
-            mechanism, error, worst, found.misses, found.inputs, found.defects, search.mechanism.name
+            mechanism, error, worst, found.misses, found.inputs, found.defects, search.mechanism.name, numbers
         )
         (self.rejected if found.defects else self.sound).append(told)
 
@@ -155,16 +216,38 @@ class _TaskSearch:
         return f"{start}: {count_freedom(self.task, self.starts[start]).sentence}"
 
     def result(self) -> Synthesis:
-        """All that was found."""
+        """All that was found so far."""
         remarks = [*self.remarks]
-        if self.is_over():
-            remarks.append("the time was up before every start had been searched")
-        ranked = rank_designs(self.sound, self.many)
-        sound = tuple(replace(each, cognates=task_cognates(each.mechanism, self.task)) for each in ranked)
-        remarks += [self._freedom(each.start) for each in (sound or self.rejected)[:1]]
-        if not sound:
+        if not self.is_finished:
+            remarks.append(self._unfinished())
+        sound = tuple(map(self._complete, rank_designs(self.sound, self.many)))
+        rejected = tuple(
+            replace(each, motion=design_motion(each.mechanism, each.inputs))
+            for each in rank_designs(self.rejected, self.many)
+        )
+        remarks += [self._freedom(each.start) for each in (sound or rejected)[:1]]
+        if not sound and (self.rejected or self.is_finished):
             remarks.append(_refusal(self.rejected))
-        return Synthesis(self.task, sound, rank_designs(self.rejected, self.many), self.size, tuple(remarks))
+        return Synthesis(self.task, sound, rejected, self.size, tuple(remarks), self.seed, self.is_finished)
+
+    def _complete(self, design: SynthesisedDesign) -> SynthesisedDesign:
+        """A sound design with how it moves, and its cognates."""
+        moving = design_motion(design.mechanism, design.inputs)
+        return replace(design, motion=moving, cognates=task_cognates(design.mechanism, self.task))
+
+    def _unfinished(self) -> str:
+        """How far a search came that did not search every start."""
+        start, number, turn = self._at
+        where = f"start {number}{f' of {self.count}' if self.count else ''} ({start}), catalogue {turn} of {ROUNDS}"
+        why = f"the time limit of {self.time_limit:g} s was up" if self.is_over() else "the search was interrupted"
+        return f"{why} at {where}: what is told was found till then"
+
+
+def _plan(many: int, seed: int) -> dict[str, Any]:
+    """What makes a search what it is, beside its task."""
+    settings = {"draws": DRAWS, "matches": MATCHES, "rounds": ROUNDS, "good": GOOD, "settled": SETTLED, "same": SAME}
+    settings |= {"spare": ALIKE_SPARE, "kept": KEPT_SHARE}
+    return {"version": __version__, "many": many, "seed": seed, "settings": settings}
 
 
 def _refusal(rejected: list[SynthesisedDesign]) -> str:

@@ -126,8 +126,10 @@ def results():
     fitted = planar.calibrate("crank-rocker", measured, ["coupler.length", "rocker.length"])
     yield from (fitted, *fitted.unidentified[:1], *fitted.outliers[:1])
     wanted = {"point": "E", "through": [["0 mm", "0 mm"], ["20 mm", "12 mm"], ["42 mm", "15 mm"], ["63 mm", "8 mm"]]}
-    found = planar.synthesise({"planar": 1, "start": "four-bar", "wanted": [wanted]}, many=1)
-    yield from (found, found[0], found.task, found.task.wanted[0], found.task.demands)
+    steps = []
+    task = {"planar": 1, "start": "four-bar", "wanted": [wanted]}
+    found = planar.synthesise(task, many=1, progress=steps.append)
+    yield from (found, found[0], found[0].motion, steps[0], found.task, found.task.wanted[0], found.task.demands)
     turned = {"from": "A", "to": "D", "pairs": [["0 deg", "0 deg"], ["20 deg", "31 deg"]]}
     posed = {"link": "BC", "poses": [{"at": ["0 mm", "1 mm"], "angle": "90 deg"}]}
     yield from planar.read_task({"planar": 1, "start": "four-bar", "wanted": [turned, posed]}).wanted

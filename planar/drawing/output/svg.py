@@ -1,7 +1,7 @@
 """A picture as SVG text, without a drawing library: for pages and notebooks, where no font is measured.
 
 Letters stand where a guess of their size finds room. Strokes are black, areas white, unless the page that the SVG
-stands in says otherwise: by its colour, and by `--paper` and `--link`.
+stands in says otherwise: by its colour, and by `--paper` and `--link`; `--pen-c2185b` is what it has for that colour.
 """
 
 from __future__ import annotations
@@ -120,8 +120,13 @@ def _stroke_attributes(pen: Pen) -> str:
     return f'stroke="{_css_colour(ink.colour)}" stroke-width="{_format_number(ink.width)}"{dashes}'
 
 
+def pen_variable(colour: str) -> str:
+    """By which a page may have another colour for this one."""
+    return f"--pen-{colour.removeprefix('#')}"
+
+
 def _css_colour(colour: str) -> str:
-    return "currentColor" if colour == "#000000" else colour
+    return "currentColor" if colour == "#000000" else f"var({pen_variable(colour)},{colour})"
 
 
 def _fill_colour(fill: Fill) -> str:

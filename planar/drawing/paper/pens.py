@@ -55,6 +55,7 @@ PEN_STYLES = {
     Pen.MEAN: PenStyle(0.25, "#333333", (4.0, 0.9, 0.5, 0.9)),
     Pen.FIRST_COGNATE: PenStyle(0.55, "#1565c0"),
     Pen.SECOND_COGNATE: PenStyle(0.55, "#c75a00", (3.0, 1.2)),
+    Pen.WANTED: PenStyle(0.3, "#c2185b", (4.0, 0.7)),
     Pen.WORST: PenStyle(0.05, "#c9dcf2"),
     Pen.LIKELY: PenStyle(0.1, "#85addc"),
 }

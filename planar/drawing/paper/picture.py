@@ -77,6 +77,8 @@ class Pen(Enum):
     """The mean of a curve."""
     FIRST_COGNATE, SECOND_COGNATE = "first cognate", "second cognate"
     """The body of a moving link of another linkage that traces the same path."""
+    WANTED = "wanted"
+    """What a mechanism is to do: places, poses, a curve."""
     WORST, LIKELY = "worst", "likely"
     """The edge of where something is in the worst case, and nearly always."""
 

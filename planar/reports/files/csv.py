@@ -20,7 +20,7 @@ def encode_csv(motion: Motion, more: Iterable[ReportedSeries]) -> bytes:
     """A row a position; in the units that go with the mechanism's file, as the heads say."""
     all_columns = tuple(run_columns(motion, more))
     text = io.BytesIO()
-    text.write((",".join(_csv_cell(column.head) for column in all_columns) + "\n").encode())
+    text.write((",".join(csv_cell(column.head) for column in all_columns) + "\n").encode())
     for first in range(0, len(motion), CSV_BLOCK_ROWS):
         block = np.column_stack([column.values[first : first + CSV_BLOCK_ROWS] for column in all_columns]).tolist()
         rows = "".join(",".join(map(repr, row)) + "\n" for row in block)
@@ -28,7 +28,7 @@ def encode_csv(motion: Motion, more: Iterable[ReportedSeries]) -> bytes:
     return text.getvalue()
 
 
-def _csv_cell(text: str) -> str:
+def csv_cell(text: str) -> str:
     """A text as a cell, in quotes where it holds what ends a cell (RFC 4180).
 
     What a spreadsheet would take for a formula has an apostrophe before it, and so has what begins with one: a reader

@@ -50,6 +50,12 @@ class DesignJudge:
 
     def judge(self, mechanism: Mechanism, inputs: Sequence[Array], values: Sequence[Array]) -> Judgement:
         """The judgement of a mechanism of which a fit has results `values` (n, parts) at `inputs` (n,), SI."""
+        try:
+            return self._judgement(mechanism, inputs, values)
+        except NoAnswer as problem:  # where branches meet between the positions of its motion
+            return self._unreached(inputs, f"it cannot be followed through what is wanted: {problem}")
+
+    def _judgement(self, mechanism: Mechanism, inputs: Sequence[Array], values: Sequence[Array]) -> Judgement:
         running = mechanism.inputs[0].pair
         try:
             motion = cycle(mechanism, STEPS, pair=running)

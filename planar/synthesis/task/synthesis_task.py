@@ -133,6 +133,11 @@ class SynthesisTask:
         return f"<SynthesisTask {self.name!r}: {count_phrase(self.entry_count, 'wanted entry', 'wanted entries')}>"
 
     @property
+    def wants_places(self) -> bool:
+        """Whether places are wanted, so that a miss may be seen beside their extent."""
+        return any(not isinstance(each, WantedFunction) for each in self.wanted)
+
+    @property
     def entry_count(self) -> int:
         """How many places, poses and pairs are wanted together."""
         return sum(len(each.weights) for each in self.wanted)

@@ -8,7 +8,7 @@ from planar.derivatives.design_equations import design_dimensions
 from planar.document.dimensions import Dimension
 from planar.model.mechanism import Mechanism, named_points, relative_motions
 from planar.synthesis.task.starts import with_wanted_points
-from planar.synthesis.task.synthesis_task import ChainStart, SynthesisTask, Wanted, WantedPath
+from planar.synthesis.task.synthesis_task import ChainStart, SynthesisTask, Wanted, WantedFunction, WantedPath
 
 
 def start_numbers(mechanism: Mechanism, wanted: Sequence[Wanted]) -> dict[str, Dimension]:
@@ -37,3 +37,13 @@ def task_motion_kind(task: SynthesisTask, pair: str | None = None) -> str:
     first = task.starts[0]
     name = pair or first.inputs[0].pair
     return motion_kind(first, name) if name in relative_motions(first) else "angle"
+
+
+def wanted_miss_kind(task: SynthesisTask, wanted: Wanted) -> str:
+    """What a miss of a wanted item is: a "length", or an "angle" where it is a function whose values are angles."""
+    return task_motion_kind(task, wanted.to_pair) if isinstance(wanted, WantedFunction) else "length"
+
+
+def miss_kind(task: SynthesisTask) -> str:
+    """What misses of a task are together: an "angle" where all of them are."""
+    return "angle" if all(wanted_miss_kind(task, each) == "angle" for each in task.wanted) else "length"

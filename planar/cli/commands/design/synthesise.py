@@ -2,12 +2,27 @@
 
 from __future__ import annotations
 
+import signal
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import click
 
+from planar.cli.exit_status import INTERRUPTED
 from planar.cli.options import json_option, main, print_or_write, show_progress, show_status
 from planar.cli.streams import print_json
+
+if TYPE_CHECKING:
+    from planar.synthesis.search_progress import SearchProgress
+    from planar.synthesis.synthesis import Synthesis
+    from planar.synthesis.synthesise import TaskSearch
+    from planar.synthesis.task.synthesis_task import SynthesisTask
+
+SHEET_SUFFIXES = (".png", ".svg", ".pdf")
+"""What `-o` names where it is no folder: sheets of drawings."""
 
 
 @main.command()
@@ -22,43 +37,92 @@ from planar.cli.streams import print_json
 @click.option(
     "-o",
     "output",
-    type=click.Path(file_okay=False, path_type=Path),
+    type=click.Path(path_type=Path),
     metavar="FOLDER",
-    help="The folder for the designs, a mechanism file and a page each, with their index.",
+    help="The folder for the designs, a mechanism file and a page each, with a gallery; the same command goes on there "
+    "where it was interrupted. Or a .pdf, .png or .svg file for drawings of the designs alone.",
 )
 @json_option
 def synthesise(task: Path, many: int, seed: int, seconds: float | None, output: Path | None, as_json: bool) -> None:
     """The linkages that do best what a TASK wants: paths, poses or functions, of any structure."""
     from planar.reports.tables.design.synthesis import record, table
-    from planar.synthesis.synthesise import SearchProgress
-    from planar.synthesis.synthesise import synthesise as search
+    from planar.synthesis.synthesise import TaskSearch
     from planar.synthesis.task.task_reader import read_task
 
     wanted = read_task(task)
+    is_sheet = output is not None and output.suffix.lower() in SHEET_SUFFIXES
+    folder = None if is_sheet else output
     with show_status(f"{wanted.name}: designs") as status:
 
         def show(done: SearchProgress) -> None:
             if status is not None:
-                status.update(f"{wanted.name}: {done.start} done, {done.done} in all")
+                status.update(f"{wanted.name}: {progress_text(done, wanted)}")
 
-        found = search(wanted, many=many, seed=seed, time_limit=seconds, progress=show)
+        search = TaskSearch(wanted, many, seed, seconds, folder, show)
+        ended_by = _run(search)
+        found = search.result()
     files: list[Path] = []
-    if output is not None and len(found):
-        from planar.document.files import dumps
-        from planar.foundation.safe_files import save_file
-        from planar.pages.gallery import write_gallery
+    if folder is not None:
+        from planar.pages.design_gallery import design_files, write_designs
 
-        names = [f"{number:02d}" for number in range(1, len(found) + 1)]
         with show_progress(f"{len(found)} pages") as progress:
-            models = [(name, each.mechanism) for name, each in zip(names, found, strict=True)]
-            write_gallery(models, output, progress, wanted)
-        for name, each in zip(names, found, strict=True):
-            path = output / f"{name}.json"
-            save_file(path, dumps(each.mechanism))
-            files.append(path)
-            for number, other in enumerate(each.cognates, start=1):
-                save_file(output / f"{name}-cognate-{number}.json", dumps(other.mechanism))
+            write_designs(found, folder, progress=progress)
+        files = design_files(found, folder)
+    elif output is not None and len(found):
+        _write_sheets(found, output)
     if as_json:
         print_json(record(found, files))
+    else:
+        print_or_write(table(found, files), None)
+    if ended_by is not None:
+        goes_on = "; the same command goes on where it was" if folder is not None else "; with -o FOLDER it could go on"
+        click.echo(f"planar: interrupted: what was found till then is told{goes_on}", err=True)
+        sys.exit(ended_by)
+
+
+def progress_text(done: SearchProgress, task: SynthesisTask) -> str:
+    """How far a search is, in a line."""
+    from planar.model.wording import amount
+    from planar.synthesis.task.task_numbers import miss_kind
+
+    number = f"start {done.start_number}" + (f" of {done.start_count}" if done.start_count else "")
+    where = f"{number} ({done.start}), catalogue {done.round}: {done.stage}"
+    if done.best == float("inf"):
+        return where
+    share = f"{100.0 * done.best_share:.3g} % of the size"
+    best = share if task.wants_places else amount(done.best, miss_kind(task), task.units)
+    return f"{where}; best error so far {best}"
+
+
+def _run(search: TaskSearch) -> int | None:
+    """Run a search; an exit status where the keyboard, or a signal to end, stopped it."""
+    try:
+        with _ended_by_signal():
+            search.run()
+    except KeyboardInterrupt as stopped:
+        return 128 + signal.SIGTERM if stopped.args == (signal.SIGTERM,) else INTERRUPTED
+    return None
+
+
+@contextmanager
+def _ended_by_signal() -> Iterator[None]:
+    """What ends a process (SIGTERM) stops what is done here as the keyboard does."""
+
+    def stop(number: int, _: Any) -> NoReturn:
+        raise KeyboardInterrupt(number)
+
+    try:
+        before: Callable[..., Any] | int | None = signal.signal(signal.SIGTERM, stop)
+    except ValueError:  # signals are the main thread's
+        yield
         return
-    print_or_write(table(found, files), None)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
+def _write_sheets(found: Synthesis, output: Path) -> None:
+    from planar import plot
+
+    plot.save(plot.designs(found), output)

@@ -9,13 +9,13 @@ from typing import Any
 from rich.console import Group, RenderableType
 from rich.text import Text
 
-from planar.document.writer import write_mechanism
 from planar.model.wording import amount, count_phrase
 from planar.reports.fitted_table import FittedTable, plain_table
 from planar.reports.number_format import format_number, paragraphs
 from planar.reports.tables.design.cognates import cognate_record
+from planar.synthesis.design_record import design_record
 from planar.synthesis.synthesis import Synthesis, SynthesisedDesign
-from planar.synthesis.task.synthesis_task import WantedFunction
+from planar.synthesis.task.task_numbers import miss_kind, motion_kind
 
 MAX_REJECTED = 8
 """Rejected designs whose defects are listed."""
@@ -40,9 +40,11 @@ def _designs_table(found: Synthesis, files: Sequence[Path]) -> FittedTable:
         "greatest miss",
         "root mean square",
         "of the extent %",
+        "input",
+        "transmission",
         "cognates",
         "file",
-        left=(1, 6),
+        left=(1, 5, 8),
         keys=1,
     )
     for number, each in enumerate(found, start=1):
@@ -50,6 +52,8 @@ def _designs_table(found: Synthesis, files: Sequence[Path]) -> FittedTable:
             str(number),
             each.start,
             *_misses(found, each),
+            input_text(found, each),
+            transmission_text(found, each),
             str(len(each.cognates)),
             str(files[number - 1]) if files else "",
         )
@@ -64,16 +68,29 @@ def _rejected_table(found: Synthesis) -> FittedTable:
 
 
 def _misses(found: Synthesis, design: SynthesisedDesign) -> tuple[str, str, str]:
-    kind, units = _kind(found), found.task.units
+    kind, units = miss_kind(found.task), found.task.units
     if design.error != design.error:
         return "", "", ""
-    whole = found.size if kind == "length" else 1.0
-    share = format_number(100.0 * design.greatest_miss / whole) if kind == "length" else ""
+    share = format_number(100.0 * design.greatest_miss / found.size) if found.task.wants_places else ""
     return amount(design.greatest_miss, kind, units), amount(design.error, kind, units), share
 
 
-def _kind(found: Synthesis) -> str:
-    return "angle" if all(isinstance(each, WantedFunction) for each in found.task.wanted) else "length"
+def input_text(found: Synthesis, design: SynthesisedDesign) -> str:
+    """How far the input of a design goes."""
+    if design.motion is None:
+        return ""
+    pair, low, high, is_whole, _ = design.motion
+    if is_whole:
+        return f"{pair} turns fully"
+    kind = motion_kind(design.mechanism, pair)
+    ends = (amount(each, kind, found.task.units) for each in (low, high))
+    return f"{pair} {' to '.join(ends)}"
+
+
+def transmission_text(found: Synthesis, design: SynthesisedDesign) -> str:
+    """The least transmission angle of a design."""
+    least = None if design.motion is None else design.motion.least_transmission
+    return "" if least is None else amount(least.value, "angle", found.task.units)
 
 
 def _remarks(found: Synthesis) -> Iterator[str]:
@@ -87,26 +104,22 @@ def record(found: Synthesis, files: Sequence[Path]) -> dict[str, Any]:
     """The designs as JSON values, SI."""
     return {
         "task": found.task.name,
+        "seed": found.seed,
+        "is_finished": found.is_finished,
         "size": found.size,
         "designs": [
-            _design_record(each)
+            _record(each)
             | {"cognates": [cognate_record(one) for one in each.cognates]}
             | ({"file": str(files[k])} if files else {})
             for k, each in enumerate(found)
         ],
-        "rejected": [_design_record(each) for each in found.rejected],
+        "rejected": [_record(each) for each in found.rejected],
         "remarks": list(found.remarks),
     }
 
 
-def _design_record(design: SynthesisedDesign) -> dict[str, Any]:
-    is_known = design.error == design.error
-    return {
-        "start": design.start,
-        "error": design.error if is_known else None,
-        "greatest_miss": design.greatest_miss if is_known else None,
-        "misses": [each.tolist() if is_known else None for each in design.misses],
-        "inputs": [each.tolist() for each in design.inputs],
-        "defects": list(design.defects),
-        "mechanism": write_mechanism(design.mechanism),
-    }
+def _record(design: SynthesisedDesign) -> dict[str, Any]:
+    if design.motion is None:
+        return design_record(design) | {"motion": None}
+    least = {name: each._asdict() for name, each in design.motion.transmission.items()}
+    return design_record(design) | {"motion": design.motion._asdict() | {"transmission": least}}

@@ -1,0 +1,1 @@
+"""Designs with what was wanted of them."""

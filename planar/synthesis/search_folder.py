@@ -1,0 +1,94 @@
+"""The folder of a search: what it has done is kept there, so that it goes on after an interrupt, or a kill."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from planar.document.files import load_value
+from planar.foundation.errors import BadInput
+from planar.foundation.safe_files import PARTIAL_FILE_NAME, make_folder, save_file, write_error
+from planar.synthesis.design_record import design_record, read_design
+from planar.synthesis.synthesis import SynthesisedDesign
+from planar.synthesis.task.synthesis_task import SynthesisTask
+from planar.synthesis.task.task_writer import write_task
+
+TASK_FILE, SEARCH_FILE, ROUNDS_FOLDER = "task.json", "search.json", "search"
+DAMAGES = (BadInput, KeyError, TypeError, ValueError, AttributeError)
+"""What comes of reading a file that somebody changed: its round is made once more."""
+
+
+def claim_folder(folder: Path, task: SynthesisTask) -> None:
+    """Make sure that a folder is there for the designs of a task, and for nothing else; its file is written there.
+
+    Raises BadInput where it holds the designs of another task, or other things, and where it cannot be written.
+    """
+    own = json.loads(json.dumps(write_task(task)))
+    make_folder(folder)
+    try:
+        held = sorted(each.name for each in folder.iterdir() if not PARTIAL_FILE_NAME.fullmatch(each.name))
+    except OSError as problem:
+        raise write_error(str(folder), "the folder", problem, "read") from None
+    if TASK_FILE in held:
+        other = load_value(folder / TASK_FILE, "a task's file")
+        if other != own:
+            name = other.get("name") if isinstance(other, dict) else None
+            named = f", {name!r:.60}" if isinstance(name, str) and name != task.name else ""
+            told = f"this folder holds the designs of another task{named} ({TASK_FILE}); name another folder"
+            raise BadInput(str(folder), told)
+    elif held:
+        told = f"this folder holds {held[0]!r:.60} and no designs of a task ({TASK_FILE})"
+        raise BadInput(str(folder), f"{told}; name an empty or a new folder")
+    else:
+        save_file(folder / TASK_FILE, json.dumps(own, indent=2, ensure_ascii=False) + "\n")
+
+
+class SearchFolder:
+    """The rounds of a search that are done, in files of their own; each is written whole or not at all.
+
+    `plan` is what makes a search what it is beside its task: another one in the folder is refused (BadInput).
+    """
+
+    def __init__(self, folder: Path, task: SynthesisTask, plan: Mapping[str, Any]):
+        self.folder = folder
+        claim_folder(folder, task)
+        own = json.loads(json.dumps(plan))
+        if not (folder / SEARCH_FILE).exists():
+            save_file(folder / SEARCH_FILE, json.dumps(own, indent=2) + "\n")
+        known = load_value(folder / SEARCH_FILE, "a search's file")
+        if known != own:
+            raise BadInput(str(folder), f"{_difference(known, own)}; name another folder")
+        make_folder(folder / ROUNDS_FOLDER)
+
+    def read(self, start: int, number: int) -> tuple[float, list[SynthesisedDesign]] | None:
+        """The size and the designs of a start's round (both numbers from 1), None where it is not done."""
+        path = self._path(start, number)
+        if not path.is_file():
+            return None
+        try:
+            record = load_value(path, "a round's file")
+            return float(record["size"]), [read_design(each) for each in record["designs"]]
+        except DAMAGES:
+            return None
+
+    def write(self, start: int, number: int, size: float, designs: Sequence[SynthesisedDesign]) -> None:
+        """Keep a round that is done."""
+        record = {"size": size, "designs": [design_record(each) for each in designs]}
+        save_file(self._path(start, number), json.dumps(record, ensure_ascii=False, allow_nan=False) + "\n")
+
+    def _path(self, start: int, number: int) -> Path:
+        return self.folder / ROUNDS_FOLDER / f"{start:05d}-{number}.json"
+
+
+def _difference(known: Any, own: Mapping[str, Any]) -> str:
+    """What of a search in the folder is another."""
+    if not isinstance(known, dict):
+        return f"{SEARCH_FILE} there is of no search"
+    for name, value in own.items():
+        if known.get(name) != value:
+            if isinstance(value, dict):
+                return "the search in this folder has other settings"
+            return f"the search in this folder has {name} = {known.get(name)!r:.40}, and not {value!r:.40}"
+    return "the search in this folder has other settings"
