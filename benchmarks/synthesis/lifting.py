@@ -13,22 +13,6 @@ from planar.foundation.jets import value_and_rates
 from planar.solving.grids.grid_motion import motion_over_input
 
 LINK = "BC"
-START = {
-    "planar": 1,
-    "name": "four-bar",
-    "units": {"length": "mm", "angle": "deg"},
-    "frame": "AD",
-    "links": {
-        "AD": {"points": {"A": [0, 0], "D": [100, 0]}},
-        "AB": {"ends": ["A", "B"], "length": 50},
-        "BC": {"points": {"B": [-30, -20], "C": [30, -20]}},
-        "DC": {"ends": ["D", "C"], "length": 60},
-    },
-    "pairs": [{"turning": "A"}, {"turning": "B"}, {"turning": "C"}, {"turning": "D"}],
-    "inputs": [{"pair": "A", "position": 60}],
-    "sketch": {"C": [80, 55]},
-}
-"""A four-bar whose coupler has axes of its own, apart from its pins."""
 GARAGE = [[0, 0, 90], [20, 70, 68], [60, 130, 32], [130, 150, 0]]
 OVEN = [[0, 0, 90], [8, -3, 72], [22, -12, 48], [36, -28, 22], [44, -46, 0]]
 
@@ -71,7 +55,7 @@ def lift_task(lift: Lift) -> dict[str, object]:
     poses = [{"at": [x, y], "angle": turned} for x, y, turned in lift.poses.tolist()]
     wanted = [{"link": LINK, "poses": poses, "in_order": True}]
     units = {"length": "mm", "angle": "deg"}
-    return {"planar": 1, "name": lift.name, "units": units, "start": START, "wanted": wanted}
+    return {"planar": 1, "name": lift.name, "units": units, "start": "four-bar", "wanted": wanted}
 
 
 def measure(lift: Lift) -> LiftResult:

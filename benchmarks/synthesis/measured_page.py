@@ -46,7 +46,7 @@ def _table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str]:
 
 def _percent(misses: Sequence[float] | None) -> str:
     """Root mean square and greatest, as they stand in a result."""
-    return NONE if misses is None else f"{misses[0]:.2g} ({misses[1]:.2g})"
+    return NONE if misses is None else f"{misses[0]:.3g} ({misses[1]:.3g})"
 
 
 def _number(value: float | None, digits: int = 2) -> str:
