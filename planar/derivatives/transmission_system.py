@@ -38,14 +38,14 @@ class TransmissionSystem:
         """The derivatives of the angles (n,) by the names of inputs and dimensions (n,)."""
         system = self.balance.system
         values, parameters, constants = self.balance.values_at(moving)
-        jacobians = system.result_jacobians(self.balance.in_unknowns(self._angle))
+        jacobians = system.result_jacobians(self.balance.in_unknowns(self.angle))
         found = system.slopes(jacobians, values, parameters, constants)
         is_told = ~found.is_singular & (np.abs(angle - 0.5 * np.pi) > FOLD) & (angle > FOLD)
         told = np.where(is_told[:, None], found.slopes[:, 0], np.nan)
         return {name: told[:, k] for k, name in enumerate(self.design.names) if name in {*self.names}}
 
     @property
-    def _angle(self) -> ca.SX:
+    def angle(self) -> ca.SX:
         """Between the force of the other moving links on the output and its lever, or across its way."""
         forces = [self.balance.force_on(name, self.link) for name in self.through]
         force = Vector(sum(each.x for each in forces), sum(each.y for each in forces))

@@ -7,14 +7,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from planar.analysis.motion.output import Extreme
-from planar.analysis.motion.transmission_angle import transmission
 from planar.foundation.arrays import Array
-from planar.foundation.errors import BadInput, NoAnswer, PlanarError
-from planar.foundation.jets import TURN
-from planar.model.mechanism import Mechanism, relative_motions
-from planar.model.pairs import MeasureKind
+from planar.foundation.errors import BadInput, NoAnswer
+from planar.model.mechanism import Mechanism
 from planar.results.motion import Motion
 from planar.solving.cycle import cycle
+from planar.synthesis.demands.output_transmissions import output_transmissions
+from planar.synthesis.judgement.input_range import input_range
 from planar.synthesis.synthesis import DesignMotion
 
 STEPS = 90
@@ -27,32 +26,19 @@ def design_motion(mechanism: Mechanism, inputs: Sequence[Array]) -> DesignMotion
         motion = cycle(mechanism, STEPS, pair=running)
     except (NoAnswer, BadInput):
         return None
-    given = motion.inputs[running].position
-    low, high = float(given.min()), float(given.max())
-    turns = relative_motions(mechanism)[running].input_kind is not MeasureKind.LENGTH
-    is_whole = turns and high - low > TURN * (1.0 - 1e-9)
+    reach = input_range(motion, inputs)
     used: Motion | None = motion
-    if not is_whole:
-        every = np.clip(np.concatenate(inputs), low, high)
+    if not reach.is_whole_turn:
+        every = reach.bring(np.concatenate(inputs))
         try:
             used = cycle(mechanism, STEPS, float(every.min()), float(every.max()), running)
         except (NoAnswer, BadInput):
             used = None  # what is wanted lies at one place, or beyond what it runs through
-    return DesignMotion(running, low, high, is_whole, {} if used is None else least_transmissions(used))
+    return DesignMotion(
+        running, reach.low, reach.high, reach.is_whole_turn, {} if used is None else least_transmissions(used)
+    )
 
 
 def least_transmissions(motion: Motion) -> dict[str, Extreme]:
     """The least transmission angle (rad) over a motion at every output that has one, by its pair."""
-    mechanism = motion.mechanism
-    driven = {each.pair for each in mechanism.inputs}
-    found = {}
-    for pair in mechanism.pairs:
-        if mechanism.frame not in pair.links or pair.name in driven:
-            continue
-        try:
-            least = transmission(motion, pair.name).least
-        except PlanarError:
-            continue  # nothing is transmitted to it by one force
-        if least is not None:
-            found[pair.name] = least
-    return found
+    return {each.pair: each.least for each in output_transmissions(motion) if each.least is not None}

@@ -9,6 +9,7 @@ import numpy as np
 
 from planar.document.files import from_dict, to_dict
 from planar.foundation.arrays import Array
+from planar.synthesis.judgement.defects import Defect
 from planar.synthesis.synthesis import SynthesisedDesign
 
 
@@ -21,7 +22,7 @@ def design_record(design: SynthesisedDesign) -> dict[str, Any]:
         "greatest_miss": design.greatest_miss if is_known else None,
         "misses": [_finite(each) for each in design.misses],
         "inputs": [each.tolist() for each in design.inputs],
-        "defects": list(design.defects),
+        "shortages": [list(each) for each in design.shortages],
         "numbers": dict(design.numbers),
         "mechanism": to_dict(design.mechanism),
     }
@@ -36,7 +37,7 @@ def read_design(record: Mapping[str, Any]) -> SynthesisedDesign:
         worst,
         tuple(_numbers(each) for each in record["misses"]),
         tuple(_numbers(each) for each in record["inputs"]),
-        tuple(map(str, record["defects"])),
+        tuple(Defect(*each) for each in record["shortages"]),
         str(record["start"]),
         {str(name): float(value) for name, value in record["numbers"].items()},
     )

@@ -10,20 +10,20 @@ from planar.derivatives.design_equations import design_equations
 from planar.document.revised.similar_mechanism import similar_mechanism
 from planar.foundation.arrays import Array
 from planar.model.mechanism import Mechanism
+from planar.synthesis.catalogue.branch_tracking import follow_branches
 from planar.synthesis.catalogue.catalogue import Catalogue
 from planar.synthesis.catalogue.catalogue_store import kept_catalogue
 from planar.synthesis.catalogue.matches import Match, find_matches
 from planar.synthesis.catalogue.moved_numbers import moved_numbers
 from planar.synthesis.catalogue.step_choices import WantedItem
+from planar.synthesis.fitting.demanded_rows import demand_guards
 from planar.synthesis.fitting.design_fit import DesignFit, FittedDesigns
+from planar.synthesis.fitting.kept_demands import lacks
 from planar.synthesis.fitting.wanted_equations import WantedEquations, tangents
 from planar.synthesis.fitting.wanted_rows import wanted_rows, wanted_size
 from planar.synthesis.task.freedom import can_move_whole
 from planar.synthesis.task.starts import FreeNumbers, free_numbers
-from planar.synthesis.task.synthesis_task import SynthesisTask, WantedPath
-
-GUARD_POSITIONS = 24
-"""Round a turn, at which a design that is to turn fully must go together all the time."""
+from planar.synthesis.task.synthesis_task import SynthesisTask
 
 
 class Candidate(NamedTuple):
@@ -34,6 +34,22 @@ class Candidate(NamedTuple):
     unknowns: tuple[Array, ...]
     "of each wanted item (n, unknowns)"
     squares: float
+    lack: float = 0.0
+    "by how much a demand is missed, rad or of the extent of what is wanted"
+
+
+DEMANDING, LACK_WEIGHT = 6, 0.3
+"""Where something is demanded of the motion, so many times as many matches as are fitted are looked at, and what they
+lack (rad, or of the extent of what is wanted) counts so much beside their distance."""
+
+
+class _FitStart(NamedTuple):
+    """From where a design is fitted: its numbers, the unknowns at entries, and at positions that are guarded."""
+
+    numbers: Array
+    unknowns: list[Array]
+    guarded: Array
+    over_turn: bool
 
 
 class DesignSearch:
@@ -44,7 +60,7 @@ class DesignSearch:
         own = design_equations(mechanism).solver.unit
         self.size = wanted_size(task, own)
         self.can_move = can_move_whole(task, mechanism, free_numbers(task, mechanism))
-        if self.can_move:  # its scale is that of what is wanted, however large its file is
+        if self.can_move and not task.within:  # its scale is that of what is wanted, however large its file is
             mechanism = similar_mechanism(mechanism, self.size / own)
             own = design_equations(mechanism).solver.unit
         self.mechanism = mechanism
@@ -54,10 +70,7 @@ class DesignSearch:
         self.ratio = own / self.size
         "of the scale of numbers to that of places"
         self.moves = moved_numbers(self.equations[0], self.free)
-        closed = any(isinstance(each, WantedPath) and each.is_closed for each in task.wanted)
-        self.needs_whole_turn = task.demands.whole_turn or closed
-        guard = rows[0]._replace(inputs=np.zeros(GUARD_POSITIONS))
-        self.guard = WantedEquations(mechanism, guard, self.free.names, own) if self.needs_whole_turn else None
+        self.guards = demand_guards(task, self.equations[0], rows[0], self.free, self.size)
 
     def catalogue(self, count: int, seed: int) -> Catalogue:
         """Random designs of this start with their motion, from disk where they were kept."""
@@ -74,37 +87,94 @@ class DesignSearch:
             )
             for each in self.equations
         ]
-        return find_matches(catalogue, items, self.can_move, many, self.needs_whole_turn)
+        factors = self._factors(catalogue) if self.can_move else None
+        if self.guards is None or not self.guards[True].rows:
+            return find_matches(catalogue, items, factors, many, self.task.needs_whole_turn)
+        found = find_matches(catalogue, items, factors, DEMANDING * many, self.task.needs_whole_turn)
+        scores = np.hypot([each.distance for each in found], LACK_WEIGHT * self._lacks(catalogue, found))
+        return [found[k] for k in np.argsort(scores, kind="stable")[:many]]
+
+    def _lacks(self, catalogue: Catalogue, matches: list[Match]) -> Array:
+        """By how much matches miss what is demanded of their motion (matches,)."""
+        assert self.guards is not None
+        starts, found = self._fit_starts(catalogue, matches), np.zeros(len(matches))
+        for over_turn, guard in self.guards.items():
+            rows = [k for k, each in enumerate(starts) if each.over_turn is over_turn]
+            if rows:
+                x, y = (np.array([getattr(starts[k], name) for k in rows]) for name in ("numbers", "guarded"))
+                found[rows] = lacks(guard.slacks(x, y))
+        return found
+
+    def _factors(self, catalogue: Catalogue) -> Array | None:
+        """By how much the designs of a catalogue may grow."""
+        scale = self.equations[0].scale
+        return self.moves.factors(catalogue.numbers, self.free.lower / scale, self.free.upper / scale)
 
     def fit(self, catalogue: Catalogue, matches: list[Match], keep: int) -> list[Candidate]:
-        """The matches fitted, the best so many."""
-        if not matches:
-            return []
-        guarded: list[Array] = []
-        numbers, unknowns = [], [[] for _ in self.equations]  # type: ignore[var-annotated]
+        """The matches fitted, the best so many; of those that turn fully, and of others, where demands are kept.
+
+        What comes to turn fully is fitted once more, since its demands are kept all round the turn then."""
+        groups = self._fit_starts(catalogue, matches)
+        found: list[Candidate] = []
+        for over_turn in (False, True):
+            own = [each for each in groups if each.over_turn is over_turn]
+            if not own:
+                continue
+            fitted = self._fit_alike(own, keep, over_turn)
+            turned: dict[int, _FitStart] = {}
+            if not over_turn and self.guards is not None and self.guards[True].rows:
+                turned = self._turned(fitted)
+            groups += turned.values()
+            known = np.flatnonzero(np.isfinite(fitted.squares)).tolist()
+            found += [self._candidate(fitted, k) for k in known if k not in turned]
+        return sorted(found, key=lambda each: (each.lack > 0.0, each.squares))[:keep]
+
+    def _fit_starts(self, catalogue: Catalogue, matches: list[Match]) -> list[_FitStart]:
+        """Matches as they lie, with the positions at which each is guarded."""
+        found = []
         for match in matches:
-            x = catalogue.numbers[match.design]
-            ys = [catalogue.unknowns[match.design][steps] for steps in match.steps]
-            for k, y in enumerate(ys):
-                # places of the catalogue are in units of what is wanted, numbers in those of the mechanism
-                moved, own = self.moves.move(x, y, match.factor, match.offset / self.ratio)
-                unknowns[k].append(own)
-            numbers.append(moved if self.can_move else x)
-            if self.guard is not None:
-                guarded.append(self._turn(catalogue, match))
-        x, ys = np.array(numbers), [np.array(each) for each in unknowns]
+            x, own = catalogue.numbers[match.design], catalogue.unknowns[match.design]
+            # places of the catalogue are in units of what is wanted, numbers in those of the mechanism
+            moved, y = self.moves.move(x, own, match.factor, match.offset / self.ratio)
+            ys = [y[steps] for steps in match.steps]
+            over_turn = self.guards is not None and bool(catalogue.is_whole[match.design])
+            branch = y[np.isfinite(y).all(axis=1)]
+            found.append(_FitStart(moved, ys, self._guarded(branch, ys, over_turn), over_turn))
+        return found
+
+    def _guarded(self, branch: Array, unknowns: list[Array], over_turn: bool) -> Array:
+        """The unknowns at positions of a branch (steps, unknowns) all round its turn, or between entries."""
+        many = 0 if self.guards is None else self.guards[over_turn].position_count
+        if over_turn:
+            turned: Array = branch[np.linspace(0, len(branch) - 1, many).astype(int)]
+            return turned
+        ends = np.concatenate([each[:, -1] for each in unknowns])
+        wanted = np.linspace(ends.min(), ends.max(), many)
+        found: Array = np.stack([np.interp(wanted, branch[:, -1], part) for part in branch.T], axis=1)
+        return found
+
+    def _fit_alike(self, starts: list[_FitStart], keep: int, over_turn: bool) -> FittedDesigns:
+        """Designs fitted that all turn fully, or are all seen between their entries only."""
+        x = np.array([each.numbers for each in starts])
+        ys = [np.array(each) for each in zip(*(each.unknowns for each in starts), strict=True)]
         zeros = self._zeros(x, ys)
         scale = self.equations[0].scale
-        fit = DesignFit(self.equations, self.free.lower / scale, self.free.upper / scale, self.guard)
-        found: FittedDesigns = fit.fit(x, ys, zeros, keep, np.array(guarded) if guarded else None)
-        return [self._candidate(found, k) for k in range(len(found.squares)) if np.isfinite(found.squares[k])]
+        guard = None if self.guards is None else self.guards[over_turn]
+        fit = DesignFit(self.equations, self.free.lower / scale, self.free.upper / scale, guard)
+        positions = np.array([each.guarded for each in starts])
+        shares = np.broadcast_to(np.linspace(0.0, 1.0, positions.shape[1]), positions.shape[:2])
+        return fit.fit(x, ys, zeros, keep, (positions, shares) if guard is not None else None)
 
-    def _turn(self, catalogue: Catalogue, match: Match) -> Array:
-        """The unknowns of a match at positions all round its turn."""
-        own = catalogue.unknowns[match.design]
-        own = own[np.isfinite(own).all(axis=1)]
-        own = own[np.linspace(0, len(own) - 1, GUARD_POSITIONS, endpoint=False).astype(int)]
-        return self.moves.move(catalogue.numbers[match.design], own, match.factor, match.offset / self.ratio)[1]
+    def _turned(self, found: FittedDesigns) -> dict[int, _FitStart]:
+        """Those of fitted designs that turn fully, by their number."""
+        if not len(found.numbers):
+            return {}
+        branches, is_whole = follow_branches(self.equations[0], found.numbers, found.unknowns[0][:, 0])
+        told = {}
+        for k in np.flatnonzero(is_whole & np.isfinite(found.squares)).tolist():
+            branch, ys = branches[k][np.isfinite(branches[k]).all(axis=1)], [each[k] for each in found.unknowns]
+            told[k] = _FitStart(found.numbers[k], ys, self._guarded(branch, ys, True), True)
+        return told
 
     def most_regular(self, candidate: Candidate) -> Array:
         """The unknowns of that entry which is farthest from a dead point: there the assemblies lie apart."""
@@ -146,4 +216,5 @@ class DesignSearch:
             dict(zip(self.free.names, map(float, numbers), strict=True)),
             tuple(each[k] for each in found.unknowns),
             float(found.squares[k]),
+            float(found.lacks[k]),
         )

@@ -15,6 +15,7 @@ from planar.foundation.short_repr import short_repr
 from planar.model.mechanism import Mechanism
 from planar.model.wording import count_phrase
 from planar.synthesis.cognates.cognates import Cognate
+from planar.synthesis.judgement.defects import Defect
 from planar.synthesis.task.synthesis_task import SynthesisTask
 
 
@@ -45,10 +46,10 @@ class SynthesisedDesign:
     """A linkage that does what a task wants, as far as it says.
 
     `error` is the root mean square of its misses and `greatest_miss` the greatest (m; rad where functions of angles
-    alone are wanted); `misses` (n,) are those of each wanted item and `inputs` (n,) where the input is there. `defects`
-    are sentences, none of an accepted design. `start` names the mechanism that it was made from; `numbers` are those
-    that were sought, by name (SI). `motion` says how it moves, None where it does not. `cognates` are other linkages
-    that come to the same places of a point: of a path whose timing is prescribed those that keep it.
+    alone are wanted); `misses` (n,) are those of each wanted item and `inputs` (n,) where the input is there.
+    `shortages` tell what it is short of, none of an accepted design. `start` names the mechanism that it was made from;
+    `numbers` are those that were sought, by name (SI). `motion` says how it moves, None where it does not. `cognates`
+    are other linkages that come to the same places of a point: of a path whose timing is prescribed those that keep it.
     """
 
     mechanism: Mechanism
@@ -56,11 +57,16 @@ class SynthesisedDesign:
     greatest_miss: float
     misses: tuple[Array, ...] = field(repr=False)
     inputs: tuple[Array, ...] = field(repr=False)
-    defects: tuple[str, ...]
+    shortages: tuple[Defect, ...] = field(repr=False)
     start: str
     numbers: Mapping[str, float] = field(repr=False)
     motion: DesignMotion | None = field(default=None, repr=False)
     cognates: tuple[Cognate, ...] = field(default=(), repr=False)
+
+    @property
+    def defects(self) -> tuple[str, ...]:
+        """What is wrong with it, in sentences."""
+        return tuple(each.sentence for each in self.shortages)
 
     def __repr__(self) -> str:
         told = f", {count_phrase(len(self.defects), 'defect')}" if self.defects else ""

@@ -13,18 +13,19 @@ import numpy as np
 
 from planar import __version__
 from planar.document.dimensions import file_dimensions
-from planar.foundation.errors import BadInput, PlanarError
+from planar.foundation.errors import BadInput, NoAnswer, PlanarError
 from planar.model.mechanism import Mechanism
 from planar.model.run_arguments import check_whole_number
 from planar.synthesis.cognates.task_cognates import task_cognates
 from planar.synthesis.design_motion import design_motion
 from planar.synthesis.design_search import Candidate, DesignSearch
 from planar.synthesis.judgement.judgement import DesignJudge
-from planar.synthesis.judgement.written_design import write_design
+from planar.synthesis.judgement.refusal import refusal
+from planar.synthesis.judgement.written_design import DIGITS, EXACT_DIGITS, write_design
 from planar.synthesis.search_folder import SearchFolder
 from planar.synthesis.search_progress import SearchProgress
 from planar.synthesis.synthesis import Synthesis, SynthesisedDesign, rank_designs
-from planar.synthesis.task.freedom import count_freedom
+from planar.synthesis.task.freedom import count_freedom, exactness_in_excess
 from planar.synthesis.task.starts import start_mechanisms
 from planar.synthesis.task.synthesis_task import ChainStart, SynthesisTask
 from planar.synthesis.task.task_reader import read_task
@@ -78,9 +79,22 @@ def synthesise(  # many: the public signature
     known = read_task(task)
     check_whole_number("many", many, 1, 1000)
     check_whole_number("seed", seed, 0)
+    _refuse_excess(known)
     search = TaskSearch(known, many, seed, time_limit, None if folder is None else Path(folder), progress)
     search.run()
     return search.result()
+
+
+def _refuse_excess(task: SynthesisTask) -> None:
+    """Refuse what no start can meet exactly."""
+    if isinstance(task.starts, ChainStart) or not task.exact:
+        return
+    try:
+        told = [exactness_in_excess(task, start) for start in start_mechanisms(task)]
+    except NoAnswer:
+        return  # a start that cannot move is told of in the search
+    if told[0] is not None and None not in told:
+        raise BadInput("$.wanted", told[0])
 
 
 class TaskSearch:
@@ -143,12 +157,8 @@ class TaskSearch:
             elif self.is_over():
                 return False
             else:
-                try:
-                    search = DesignSearch(self.task, mechanism) if search is None else search
-                except BadInput:
-                    raise
-                except PlanarError as problem:
-                    self.remarks.append(f"{mechanism.name} is no start: {problem}")
+                search = self._begin(mechanism) if search is None else search
+                if search is None:
                     return True
                 self.size = search.size
                 self.starts[mechanism.name] = mechanism
@@ -156,6 +166,19 @@ class TaskSearch:
             if self._is_settled(before):
                 break
         return True
+
+    def _begin(self, mechanism: Mechanism) -> DesignSearch | None:
+        """The search of a start; None where it is none, which a remark says."""
+        try:
+            search, excess = DesignSearch(self.task, mechanism), exactness_in_excess(self.task, mechanism)
+        except BadInput:
+            raise
+        except PlanarError as problem:
+            excess = str(problem)
+        if excess is not None:
+            self.remarks.append(f"{mechanism.name} is no start: {excess}")
+            return None
+        return search
 
     def _is_settled(self, before: int) -> bool:
         """Whether no other catalogue is looked at: the best design of a start is good, or several fits led to it."""
@@ -198,7 +221,8 @@ class TaskSearch:
         values = [search.shown(k, candidate) for k in range(len(search.equations))]
         y = search.most_regular(candidate)
         try:
-            mechanism = write_design(design, candidate.numbers, y, float(y[-1] * search.equations[0].input_scale), name)
+            at, digits = float(y[-1] * search.equations[0].input_scale), EXACT_DIGITS if self.task.exact else DIGITS
+            mechanism = write_design(design, candidate.numbers, y, at, name, digits)
         except BadInput:
             return  # no file could say it
         found = judge.judge(mechanism, inputs, values)
@@ -227,7 +251,7 @@ class TaskSearch:
         )
         remarks += [self._freedom(each.start) for each in (sound or rejected)[:1]]
         if not sound and (self.rejected or self.is_finished):
-            remarks.append(_refusal(self.rejected))
+            remarks.append(refusal([each.shortages for each in self.rejected], self.task.units))
         return Synthesis(self.task, sound, rejected, self.size, tuple(remarks), self.seed, self.is_finished)
 
     def _complete(self, design: SynthesisedDesign) -> SynthesisedDesign:
@@ -248,16 +272,3 @@ def _plan(many: int, seed: int) -> dict[str, Any]:
     settings = {"draws": DRAWS, "matches": MATCHES, "rounds": ROUNDS, "good": GOOD, "settled": SETTLED, "same": SAME}
     settings |= {"spare": ALIKE_SPARE, "kept": KEPT_SHARE}
     return {"version": __version__, "many": many, "seed": seed, "settings": settings}
-
-
-def _refusal(rejected: list[SynthesisedDesign]) -> str:
-    """Which demand is in the way."""
-    if not rejected:
-        return "no design comes near: another start, or more free numbers, may"
-    kinds: dict[str, int] = {}
-    for each in rejected:
-        for sentence in each.defects:
-            kind = sentence.split(":")[0] if "defect" in sentence or "turn" in sentence else sentence.split(" of ")[0]
-            kinds[kind] = kinds.get(kind, 0) + 1
-    worst = max(kinds, key=lambda kind: kinds[kind])
-    return f"no design without a defect: {kinds[worst]} of {len(rejected)} have this one: {worst}"

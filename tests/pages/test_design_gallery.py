@@ -17,6 +17,7 @@ from planar.drawing.designs.design_picture import closeup_picture, design_pictur
 from planar.drawing.designs.function_picture import function_picture
 from planar.drawing.paper.picture import Circle, Label, Pen, Polyline
 from planar.synthesis.design_motion import design_motion
+from planar.synthesis.judgement.defects import Defect
 from planar.synthesis.judgement.judgement import DesignJudge
 from planar.synthesis.synthesis import Synthesis, SynthesisedDesign
 from planar.synthesis.task.task_numbers import miss_kind
@@ -50,7 +51,7 @@ def designed(wanted, values, name, start="four-bar", **more):
         design_motion(mechanism, found.inputs),
         tuple(planar.cognates(mechanism, "E")[1:]),
     )
-    refused = replace(design, defects=("branch defect: <b>entry</b> 1",), cognates=())
+    refused = replace(design, shortages=(Defect("one branch", "branch defect: <b>entry</b> 1"),), cognates=())
     unsolved = replace(
         refused, error=np.nan, greatest_miss=np.nan, misses=tuple(np.full_like(each, np.nan) for each in found.misses)
     )

@@ -110,7 +110,7 @@ FRAME_BY_ENDS = {"ends": ["A", "D"], "length": 100}
         ("four-bar", timed(3), {}, True),
         ("four-bar", timed(3, absolute=True), {}, False),  # a turn changes the input
         (four_bar_with("AD", FRAME_BY_ENDS), path(3), {}, False),  # its first end stays at the origin
-        ("four-bar", path(3), {"within": {"AB.length": [20, 80]}}, False),
+        ("four-bar", path(3), {"within": {"AB.length": [20, 80]}}, True),
         ("four-bar", path(3), {"within": {"AB.length": [None, None]}}, True),
         ("four-bar", path(3), {"free": ["AB.length", "BC.length"]}, False),
         ("four-bar", function(3), {}, False),

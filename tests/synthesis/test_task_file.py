@@ -92,7 +92,7 @@ MISTAKES = [
     mistake("wanted/0/through/1/at", GONE, "$.wanted[0].through[1]", "'at'", "missing"),
     mistake("wanted/0/through/1/weight", 0, "$.wanted[0].through[1].weight", "above zero"),
     mistake("wanted/0/through/1/input", 5, "$.wanted[0].through", "entry 1 lacks it"),
-    mistake("wanted/0/tolerance", 0, "$.wanted[0].tolerance", "above zero"),
+    mistake("wanted/0/tolerance", -1, "$.wanted[0].tolerance", "above zero"),
     mistake("wanted/0/closed", "yes", "$.wanted[0].closed", "true or false"),
     mistake("wanted/1/closed", True, "$.wanted[1].through", "4 places"),
     mistake("wanted/2/link", "AD", "$.wanted[2].link", "frame"),

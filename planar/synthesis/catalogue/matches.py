@@ -44,18 +44,19 @@ class _NearestChoices(NamedTuple):
 
 
 def find_matches(
-    catalogue: Catalogue, items: list[WantedItem], can_move: bool, many: int, whole_only: bool = False
+    catalogue: Catalogue, items: list[WantedItem], factors: Array | None, many: int, whole_only: bool = False
 ) -> list[Match]:
     """The nearest designs, one match each: by the item with the most entries, and of what is near by this all items.
 
-    With `whole_only` of those that turn fully."""
+    `factors` (designs, 2) are the least and the greatest by which each design may grow where it is moved; without them
+    all stay where they are. With `whole_only` of those that turn fully."""
     order = sorted(range(len(items)), key=lambda k: -len(items[k].target))
     first = items[order[0]]
     designs = np.flatnonzero(catalogue.is_whole) if whole_only or first.is_closed else np.arange(len(catalogue))
     if len(first.target) > COARSE_ENTRIES:
-        coarse = _nearest_choices(catalogue, designs, order[0], first, can_move, COARSE_ENTRIES)
+        coarse = _nearest_choices(catalogue, designs, order[0], first, factors, COARSE_ENTRIES)
         designs = designs[_best(coarse.distance, COARSE_SHARE * many)]
-    nearest = _nearest_choices(catalogue, designs, order[0], first, can_move, len(first.target))
+    nearest = _nearest_choices(catalogue, designs, order[0], first, factors, len(first.target))
     matches = []
     for row in _best(nearest.distance, COARSE_SHARE * many if len(items) > 1 else many).tolist():
         steps: list[IntArray] = [np.zeros(0, int)] * len(items)
@@ -77,7 +78,7 @@ def _best(distance: Array, many: int) -> IntArray:
 
 
 def _nearest_choices(
-    catalogue: Catalogue, designs: IntArray, k: int, item: WantedItem, can_move: bool, most: int
+    catalogue: Catalogue, designs: IntArray, k: int, item: WantedItem, factors: Array | None, most: int
 ) -> _NearestChoices:
     """The nearest choice of each design for the item k, of which at most so many entries are looked at."""
     many, entries = len(designs), len(item.target)
@@ -87,8 +88,9 @@ def _nearest_choices(
     for first in range(0, many, CHUNK):
         rows = slice(first, first + CHUNK)
         few = catalogue.take(designs[rows])
+        own = None if factors is None else factors[designs[rows]]
         for choices in step_choices(few, item, few.values[k], most):
-            _take_better(nearest, rows, few.values[k], choices.steps, choices.entries, item, can_move)
+            _take_better(nearest, rows, few.values[k], choices.steps, choices.entries, item, own)
     return nearest
 
 
@@ -99,11 +101,11 @@ def _take_better(
     steps: IntArray,
     entries: IntArray,
     item: WantedItem,
-    can_move: bool,
+    factors: Array | None,
 ) -> None:
     """Keep of each design the choice with the least distance."""
     with np.errstate(invalid="ignore", over="ignore"):  # steps that a design lacks
-        distance, factor, offset = _distances(values, steps, entries, item, can_move)
+        distance, factor, offset = _distances(values, steps, entries, item, factors)
     every = np.arange(len(values))
     best = np.argmin(distance, axis=1)
     least = distance[every, best]
@@ -119,7 +121,7 @@ def _take_better(
 
 
 def _distances(
-    values: Array, steps: IntArray, entries: IntArray, item: WantedItem, can_move: bool
+    values: Array, steps: IntArray, entries: IntArray, item: WantedItem, factors: Array | None
 ) -> tuple[Array, ComplexArray, ComplexArray]:
     """Root mean square misses of choices (designs, choices), after the move that is best for the places."""
     there = values[np.arange(len(values))[:, None, None], np.maximum(steps, 0)]
@@ -135,18 +137,21 @@ def _distances(
     own, wanted = there[..., 0] + 1j * there[..., 1], target[:, 0] + 1j * target[:, 1]
     factor: ComplexArray = np.ones(own.shape[:2], complex)
     offset: ComplexArray = np.zeros(own.shape[:2], complex)
-    if can_move:
+    if factors is not None:
         centre, middle = _mean(own, weights), np.sum(wanted * weights)
         part = own - centre[..., None]
         size = _mean(np.abs(part) ** 2, weights)
         factor = _mean(np.conj(part) * (wanted - middle), weights) / np.maximum(size, 1e-9)
-        is_small: BoolArray = np.asarray(np.abs(factor) > MAX_FACTOR)
+        grown = np.abs(factor)
+        bounded = np.clip(grown, factors[:, :1], factors[:, 1:])
+        factor = factor * np.where(grown > 0.0, bounded / np.where(grown > 0.0, grown, 1.0), 1.0)
+        is_small: BoolArray = np.asarray(bounded > MAX_FACTOR)
         offset = middle - factor * centre
     square = _mean(np.abs(factor[..., None] * own + offset[..., None] - wanted) ** 2, weights)
     if isinstance(item.wanted, WantedPoses):
         turned = there[..., 2] + np.angle(factor)[..., None] - target[:, 2]
         square = square + _mean((turned - TURN * np.round(turned / TURN)) ** 2, weights)
-    if can_move:
+    if factors is not None:
         square = np.where(is_small, np.inf, square)
     return _refused(square, steps), factor, offset
 

@@ -38,6 +38,22 @@ class MovedNumbers:
         y[:, self.own_angles] += turn
         return x, y
 
+    def factors(self, x: Array, lower: Array, upper: Array) -> Array | None:
+        """The least and the greatest size (designs, 2) by which scaled free numbers (designs, free) may grow between
+        their bounds; None where bounds of places or of angles in the frame hold designs where they are."""
+        is_bound = np.isfinite(lower) | np.isfinite(upper)
+        held = [*self.angles.tolist(), *(k for place in self.places for k in place)]
+        if is_bound[held].any():
+            return None
+        own = self.lengths[is_bound[self.lengths]]
+        size, low, high = x[:, own], lower[own], upper[own]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            ends = np.stack([low / size, high / size])
+        ends = np.where(size == 0.0, np.array([0.0, np.inf])[:, None, None], ends)
+        least = np.maximum(ends.min(axis=0).max(axis=1, initial=0.0), 0.0)
+        most = ends.max(axis=0).min(axis=1, initial=np.inf)
+        return np.stack([np.minimum(least, 1.0), np.maximum(most, 1.0)], axis=1)
+
 
 def moved_numbers(equations: WantedEquations, free: FreeNumbers) -> MovedNumbers:
     """How a mechanism's free numbers follow where it is moved as a whole."""

@@ -81,10 +81,8 @@ class WantedEquations:
         design = self.design
         self.result = wanted_expression(design, rows.wanted) / ca.DM(rows.scales)
         self.z_count = design.z.numel()
-        names = [each.name for each in design.dimensions]
-        self.columns = [names.index(name) for name in free]
-        self.base = np.array([each.value for each in design.dimensions])
-        self.scale = np.array([unit if design.dimensions[k].kind == "length" else 1.0 for k in self.columns])
+        kinds = {each.name: each.kind for each in design.dimensions}
+        self.scale = np.array([unit if kinds[name] == "length" else 1.0 for name in free])
         "SI of one of each free number"
         self.input_scale = float(design.input_scale[0])
         self.zero_count = int(rows.input_is_free) + int(rows.value_is_free)
@@ -96,17 +94,7 @@ class WantedEquations:
         return self.rows.inputs is not None
 
     def _in_entries(self, outputs: list[ca.SX]) -> tuple[ca.SX, ca.SX, list[ca.SX]]:
-        """Symbols of an entry's unknowns and of the free numbers, and expressions in them."""
-        design = self.design
-        x = ca.SX.sym("x", len(self.free))
-        y = ca.SX.sym("y", self.z_count + 1)
-        d = ca.SX(ca.DM(self.base))
-        for k, column in enumerate(self.columns):
-            d[column] = x[k] * self.scale[k]
-        u = ca.vertcat(y[-1] * self.input_scale, *(each.position for each in design.mechanism.inputs[1:]))
-        zero = ca.SX.zeros(design.u1.numel())
-        given = [design.z, design.u, design.u1, design.u2, design.d]
-        return y, x, ca.substitute(outputs, given, [y[: self.z_count], u, zero, zero, d])
+        return in_entries(self.design, self.free, self.scale, outputs)
 
     def _function(self, outputs: list[ca.SX]) -> BufferedFunction:
         y, x, (F, *rest) = self._in_entries(outputs)
@@ -229,6 +217,22 @@ class WantedEquations:
             shaped = each.reshape(many, entries, *each.shape[1:]).swapaxes(-1, -2)
             found.append(shaped[..., 0] if k in VECTORS else shaped)
         return found
+
+
+def in_entries(
+    design: DesignEquations, free: Sequence[str], scale: Array, outputs: list[ca.SX]
+) -> tuple[ca.SX, ca.SX, list[ca.SX]]:
+    """Symbols of an entry's unknowns y and of the free numbers x, in units of a `scale`, and expressions in them."""
+    z_count = design.z.numel()
+    x, y = ca.SX.sym("x", len(free)), ca.SX.sym("y", z_count + 1)
+    names = [each.name for each in design.dimensions]
+    d = ca.SX(ca.DM([each.value for each in design.dimensions]))
+    for k, name in enumerate(free):
+        d[names.index(name)] = x[k] * scale[k]
+    u = ca.vertcat(y[-1] * float(design.input_scale[0]), *(each.position for each in design.mechanism.inputs[1:]))
+    zero = ca.SX.zeros(design.u1.numel())
+    given = [design.z, design.u, design.u1, design.u2, design.d]
+    return y, x, ca.substitute(outputs, given, [y[:z_count], u, zero, zero, d])
 
 
 CLOSED = 1e-10

@@ -18,11 +18,16 @@ def wanted_size(task: SynthesisTask, mechanism_size: float) -> float:
 
 def wanted_rows(task: SynthesisTask, size: float) -> list[WantedRows]:
     """Of each wanted item its rows: places in units of the size, angles in rad, lengths of functions in the size."""
-    return [_rows(each, size) for each in task.wanted]
+    heavier = EXACT_WEIGHT if 0 < len(task.exact) < len(task.wanted) else 1.0
+    return [_rows(each, size, heavier if each.tolerance == 0.0 else 1.0) for each in task.wanted]
 
 
-def _rows(wanted: Wanted, size: float) -> WantedRows:
-    weights = np.sqrt(wanted.weights)
+EXACT_WEIGHT = 30.0
+"""Of a miss of what is to be met exactly beside others, before a fit's last steps meet it."""
+
+
+def _rows(wanted: Wanted, size: float, heavier: float) -> WantedRows:
+    weights = heavier * np.sqrt(wanted.weights)
     if isinstance(wanted, WantedFunction):
         scale = np.ones(1)
         is_free = not wanted.is_absolute

@@ -8,18 +8,21 @@ from functools import partial
 
 import numpy as np
 
-from planar.analysis.motion.transmission_angle import transmission
-from planar.foundation.arrays import Array, BoolArray
-from planar.foundation.errors import BadInput, NoAnswer, PlanarError
+from planar.foundation.arrays import Array
+from planar.foundation.errors import BadInput, NoAnswer
 from planar.foundation.jets import TURN, Scalar, value_and_rates
 from planar.model.mechanism import Mechanism, relative_motions
-from planar.model.pairs import MeasureKind
 from planar.model.wording import amount
 from planar.results.motion import Motion
 from planar.solving.cycle import cycle
 from planar.solving.grids.grid_motion import motion_over_input
+from planar.synthesis.judgement.defects import Defect
 from planar.synthesis.judgement.entry_order import ordered_inputs
+from planar.synthesis.judgement.input_range import InputRange, input_range
+from planar.synthesis.judgement.misses import entry_misses, repeat_entry, resting_misses
+from planar.synthesis.judgement.motion_demands import region_defects, transmission_defects
 from planar.synthesis.task.synthesis_task import SynthesisTask, Wanted, WantedFunction, WantedPath
+from planar.synthesis.task.task_numbers import task_motion_kind
 from planar.synthesis.task.wanted_expressions import carried_name
 
 STEPS = 90
@@ -27,10 +30,13 @@ SAME = 1e-6
 """Of the extent of what is wanted, or rad: an entry that is missed by no more beside the fit is met as fitted."""
 FEET, FOOT_POSITIONS = 4, 13
 """How often, and at how many positions of the input, the nearest one to an entry is looked for."""
+EXACT = 1e-9
+"""The same of what is to be met exactly."""
+REACH = "the reach"
 OTHER_ASSEMBLY = 0.01
 """Of the extent of what is wanted, or rad: what misses an entry by so much more than the fit is another assembly."""
-ON_END = 1e-6
-"""rad, or of the range: an entry so little beyond the end of a branch is on it."""
+NOWHERE_NEAR = 0.5
+"""Of the root mean square of what one at rest misses: a design that misses more does not do what is wanted."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +45,7 @@ class Judgement:
 
     misses: tuple[Array, ...]
     inputs: tuple[Array, ...]
-    defects: tuple[str, ...]
+    defects: tuple[Defect, ...]
 
 
 class DesignJudge:
@@ -53,188 +59,148 @@ class DesignJudge:
         try:
             return self._judgement(mechanism, inputs, values)
         except NoAnswer as problem:  # where branches meet between the positions of its motion
-            return self._unreached(inputs, f"it cannot be followed through what is wanted: {problem}")
+            return self._unreached(inputs, Defect(REACH, f"it cannot be followed through what is wanted: {problem}"))
 
     def _judgement(self, mechanism: Mechanism, inputs: Sequence[Array], values: Sequence[Array]) -> Judgement:
         running = mechanism.inputs[0].pair
         try:
             motion = cycle(mechanism, STEPS, pair=running)
         except NoAnswer as problem:
-            return self._unreached(inputs, f"it cannot be solved: {problem}")
-        given = motion.inputs[running].position
-        is_whole = _turns(mechanism) and float(np.ptp(given)) > TURN * (1.0 - 1e-9)
-        defects = [*self._branch_defects(mechanism, motion, is_whole, inputs)]
+            return self._unreached(inputs, Defect(REACH, f"it cannot be solved: {problem}"))
+        reach = input_range(motion, inputs)
+        defects = [*self._branch_defects(mechanism, reach, inputs)]
         if defects:
             return self._unreached(inputs, *defects)
-        there = [_brought_into(each, given, is_whole) for each in inputs]
+        there = [reach.bring(each) for each in inputs]
         try:
             shown = _results(mechanism, self.task.wanted, there)
         except NoAnswer as problem:
-            return self._unreached(inputs, f"it does not reach what is wanted: {problem}")
+            return self._unreached(inputs, Defect(REACH, f"it does not reach what is wanted: {problem}"))
         misses = []
         for k, (wanted, own, fitted) in enumerate(zip(self.task.wanted, shown, values, strict=True)):
-            off, fit_off = _misses(wanted, own, self.size), _misses(wanted, fitted, self.size)
+            off, fit_off = entry_misses(wanted, own, self.size), entry_misses(wanted, fitted, self.size)
             scale = 1.0 if isinstance(wanted, WantedFunction) else self.size
             for entry in np.flatnonzero(off > fit_off + SAME * scale).tolist():
                 if not isinstance(wanted, WantedFunction) and wanted.inputs is None:
-                    there[k][entry], off[entry] = self._nearest_on_branch(motion, k, entry)
+                    there[k][entry], off[entry] = self._nearest_on_branch(motion, reach, k, entry)
             more = off - fit_off
             if float(more.max(initial=0.0)) > OTHER_ASSEMBLY * scale:
                 entry = int(np.argmax(more))
-                defects.append(f"circuit defect: {wanted.of} meets entry {entry + 1} in another assembly only")
+                told = f"circuit defect: {wanted.of} meets entry {entry + 1} in another assembly only"
+                defects.append(Defect("one circuit", told))
             misses.append(off)
-        defects += [*self._put_in_order(motion, is_whole, there, misses)]
+        defects += [*self._put_in_order(motion, reach, there, misses)]
         defects += [*self._tolerance_defects(misses)]
-        if self.task.demands.whole_turn and not is_whole:
-            low, high = (
-                amount(float(each), _input_kind(mechanism), mechanism.units) for each in (given.min(), given.max())
-            )
-            defects.append(f"no whole turn: {running} goes from {low} to {high} only")
-        defects += [*self._motion_defects(mechanism, motion, there, is_whole)]
+        if self.task.needs_whole_turn and not reach.is_whole_turn:
+            low, high = (amount(each, reach.kind, mechanism.units) for each in (reach.low, reach.high))
+            told = f"no whole turn: {running} goes from {low} to {high} only"
+            defects.append(Defect("the whole turn", told, reach.high - reach.low, TURN))
+        defects += [*self._motion_defects(motion, reach, there), *self._rest_defects(misses)]
         return Judgement(tuple(misses), tuple(there), tuple(defects))
 
-    def _nearest_on_branch(self, motion: Motion, item: int, entry: int) -> tuple[float, float]:
+    def _nearest_on_branch(self, motion: Motion, reach: InputRange, item: int, entry: int) -> tuple[float, float]:
         """Where the input is nearest to an entry, and how far off that is; a fit beyond a dead point tells neither."""
         wanted = self.task.wanted[item]
-        given = np.sort(motion.inputs[motion.mechanism.inputs[0].pair].position)
-        margin = ON_END * float(np.ptp(given))
-        tried = np.clip(given, given[0] + margin, given[-1] - margin)
+        tried = np.linspace(reach.low + reach.margin, reach.high - reach.margin, len(motion))
         for _ in range(FEET):
             shown = _results(motion.mechanism, [wanted], [tried])[0]
-            off = _misses(_at_entry(wanted, entry, len(tried)), shown, self.size)
+            off = entry_misses(repeat_entry(wanted, entry, len(tried)), shown, self.size)
             best = int(np.nanargmin(off))
             around = tried[max(best - 1, 0)], tried[min(best + 1, len(tried) - 1)]
             nearest = float(tried[best]), float(off[best])
             tried = np.linspace(*around, FOOT_POSITIONS)
         return nearest
 
-    def _unreached(self, inputs: Sequence[Array], *sentences: str) -> Judgement:
-        return Judgement(tuple(np.full(len(each), np.nan) for each in inputs), tuple(inputs), sentences)
+    def _unreached(self, inputs: Sequence[Array], *defects: Defect) -> Judgement:
+        return Judgement(tuple(np.full(len(each), np.nan) for each in inputs), tuple(inputs), defects)
 
-    def _branch_defects(
-        self, mechanism: Mechanism, motion: Motion, is_whole: bool, inputs: Sequence[Array]
-    ) -> Iterator[str]:
-        if is_whole:
-            return
-        running = mechanism.inputs[0].pair
-        given = motion.inputs[running].position
-        low, high = float(given.min()), float(given.max())
-        margin = ON_END * max(high - low, 1e-3)
+    def _branch_defects(self, mechanism: Mechanism, reach: InputRange, inputs: Sequence[Array]) -> Iterator[Defect]:
         for wanted, own in zip(self.task.wanted, inputs, strict=True):
-            beyond: BoolArray = np.asarray((own < low - margin) | (own > high + margin))
+            beyond = reach.are_beyond(own)
             if beyond.any():
                 entry = int(np.argmax(beyond))
-                ends = " to ".join(amount(each, _input_kind(mechanism), mechanism.units) for each in (low, high))
-                yield (
+                ends = " to ".join(amount(each, reach.kind, mechanism.units) for each in (reach.low, reach.high))
+                yield Defect(
+                    "one branch",
                     f"branch defect: entry {entry + 1} of {wanted.of} lies beyond a dead point; the branch of the "
-                    f"first goes from {running} = {ends}"
+                    f"first goes from {reach.pair} = {ends}",
                 )
 
-    def _put_in_order(self, motion: Motion, is_whole: bool, inputs: list[Array], misses: list[Array]) -> Iterator[str]:
+    def _put_in_order(
+        self, motion: Motion, reach: InputRange, inputs: list[Array], misses: list[Array]
+    ) -> Iterator[Defect]:
         """Entries that are wanted in their order are met so, where that costs hardly anything; else a defect."""
-        given = motion.inputs[motion.mechanism.inputs[0].pair].position
-        low, high = float(given.min()), float(given.max())
-        margin = 0.0 if is_whole else ON_END * (high - low)
         for k, wanted in enumerate(self.task.wanted):
-            if isinstance(wanted, WantedFunction) or not wanted.in_order or _is_in_order(inputs[k], is_whole):
+            if isinstance(wanted, WantedFunction) or not wanted.in_order or reach.is_in_order(inputs[k]):
                 continue
             off = np.full(len(inputs[k]), np.inf)
             if wanted.inputs is None:
-                own = ordered_inputs(partial(self._every_miss, motion, wanted), low + margin, high - margin, is_whole)
+                ends = reach.low + reach.margin, reach.high - reach.margin
+                own = ordered_inputs(partial(self._every_miss, motion, wanted), *ends, reach.is_cyclic)
                 off = np.diag(self._every_miss(motion, wanted, own))
             if float((off - misses[k]).max()) > OTHER_ASSEMBLY * self.size:
-                yield f"order defect: {wanted.of} does not meet its entries in their order"
+                yield Defect("the order", f"order defect: {wanted.of} does not meet its entries in their order")
             else:
                 inputs[k], misses[k] = own, off
 
     def _every_miss(self, motion: Motion, wanted: Wanted, inputs: Array) -> Array:
         """How far each of n entries is missed at m positions of the input (m, n)."""
         shown = _results(motion.mechanism, [wanted], [inputs])[0]
-        every = [_misses(_at_entry(wanted, k, len(inputs)), shown, self.size) for k in range(len(wanted.weights))]
+        every = [
+            entry_misses(repeat_entry(wanted, k, len(inputs)), shown, self.size) for k in range(len(wanted.weights))
+        ]
         return np.stack(every, axis=1)
 
-    def _tolerance_defects(self, misses: Sequence[Array]) -> Iterator[str]:
+    def _tolerance_defects(self, misses: Sequence[Array]) -> Iterator[Defect]:
         for wanted, own in zip(self.task.wanted, misses, strict=True):
-            if wanted.tolerance is not None and float(own.max(initial=0.0)) > wanted.tolerance:
-                kind = "angle" if isinstance(wanted, WantedFunction) else "length"
+            scale = 1.0 if isinstance(wanted, WantedFunction) else self.size
+            spared = (SAME if wanted.tolerance else EXACT) * scale  # for what rounding of a file takes
+            if wanted.tolerance is not None and float(own.max(initial=0.0)) > wanted.tolerance + spared:
+                kind = self._miss_kind(wanted)
                 entry, units = int(np.argmax(own)), self.task.units
                 off, most = (amount(each, kind, units) for each in (float(own[entry]), wanted.tolerance))
-                yield f"entry {entry + 1} of {wanted.of} is missed by {off}, more than the tolerance of {most}"
+                told = f"entry {entry + 1} of {wanted.of} is missed by {off}, more than the tolerance of {most}"
+                demand = f"the tolerance of {wanted.of}"
+                yield Defect(demand, told, float(own[entry]), wanted.tolerance, kind, more=False, verb="misses by")
 
-    def _motion_defects(
-        self, mechanism: Mechanism, motion: Motion, inputs: Sequence[Array], is_whole: bool
-    ) -> Iterator[str]:
+    def _rest_defects(self, misses: Sequence[Array]) -> Iterator[Defect]:
+        """What does little better than one that stands still, as where a demand leaves it no room."""
+        for wanted, own in zip(self.task.wanted, misses, strict=True):
+            resting, off = (float(np.sqrt(np.mean(each**2))) for each in (resting_misses(wanted, self.size), own))
+            if resting > 0.0 and off > NOWHERE_NEAR * resting:
+                told = (
+                    f"{wanted.of} comes nowhere near: its misses are {off / resting:.2g} of those of one at rest "
+                    "amid what is wanted"
+                )
+                yield Defect(self._narrow_demands(), told)
+
+    def _narrow_demands(self) -> str:
+        """The demands that may leave what is wanted no room."""
+        demands = self.task.demands
+        names = ["the region"] * (demands.inside is not None)
+        names += ["the transmission angle"] * (demands.transmission is not None)
+        names += ["the whole turn"] * self.task.needs_whole_turn
+        names += ["the bounds"] * bool(self.task.within)
+        return " or ".join(names) or "what is wanted"
+
+    def _miss_kind(self, wanted: Wanted) -> str:
+        return task_motion_kind(self.task, wanted.to_pair) if isinstance(wanted, WantedFunction) else "length"
+
+    def _motion_defects(self, motion: Motion, reach: InputRange, inputs: Sequence[Array]) -> Iterator[Defect]:
         demands = self.task.demands
         if demands.transmission is None and demands.inside is None:
             return
-        running = mechanism.inputs[0].pair
-        if not is_whole:
+        if not reach.is_whole_turn:
             every = np.concatenate(inputs)
             try:
-                motion = cycle(mechanism, STEPS, float(every.min()), float(every.max()), running)
+                motion = cycle(motion.mechanism, STEPS, float(every.min()), float(every.max()), reach.pair)
             except (NoAnswer, BadInput) as problem:
-                yield f"it does not run through what is wanted: {problem}"
+                yield Defect(REACH, f"it does not run through what is wanted: {problem}")
                 return
         if demands.transmission is not None:
-            yield from _transmission_defects(motion, demands.transmission)
+            yield from transmission_defects(motion, demands.transmission)
         if demands.inside is not None:
-            yield from _region_defects(motion, demands.inside)
-
-
-def _is_in_order(inputs: Array, is_whole: bool) -> bool:
-    """Whether inputs (n,) rise or fall all the way; of a whole turn once round at most."""
-    if len(inputs) < 3:
-        return True
-    steps = np.diff(inputs)
-    if not is_whole:
-        return bool((steps > -1e-9).all() or (steps < 1e-9).all())
-    forward = np.mod(steps, TURN)
-    rounds = float(forward.sum()) / TURN, float(np.mod(-steps, TURN).sum()) / TURN
-    return min(rounds) < 1.0 + 1e-9
-
-
-def _transmission_defects(motion: Motion, least: float) -> Iterator[str]:
-    mechanism = motion.mechanism
-    outputs = [
-        pair.name
-        for pair in mechanism.pairs
-        if mechanism.frame in pair.links and pair.name not in {each.pair for each in mechanism.inputs}
-    ]
-    for name in outputs:
-        try:
-            found = transmission(motion, name)
-        except PlanarError:
-            continue  # nothing is transmitted to it by one force
-        if found.least is not None and found.least.value < least:
-            at = amount(found.least.input, _input_kind(mechanism), mechanism.units)
-            angle, wanted = (amount(each, "angle", mechanism.units) for each in (found.least.value, least))
-            where = f"{mechanism.inputs[0].pair} = {at}"
-            yield f"the transmission angle at {name} falls to {angle} at {where}, below {wanted}"
-
-
-def _region_defects(motion: Motion, corners: Array) -> Iterator[str]:
-    for name in motion.point_names:
-        places = np.atleast_2d(motion.point(name).position)
-        outside = ~_are_inside(places, corners)
-        if outside.any():
-            at = places[int(np.argmax(outside))]
-            x, y = (amount(float(each), "length", motion.mechanism.units) for each in at)
-            yield f"{name} leaves the region at x = {x}, y = {y}"
-
-
-def _are_inside(places: Array, corners: Array) -> BoolArray:
-    """Which places (n, 2) lie in a polygon, its border included by a hair."""
-    first, second = corners, np.roll(corners, -1, axis=0)
-    x, y = places[:, 0, None], places[:, 1, None]
-    crosses = (first[:, 1] > y) != (second[:, 1] > y)
-    rise = np.where(crosses, second[:, 1] - first[:, 1], 1.0)
-    right = first[:, 0] + (y - first[:, 1]) / rise * (second[:, 0] - first[:, 0])
-    inside: BoolArray = np.asarray(np.sum(crosses & (x < right), axis=1) % 2 == 1)
-    along = second - first
-    share = np.clip(np.sum((places[:, None] - first) * along, axis=2) / np.sum(along**2, axis=1), 0.0, 1.0)
-    off = np.linalg.norm(places[:, None] - first - share[..., None] * along, axis=2).min(axis=1)
-    found: BoolArray = inside | np.asarray(off < 1e-9 * float(np.ptp(corners, axis=0).max()))
-    return found
+            yield from region_defects(motion, demands.inside)
 
 
 def _results(mechanism: Mechanism, wanted: Sequence[Wanted], inputs: Sequence[Array]) -> list[Array]:
@@ -264,53 +230,3 @@ def _pair_result(mechanism: Mechanism, name: str) -> str:
 def _values(jet: Scalar, many: int) -> Array:
     value = np.asarray(value_and_rates(jet)[0], float)
     return np.broadcast_to(value, (many,))
-
-
-def _difference(own: Array, other: Array, wanted: Wanted) -> Array:
-    """Of results (n, parts), angles by less than half a turn."""
-    apart: Array = own - other
-    if isinstance(wanted, WantedPath):
-        return apart
-    turned = apart[:, -1] - TURN * np.round(apart[:, -1] / TURN)
-    told: Array = np.concatenate([apart[:, :-1], turned[:, None]], axis=1)
-    return told
-
-
-def _misses(wanted: Wanted, shown: Array, size: float) -> Array:
-    """How far each entry is missed (n,): m, of functions rad or m; of a pose the angle counts by the size."""
-    if isinstance(wanted, WantedPath):
-        found: Array = np.linalg.norm(shown - wanted.places, axis=1)
-        return found
-    if isinstance(wanted, WantedFunction):
-        off = _difference(shown, wanted.values[:, None], wanted)[:, 0]
-        return np.abs(off if wanted.is_absolute else off - off.mean())
-    target = np.concatenate([wanted.places, wanted.angles[:, None]], axis=1)
-    apart = _difference(shown, target, wanted) * np.array([1.0, 1.0, size])
-    missed: Array = np.linalg.norm(apart, axis=1)
-    return missed
-
-
-def _at_entry(wanted: Wanted, entry: int, many: int) -> Wanted:
-    """A path or poses, so many times this entry."""
-    assert not isinstance(wanted, WantedFunction)
-    places = np.broadcast_to(wanted.places[entry], (many, 2))
-    if isinstance(wanted, WantedPath):
-        return wanted._replace(places=places)
-    return wanted._replace(places=places, angles=np.broadcast_to(wanted.angles[entry], (many,)))
-
-
-def _brought_into(inputs: Array, given: Array, is_whole: bool) -> Array:
-    """Positions of an input by whole turns in the range that runs."""
-    low, high = float(given.min()), float(given.max())
-    if not is_whole:
-        return np.clip(inputs, low, high)
-    found: Array = low + np.mod(inputs - low, TURN)
-    return np.minimum(found, high)
-
-
-def _turns(mechanism: Mechanism) -> bool:
-    return relative_motions(mechanism)[mechanism.inputs[0].pair].input_kind is not MeasureKind.LENGTH
-
-
-def _input_kind(mechanism: Mechanism) -> str:
-    return "angle" if _turns(mechanism) else "length"

@@ -16,26 +16,31 @@ from planar.foundation.arrays import Array
 from planar.model.file_units import FileUnits, unit_of_kind
 from planar.model.mechanism import Mechanism, NamedPoint, named_points
 
-DIGITS = 7
-"""Of the size of a mechanism, or of a rad, that its file is written with."""
+DIGITS, EXACT_DIGITS = 7, 13
+"""Of the size of a mechanism, or of a rad, that its file is written with; where something is to be met exactly."""
 
 
 def write_design(
-    design: DesignEquations, numbers: Mapping[str, float], y: Array, input_position: float, name: str
+    design: DesignEquations,
+    numbers: Mapping[str, float],
+    y: Array,
+    input_position: float,
+    name: str,
+    digits: int = DIGITS,
 ) -> Mechanism:
     """The mechanism with these numbers (SI, rounded to what a file needs), whose sketch is where it stands with
     unknowns y (unknowns,). Raises BadInput where a file with these numbers is refused."""
     start = design.mechanism
     units, size = start.units, design.solver.unit
     known = file_dimensions(start)
-    told = {key: _rounded(value, known[key].kind, units, size) for key, value in numbers.items()}
+    told = {key: _rounded(value, known[key].kind, units, size, digits) for key, value in numbers.items()}
     running = f"{start.inputs[0].pair}.position"
-    told[running] = _rounded(input_position, known[running].kind, units, size)
+    told[running] = _rounded(input_position, known[running].kind, units, size, digits)
     joints = [each for each in named_points(start) if len(each.members) > 1 and _moves(start, each)]
     places = _places(design, joints, told, y)
     sketch = []
     for each, at in zip(joints, places, strict=True):
-        x, y_own = (_rounded(part, "length", units, size) for part in at)
+        x, y_own = (_rounded(part, "length", units, size, DIGITS) for part in at)
         sketch.append((each.name, x, y_own))
     made = replace(start, sketch=tuple(sketch), name=name, about=None, source=None, published=(), ids=())
     return with_values(made, told)
@@ -60,10 +65,10 @@ def _places(
     return list(zip(found[::2], found[1::2], strict=True))
 
 
-def _rounded(value: float, kind: str, units: FileUnits, size: float) -> float:
+def _rounded(value: float, kind: str, units: FileUnits, size: float, digits: int) -> float:
     """A quantity (SI) with so many digits behind that of the size, in the file's units."""
     if kind not in ("length", "angle"):
         return float(value)
     of = unit_of_kind(kind, units)[1]
     whole = abs(of.from_si(size if kind == "length" else 1.0))
-    return float(of.to_si(round(of.from_si(float(value)), DIGITS - ceil(log10(whole)))))
+    return float(of.to_si(round(of.from_si(float(value)), digits - ceil(log10(whole)))))

@@ -108,25 +108,39 @@ class _ResultRows(NamedTuple):
         return len(self.wanted.weights) * (parts if self.is_timed else parts - 1)
 
 
-def count_freedom(task: SynthesisTask, mechanism: Mechanism) -> FreedomCount:
-    """The free unknowns of a start (see `start_mechanisms`) beside the conditions of what is wanted, by rank.
+def count_freedom(task: SynthesisTask, mechanism: Mechanism, wanted: Sequence[Wanted] | None = None) -> FreedomCount:
+    """The free unknowns of a start (see `start_mechanisms`) beside the conditions of what is `wanted`, by rank: of all
+    that the task wants, or of some of it.
 
     A four-bar whose coupler point comes to places at any input meets nine of them exactly, a function five pairs.
     Raises NoAnswer where the start cannot move.
     """
     free = free_numbers(task, mechanism)
-    items = _result_rows(_generic(mechanism, free), task.wanted, free)
+    conditions = task.wanted if wanted is None else wanted
+    items = _result_rows(generic_start(mechanism, free), conditions, free)
     every, own = (
         unseen_changes(_stack([each.spread(count) for each, count in zip(items, counts, strict=True)]))[2]
-        for counts in ([len(each.values) for each in items], [len(each.weights) for each in task.wanted])
+        for counts in ([len(each.values) for each in items], [len(each.weights) for each in conditions])
     )
     return FreedomCount(every, sum(each.condition_count for each in items), own)
 
 
+def exactness_in_excess(task: SynthesisTask, mechanism: Mechanism) -> str | None:
+    """What forbids that a start meets all that is to be met exactly, in words; None where nothing does."""
+    if not task.exact:
+        return None
+    count = count_freedom(task, mechanism, task.exact)
+    if not count.excess:
+        return None
+    free = count_phrase(count.free, "independent number is", "independent numbers are")
+    met = f", by which {count.met} can be met" if count.met < count.free else ""
+    sets = f"what is to be met exactly, with a tolerance of 0, sets {count_phrase(count.demanded, 'condition')}"
+    return f"{sets}, and only {free} free in {mechanism.name!r}{met}: give some of it a tolerance"
+
+
 def can_move_whole(task: SynthesisTask, mechanism: Mechanism, free: FreeNumbers) -> bool:
-    """Whether free numbers without bounds bring what is wanted of the mechanism to any place, size and turn."""
-    is_bounded = bool(np.isfinite(free.lower).any() or np.isfinite(free.upper).any())
-    if is_bounded or any(isinstance(each, WantedFunction) for each in task.wanted):
+    """Whether free numbers, but for their bounds, bring what is wanted of the mechanism to any place, size and turn."""
+    if any(isinstance(each, WantedFunction) for each in task.wanted):
         return False
     items = _result_rows(mechanism, task.wanted, free)
     matrix = _stack(items)
@@ -197,7 +211,7 @@ def _is_length(mechanism: Mechanism, wanted: Wanted, part: int) -> bool:
     return part < 2
 
 
-def _generic(mechanism: Mechanism, free: FreeNumbers) -> Mechanism:
+def generic_start(mechanism: Mechanism, free: FreeNumbers) -> Mechanism:
     """A mechanism near a start, which may be a special one; the start itself, where that does not go together."""
     size = float(np.abs(free.values[np.array(free.kinds) == "length"]).max(initial=0.0)) or 1.0
     way = np.cos(1.0 + np.arange(len(free.names)))

@@ -18,7 +18,8 @@ class WantedPath(NamedTuple):
 
     `inputs` (n,) are where the running input is there (rad or m), None where that is left open; unless `is_absolute`
     they count by their differences. `in_order`: the places are met one after the other, either way. `is_closed`: they
-    lie round a closed curve. A miss counts by its `weights` (n,); one greater than the `tolerance` (m) is a defect.
+    lie round a closed curve. A miss counts by its `weights` (n,); one greater than the `tolerance` (m) is a defect, any
+    but round-off where that is 0.
     `link` carries the point, where a start lacks it.
     """
 
@@ -70,7 +71,8 @@ class WantedFunction(NamedTuple):
     """Positions `values` (n,) of the pair `to_pair` at positions `inputs` (n,) of the input `from_pair`, rad or m.
 
     Unless `is_absolute` both count by their differences, so that the zeros of both scales are free. A miss counts by
-    its `weights` (n,); one greater than the `tolerance` is a defect.
+    its `weights` (n,); one greater than the `tolerance` is a defect, any but round-off where
+    that is 0.
     """
 
     from_pair: str
@@ -136,6 +138,17 @@ class SynthesisTask:
     def wants_places(self) -> bool:
         """Whether places are wanted, so that a miss may be seen beside their extent."""
         return any(not isinstance(each, WantedFunction) for each in self.wanted)
+
+    @property
+    def needs_whole_turn(self) -> bool:
+        """Whether the running input is to turn fully: where that is demanded, and round closed curves."""
+        closed = any(isinstance(each, WantedPath) and each.is_closed for each in self.wanted)
+        return closed or self.demands.whole_turn
+
+    @property
+    def exact(self) -> tuple[Wanted, ...]:
+        """What is to be met exactly: items with no tolerance for a miss."""
+        return tuple(each for each in self.wanted if each.tolerance == 0.0)
 
     @property
     def entry_count(self) -> int:

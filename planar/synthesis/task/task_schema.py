@@ -35,7 +35,9 @@ _IN_ORDER = described(_FLAG, "true: they are met one after the other, either way
 _ABSOLUTE = described(
     _FLAG, "true: inputs are positions of the pair itself; left out: they count by their differences from the first"
 )
-_TOLERANCE = described(schema_reference("size"), "the greatest miss that is accepted; left out: any")
+_TOLERANCE = described(
+    schema_reference("amount"), "the greatest miss that is accepted, 0: it is to be met exactly; left out: any"
+)
 
 PLACE_SCHEMA: Schema = {
     "at": described(vector_schema("length"), "the place, in the frame's axes"),
@@ -91,7 +93,7 @@ FUNCTION_SCHEMA: Schema = {
     "absolute": described(
         _FLAG, "true: both are positions of the pairs themselves; left out: they count by their differences"
     ),
-    "tolerance": described(schema_reference("positive"), "the greatest miss that is accepted; left out: any"),
+    "tolerance": _TOLERANCE,
 }
 DEMAND_SCHEMA: Schema = {
     "transmission": described(

@@ -60,7 +60,7 @@ class WantedReader:
             (is_closed := self._read_closed(cursor, len(places))) or cursor.flag("in_order"),
             is_closed,
             cursor.flag("absolute"),
-            cursor["tolerance"].as_positive("length") if cursor.has("tolerance") else None,
+            _read_tolerance(cursor, "length"),
             link,
         )
 
@@ -118,7 +118,7 @@ class WantedReader:
             frozen_array(weights),
             cursor.flag("in_order"),
             cursor.flag("absolute"),
-            cursor["tolerance"].as_positive("length") if cursor.has("tolerance") else None,
+            _read_tolerance(cursor, "length"),
         )
 
     def _find_moving_link(self, cursor: Cursor) -> str:
@@ -144,7 +144,7 @@ class WantedReader:
         if not rows:
             raise cursor.error_at("pairs", "pairs of positions are wanted here, as [[0, 0], [20, 31]]")
         inputs, values, weights = map(frozen_array, zip(*rows, strict=True))
-        tolerance = cursor["tolerance"].as_positive(value_kind) if cursor.has("tolerance") else None
+        tolerance = _read_tolerance(cursor, value_kind)
         return WantedFunction(given, to, inputs, values, weights, cursor.flag("absolute"), tolerance)
 
     def _find_pair(self, cursor: Cursor) -> tuple[str, str]:
@@ -236,6 +236,13 @@ def _read_timing(cursor: Cursor, inputs: Sequence[float | None]) -> Array | None
     if not all(given):
         raise cursor.error_at(None, f"'input' is given for some; entry {given.index(False) + 1} lacks it")
     return frozen_array(inputs)
+
+
+def _read_tolerance(cursor: Cursor, kind: str) -> float | None:
+    """None where there is none, 0 of what is to be met exactly."""
+    if not cursor.has("tolerance"):
+        return None
+    return cursor["tolerance"].as_positive(kind) if cursor.quantity("tolerance", kind) else 0.0
 
 
 def _read_weight(cursor: Cursor) -> float:

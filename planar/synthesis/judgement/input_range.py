@@ -1,0 +1,83 @@
+"""The range of a design's input, and where in it its entries are."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import isclose
+
+import numpy as np
+
+from planar.dynamics.flywheel import whole_turns
+from planar.foundation.arrays import Array, BoolArray
+from planar.foundation.jets import TURN
+from planar.model.mechanism import relative_motions
+from planar.model.pairs import MeasureKind
+from planar.results.motion import Motion
+
+ON_END = 1e-6
+"""Of the range: an entry so little beyond the end of a branch is on it."""
+
+
+@dataclass(frozen=True)
+class InputRange:
+    """The running input goes from `low` to `high` (rad or m).
+
+    `is_whole_turn`: no dead point ends it. `is_cyclic`: after a turn all is as it was, so that positions a turn apart
+    are the same; where gears bring it back after several turns only, it is followed over all entries. `turns` tells an
+    angle from a length.
+    """
+
+    pair: str
+    low: float
+    high: float
+    is_whole_turn: bool
+    is_cyclic: bool
+    turns: bool
+
+    @property
+    def margin(self) -> float:
+        """How far inside its ends positions are looked at: there a branch ends."""
+        return 0.0 if self.is_whole_turn else ON_END * max(self.high - self.low, 1e-3)
+
+    @property
+    def kind(self) -> str:
+        """Of the quantity."""
+        return "angle" if self.turns else "length"
+
+    def are_beyond(self, inputs: Array) -> BoolArray:
+        """Which positions (n,) lie beyond an end."""
+        if self.is_whole_turn:
+            return np.zeros(len(inputs), bool)
+        beyond: BoolArray = np.asarray((inputs < self.low - self.margin) | (inputs > self.high + self.margin))
+        return beyond
+
+    def bring(self, inputs: Array) -> Array:
+        """Positions (n,) by whole turns, or from a hair beyond its ends, within it."""
+        turned = self.low + np.mod(inputs - self.low, TURN) if self.is_cyclic else inputs
+        brought: Array = np.clip(turned, self.low, self.high)
+        return brought
+
+    def is_in_order(self, inputs: Array) -> bool:
+        """Whether positions (n,) rise or fall all the way; once round at most where it is cyclic."""
+        if len(inputs) < 3:
+            return True
+        steps = np.diff(inputs)
+        if not self.is_cyclic:
+            return bool((steps > -1e-9).all() or (steps < 1e-9).all())
+        rounds = float(np.mod(steps, TURN).sum()) / TURN, float(np.mod(-steps, TURN).sum()) / TURN
+        return min(rounds) < 1.0 + 1e-9
+
+
+def input_range(motion: Motion, inputs: Sequence[Array]) -> InputRange:
+    """The range of the running input of a motion through all of it, for entries at positions of it (n,)."""
+    pair = motion.mechanism.inputs[0].pair
+    given = motion.inputs[pair].position
+    low, high = float(given.min()), float(given.max())
+    turns = relative_motions(motion.mechanism)[pair].input_kind is not MeasureKind.LENGTH
+    is_whole = turns and isclose(high - low, TURN, rel_tol=1e-9)
+    is_cyclic = is_whole and whole_turns(motion, pair) == 1
+    if is_whole and not is_cyclic:
+        every = np.concatenate(inputs)
+        low, high = min(low, float(every.min())), max(high, float(every.max()))
+    return InputRange(pair, low, high, is_whole, is_cyclic, turns)
