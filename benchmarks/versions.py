@@ -17,10 +17,21 @@ LIBRARIES = ("numpy", "casadi", "llvmlite", "scipy", "networkx")
 
 def versions() -> str:
     """One line: planar, Python, the libraries that do the work, the peers, the C compiler, the processor."""
+    return f"{_own_versions()}; {peers.versions()}; {compiler_version()}; {_machine()}"
+
+
+def planar_versions() -> str:
+    """One line without the compiler and the peers."""
+    return f"{_own_versions()}; {_machine()}"
+
+
+def _own_versions() -> str:
     libraries = ", ".join(f"{name} {version(name)}" for name in LIBRARIES if find_spec(name))
-    machine = f"{_processor()}, {cpu_count()} cores"
-    python = f"planar {planar.__version__}, Python {platform.python_version()}, {libraries}"
-    return f"{python}; {peers.versions()}; {compiler_version()}; {machine}"
+    return f"planar {planar.__version__}, Python {platform.python_version()}, {libraries}"
+
+
+def _machine() -> str:
+    return f"{_processor()}, {cpu_count()} cores"
 
 
 def _processor() -> str:

@@ -1,0 +1,81 @@
+"""By how much a path misses places: the one metric in which all linkages of this benchmark are compared.
+
+The miss of a place is its distance from the path, which may be met anywhere; what is stated is the root mean square of
+the misses and the greatest, both in % of the diagonal of the places' bounding box.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+import planar
+from planar.foundation.jets import TURN
+from planar.solving.grids.grid_motion import motion_over_input
+
+Array = np.ndarray
+
+STEPS = 3600
+"""Of a path: its chords are off a smooth one by 4e-7 of its extent or so."""
+WHOLE = 1e-9
+
+
+class Misses(NamedTuple):
+    """Of places (n, 2) from a path: root mean square and greatest, in % of the places' extent."""
+
+    rms: float
+    greatest: float
+
+
+def extent(places: Array) -> float:
+    """The diagonal of the bounding box of places (n, 2)."""
+    return float(np.hypot(*np.ptp(places, axis=0)))
+
+
+def path_of(mechanism: planar.Mechanism, point: str, steps: int = STEPS) -> Array:
+    """The path (n, 2) of a point over all of the motion that the first input makes, from end to end on one branch.
+
+    So many positions stand at equal ways along it, where it is fast beside the input, too; half as many are even in the
+    input, for its cusps.
+    """
+    running = mechanism.inputs[0].pair
+    motion = planar.cycle(mechanism, steps // 2, pair=running)
+    given, path = motion.inputs[running].position, np.asarray(motion.point(point).position)
+    if not is_whole_turn(mechanism, motion):  # close at both ends, which are dead points
+        low, high = float(given.min()), float(given.max())
+        given = low + (high - low) * 0.5 * (1.0 - np.cos(np.linspace(0.0, np.pi, steps // 2 + 1)))[1:-1]
+        path = np.asarray(motion_over_input(mechanism, given).point(point).position)
+    way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(path, axis=0).T))])
+    if way[-1] == 0.0:
+        return path
+    fast = np.interp(np.linspace(0.0, way[-1], steps + 1)[1:-1], way, given)
+    every = np.unique(np.concatenate([given, fast]))
+    return np.asarray(motion_over_input(mechanism, every).point(point).position)
+
+
+def is_whole_turn(mechanism: planar.Mechanism, motion: planar.Motion) -> bool:
+    """Whether the first input of a motion makes a whole turn."""
+    running = mechanism.inputs[0].pair
+    turns = not any(isinstance(pair, planar.SlidingPair) and pair.name == running for pair in mechanism.pairs)
+    return turns and float(np.ptp(motion.inputs[running].position)) > TURN * (1.0 - WHOLE)
+
+
+def distances(path: Array, places: Array) -> Array:
+    """How far places (n, 2) are from a path of straight chords (m, 2): (n,), and (n, chords) for each chord."""
+    return chord_distances(path, places).min(axis=1)
+
+
+def chord_distances(path: Array, places: Array) -> Array:
+    """How far each of places (n, 2) is from each chord of a path (m, 2): (n, m - 1)."""
+    first, along = path[:-1], np.diff(path, axis=0)
+    squares = np.maximum(np.sum(along**2, axis=1), np.finfo(float).tiny)
+    apart = places[:, None] - first
+    share = np.clip(np.sum(apart * along, axis=2) / squares, 0.0, 1.0)
+    return np.linalg.norm(apart - share[..., None] * along, axis=2)
+
+
+def misses(path: Array, places: Array) -> Misses:
+    """Of places (n, 2) from a path (m, 2)."""
+    off = distances(path, places) / extent(places) * 100.0
+    return Misses(float(np.sqrt(np.mean(off**2))), float(off.max()))
