@@ -21,7 +21,9 @@ class CompiledRows:
 
     def __init__(self, rows: EntryRows, unknowns: Sequence[int], given: Sequence[int]):
         self.unknowns, self.given, self.count = tuple(unknowns), tuple(given), rows.count
-        x, q, dq = (ca.SX.sym(name, many) for name, many in (("x", len(unknowns)), ("q", len(given)), ("dq", len(given))))
+        x, q, dq = (
+            ca.SX.sym(name, many) for name, many in (("x", len(unknowns)), ("q", len(given)), ("dq", len(given)))
+        )
         values = {number: x[k] for k, number in enumerate(unknowns)}
         values |= {number: q[k] for k, number in enumerate(given)}
         f = ca.vertcat(*_expressions(rows, values))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
 from planar.foundation.geometry import Frame
@@ -164,5 +163,3 @@ def turned_link(pose: ReferencePose, name: str) -> str:
 def _frame(link: MovingLink, name: str) -> Frame:
     origin, way = point(link.translation), point(link.turn)
     return Frame(origin.x, origin.y, way.x, way.y, AngleSum({name: 1}))
-
-

@@ -113,7 +113,10 @@ class ExactProblem:
             tuple(row.substitute(values) for row in each.rows.rows),
             tuple(type(row)(*(part.substitute(values) for part in row)) for row in each.rows.linear),
             each.rows.turn,
-            tuple(type(s)(s.symbol, s.numerator.substitute(values), s.denominator.substitute(values)) for s in each.rows.steps),
+            tuple(
+                type(s)(s.symbol, s.numerator.substitute(values), s.denominator.substitute(values))
+                for s in each.rows.steps
+            ),
         )
         return each._replace(rows=rows)
 

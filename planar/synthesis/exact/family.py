@@ -48,25 +48,30 @@ class Family(NamedTuple):
         return Member(tuple(_random_numbers(rng, each) for each in self.parts))
 
     def rows_at(
-        self, x: ComplexArray, begin: Member, change: Sequence[ComplexArray], way: ComplexArray
+        self,
+        x: ComplexArray,
+        begin: Member,
+        change: Sequence[ComplexArray],
+        way: ComplexArray,
+        turns_are_straight: bool = False,
     ) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
         """Rows (rows, paths), Jacobian (rows, unknowns, paths) and derivative along the way (rows, paths) of solutions
-        x (unknowns, paths), where numbers have gone a part `way` (paths,) of their change."""
+        x (unknowns, paths), where numbers have gone a part `way` (paths,) of their change; of turns the angle, or e
+        itself on a straight way."""
         many = x.shape[1]
         found = []
         first: tuple[list[ComplexArray], list[ComplexArray]] = ([], [])
         for k, part in enumerate(self.parts):
-            q, dq = _values(part, begin.parts[k], change[k], way)
+            q, dq = _values(part, begin.parts[k], change[k], way, turns_are_straight)
             if k == 0:
                 first = ([each[0] for each in q], [each[0] for each in dq])
             if not part.rows.count:
                 continue
             own = (q, dq) if k else ([], [])
-            f, slope, along = part.rows.evaluate(
-                [*x], [*first[0], *own[0]], [*first[1], *own[1]], (part.count, many)
-            )
+            f, slope, along = part.rows.evaluate([*x], [*first[0], *own[0]], [*first[1], *own[1]], (part.count, many))
             rows = part.rows.count * part.count
-            found.append((f.reshape(rows, many), slope.swapaxes(1, 2).reshape(rows, -1, many), along.reshape(rows, many)))
+            slope = slope.swapaxes(1, 2).reshape(rows, -1, many)
+            found.append((f.reshape(rows, many), slope, along.reshape(rows, many)))
         return tuple(np.concatenate(each) for each in zip(*found, strict=True))  # type: ignore[return-value]
 
 
@@ -82,13 +87,18 @@ def _random_numbers(rng: np.random.Generator, part: FamilyPart) -> ComplexArray:
 
 
 def _values(
-    part: FamilyPart, begin: ComplexArray, change: ComplexArray, way: ComplexArray
+    part: FamilyPart, begin: ComplexArray, change: ComplexArray, way: ComplexArray, turns_are_straight: bool
 ) -> tuple[list[ComplexArray], list[ComplexArray]]:
     """What stands for the symbols of a part, conjugates beside them, and their derivatives: (entries, paths) each."""
     value = begin[..., None] + change[..., None] * way
     step = np.broadcast_to(change[..., None], value.shape)
     turns = [k for k, kind in enumerate(part.kinds) if kind is NumberKind.TURN]
-    if turns:
+    if turns and turns_are_straight:
+        step = step.copy()
+        value[:, turns, 0] = np.exp(1j * begin[:, turns, 0])[..., None] + change[:, turns, 0][..., None] * way
+        value[:, turns, 1] = 1.0 / value[:, turns, 0]
+        step[:, turns, 1] = -step[:, turns, 0] * value[:, turns, 1] ** 2
+    elif turns:
         step = step.copy()
         angle = 1j * value[:, turns, 0]
         value[:, turns, 0], value[:, turns, 1] = np.exp(angle), np.exp(-angle)

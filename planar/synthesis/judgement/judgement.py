@@ -55,6 +55,7 @@ class DesignJudge:
             return self._unreached(inputs, f"it cannot be solved: {problem}")
         given = motion.inputs[running].position
         is_whole = _turns(mechanism) and float(np.ptp(given)) > TURN * (1.0 - 1e-9)
+        inputs = [_by_whole_turns(each, given) if _turns(mechanism) else each for each in inputs]
         defects = [*self._branch_defects(mechanism, motion, is_whole, inputs)]
         if defects:
             return self._unreached(inputs, *defects)
@@ -268,6 +269,13 @@ def _at_entry(wanted: Wanted, entry: int, many: int) -> Wanted:
     if isinstance(wanted, WantedPath):
         return wanted._replace(places=places)
     return wanted._replace(places=places, angles=np.broadcast_to(wanted.angles[entry], (many,)))
+
+
+def _by_whole_turns(inputs: Array, given: Array) -> Array:
+    """Angles of an input, each by whole turns where it is nearest to the middle of the range that runs."""
+    middle = 0.5 * float(given.min() + given.max())
+    found: Array = inputs - TURN * np.round((inputs - middle) / TURN)
+    return found
 
 
 def _brought_into(inputs: Array, given: Array, is_whole: bool) -> Array:
