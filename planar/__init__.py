@@ -125,6 +125,7 @@ if TYPE_CHECKING:
     from planar.structures.symmetry import ChainSymmetry
     from planar.synthesis.cognates.cognate_inputs import CognateInput
     from planar.synthesis.cognates.cognates import Cognate, Cognates, cognates
+    from planar.synthesis.exact.complete_synthesis import CompleteSynthesis, DyadCurve, ExactDesign
     from planar.synthesis.synthesis import Synthesis, SynthesisedDesign
     from planar.synthesis.synthesise import synthesise
     from planar.synthesis.task.synthesis_task import Demands, SynthesisTask, WantedFunction, WantedPath, WantedPoses
@@ -166,6 +167,7 @@ __all__ = [
     "Cognate",
     "CognateInput",
     "Cognates",
+    "CompleteSynthesis",
     "ConditionSet",
     "ConditionTerm",
     "Conflict",
@@ -182,7 +184,9 @@ __all__ = [
     "Drive",
     "Dwell",
     "DwellSegment",
+    "DyadCurve",
     "Each",
+    "ExactDesign",
     "Extreme",
     "Extremes",
     "FileUnits",

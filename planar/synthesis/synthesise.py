@@ -6,7 +6,7 @@ import os
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from time import monotonic
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, overload
 
 import numpy as np
 
@@ -23,6 +23,9 @@ from planar.synthesis.task.freedom import count_freedom
 from planar.synthesis.task.starts import start_mechanisms
 from planar.synthesis.task.synthesis_task import SynthesisTask
 from planar.synthesis.task.task_reader import read_task
+
+if TYPE_CHECKING:
+    from planar.synthesis.exact.complete_synthesis import CompleteSynthesis
 
 DRAWS = 6000
 """Of designs at random for a catalogue."""
@@ -46,9 +49,27 @@ class SearchProgress(NamedTuple):
     best: float
 
 
+@overload
 def synthesise(
     task: Mapping[str, Any] | str | os.PathLike[str] | SynthesisTask,
     *,
+    complete: Literal[True],
+    progress: Callable[[SearchProgress], None] | None = None,
+) -> CompleteSynthesis: ...
+@overload
+def synthesise(
+    task: Mapping[str, Any] | str | os.PathLike[str] | SynthesisTask,
+    *,
+    complete: Literal[False] = False,
+    many: int = 10,
+    seed: int = 0,
+    time_limit: float | None = None,
+    progress: Callable[[SearchProgress], None] | None = None,
+) -> Synthesis: ...
+def synthesise(
+    task: Mapping[str, Any] | str | os.PathLike[str] | SynthesisTask,
+    *,
+    complete: bool = False,
     many: int = 10,
     seed: int = 0,
     time_limit: float | None = None,
@@ -61,7 +82,10 @@ def synthesise(
     turned they are, are fitted by least squares on exact derivatives. `many` is how many designs are told; the same
     `seed` gives the same ones. A search that has taken the `time_limit` (s) begins nothing new.
 
-    Raises BadInput with the place in the task's file.
+    With `complete` all linkages of one start are found that meet exactly as much as it can meet, each certified where
+    python-flint is there; `many`, `seed` and `time_limit` are not for that.
+
+    Raises BadInput with the place in the task's file, and where no complete list can be made.
 
     >>> import planar
     >>> task = {"planar": 1, "units": {"length": "mm", "angle": "deg"}, "start": "four-bar", "wanted": [{"point": "E",
@@ -71,6 +95,12 @@ def synthesise(
     (True, ())
     """
     known = read_task(task)
+    if complete:
+        from planar.synthesis.exact.exact_synthesis import synthesise_all
+
+        if (many, seed, time_limit) != (10, 0, None):
+            raise BadInput("complete", "a complete list is one, whole: leave many, seed and time_limit out")
+        return synthesise_all(known, progress and (lambda said: progress(SearchProgress(said, 0, 0.0))))
     count = check_whole_number("many", many, 1, 1000)
     end = None if time_limit is None else monotonic() + time_limit
     search = _TaskSearch(known, count, check_whole_number("seed", seed, 0), end)

@@ -20,7 +20,7 @@ class CompiledRows:
     """Rows f(x, q): `unknowns` are the numbers of the symbols x, `given` those of q, conjugates each on its own."""
 
     def __init__(self, rows: EntryRows, unknowns: Sequence[int], given: Sequence[int]):
-        self.unknowns, self.given, self.count = tuple(unknowns), tuple(given), rows.count
+        self.unknowns, self.given, self.count = tuple(unknowns), tuple(given), rows.equation_count
         x, q, dq = (
             ca.SX.sym(name, many) for name, many in (("x", len(unknowns)), ("q", len(given)), ("dq", len(given)))
         )
@@ -33,7 +33,7 @@ class CompiledRows:
         "f, its Jacobian in x, and its derivative where q changes by dq"
 
     @cached_property
-    def _numpy(self) -> tuple[NumpyFunction, list[tuple[int, ...]]]:
+    def _numpy(self) -> tuple[NumpyFunction, list[tuple[int, int]]]:
         listing: InstructionList[tuple[str, int]] = InstructionList()
         inputs = [
             [listing.add_input((name, k)) for k in range(self.function.numel_in(n))]
@@ -86,4 +86,5 @@ def _expressions(rows: EntryRows, values: dict[int, ca.SX]) -> list[ca.SX]:
 def _real(row: Any, values: dict[int, ca.SX]) -> ca.SX:
     """A row with real coefficients: itself, or i times it."""
     first = next(iter(row.terms.values()))
-    return (row if abs(first.imag) < abs(first.real) else row * 1j).expression(values)
+    found: ca.SX = (row if abs(first.imag) < abs(first.real) else row * 1j).expression(values)
+    return found

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
+
+import numpy as np
 
 from planar.foundation.arrays import Array
 from planar.model.wording import count_phrase
@@ -29,7 +30,8 @@ class DyadCurve:
 
     `circle_points` (n, 2) are places of the `joint` at the first pose, `centre_points` (n, 2) those of its fixed
     `pivot` (m), not numbers between parts of a curve. Where two parameters are open every place of the joint will do,
-    and none stand here; `centres` gives the pivots (n, 2) of any places (n, 2) of the joint.
+    and none stand here; `centres` gives the pivots that go with them. `rows` (poses - 1, 3, 3): (1, x, y) of the joint
+    times this times (1, x, y) of the pivot vanishes; none where the pivot is a line.
     """
 
     pivot: str
@@ -37,7 +39,19 @@ class DyadCurve:
     dimension: int
     circle_points: Array = field(repr=False)
     centre_points: Array = field(repr=False)
-    centres: Callable[[Array], Array] = field(repr=False)
+    rows: Array = field(repr=False)
+
+    def centres(self, joints: Array) -> Array:
+        """The fixed pivots (n, 2) m that go with places of the joint at the first pose (n, 2) m; by least squares where
+        these are none of the curve."""
+        places = np.atleast_2d(np.asarray(joints, float))
+        found = np.full(places.shape, np.nan)
+        known = np.isfinite(places).all(axis=1)
+        if len(self.rows) < 2:
+            return found
+        whole = np.einsum("na,rab->nrb", np.insert(places[known], 0, 1.0, axis=1), self.rows)
+        found[known] = -np.einsum("nij,nj->ni", np.linalg.pinv(whole[:, :, 1:]), whole[:, :, 0])
+        return found
 
 
 @dataclass(frozen=True, eq=False)

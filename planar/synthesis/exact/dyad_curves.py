@@ -8,6 +8,9 @@ meets it in two more.
 
 from __future__ import annotations
 
+from dataclasses import replace
+from functools import cached_property
+
 import numpy as np
 
 from planar.foundation.arrays import Array, ComplexArray
@@ -25,17 +28,15 @@ BREAK = 2.0
 def dyad_curve(problem: ExactProblem, component: Component, x: ComplexArray | None = None) -> DyadCurve:
     """The dyads of a component: a curve or more, or the one with unknowns x."""
     dyad = _Dyad(problem, component)
+    none: Array = np.zeros((0, 2))
+    joints: Array = none
+    dimension = component.freedom
     if x is not None:
-        joint, pivot = dyad.places_of(x)
-        return DyadCurve(dyad.pivot_name, dyad.joint_name, 0, joint[None], pivot[None], dyad.centres)
-    if component.freedom > 1:
-        return DyadCurve(
-            dyad.pivot_name, dyad.joint_name, component.freedom, np.zeros((0, 2)), np.zeros((0, 2)), dyad.centres
-        )
-    joints = dyad.trace()
-    return DyadCurve(
-        dyad.pivot_name, dyad.joint_name, 1, dyad.to_world(joints), dyad.to_world(dyad.pivots(joints)), dyad.centres
-    )
+        joints = dyad.to_world(np.array([[x[dyad.joint].real, x[dyad.joint].imag]]))
+    elif dimension == 1:
+        joints = dyad.to_world(dyad.trace())
+    found = DyadCurve(dyad.pivot_name, dyad.joint_name, dimension, joints, none, dyad.world_rows())
+    return replace(found, centre_points=found.centres(joints))
 
 
 class _Dyad:
@@ -64,41 +65,34 @@ class _Dyad:
         found: Array = places * self.problem.size + origin
         return found
 
-    def places_of(self, x: ComplexArray) -> tuple[Array, Array]:
-        """Joint and pivot (2,) of a solution; a pivot that slides along a line is at no place."""
-        places = [
-            self.to_world(np.array([x[k].real, x[k].imag])) if k >= 0 else np.full(2, np.nan)
-            for k in (self.joint, self.pivot)
-        ]
-        return places[0], places[1]
-
-    def _rows(self, joints: Array) -> tuple[Array, Array]:
-        """The rows (n, rows, 2) by x and y of the pivot, and the rest (n, rows), for joints (n, 2)."""
-        z = joints[:, 0] + 1j * joints[:, 1]
-        x = np.zeros((4, len(joints)), dtype=complex)
-        x[self.joint], x[self.joint + 2] = z, z.conj()
+    @cached_property
+    def rows(self) -> Array:
+        """(entries, 3, 3): (1, x, y) of the joint times this times (1, x, y) of the pivot vanishes."""
+        if self.pivot < 0:
+            return np.zeros((0, 3, 3))
+        places = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
+        z = places[:, 0] + 1j * places[:, 1]
+        x = np.zeros((4, 9), dtype=complex)
+        x[self.joint], x[self.pivot] = np.repeat(z, 3), np.tile(z, 3)
+        x[self.joint + 2], x[self.pivot + 2] = x[self.joint].conj(), x[self.pivot].conj()
         member = self.component.member
         still = [np.zeros_like(each) for each in member.parts]
-        f, slope, _ = self.component.family.rows_at(x, member, still, np.zeros(len(joints)))
-        own, other = slope[:, self.pivot], slope[:, self.pivot + 2]
-        return np.stack([(own + other).real, (1j * (own - other)).real], axis=-1).swapaxes(0, 1), f.real.T
-
-    def pivots(self, joints: Array) -> Array:
-        """The pivots (n, 2) of joints (n, 2), by least squares where rows are more than two."""
-        found = np.full(joints.shape, np.nan)
-        known = np.isfinite(joints).all(axis=1)
-        slope, rest = self._rows(joints[known])
-        found[known] = -np.einsum("nij,nj->ni", np.linalg.pinv(slope), rest)
+        values = self.component.family.rows_at(x, member, still, np.zeros(9))[0].real.reshape(-1, 3, 3)
+        back = np.array([[1.0, 0.0, 0.0], [-1.0, 1.0, 0.0], [-1.0, 0.0, 1.0]])
+        found: Array = np.einsum("ai,rij,bj->rab", back, values, back)
         return found
 
-    def centres(self, joints: Array) -> Array:
-        """The fixed pivots (n, 2) m that go with places of the joint at the first pose (n, 2) m."""
-        origin = np.array([self.problem.origin.real, self.problem.origin.imag])
-        return self.to_world(self.pivots((np.atleast_2d(joints) - origin) / self.problem.size))
+    def world_rows(self) -> Array:
+        """The same for places in m."""
+        size, origin = self.problem.size, self.problem.origin
+        moved = np.array(
+            [[1.0, -origin.real / size, -origin.imag / size], [0.0, 1.0 / size, 0.0], [0.0, 0.0, 1.0 / size]]
+        )
+        found: Array = np.einsum("ai,rij,bj->rab", moved, self.rows, moved)
+        return found
 
     def _cubic(self, joints: Array) -> Array:
-        slope, rest = self._rows(joints)
-        found: Array = np.linalg.det(np.concatenate([slope, rest[..., None]], axis=-1))
+        found: Array = np.linalg.det(np.einsum("na,rab->nrb", np.insert(joints, 0, 1.0, axis=1), self.rows))
         return found
 
     def trace(self) -> Array:

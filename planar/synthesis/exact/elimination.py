@@ -45,7 +45,7 @@ class EntryRows(NamedTuple):
     steps: tuple[Quotient, ...]
 
     @property
-    def count(self) -> int:
+    def equation_count(self) -> int:
         """How many equations they make."""
         return len(self.rows) + (len(self.linear) - 1 if self.turn else 0)
 
@@ -74,17 +74,21 @@ def eliminate(
     if len(left) > 1:
         raise refuse("its links need more than one unknown turn at a time, as those of six-bars do")
     if not left:
-        return EntryRows((*(each for row in rows for each in (row, row.conjugate)), *single), (), None, tuple(steps))
+        return EntryRows((*_with_conjugates(rows), *single), (), None, tuple(steps))
     turn = left[0]
     linear, plain = [], []
-    for row in (*(each for row in rows for each in (row, row.conjugate)), *single):
-        if {*turn} & row.symbols:
-            linear.append(_linear_row(row.with_unit(turn), turn))
+    for each in (*_with_conjugates(rows), *single):
+        if {*turn} & each.symbols:
+            linear.append(_linear_row(each.with_unit(turn), turn))
         else:
-            plain.append(row)
+            plain.append(each)
     if len(linear) < 2:
         raise refuse("its links are left free")
     return EntryRows(tuple(plain), tuple(linear), turn, tuple(steps))
+
+
+def _with_conjugates(rows: list[Polynomial]) -> list[Polynomial]:
+    return [each for row in rows for each in (row, row.conjugate)]
 
 
 def _without_translations(

@@ -46,13 +46,12 @@ def evaluate(row: Polynomial, values: Values) -> complex:
     return total
 
 
-def entry_values(problem: ExactProblem, relations: EntryRelations, numbers: ComplexArray, values: Values) -> Values:
+def entry_values(relations: EntryRelations, numbers: ComplexArray, values: Values) -> Values:
     """The values of all symbols at an entry, which gives `numbers` (numbers, 2)."""
     here = dict(values)
-    for each, (value, other) in zip(relations.numbers, numbers, strict=True):
-        if each.kind is NumberKind.TURN:
-            value, other = exp(1j * value), exp(-1j * value)
-        here[each.symbol.own], here[each.symbol.conjugate] = complex(value), complex(other)
+    for each, given in zip(relations.numbers, numbers.tolist(), strict=True):
+        value, other = (exp(1j * given[0]), exp(-1j * given[0])) if each.kind is NumberKind.TURN else given
+        here[each.symbol.own], here[each.symbol.conjugate] = value, other
     rows = relations.rows
     if rows.turn is not None:
         linear = np.array([[evaluate(part, here) for part in row] for row in rows.linear])
@@ -107,7 +106,7 @@ class _LinkageWriter:
     def _link_numbers(self, link: Link) -> dict[str, float]:
         places = self._places(link)
         if link.name == self.mechanism.frame:
-            found = {}
+            found: dict[str, float] = {}
             for name, at in places.items():
                 found |= {f"{link.name}.{name}.x": at.real, f"{link.name}.{name}.y": at.imag}
             if link.ends is not None and link.ends[1] in places:
@@ -212,7 +211,7 @@ class _LinkageWriter:
             given = self.problem.entry_numbers(wanted, relations.numbers, k > 0)
             positions: list[float] = [] if k else [start]
             for numbers in given:
-                here = entry_values(self.problem, relations, numbers, self.values)
+                here = entry_values(relations, numbers, self.values)
                 positions.append(start + self._moved(relations, running, here))
             by_item[id(wanted)] = np.array(positions)
         return tuple(by_item[id(each)] for each in self.problem.task.wanted)

@@ -53,7 +53,7 @@ class ExactProblem:
         add_given_numbers(self.pose, self.axes, self.first_slides)
         self.pose.finish()
         self.relations: tuple[EntryRelations, ...] = tuple(map(self._settled, relations))
-        self.size = wanted_size(task, _extent(self.pose, mechanism))
+        self.size = wanted_size(task, _extent(self.pose))
         self.origin = self._origin()
         self.components = self._components()
 
@@ -213,7 +213,7 @@ def _member(mechanism: Mechanism, name: str) -> tuple[str, str]:
     return moving[0]
 
 
-def _extent(pose: ReferencePose, mechanism: Mechanism) -> float:
+def _extent(pose: ReferencePose) -> float:
     lengths = [abs(each.value) for each in pose.numbers.values() if each.kind == "length" and each.path[0] == "links"]
     return max(map(float, lengths), default=1.0) or 1.0
 

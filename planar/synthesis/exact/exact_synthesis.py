@@ -198,7 +198,7 @@ def _best_design(
         try:
             linkage = exact_linkage(problem, each, f"{problem.task.name}: {problem.mechanism.name} {number}")
         except BadInput as problem_found:
-            found.append(_unwritten(problem, certified, number, f"no file could say it: {problem_found.sentence}"))
+            found.append(_unwritten(problem, certified, f"no file could say it: {problem_found.sentence}"))
             continue
         found.append(_judged(problem, judge, linkage, certified))
         if not found[-1].defects:
@@ -206,9 +206,9 @@ def _best_design(
     return min(found, key=lambda each: len(each.defects))
 
 
-def _unwritten(problem: ExactProblem, certified: bool, number: int, why: str) -> ExactDesign:
+def _unwritten(problem: ExactProblem, certified: bool, why: str) -> ExactDesign:
     none = tuple(np.full(len(each.weights), np.nan) for each in problem.task.wanted)
-    return ExactDesign(problem.mechanism, np.inf, np.inf, none, none, (why,), problem.mechanism.name, (), certified)
+    return ExactDesign(problem.mechanism, np.nan, np.nan, none, none, (why,), problem.mechanism.name, (), certified)
 
 
 def _judged(problem: ExactProblem, judge: DesignJudge, linkage: ExactLinkage, certified: bool) -> ExactDesign:

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.foundation.arrays import ComplexArray
+from planar.foundation.arrays import Array, ComplexArray
 from planar.synthesis.exact.compiled_rows import CompiledRows
 from planar.synthesis.exact.unknowns import NumberKind
 
@@ -24,11 +24,11 @@ class Member(NamedTuple):
 
 
 class FamilyPart(NamedTuple):
-    """Rows that stand once for each of `count` entries (1: conditions); `kinds` of the numbers that an entry gives."""
+    """Rows that stand once for each of `entry_count` entries (1: conditions); `kinds` of the numbers that an entry gives."""
 
     rows: CompiledRows
     kinds: tuple[NumberKind, ...]
-    count: int
+    entry_count: int
 
 
 class Family(NamedTuple):
@@ -41,7 +41,7 @@ class Family(NamedTuple):
     @property
     def row_count(self) -> int:
         """How many equations."""
-        return sum(each.rows.count * each.count for each in self.parts)
+        return sum(each.rows.count * each.entry_count for each in self.parts)
 
     def random_member(self, rng: np.random.Generator) -> Member:
         """A member with random complex numbers."""
@@ -52,7 +52,7 @@ class Family(NamedTuple):
         x: ComplexArray,
         begin: Member,
         change: Sequence[ComplexArray],
-        way: ComplexArray,
+        way: Array | ComplexArray,
         turns_are_straight: bool = False,
     ) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
         """Rows (rows, paths), Jacobian (rows, unknowns, paths) and derivative along the way (rows, paths) of solutions
@@ -68,26 +68,28 @@ class Family(NamedTuple):
             if not part.rows.count:
                 continue
             own = (q, dq) if k else ([], [])
-            f, slope, along = part.rows.evaluate([*x], [*first[0], *own[0]], [*first[1], *own[1]], (part.count, many))
-            rows = part.rows.count * part.count
+            f, slope, along = part.rows.evaluate(
+                [*x], [*first[0], *own[0]], [*first[1], *own[1]], (part.entry_count, many)
+            )
+            rows = part.rows.count * part.entry_count
             slope = slope.swapaxes(1, 2).reshape(rows, -1, many)
             found.append((f.reshape(rows, many), slope, along.reshape(rows, many)))
         return tuple(np.concatenate(each) for each in zip(*found, strict=True))  # type: ignore[return-value]
 
 
 def _random_numbers(rng: np.random.Generator, part: FamilyPart) -> ComplexArray:
-    shape = (part.count, len(part.kinds), 2)
+    shape = (part.entry_count, len(part.kinds), 2)
     found: ComplexArray = rng.normal(size=shape) + 1j * rng.normal(size=shape)
     for k, kind in enumerate(part.kinds):
         if kind is NumberKind.TURN:
-            found[:, k, 0] = rng.uniform(-np.pi, np.pi, part.count) + 0.5j * rng.normal(size=part.count)
+            found[:, k, 0] = rng.uniform(-np.pi, np.pi, part.entry_count) + 0.5j * rng.normal(size=part.entry_count)
         if kind in (NumberKind.TURN, NumberKind.LENGTH):
             found[:, k, 1] = found[:, k, 0]
     return found
 
 
 def _values(
-    part: FamilyPart, begin: ComplexArray, change: ComplexArray, way: ComplexArray, turns_are_straight: bool
+    part: FamilyPart, begin: ComplexArray, change: ComplexArray, way: Array | ComplexArray, turns_are_straight: bool
 ) -> tuple[list[ComplexArray], list[ComplexArray]]:
     """What stands for the symbols of a part, conjugates beside them, and their derivatives: (entries, paths) each."""
     value = begin[..., None] + change[..., None] * way

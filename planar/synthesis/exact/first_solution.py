@@ -22,7 +22,7 @@ def first_solution(family: Family, rng: np.random.Generator) -> tuple[Member, Co
         found = _solve(family, member, x)
         if found is not None:
             return found
-    raise NoAnswer(Outcome.NO_ASSEMBLY, "no random mechanism of this kind was found")
+    raise NoAnswer(Outcome.CANNOT_BE_ASSEMBLED, "no random mechanism of this kind was found")
 
 
 def _solve(family: Family, member: Member, x: ComplexArray) -> tuple[Member, ComplexArray] | None:
@@ -50,10 +50,10 @@ def _directions(family: Family) -> list[Member]:
     """A member of each number that may change, one where it does."""
     found = []
     for k, part in enumerate(family.parts):
-        for entry in range(part.count):
+        for entry in range(part.entry_count):
             for n, kind in enumerate(part.kinds):
                 for sides in [(0, 1)] if kind in (NumberKind.TURN, NumberKind.LENGTH) else [(0,), (1,)]:
-                    parts = [np.zeros((each.count, len(each.kinds), 2), dtype=complex) for each in family.parts]
+                    parts = [np.zeros((each.entry_count, len(each.kinds), 2), dtype=complex) for each in family.parts]
                     for side in sides:
                         parts[k][entry, n, side] = 1.0
                     found.append(Member(tuple(parts)))
@@ -63,10 +63,7 @@ def _directions(family: Family) -> list[Member]:
 def _linearise(
     family: Family, member: Member, x: ComplexArray, directions: list[Member]
 ) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
-    columns = []
     still = np.zeros(1)
-    f = slope = np.zeros(0)
-    for each in directions:
-        f, slope, along = family.rows_at(x[:, None], member, each.parts, still)
-        columns.append(along[:, 0])
+    f, slope, _ = family.rows_at(x[:, None], member, [np.zeros_like(each) for each in member.parts], still)
+    columns = [family.rows_at(x[:, None], member, each.parts, still)[2][:, 0] for each in directions]
     return f[:, 0], slope[:, :, 0], np.array(columns).T.reshape(len(f), -1)

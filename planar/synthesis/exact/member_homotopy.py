@@ -30,9 +30,7 @@ class MemberHomotopy:
             here = x[:, first - (first > 0) : first - (first > 0) + many].T
             whole[:, first] = -np.einsum("rup,up->rp", half, here) / over
             whole[:, first + 1 : first + 1 + many] = half / over
-        size = np.sqrt(
-            np.einsum("rup,rup->rp", whole.real, whole.real) + np.einsum("rup,rup->rp", whole.imag, whole.imag)
-        )
+        size = np.linalg.norm(whole, axis=1)
         scale = 1.0 / np.where(size > 0.0, size, 1.0)
         return (
             np.ascontiguousarray((f * scale).T),

@@ -40,7 +40,7 @@ def find_generic_solutions(
     enough: int | None = None,
     progress: Callable[[int], None] | None = None,
 ) -> GenericSolutions:
-    """The solutions of a random member, one of those that are `images` of each other; no more where there are `enough`."""
+    """The solutions of a random member, one of those that are `images` of each other; no more than are `enough`."""
     rng = np.random.default_rng(seed)
     member, x = first_solution(family, rng)
     graph = _MemberGraph(family, member, homogeneous_solutions(x[None]), images)

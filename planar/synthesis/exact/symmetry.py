@@ -1,4 +1,4 @@
-"""Which exchanges of unknowns leave a family's rows as they are, and a name for a family whatever its symbols' order."""
+"""Which exchanges of unknowns leave a family's rows as they are, and a name that does not depend on their order."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def name_family(family: Family) -> FamilyName:
             if best is None or key < best[0]:
                 best = key, unknowns, order
     assert best is not None
-    shape = [(part.count, [each.value for each in part.kinds]) for part in family.parts]
+    shape = [(part.entry_count, [each.value for each in part.kinds]) for part in family.parts]
     shape[0] = (1, sorted(each.value for each in given))
     text = sha256(repr((family.size, shape, best[0])).encode()).hexdigest()
     return FamilyName(text, best[1], best[2], exchanges)
@@ -118,5 +118,5 @@ def solution_keys(V: ComplexArray) -> ComplexArray:
     rng = np.random.default_rng(1)
     weights = rng.normal(size=(2, 2, half)) + 1j * rng.normal(size=(2, 2, half))
     parts = V[:, :half], V[:, half:]
-    found: ComplexArray = sum((each @ w[0]) / (each @ w[1]) for each, w in zip(parts, weights, strict=True))  # type: ignore[assignment]
+    found: ComplexArray = sum((each @ w[0]) / (each @ w[1]) for each, w in zip(parts, weights, strict=True))
     return found

@@ -8,6 +8,7 @@ s = 0 has no more than they lead to. A. Leykin, J. I. Rodriguez, F. Sottile, Tra
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -57,23 +58,23 @@ class _SliceHomotopy:
         rows, paths = f.shape
         c = self.begin.c + way[:, None] * (self.end.c - self.begin.c)
         level = self.begin.level + way * (self.end.level - self.begin.level)
-        whole = np.zeros((paths, rows + 2, 2 * n + 2), dtype=complex)
+        whole: ComplexArray = np.zeros((paths, rows + 2, 2 * n + 2), dtype=complex)
         whole[:, :rows, :n], whole[:, :rows, n] = slope[:, :n].transpose(2, 0, 1), by_s.T
         whole[:, :rows, n + 1 : 2 * n + 1] = slope[:, n:].transpose(2, 0, 1)
         whole[:, rows, : 2 * n + 1] = c
         whole[:, rows + 1, n], whole[:, rows + 1, 2 * n + 1] = 1.0, -1.0
-        left = np.zeros((paths, rows + 2), dtype=complex)
+        left: ComplexArray = np.zeros((paths, rows + 2), dtype=complex)
         left[:, :rows], left[:, rows] = f.T, np.sum(c * y[:, :-1], axis=1) - level
         left[:, rows + 1] = y[:, n] - y[:, 2 * n + 1]
-        along = np.zeros_like(left)
+        along: ComplexArray = np.zeros_like(left)
         along[:, rows] = y[:, :-1] @ (self.end.c - self.begin.c) - (self.end.level - self.begin.level)
-        found = np.empty((paths, rows + 2, 2 * n + 4), dtype=complex)
+        found: ComplexArray = np.empty((paths, rows + 2, 2 * n + 4), dtype=complex)
         for first, at in ((0, 0), (n + 1, n + 2)):
             part, over = whole[:, :, first : first + n + 1], V[:, at][:, None]
             found[:, :, at] = -np.einsum("pru,pu->pr", part, y[:, first : first + n + 1]) / over
             found[:, :, at + 1 : at + n + 2] = part / over[..., None]
         size = np.linalg.norm(found, axis=2)
-        scale = 1.0 / np.where(size > 0.0, size, 1.0)
+        scale: Array = 1.0 / np.where(size > 0.0, size, 1.0)
         return left * scale, found * scale[..., None], along * scale
 
 
@@ -142,7 +143,10 @@ def _homogeneous(x: ComplexArray) -> ComplexArray:
     return normalize(np.concatenate([one, x[:, :half], one, x[:, half:]], axis=1))
 
 
-def _is_even(points: ComplexArray, plane: _Plane, n: int, follow) -> bool:  # type: ignore[no-untyped-def]  # noqa: ANN001
+_Follow = Callable[[ComplexArray, _Plane, _Plane], tuple[ComplexArray, bool]]
+
+
+def _is_even(points: ComplexArray, plane: _Plane, n: int, follow: _Follow) -> bool:
     """Whether the sum of the points moves evenly with the plane's level."""
     sums = []
     for step in (0.0, 1.0, -1.0):

@@ -26,8 +26,13 @@ from planar.cli.streams import print_json
     metavar="FOLDER",
     help="The folder for the designs, a mechanism file and a page each, with their index.",
 )
+@click.option(
+    "--complete", is_flag=True, help="All linkages that meet exactly as much as the start can, each certified."
+)
 @json_option
-def synthesise(task: Path, many: int, seed: int, seconds: float | None, output: Path | None, as_json: bool) -> None:
+def synthesise(
+    task: Path, many: int, seed: int, seconds: float | None, output: Path | None, complete: bool, as_json: bool
+) -> None:
     """The linkages that do best what a TASK wants: paths, poses or functions, of any structure."""
     from planar.reports.tables.design.synthesis import record, table
     from planar.synthesis.synthesise import SearchProgress
@@ -39,9 +44,14 @@ def synthesise(task: Path, many: int, seed: int, seconds: float | None, output: 
 
         def show(done: SearchProgress) -> None:
             if status is not None:
-                status.update(f"{wanted.name}: {done.start} done, {done.done} in all")
+                told = done.start if complete else f"{done.start} done, {done.done} in all"
+                status.update(f"{wanted.name}: {told}")
 
-        found = search(wanted, many=many, seed=seed, time_limit=seconds, progress=show)
+        found = (
+            search(wanted, complete=True, progress=show)
+            if complete
+            else search(wanted, many=many, seed=seed, time_limit=seconds, progress=show)
+        )
     files: list[Path] = []
     if output is not None and len(found):
         from planar.document.files import dumps

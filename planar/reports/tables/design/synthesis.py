@@ -6,14 +6,17 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from rich.console import Group, RenderableType
 from rich.text import Text
 
 from planar.document.writer import write_mechanism
+from planar.foundation.arrays import Array
 from planar.model.wording import amount, count_phrase
 from planar.reports.fitted_table import FittedTable, plain_table
 from planar.reports.number_format import format_number, paragraphs
 from planar.reports.tables.design.cognates import cognate_record
+from planar.synthesis.exact.complete_synthesis import CompleteSynthesis, ExactDesign
 from planar.synthesis.synthesis import Synthesis, SynthesisedDesign
 from planar.synthesis.task.synthesis_task import WantedFunction
 
@@ -25,7 +28,9 @@ def table(found: Synthesis, files: Sequence[Path]) -> RenderableType:
     """The designs with their misses, where they are written, and the best of those rejected with the reason."""
     entries = count_phrase(found.task.entry_count, "entry is wanted", "entries are wanted")
     parts: list[RenderableType] = [Text(found.task.name, style="bold"), Text(entries), Text()]
-    if len(found):
+    if isinstance(found, CompleteSynthesis):
+        parts += [*_complete_parts(found, files), Text()]
+    elif len(found):
         parts += [_designs_table(found, files), Text()]
     if found.rejected:
         parts += [_rejected_table(found), Text()]
@@ -56,6 +61,29 @@ def _designs_table(found: Synthesis, files: Sequence[Path]) -> FittedTable:
     return rows
 
 
+def _complete_parts(found: CompleteSynthesis, files: Sequence[Path]) -> Iterator[RenderableType]:
+    """How many there are and how many were to be expected, all real ones with their defects, and curves of them."""
+    if found.expected is not None:
+        real = count_phrase(len(found), "linkage is real", "linkages are real")
+        yield Text(f"{found.found} of {found.expected} found ({found.counted}); {real}")
+    yield Text(found.complete)
+    if len(found):
+        yield Text()
+        rows = plain_table("Linkages", "no.", "certified", "greatest miss", "defects", "file", left=(3, 4), keys=1)
+        for number, each in enumerate(found, start=1):
+            sure = "yes" if isinstance(each, ExactDesign) and each.certified else "no"
+            told = "; ".join(each.defects) or "none"
+            rows.add_row(str(number), sure, _misses(found, each)[0], told, str(files[number - 1]) if files else "")
+        yield rows
+    if found.curves:
+        yield Text()
+        rows = plain_table("Dyads", "pivot", "joint", "open parameters", "places told", left=(0, 1), keys=2)
+        for curve in found.curves:
+            places = int(np.isfinite(curve.circle_points).all(axis=1).sum())
+            rows.add_row(curve.pivot, curve.joint, str(curve.dimension), str(places))
+        yield rows
+
+
 def _rejected_table(found: Synthesis) -> FittedTable:
     rows = plain_table("Rejected", "start", "greatest miss", "defects", left=(0, 2), keys=1)
     for each in found.rejected[:MAX_REJECTED]:
@@ -77,7 +105,8 @@ def _kind(found: Synthesis) -> str:
 
 
 def _remarks(found: Synthesis) -> Iterator[str]:
-    yield "judged by the general path: every entry on one branch of the motion, in its order where that is wanted"
+    if len(found) or found.rejected:
+        yield "judged by the general path: every entry on one branch of the motion, in its order where that is wanted"
     if len(found.rejected) > MAX_REJECTED:
         yield f"{len(found.rejected) - MAX_REJECTED} more were rejected; --json lists them"
     yield from found.remarks
@@ -85,6 +114,7 @@ def _remarks(found: Synthesis) -> Iterator[str]:
 
 def record(found: Synthesis, files: Sequence[Path]) -> dict[str, Any]:
     """The designs as JSON values, SI."""
+    whole = _complete_record(found) if isinstance(found, CompleteSynthesis) else {}
     return {
         "task": found.task.name,
         "size": found.size,
@@ -96,7 +126,31 @@ def record(found: Synthesis, files: Sequence[Path]) -> dict[str, Any]:
         ],
         "rejected": [_design_record(each) for each in found.rejected],
         "remarks": list(found.remarks),
+        **whole,
     }
+
+
+def _complete_record(found: CompleteSynthesis) -> dict[str, Any]:
+    return {
+        "expected": found.expected,
+        "found": found.found,
+        "complete": found.complete,
+        "counted": found.counted,
+        "curves": [
+            {
+                "pivot": each.pivot,
+                "joint": each.joint,
+                "dimension": each.dimension,
+                "circle_points": _points(each.circle_points),
+                "centre_points": _points(each.centre_points),
+            }
+            for each in found.curves
+        ],
+    }
+
+
+def _points(places: Array) -> list[list[float] | None]:
+    return [each.tolist() if np.isfinite(each).all() else None for each in places]
 
 
 def _design_record(design: SynthesisedDesign) -> dict[str, Any]:
@@ -106,7 +160,8 @@ def _design_record(design: SynthesisedDesign) -> dict[str, Any]:
         "error": design.error if is_known else None,
         "greatest_miss": design.greatest_miss if is_known else None,
         "misses": [each.tolist() if is_known else None for each in design.misses],
-        "inputs": [each.tolist() for each in design.inputs],
+        "inputs": [[float(at) if np.isfinite(at) else None for at in each] for each in design.inputs],
         "defects": list(design.defects),
+        **({"certified": design.certified} if isinstance(design, ExactDesign) else {}),
         "mechanism": write_mechanism(design.mechanism),
     }
