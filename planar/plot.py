@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from planar.results.motion import Motion, State
     from planar.structures.chain import Chain
     from planar.synthesis.cognates.cognates import Cognates
+    from planar.synthesis.exact.complete_synthesis import CompleteSynthesis
 
     Drawing = Figure | list[Figure]
     """One figure, or several sheets."""
@@ -46,6 +47,7 @@ __all__ = [
     "circuits",
     "cognates",
     "diagrams",
+    "dyad_curves",
     "forces",
     "loci",
     "modes",
@@ -230,6 +232,23 @@ def cognates(found: Cognates | Mechanism, of: str | None = None, scale: ScaleTex
         found = first_cognates(found) if of is None else all_cognates(found, of)
     heading = f"{found.mechanism.name}: cognates of the path of {found.point}"
     return draw_pictures(cognate_pictures(found, _length_scale(scale, found)), heading)
+
+
+def dyad_curves(found: CompleteSynthesis, scale: ScaleTexts = None) -> Figure:
+    """Burmester's curves of a task with four poses: where the joints of the link may be, and their fixed pivots.
+
+    Raises BadInput where what was found has no curve of dyads.
+    """
+    from planar.drawing.diagrams.dyad_drawing import dyad_pictures
+    from planar.foundation.errors import BadInput
+    from planar.synthesis.exact.complete_synthesis import CompleteSynthesis
+
+    if not isinstance(found, CompleteSynthesis):
+        raise BadInput("found", f"what planar.synthesise(..., complete=True) gives is wanted here, not {found!r:.60}")
+    pictures = dyad_pictures(found, parse_scales(scale, ["length"], found.task.units).get("length"))
+    if not pictures:
+        raise BadInput("found", "there is no curve of dyads; four poses of a link leave one")
+    return draw_pictures(pictures, f"{found.task.name}: dyads for the poses")
 
 
 @takes_result("Forces", "State")
