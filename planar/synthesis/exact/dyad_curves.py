@@ -108,17 +108,16 @@ class _Dyad:
             root = np.sqrt(spread)
             both = [(-c1 + sign * root) / (2.0 * c2) for sign in (-1.0, 1.0)]
         near, far = (start + each[:, None] * way for each in both)
-        # after half a turn the one root goes on as the other
-        turn: Array = np.concatenate([near[:-1], far[:-1]])
-        real = np.isfinite(turn).all(axis=1)
+        # after half a turn both are again where they were
+        real = np.isfinite(near).all(axis=1)
+        none = np.full((1, 2), np.nan)
         if real.all():
-            return _broken(np.concatenate([turn, turn[:1]]))
+            return _broken(np.concatenate([near, none, far]))
         gap = int(np.argmin(real))
-        turn, real = np.roll(turn, -gap, axis=0), np.roll(real, -gap)
+        near, far, real = (np.roll(each[:-1], -gap, axis=0) for each in (near, far, real))
         pieces = []
-        for first, last in _runs(real[:DIRECTIONS]):
-            own, other = turn[first:last], turn[first + DIRECTIONS : last + DIRECTIONS]
-            pieces += [own, other[::-1], own[:1], np.full((1, 2), np.nan)]
+        for first, last in _runs(real):
+            pieces += [near[first:last], far[first:last][::-1], near[first : first + 1], none]
         return _broken(np.concatenate(pieces)) if pieces else start[None]
 
     def _one_place(self) -> Array:
