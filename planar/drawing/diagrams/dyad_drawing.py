@@ -1,4 +1,4 @@
-"""Burmester's curves on paper: where a joint of a link may be at its first pose, and its fixed pivot, with the poses."""
+"""Burmester's curves on paper: where a joint may be at the first pose, and its fixed pivot, with the poses."""
 
 from __future__ import annotations
 

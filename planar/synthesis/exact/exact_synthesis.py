@@ -27,7 +27,14 @@ from planar.synthesis.exact.member_solutions import MemberSolutions, solve_membe
 from planar.synthesis.exact.symmetry import FamilyName, exchange_images, reordered
 from planar.synthesis.judgement.judgement import DesignJudge
 from planar.synthesis.task.starts import start_mechanisms
-from planar.synthesis.task.synthesis_task import ChainStart, SynthesisTask, Wanted, WantedFunction, WantedPath
+from planar.synthesis.task.synthesis_task import (
+    ChainStart,
+    SynthesisTask,
+    Wanted,
+    WantedFunction,
+    WantedPath,
+    WantedPoses,
+)
 
 REAL = 1e-7
 """Of a solution's size: one that differs from its own conjugate by less is real."""
@@ -86,7 +93,8 @@ def _check_freedom(problem: ExactProblem) -> None:
         told = f"{count_phrase(-least, 'condition')} more than {problem.mechanism.name!r} can meet exactly"
         raise BadInput("$.wanted", f"what is wanted sets {told} with the numbers that are free")
     left = [each for each in problem.components if each.freedom > 0]
-    if left and not all(_is_dyad(each) for each in left):
+    is_for_poses = len(problem.items) == 1 and isinstance(problem.items[0], WantedPoses)
+    if left and not (is_for_poses and all(_is_dyad(each) for each in left)):
         most = max(each.freedom for each in left)
         raise BadInput(
             "$.wanted",

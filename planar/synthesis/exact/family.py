@@ -24,7 +24,7 @@ class Member(NamedTuple):
 
 
 class FamilyPart(NamedTuple):
-    """Rows that stand once for each of `entry_count` entries (1: conditions); `kinds` of the numbers that an entry gives."""
+    """Rows that stand once for each entry (one: conditions); `kinds` of the numbers that an entry gives."""
 
     rows: CompiledRows
     kinds: tuple[NumberKind, ...]
