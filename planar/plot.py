@@ -111,11 +111,8 @@ def centres(
 
     found = all_centres(state)
     shown = choose_centres(found, links)
-    pictures = [
-        centres_picture(found, shown, _length_scale(scale, state), DEFAULT_REACH if reach is None else reach),
-        circle_picture(found, shown),
-    ]
-    return draw_pictures(pictures, state.mechanism.name)
+    drawn = centres_picture(found, shown, _length_scale(scale, state), DEFAULT_REACH if reach is None else reach)
+    return draw_pictures([drawn, circle_picture(found, shown)], state.mechanism.name)
 
 
 @takes_result("Calibration")
@@ -225,30 +222,18 @@ def cognates(found: Cognates | Mechanism, of: str | None = None, scale: ScaleTex
     point has any, Unknown for one that is not there, and what `planar.cognates` raises.
     """
     from planar.drawing.diagrams.cognate_drawing import cognate_pictures
-    from planar.synthesis.cognates.cognates import Cognates, first_cognates
-    from planar.synthesis.cognates.cognates import cognates as all_cognates
+    from planar.synthesis.cognates.cognates import cognates_of
 
-    if not isinstance(found, Cognates):
-        found = first_cognates(found) if of is None else all_cognates(found, of)
-    heading = f"{found.mechanism.name}: cognates of the path of {found.point}"
-    return draw_pictures(cognate_pictures(found, _length_scale(scale, found)), heading)
+    of_all = cognates_of(found, of)
+    heading = f"{of_all.mechanism.name}: cognates of the path of {of_all.point}"
+    return draw_pictures(cognate_pictures(of_all, _length_scale(scale, of_all)), heading)
 
 
 def dyad_curves(found: CompleteSynthesis, scale: ScaleTexts = None) -> Figure:
-    """Burmester's curves of a task with four poses: where the joints of the link may be, and their fixed pivots.
-
-    Raises BadInput where what was found has no curve of dyads.
-    """
+    """Burmester's curves of four poses: where joints may be, and their pivots. Raises BadInput where there is none."""
     from planar.drawing.diagrams.dyad_drawing import dyad_pictures
-    from planar.foundation.errors import BadInput
-    from planar.synthesis.exact.complete_synthesis import CompleteSynthesis
 
-    if not isinstance(found, CompleteSynthesis):
-        raise BadInput("found", f"what planar.synthesise(..., complete=True) gives is wanted here, not {found!r:.60}")
-    pictures = dyad_pictures(found, parse_scales(scale, ["length"], found.task.units).get("length"))
-    if not pictures:
-        raise BadInput("found", "there is no curve of dyads; four poses of a link leave one")
-    return draw_pictures(pictures, f"{found.task.name}: dyads for the poses")
+    return draw_pictures(*dyad_pictures(found, scale))
 
 
 @takes_result("Forces", "State")
@@ -342,12 +327,10 @@ def tolerance(
     from planar.model.mechanism import Mechanism
     from planar.solving.cycle import cycle
 
-    if isinstance(moving, ToleranceBand):
-        band = moving
-    else:
-        run = cycle(moving) if isinstance(moving, Mechanism) else moving
-        band = find_band(run, of or next(iter(run.mechanism.inputs)).pair, result=result)
-    return draw_pictures(tolerance_pictures(band, _length_scale(scale, band.moving)))
+    run = cycle(moving) if isinstance(moving, Mechanism) else moving
+    if not isinstance(run, ToleranceBand):
+        run = find_band(run, of or next(iter(run.mechanism.inputs)).pair, result=result)
+    return draw_pictures(tolerance_pictures(run, _length_scale(scale, run.moving)))
 
 
 @takes_result("Motion", "Simulation", "Mechanism")

@@ -7,11 +7,11 @@ import pytest
 
 import planar
 from planar.foundation.jets import value_and_rates
-from planar.synthesis.exact.exact_certificates import certify_member
-from planar.synthesis.exact.exact_problem import ExactProblem
-from planar.synthesis.exact.generic_store import family_record
-from planar.synthesis.exact.member_homotopy import affine_solutions
-from planar.synthesis.exact.symmetry import name_family
+from planar.synthesis.exact.relations.exact_problem import ExactProblem
+from planar.synthesis.exact.tracking.exact_certificates import certify_member
+from planar.synthesis.exact.tracking.generic_store import family_record
+from planar.synthesis.exact.tracking.member_homotopy import affine_solutions
+from planar.synthesis.exact.tracking.symmetry import name_family
 from planar.synthesis.task.starts import start_mechanisms
 from tests.command import run
 

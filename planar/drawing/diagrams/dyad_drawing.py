@@ -7,8 +7,10 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from planar.drawing.paper.picture import Arrow, Label, Mark, Pen, Picture, Polyline, paper_point
-from planar.drawing.paper.scales import DRAWING_HEIGHT, DRAWING_WIDTH, Scale, round_scale
+from planar.drawing.paper.scales import DRAWING_HEIGHT, DRAWING_WIDTH, Scale, parse_scales, round_scale
+from planar.drawing.polygons.panels import ScaleTexts
 from planar.foundation.arrays import Array
+from planar.foundation.errors import BadInput
 from planar.synthesis.exact.complete_synthesis import CompleteSynthesis, DyadCurve
 from planar.synthesis.task.synthesis_task import WantedPoses
 
@@ -19,13 +21,20 @@ AXIS_LENGTH = 0.16
 CIRCLE, CENTRE = "circle points", "centre points"
 
 
-def dyad_pictures(found: CompleteSynthesis, scale: Scale | None = None) -> list[Picture]:
-    """A picture for each curve of dyads; those that are the same curve are drawn once."""
+def dyad_pictures(found: CompleteSynthesis, scale: ScaleTexts = None) -> tuple[list[Picture], str]:
+    """A picture for each curve of dyads, those that are the same once, and their heading.
+
+    Raises BadInput where there is none."""
+    if not isinstance(found, CompleteSynthesis):
+        raise BadInput("found", f"a complete list, as of synthesise(..., complete=True), is wanted, not {found!r:.60}")
+    known = parse_scales(scale, ["length"], found.task.units).get("length")
     curves: list[DyadCurve] = []
     for each in found.curves:
         if each.dimension == 1 and not any(_is_same(each, other) for other in curves):
             curves.append(each)
-    return [_picture(found, each, scale) for each in curves]
+    if not curves:
+        raise BadInput("found", "there is no curve of dyads; four poses of a link leave one")
+    return [_picture(found, each, known) for each in curves], f"{found.task.name}: dyads for the poses"
 
 
 def _is_same(one: DyadCurve, other: DyadCurve) -> bool:

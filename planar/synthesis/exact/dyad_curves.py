@@ -15,7 +15,7 @@ import numpy as np
 
 from planar.foundation.arrays import Array, ComplexArray
 from planar.synthesis.exact.complete_synthesis import DyadCurve
-from planar.synthesis.exact.exact_problem import Component, ExactProblem
+from planar.synthesis.exact.relations.exact_problem import Component, ExactProblem
 
 DIRECTIONS = 1440
 """Of lines through one place of a cubic."""

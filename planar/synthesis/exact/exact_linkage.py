@@ -13,11 +13,11 @@ from planar.document.revised.changed_numbers import with_values
 from planar.foundation.arrays import Array, ComplexArray
 from planar.model.link_shapes import Link, link_shape
 from planar.model.mechanism import Mechanism, named_points
-from planar.synthesis.exact.entry_relations import EntryRelations, turned_link
-from planar.synthesis.exact.exact_problem import ExactProblem
-from planar.synthesis.exact.polynomials import Polynomial
-from planar.synthesis.exact.reference_pose import SlidingRow
-from planar.synthesis.exact.unknowns import NumberKind
+from planar.synthesis.exact.relations.entry_relations import EntryRelations, turned_link
+from planar.synthesis.exact.relations.exact_problem import ExactProblem
+from planar.synthesis.exact.relations.polynomials import Polynomial
+from planar.synthesis.exact.relations.reference_pose import SlidingRow
+from planar.synthesis.exact.relations.unknowns import NumberKind
 
 Values = dict[int, complex]
 """Of symbols, by their numbers."""

@@ -14,17 +14,17 @@ from planar.foundation.arrays import Array, BoolArray, ComplexArray
 from planar.foundation.errors import BadInput
 from planar.model.mechanism import Mechanism
 from planar.model.wording import count_phrase
-from planar.synthesis.exact.class_members import class_members
 from planar.synthesis.exact.complete_synthesis import CompleteSynthesis, DyadCurve, ExactDesign
 from planar.synthesis.exact.dyad_curves import dyad_curve
-from planar.synthesis.exact.exact_certificates import certify_member
 from planar.synthesis.exact.exact_linkage import ExactLinkage, exact_linkage
-from planar.synthesis.exact.exact_problem import Component, ExactProblem
-from planar.synthesis.exact.family import Member
-from planar.synthesis.exact.generic_store import FamilyRecord, family_record
-from planar.synthesis.exact.member_homotopy import affine_solutions, homogeneous_solutions
-from planar.synthesis.exact.member_solutions import MemberSolutions, solve_member
-from planar.synthesis.exact.symmetry import FamilyName, exchange_images, reordered
+from planar.synthesis.exact.relations.exact_problem import Component, ExactProblem
+from planar.synthesis.exact.relations.family import Member
+from planar.synthesis.exact.tracking.class_members import class_members
+from planar.synthesis.exact.tracking.exact_certificates import certify_member
+from planar.synthesis.exact.tracking.generic_store import FamilyRecord, family_record
+from planar.synthesis.exact.tracking.member_homotopy import affine_solutions, homogeneous_solutions
+from planar.synthesis.exact.tracking.member_solutions import MemberSolutions, solve_member
+from planar.synthesis.exact.tracking.symmetry import FamilyName, exchange_images, reordered
 from planar.synthesis.judgement.judgement import DesignJudge
 from planar.synthesis.task.starts import start_mechanisms
 from planar.synthesis.task.synthesis_task import (

@@ -69,7 +69,7 @@ def _complete_parts(found: CompleteSynthesis, files: Sequence[Path]) -> Iterator
     yield Text(found.complete)
     if len(found):
         yield Text()
-        rows = plain_table("Linkages", "no.", "certified", "greatest miss", "defects", "file", left=(3, 4), keys=1)
+        rows = plain_table("Designs", "no.", "proved", "greatest miss", "defects", "file", left=(3, 4), keys=1)
         for number, each in enumerate(found, start=1):
             sure = "yes" if isinstance(each, ExactDesign) and each.certified else "no"
             told = "; ".join(each.defects) or "none"
@@ -77,7 +77,7 @@ def _complete_parts(found: CompleteSynthesis, files: Sequence[Path]) -> Iterator
         yield rows
     if found.curves:
         yield Text()
-        rows = plain_table("Dyads", "pivot", "joint", "open parameters", "places told", left=(0, 1), keys=2)
+        rows = plain_table("Dyads", "pivot", "joint", "dimension", "points", left=(0, 1), keys=2)
         for curve in found.curves:
             places = int(np.isfinite(curve.circle_points).all(axis=1).sum())
             rows.add_row(curve.pivot, curve.joint, str(curve.dimension), str(places))

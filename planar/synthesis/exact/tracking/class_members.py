@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from planar.foundation.arrays import BoolArray, ComplexArray
-from planar.synthesis.exact.exact_problem import Component
-from planar.synthesis.exact.generic_store import FamilyRecord
-from planar.synthesis.exact.member_homotopy import affine_solutions, homogeneous_solutions
-from planar.synthesis.exact.monodromy import first_of_same, follow
-from planar.synthesis.exact.symmetry import exchange_images, representatives
+from planar.synthesis.exact.relations.exact_problem import Component
+from planar.synthesis.exact.tracking.generic_store import FamilyRecord
+from planar.synthesis.exact.tracking.member_homotopy import affine_solutions, homogeneous_solutions
+from planar.synthesis.exact.tracking.monodromy import first_of_same, follow
+from planar.synthesis.exact.tracking.symmetry import exchange_images, representatives
 
 PRECISION = 1e-5
 

@@ -13,7 +13,7 @@ from planar.codegen.generic_evaluation import evaluate_function
 from planar.codegen.instructions import InstructionList
 from planar.codegen.numpy_code import NumpyFunction, compile_numpy
 from planar.foundation.arrays import ComplexArray
-from planar.synthesis.exact.elimination import EntryRows
+from planar.synthesis.exact.relations.elimination import EntryRows
 
 
 class CompiledRows:

@@ -18,8 +18,8 @@ from planar.assemblies.polynomial.krawczyk import (
     prove_box,
 )
 from planar.foundation.arrays import BoolArray, ComplexArray
-from planar.synthesis.exact.family import Family, Member
-from planar.synthesis.exact.unknowns import NumberKind
+from planar.synthesis.exact.relations.family import Family, Member
+from planar.synthesis.exact.relations.unknowns import NumberKind
 
 
 class ExactCertificates(NamedTuple):

@@ -10,14 +10,14 @@ import numpy as np
 from planar.foundation.arrays import ComplexArray
 from planar.model.mechanism import Mechanism, named_points, relative_motions
 from planar.model.pairs import MeasureKind
-from planar.synthesis.exact.compiled_rows import CompiledRows
-from planar.synthesis.exact.elimination import EntryRows
-from planar.synthesis.exact.entry_relations import EntryNumber, EntryRelations, entry_relations, turned_link
-from planar.synthesis.exact.family import Family, FamilyPart, Member
-from planar.synthesis.exact.given_numbers import KnownAxes, add_given_numbers
-from planar.synthesis.exact.polynomials import Polynomial, Symbol
-from planar.synthesis.exact.reference_pose import ReferencePose
-from planar.synthesis.exact.unknowns import NumberKind, refuse
+from planar.synthesis.exact.relations.compiled_rows import CompiledRows
+from planar.synthesis.exact.relations.elimination import EntryRows
+from planar.synthesis.exact.relations.entry_relations import EntryNumber, EntryRelations, entry_relations, turned_link
+from planar.synthesis.exact.relations.family import Family, FamilyPart, Member
+from planar.synthesis.exact.relations.given_numbers import KnownAxes, add_given_numbers
+from planar.synthesis.exact.relations.polynomials import Polynomial, Symbol
+from planar.synthesis.exact.relations.reference_pose import ReferencePose
+from planar.synthesis.exact.relations.unknowns import NumberKind, refuse
 from planar.synthesis.fitting.wanted_rows import wanted_size
 from planar.synthesis.task.starts import free_numbers
 from planar.synthesis.task.synthesis_task import SynthesisTask, Wanted, WantedFunction, WantedPath, WantedPoses

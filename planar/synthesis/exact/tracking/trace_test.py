@@ -15,11 +15,11 @@ import numpy as np
 
 from planar.assemblies.polynomial.path_tracker import HomotopyValues, is_finite_solution, normalize, track_paths
 from planar.foundation.arrays import Array, ComplexArray
-from planar.synthesis.exact.family import Family
-from planar.synthesis.exact.member_homotopy import affine_solutions
-from planar.synthesis.exact.monodromy import GenericSolutions, first_of_same
-from planar.synthesis.exact.symmetry import exchange_images
-from planar.synthesis.exact.unknowns import NumberKind
+from planar.synthesis.exact.relations.family import Family
+from planar.synthesis.exact.relations.unknowns import NumberKind
+from planar.synthesis.exact.tracking.member_homotopy import affine_solutions
+from planar.synthesis.exact.tracking.monodromy import GenericSolutions, first_of_same
+from planar.synthesis.exact.tracking.symmetry import exchange_images
 
 MAX_POINTS = 1500
 """Of a slice; with more the test is not made."""

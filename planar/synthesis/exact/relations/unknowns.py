@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 
 from planar.foundation.errors import BadInput
-from planar.synthesis.exact.polynomials import Symbol, symbol
+from planar.synthesis.exact.relations.polynomials import Symbol, symbol
 
 
 class NumberKind(Enum):

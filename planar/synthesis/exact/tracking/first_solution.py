@@ -6,8 +6,8 @@ import numpy as np
 
 from planar.foundation.arrays import ComplexArray
 from planar.foundation.errors import NoAnswer, Outcome
-from planar.synthesis.exact.family import Family, Member
-from planar.synthesis.exact.unknowns import NumberKind
+from planar.synthesis.exact.relations.family import Family, Member
+from planar.synthesis.exact.relations.unknowns import NumberKind
 
 TRIES, STEPS = 200, 60
 CLOSED = 1e-12

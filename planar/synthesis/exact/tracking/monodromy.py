@@ -13,10 +13,10 @@ import numpy as np
 
 from planar.assemblies.polynomial.path_tracker import PathEnds, normalize, track_paths
 from planar.foundation.arrays import BoolArray, ComplexArray, IntArray
-from planar.synthesis.exact.family import Family, Member
-from planar.synthesis.exact.first_solution import first_solution
-from planar.synthesis.exact.member_homotopy import MemberHomotopy, homogeneous_solutions
-from planar.synthesis.exact.symmetry import Images, representatives, solution_keys
+from planar.synthesis.exact.relations.family import Family, Member
+from planar.synthesis.exact.tracking.first_solution import first_solution
+from planar.synthesis.exact.tracking.member_homotopy import MemberHomotopy, homogeneous_solutions
+from planar.synthesis.exact.tracking.symmetry import Images, representatives, solution_keys
 
 FIRST_NODES, IDLE_NODES = 4, 2
 """Members at first, and how many more must bring nothing new."""

@@ -8,10 +8,10 @@ import numpy as np
 
 from planar.assemblies.polynomial.path_tracker import SINGULAR_TOLERANCE, is_finite_solution
 from planar.foundation.arrays import BoolArray, ComplexArray
-from planar.synthesis.exact.family import Family, Member
-from planar.synthesis.exact.member_homotopy import affine_solutions
-from planar.synthesis.exact.monodromy import GenericSolutions, first_of_same, follow
-from planar.synthesis.exact.symmetry import Images, representatives
+from planar.synthesis.exact.relations.family import Family, Member
+from planar.synthesis.exact.tracking.member_homotopy import affine_solutions
+from planar.synthesis.exact.tracking.monodromy import GenericSolutions, first_of_same, follow
+from planar.synthesis.exact.tracking.symmetry import Images, representatives
 
 PRECISIONS = (1e-4, 1e-6, 1e-8)
 """How far predictions may be off; paths that are lost are followed again with the next."""

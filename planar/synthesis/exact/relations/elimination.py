@@ -13,8 +13,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from planar.synthesis.exact.polynomials import Polynomial, Symbol
-from planar.synthesis.exact.unknowns import refuse
+from planar.synthesis.exact.relations.polynomials import Polynomial, Symbol
+from planar.synthesis.exact.relations.unknowns import refuse
 
 
 class Quotient(NamedTuple):

@@ -7,10 +7,10 @@ from typing import NamedTuple
 from planar.foundation.geometry import Frame
 from planar.model.mechanism import relative_motions
 from planar.model.pairs import MeasureKind
-from planar.synthesis.exact.elimination import EntryRows, eliminate
-from planar.synthesis.exact.polynomials import AngleSum, Polynomial, Symbol, as_polynomial, point
-from planar.synthesis.exact.reference_pose import WORLD, ReferencePose
-from planar.synthesis.exact.unknowns import NumberKind, refuse
+from planar.synthesis.exact.relations.elimination import EntryRows, eliminate
+from planar.synthesis.exact.relations.polynomials import AngleSum, Polynomial, Symbol, as_polynomial, point
+from planar.synthesis.exact.relations.reference_pose import WORLD, ReferencePose
+from planar.synthesis.exact.relations.unknowns import NumberKind, refuse
 from planar.synthesis.task.synthesis_task import Wanted, WantedFunction, WantedPath
 
 

@@ -15,8 +15,8 @@ from planar.foundation.geometry import Frame, Vector
 from planar.model.link_shapes import LinkShape, PointReference, link_shape
 from planar.model.mechanism import Mechanism
 from planar.model.pairs import MeasureKind, Pair
-from planar.synthesis.exact.polynomials import AngleSum, Direction, Polynomial, Symbol, complex_row, point
-from planar.synthesis.exact.unknowns import NumberKind, SymbolTable, refuse
+from planar.synthesis.exact.relations.polynomials import AngleSum, Direction, Polynomial, Symbol, complex_row, point
+from planar.synthesis.exact.relations.unknowns import NumberKind, SymbolTable, refuse
 
 PIN_KINDS = (MeasureKind.LENGTH, MeasureKind.LENGTH)
 KNOWN_KINDS = (PIN_KINDS, (*PIN_KINDS, MeasureKind.ANGLE))

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planar.foundation.arrays import ComplexArray, IntArray
-from planar.synthesis.exact.family import Family, FamilyPart, Member
+from planar.synthesis.exact.relations.family import Family, FamilyPart, Member
 
 MAX_ORDERS = 5040
 """Orders of unknowns that are tried."""

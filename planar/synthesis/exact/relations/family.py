@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from planar.foundation.arrays import Array, ComplexArray
-from planar.synthesis.exact.compiled_rows import CompiledRows
-from planar.synthesis.exact.unknowns import NumberKind
+from planar.synthesis.exact.relations.compiled_rows import CompiledRows
+from planar.synthesis.exact.relations.unknowns import NumberKind
 
 
 class Member(NamedTuple):

@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from planar.model.link_shapes import At, Link
-from planar.synthesis.exact.polynomials import Polynomial, as_polynomial
-from planar.synthesis.exact.reference_pose import ReferencePose, SlidingRow
-from planar.synthesis.exact.unknowns import NumberKind, refuse
+from planar.synthesis.exact.relations.polynomials import Polynomial, as_polynomial
+from planar.synthesis.exact.relations.reference_pose import ReferencePose, SlidingRow
+from planar.synthesis.exact.relations.unknowns import NumberKind, refuse
 
 
 class KnownAxes(NamedTuple):

@@ -6,7 +6,7 @@ import numpy as np
 
 from planar.assemblies.polynomial.path_tracker import HomotopyValues
 from planar.foundation.arrays import Array, ComplexArray
-from planar.synthesis.exact.family import Family, Member
+from planar.synthesis.exact.relations.family import Family, Member
 
 
 class MemberHomotopy:
