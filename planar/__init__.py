@@ -127,6 +127,7 @@ if TYPE_CHECKING:
     from planar.structures.symmetry import ChainSymmetry
     from planar.synthesis.cognates.cognate_inputs import CognateInput
     from planar.synthesis.cognates.cognates import Cognate, Cognates, cognates
+    from planar.synthesis.exact.complete_synthesis import CompleteSynthesis, DyadCurve, ExactDesign
     from planar.synthesis.search_progress import SearchProgress
     from planar.synthesis.synthesis import DesignMotion, Synthesis, SynthesisedDesign
     from planar.synthesis.synthesise import synthesise
@@ -169,6 +170,7 @@ __all__ = [
     "Cognate",
     "CognateInput",
     "Cognates",
+    "CompleteSynthesis",
     "ConditionSet",
     "ConditionTerm",
     "Conflict",
@@ -187,7 +189,9 @@ __all__ = [
     "Drive",
     "Dwell",
     "DwellSegment",
+    "DyadCurve",
     "Each",
+    "ExactDesign",
     "Extreme",
     "Extremes",
     "FileUnits",

@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from planar.results.motion import Motion, State
     from planar.structures.chain import Chain
     from planar.synthesis.cognates.cognates import Cognates
+    from planar.synthesis.exact.complete_synthesis import CompleteSynthesis
     from planar.synthesis.synthesis import Synthesis
 
     Drawing = Figure | list[Figure]  # one figure, or several sheets
@@ -47,6 +48,7 @@ __all__ = [
     "cognates",
     "designs",
     "diagrams",
+    "dyad_curves",
     "forces",
     "loci",
     "modes",
@@ -110,11 +112,8 @@ def centres(
 
     found = all_centres(state)
     shown = choose_centres(found, links)
-    pictures = [
-        centres_picture(found, shown, _length_scale(scale, state), DEFAULT_REACH if reach is None else reach),
-        circle_picture(found, shown),
-    ]
-    return draw_pictures(pictures, state.mechanism.name)
+    drawn = centres_picture(found, shown, _length_scale(scale, state), DEFAULT_REACH if reach is None else reach)
+    return draw_pictures([drawn, circle_picture(found, shown)], state.mechanism.name)
 
 
 @takes_result("Calibration")
@@ -229,13 +228,18 @@ def cognates(found: Cognates | Mechanism, of: str | None = None, scale: ScaleTex
     point has any, Unknown for one that is not there, and what `planar.cognates` raises.
     """
     from planar.drawing.diagrams.cognate_drawing import cognate_pictures
-    from planar.synthesis.cognates.cognates import Cognates, first_cognates
-    from planar.synthesis.cognates.cognates import cognates as all_cognates
+    from planar.synthesis.cognates.cognates import cognates_of
 
-    if not isinstance(found, Cognates):
-        found = first_cognates(found) if of is None else all_cognates(found, of)
-    heading = f"{found.mechanism.name}: cognates of the path of {found.point}"
-    return draw_pictures(cognate_pictures(found, _length_scale(scale, found)), heading)
+    of_all = cognates_of(found, of)
+    heading = f"{of_all.mechanism.name}: cognates of the path of {of_all.point}"
+    return draw_pictures(cognate_pictures(of_all, _length_scale(scale, of_all)), heading)
+
+
+def dyad_curves(found: CompleteSynthesis, scale: ScaleTexts = None) -> Figure:
+    """Burmester's curves of four poses: where joints may be, and their pivots. Raises BadInput where there is none."""
+    from planar.drawing.diagrams.dyad_drawing import dyad_pictures
+
+    return draw_pictures(*dyad_pictures(found, scale))
 
 
 @takes_result("Forces", "State")

@@ -138,6 +138,9 @@ PICTURES: dict[str, Callable[[], object]] = {
     "design/chains": lambda: plot.chains(planar.chains(8))[0],
     "design/multiple-pins": lambda: plot.chains(planar.chains(8, multiple_pins=2))[0],
     "design/cognates": lambda: plot.cognates("four-bar", "F"),
+    "design/exact-synthesis": lambda: plot.dyad_curves(
+        planar.synthesise(shown_file("hatch.json", "design/exact-synthesis"), complete=True)
+    ),
     "bodies": lambda: plot.forces(planar.forces(planar.solve("two-stroke-engine"))),
     "forces/stick-slip": lambda: plot.diagrams(planar.simulate("stick-slip", 5.0), "block"),
     "forces/balance": lambda: plot.balance(
@@ -148,12 +151,11 @@ PICTURES: dict[str, Callable[[], object]] = {
     "circuits": lambda: plot.circuits(planar.circuits("watt-six-bar")),
     **{f"keys/{each.example}": partial(example_figure, each.example) for each in key_sections() if each.example},
 }
-RECIPES = read_page("look-up/recipes")
 
 
-def shown_file(name: str) -> dict[str, object]:
-    """A file that a recipe shows."""
-    found = re.search(rf"<!-- file: {re.escape(name)} -->\n```json\n(.*?)```", RECIPES, re.DOTALL)
+def shown_file(name: str, page: str = "look-up/recipes") -> dict[str, object]:
+    """A file that a page of the guide shows."""
+    found = re.search(rf"<!-- file: {re.escape(name)} -->\n```json\n(.*?)```", read_page(page), re.DOTALL)
     value: dict[str, object] = json.loads(found[1]) if found else {}
     return value
 

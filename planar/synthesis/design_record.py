@@ -21,7 +21,7 @@ def design_record(design: SynthesisedDesign) -> dict[str, Any]:
         "error": design.error if is_known else None,
         "greatest_miss": design.greatest_miss if is_known else None,
         "misses": [_finite(each) for each in design.misses],
-        "inputs": [each.tolist() for each in design.inputs],
+        "inputs": [_finite(each) for each in design.inputs],
         "shortages": [list(each) for each in design.shortages],
         "numbers": dict(design.numbers),
         "mechanism": to_dict(design.mechanism),

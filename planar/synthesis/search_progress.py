@@ -10,8 +10,8 @@ class SearchProgress(NamedTuple):
 
     `stage` is "catalogue", "matches", "fit" or "judgement" of the `round`-th catalogue of the start.
     `best` is the least error of a sound design so far (m, or rad where functions of angles alone are wanted; infinite
-    where there is none) and `best_share` the same beside the extent of
-    the places that are wanted, where there are some.
+    where there is none) and `best_share` the same beside the extent of the places that are wanted, where there are
+    some. Of a complete list `stage` says what is done, and the rest nothing.
     """
 
     start: str
@@ -21,3 +21,8 @@ class SearchProgress(NamedTuple):
     stage: str
     best: float
     best_share: float
+
+
+def progress_of_list(stage: str) -> SearchProgress:
+    """How far a complete list is, in words."""
+    return SearchProgress("", 0, None, 0, stage, float("inf"), float("inf"))

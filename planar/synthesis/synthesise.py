@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from time import monotonic
-from typing import Any
+from typing import TYPE_CHECKING, Any, Literal, overload
 
 import numpy as np
 
@@ -23,12 +23,15 @@ from planar.synthesis.judgement.judgement import DesignJudge
 from planar.synthesis.judgement.refusal import refusal
 from planar.synthesis.judgement.written_design import DIGITS, EXACT_DIGITS, write_design
 from planar.synthesis.search_folder import SearchFolder
-from planar.synthesis.search_progress import SearchProgress
+from planar.synthesis.search_progress import SearchProgress, progress_of_list
 from planar.synthesis.synthesis import Synthesis, SynthesisedDesign, rank_designs
 from planar.synthesis.task.freedom import count_freedom, exactness_in_excess
 from planar.synthesis.task.starts import start_mechanisms
 from planar.synthesis.task.synthesis_task import ChainStart, SynthesisTask
 from planar.synthesis.task.task_reader import read_task
+
+if TYPE_CHECKING:
+    from planar.synthesis.exact.complete_synthesis import CompleteSynthesis
 
 DRAWS = 6000
 """Of designs at random for a catalogue."""
@@ -49,9 +52,28 @@ KEPT_SHARE = 4
 """Of each start so many times as many designs as are wanted are judged."""
 
 
-def synthesise(  # many: the public signature
+@overload
+def synthesise(
     task: Mapping[str, Any] | str | os.PathLike[str] | SynthesisTask,
     *,
+    complete: Literal[True],
+    progress: Callable[[SearchProgress], None] | None = None,
+) -> CompleteSynthesis: ...
+@overload
+def synthesise(
+    task: Mapping[str, Any] | str | os.PathLike[str] | SynthesisTask,
+    *,
+    complete: Literal[False] = False,
+    many: int = 10,
+    seed: int = 0,
+    time_limit: float | None = None,
+    folder: str | os.PathLike[str] | None = None,
+    progress: Callable[[SearchProgress], None] | None = None,
+) -> Synthesis: ...
+def synthesise(
+    task: Mapping[str, Any] | str | os.PathLike[str] | SynthesisTask,
+    *,
+    complete: bool = False,
     many: int = 10,
     seed: int = 0,
     time_limit: float | None = None,
@@ -67,7 +89,11 @@ def synthesise(  # many: the public signature
     done is kept: the same call goes on where it was interrupted, or its time was up, to the same designs. `progress`
     is told what is being done.
 
-    Raises BadInput with the place in the task's file, and for a folder that holds something else.
+    With `complete` all linkages of one start are found that meet exactly as much as it can meet, each certified where
+    python-flint is there; `many`, `seed`, `time_limit` and `folder` are not for that.
+
+    Raises BadInput with the place in the task's file, for a folder that holds something else, and where no complete
+    list can be made.
 
     >>> import planar
     >>> task = {"planar": 1, "units": {"length": "mm", "angle": "deg"}, "start": "four-bar", "wanted": [{"point": "E",
@@ -77,6 +103,12 @@ def synthesise(  # many: the public signature
     (True, ())
     """
     known = read_task(task)
+    if complete:
+        from planar.synthesis.exact.exact_synthesis import synthesise_all
+
+        if (many, seed, time_limit, folder) != (10, 0, None, None):
+            raise BadInput("complete", "a complete list is one, whole: leave many, seed, time_limit and folder out")
+        return synthesise_all(known, progress and (lambda said: progress(progress_of_list(said))))
     check_whole_number("many", many, 1, 1000)
     check_whole_number("seed", seed, 0)
     _refuse_excess(known)

@@ -16,12 +16,16 @@ import casadi as ca
 import numpy as np
 
 from planar.assemblies.polynomial.isotropic_form import IsotropicForm
+from planar.assemblies.polynomial.krawczyk import (
+    ProvedBox,
+    apart_boxes,
+    ball,
+    ball_precision,
+    is_own_image,
+    prove_box,
+)
 from planar.codegen.generic_evaluation import evaluate_function
 from planar.foundation.arrays import Array, BoolArray, ComplexArray
-
-BALL_PRECISION_BITS = 128
-BOX_HALF_WIDTHS = (1e-7, 1e-9, 1e-11, 1e-13)
-"""Half widths of boxes that are tried, the widest first."""
 
 
 class Certificate(NamedTuple):
@@ -37,16 +41,12 @@ class Certificate(NamedTuple):
 
 def certify_solutions(form: IsotropicForm, given: Sequence[Array], V: ComplexArray) -> Certificate:
     """What is proved of solutions V (solutions, 2 many) of a block at (z, u, p)."""
-    from flint import ctx
-
-    before, ctx.prec = ctx.prec, BALL_PRECISION_BITS
-    try:
-        return _certify_balls(_BallPolynomials(form, given), V)
-    except ZeroDivisionError:  # rows of X that may depend on each other
-        none = np.zeros(len(V), dtype=bool)
-        return Certificate(none, none, none)
-    finally:
-        ctx.prec = before
+    with ball_precision():
+        try:
+            return _certify_balls(_BallPolynomials(form, given), V)
+        except ZeroDivisionError:  # rows of X that may depend on each other
+            none = np.zeros(len(V), dtype=bool)
+            return Certificate(none, none, none)
 
 
 def _certify_balls(balls: _BallPolynomials, V: ComplexArray) -> Certificate:
@@ -55,26 +55,21 @@ def _certify_balls(balls: _BallPolynomials, V: ComplexArray) -> Certificate:
     x, y = balls.reduce_solutions(V[:, :m], V[:, m:])
     w = np.concatenate([x, y], axis=1)
     half = np.full(count, np.inf)
-    inside: list[Any] = [None] * count
+    boxes: list[ProvedBox | None] = [None] * count
     for k in range(count):
-        found = balls.prove_box(w[k])
-        if found is not None:
-            proved[k], (half[k], inside[k]) = True, found
-    # the greatest difference of any entry: with a factor of two to spare nothing is left to rounding
-    apart = np.abs(w[:, None] - w[None]).max(axis=2, initial=0.0)
-    np.fill_diagonal(apart, np.inf)
-    safe = np.where(np.isfinite(half), half, 0.0)
-    for k in np.flatnonzero(proved).tolist():
-        others = proved & (apart[k] <= 4.0 * (safe[k] + safe))
-        if others.any():
-            proved[k] = False
+        boxes[k] = box = prove_box(balls.residuals_and_jacobian, [ball(complex(each)) for each in w[k]])
+        if box is not None:
+            proved[k], half[k] = True, box.half
+    proved = apart_boxes(w, half, proved)
     n = w.shape[1] // 2
-    for k in np.flatnonzero(proved).tolist():
+    for k, box in enumerate(boxes):
+        if box is None or not proved[k]:
+            continue
         image = np.concatenate([w[k, n:], w[k, :n]]).conj()
         gap = float(np.abs(image - w[k]).max())
         if gap > 4.0 * half[k]:
             decided[k] = True
-        elif balls.is_own_image(w[k], half[k], inside[k]) and balls.is_finite(inside[k]):
+        elif is_own_image(box) and balls.is_finite(box.inside):
             real[k] = decided[k] = True
     return Certificate(proved, real, decided)
 
@@ -90,13 +85,10 @@ def is_available() -> bool:
 
 def is_regular(slope: ca.Function, given: Sequence[Array]) -> bool:
     """Whether it is proved that linear equations, of a square slope as a function of (z, u, p), have one solution."""
-    from flint import arb_mat, ctx
+    from flint import arb_mat
 
-    before, ctx.prec = ctx.prec, BALL_PRECISION_BITS
-    try:
+    with ball_precision():
         return not arb_mat(_evaluate_in_balls(slope, given)[0]).det().contains(0)
-    finally:
-        ctx.prec = before
 
 
 class _BallPolynomials:
@@ -155,7 +147,7 @@ class _BallPolynomials:
         Y = self.mat(self.P).conjugate() * self.mat([[each] for each in w[n:]])
         return X.entries(), Y.entries()
 
-    def _residuals_and_jacobian(self, w: Sequence[Any], slopes: bool) -> tuple[list[Any], list[list[Any]]]:
+    def residuals_and_jacobian(self, w: Sequence[Any]) -> tuple[list[Any], list[list[Any]]]:
         """The equations at w, and their Jacobian."""
         n = len(self.free)
         X, Y = self._expand_solution(w)
@@ -163,70 +155,27 @@ class _BallPolynomials:
         left, slope = [], []
         for i, j, k, l in self.products:  # noqa: E741
             left.append(X[i] * Y[j] - X[k] * Y[l])
-            if slopes:
-                row = [P[i][q] * Y[j] - P[k][q] * Y[l] for q in range(n)]
-                slope.append(row + [conj[j][q] * X[i] - conj[l][q] * X[k] for q in range(n)])
+            row = [P[i][q] * Y[j] - P[k][q] * Y[l] for q in range(n)]
+            slope.append(row + [conj[j][q] * X[i] - conj[l][q] * X[k] for q in range(n)])
         for terms in self.single:
             one = sum((a * x for a, x in zip(terms, X, strict=True)), self.acb(0))
             other = sum((a.conjugate() * y for a, y in zip(terms, Y, strict=True)), self.acb(0))
             left.append(one * Y[0] + X[0] * other)
-            if slopes:
-                a = [sum((t * P[r][q] for r, t in enumerate(terms)), self.acb(0)) for q in range(n)]
-                b = [each.conjugate() for each in a]
-                row = [a[q] * Y[0] + P[0][q] * other for q in range(n)]
-                slope.append(row + [conj[0][q] * one + b[q] * X[0] for q in range(n)])
+            a = [sum((t * P[r][q] for r, t in enumerate(terms)), self.acb(0)) for q in range(n)]
+            b = [each.conjugate() for each in a]
+            row = [a[q] * Y[0] + P[0][q] * other for q in range(n)]
+            slope.append(row + [conj[0][q] * one + b[q] * X[0] for q in range(n)])
         none = [self.acb(0)] * n
         c = self.c_balls
         left.append(sum((a * x for a, x in zip(c, w[:n], strict=True)), self.acb(-1)))
         left.append(sum((a.conjugate() * y for a, y in zip(c, w[n:], strict=True)), self.acb(-1)))
-        if slopes:
-            slope += [c + none, none + [each.conjugate() for each in c]]
+        slope += [c + none, none + [each.conjugate() for each in c]]
         return left, slope
-
-    def prove_box(self, w: ComplexArray) -> tuple[float, list[Any]] | None:
-        """The half width of a box about w that holds one solution and no other, and a narrow box of it within."""
-        middle = [self.acb(each.real, each.imag) for each in w]
-        left, slope = self._residuals_and_jacobian(middle, True)
-        there = np.array([[complex(each.mid()) for each in row] for row in slope])
-        try:
-            inverse = np.linalg.inv(there)
-        except np.linalg.LinAlgError:
-            return None
-        if not np.all(np.isfinite(inverse)):
-            return None
-        near = self.mat([[self.acb(each.real, each.imag) for each in row] for row in inverse])
-        step = near * self.mat([[each] for each in left])
-        one = self.mat(len(w), len(w), [1 if i == j else 0 for i in range(len(w)) for j in range(len(w))])
-        for half in BOX_HALF_WIDTHS:
-            box = self._box(w, half)
-            wide = one - near * self.mat(self._residuals_and_jacobian(box, True)[1])
-            about = self.mat([[each] for each in self._box(np.zeros(len(w), dtype=complex), half)])
-            moved = (wide * about - step).entries()
-            if all(_is_within(each, half) for each in moved):
-                return half, [at + each for at, each in zip(middle, moved, strict=True)]
-        return None
-
-    def _box(self, w: ComplexArray, half: float) -> list[Any]:
-        from flint import arb
-
-        return [self.acb(arb(each.real, half), arb(each.imag, half)) for each in w.astype(complex)]
-
-    def is_own_image(self, w: ComplexArray, half: float, inside: Sequence[Any]) -> bool:
-        """Whether the mirror image of the solution lies in the box of which it is the only one."""
-        n = len(self.free)
-        image = [each.conjugate() for each in (*inside[n:], *inside[:n])]
-        middle = [self.acb(each.real, each.imag) for each in w]
-        return all(_is_within(each - at, half) for each, at in zip(image, middle, strict=True))
 
     def is_finite(self, inside: Sequence[Any]) -> bool:
         """Whether the solution is at a finite place."""
         X, Y = self._expand_solution(inside)
         return not (X[0].contains(0) or Y[0].contains(0))
-
-
-def _is_within(ball: Any, half: float) -> bool:
-    """Whether a ball lies inside of a square about nothing."""
-    return bool(ball.real.abs_upper() < half) and bool(ball.imag.abs_upper() < half)
 
 
 def _pivots(rows: ComplexArray) -> list[int]:

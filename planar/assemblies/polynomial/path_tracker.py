@@ -198,15 +198,22 @@ def _with_patch_rows(slope: ComplexArray, patch: ComplexArray) -> ComplexArray:
     return np.concatenate([slope, rows], axis=1)
 
 
+def _with_no_patch_rows(right: ComplexArray) -> ComplexArray:
+    """Right sides with nothing for these two rows."""
+    found = np.zeros((len(right), right.shape[1] + 2), dtype=complex)
+    found[:, :-2] = right
+    return found
+
+
 def _tangent(at: Homotopy, patch: ComplexArray, V: ComplexArray, way: Array) -> ComplexArray:
     _, slope, along = at(V, way)
-    return _solve_batch(_with_patch_rows(slope, patch), np.pad(-along, ((0, 0), (0, 2))))
+    return _solve_batch(_with_patch_rows(slope, patch), _with_no_patch_rows(-along))
 
 
 def _newton_step(at: Homotopy, patch: ComplexArray, V: ComplexArray, way: Array) -> tuple[ComplexArray, ComplexArray]:
     left, slope, _ = at(V, way)
     slope = _with_patch_rows(slope, patch)
-    return _solve_batch(slope, np.pad(-left, ((0, 0), (0, 2)))), slope
+    return _solve_batch(slope, _with_no_patch_rows(-left)), slope
 
 
 def _solve_batch(slope: ComplexArray, right: ComplexArray) -> ComplexArray:

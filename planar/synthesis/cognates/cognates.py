@@ -141,6 +141,13 @@ def first_cognates(mechanism: Mechanism) -> Cognates:
     raise BadInput(mechanism.name, "no point of it has a path that another linkage is known to trace")
 
 
+def cognates_of(found: Cognates | Mechanism, of: str | None) -> Cognates:
+    """Cognates as they are, or those of a mechanism's point, of the first that has any where none is named."""
+    if isinstance(found, Cognates):
+        return found
+    return first_cognates(found) if of is None else cognates(found, of)
+
+
 def _search(
     posed: PosedLinkage, mechanism: Mechanism, tracer: Tracer, motion: PathMotion
 ) -> tuple[list[PosedLinkage], list[Refusal]]:

@@ -11,7 +11,7 @@ import numpy as np
 from planar.dynamics.flywheel import whole_turns
 from planar.foundation.arrays import Array, BoolArray
 from planar.foundation.jets import TURN
-from planar.model.mechanism import relative_motions
+from planar.model.mechanism import links_counting_turns, relative_motions
 from planar.model.pairs import MeasureKind
 from planar.results.motion import Motion
 
@@ -25,7 +25,7 @@ class InputRange:
 
     `is_whole_turn`: no dead point ends it. `is_cyclic`: after a turn all is as it was, so that positions a turn apart
     are the same; where gears bring it back after several turns only, it is followed over all entries. `turns` tells an
-    angle from a length.
+    angle from a length, `counts_turns` whether gears make positions a turn apart others.
     """
 
     pair: str
@@ -34,6 +34,7 @@ class InputRange:
     is_whole_turn: bool
     is_cyclic: bool
     turns: bool
+    counts_turns: bool
 
     @property
     def margin(self) -> float:
@@ -49,14 +50,23 @@ class InputRange:
         """Which positions (n,) lie beyond an end."""
         if self.is_whole_turn:
             return np.zeros(len(inputs), bool)
+        inputs = self._turned(inputs)
         beyond: BoolArray = np.asarray((inputs < self.low - self.margin) | (inputs > self.high + self.margin))
         return beyond
 
     def bring(self, inputs: Array) -> Array:
         """Positions (n,) by whole turns, or from a hair beyond its ends, within it."""
-        turned = self.low + np.mod(inputs - self.low, TURN) if self.is_cyclic else inputs
-        brought: Array = np.clip(turned, self.low, self.high)
+        brought: Array = np.clip(self._turned(inputs), self.low, self.high)
         return brought
+
+    def _turned(self, inputs: Array) -> Array:
+        """Angles by whole turns where they are in the range, or nearest to its middle, unless they count turns."""
+        turned: Array = inputs
+        if self.is_cyclic:
+            turned = self.low + np.mod(inputs - self.low, TURN)
+        elif self.turns and not self.counts_turns:
+            turned = inputs - TURN * np.round((inputs - 0.5 * (self.low + self.high)) / TURN)
+        return turned
 
     def is_in_order(self, inputs: Array) -> bool:
         """Whether positions (n,) rise or fall all the way; once round at most where it is cyclic."""
@@ -75,9 +85,10 @@ def input_range(motion: Motion, inputs: Sequence[Array]) -> InputRange:
     given = motion.inputs[pair].position
     low, high = float(given.min()), float(given.max())
     turns = relative_motions(motion.mechanism)[pair].input_kind is not MeasureKind.LENGTH
+    counts_turns = bool(links_counting_turns(motion.mechanism))
     is_whole = turns and isclose(high - low, TURN, rel_tol=1e-9)
     is_cyclic = is_whole and whole_turns(motion, pair) == 1
     if is_whole and not is_cyclic:
         every = np.concatenate(inputs)
         low, high = min(low, float(every.min())), max(high, float(every.max()))
-    return InputRange(pair, low, high, is_whole, is_cyclic, turns)
+    return InputRange(pair, low, high, is_whole, is_cyclic, turns, counts_turns)

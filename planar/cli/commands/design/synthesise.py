@@ -42,11 +42,17 @@ SHEET_SUFFIXES = (".png", ".svg", ".pdf")
     help="The folder for the designs, a mechanism file and a page each, with a gallery; the same command goes on there "
     "where it was interrupted. Or a .pdf, .png or .svg file for drawings of the designs alone.",
 )
+@click.option(
+    "--complete", is_flag=True, help="All linkages that meet exactly as much as the start can, each certified."
+)
 @json_option
-def synthesise(task: Path, many: int, seed: int, seconds: float | None, output: Path | None, as_json: bool) -> None:
+def synthesise(
+    task: Path, many: int, seed: int, seconds: float | None, output: Path | None, complete: bool, as_json: bool
+) -> None:
     """The linkages that do best what a TASK wants: paths, poses or functions, of any structure."""
     from planar.reports.tables.design.synthesis import record, table
     from planar.synthesis.synthesise import TaskSearch
+    from planar.synthesis.synthesise import synthesise as find_all
     from planar.synthesis.task.task_reader import read_task
 
     wanted = read_task(task)
@@ -56,11 +62,16 @@ def synthesise(task: Path, many: int, seed: int, seconds: float | None, output: 
 
         def show(done: SearchProgress) -> None:
             if status is not None:
-                status.update(f"{wanted.name}: {progress_text(done, wanted)}")
+                status.update(f"{wanted.name}: {done.stage if complete else progress_text(done, wanted)}")
 
-        search = TaskSearch(wanted, many, seed, seconds, folder, show)
-        ended_by = _run(search)
-        found = search.result()
+        ended_by: int | None = None
+        found: Synthesis
+        if complete:
+            found = find_all(wanted, complete=True, progress=show)
+        else:
+            search = TaskSearch(wanted, many, seed, seconds, folder, show)
+            ended_by = _run(search)
+            found = search.result()
     files: list[Path] = []
     if folder is not None:
         from planar.pages.design_gallery import design_files, write_designs

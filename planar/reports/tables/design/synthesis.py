@@ -6,14 +6,17 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from rich.console import Group, RenderableType
 from rich.text import Text
 
+from planar.foundation.arrays import Array
 from planar.model.wording import amount, count_phrase
 from planar.reports.fitted_table import FittedTable, plain_table
 from planar.reports.number_format import format_number, paragraphs
 from planar.reports.tables.design.cognates import cognate_record
 from planar.synthesis.design_record import design_record
+from planar.synthesis.exact.complete_synthesis import CompleteSynthesis, ExactDesign
 from planar.synthesis.synthesis import Synthesis, SynthesisedDesign
 from planar.synthesis.task.task_numbers import miss_kind, motion_kind
 
@@ -25,7 +28,9 @@ def table(found: Synthesis, files: Sequence[Path]) -> RenderableType:
     """The designs with their misses, where they are written, and the best of those rejected with the reason."""
     entries = count_phrase(found.task.entry_count, "entry is wanted", "entries are wanted")
     parts: list[RenderableType] = [Text(found.task.name, style="bold"), Text(entries), Text()]
-    if len(found):
+    if isinstance(found, CompleteSynthesis):
+        parts += [*_complete_parts(found, files), Text()]
+    elif len(found):
         parts += [_designs_table(found, files), Text()]
     if found.rejected:
         parts += [_rejected_table(found), Text()]
@@ -58,6 +63,29 @@ def _designs_table(found: Synthesis, files: Sequence[Path]) -> FittedTable:
             str(files[number - 1]) if files else "",
         )
     return rows
+
+
+def _complete_parts(found: CompleteSynthesis, files: Sequence[Path]) -> Iterator[RenderableType]:
+    """How many there are and how many were to be expected, all real ones with their defects, and curves of them."""
+    if found.expected is not None:
+        real = count_phrase(len(found), "linkage is real", "linkages are real")
+        yield Text(f"{found.found} of {found.expected} found ({found.counted}); {real}")
+    yield Text(found.complete)
+    if len(found):
+        yield Text()
+        rows = plain_table("Designs", "no.", "proved", "greatest miss", "defects", "file", left=(3, 4), keys=1)
+        for number, each in enumerate(found, start=1):
+            sure = "yes" if isinstance(each, ExactDesign) and each.certified else "no"
+            told = "; ".join(each.defects) or "none"
+            rows.add_row(str(number), sure, _misses(found, each)[0], told, str(files[number - 1]) if files else "")
+        yield rows
+    if found.curves:
+        yield Text()
+        rows = plain_table("Dyads", "pivot", "joint", "dimension", "points", left=(0, 1), keys=2)
+        for curve in found.curves:
+            places = int(np.isfinite(curve.circle_points).all(axis=1).sum())
+            rows.add_row(curve.pivot, curve.joint, str(curve.dimension), str(places))
+        yield rows
 
 
 def _rejected_table(found: Synthesis) -> FittedTable:
@@ -94,7 +122,8 @@ def transmission_text(found: Synthesis, design: SynthesisedDesign) -> str:
 
 
 def _remarks(found: Synthesis) -> Iterator[str]:
-    yield "judged by the general path: every entry on one branch of the motion, in its order where that is wanted"
+    if len(found) or found.rejected:
+        yield "judged by the general path: every entry on one branch of the motion, in its order where that is wanted"
     if len(found.rejected) > MAX_REJECTED:
         yield f"{len(found.rejected) - MAX_REJECTED} more were rejected; --json lists them"
     yield from found.remarks
@@ -102,6 +131,7 @@ def _remarks(found: Synthesis) -> Iterator[str]:
 
 def record(found: Synthesis, files: Sequence[Path]) -> dict[str, Any]:
     """The designs as JSON values, SI."""
+    whole = _complete_record(found) if isinstance(found, CompleteSynthesis) else {}
     return {
         "task": found.task.name,
         "seed": found.seed,
@@ -115,11 +145,39 @@ def record(found: Synthesis, files: Sequence[Path]) -> dict[str, Any]:
         ],
         "rejected": [_record(each) for each in found.rejected],
         "remarks": list(found.remarks),
+        **whole,
     }
 
 
 def _record(design: SynthesisedDesign) -> dict[str, Any]:
-    if design.motion is None:
-        return design_record(design) | {"motion": None}
-    least = {name: each._asdict() for name, each in design.motion.transmission.items()}
-    return design_record(design) | {"motion": design.motion._asdict() | {"transmission": least}}
+    own = design_record(design) | {"defects": list(design.defects), "motion": None}
+    own["shortages"] = [each._asdict() for each in design.shortages]
+    if isinstance(design, ExactDesign):
+        own["certified"] = design.certified
+    if design.motion is not None:
+        least = {name: each._asdict() for name, each in design.motion.transmission.items()}
+        own["motion"] = design.motion._asdict() | {"transmission": least}
+    return own
+
+
+def _complete_record(found: CompleteSynthesis) -> dict[str, Any]:
+    return {
+        "expected": found.expected,
+        "found": found.found,
+        "complete": found.complete,
+        "counted": found.counted,
+        "curves": [
+            {
+                "pivot": each.pivot,
+                "joint": each.joint,
+                "dimension": each.dimension,
+                "circle_points": _points(each.circle_points),
+                "centre_points": _points(each.centre_points),
+            }
+            for each in found.curves
+        ],
+    }
+
+
+def _points(places: Array) -> list[list[float] | None]:
+    return [each.tolist() if np.isfinite(each).all() else None for each in places]

@@ -1,0 +1,77 @@
+"""What exact synthesis finds: all linkages that meet a task, with what is proved of each and of the whole."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from planar.foundation.arrays import Array
+from planar.model.wording import count_phrase
+from planar.synthesis.synthesis import Synthesis, SynthesisedDesign
+
+
+@dataclass(frozen=True, eq=False)
+class ExactDesign(SynthesisedDesign):
+    """A linkage that meets a task exactly. `certified`: a box of its own is proved to hold it and no other; defective
+    ones are listed, too, and say so in `defects`."""
+
+    certified: bool = False
+
+    def __repr__(self) -> str:
+        word = "certified" if self.certified else "not certified"
+        told = f", {count_phrase(len(self.defects), 'defect')}" if self.defects else ""
+        return f"<ExactDesign {self.mechanism.name!r}: {word}{told}>"
+
+
+@dataclass(frozen=True, eq=False)
+class DyadCurve:
+    """The dyads that carry a link through poses where these leave `dimension` parameters of them open: 0, 1 or 2.
+
+    `circle_points` (n, 2) are places of the `joint` at the first pose, `centre_points` (n, 2) those of its fixed
+    `pivot` (m), not numbers between parts of a curve. Where two parameters are open every place of the joint will do,
+    and none stand here; `centres` gives the pivots that go with them. `rows` (poses - 1, 3, 3): (1, x, y) of the joint
+    times this times (1, x, y) of the pivot vanishes; none where the pivot is a line.
+    """
+
+    pivot: str
+    joint: str
+    dimension: int
+    circle_points: Array = field(repr=False)
+    centre_points: Array = field(repr=False)
+    rows: Array = field(repr=False)
+
+    def centres(self, joints: Array) -> Array:
+        """The fixed pivots (n, 2) m that go with places of the joint at the first pose (n, 2) m; by least squares where
+        these are none of the curve."""
+        places = np.atleast_2d(np.asarray(joints, float))
+        found = np.full(places.shape, np.nan)
+        known = np.isfinite(places).all(axis=1)
+        if len(self.rows) < 2:
+            return found
+        whole = np.einsum("na,rab->nrb", np.insert(places[known], 0, 1.0, axis=1), self.rows)
+        found[known] = -np.einsum("nij,nj->ni", np.linalg.pinv(whole[:, :, 1:]), whole[:, :, 0])
+        return found
+
+
+@dataclass(frozen=True, eq=False)
+class CompleteSynthesis(Synthesis):
+    """All real linkages that meet a task, the sound ones first; `len` counts them, each cognate on its own.
+
+    `expected`: how many complex solutions a random task of this kind has, of the class that `counted` says; None where
+    there are curves of them. `complete`: "complete" where it is proved that there are no others, "numerically complete"
+    where all paths came to an end and a trace test says that these are all, else how far it is. `found`: how many of
+    those expected there are. `curves`: families of solutions with a parameter.
+    """
+
+    expected: int | None = None
+    found: int = 0
+    complete: str = ""
+    counted: str = ""
+    curves: tuple[DyadCurve, ...] = ()
+
+    def __repr__(self) -> str:
+        whole = f", {self.expected} expected" if self.expected is not None else ""
+        return (
+            f"<CompleteSynthesis of {self.task.name!r}: {count_phrase(len(self), 'linkage')}{whole}, {self.complete}>"
+        )

@@ -1,0 +1,1 @@
+"""What a task wants of a structure, as polynomials in isotropic coordinates."""

@@ -1,0 +1,207 @@
+"""A mechanism as it stands at the first entry: its points as unknown places of the plane, and how they are tied.
+
+Every link's axes are taken parallel to the world's there, so that a point of a link is a place x + i y, and what turns
+later turns from there. A pin is one place then, and lengths and coordinates that are free say nothing of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from planar.document.dimensions import Dimension, change_dimension, file_dimensions
+from planar.foundation.geometry import Frame, Vector
+from planar.model.link_shapes import LinkShape, PointReference, link_shape
+from planar.model.mechanism import Mechanism
+from planar.model.pairs import MeasureKind, Pair
+from planar.synthesis.exact.relations.polynomials import AngleSum, Direction, Polynomial, Symbol, complex_row, point
+from planar.synthesis.exact.relations.unknowns import NumberKind, SymbolTable, refuse
+
+PIN_KINDS = (MeasureKind.LENGTH, MeasureKind.LENGTH)
+KNOWN_KINDS = (PIN_KINDS, (*PIN_KINDS, MeasureKind.ANGLE))
+WORLD = Frame(0.0, 0.0, 1.0, 0.0, AngleSum({}), True)
+PATCH_ANGLE = 0.7
+"""rad: directions that are sought are measured along this one, so that they have one length."""
+
+
+class PlacedShape(LinkShape):
+    """A link whose points are places, which `find` makes as they are asked for."""
+
+    def __init__(self, find: Callable[[PointReference], Polynomial]):
+        super().__init__({}, Vector(0.0, 0.0), Vector(1.0, 0.0))
+        object.__setattr__(self, "find", find)
+
+    def position(self, point_: PointReference) -> Vector:
+        """x and y of a point."""
+        return point(self.find(point_))  # type: ignore[attr-defined]
+
+
+@dataclass(frozen=True)
+class SlidingRow:
+    """A pair with a coordinate of its own: the place `slider` of its second link, that `through` which its line goes
+    (a name or coordinates), and its line's `direction`."""
+
+    pair: Pair
+    slider: Polynomial
+    through: PointReference
+    direction: Polynomial
+
+
+class ReferencePose:
+    """The places of one mechanism; `free` are the names of the numbers that are sought, `kept` whether the fixed pins
+    stay where they are all the same."""
+
+    def __init__(self, mechanism: Mechanism, free: Sequence[str], pins_are_kept: bool):
+        self.mechanism, self.free, self.pins_are_kept = mechanism, frozenset(free), pins_are_kept
+        self.table = SymbolTable()
+        self.numbers = file_dimensions(mechanism)
+        self.conditions: list[Polynomial] = []
+        self.places: dict[tuple[str, PointReference], Polynomial] = {}
+        "of links' points, before what ties them is put in"
+        self.values: dict[int, Polynomial] = {}
+        "what stands for symbols that are eliminated"
+        self.links = {each.name: each for each in mechanism.links}
+        self.directions: dict[str, Direction] = {}
+        "the line of a pair that has one"
+        self.pairs = [self._with_direction(index) for index in range(len(mechanism.pairs))]
+        for pair in self.pairs:
+            if tuple(pair.residual_kinds) not in KNOWN_KINDS or len(pair.coordinate_kinds) > 1:
+                raise refuse(f"{pair.name!r} is neither a pin nor a slide")
+        for pair in self.pairs:
+            if not pair.coordinate_kinds:
+                (row,) = self.pair_rows(pair, dict.fromkeys(pair.bodies, WORLD), ())[0]
+                self.tie(row)
+        self.slides = [self._sliding_row(pair) for pair in self.pairs if pair.coordinate_kinds]
+
+    # points
+
+    def shape(self, link: str) -> PlacedShape:
+        """A link with places for points."""
+        return PlacedShape(lambda name: self.place(link, name))
+
+    def place(self, link: str, name: PointReference) -> Polynomial:
+        """x + i y of a point, as far as it is known."""
+        if (link, name) not in self.places:
+            fixed = link == self.mechanism.frame
+            if not fixed and not isinstance(name, str):
+                raise refuse(f"{link!r} moves and has a place without a name")
+            made = self._fixed_place(name) if fixed else self.table.add().value
+            self.places[link, name] = made
+        return self.places[link, name].substitute(self.values)
+
+    def _fixed_place(self, name: PointReference) -> Polynomial:
+        at = link_shape(self.links[self.mechanism.frame]).position(name)
+        value = complex(at.x, at.y)
+        free = (False, False) if self.pins_are_kept else self.free_coordinates(name)
+        if not any(free):
+            return self.table.add_given(NumberKind.PLACE, value).value
+        found = self.table.add_unknown().value
+        if not all(free):
+            known = 1 if free[0] else 0  # which coordinate is given
+            given = self.table.add_given(NumberKind.PLACE, value).value
+            off = found - given
+            self.conditions.append(off - off.conjugate if known else off + off.conjugate)
+        return found
+
+    def free_coordinates(self, name: PointReference) -> tuple[bool, bool]:
+        """Whether x and y of a point of the frame are sought; each is a number of the file, or nothing is."""
+        frame = self.mechanism.frame
+        if not isinstance(name, str):
+            return False, False
+        index = [each.name for each in self.mechanism.links].index(frame)
+        own: list[Dimension] = [each for each in self.numbers.values() if each.address[:2] == ("links", index)]
+        here = link_shape(self.links[frame]).position(name)
+        moved = [
+            link_shape(change_dimension(self.mechanism, each, each.value + 1.0).links[index]).position(name)
+            for each in own
+            if each.name in self.free
+        ]
+        steps = [(round(each.x - here.x, 9), round(each.y - here.y, 9)) for each in moved]
+        if not {*steps} <= {(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)}:
+            raise refuse(f"point {name!r} of the frame is not written by its coordinates")
+        return (1.0, 0.0) in steps, (0.0, 1.0) in steps
+
+    # pairs
+
+    def _with_direction(self, index: int) -> Pair:
+        """A pair whose line has a direction as a symbol."""
+        pair = self.mechanism.pairs[index]
+        for each in self.numbers.values():
+            if each.address[:2] != ("pairs", index) or each.kind != "angle":
+                continue
+            trial = Direction(self.table.add())
+            changed = change_dimension(self.mechanism, each, trial).pairs[index]
+            shapes = [PlacedShape(lambda _: self.table.add().value) for _ in pair.bodies]
+            numbers = changed.measure(shapes)
+            if not any(isinstance(n, Polynomial) and trial.symbol.own in n.symbols for n in numbers):
+                continue
+            if pair.bodies[0] != self.mechanism.frame:
+                raise refuse(f"{pair.name!r} slides along a link that moves")
+            if each.name in self.free and not self.pins_are_kept:
+                way = self.table.add_unknown()
+                patch = self.table.add_given(NumberKind.TURN, PATCH_ANGLE).value
+                along = way.value * patch.conjugate
+                self.conditions.append(along + along.conjugate - 2.0)
+            else:
+                way = self.table.add_given(NumberKind.TURN, float(each.value))
+            self.directions[pair.name] = Direction(way)
+            return change_dimension(self.mechanism, each, self.directions[pair.name]).pairs[index]
+        return pair
+
+    def pair_rows(
+        self, pair: Pair, frames: dict[str, Frame], own: Sequence[Polynomial]
+    ) -> tuple[list[Polynomial], list[AngleSum]]:
+        """The row x + i y of a pair where its links have these frames, and what its row between angles adds up."""
+        shapes: list[Any] = [self.shape(link) for link in pair.bodies]
+        if own:  # its line goes through where its point is at the first entry, so that it slides from there
+            through = self.place(pair.bodies[1], pair.point_on_line()[0][1])  # type: ignore[index]
+            shapes[0] = PlacedShape(lambda _: through)
+        numbers = pair.measure(shapes)
+        rows = pair.residual([frames[link] for link in pair.bodies], numbers, own)
+        turns = [each if isinstance(each, AngleSum) else AngleSum({}) for each in rows[2:]]
+        return [complex_row(rows[0], rows[1])], turns
+
+    def _sliding_row(self, pair: Pair) -> SlidingRow:
+        point_ = pair.point_on_line()
+        if point_ is None or pair.name not in self.directions:
+            raise refuse(f"the line of {pair.name!r} is not given by a direction")
+        asked: list[PointReference] = []
+
+        def note(name: PointReference) -> Polynomial:
+            asked.append(name)
+            return Polynomial({})
+
+        pair.measure([PlacedShape(note), self.shape(pair.bodies[1])])
+        slider = self.place(pair.bodies[1], point_[0][1])
+        return SlidingRow(pair, slider, asked[0], self.directions[pair.name].symbol.value)
+
+    # ties
+
+    def tie(self, row: Polynomial) -> None:
+        """Keep a complex row at zero: by eliminating a place that stands in it alone, or as two conditions."""
+        row = row.substitute(self.values)
+        known = {each.symbol.own for each in self.table.given}
+        sought = {each.own for each in self.table.unknowns}
+        moving = [k for k in sorted(row.symbols) if k % 2 == 0 and k not in known]
+        for k in sorted(moving, key=lambda each: each in sought):
+            powers = row.by_powers(k)
+            factor = powers.get(1, Polynomial({})).constant()
+            if len(powers) <= 2 and 2 not in powers and factor:
+                value = powers.get(0, Polynomial({})) * (-1.0 / factor)
+                new = {k: value, k + 1: value.conjugate}
+                self.values = {key: each.substitute(new) for key, each in self.values.items()} | new
+                self.table.unknowns = [each for each in self.table.unknowns if each.own != k]
+                self.conditions = [each.substitute(new) for each in self.conditions]
+                return
+        if row.symbols:
+            self.conditions += [row, row.conjugate]
+
+    def finish(self) -> None:
+        """What is left of the places of moving links is sought."""
+        known = {each.symbol.own for each in self.table.given} | {each.own for each in self.table.unknowns}
+        for place in self.places.values():
+            for k in sorted({each & ~1 for each in place.substitute(self.values).symbols} - known):
+                known.add(k)
+                self.table.unknowns.append(Symbol(k, k + 1))
+        self.conditions = [each.substitute(self.values) for each in self.conditions]

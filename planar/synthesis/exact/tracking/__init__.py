@@ -1,0 +1,1 @@
+"""All complex solutions of a member of a family: found once, followed, certified."""

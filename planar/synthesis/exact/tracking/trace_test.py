@@ -1,0 +1,162 @@
+"""The trace test: whether solutions that were found are all, by a line in the numbers of a family and a linear slice.
+
+Along a line p + s v of members the solutions are a curve in unknowns and s. Where it meets a plane, and that plane is
+moved along itself, the sum of all points of an irreducible curve moves evenly, and that of some of them does not. The
+points on a plane are found by monodromy from those of the member; where their trace is even they are all, and the plane
+s = 0 has no more than they lead to. A. Leykin, J. I. Rodriguez, F. Sottile, Trace test, Arnold Math. J. 4, 2018.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from planar.assemblies.polynomial.path_tracker import HomotopyValues, is_finite_solution, normalize, track_paths
+from planar.foundation.arrays import Array, ComplexArray
+from planar.synthesis.exact.relations.family import Family
+from planar.synthesis.exact.relations.unknowns import NumberKind
+from planar.synthesis.exact.tracking.member_homotopy import affine_solutions
+from planar.synthesis.exact.tracking.monodromy import GenericSolutions, first_of_same
+from planar.synthesis.exact.tracking.symmetry import exchange_images
+
+MAX_POINTS = 1500
+"""Of a slice; with more the test is not made."""
+ROUNDS, IDLE_ROUNDS = 60, 6
+FINITE = 1e-6
+"""Of solutions of length one: what is nearer to infinity is there."""
+EVEN = 1e-7
+"""Of the size of the sums: by how much a trace may be off."""
+
+
+class _Plane(NamedTuple):
+    """c . (x, s) = level."""
+
+    c: ComplexArray
+    level: complex
+
+
+class _SliceHomotopy:
+    """From a plane to another; solutions are (1, places, s; 1, conjugates, s)."""
+
+    def __init__(
+        self,
+        family: Family,
+        known: GenericSolutions,
+        line: tuple[ComplexArray, ...],
+        planes: tuple[_Plane, _Plane],
+    ):
+        self.family, self.member, self.line = family, known.member, line
+        self.begin, self.end = planes
+
+    def __call__(self, V: ComplexArray, way: Array) -> HomotopyValues:
+        """The equations, their slope, and their derivative along the way."""
+        n = self.family.size
+        x, s, y = _affine(V, n)
+        f, slope, by_s = self.family.rows_at(x.T.copy(), self.member, self.line, s, True)
+        rows, paths = f.shape
+        c = self.begin.c + way[:, None] * (self.end.c - self.begin.c)
+        level = self.begin.level + way * (self.end.level - self.begin.level)
+        whole: ComplexArray = np.zeros((paths, rows + 2, 2 * n + 2), dtype=complex)
+        whole[:, :rows, :n], whole[:, :rows, n] = slope[:, :n].transpose(2, 0, 1), by_s.T
+        whole[:, :rows, n + 1 : 2 * n + 1] = slope[:, n:].transpose(2, 0, 1)
+        whole[:, rows, : 2 * n + 1] = c
+        whole[:, rows + 1, n], whole[:, rows + 1, 2 * n + 1] = 1.0, -1.0
+        left: ComplexArray = np.zeros((paths, rows + 2), dtype=complex)
+        left[:, :rows], left[:, rows] = f.T, np.sum(c * y[:, :-1], axis=1) - level
+        left[:, rows + 1] = y[:, n] - y[:, 2 * n + 1]
+        along: ComplexArray = np.zeros_like(left)
+        along[:, rows] = y[:, :-1] @ (self.end.c - self.begin.c) - (self.end.level - self.begin.level)
+        found: ComplexArray = np.empty((paths, rows + 2, 2 * n + 4), dtype=complex)
+        for first, at in ((0, 0), (n + 1, n + 2)):
+            part, over = whole[:, :, first : first + n + 1], V[:, at][:, None]
+            found[:, :, at] = -np.einsum("pru,pu->pr", part, y[:, first : first + n + 1]) / over
+            found[:, :, at + 1 : at + n + 2] = part / over[..., None]
+        size = np.linalg.norm(found, axis=2)
+        scale: Array = 1.0 / np.where(size > 0.0, size, 1.0)
+        return left * scale, found * scale[..., None], along * scale
+
+
+def _affine(V: ComplexArray, n: int) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
+    """The unknowns, s, and all entries of both halves."""
+    y = affine_solutions(V)
+    return np.concatenate([y[:, :n], y[:, n + 1 : -1]], axis=1), y[:, n], y
+
+
+def trace_test(family: Family, known: GenericSolutions, exchanges: tuple[tuple[int, ...], ...], seed: int = 9) -> bool:
+    """Whether the solutions of a random member, with what exchanges make of them, are all that it has.
+
+    False also where the slice has too many points for the test.
+    """
+    V = np.concatenate(exchange_images(exchanges)(known.V))
+    V = V[first_of_same(V) == np.arange(len(V))]
+    if len(V) * 4 > MAX_POINTS:
+        return False
+    rng = np.random.default_rng(seed)
+    line = tuple(rng.normal(size=each.shape) + 1j * rng.normal(size=each.shape) for each in known.member.parts)
+    for part, each in zip(family.parts, line, strict=True):
+        real = [k for k, kind in enumerate(part.kinds) if kind is NumberKind.LENGTH]
+        each[:, real, 1] = each[:, real, 0]
+    n = family.size
+    start = _Plane(np.eye(1, 2 * n + 1, n)[0].astype(complex), 0.0)
+
+    def plane() -> _Plane:
+        c, level = rng.normal(size=(2, 2 * n + 1)), rng.normal(size=2)
+        return _Plane(c[0] + 1j * c[1], complex(*level))
+
+    def follow(points: ComplexArray, one: _Plane, other: _Plane) -> tuple[ComplexArray, bool]:
+        ends = track_paths(_SliceHomotopy(family, known, line, (one, other)), points)
+        return ends.V[ends.is_single], bool(ends.is_single.all())
+
+    x = affine_solutions(V)
+    one = np.ones((len(x), 1))
+    W = normalize(np.concatenate([one, x[:, :n], 0.0 * one, one, x[:, n:], 0.0 * one], axis=1))
+    slice_ = plane()
+    points, _ = follow(W, start, slice_)
+    idle = 0
+    for _ in range(ROUNDS):
+        a, b = plane(), plane()
+        gone = points
+        for first, last in ((slice_, a), (a, b), (b, slice_)):
+            gone, _ = follow(gone, first, last)
+        both = np.concatenate([points, gone])
+        new = both[first_of_same(both) == np.arange(len(both))]
+        idle = idle + 1 if len(new) == len(points) else 0
+        points = new
+        if len(points) > MAX_POINTS:
+            return False
+        if idle and _is_even(points, slice_, n, follow):
+            break
+        if idle >= IDLE_ROUNDS:
+            return False
+    else:
+        return False
+    back, _ = follow(points, slice_, start)
+    told = _affine(back[is_finite_solution(back, FINITE)], n)[0]
+    every = np.concatenate([V, _homogeneous(told)])
+    return int(np.sum(first_of_same(every) == np.arange(len(every)))) == len(V)
+
+
+def _homogeneous(x: ComplexArray) -> ComplexArray:
+    half, one = x.shape[1] // 2, np.ones((len(x), 1))
+    return normalize(np.concatenate([one, x[:, :half], one, x[:, half:]], axis=1))
+
+
+_Follow = Callable[[ComplexArray, _Plane, _Plane], tuple[ComplexArray, bool]]
+
+
+def _is_even(points: ComplexArray, plane: _Plane, n: int, follow: _Follow) -> bool:
+    """Whether the sum of the points moves evenly with the plane's level."""
+    sums = []
+    for step in (0.0, 1.0, -1.0):
+        moved, is_whole = (
+            (points, True) if not step else follow(points, plane, plane._replace(level=plane.level + step))
+        )
+        if not is_whole:
+            return False
+        x, s, _ = _affine(moved, n)
+        sums.append(np.append(x.sum(axis=0), s.sum()))
+    off = np.abs(sums[1] + sums[2] - 2.0 * sums[0]).max()
+    size = max(float(np.abs(each).max()) for each in sums)
+    return bool(off <= EVEN * max(size, 1.0))

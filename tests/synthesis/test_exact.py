@@ -1,0 +1,208 @@
+"""Complete lists against closed forms, published numbers, and the linkages that made the tasks."""
+
+import json
+
+import numpy as np
+import pytest
+
+import planar
+from planar.foundation.jets import value_and_rates
+from planar.synthesis.exact.relations.exact_problem import ExactProblem
+from planar.synthesis.exact.tracking.exact_certificates import certify_member
+from planar.synthesis.exact.tracking.generic_store import family_record
+from planar.synthesis.exact.tracking.member_homotopy import affine_solutions
+from planar.synthesis.exact.tracking.symmetry import name_family
+from planar.synthesis.task.starts import start_mechanisms
+from tests.command import run
+
+UNITS = {"length": "mm", "angle": "deg"}
+POSES = [(0, 0, 0), (30, 20, 25), (70, 25, 60), (95, 5, 80)]
+
+
+def task(start, *wanted, **more):
+    return {"planar": 1, "units": UNITS, "start": start, "wanted": list(wanted)} | more
+
+
+def with_points_on_coupler():
+    start = planar.to_dict(planar.load("four-bar"))
+    start["links"]["BC"] = {"points": {"B": [0, 0], "C": [66, 0]}}
+    return start
+
+
+def poses(count):
+    return {"link": "BC", "poses": [{"at": [x, y], "angle": angle} for x, y, angle in POSES[:count]]}
+
+
+def carried(place, number):
+    """Where a place at the first pose is at another one (m)."""
+    first, other = (np.array(POSES[k][:2]) * 1e-3 for k in (0, number))
+    angle = np.radians(POSES[number][2] - POSES[0][2])
+    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    return other + (place - first) @ turn.T
+
+
+def family_of(value):
+    wanted = planar.read_task(value)
+    (component, *_) = ExactProblem(wanted, next(iter(start_mechanisms(wanted)))).components
+    return component
+
+
+def frame_parts(motion, link):
+    frame = motion.frames[link]
+    return [np.asarray(value_and_rates(getattr(frame, part))[0]) for part in ("x", "y", "angle")]
+
+
+def test_the_linkage_that_made_five_poses_is_among_the_six_that_do_them():
+    maker = planar.from_dict(with_points_on_coupler())
+    motion = planar.cycle(maker, 60)
+    x, y, angle = frame_parts(motion, "BC")
+    rows = [4, 11, 20, 27, 35]
+    wanted = {
+        "link": "BC",
+        "poses": [{"at": [1e3 * x[k], 1e3 * y[k]], "angle": float(np.degrees(angle[k]))} for k in rows],
+    }
+    found = planar.synthesise(task(with_points_on_coupler(), wanted), complete=True)
+    assert (found.expected, found.found, found.complete) == (6, 6, "numerically complete")
+    assert len(found) in (0, 1, 6) and all(each.certified for each in found)
+    pivots = [
+        {(round(each["AD.A.x"], 7), round(each["AD.D.x"], 7)) for each in (planar.dimensions(one.mechanism),)}
+        for one in found
+    ]
+    assert {(0.0, 0.1)} in pivots or {(0.1, 0.0)} in pivots
+    for design in found:
+        if design.defects:
+            continue
+        assert design.greatest_miss < 1e-10
+        for at, k in zip(design.inputs[0], rows, strict=True):  # by the general path, from the file
+            state = planar.solve(planar.loads(planar.dumps(design.mechanism)), {"A": float(at)})
+            own = [float(value_and_rates(getattr(state.frames["BC"], part))[0]) for part in ("x", "y", "angle")]
+            np.testing.assert_allclose(own[:2], [x[k], y[k]], atol=1e-9)
+            assert np.cos(own[2] - angle[k]) == pytest.approx(1.0, abs=1e-12)
+
+
+def test_burmesters_curves_keep_their_distances_and_close():
+    curves = planar.synthesise(task(with_points_on_coupler(), poses(4)), complete=True).curves
+    assert [(each.pivot, each.joint, each.dimension) for each in curves] == [("A", "B", 1), ("D", "C", 1)]
+    known = np.isfinite(curves[0].circle_points).all(axis=1)
+    joints, pivots = curves[0].circle_points[known], curves[0].centre_points[known]
+    assert known.sum() > 500
+    distances = [np.linalg.norm(carried(joints, k) - pivots, axis=1) for k in range(4)]
+    np.testing.assert_allclose(distances, np.broadcast_to(distances[0], (4, len(joints))), atol=1e-11)
+
+
+def test_three_poses_leave_every_joint_the_centre_of_its_circle():
+    found = planar.synthesise(task(with_points_on_coupler(), poses(3)), complete=True)
+    joint = np.array([0.012, -0.031])
+    a, b, c = (carried(joint, k) for k in range(3))
+    matrix, right = 2.0 * np.array([b - a, c - a]), np.array([b @ b - a @ a, c @ c - a @ a])
+    assert found.curves[0].dimension == 2 and found.expected is None and not len(found)
+    np.testing.assert_allclose(found.curves[0].centres(joint)[0], np.linalg.solve(matrix, right), atol=1e-13)
+
+
+def test_four_poses_leave_one_slide_whose_joint_stays_on_a_line():
+    start = planar.to_dict(planar.load("offset-slider-crank"))
+    start["links"]["rod"] = {"points": {"A": [0, 0], "B": [200, 0]}}
+    wanted = poses(4) | {"link": "rod"}
+    single = planar.synthesise(task(start, wanted), complete=True).curves[1]
+    assert (single.pivot, single.joint, single.dimension) == ("stroke", "B", 0)
+    places = np.array([carried(single.circle_points[0], k) for k in range(4)])
+    assert np.linalg.svd(places - places.mean(axis=0))[1][1] < 1e-12
+
+
+def test_three_pairs_with_their_zeros_are_freudensteins():
+    """F. Freudenstein, Trans. ASME 77, 1955: K1 cos(psi) - K2 cos(phi) + K3 = cos(phi - psi)."""
+    pairs = np.array([[20.0, 50.0], [45.0, 68.0], [80.0, 95.0]])
+    wanted = {"from": "A", "to": "D", "pairs": pairs.tolist(), "absolute": True}
+    found = planar.synthesise(task("four-bar", wanted), complete=True)
+    assert (found.expected, found.found, len(found), found[0].certified) == (1, 1, 1, True)
+    phi, psi = np.radians(pairs).T
+    k = np.linalg.solve(np.stack([np.cos(psi), -np.cos(phi), np.ones(3)], axis=1), np.cos(phi - psi))
+    numbers = planar.dimensions(found[0].mechanism)
+    d = numbers["AD.D.x"]
+    a, b, c = (numbers[f"{link}.length"] for link in ("AB", "BC", "DC"))
+    # a crank that would be negative points the other way
+    np.testing.assert_allclose(np.abs([d / a, d / c]), np.abs(k[:2]), rtol=1e-9)
+    assert (a * a - b * b + c * c + d * d) / (2 * a * c) == pytest.approx(abs(k[2]), rel=1e-9)
+
+
+def test_five_pairs_have_three_four_bars():
+    motion = planar.cycle("four-bar", 48)
+    rows = [3, 10, 17, 25, 31]
+    phi, psi = np.degrees(motion.inputs["A"].position), np.degrees(motion.link("DC").angle)
+    wanted = {"from": "A", "to": "D", "pairs": [[float(phi[k]), float(psi[k])] for k in rows]}
+    found = planar.synthesise(task("four-bar", wanted), complete=True)
+    assert (found.expected, found.found, found.complete) == (3, 3, "numerically complete")
+    lengths = [[planar.dimensions(one.mechanism)[f"{link}.length"] for link in ("AB", "BC", "DC")] for one in found]
+    assert np.abs(np.array(lengths) - [0.05, 0.066, 0.056]).max(axis=1).min() < 1e-9
+
+
+def test_known_members_are_solved_by_all_that_stands_with_them():
+    places = [[k * k % 17, 3 * k * k % 19] for k in range(9)]
+    nine = family_of(task("four-bar", {"point": "E", "through": places}))
+    record = family_record(nine.family)
+    assert record.classes.shape == (1442, 3) and not record.is_traced
+    assert len(record.name.exchanges) == 2  # either crank may be the first
+    x = affine_solutions(record.solutions.V).T.copy()
+    still = [np.zeros_like(each) for each in record.solutions.member.parts]
+    f, slope, _ = nine.family.rows_at(x, record.solutions.member, still, np.zeros(x.shape[1]))
+    size = np.abs(slope * x).sum(axis=1)
+    assert (np.abs(f) / size).max() < 1e-8
+
+
+def test_a_family_is_known_whatever_its_links_are_called():
+    places = [[k * k % 17, 3 * k * k % 19] for k in range(9)]
+    other = planar.to_dict(planar.load("four-bar"))
+    links = other["links"]
+    other["links"] = {name: links[name] for name in ("DC", "BC", "AD", "AB")}
+    other["pairs"] = other["pairs"][::-1]
+    first, second = (family_of(task(start, {"point": "E", "through": places})) for start in ("four-bar", other))
+    assert name_family(first.family).text == name_family(second.family).text
+
+
+def test_what_is_no_solution_is_not_certified():
+    component = family_of(
+        task(with_points_on_coupler(), {"link": "BC", "poses": [*poses(4)["poses"], {"at": [99, -30], "angle": 99}]})
+    )
+    record = family_record(component.family)
+    x = affine_solutions(record.solutions.V)
+    assert not certify_member(component.family, component.member, x * 1e6).proved.any()
+
+
+@pytest.mark.parametrize(
+    ("value", "said"),
+    [
+        (task({"chains": [4]}, {"point": "P", "through": [[0, 0]]}), "that of one mechanism"),
+        (task("four-bar", {"point": "E", "through": [[k, k * k] for k in range(10)]}), "1 condition more"),
+        (task("four-bar", {"point": "E", "through": [[k, k * k] for k in range(8)]}), "1 number of"),
+        (
+            task("stephenson-3-five-bar", {"point": "E", "through": [[k, k * k] for k in range(9)]}),
+            "more than one unknown turn",
+        ),
+        (task("four-bar", {"from": "A", "to": "D", "pairs": [[k, 2 * k] for k in range(4)]}), "1 number of"),
+    ],
+)
+def test_what_has_no_list_is_refused_in_words(value, said):
+    with pytest.raises(planar.BadInput, match=said):
+        planar.synthesise(value, complete=True)
+    with pytest.raises(planar.BadInput, match="leave many"):
+        planar.synthesise(value, complete=True, many=3)
+
+
+def test_the_command_tells_what_is_expected_found_and_proved(tmp_path):
+    pairs = [[0, 0], [25, 14], [50, 33], [70, 51], [90, 75]]
+    (tmp_path / "throw.json").write_text(
+        json.dumps(task("four-bar", {"from": "A", "to": "D", "pairs": pairs}, name="Throw"))
+    )
+    out = run(tmp_path, "synthesise", "throw.json", "--complete").done()
+    assert "3 of 3 found" in out and "numerically complete" in out
+    told = json.loads(run(tmp_path, "synthesise", "throw.json", "--complete", "--json").done())
+    assert (told["expected"], told["found"], told["curves"]) == (3, 3, [])
+    assert all(isinstance(each["certified"], bool) for each in told["designs"])
+
+
+def test_a_picture_shows_each_curve_once():
+    found = planar.synthesise(task(with_points_on_coupler(), poses(4)), complete=True)
+    texts = [each.get_text() for each in planar.plot.dyad_curves(found).findobj(lambda one: hasattr(one, "get_text"))]
+    assert sum("Dyads B about A and C about D" in each for each in texts) == 1
+    with pytest.raises(planar.BadInput, match="no curve"):
+        planar.plot.dyad_curves(planar.synthesise(task(with_points_on_coupler(), poses(3)), complete=True))
