@@ -21,6 +21,7 @@ from planar.pages.page import fill_template
 from planar.reports.number_format import format_number
 from planar.reports.tables.design.design_columns import DesignColumn
 from planar.reports.tables.design.synthesis import input_text
+from planar.synthesis.exact.complete_synthesis import CompleteSynthesis, ExactDesign
 from planar.synthesis.synthesis import Synthesis, SynthesisedDesign
 from planar.synthesis.task.synthesis_task import WantedFunction
 from planar.synthesis.task.task_numbers import miss_kind
@@ -60,7 +61,8 @@ def gallery_page(found: Synthesis, cards: Sequence[GalleryCard], columns: Sequen
     entries = count_phrase(found.task.entry_count, "entry is wanted", "entries are wanted")
     refused = f", the best {len(rejected)} of those rejected" if rejected else ""
     counts = f"{entries}; {count_phrase(len(sound), 'design')}{refused}"
-    remarks = "".join(f"<li>{escape(each)}</li>" for each in found.remarks)
+    summary = found.summary if isinstance(found, CompleteSynthesis) else ()
+    remarks = "".join(f"<li>{escape(each)}</li>" for each in (*summary, *found.remarks))
     parts = {
         "title": escape(found.task.name),
         "styles": "\n".join(styles),
@@ -126,6 +128,8 @@ def _facts(found: Synthesis, design: SynthesisedDesign) -> Iterator[tuple[str, s
         share = f", {100.0 * design.greatest_miss / found.size:.3g} % of the size"
         yield "greatest miss", amount(design.greatest_miss, kind, units) + (share if found.task.wants_places else "")
         yield "root mean square", amount(design.error, kind, units)
+    if isinstance(design, ExactDesign):
+        yield "proved", "yes" if design.certified else "no"
     if design.motion is None:
         return
     yield "input", input_text(found, design)

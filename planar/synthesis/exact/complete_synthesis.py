@@ -70,6 +70,14 @@ class CompleteSynthesis(Synthesis):
     counted: str = ""
     curves: tuple[DyadCurve, ...] = ()
 
+    @property
+    def summary(self) -> tuple[str, ...]:
+        """How many there are, how many were to be expected, and what is known of the whole, in sentences."""
+        if self.expected is None:
+            return (self.complete,)
+        real = count_phrase(len(self), "linkage is real", "linkages are real")
+        return f"{self.found} of {self.expected} found ({self.counted}); {real}", self.complete
+
     def __repr__(self) -> str:
         whole = f", {self.expected} expected" if self.expected is not None else ""
         return (

@@ -67,10 +67,7 @@ def _designs_table(found: Synthesis, files: Sequence[Path]) -> FittedTable:
 
 def _complete_parts(found: CompleteSynthesis, files: Sequence[Path]) -> Iterator[RenderableType]:
     """How many there are and how many were to be expected, all real ones with their defects, and curves of them."""
-    if found.expected is not None:
-        real = count_phrase(len(found), "linkage is real", "linkages are real")
-        yield Text(f"{found.found} of {found.expected} found ({found.counted}); {real}")
-    yield Text(found.complete)
+    yield from map(Text, found.summary)
     if len(found):
         yield Text()
         rows = plain_table("Designs", "no.", "proved", "greatest miss", "defects", "file", left=(3, 4), keys=1)
