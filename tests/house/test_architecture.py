@@ -65,7 +65,7 @@ LIBRARIES = {
     "rich": {"cli", "reports"},
     "contourpy": {"drawing"},
     "matplotlib": {"drawing", "plot"},
-    "ezdxf": {"manufacture"},
+    "ezdxf": {"drawing", "manufacture"},
     "fontTools": {"drawing"},
     "PIL": {"drawing"},
     "imageio_ffmpeg": {"drawing"},
