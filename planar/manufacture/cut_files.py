@@ -9,9 +9,9 @@ from typing import Any, NamedTuple
 from xml.sax.saxutils import escape
 
 from planar.foundation.errors import BadInput, unknown_format_error
-from planar.manufacture.plates import Plate, Slot, Vertex, sampled
+from planar.manufacture.plates import Plate, Slot, Vertex
 
-SUFFIXES = (".dxf", ".svg")
+SUFFIXES = (".dxf", ".svg", ".step")
 SHEET_GAP = 40.0
 """Between sheets that stand beside each other in one drawing (mm)."""
 LETTER_HEIGHT = 4.0
@@ -150,14 +150,3 @@ def _svg_path(loop: tuple[Vertex, ...], x: float, height: float) -> str:
         large, sweep = int(abs(degrees(turn)) > 180.0), int(bulge < 0.0)
         found.append(f"A{radius:.6f} {radius:.6f} 0 {large} {sweep} {to}")
     return " ".join([*found, "Z"])
-
-
-def plate_area(plate: Plate) -> float:
-    """The area of a plate (mm^2), by polygons."""
-
-    def area(points: list[tuple[float, float]]) -> float:
-        return abs(sum(a * d - b * c for (a, b), (c, d) in zip(points, [*points[1:], points[0]], strict=True))) / 2.0
-
-    cut = sum(area(sampled(loop, 64)) for loop in plate.loops[1:])
-    holes = sum(3.141592653589793 * hole.diameter**2 / 4.0 for hole in plate.holes)
-    return area(sampled(plate.outline, 64)) - cut - holes

@@ -73,15 +73,22 @@ class Parts:
         return f"<Parts of {self.mechanism.name!r}: {many}, sheets: {len(self.sheets)}>"
 
     def encode(self, suffix: str) -> bytes:
-        """The sheets side by side, with the list of parts, as the content of a .dxf or .svg file. Raises BadInput."""
+        """The sheets side by side, with the list of parts, as a .dxf or .svg file has them; for .step the solids.
+
+        Those are stacked where the mechanism was drawn. Raises BadInput.
+        """
         from planar.manufacture.cut_files import Layout, encode_layout
 
+        if suffix.lower() == ".step":
+            from planar.manufacture.step_file import encode_step
+
+            return encode_step(self.plates, 1e3 * self.thickness, self.mechanism.name)
         numbers = {plate.name: number for number, plate in enumerate(self.plates, 1)}
         size = (1e3 * self.sheet[0], 1e3 * self.sheet[1])
         return encode_layout(Layout(self.sheets, size, numbers, self.lines()), suffix)
 
     def save(self, file: str | os.PathLike[str]) -> None:
-        """Write the sheets to a .dxf or .svg file. Raises BadInput."""
+        """Write the sheets to a .dxf or .svg file, or the stacked plates to a .step file. Raises BadInput."""
         path = Path(file)
         save_file(path, self.encode(path.suffix))
 

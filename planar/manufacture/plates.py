@@ -106,6 +106,24 @@ def sampled(loop: Sequence[Vertex], steps: int = 16) -> list[Place]:
     return found
 
 
+def plate_area(plate: Plate) -> float:
+    """The area of a plate (mm^2), of its straight edges and arcs."""
+    holes = sum(pi * hole.diameter**2 / 4.0 for hole in plate.holes)
+    return _loop_area(plate.outline) - sum(_loop_area(loop) for loop in plate.loops[1:]) - holes
+
+
+def _loop_area(loop: Sequence[Vertex]) -> float:
+    """The area within a closed line: its polygon's, and the segments between arcs and their chords."""
+    found = 0.0
+    for (x, y, bulge), (u, v, _) in zip(loop, [*loop[1:], loop[0]], strict=True):
+        found += (x * v - u * y) / 2.0
+        if bulge:
+            turn = 4.0 * _arctan(bulge)
+            radius = hypot(u - x, v - y) / 2.0 / sin(turn / 2.0)
+            found += radius * radius * (turn - sin(turn)) / 2.0
+    return abs(found)
+
+
 def moved_plate(plate: Plate, angle: float, x: float, y: float) -> Plate:
     """The plate turned (degrees) about the origin, then shifted."""
     c, s = cos(radians(angle)), sin(radians(angle))

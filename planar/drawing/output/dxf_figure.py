@@ -16,6 +16,7 @@ DOTS = 72.0
 """To an inch, in which the figure is drawn."""
 MM_PER_DOT = 25.4 / DOTS
 LINES, LETTERS = "LINES", "TEXT"
+DARK = 0.2
 
 
 def encode_dxf(figure: Figure) -> bytes:
@@ -30,7 +31,7 @@ def encode_dxf(figure: Figure) -> bytes:
 
     document = new("R2010", setup=["linetypes"], units=units.MM)
     document.layers.add(LINES, color=7)
-    document.layers.add(LETTERS, color=3)
+    document.layers.add(LETTERS, color=7)
     space = document.modelspace()
     width, height = figure.get_size_inches() * DOTS
 
@@ -46,7 +47,9 @@ def encode_dxf(figure: Figure) -> bytes:
                 return
             box = gc.get_clip_rectangle()
             clip = (0.0, 0.0, width, height) if box is None else tuple(box.extents)
-            told = {"layer": self.layer, "true_color": colors.rgb2int(tuple(round(255 * each) for each in colour[:3]))}
+            told: dict[str, Any] = {"layer": self.layer}
+            if max(colour[:3]) > DARK:  # black is the colour of the layer, which is white on a dark ground
+                told["true_color"] = colors.rgb2int(tuple(round(255 * each) for each in colour[:3]))
             if stroked and gc.get_dashes()[1] is not None:
                 told |= {"linetype": "DASHED", "ltscale": 0.1}
             for points, closed in _polylines(

@@ -22,7 +22,7 @@ from planar.foundation.errors import BadInput
 
 @main.command()
 @model_argument()
-@output_option("Write the sheets to a .dxf or .svg file.")
+@output_option("Write the sheets to a .dxf or .svg file, or solids to .step.")
 @click.option("--thickness", default="3mm", show_default=True, metavar="LENGTH", help="Of the plates.")
 @click.option("--pin", metavar="LENGTH", help="The diameter of the pins; left out, one that suits the links.")
 @click.option("--wall", metavar="LENGTH", help="What is left round a hole; left out, as wide as a pin.")

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from rich.console import Group, RenderableType
 from rich.text import Text
 
-from planar.manufacture.cut_files import plate_area
+from planar.manufacture.plates import plate_area
 from planar.reports.fitted_table import plain_table
 
 if TYPE_CHECKING:
