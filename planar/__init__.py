@@ -78,6 +78,8 @@ if TYPE_CHECKING:
     from planar.dynamics.reactions import Reaction
     from planar.dynamics.simulation import Simulation, simulate
     from planar.foundation.errors import BadInput, NoAnswer, Outcome, PlanarError, Unknown
+    from planar.manufacture.parts import PartPin, Parts, parts
+    from planar.manufacture.plates import Plate
     from planar.model.file_units import FileUnits
     from planar.model.input_laws.cam_rises import (
         CycloidalRise,
@@ -240,8 +242,11 @@ __all__ = [
     "Pair",
     "PairFriction",
     "ParabolicRise",
+    "PartPin",
+    "Parts",
     "PinnedLinkages",
     "PlanarError",
+    "Plate",
     "Point",
     "PointMotion",
     "PointState",
@@ -335,6 +340,7 @@ __all__ = [
     "mobility",
     "modes",
     "motor_duty",
+    "parts",
     "pinned",
     "pinned_linkages",
     "plot",

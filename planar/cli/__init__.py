@@ -24,6 +24,7 @@ main.modules = {
     "mark": "planar.cli.commands.problem_mark",
     "models": "planar.cli.commands.inspect_models_schema_bench",
     "modes": "planar.cli.commands.modes",
+    "parts": "planar.cli.commands.design.parts",
     "plot": "planar.cli.commands.plot_animate",
     "problem": "planar.cli.commands.problem_mark",
     "schema": "planar.cli.commands.inspect_models_schema_bench",

@@ -600,8 +600,8 @@ def test_every_other_name_of_a_command_is_of_one_that_there_is_and_is_none_itsel
     [
         (["solve", "four-bar"], ".txt, .html or .svg"),
         (["explain", "four-bar"], ".txt, .html, .svg, .pdf or .png"),
-        (["cycle", "four-bar", "--steps", "2"], ".csv, .json, .npz or .parquet"),
-        (["plot", "four-bar", "scheme"], ".png, .svg or .pdf"),
+        (["cycle", "four-bar", "--steps", "2"], ".csv, .json, .npz, .parquet or .xlsx"),
+        (["plot", "four-bar", "scheme"], ".png, .svg, .pdf or .dxf"),
         (["explain", "four-bar"], ".txt, .html, .svg, .pdf or .png"),
         (["view", "four-bar"], ".html or .htm"),
         (["animate", "four-bar"], ".gif or .mp4"),

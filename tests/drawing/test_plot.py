@@ -107,7 +107,7 @@ def test_scales_are_taken_by_what_they_measure(tmp_path):
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (("scheme", "-o", "a.bmp"), "a drawing can be written to files that end in .png, .svg or .pdf"),
+        (("scheme", "-o", "a.bmp"), "a drawing can be written to files that end in .png, .svg, .pdf or .dxf"),
         (("scheme", "--input", "A", "-o", "a.png"), "a scheme is of one position"),
         (("loci", "--at", "A=60deg", "-o", "a.png"), "say where it starts with --from"),
         (("loci", "--point", "nothing", "-o", "a.png"), "there is no point 'nothing'"),

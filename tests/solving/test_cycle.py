@@ -492,7 +492,7 @@ def test_a_geared_five_bar_closes_only_after_two_turns():
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["-o", "m.xlsx"], [".xlsx", ".csv, .json, .npz or .parquet"]),
+        (["-o", "m.xls"], [".xls", ".csv, .json, .npz, .parquet or .xlsx"]),
         (["-o", "m"], ["a file name without an ending", ".csv"]),
         (["-o", "no/m.csv"], ["m.csv", "cannot be written"]),
         (["-o", "m.csv", "--json"], ["-o", "give one of the two"]),

@@ -69,7 +69,7 @@ DRAWN_STEPS = 360
         )
     ),
 )
-@output_option("Write the drawing to a .png, .svg or .pdf file.", required=True)
+@output_option("Write the drawing to a .png, .svg, .pdf or .dxf file.", required=True)
 @scale_option
 @at_option
 @click.option(

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 def save(figures: Figure | Sequence[Figure], file: str | Path) -> None:
-    """Write a figure to a .png, .svg or .pdf file; several as pages of one .pdf, or one below the other.
+    """Write a figure to a .png, .svg, .pdf or .dxf file; several as pages of one .pdf, or one below the other.
 
     Raises BadInput for another kind of file, and where it cannot be written.
     """

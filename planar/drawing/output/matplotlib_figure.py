@@ -169,21 +169,22 @@ def _row_height(row: Sequence[PictureCell]) -> float:
 
 
 def encode_figure(figure: Figure, suffix: str) -> bytes:
-    """A figure as a file's content: png (200 dots to an inch), svg or pdf; the same bytes for the same picture.
+    """A figure as a file's content: png (200 dots to an inch), svg, pdf or dxf.
 
-    Raises BadInput for another suffix, or a PNG too large for any screen.
+    All but dxf are the same bytes for the same picture. Raises BadInput for another suffix, or a PNG too large for any
+    screen.
     """
     return encode_pages([figure], suffix)
 
 
 def encode_pages(figures: Sequence[Figure], suffix: str) -> bytes:
-    """Figures as the pages of one PDF, or a single one as png or svg. Raises BadInput."""
+    """Figures as the pages of one PDF, or a single one as png, svg or dxf. Raises BadInput."""
     require_matplotlib()
     from matplotlib import rc_context
 
     kind = suffix.lower().removeprefix(".")
-    if kind not in METADATA:
-        raise unknown_format_error(suffix, "a drawing", (f".{each}" for each in METADATA))
+    if kind not in (*METADATA, "dxf"):
+        raise unknown_format_error(suffix, "a drawing", (f".{each}" for each in (*METADATA, "dxf")))
     if not figures:
         raise BadInput(suffix, "there is nothing to draw")
     if len(figures) > 1 and kind != "pdf":
@@ -192,6 +193,10 @@ def encode_pages(figures: Sequence[Figure], suffix: str) -> bytes:
     with rc_context(MATPLOTLIB_SETTINGS), quiet_font_logs():
         if kind == "pdf":
             return _encode_pdf(figures)
+        if kind == "dxf":
+            from planar.drawing.output.dxf_figure import encode_dxf
+
+            return encode_dxf(figures[0])
         across, up = figures[0].get_size_inches() * RESOLUTION
         if kind == "png" and (across * up > MAX_PIXELS or max(across, up) >= 2**16):
             raise BadInput(suffix, f"{across:.0f} x {up:.0f} pixels are too many: choose .pdf, .svg or a smaller scale")

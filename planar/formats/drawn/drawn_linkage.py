@@ -60,6 +60,11 @@ class WheelJoint(NamedTuple):
     sizes: tuple[float, ...]
     crossed: bool = False
 
+    @property
+    def meshes(self) -> bool:
+        """Whether the wheels touch with their teeth."""
+        return self.kind == "gear"
+
 
 Joint = PinJoint | SlideJoint | SlotJoint | WheelJoint
 

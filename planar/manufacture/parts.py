@@ -1,0 +1,349 @@
+"""A mechanism as parts to be cut: plates in layers that clear one another over its run, pins, and sheets."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+from math import cos, radians, sin
+from pathlib import Path
+
+import numpy as np
+
+from planar.document.first_argument import takes_mechanism
+from planar.formats.drawn.blocks import slots_for_blocks
+from planar.formats.drawn.drawn_linkage import DrawnLinkage, Joint, SlideJoint, SlotJoint, WheelJoint, joined_links
+from planar.formats.drawn.drawn_mechanism import drawn_mechanism
+from planar.foundation.errors import BadInput, NoAnswer, join_names
+from planar.foundation.geometry import Frame
+from planar.foundation.safe_files import save_file
+from planar.foundation.units import parse_unit
+from planar.manufacture.clearances import hull_rows, least_distance, places_over
+from planar.manufacture.layers import LayerRules, find_layers
+from planar.manufacture.nesting import nested
+from planar.manufacture.plate_making import Pin, Sizes, Travel, make_plates
+from planar.manufacture.plates import Plate
+from planar.model.mechanism import Mechanism
+from planar.results.motion import Motion
+from planar.solving.cycle import cycle
+from planar.solving.rest_position import rest_position
+
+NICE_PINS = (1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)
+"""Diameters that rods are sold in (mm)."""
+PIN_SHARE = 0.1
+"""Of the middle one of the distances between pins, of which the pins' diameter is to be about so much."""
+SCALES = (1.0, 2.0, 2.5, 5.0, 10.0, 20.0, 25.0, 50.0, 100.0, 200.0, 500.0, 1000.0)
+"""By which a mechanism is made smaller, so that its largest plate fits the sheet."""
+
+
+@dataclass(frozen=True)
+class PartPin:
+    """A pin: its diameter and length (m), and the first and last layer that it joins."""
+
+    name: str
+    diameter: float
+    length: float
+    layers: tuple[int, int]
+
+
+@dataclass(frozen=True)
+class Parts:
+    """Plates of the links of a mechanism, in mm where they were drawn, and the same laid out on sheets.
+
+    `is_clear` tells whether no plate meets another in its layer and no pin runs through one, at any of `positions`
+    positions of the run; what meets, and what else is to know, is in `notes`. `thickness`, `sheet` and `scale` are as
+    they were asked for (m; a scale of 0.2 is 1:5).
+    """
+
+    mechanism: Mechanism
+    plates: tuple[Plate, ...]
+    pins: tuple[PartPin, ...]
+    sheets: tuple[tuple[Plate, ...], ...]
+    thickness: float
+    sheet: tuple[float, float]
+    scale: float
+    is_clear: bool
+    positions: int
+    notes: tuple[str, ...]
+
+    def __repr__(self) -> str:
+        layers = len({plate.layer for plate in self.plates})
+        many = f"{len(self.plates)} plates in {layers} layers"
+        return f"<Parts of {self.mechanism.name!r}: {many}, sheets: {len(self.sheets)}>"
+
+    def encode(self, suffix: str) -> bytes:
+        """The sheets side by side, with the list of parts, as a .dxf or .svg file has them; for .step the solids.
+
+        Those are stacked where the mechanism was drawn. Raises BadInput.
+        """
+        from planar.manufacture.cut_files import Layout, encode_layout
+
+        if suffix.lower() == ".step":
+            from planar.manufacture.step_file import encode_step
+
+            return encode_step(self.plates, 1e3 * self.thickness, self.mechanism.name)
+        numbers = {plate.name: number for number, plate in enumerate(self.plates, 1)}
+        size = (1e3 * self.sheet[0], 1e3 * self.sheet[1])
+        return encode_layout(Layout(self.sheets, size, numbers, self.lines()), suffix)
+
+    def save(self, file: str | os.PathLike[str]) -> None:
+        """Write the sheets to a .dxf or .svg file, or the stacked plates to a .step file. Raises BadInput."""
+        path = Path(file)
+        save_file(path, self.encode(path.suffix))
+
+    def lines(self) -> list[str]:
+        """The list of plates and pins, a line each."""
+        found = [f"{self.mechanism.name}, {1e3 * self.thickness:g} mm plates, 1:{1.0 / self.scale:g}"]
+        for number, plate in enumerate(self.plates, 1):
+            told = f", {plate.teeth} teeth of module {plate.module:.4g}" if plate.teeth else ""
+            found.append(f"{number}  {plate.name}: layer {plate.layer}{told}")
+        for pin in self.pins:
+            size, (low, high) = f"{1e3 * pin.diameter:g} x {1e3 * pin.length:g} mm", pin.layers
+            found.append(f"pin {pin.name}: {size}, layers {low} to {high}")
+        return found
+
+
+@takes_mechanism
+def parts(  # many: sizes of what is cut
+    mechanism: Mechanism,
+    *,
+    thickness: float = 0.003,
+    pin: float | None = None,
+    wall: float | None = None,
+    play: float = 1e-4,
+    sheet: tuple[float, float] = (0.6, 0.4),
+    gap: float = 0.004,
+    scale: float | None = None,
+    steps: int = 90,
+) -> Parts:
+    """The parts of a mechanism: a plate of this `thickness` for each link, gears with involute teeth, pins, sheets.
+
+    Lengths in m. A plate is what is within `pin` / 2 + `wall` of its pins and slots; holes and slots are wider than
+    their pins by `play`; the pins of the file keep its radii. Left out, pins are about a tenth of the middle distance
+    between pins, walls as wide as pins, and the scale is the largest that lets each plate fit a `sheet`, `gap` apart.
+    Layers are found by the distances of all plates and pins at steps + 1 positions of `planar.cycle`. Raises BadInput
+    for a pair that is none of plates, and where a plate cannot be; NoAnswer where the mechanism does not run.
+
+    >>> import planar
+    >>> planar.parts("four-bar", thickness=0.003)
+    <Parts of 'Four-bar chain': 4 plates in 3 layers, sheets: 1>
+    """
+    for name, value in {"thickness": thickness, "pin": pin, "wall": wall, "gap": gap, "scale": scale}.items():
+        if value is not None and not 0.0 < value < 1e4:
+            raise BadInput(name, f"a size above zero is wanted, not {value!r:.40}")
+    drawn = rest_position(mechanism).frames
+    try:
+        linkage = slots_for_blocks(drawn_mechanism(mechanism, drawn, "plates"))
+    except BadInput as problem:
+        told = problem.sentence.replace("cannot be said in this format", "cannot be cut as plates that lie flat")
+        raise BadInput(problem.place, told) from None
+    held = {link for joint in linkage.joints for link in joined_links(joint)}
+    linkage = replace(linkage, links=tuple(link for link in linkage.links if link in held))
+    motion = _whole_run(mechanism, steps)
+    run = _Run(motion, drawn, linkage)
+    sizes = _Request(thickness, pin, wall, play, sheet, gap, steps)
+    for made in SCALES if scale is None else (1.0 / scale,):
+        found = _parts_at(mechanism, run, sizes, 1.0 / made)
+        if found is not None:
+            return found
+    told = (
+        "at no scale down to 1:1000 do its plates fit the sheet" if scale is None else "its plates do not fit the sheet"
+    )
+    raise BadInput(
+        "sheet", f"{told} of {sheet[0] * 1e3:g} x {sheet[1] * 1e3:g} mm; choose a larger one or a smaller scale"
+    )
+
+
+def _whole_run(mechanism: Mechanism, steps: int) -> Motion:
+    motion = (
+        cycle(mechanism, steps) if len(mechanism.inputs) < 2 else cycle(mechanism, steps, pair=mechanism.inputs[0].pair)
+    )
+    if len(motion) < 2:
+        raise NoAnswer(motion.outcome, motion.reason)
+    return motion
+
+
+@dataclass(frozen=True)
+class _Request:
+    thickness: float
+    pin: float | None
+    wall: float | None
+    play: float
+    sheet: tuple[float, float]
+    gap: float
+    steps: int
+
+
+class _Run:
+    """A run, and the linkage where it was drawn."""
+
+    def __init__(self, motion: Motion, drawn: Mapping[str, Frame], linkage: DrawnLinkage) -> None:
+        self.motion, self.drawn, self.linkage = motion, drawn, linkage
+
+    def places(self, link: str, points: tuple[tuple[float, float], ...], scale: float) -> np.ndarray:
+        frame = self.motion.frames[link]
+        return places_over(points, self.drawn[link], frame, 1e-3 / scale, len(self.motion))
+
+    def travels(self, linkage: DrawnLinkage, scale: float) -> dict[str, Travel]:
+        """How far each slide goes in its guide from where it was drawn."""
+        found = {}
+        for joint in linkage.joints:
+            if isinstance(joint, SlideJoint | SlotJoint):
+                rider = joint.slider if isinstance(joint, SlideJoint) else joint.rider
+                way = cos(radians(joint.angle)), sin(radians(joint.angle))
+                ahead = (joint.at[0] + way[0], joint.at[1] + way[1])
+                own = self.places(rider, (joint.at,), scale)
+                guide = self.places(joint.guide, (joint.at, ahead), scale)
+                ways = guide[:, 1] - guide[:, 0]
+                along = np.einsum("ij,ij->i", own[:, 0] - guide[:, 0], ways)
+                found[joint.name] = Travel(float(along.min()), float(along.max()))
+        return found
+
+
+def _parts_at(mechanism: Mechanism, run: _Run, request: _Request, scale: float) -> Parts | None:
+    """The parts at a scale; None where a plate does not fit the sheet."""
+    linkage = _scaled(run.linkage, scale)
+    pin = _pin_diameter(linkage) if request.pin is None else 1e3 * request.pin
+    wall = pin if request.wall is None else 1e3 * request.wall
+    sizes = Sizes(pin, _own_pins(mechanism, scale, pin) if request.pin is None else {}, 1e3 * request.play, wall)
+    angles = {pair.name: float(getattr(pair, "pressure_angle", radians(20.0))) for pair in mechanism.pairs}
+    plates, pins, meshing = make_plates(linkage, sizes, run.travels(linkage, scale), angles)
+    try:
+        sheets = nested(plates, (1e3 * request.sheet[0], 1e3 * request.sheet[1]), 1e3 * request.gap)
+    except BadInput:
+        return None
+    layers, meets = find_layers(_rules(run, plates, pins, meshing, sizes, scale))
+    placed = tuple(plate._replace(layer=layer) for plate, layer in zip(plates, layers, strict=True))
+    by_name = {plate.name: plate.layer for plate in placed}
+    notes = _notes(plates, meets, run, scale)
+    return Parts(
+        mechanism,
+        placed,
+        tuple(_part_pin(each, placed, sizes, request.thickness) for each in pins),
+        tuple(tuple(plate._replace(layer=by_name[plate.name]) for plate in sheet) for sheet in sheets),
+        request.thickness,
+        request.sheet,
+        scale,
+        not meets,
+        len(run.motion),
+        notes,
+    )
+
+
+def _own_pins(mechanism: Mechanism, scale: float, usual: float) -> dict[str, float]:
+    """The diameters of pins that the file says (mm), of those that are no thicker than suits plates."""
+    told = {pair.entry_name(): pair.pin_diameter() for pair in mechanism.pairs}
+    sizes = {name: 1e3 * scale * float(diameter) for name, diameter in told.items() if diameter is not None}
+    return {name: size for name, size in sizes.items() if size <= 2.0 * usual}
+
+
+def _scaled(linkage: DrawnLinkage, scale: float) -> DrawnLinkage:
+    """The linkage in mm at a scale."""
+    factor = scale * float(parse_unit(linkage.length).to_si(1.0)) * 1e3
+
+    def place(at: tuple[float, float]) -> tuple[float, float]:
+        return at[0] * factor, at[1] * factor
+
+    joints: list[Joint] = []
+    for joint in linkage.joints:
+        if not isinstance(joint, WheelJoint):
+            joints.append(joint._replace(at=place(joint.at)))
+        elif joint.size_kind == "radii":
+            joints.append(joint._replace(sizes=tuple(each * factor for each in joint.sizes)))
+        else:
+            joints.append(joint)
+    tracers = tuple(each._replace(at=place(each.at)) for each in linkage.tracers)
+    return replace(linkage, joints=tuple(joints), tracers=tracers, length="mm")
+
+
+def _pin_diameter(linkage: DrawnLinkage) -> float:
+    """About a tenth of the middle distance between pins of a link, of those that rods are sold in."""
+    places: dict[str, list[tuple[float, float]]] = {}
+    for joint in linkage.joints:
+        if not isinstance(joint, WheelJoint):
+            for link in joined_links(joint):
+                places.setdefault(link, []).append(joint.at)
+    apart = sorted(
+        float(np.hypot(a[0] - b[0], a[1] - b[1])) for points in places.values() for a, b in combinations(points, 2)
+    )
+    apart = [each for each in apart if each > 1e-6 * apart[-1]]
+    wanted = PIN_SHARE * apart[len(apart) // 2] if apart else 5.0
+    return min(NICE_PINS, key=lambda each: abs(each - wanted))
+
+
+def _rules(
+    run: _Run,
+    plates: Sequence[Plate],
+    pins: Sequence[Pin],
+    meshing: Sequence[tuple[str, str]],
+    sizes: Sizes,
+    scale: float,
+) -> LayerRules:
+    """What must not share a layer, and what no pin may run through, by the distances over the run."""
+    number = {plate.name: index for index, plate in enumerate(plates)}
+    together = tuple((number[one], number[other]) for one, other in meshing)
+    rows = [run.places(plate.link, hull_rows(plate.core), scale) for plate in plates]
+    apart, beside = set(), set()
+    for one, other in combinations(range(1, len(plates)), 2):
+        if plates[one].link == plates[other].link:
+            apart.add((one, other))
+            beside.add((one, other))
+        elif (one, other) not in together and (other, one) not in together:
+            room = plates[one].reach + plates[other].reach + sizes.play
+            if least_distance(rows[one], rows[other]) < room:
+                apart.add((one, other))
+    joins = {each.name: _joined_plates(each, plates) for each in pins}
+    spots = {each.name: run.places(each.on, (each.at,), scale) for each in pins}
+    obstacles = {}
+    for each in pins:
+        radius = sizes.diameter(each.name) / 2.0
+        near = [
+            index
+            for index, plate in enumerate(plates)
+            if index
+            and index not in joins[each.name]
+            and plate.link not in each.links
+            and least_distance(spots[each.name], rows[index]) < plate.reach + radius + sizes.play
+        ]
+        obstacles[each.name] = frozenset(near)
+    crowded = frozenset(
+        (one.name, other.name)
+        for one, other in combinations(pins, 2)
+        if least_distance(spots[one.name], spots[other.name])
+        < (sizes.diameter(one.name) + sizes.diameter(other.name)) / 2.0 + sizes.play
+    )
+    return LayerRules(len(plates), frozenset(apart), together, tuple(sorted(beside)), joins, obstacles, crowded)
+
+
+def _joined_plates(pin: Pin, plates: Sequence[Plate]) -> tuple[int, ...]:
+    """The plates with the pin's hole, or the slot in which it slides."""
+
+    def is_held(plate: Plate) -> bool:
+        drilled = any(hole.pin == pin.name for hole in plate.holes)
+        slid = any(pin.name in (slot.pin, f"{slot.pin} 2") for slot in plate.slots)
+        return plate.link in pin.links and (drilled or slid)
+
+    return tuple(index for index, plate in enumerate(plates) if is_held(plate))
+
+
+def _part_pin(pin: Pin, plates: Sequence[Plate], sizes: Sizes, thickness: float) -> PartPin:
+    layers = [plates[index].layer for index in _joined_plates(pin, plates)] or [0]
+    low, high = min(layers), max(layers)
+    return PartPin(pin.name, sizes.diameter(pin.name) / 1e3, thickness * (high - low + 1), (low, high))
+
+
+def _notes(plates: Sequence[Plate], meets: Sequence[str], run: _Run, scale: float) -> tuple[str, ...]:
+    found = [f"made at 1:{1.0 / scale:g}, so that each plate fits the sheet"] if scale != 1.0 else []
+    if meets:
+        said = [each.partition("|")[::2] for each in meets]
+        told = [f"{one!r} and {plates[int(other)].name if other.isdecimal() else other!r}" for one, other in said]
+        found.append(f"no order of layers keeps everything clear: the pin meets what is named: {join_names(told)}")
+    if any(plate.kind == "disc" for plate in plates):
+        found.append("wheels of belts and chains are discs of their pitch radius here; teeth and grooves are bought")
+    few = sorted({plate.name for plate in plates if plate.kind == "wheel" and plate.teeth < 17})
+    if few:
+        found.append(f"teeth of {join_names(few)} are fewer than 17, and would be undercut by a hob")
+    if run.motion.outcome.value != "solved":
+        found.append(f"clear as far as it runs: {run.motion.reason}")
+    return tuple(found)

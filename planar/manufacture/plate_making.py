@@ -1,0 +1,192 @@
+"""The plates and pins of a linkage: bars round the points of each link, slots as long as their travel, gears."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from math import cos, hypot, radians, sin
+from typing import NamedTuple
+
+from planar.formats.drawn.drawn_linkage import DrawnLinkage, PinJoint, Place, SlideJoint, SlotJoint, WheelJoint
+from planar.formats.drawn.wheels import wheel_centre
+from planar.foundation.errors import BadInput
+from planar.manufacture.gear_sizes import MeshedWheel, meshed_wheels
+from planar.manufacture.involute import ADDENDUM, DEDENDUM, gear_outline
+from planar.manufacture.plates import Hole, Plate, Slot, Vertex, convex_hull, rounded_hull
+
+BACKLASH = 0.02
+"""Of the module: what each tooth is thinner."""
+RIM = 3.0
+"""Modules of a ring outside of its teeth."""
+
+
+class Sizes(NamedTuple):
+    """What all plates have in common (mm): pins by their names and others, the play of holes, the wall round them."""
+
+    pin: float
+    pins: Mapping[str, float]
+    play: float
+    wall: float
+
+    def diameter(self, pin: str) -> float:
+        """The diameter of a pin."""
+        return self.pins.get(pin, self.pin)
+
+
+class Pin(NamedTuple):
+    """A pin: where it was drawn and on which link it is fixed, and the links whose plates it joins."""
+
+    name: str
+    at: Place
+    on: str
+    links: tuple[str, ...]
+
+
+class Travel(NamedTuple):
+    """How far the pin of a slide or slot goes along its guide from where it was drawn, to either side (mm)."""
+
+    least: float
+    greatest: float
+
+
+def make_plates(
+    linkage: DrawnLinkage, sizes: Sizes, travels: Mapping[str, Travel], pressure_angles: Mapping[str, float]
+) -> tuple[list[Plate], list[Pin], list[tuple[str, str]]]:
+    """Plates, pins, and the plates that mesh, by name; the frame's first. Raises BadInput where a plate cannot be."""
+    maker = _Maker(linkage, sizes, travels)
+    wheels = meshed_wheels(linkage, pressure_angles)
+    plates = maker.bars({wheel.link for two in wheels for wheel in two} | maker.pulleys())
+    gears, meshing = maker.gears(wheels)
+    return [*plates, *gears, *maker.discs()], maker.pins, meshing
+
+
+class _Maker:
+    """One linkage on its way to plates."""
+
+    def __init__(self, linkage: DrawnLinkage, sizes: Sizes, travels: Mapping[str, Travel]) -> None:
+        self.linkage, self.sizes = linkage, sizes
+        self.holes: dict[str, dict[str, Place]] = {link: {} for link in linkage.links}
+        self.slots: dict[str, list[Slot]] = {link: [] for link in linkage.links}
+        self.pins: list[Pin] = []
+        for joint in linkage.joints:
+            if isinstance(joint, PinJoint):
+                self._add_pin(joint.name, joint.at, joint.links[0], joint.links, joint.links)
+            elif isinstance(joint, SlideJoint | SlotJoint):
+                self._add_slot(joint, travels[joint.name])
+
+    def _add_pin(self, name: str, at: Place, on: str, links: tuple[str, ...], drilled: tuple[str, ...]) -> None:
+        self.pins.append(Pin(name, at, on, links))
+        for link in drilled:
+            self.holes[link][name] = at
+
+    def _add_slot(self, joint: SlideJoint | SlotJoint, travel: Travel) -> None:
+        """A slot, and the pin in it; two pins, apart by four diameters, where the link must not turn."""
+        rider = joint.slider if isinstance(joint, SlideJoint) else joint.rider
+        way = cos(radians(joint.angle)), sin(radians(joint.angle))
+        (x, y), width = joint.at, self.sizes.diameter(joint.name)
+        further = 4.0 * width if isinstance(joint, SlideJoint) else 0.0
+        low, high = travel.least, travel.greatest + further
+        start, end = ((x + along * way[0], y + along * way[1]) for along in (low, high))
+        self.slots[joint.guide].append(Slot(joint.name, start, end, width + self.sizes.play))
+        self._add_pin(joint.name, joint.at, rider, (joint.guide, rider), (rider,))
+        if further:
+            second = (x + further * way[0], y + further * way[1])
+            self._add_pin(f"{joint.name} 2", second, rider, (joint.guide, rider), (rider,))
+
+    def pulleys(self) -> set[str]:
+        """Links that are wheels of belts and chains."""
+        return {wheel for each in self.linkage.joints if isinstance(each, WheelJoint) for wheel in each.wheels}
+
+    def _reach(self, link: str) -> float:
+        widest = max(
+            (
+                *(self.sizes.diameter(name) for name in self.holes[link]),
+                *(slot.width for slot in self.slots[link]),
+                self.sizes.pin,
+            )
+        )
+        return widest / 2.0 + self.sizes.wall
+
+    def _cut(self, link: str) -> tuple[tuple[Hole, ...], tuple[Slot, ...]]:
+        play = self.sizes.play
+        holes = tuple(Hole(name, at, self.sizes.diameter(name) + play) for name, at in self.holes[link].items())
+        return holes, tuple(self.slots[link])
+
+    def bars(self, wheels: set[str]) -> list[Plate]:
+        """A bar for every link, none for a wheel that has no other point than its centre."""
+        found = []
+        for link in self.linkage.links:
+            holes, slots = self._cut(link)
+            points = [hole.at for hole in holes] + [end for slot in slots for end in (slot.start, slot.end)]
+            points += [each.at for each in self.linkage.tracers if each.link == link != self.linkage.frame]
+            if link in wheels and len(set(points)) < 2 and link != self.linkage.frame:
+                continue
+            if not points:
+                raise BadInput(link, "this link has no pin and no point, so there is no plate of it")
+            core, reach = tuple(convex_hull(points)), self._reach(link)
+            found.append(Plate(link, link, "bar", rounded_hull(core, reach), (), holes, slots, core, reach))
+        found.sort(key=lambda plate: plate.link != self.linkage.frame)
+        return found
+
+    def gears(self, pairs: list[tuple[MeshedWheel, MeshedWheel]]) -> tuple[list[Plate], list[tuple[str, str]]]:
+        """A plate for each toothed wheel, once for all pairs that have the same teeth of it, and which of them mesh."""
+        found: dict[tuple[str, int, bool], Plate] = {}
+        meshing = []
+        for pair in pairs:
+            two = []
+            for wheel in pair:
+                key = wheel.link, wheel.teeth, wheel.internal
+                if key not in found:
+                    several = any(link == wheel.link for link, _, _ in found)
+                    name = (
+                        f"{wheel.link} {'ring' if wheel.internal else 'wheel'}{f' of {wheel.teeth}' if several else ''}"
+                    )
+                    found[key] = self._ring(wheel, name) if wheel.internal else self._gear(wheel, name)
+                two.append(found[key].name)
+            meshing.append((two[0], two[1]))
+        return list(found.values()), meshing
+
+    def _gear(self, wheel: MeshedWheel, name: str) -> Plate:
+        teeth = gear_outline(wheel.teeth, wheel.module, wheel.pressure_angle, wheel.phase, BACKLASH * wheel.module)
+        pitch = wheel.module * wheel.teeth / 2.0
+        room = pitch - DEDENDUM * wheel.module - self.sizes.wall
+        holes, _ = self._cut(wheel.link)
+        held = tuple(hole for hole in holes if _apart(hole.at, wheel.at) + hole.diameter / 2.0 <= room)
+        if not any(_apart(hole.at, wheel.at) < 1e-9 * pitch for hole in held):
+            raise BadInput(
+                name, "the hole of its pin and the wall round it leave no room for the teeth; take a smaller pin"
+            )
+        outline = _shifted(teeth, wheel.at)
+        reach = pitch + ADDENDUM * wheel.module
+        return Plate(name, wheel.link, "wheel", outline, (), held, (), (wheel.at,), reach, 0, wheel.teeth, wheel.module)
+
+    def _ring(self, wheel: MeshedWheel, name: str) -> Plate:
+        teeth = gear_outline(
+            wheel.teeth, wheel.module, wheel.pressure_angle, wheel.phase, BACKLASH * wheel.module, internal=True
+        )
+        reach = wheel.module * wheel.teeth / 2.0 + (DEDENDUM + RIM) * wheel.module
+        outline, inside = rounded_hull((wheel.at,), reach), (_shifted(teeth, wheel.at),)
+        return Plate(
+            name, wheel.link, "ring", outline, inside, (), (), (wheel.at,), reach, 0, wheel.teeth, wheel.module
+        )
+
+    def discs(self) -> list[Plate]:
+        """Wheels of belts and chains as discs of their pitch radius, which are bought rather than cut."""
+        found = []
+        for joint in self.linkage.joints:
+            if not isinstance(joint, WheelJoint) or joint.meshes or joint.size_kind != "radii":
+                continue
+            for wheel, radius in zip(joint.wheels, joint.sizes, strict=True):
+                centre = wheel_centre(self.linkage.joints, wheel, joint.carrier)
+                if centre is not None:
+                    holes = tuple(hole for hole in self._cut(wheel)[0] if _apart(hole.at, centre) < 1e-9 * radius)
+                    outline = rounded_hull((centre,), radius)
+                    found.append(Plate(f"{wheel} pulley", wheel, "disc", outline, (), holes, (), (centre,), radius))
+        return found
+
+
+def _shifted(loop: tuple[Vertex, ...], at: Place) -> tuple[Vertex, ...]:
+    return tuple((x + at[0], y + at[1], bulge) for x, y, bulge in loop)
+
+
+def _apart(one: Place, other: Place) -> float:
+    return hypot(one[0] - other[0], one[1] - other[1])

@@ -1,0 +1,241 @@
+"""Plates that are cut: what holes are apart, what clears what by polygons, teeth by what is measured on gears."""
+
+import io
+import json
+from itertools import combinations
+from math import acos, cos, hypot, pi, radians, sin, tan
+from xml.etree import ElementTree
+
+import ezdxf
+import numpy as np
+import pytest
+from matplotlib.path import Path as Polygon
+
+import planar
+from planar.manufacture.gear_sizes import MODULES
+from planar.manufacture.involute import gear_outline, span_length
+from planar.manufacture.layers import LayerRules, broken_rules, find_layers
+from planar.manufacture.nesting import nested
+from planar.manufacture.plates import Hole, Plate, convex_hull, moved_plate, plate_area, rounded_hull, sampled
+from planar.results.motion import Motion
+from tests.command import run
+from tests.draws import part
+
+CLEAR = ("four-bar", "klann-leg", "jansen-leg", "v-twin-engine", "gear-reducer", "planetary-gear-set", "slider-crank")
+
+
+def dxf(found):
+    return ezdxf.read(io.StringIO(found.encode(".dxf").decode())).modelspace()
+
+
+def drawn(plate: Plate, motion: Motion, row: int) -> list[np.ndarray]:
+    """A plate's outline where its link is in a row of a run, by the places of two of the link's points (mm)."""
+    frame = motion.frames[plate.link]
+    x, y, angle = (
+        np.broadcast_to(getattr(each, "parts", (each,))[0], (len(motion),))[row]
+        for each in (frame.x, frame.y, frame.angle)
+    )
+    start = planar.solve(motion.mechanism).frames[plate.link]
+    u, v, first = (float(getattr(each, "parts", (each,))[0]) for each in (start.x, start.y, start.angle))
+    points = np.array(sampled(plate.outline)) / 1e3
+    c, s = cos(angle - first), sin(angle - first)
+    return np.column_stack(
+        [x + c * (points[:, 0] - u) - s * (points[:, 1] - v), y + s * (points[:, 0] - u) + c * (points[:, 1] - v)]
+    )
+
+
+def meet(one, other):
+    """Whether two polygons meet: a corner of one in the other, or edges that cross."""
+    return bool(Polygon(one, closed=False).intersects_path(Polygon(other, closed=False), filled=True))
+
+
+@pytest.mark.parametrize("model", part(CLEAR[:5], 2))
+def test_plates_of_a_layer_never_meet_by_polygons(model):
+    found = planar.parts(model, scale=1.0, sheet=(9.0, 9.0))
+    assert found.is_clear
+    motion = planar.cycle(model, steps=40)
+    for one, other in combinations(found.plates, 2):
+        if one.layer == other.layer and one.link != other.link and "wheel" not in (one.kind, other.kind):
+            assert not any(meet(drawn(one, motion, row), drawn(other, motion, row)) for row in range(0, 41, 2))
+
+
+@pytest.mark.parametrize("model", CLEAR)
+def test_no_pin_runs_through_a_plate(model):
+    found = planar.parts(model, scale=1.0, sheet=(9.0, 9.0))
+    assert found.is_clear
+    layers = {plate.name: plate.layer for plate in found.plates}
+    for pin in found.pins:
+        held = {p.layer for p in found.plates if pin.name in {h.pin for h in (*p.holes, *p.slots)}}
+        assert pin.layers[0] <= min(held) and max(held) <= pin.layers[1]
+        assert pin.length == pytest.approx(found.thickness * (pin.layers[1] - pin.layers[0] + 1))
+    assert layers[found.plates[0].name] == 0 and found.plates[0].link == found.mechanism.frame
+
+
+def test_where_no_order_is_clear_it_says_what_meets():
+    """Whitworth's crank goes round the pin of its slotted link, which goes round the crank's."""
+    found = planar.parts("whitworth")
+    assert not found.is_clear
+    assert any("no order of layers keeps everything clear" in note for note in found.notes)
+
+
+def test_holes_in_the_dxf_are_as_far_apart_as_the_links_are_long():
+    found = planar.parts("klann-leg", play=2e-4)
+    circles = [each for each in dxf(found) if each.dxftype() == "CIRCLE"]
+    assert {round(2.0 * each.dxf.radius, 9) for each in circles} == {6.2}
+    read = sorted(
+        round(hypot(a.dxf.center.x - b.dxf.center.x, a.dxf.center.y - b.dxf.center.y), 6)
+        for a, b in combinations(circles, 2)
+    )
+    state = planar.solve("klann-leg")
+    for first, second in (("O", "C"), ("C", "E"), ("E", "K"), ("L", "E"), ("U", "H"), ("K", "H")):
+        wanted = 1e3 * np.linalg.norm(state.point(first).position - state.point(second).position)
+        assert min(abs(each - wanted) for each in read) < 1e-5
+
+
+def test_the_dxf_says_millimetres_and_has_all_that_is_cut():
+    found = planar.parts("slider-crank")
+    document = ezdxf.read(io.StringIO(found.encode(".dxf").decode()))
+    assert document.units == ezdxf.units.MM
+    assert not document.audit().errors
+    kinds = [(each.dxftype(), each.dxf.layer) for each in document.modelspace()]
+    assert kinds.count(("LWPOLYLINE", "CUT")) == len(found.plates)
+    assert kinds.count(("LWPOLYLINE", "SLOTS")) == 1
+    assert found.scale == 0.2 and "1:5" in found.notes[0]
+
+
+def test_a_slot_is_as_long_as_the_stroke():
+    """At 1:5 of twice the crank of 480 mm."""
+    (slot,) = (slot for plate in planar.parts("slider-crank").plates for slot in plate.slots)
+    assert hypot(slot.end[0] - slot.start[0], slot.end[1] - slot.start[1]) == pytest.approx(2 * 480 / 5)
+
+
+def test_the_svg_has_the_same_plates_in_millimetres():
+    found = planar.parts("four-bar")
+    root = ElementTree.fromstring(found.encode(".svg"))
+    assert root.get("width") == "600mm" and root.get("viewBox").startswith("0 0 600 ")
+    paths = [each for each in root if each.tag.endswith("path")]
+    assert len(paths) == len(found.plates)
+
+
+def test_a_bar_is_its_length_and_two_half_discs():
+    hull = rounded_hull([(0.0, 0.0), (30.0, 40.0)], 6.0)
+    plate = Plate("b", "b", "bar", hull, (), (Hole("p", (0.0, 0.0), 5.0),), (), ((0.0, 0.0), (30.0, 40.0)), 6.0)
+    wanted = 50 * 12 + pi * 36 - pi * 6.25
+    assert plate_area(plate) == pytest.approx(wanted, rel=1e-12)
+    assert plate_area(moved_plate(plate, 33.0, 7.0, -2.0)) == pytest.approx(plate_area(plate))
+
+
+def test_the_hull_is_convex_and_holds_all_points():
+    points = [(cos(n * 2.4) * n, sin(n * 2.4) * n) for n in range(40)]
+    hull = np.array(convex_hull(points))
+    ways = np.roll(hull, -1, axis=0) - hull
+    after = np.roll(ways, -1, axis=0)
+    assert np.all(ways[:, 0] * after[:, 1] - ways[:, 1] * after[:, 0] > 0)
+    assert Polygon(np.vstack([hull, hull[:1]])).contains_points(points, radius=1e-9).sum() >= len(points) - len(hull)
+
+
+@pytest.mark.parametrize(("teeth", "over"), [(17, 2), (20, 3), (41, 5)])
+def test_teeth_measure_over_several_as_involutes_do(teeth, over):
+    """Parallel planes that touch k teeth are m cos a (pi (k - 1/2) + z inv a) apart (Wildhaber)."""
+    module, angle = 2.0, radians(20.0)
+    first = pi / 2 - (over - 1) * pi / teeth  # so many teeth, to either side of upwards
+    points = np.array([(x, y) for x, y, _ in gear_outline(teeth, module, angle, first)])
+    embraced = points[: over * len(points) // teeth]
+    wanted = span_length(teeth, module, angle, over)
+    assert np.ptp(embraced[:, 0]) == pytest.approx(wanted, rel=1e-3)
+    assert {17: 9.332, 20: 15.321, 41: 27.718}[teeth] == pytest.approx(wanted, abs=6e-3)
+
+
+@pytest.mark.parametrize("teeth", [12, 17, 34, 80])
+def test_a_tooth_is_as_thick_as_an_involute_is_at_any_radius(teeth):
+    """s(r) = r (pi / z + 2 inv a - 2 inv acos(rb / r)), the textbook's formula."""
+    module, angle = 1.5, radians(20.0)
+    pitch = module * teeth / 2.0
+    points = np.array([(x, y) for x, y, _ in gear_outline(teeth, module, angle, 0.0)])
+    own = points[: len(points) // teeth]
+    radius = np.hypot(*own.T)
+    base = pitch * cos(angle)
+    for at, polar in zip(radius, np.arctan2(own[:, 1], own[:, 0]), strict=True):
+        if at > base * (1 + 1e-9):
+            steep = acos(base / at)
+            half = pi / (2 * teeth) + (tan(angle) - angle) - (tan(steep) - steep)
+            assert abs(polar) == pytest.approx(half, abs=1e-12)
+    assert radius.max() <= pitch + module + 1e-12
+    assert radius.min() == pytest.approx(pitch - 1.25 * module)
+
+
+@pytest.mark.parametrize("model", ["gear-reducer", "planetary-gear-set"])
+def test_gears_in_mesh_turn_without_cutting_into_each_other(model):
+    found = planar.parts(model, scale=1.0, sheet=(9.0, 9.0))
+    gears = [plate for plate in found.plates if plate.kind in ("wheel", "ring")]
+    motion = planar.cycle(model, steps=50)
+    for one, other in combinations(gears, 2):
+        if one.layer != other.layer or one.module != pytest.approx(other.module):
+            continue
+        ring = next((each for each in (one, other) if each.kind == "ring"), None)
+        for row in range(0, 51, 7):
+            first, second = (
+                drawn(each._replace(outline=each.inside[0] if each.kind == "ring" else each.outline), motion, row)
+                for each in (one, other)
+            )
+            if ring is None:
+                assert not meet(first, second)
+            else:
+                space, gear = (first, second) if ring is one else (second, first)
+                assert Polygon(np.vstack([space, space[:1]])).contains_points(gear).all()
+
+
+def test_gears_take_a_module_that_is_sold_where_radii_let_them():
+    gears = [plate for plate in planar.parts("planetary-gear-set").plates if plate.teeth]
+    assert [plate.module for plate in gears] == pytest.approx([2.0] * 3) and 2.0 in MODULES
+    assert sorted(plate.teeth for plate in gears) == [20, 40, 80]
+
+
+def test_layers_keep_a_pin_out_of_a_plate_between():
+    """A pin from the frame to plate 2 that would meet plate 1: 2 lies below 1."""
+    rules = LayerRules(3, frozenset({(1, 2)}), (), (), {"P": (0, 2)}, {"P": frozenset({1})}, frozenset())
+    layers, broken = find_layers(rules)
+    assert layers == [0, 2, 1] and broken == []
+    both = rules._replace(pins={"P": (0, 2), "Q": (0, 1)}, obstacles={"P": frozenset({1}), "Q": frozenset({2})})
+    layers, broken = find_layers(both)
+    assert len(broken) == 1 == len(broken_rules(both, layers))
+
+
+def test_sheets_hold_plates_apart_and_refuse_what_is_larger():
+    bar = Plate("b", "b", "bar", rounded_hull([(0, 0), (90, 0)], 5.0), (), (), (), ((0.0, 0.0), (90.0, 0.0)), 5.0)
+    sheets = nested([bar._replace(name=str(n)) for n in range(30)], (300.0, 100.0), 4.0)
+    assert sum(map(len, sheets)) == 30
+    for sheet in sheets:
+        boxes = [np.array(sampled(plate.outline)) for plate in sheet]
+        for points in boxes:
+            assert (
+                points.min() >= 4.0 - 1e-9 and points[:, 0].max() <= 296.0 + 1e-9 and points[:, 1].max() <= 96.0 + 1e-9
+            )
+        for one, other in combinations(boxes, 2):
+            assert not meet(one, other)
+    with pytest.raises(planar.BadInput, match="larger than the sheet"):
+        nested([bar], (80.0, 80.0), 4.0)
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["valve-cam"], "the cam 'lift' cannot be cut as plates"),
+        (["four-bar", "-o", "x.iges"], "files that end in .dxf, .svg or .step"),
+        (["four-bar", "--sheet", "big"], "not of the form WxH"),
+        (["four-bar", "--made-at", "5"], "no scale such as 1:5"),
+        (["four-bar", "--made-at", "1:1", "--sheet", "50x50"], "do not fit the sheet"),
+        (["four-bar", "--thickness", "-3mm"], "--thickness"),
+    ],
+)
+def test_what_cannot_be_is_answered_in_a_sentence(words, told, tmp_path):
+    assert told in run(tmp_path, "parts", *words).refused(2)
+
+
+def test_the_command_lists_plates_and_pins_and_writes_them(tmp_path):
+    shown = run(tmp_path, "parts", "klann-leg", "-o", "leg.dxf").done()
+    assert "connecting rod" in shown and "every plate and pin is clear" in shown
+    assert (tmp_path / "leg.dxf").stat().st_size > 5000
+    value = json.loads(run(tmp_path, "parts", "klann-leg", "--pin", "4mm", "--json").done())
+    assert {pin["diameter"] for pin in value["pins"]} == {0.004}
+    assert value["clear"] is True
