@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -110,9 +111,10 @@ class DesignSearch:
         scale = self.equations[0].scale
         return self.moves.factors(catalogue.numbers, self.free.lower / scale, self.free.upper / scale)
 
-    def fit(self, catalogue: Catalogue, matches: list[Match], keep: int) -> list[Candidate]:
+    def fit(self, catalogue: Catalogue, matches: list[Match], keep: int, keeps_order: bool = False) -> list[Candidate]:
         """The matches fitted, the best so many; of those that turn fully, and of others, where demands are kept.
 
+        With `keeps_order` entries are met in their order all the way, which may end in a worse optimum.
         What comes to turn fully is fitted once more, since its demands are kept all round the turn then."""
         groups = self._fit_starts(catalogue, matches)
         found: list[Candidate] = []
@@ -120,7 +122,7 @@ class DesignSearch:
             own = [each for each in groups if each.over_turn is over_turn]
             if not own:
                 continue
-            fitted = self._fit_alike(own, keep, over_turn)
+            fitted = self._fit_alike(own, keep, over_turn, keeps_order)
             turned: dict[int, _FitStart] = {}
             if not over_turn and self.guards is not None and self.guards[True].rows:
                 turned = self._turned(fitted)
@@ -153,13 +155,13 @@ class DesignSearch:
         found: Array = np.stack([np.interp(wanted, branch[:, -1], part) for part in branch.T], axis=1)
         return found
 
-    def _fit_alike(self, starts: list[_FitStart], keep: int, over_turn: bool) -> FittedDesigns:
+    def _fit_alike(self, starts: list[_FitStart], keep: int, over_turn: bool, keeps_order: bool) -> FittedDesigns:
         """Designs fitted that all turn fully, or are all seen between their entries only."""
         x = np.array([each.numbers for each in starts])
         ys = [np.array(each) for each in zip(*(each.unknowns for each in starts), strict=True)]
         zeros = self._zeros(x, ys)
         scale = self.equations[0].scale
-        guard = None if self.guards is None else self.guards[over_turn]
+        guard = None if self.guards is None else replace(self.guards[over_turn], keeps_order=keeps_order)
         fit = DesignFit(self.equations, self.free.lower / scale, self.free.upper / scale, guard)
         positions = np.array([each.guarded for each in starts])
         shares = np.broadcast_to(np.linspace(0.0, 1.0, positions.shape[1]), positions.shape[:2])

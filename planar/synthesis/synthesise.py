@@ -19,7 +19,7 @@ from planar.model.run_arguments import check_whole_number
 from planar.synthesis.cognates.task_cognates import task_cognates
 from planar.synthesis.design_motion import design_motion
 from planar.synthesis.design_search import Candidate, DesignSearch
-from planar.synthesis.judgement.judgement import DesignJudge
+from planar.synthesis.judgement.judgement import ORDER, DesignJudge
 from planar.synthesis.judgement.refusal import refusal
 from planar.synthesis.judgement.written_design import DIGITS, EXACT_DIGITS, write_design
 from planar.synthesis.search_folder import SearchFolder
@@ -225,13 +225,16 @@ class TaskSearch:
         catalogue = search.catalogue(DRAWS, self.seed + 1000 * turn)
         self._tell("matches")
         matches = search.matches(catalogue, MATCHES)
-        self._tell("fit")
-        candidates = search.fit(catalogue, matches, KEPT_SHARE * self.many)
         judge = DesignJudge(self.task, search.size)
-        for each in candidates:
-            self._tell("judgement")
-            self._judge(search, judge, each)
-            if len(self.sound) - before >= (self.many + ALIKE_SPARE) * (turn + 1):
+        for keeps_order in (False, True):  # the second only where the first leads to none in order
+            self._tell("fit")
+            for each in search.fit(catalogue, matches, KEPT_SHARE * self.many, keeps_order):
+                self._tell("judgement")
+                self._judge(search, judge, each)
+                if len(self.sound) - before >= (self.many + ALIKE_SPARE) * (turn + 1):
+                    break
+            short = {one.demand for each in self.rejected[first[1] :] for one in each.shortages}
+            if len(self.sound) > first[0] or ORDER not in short:
                 break
         if self.folder is not None:
             designs = [*self.sound[first[0] :], *self.rejected[first[1] :]]

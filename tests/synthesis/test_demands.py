@@ -138,7 +138,7 @@ def test_slacks_of_an_order_are_steps_of_the_input_in_its_sense():
     own.rows = own.rows._replace(wanted=own.rows.wanted._replace(in_order=True))
     inputs = np.array([[5.9, 0.2, 0.5], [3.0, 2.0, 2.5]])
     unknowns = [inputs[..., None]]
-    round_turn, between = (OrderSlacks([own], unknowns, over_turn) for over_turn in (True, False))
+    round_turn, between = (OrderSlacks([own], unknowns, over_turn, True) for over_turn in (True, False))
     turn = 2 * np.pi
     slack = round_turn.slacks(inputs, np.arange(2))
     np.testing.assert_allclose(slack[0], [0.2 - 5.9 + turn, 0.3, turn - (0.5 - 5.9 + turn)])

@@ -47,6 +47,8 @@ class DemandGuard:
     rows: tuple[AdjointRows | RegionRows, ...] = ()
     least: tuple[float, ...] = ()
     over_range: bool = False
+    keeps_order: bool = True
+    "whether entries that are wanted in their order keep it while a design is fitted"
 
     @property
     def position_count(self) -> int:

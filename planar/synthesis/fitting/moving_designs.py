@@ -96,7 +96,7 @@ class MovingDesigns:
             is_closed &= own
         self.demands: KeptDemands | None = None
         if fit.guard is not None and guarded is not None:
-            order = OrderSlacks(fit.equations, self.unknowns, not fit.guard.over_range)
+            order = OrderSlacks(fit.equations, self.unknowns, not fit.guard.over_range, fit.guard.keeps_order)
             self.demands = KeptDemands(fit.guard, order, self.numbers, self.unknowns, *guarded)
             is_closed &= self.demands.is_closed
         self.squares = np.full(len(numbers), np.inf)

@@ -18,10 +18,11 @@ LEAST_ORDERED = 3
 class OrderSlacks:
     """Slacks of designs whose entries of some items are met in their order, either way; in one turn, if they turn.
 
-    The sense of each design, and over which entries a new turn begins, is as it is at first.
+    The sense of each design, and over which entries a new turn begins, is as it is at first. With no `is_kept` there
+    are none.
     """
 
-    def __init__(self, equations: Sequence[WantedEquations], unknowns: Sequence[Array], over_turn: bool):
+    def __init__(self, equations: Sequence[WantedEquations], unknowns: Sequence[Array], over_turn: bool, is_kept: bool):
         self.turns: list[Array] = []
         "of each ordered item what is added to the differences of inputs (designs, entries - 1)"
         self.senses: list[Array] = []
@@ -31,7 +32,7 @@ class OrderSlacks:
         at = 0
         for each, y in zip(equations, unknowns, strict=True):
             wanted, many = each.rows.wanted, y.shape[1]
-            if not isinstance(wanted, WantedFunction) and wanted.in_order and many >= LEAST_ORDERED:
+            if is_kept and not isinstance(wanted, WantedFunction) and wanted.in_order and many >= LEAST_ORDERED:
                 self.slices.append(slice(at, at + many))
                 self._add_item(np.diff(y[..., -1], axis=1))
             at += many

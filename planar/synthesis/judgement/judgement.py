@@ -32,7 +32,7 @@ FEET, FOOT_POSITIONS = 4, 13
 """How often, and at how many positions of the input, the nearest one to an entry is looked for."""
 EXACT = 1e-9
 """The same of what is to be met exactly."""
-REACH = "the reach"
+REACH, ORDER = "the reach", "the order"
 OTHER_ASSEMBLY = 0.01
 """Of the extent of what is wanted, or rad: what misses an entry by so much more than the fit is another assembly."""
 NOWHERE_NEAR = 0.5
@@ -139,7 +139,7 @@ class DesignJudge:
                 own = ordered_inputs(partial(self._every_miss, motion, wanted), *ends, reach.is_cyclic)
                 off = np.diag(self._every_miss(motion, wanted, own))
             if float((off - misses[k]).max()) > OTHER_ASSEMBLY * self.size:
-                yield Defect("the order", f"order defect: {wanted.of} does not meet its entries in their order")
+                yield Defect(ORDER, f"order defect: {wanted.of} does not meet its entries in their order")
             else:
                 inputs[k], misses[k] = own, off
 
