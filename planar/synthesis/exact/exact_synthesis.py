@@ -104,7 +104,7 @@ def _check_freedom(problem: ExactProblem) -> None:
 
 
 def _is_dyad(component: Component) -> bool:
-    return component.family.size == 2 and component.family.parts[0].rows.count == 0
+    return component.family.size == 2 and component.family.parts[0].rows.equation_count == 0
 
 
 def _solve_all(components: Sequence[Component], say: Progress) -> list[ComponentSolutions]:
