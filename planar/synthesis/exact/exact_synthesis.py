@@ -25,7 +25,7 @@ from planar.synthesis.exact.tracking.exact_certificates import certify_member
 from planar.synthesis.exact.tracking.generic_store import FamilyRecord, family_record
 from planar.synthesis.exact.tracking.member_homotopy import affine_solutions, homogeneous_solutions
 from planar.synthesis.exact.tracking.member_solutions import MemberSolutions, solve_member
-from planar.synthesis.exact.tracking.symmetry import FamilyName, exchange_images, reordered
+from planar.synthesis.exact.tracking.symmetry import FamilyName, reordered
 from planar.synthesis.judgement.defects import Defect
 from planar.synthesis.judgement.judgement import DesignJudge
 from planar.synthesis.task.starts import start_mechanisms
@@ -40,6 +40,8 @@ from planar.synthesis.task.synthesis_task import (
 
 REAL = 1e-7
 """Of a solution's size: one that differs from its own conjugate by less is real."""
+MET = 1e-6
+"""Of the extent of what is wanted, or rad: an exact linkage that misses more is in another assembly there."""
 Progress = Callable[[str], None]
 
 
@@ -52,6 +54,8 @@ class ComponentSolutions(NamedTuple):
     x: ComplexArray
     proved: BoolArray
     all_proved: int
+    missing: int
+    "of classes of real ones, linkages that were not reached"
 
 
 def synthesise_all(task: SynthesisTask, progress: Progress | None = None) -> CompleteSynthesis:
@@ -106,7 +110,7 @@ def _check_freedom(problem: ExactProblem) -> None:
 
 
 def _is_dyad(component: Component) -> bool:
-    return component.family.size == 2 and component.family.parts[0].rows.count == 0
+    return component.family.size == 2 and component.family.parts[0].rows.equation_count == 0
 
 
 def _solve_all(components: Sequence[Component], say: Progress) -> list[ComponentSolutions]:
@@ -124,10 +128,8 @@ def _solve_all(components: Sequence[Component], say: Progress) -> list[Component
 
 
 def _solve(component: Component, record: FamilyRecord, say: Progress) -> ComponentSolutions:
-    images = exchange_images(record.name.exchanges)
-    known = record.representatives
-    say(f"{count_phrase(len(known.V), 'path')}")
-    whole = solve_member(component.family, known, component.member, images)
+    say(f"{count_phrase(len(record.classes), 'path')}")
+    whole = solve_member(component.family, record, component.member)
     proved = np.zeros(len(whole.x), dtype=bool)
     x, is_real = whole.x, _is_real(whole.x)
     all_proved = 0
@@ -137,9 +139,10 @@ def _solve(component: Component, record: FamilyRecord, say: Progress) -> Compone
         x, proved, all_proved = proof.x, proof.proved & proof.is_real, int(proof.proved.sum())
         is_real = np.where(proof.proved, proof.is_real, is_real)
     real, sure = x[is_real], proved[is_real]
+    wanted = record.classes.shape[1] * len(real)
     if record.classes.shape[1] > 1 and len(real):
         real, sure = class_members(component, record, real, sure)
-    return ComponentSolutions(component, record, whole, real, sure, all_proved)
+    return ComponentSolutions(component, record, whole, real, sure, all_proved, max(0, wanted - len(real)))
 
 
 def _is_real(x: ComplexArray) -> BoolArray:
@@ -226,13 +229,17 @@ def _judged(problem: ExactProblem, judge: DesignJudge, linkage: ExactLinkage, ce
     values = [_wanted_values(each) for each in problem.task.wanted]
     found = judge.judge(linkage.mechanism, linkage.inputs, values)
     every = np.concatenate(found.misses)
+    defects = found.defects
+    scale = 1.0 if all(isinstance(each, WantedFunction) for each in problem.task.wanted) else problem.size
+    if not defects and float(every.max()) > MET * scale:
+        defects = (Defect("one circuit", "circuit defect: not every entry is met in the assembly of the first"),)
     return ExactDesign(
         linkage.mechanism,
         float(np.sqrt(np.mean(every**2))),
         float(every.max()),
         found.misses,
         found.inputs,
-        found.defects,
+        defects,
         problem.mechanism.name,
         linkage.numbers,
         design_motion(linkage.mechanism, found.inputs),
@@ -271,11 +278,16 @@ def _counted(solved: Sequence[ComponentSolutions]) -> str:
 
 
 def _completeness(solved: Sequence[ComponentSolutions]) -> str:
+    if any(len(each.whole.x) > each.whole.followed for each in solved):
+        return "incomplete: there are more solutions than a random task was known to have"
     lost = sum(each.whole.lost for each in solved)
     if lost:
         return f"incomplete: {lost} of {sum(each.whole.followed for each in solved)} paths were lost"
+    missing = sum(each.missing for each in solved)
+    if missing:
+        return f"incomplete: {count_phrase(missing, 'cognate')} of real linkages were not reached"
     if any(each.whole.singular for each in solved):
-        return "complete but for singular solutions, where several meet or a curve of them passes"
+        return "numerically complete but for singular solutions, where several meet or a curve of them passes"
     if not all(each.record.is_traced for each in solved):
         return "all of a number that is a lower bound: it was found by monodromy without a trace test"
     return "numerically complete"

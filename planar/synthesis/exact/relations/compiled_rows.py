@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import cached_property
 from typing import Any
 
 import casadi as ca
 import numpy as np
 
-from planar.codegen.generic_evaluation import evaluate_function
 from planar.codegen.instructions import InstructionList
 from planar.codegen.numpy_code import NumpyFunction, compile_numpy
 from planar.foundation.arrays import ComplexArray
@@ -20,7 +19,7 @@ class CompiledRows:
     """Rows f(x, q): `unknowns` are the numbers of the symbols x, `given` those of q, conjugates each on its own."""
 
     def __init__(self, rows: EntryRows, unknowns: Sequence[int], given: Sequence[int]):
-        self.unknowns, self.given, self.count = tuple(unknowns), tuple(given), rows.equation_count
+        self.unknowns, self.given, self.equation_count = tuple(unknowns), tuple(given), rows.equation_count
         x, q, dq = (
             ca.SX.sym(name, many) for name, many in (("x", len(unknowns)), ("q", len(given)), ("dq", len(given)))
         )
@@ -33,24 +32,32 @@ class CompiledRows:
         "f, its Jacobian in x, and its derivative where q changes by dq"
 
     @cached_property
-    def _numpy(self) -> tuple[NumpyFunction, list[tuple[int, int]]]:
+    def _listing(self) -> tuple[InstructionList[tuple[str, int]], list[list[int]], list[list[int]]]:
+        """The instructions, the numbers of the inputs, and those of what is wanted."""
         listing: InstructionList[tuple[str, int]] = InstructionList()
         inputs = [
             [listing.add_input((name, k)) for k in range(self.function.numel_in(n))]
             for n, name in enumerate(("x", "q", "dq"))
         ]
-        found = listing.inline_function(self.function, inputs)
-        wanted = [each for part in found for each in part]
-        shapes = [self.function.size_out(k) for k in range(3)]
-        return compile_numpy(listing, wanted, [each for part in inputs for each in part]), shapes
+        return listing, inputs, listing.inline_function(self.function, inputs)
+
+    @cached_property
+    def _with_change(self) -> NumpyFunction:
+        listing, inputs, wanted = self._listing
+        return compile_numpy(listing, [each for part in wanted for each in part], [k for part in inputs for k in part])
+
+    @cached_property
+    def _without_change(self) -> NumpyFunction:
+        listing, inputs, wanted = self._listing
+        return compile_numpy(listing, [each for part in wanted[:2] for each in part], [*inputs[0], *inputs[1]])
 
     def evaluate(
         self, x: Sequence[Any], q: Sequence[Any], dq: Sequence[Any], shape: tuple[int, ...]
     ) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
         """f (rows, *shape), its Jacobian (rows, unknowns, *shape) and its change (rows, *shape), of arrays that
         broadcast to a shape."""
-        called, shapes = self._numpy
-        values = called(*x, *q, *dq)
+        shapes = [self.function.size_out(k) for k in range(3)]
+        values = self._with_change(*x, *q, *dq)
         found, at = [], 0
         for rows, columns in shapes:
             many = rows * columns
@@ -62,13 +69,11 @@ class CompiledRows:
         f, slope, along = found
         return f[0], np.swapaxes(slope, 0, 1), along[0]
 
-    def evaluate_as(
-        self, x: Sequence[Any], q: Sequence[Any], convert: Callable[[float], Any]
-    ) -> tuple[list[Any], list[list[Any]]]:
-        """f and its Jacobian, row by row, in numbers of another kind."""
-        zero = [convert(0.0)] * len(self.given)
-        f, slope, _ = evaluate_function(self.function, [list(x), list(q), zero], convert)
-        return f, [slope[row :: self.count] for row in range(self.count)]
+    def evaluate_as(self, x: Sequence[Any], q: Sequence[Any]) -> tuple[list[Any], list[list[Any]]]:
+        """f and its Jacobian, row by row, in numbers of another kind that floats go with."""
+        values = [x[0] * 0 + each for each in self._without_change(*x, *q)]
+        f, slope = values[: self.equation_count], values[self.equation_count :]
+        return f, [slope[row :: self.equation_count] for row in range(self.equation_count)]
 
 
 def _expressions(rows: EntryRows, values: dict[int, ca.SX]) -> list[ca.SX]:

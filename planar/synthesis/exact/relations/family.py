@@ -41,7 +41,7 @@ class Family(NamedTuple):
     @property
     def row_count(self) -> int:
         """How many equations."""
-        return sum(each.rows.count * each.entry_count for each in self.parts)
+        return sum(each.rows.equation_count * each.entry_count for each in self.parts)
 
     def random_member(self, rng: np.random.Generator) -> Member:
         """A member with random complex numbers."""
@@ -65,13 +65,13 @@ class Family(NamedTuple):
             q, dq = _values(part, begin.parts[k], change[k], way, turns_are_straight)
             if k == 0:
                 first = ([each[0] for each in q], [each[0] for each in dq])
-            if not part.rows.count:
+            if not part.rows.equation_count:
                 continue
             own = (q, dq) if k else ([], [])
             f, slope, along = part.rows.evaluate(
                 [*x], [*first[0], *own[0]], [*first[1], *own[1]], (part.entry_count, many)
             )
-            rows = part.rows.count * part.entry_count
+            rows = part.rows.equation_count * part.entry_count
             slope = slope.swapaxes(1, 2).reshape(rows, -1, many)
             found.append((f.reshape(rows, many), slope, along.reshape(rows, many)))
         return tuple(np.concatenate(each) for each in zip(*found, strict=True))  # type: ignore[return-value]

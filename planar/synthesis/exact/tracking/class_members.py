@@ -21,16 +21,20 @@ def class_members(
 
     Which class a solution is of is seen where its path began."""
     images = exchange_images(record.name.exchanges)
-    known = record.representatives
+    known = record.solutions
     ends = follow(component.family, component.member, homogeneous_solutions(real), known.member, PRECISION)
     both = np.concatenate([representatives(known.V, images), representatives(ends.V, images)])
     own = first_of_same(both)[len(known.V) :]
-    seen = ends.is_single & (own < len(known.V))
-    others = record.classes[own[seen], 1:]
-    V = record.solutions.V[others.ravel()]
-    gone = follow(component.family, known.member, V, component.member, PRECISION)
-    proofs = np.repeat(sure[seen], others.shape[1])
-    return (
-        np.concatenate([real, affine_solutions(gone.V[gone.is_single])]),
-        np.concatenate([sure, proofs[gone.is_single]]),
-    )
+    seen = np.flatnonzero(ends.is_single & (own < len(known.V)))
+    members = record.classes.shape[1]
+    class_of = np.empty(len(known.V), dtype=int)
+    class_of[record.classes] = np.arange(len(record.classes))[:, None]
+    others = [[k for k in record.classes[class_of[one]] if k != one] for one in own[seen].tolist()]
+    rows = np.array(others, dtype=int).reshape(-1)
+    gone = follow(component.family, known.member, known.V[rows], component.member, PRECISION)
+    proofs = np.repeat(sure[seen], members - 1)
+    every = np.concatenate([homogeneous_solutions(real), representatives(gone.V[gone.is_single], images)])
+    both_proofs = np.concatenate([sure, proofs[gone.is_single]])
+    first = first_of_same(np.concatenate([representatives(every[: len(real)], images), every[len(real) :]]))
+    kept = first == np.arange(len(every))
+    return affine_solutions(every[kept]), both_proofs[kept]

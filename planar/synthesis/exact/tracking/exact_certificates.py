@@ -65,10 +65,10 @@ class _MemberInBalls:
         f: list[Any] = []
         slope: list[list[Any]] = []
         for rows, entries in self.parts:
-            if not rows.count:
+            if not rows.equation_count:
                 continue
             for numbers in entries:
-                own, own_slope = rows.evaluate_as(w, numbers, ball)
+                own, own_slope = rows.evaluate_as(w, numbers)
                 f += own
                 slope += own_slope
         return f, slope

@@ -50,6 +50,8 @@ def _directions(family: Family) -> list[Member]:
     """A member of each number that may change, one where it does."""
     found = []
     for k, part in enumerate(family.parts):
+        if not k and not part.rows.equation_count:
+            continue  # what entries give is enough
         for entry in range(part.entry_count):
             for n, kind in enumerate(part.kinds):
                 for sides in [(0, 1)] if kind in (NumberKind.TURN, NumberKind.LENGTH) else [(0,), (1,)]:

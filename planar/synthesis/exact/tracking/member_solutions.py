@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -9,14 +10,17 @@ import numpy as np
 from planar.assemblies.polynomial.path_tracker import SINGULAR_TOLERANCE, is_finite_solution
 from planar.foundation.arrays import BoolArray, ComplexArray
 from planar.synthesis.exact.relations.family import Family, Member
+from planar.synthesis.exact.tracking.generic_store import FamilyRecord
 from planar.synthesis.exact.tracking.member_homotopy import affine_solutions
 from planar.synthesis.exact.tracking.monodromy import GenericSolutions, first_of_same, follow
-from planar.synthesis.exact.tracking.symmetry import Images, representatives
+from planar.synthesis.exact.tracking.symmetry import Images, exchange_images, representatives
 
 PRECISIONS = (1e-4, 1e-6, 1e-8)
 """How far predictions may be off; paths that are lost are followed again with the next."""
+NEARBY_WAYS, OFFSET = 2, 0.1
+"""Ways beside the straight one for paths that are lost, and how far off."""
 DETOURS = 2
-"""Other random members by way of which paths are followed again."""
+"""Other random members by way of which all paths are followed again."""
 INFINITY = 1e-6
 """Of homogeneous coordinates of length one."""
 
@@ -37,52 +41,56 @@ class MemberSolutions(NamedTuple):
         return self.lost == 0
 
 
-def solve_member(
-    family: Family, known: GenericSolutions, member: Member, images: Images | None, seed: int = 3
-) -> MemberSolutions:
-    """The solutions of a member. Where paths end singly at places that are few, they are followed by other ways."""
+def solve_member(family: Family, record: FamilyRecord, member: Member, seed: int = 3) -> MemberSolutions:
+    """The solutions of a member, one of each class. Where paths end singly at places that are few, they are followed
+    more closely, from other solutions of their classes, and by other ways."""
     rng = np.random.default_rng(seed)
-    found, best = known.V[:0], None
-    begin = known
-    for detour in range(DETOURS + 1):
-        if detour:
-            between = family.random_member(rng)
-            ends = follow(family, known.member, known.V, between, PRECISIONS[0])
-            begin = GenericSolutions(between, ends.V[ends.is_single])
-        told = _followed(family, begin, member, found, images)
-        found = told[0]
-        if best is None or told[1].lost < best.lost:
-            best = told[1]
-        finite = len(found)
-        if finite >= len(known.V) or (best.is_whole and finite + best.singular + best.at_infinity >= len(known.V)):
+    images = exchange_images(record.name.exchanges)
+    starts = [record.solutions._replace(V=record.solutions.V[own]) for own in record.classes.T]
+    found, whole = _followed(family, starts, member, starts[0].V[:0], images)
+    if record.classes.shape[1] > 1:
+        return whole  # by other ways they would come to others of their classes
+    many = len(record.classes)
+    for _ in range(DETOURS):
+        if len(found) >= many or whole.is_whole:
             break
-    assert best is not None
-    is_all = len(found) >= len(known.V)
-    lost = 0 if is_all else max(0, min(best.lost, len(known.V) - len(found)))
-    return MemberSolutions(
-        affine_solutions(found),
-        len(known.V),
-        0 if is_all else best.singular,
-        0 if is_all else best.at_infinity,
-        lost,
-    )
+        between = family.random_member(rng)
+        ends = follow(family, record.solutions.member, record.solutions.V, between, PRECISIONS[0])
+        begin = [GenericSolutions(between, ends.V[ends.is_single])]
+        found, other = _followed(family, begin, member, found, images)
+        whole = min(whole, other, key=lambda each: each.lost)._replace(x=affine_solutions(found))
+    if len(found) >= many:
+        whole = whole._replace(singular=0, at_infinity=0, lost=0)
+    return whole._replace(followed=many, lost=min(whole.lost, max(0, many - len(found))))
 
 
 def _followed(
-    family: Family, begin: GenericSolutions, member: Member, found: ComplexArray, images: Images | None
+    family: Family, starts: Sequence[GenericSolutions], member: Member, found: ComplexArray, images: Images
 ) -> tuple[ComplexArray, MemberSolutions]:
-    """What was found before with what paths from a random member come to, and how they ended."""
+    """What was found before with what paths from a random member come to, and how they ended; `starts` after the first
+    have others of the same classes, in the same order."""
+    begin = starts[0]
     ends = follow(family, begin.member, begin.V, member, PRECISIONS[0])
     V, is_single, is_near = ends.V.copy(), ends.is_single.copy(), ends.is_near_end.copy()
     regularity = ends.regularity.copy()
-    for near in PRECISIONS[1:]:
+    rng = np.random.default_rng(4)
+    ways = [(each, near, False) for near in PRECISIONS[1:] for each in starts]
+    ways += [(begin, PRECISIONS[1], True)] * NEARBY_WAYS
+    for number, (from_, near, is_beside) in enumerate(ways):
         again = ~(is_single & is_near) | _is_shared(V, is_single)
-        again &= ~(is_near & ~is_single)  # it came to the end, where several meet
+        if number >= len(starts):
+            again &= ~(is_near & ~is_single)  # it came to the end more than once, where several meet
         if not again.any():
             break
-        closer = follow(family, begin.member, begin.V[again], member, near)
-        V[again], is_single[again], is_near[again] = closer.V, closer.is_single, closer.is_near_end
-        regularity[again] = closer.regularity
+        beginning, start = from_.V[again], from_.member
+        if is_beside:  # round what is in the way, which seldom leads elsewhere
+            beside = _member_beside(family, start.towards(member, 0.5), rng)
+            beginning, start = follow(family, start, beginning, beside, near).V, beside
+        closer = follow(family, start, beginning, member, near)
+        better = np.flatnonzero(again)[closer.is_single | ~is_single[again]]
+        take = closer.is_single | ~is_single[again]
+        V[better], is_single[better], is_near[better] = closer.V[take], closer.is_single[take], closer.is_near_end[take]
+        regularity[better] = closer.regularity[take]
     finite = is_finite_solution(V, INFINITY)
     single = is_single & finite
     shared = _is_shared(V, single)
@@ -92,6 +100,12 @@ def _followed(
     kept = both[first_of_same(both) == np.arange(len(both))] if len(both) else both
     lost = len(V) - int(np.sum(single & ~shared)) - len({*first_of_same(V[shared]).tolist()}) - singular - infinite
     return kept, MemberSolutions(affine_solutions(kept), len(V), singular, infinite, max(lost, 0))
+
+
+def _member_beside(family: Family, member: Member, rng: np.random.Generator) -> Member:
+    """A member a little off one."""
+    other = family.random_member(rng)
+    return Member(tuple(a + OFFSET * b for a, b in zip(member.parts, other.parts, strict=True)))
 
 
 def _is_shared(V: ComplexArray, among: BoolArray) -> BoolArray:
