@@ -9,9 +9,9 @@ import numpy as np
 import planar
 from benchmarks.synthesis.misses import Array, chord_distances, is_whole_turn, path_of
 
-ROUNDING = 1e-5
+ROUNDING = 2e-5
 """Of the extent: a place may lie further off than the search says by so much."""
-CHORDS = 1800
+CHORDS = 5400
 
 
 def design_faults(mechanism: planar.Mechanism, point: str, places: Array, told: float, closed: bool) -> list[str]:

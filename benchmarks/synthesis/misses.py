@@ -19,6 +19,8 @@ Array = np.ndarray
 STEPS = 3600
 """Of a path: its chords are off a smooth one by 4e-7 of its extent or so."""
 WHOLE = 1e-9
+ON_END = 1e-5
+"""Of the range: beside a dead point no position of the input is asked for but that of the end itself."""
 
 
 class Misses(NamedTuple):
@@ -42,16 +44,19 @@ def path_of(mechanism: planar.Mechanism, point: str, steps: int = STEPS) -> Arra
     running = mechanism.inputs[0].pair
     motion = planar.cycle(mechanism, steps // 2, pair=running)
     given, path = motion.inputs[running].position, np.asarray(motion.point(point).position)
+    ends = None
     if not is_whole_turn(mechanism, motion):  # close at both ends, which are dead points
         low, high = float(given.min()), float(given.max())
-        given = low + (high - low) * 0.5 * (1.0 - np.cos(np.linspace(0.0, np.pi, steps // 2 + 1)))[1:-1]
+        inner = 0.5 - (0.5 - ON_END) * np.cos(np.linspace(0.0, np.pi, steps // 2 + 1))
+        ends, given = path[[0, -1]] if given[-1] > given[0] else path[[-1, 0]], low + (high - low) * inner
         path = np.asarray(motion_over_input(mechanism, given).point(point).position)
     way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(path, axis=0).T))])
     if way[-1] == 0.0:
         return path
     fast = np.interp(np.linspace(0.0, way[-1], steps + 1)[1:-1], way, given)
     every = np.unique(np.concatenate([given, fast]))
-    return np.asarray(motion_over_input(mechanism, every).point(point).position)
+    found = np.asarray(motion_over_input(mechanism, every).point(point).position)
+    return found if ends is None else np.concatenate([ends[:1], found, ends[1:]])
 
 
 def is_whole_turn(mechanism: planar.Mechanism, motion: planar.Motion) -> bool:
