@@ -38,6 +38,7 @@ STYLES = (
     "uplot/uPlot.min.css",
     "page.css",
     "stage/stage.css",
+    "stage/lens.css",
     "layers/layers.css",
     "controls/dimensions.css",
     "wanted/wanted.css",
@@ -59,6 +60,7 @@ SCRIPTS = (
     "stage/drawing.js",
     "controls/dragging.js",
     "controls/controls.js",
+    "controls/figures.js",
     "layers/ink.js",
     "layers/points.js",
     "layers/polygons.js",
@@ -79,8 +81,14 @@ SCRIPTS = (
     "wanted/wanted_drawing.js",
     "wanted/wanted_table.js",
     "controls/assemblies.js",
+    "controls/acting.js",
+    "controls/keeping.js",
+    "controls/panels.js",
+    "stage/lens.js",
     "controls/undo.js",
     "controls/saving.js",
+    "controls/gif.js",
+    "controls/films.js",
 )
 
 
@@ -142,15 +150,19 @@ def _notes(mechanism: Mechanism) -> str:
 
 
 START_SCRIPT = r"""
-const page = new Page(JSON.parse(document.getElementById("data").textContent), program);
+document.documentElement.classList.toggle("compact", memory.read("compact") !== null);
+const page = new Page(Figures.recall(JSON.parse(document.getElementById("data").textContent)), program);
+Keeping.recall(page);
 page.wanted = Wanted.of(page);
 const svg = document.getElementById("drawing"), drawing = new Drawing(page, svg), dragging = new Dragging(page, svg);
 const controls = new Controls(page, document.getElementById("controls"), svg, drawing, dragging);
 new Courses(page);
+const lens = new Lens(page, svg, drawing, dragging);
+page.acting = new Acting(page, document.getElementById("acting"));
 new Dimensions(page, document.getElementById("dimensions"));
 new Assemblies(page, document.getElementById("assemblies"));
 new UndoHistory(page, controls.bar, () => controls.pause());
-new Saving(page, document.getElementById("saving"), document.getElementById("drawing"));
+new Films(page, new Saving(page, document.getElementById("saving"), svg), svg, () => controls.pause());
 page.tolerances = Tolerances.ofFile(page);
 startLayers(page);
 new Influence(page, document.getElementById("dimensions"));
@@ -158,6 +170,8 @@ if (page.wanted !== null) {
   new WantedDrawing(page, svg, drawing);
   new WantedTable(page, document.getElementById("wanted"));
 }
+page.keeping = new Keeping(page);
+new Panels(page, document.querySelector(".right"));
 document.getElementById("still").remove(); // what moves stands in its place
 """
 

@@ -1,5 +1,5 @@
 "use strict";
-/* Undo and redo of what was done to the mechanism: its dimensions, its inputs, its assembly. All that changes between
+/* Undo and redo of what was done to the mechanism: its dimensions, its inputs, its assembly, what acts on it. All that changes between
    the beginning of one act of the reader (a press, a key, a number entered) and the next is one step. */
 
 const MOST_STEPS = 200;
@@ -23,7 +23,7 @@ class UndoHistory {
     // a number that is being typed is the browser's to undo, until it is entered
     document.addEventListener("input", ({ target }) => this.changed.add(target), true);
     for (const event of ["change", "focusout"]) document.addEventListener(event, ({ target }) => this.changed.delete(target), true);
-    for (const event of ["move", "size", "wanted"]) page.on(event, () => this.note());
+    for (const event of ["move", "size", "wanted", "acting"]) page.on(event, () => this.note());
     this.show();
   }
 
@@ -39,7 +39,7 @@ class UndoHistory {
 
   /** Something has changed. */
   note() {
-    if (this.restoring) return;
+    if (this.restoring || this.page.recording) return;
     const now = this.page.snapshot();
     if (!this.open && !samePosition(this.stood, now)) {
       this.done.push(this.stood);
@@ -85,5 +85,5 @@ class UndoHistory {
 /** Whether two snapshots are of one position of one mechanism, of which the same is wanted. */
 function samePosition(a, b) {
   const alike = (one, other) => one.every((each, k) => each === other[k]);
-  return alike(a.d, b.d) && alike(a.u, b.u) && alike(a.z, b.z) && alike(a.wanted, b.wanted);
+  return alike(a.d, b.d) && alike(a.u, b.u) && alike(a.z, b.z) && alike(a.wanted, b.wanted) && alike(a.acting, b.acting);
 }
