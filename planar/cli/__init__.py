@@ -13,6 +13,7 @@ main.modules = {
     "circuits": "planar.cli.commands.circuits",
     "cognates": "planar.cli.commands.design.cognates",
     "cycle": "planar.cli.commands.solve_cycle_explain",
+    "edit": "planar.cli.commands.edit",
     "explain": "planar.cli.commands.solve_cycle_explain",
     "forces": "planar.cli.commands.forces_simulate",
     "gallery": "planar.cli.commands.view_gallery",

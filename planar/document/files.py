@@ -11,7 +11,7 @@ from itertools import islice
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from planar.document import read_mechanism
+from planar.document import LINK_PREFIX, read_mechanism
 from planar.foundation.errors import BadInput
 from planar.model.mechanism import Mechanism
 
@@ -66,7 +66,7 @@ def dumps(mechanism: Mechanism | str | os.PathLike[str]) -> str:
 
 
 def load(model: str | Path) -> Mechanism:
-    """The mechanism in a file, or the model of that name or id that comes along; "-" is what is piped in.
+    """The mechanism in a file, a link, or the model of that name or id that comes along; "-" is what is piped in.
 
     Raises BadInput.
 
@@ -76,6 +76,10 @@ def load(model: str | Path) -> Mechanism:
     """
     if str(model) == PIPED:
         return loads(_piped(), "standard input")
+    if str(model).startswith(LINK_PREFIX):
+        from planar.document.texts.mechanism_link import read_link
+
+        return loads(read_link(str(model)), "link")
     path = find_model_file(model)
     content = read_limited(path)
     if path.suffix.lower() not in ("", ".json") and not content.lstrip(b"\xef\xbb\xbf \t\r\n").startswith((b"{", b"[")):

@@ -11,6 +11,7 @@ class Page {
     this.data = data;
     this.linkage = new Linkage(data, program);
     this.listeners = { move: [], size: [], said: [], course: [], chosen: [], shown: [], view: [], tolerance: [], wanted: [], acting: [] };
+    this.lifetime = new AbortController(); // ended where another page takes its place: of what it hears beside its own parts
     this.running = 0; // which input is moved
     this.acting = null; // the numbers of what acts
     this.recording = false; // whether the motion is gone through for a film: nobody is to remember that

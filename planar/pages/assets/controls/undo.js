@@ -11,18 +11,19 @@ class UndoHistory {
     this.undoButton = this.button(bar, "Undo", "Control+Z", () => this.undo());
     this.redoButton = this.button(bar, "Redo", "Control+Shift+Z Control+Y", () => this.redo());
     // what plays on while a button of these is pressed belongs to the step that it takes back
+    const { signal } = page.lifetime, capture = { capture: true, signal };
     const own = ({ target }) => target === this.undoButton || target === this.redoButton;
     // the click that ends a drag parts it not from what still follows it
     const follows = ({ type }) => type === "click" && page.wanted?.waits;
-    for (const name of ["pointerdown", "click", "change"]) document.addEventListener(name, (event) => { if (!own(event) && !follows(event)) this.begin(); }, true);
+    for (const name of ["pointerdown", "click", "change"]) document.addEventListener(name, (event) => { if (!own(event) && !follows(event)) this.begin(); }, capture);
     document.addEventListener("keydown", (event) => {
       if (!event.repeat && !own(event)) this.begin();
       if (event.key === "Enter") this.changed.delete(event.target);
-    }, true);
-    document.addEventListener("keydown", (event) => this.key(event));
+    }, capture);
+    document.addEventListener("keydown", (event) => this.key(event), { signal });
     // a number that is being typed is the browser's to undo, until it is entered
-    document.addEventListener("input", ({ target }) => this.changed.add(target), true);
-    for (const event of ["change", "focusout"]) document.addEventListener(event, ({ target }) => this.changed.delete(target), true);
+    document.addEventListener("input", ({ target }) => this.changed.add(target), capture);
+    for (const event of ["change", "focusout"]) document.addEventListener(event, ({ target }) => this.changed.delete(target), capture);
     for (const event of ["move", "size", "wanted", "acting"]) page.on(event, () => this.note());
     this.show();
   }

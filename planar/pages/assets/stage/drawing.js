@@ -16,7 +16,7 @@ class Drawing {
     svg.prepend(this.root);
     svg.setAttribute("aria-label", page.data.name);
     this.sense = 1; // of the input that runs, for its arrow
-    this.lens = null; // {zoom, at}: how much nearer than everything fits, and the place in the middle (m)
+    this.lens = null; // {scale (px/m), at}: how near, and the place in the middle (m); null where everything is to be seen
     this.measure();
     page.on("size", () => this.renew());
     page.on("move", () => { if (!this.stale) this.place(); });
@@ -91,7 +91,8 @@ class Drawing {
     const span = [high[0] - low[0], high[1] - low[1]], room = [width - 2 * MARGIN * mm, height - (2 * MARGIN + FOOT) * mm];
     const scale = Math.min(room[0] / Math.max(span[0], 1e-9), room[1] / Math.max(span[1], 1e-9));
     this.scale = Math.min(scale, (0.6 * Math.min(...room)) / (0.02 * this.page.data.size)); // a single spot is not blown up
-    if (this.lens) this.scale *= this.lens.zoom;
+    this.fitted = this.scale;
+    if (this.lens) ({ scale: this.scale } = this.lens);
     if (this.held) ({ scale: this.scale } = this.held); // what is dragged is not drawn away from the pointer
     const whole = [(low[0] + high[0]) / 2, (low[1] + high[1]) / 2 - (0.5 * FOOT * mm) / this.scale];
     const [x, y] = this.lens?.at ?? whole, origin = this.held?.origin ?? [width / 2 - x * this.scale, height / 2 + y * this.scale];

@@ -11,7 +11,7 @@ const WIDE = "(min-width: 1000px)"; // where the drawing stays beside the panels
 
 class Lens {
   constructor(page, svg, drawing, dragging) {
-    Object.assign(this, { page, svg, drawing, dragging, fingers: new Map() });
+    Object.assign(this, { page, svg, drawing, dragging, fingers: new Map(), base: null }); // base: a scale about which it is, in place of the fitting one
     this.left = svg.closest(".left");
     this.buttons();
     svg.addEventListener("wheel", (event) => this.wheel(event), { passive: false });
@@ -19,8 +19,9 @@ class Lens {
     svg.addEventListener("pointerdown", (event) => this.press(event));
     svg.addEventListener("pointermove", (event) => this.lead(event));
     for (const end of ["pointerup", "pointercancel"]) svg.addEventListener(end, (event) => this.lift(event));
-    addEventListener("keydown", ({ key }) => { if (key === "Escape" && this.isFull) this.fill(false); });
-    document.addEventListener("fullscreenchange", () => { if (!document.fullscreenElement && this.isFull) this.fill(false); });
+    const { signal } = page.lifetime;
+    addEventListener("keydown", ({ key }) => { if (key === "Escape" && this.isFull) this.fill(false); }, { signal });
+    document.addEventListener("fullscreenchange", () => { if (!document.fullscreenElement && this.isFull) this.fill(false); }, { signal });
     const keys = svg.getAttribute("aria-keyshortcuts") ?? "";
     svg.setAttribute("aria-keyshortcuts", `${keys} + - 0 F Control+ArrowRight Control+ArrowLeft Control+ArrowUp Control+ArrowDown`.trim());
     this.recall();
@@ -47,15 +48,15 @@ class Lens {
 
   /** Nearer by a factor; the place at `at` (px) stays where it is. */
   zoom(by, at = this.middle) {
-    const { drawing, page } = this, now = drawing.lens?.zoom ?? 1, zoom = Math.max(ZOOMS[0], Math.min(ZOOMS[1], now * by));
-    const place = page.view.toWorld(at), scale = (page.view.scale * zoom) / now, [x, y] = this.middle;
-    this.look({ zoom, at: [place[0] - (at[0] - x) / scale, place[1] + (at[1] - y) / scale] });
+    const { page: { view } } = this, fitted = this.base ?? this.drawing.fitted, scale = Math.max(ZOOMS[0] * fitted, Math.min(ZOOMS[1] * fitted, view.scale * by));
+    const place = view.toWorld(at), [x, y] = this.middle;
+    this.look({ scale, at: [place[0] - (at[0] - x) / scale, place[1] + (at[1] - y) / scale] });
   }
 
   /** Along by as many px. */
   pan(dx, dy) {
-    const { drawing: { lens }, page: { view }, middle: [x, y] } = this;
-    this.look({ zoom: lens?.zoom ?? 1, at: view.toWorld([x - dx, y - dy]) });
+    const { page: { view }, middle: [x, y] } = this;
+    this.look({ scale: view.scale, at: view.toWorld([x - dx, y - dy]) });
   }
 
   fit() { this.look(null); }
@@ -64,7 +65,7 @@ class Lens {
     this.drawing.lens = lens;
     this.drawing.build();
     this.show();
-    memory.write("view", lens === null ? "" : [lens.zoom, ...lens.at].map((each) => Number(each.toPrecision(5))).join(","));
+    memory.write("view", lens === null ? "" : [lens.scale, ...lens.at].map((each) => Number(each.toPrecision(5))).join(","));
   }
 
   show() {
@@ -75,8 +76,8 @@ class Lens {
   }
 
   recall() {
-    const [zoom, x, y] = (memory.read("view") ?? "").split(",").map(Number);
-    if ([zoom, x, y].every(Number.isFinite) && zoom >= ZOOMS[0] && zoom <= ZOOMS[1]) this.look({ zoom, at: [x, y] });
+    const [scale, x, y] = (memory.read("view") ?? "").split(",").map(Number), by = scale / this.drawing.fitted;
+    if ([scale, x, y].every(Number.isFinite) && by >= ZOOMS[0] / 2 && by <= ZOOMS[1] * 2) this.look({ scale, at: [x, y] });
   }
 
   /** Over the whole screen, letters large, with the controls alone; back by Escape. */
