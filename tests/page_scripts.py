@@ -10,6 +10,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from planar.document.files import read_asset
@@ -28,6 +29,11 @@ LOGIC = (
     "controls/saving.js",
 )
 """The scripts of a page that need no document."""
+
+SCREENS = {"phone": (390, 844), "desk": (1280, 900), "projector": (1920, 1080)}
+PLACES = "page.data.names.map((name) => Object.values(page.point(name)))"
+CLOSE = 1e-12
+"""Of the greatest of its kind: as nearly a page's numbers are Python's."""
 
 _carried = cache(page_data)
 needs_node = pytest.mark.skipif(NODE is None, reason="there is no Node to run the page's scripts in")
@@ -116,3 +122,24 @@ class Windows:
         window.goto("about:blank")
         wrong.clear()
         self._free[has_touch].append((window, wrong))
+
+
+def same(window, state):
+    """The page's places, velocities and accelerations are those of a state."""
+    found = np.array(window.evaluate(PLACES))
+    wanted = np.array([[p.position, p.velocity, p.acceleration] for p in state.points.values()])
+    for order in range(3):
+        scale = np.abs(wanted[:, order]).max()
+        assert np.abs(found[:, order] - wanted[:, order]).max() <= CLOSE * scale
+
+
+def settled(window):
+    """Wait for two frames, after which what was asked for is drawn."""
+    window.evaluate("new Promise((go) => requestAnimationFrame(() => requestAnimationFrame(go)))")
+
+
+def downloaded(window, button, path):
+    with window.expect_download() as coming:
+        window.get_by_role("button", name=button).click()
+    coming.value.save_as(path)
+    return path.read_text(encoding="utf-8")

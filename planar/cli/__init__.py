@@ -14,6 +14,7 @@ main.modules = {
     "cognates": "planar.cli.commands.design.cognates",
     "convert": "planar.cli.commands.convert",
     "cycle": "planar.cli.commands.solve_cycle_explain",
+    "edit": "planar.cli.commands.edit",
     "explain": "planar.cli.commands.solve_cycle_explain",
     "forces": "planar.cli.commands.forces_simulate",
     "gallery": "planar.cli.commands.view_gallery",

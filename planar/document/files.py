@@ -11,7 +11,7 @@ from itertools import islice
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from planar.document import read_mechanism
+from planar.document import LINK_PREFIX, read_mechanism
 from planar.foundation.errors import BadInput
 from planar.model.mechanism import Mechanism
 
@@ -68,7 +68,7 @@ def dumps(mechanism: Mechanism | str | os.PathLike[str]) -> str:
 
 
 def load(model: str | Path) -> Mechanism:
-    """The mechanism in a file, or the model of that name or id that comes along; "-" is what is piped in.
+    """The mechanism in a file, a link, or the model of that name or id that comes along; "-" is what is piped in.
 
     Raises BadInput.
 
@@ -92,6 +92,10 @@ def read_source(
     place = os.fsdecode(model)
     if place == PIPED:
         place, content = "standard input", _piped()
+    elif place.startswith(LINK_PREFIX):
+        from planar.document.texts.mechanism_link import read_link
+
+        return loads(read_link(place), "link"), None, ()
     elif place.startswith(("http://", "https://")):
         content = place.encode()  # the mechanism is in the address, which is not opened
     else:

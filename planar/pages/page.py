@@ -25,6 +25,14 @@ class PageLink(NamedTuple):
     words: str
 
 
+class EditedFile(NamedTuple):
+    """A file that is drawn on: its JSON value, its name if it has one, and what is told of it (`edit_answer`)."""
+
+    value: Any
+    name: str | None
+    answer: dict[str, Any]
+
+
 class PageRange(NamedTuple):
     """The part of an input's range that a page runs through: the number of the input, and both ends (rad or m)."""
 
@@ -38,6 +46,7 @@ STYLES = (
     "uplot/uPlot.min.css",
     "page.css",
     "stage/stage.css",
+    "stage/lens.css",
     "layers/layers.css",
     "controls/dimensions.css",
     "wanted/wanted.css",
@@ -59,6 +68,7 @@ SCRIPTS = (
     "stage/drawing.js",
     "controls/dragging.js",
     "controls/controls.js",
+    "controls/figures.js",
     "layers/ink.js",
     "layers/points.js",
     "layers/polygons.js",
@@ -79,9 +89,30 @@ SCRIPTS = (
     "wanted/wanted_drawing.js",
     "wanted/wanted_table.js",
     "controls/assemblies.js",
+    "controls/acting.js",
+    "controls/keeping.js",
+    "controls/panels.js",
+    "stage/lens.js",
     "controls/undo.js",
     "controls/saving.js",
+    "films/gif.js",
+    "films/films.js",
+    "start.js",
 )
+
+
+START = 'beginPage(JSON.parse(document.getElementById("data").textContent), program);'
+EDITOR_SCRIPTS = (
+    "editor/places.js",
+    "editor/document.js",
+    "editor/links.js",
+    "editor/sketch.js",
+    "editor/hand.js",
+    "editor/panel.js",
+    "editor/editing.js",
+)
+"""What a page has besides on which a mechanism is drawn."""
+EDITOR_STYLES = ("editor/editor.css",)
 
 
 def page(  # many: what is shown, and how
@@ -93,21 +124,25 @@ def page(  # many: what is shown, and how
     layers: tuple[str, ...] = ("paths",),
     library: bool | None = None,
     wanted: PageTask | None = None,
+    edited: EditedFile | None = None,
 ) -> str:
     """The page of a mechanism at its inputs.
 
     `z` are the unknowns of the assembly, left out that nearest to the sketch; `window` is the range that is run
     through, left out a turn or from limit to limit. `back` leads to an index, `layers` are
     shown at first. `library` is of notebooks: the page carries the scripts for others beside it (True), or takes them
-    from one of those (False). `wanted` is what the page shows under the mechanism, to be dragged. Raises NoAnswer where
-    it has no position to start from, BadInput for something wanted of what it does not have.
+    from one of those (False). `wanted` is what the page shows under the mechanism, to be dragged; `edited` the file
+    that its server draws on. Raises NoAnswer where it has no position to start from, BadInput for something wanted of
+    what it does not have.
     """
     data, functions = page_data(mechanism, z)
     data["window"], data["layers"] = window and window._asdict(), layers
     data["wanted"] = wanted_data(mechanism, data, wanted)
-    styles = "\n".join([overlay_styles(), *map(read_asset, STYLES), pen_styles()])
-    scripts = "\n".join([symbol_script(), overlay_script(), *map(read_asset, SCRIPTS)])
-    start = f"{functions}\n{START_SCRIPT}"
+    data["edited"] = edited and edited._asdict()
+    own = (EDITOR_SCRIPTS, EDITOR_STYLES) if edited else ((), ())
+    styles = "\n".join([overlay_styles(), *map(read_asset, STYLES + own[1]), pen_styles()])
+    scripts = "\n".join([symbol_script(), overlay_script(), *map(read_asset, SCRIPTS + own[0])])
+    start = f"{functions}\n{START}"
     if library is not None:
         key, carrying = pack_scripts(styles, scripts)
         carrying = json.dumps(carrying) if library else "null"
@@ -120,6 +155,7 @@ def page(  # many: what is shown, and how
         "still": still_svg(mechanism, z),
         "notes": _notes(mechanism),
         "styles": styles,
+        "policy": "; connect-src 'self'" if edited else "",
         "data": script_safe_json(data),
         "scripts": f"{scripts}\n{start}",
     }
@@ -139,27 +175,6 @@ def _notes(mechanism: Mechanism) -> str:
         return ""
     each = "".join(f"<li>{escape(note)}</li>" for note in mechanism.notes)
     return f'<section id="notes"><h2>Notes</h2><ul>{each}</ul></section>\n'
-
-
-START_SCRIPT = r"""
-const page = new Page(JSON.parse(document.getElementById("data").textContent), program);
-page.wanted = Wanted.of(page);
-const svg = document.getElementById("drawing"), drawing = new Drawing(page, svg), dragging = new Dragging(page, svg);
-const controls = new Controls(page, document.getElementById("controls"), svg, drawing, dragging);
-new Courses(page);
-new Dimensions(page, document.getElementById("dimensions"));
-new Assemblies(page, document.getElementById("assemblies"));
-new UndoHistory(page, controls.bar, () => controls.pause());
-new Saving(page, document.getElementById("saving"), document.getElementById("drawing"));
-page.tolerances = Tolerances.ofFile(page);
-startLayers(page);
-new Influence(page, document.getElementById("dimensions"));
-if (page.wanted !== null) {
-  new WantedDrawing(page, svg, drawing);
-  new WantedTable(page, document.getElementById("wanted"));
-}
-document.getElementById("still").remove(); // what moves stands in its place
-"""
 
 
 def fill_template(template: str, parts: dict[str, str]) -> str:

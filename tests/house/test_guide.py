@@ -30,6 +30,7 @@ from planar.model.file_units import FileUnits
 from tests import command
 from tests.draws import SEARCH, part
 from tests.guide_pictures import PICTURES
+from tests.guide_screens import SCREENS
 
 ROOT = Path(__file__).parents[2]
 FOLDER = ROOT / "planar" / "guide"
@@ -267,7 +268,7 @@ def test_every_picture_is_shown_and_one_is_what_the_tool_makes_now(tmp_path):
     shown = {target for page in PAGES.values() for target in re.findall(r"\]\((?:\.\./)*pictures/(\S+)\.png\)", page)}
     assert (
         shown
-        == {*PICTURES, *TIMES}
+        == {*PICTURES, *TIMES, *SCREENS}
         == {
             path.relative_to(FOLDER / "pictures").with_suffix("").as_posix()
             for path in (FOLDER / "pictures").rglob("*.png")

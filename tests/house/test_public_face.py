@@ -25,6 +25,7 @@ from planar.document.answer_lists import AnswerList, HandedInValue
 from planar.document.writer import write_mechanism
 from planar.model.input_laws import SEGMENT_TYPES
 from planar.model.pairs import pair_types
+from planar.pages.editor.server import EditServer
 from tests.command import run
 
 ROOT = Path(planar.__file__).parent
@@ -252,6 +253,7 @@ def test_every_command_of_a_model_takes_set_and_what_is_piped_in(name, tmp_path,
     more = {
         "plot": ["scheme", "-o", "o.svg"],
         "view": ["-o", "o.html"],
+        "edit": ["--no-browser"],
         "gallery": ["-o", "pages"],
         "animate": ["-o", "o.gif"],
         "simulate": ["--duration", "0.01s", "--steps", "2"],
@@ -275,6 +277,7 @@ def test_every_command_of_a_model_takes_set_and_what_is_piped_in(name, tmp_path,
         "animate": "slider-crank",
         "cams": "valve-cam",
     }
+    monkeypatch.setattr(EditServer, "serve_forever", lambda *_, **__: None)
     monkeypatch.chdir(tmp_path)
     piped = json.dumps(write_mechanism(planar.load(model.get(name, "slider-crank")))).encode()
     changed = {"simulate": "O.velocity=2rad/s", "cams": "lift.base_radius=30mm"}.get(name, "crank.length=25mm")

@@ -25,66 +25,10 @@ from planar.pages.view import view
 from tests.builders import triangle
 from tests.hostile import harmful_mechanism
 from tests.known import MODELS
-from tests.page_scripts import Windows, browser, opened
+from tests.page_scripts import CLOSE, PLACES, SCREENS, downloaded, opened, same, settled
 
-CLOSE = 1e-12
 STEMS = ("crank-rocker", "slider-crank", "scotch-yoke", "watt-six-bar", "whitworth", "planetary-gear-set", "open-arm")
 """Of the gallery."""
-SCREENS = {"phone": (390, 844), "desk": (1280, 900), "projector": (1920, 1080)}
-PLACES = "page.data.names.map((name) => Object.values(page.point(name)))"
-
-
-@pytest.fixture(scope="module")
-def chromium():
-    with browser() as running:
-        yield running
-
-
-@pytest.fixture(scope="module")
-def windows(chromium):
-    return Windows(chromium)
-
-
-@pytest.fixture
-def shown(windows, tmp_path):
-    """Shows the page of a mechanism: its window, in which nothing must go wrong."""
-    taken = []
-
-    def show(mechanism, screen="desk", scheme="light"):
-        width, height = SCREENS[screen]
-        window, problems = windows.take(has_touch=screen == "phone")
-        taken.append((screen == "phone", window, problems))
-        window.set_viewport_size({"width": width, "height": height})
-        window.emulate_media(media="screen", color_scheme=scheme)
-        window.goto(view(mechanism, tmp_path / "page.html").as_uri())
-        return window
-
-    yield show
-    wrong = [list(problems) for *_, problems in taken]
-    for each in taken:
-        windows.give_back(*each)
-    assert not any(wrong), wrong
-
-
-def same(window, state):
-    """The page's places, velocities and accelerations are those of a state."""
-    found = np.array(window.evaluate(PLACES))
-    wanted = np.array([[p.position, p.velocity, p.acceleration] for p in state.points.values()])
-    for order in range(3):
-        scale = np.abs(wanted[:, order]).max()
-        assert np.abs(found[:, order] - wanted[:, order]).max() <= CLOSE * scale
-
-
-def settled(window):
-    """Wait for two frames, after which what was asked for is drawn."""
-    window.evaluate("new Promise((go) => requestAnimationFrame(() => requestAnimationFrame(go)))")
-
-
-def downloaded(window, button, path):
-    with window.expect_download() as coming:
-        window.get_by_role("button", name=button).click()
-    coming.value.save_as(path)
-    return path.read_text(encoding="utf-8")
 
 
 # motion

@@ -23,7 +23,7 @@ from tests.rubbing import with_friction
 pytestmark = pytest.mark.skipif(shutil.which("node") is None, reason="there is no node here to run a page's scripts")
 
 SCRIPT = """
-const [data, moved] = JSON.parse(require("fs").readFileSync(0));
+const [data, moved] = given;
 const linkage = new Linkage(data, program), forces = new Forces(data, program);
 if (moved.d) linkage.changeTo(moved.d);
 if (moved.u) linkage.moveTo(moved.u.map((each, k) => each / linkage.scale[k]));
@@ -38,8 +38,8 @@ def on_page(mechanism: Mechanism, **moved: list[float]) -> dict[str, Any]:
     data, functions = page_data(mechanism)
     scripts = "".join(read_asset(f"solve/{name}.js") for name in ("singular", "stops", "linkage", "friction", "forces"))
     ran = subprocess.run(
-        ["node", "-e", f"{scripts}\n{functions}\n{SCRIPT}"],
-        input=json.dumps([data, moved]),
+        ["node", "-"],
+        input=f"{scripts}\n{functions}\nconst given = {json.dumps([data, moved])};\n{SCRIPT}",
         capture_output=True,
         text=True,
         check=True,

@@ -4,14 +4,17 @@
    the motion is void), "said" (a sentence for the reader), "course" (the whole motion is known, or void), "chosen" (other
    points and links are looked at), "shown" (other layers are), "view" (the drawing lies elsewhere on the screen, or is of another size),
    "tolerance" (dimensions may be off by more or less), "wanted" (what is wanted of the mechanism is elsewhere, or is missed
-   by more or less). */
+   by more or less), "acting" (loads, springs, masses are others). */
 
 class Page {
   constructor(data, program) {
     this.data = data;
     this.linkage = new Linkage(data, program);
-    this.listeners = { move: [], size: [], said: [], course: [], chosen: [], shown: [], view: [], tolerance: [], wanted: [] };
+    this.listeners = { move: [], size: [], said: [], course: [], chosen: [], shown: [], view: [], tolerance: [], wanted: [], acting: [] };
+    this.lifetime = new AbortController(); // ended where another page takes its place: of what it hears beside its own parts
     this.running = 0; // which input is moved
+    this.acting = null; // the numbers of what acts
+    this.recording = false; // whether the motion is gone through for a film: nobody is to remember that
     this.wanted = null; // what is wanted of the mechanism, if anything is
     this.assembly = null; // the number of the assembly that it was moved from, if it is one of those listed
     this.update();
@@ -102,12 +105,12 @@ class Page {
   /** Where the mechanism is, and what is wanted of it, to come back to. */
   snapshot() {
     const { linkage: { d, u, z, last, stop }, running, assembly } = this;
-    const wanted = this.wanted?.numbers() ?? [];
-    return { d: Array.from(d), u: Array.from(u), z: Float64Array.from(z), last, stop, of: z, running, assembly, wanted };
+    const wanted = this.wanted?.numbers() ?? [], acting = this.acting?.values ?? [];
+    return { d: Array.from(d), u: Array.from(u), z: Float64Array.from(z), last, stop, of: z, running, assembly, wanted, acting };
   }
 
   /** Take the mechanism back to a snapshot. */
-  restore({ d, u, z, last, stop, of, running, assembly, wanted }) {
+  restore({ d, u, z, last, stop, of, running, assembly, wanted, acting }) {
     const { linkage } = this;
     Object.assign(linkage, { d: Array.from(d), u: Array.from(u), z: Float64Array.from(z) });
     linkage.measure();
@@ -116,6 +119,7 @@ class Page {
     linkage.stop = stop && stop.to === of ? { ...stop, to: linkage.z } : null;
     Object.assign(this, { running, assembly });
     this.wanted?.take(wanted);
+    this.acting?.take(acting);
     this.update();
     this.emit("size", { reached: 1, open: 0 });
     this.emit("move");

@@ -9,6 +9,7 @@ from typing import Any
 import casadi as ca
 
 from planar.codegen.javascript import write_javascript
+from planar.document.dimensions import change_dimension
 from planar.drawing.forces.action_arrows import ActionSymbol, action_symbols, reaction_symbols
 from planar.dynamics.forces import forces
 from planar.dynamics.lagrangian import LagrangianFunctions
@@ -20,19 +21,29 @@ from planar.model.link_graph import link_numbers
 from planar.model.loads import Course, Load, Spring
 from planar.model.mechanism import Mechanism, relative_motions
 from planar.model.pairs import Pair
+from planar.pages.data.action_parameters import action_parameters, parameter_data
 from planar.pages.data.balance_rows import BalanceRows
+from planar.pages.data.dimension_numbers import DimensionNumbers
 from planar.pages.data.friction_data import contact_data
 from planar.reports.tables.forces.position_forces import undetermined_sentences
 from planar.results.motion import State
 
 
-def force_data(mechanism: Mechanism, d: ca.SX, state: State, unit: float) -> tuple[dict[str, Any], str] | None:
+def force_data(
+    numbers: DimensionNumbers, filed: Mechanism, state: State, unit: float
+) -> tuple[dict[str, Any], str] | None:
     """The data and the function of the forces; None where nothing acts.
 
-    Of a mechanism with the dimensions `d` as symbols, as it stands in its file (`state`), and its size `unit` (m).
+    Of a mechanism with its dimensions as symbols, as it is `filed` and stands in its file (`state`), and its size
+    `unit` (m). The numbers of what acts are symbols too, after the dimensions; `parameters` has them.
     """
+    mechanism, d = numbers.mechanism, numbers.d
     if not (mechanism.loads or mechanism.masses or mechanism.springs):
         return None
+    parameters = list(action_parameters(filed))
+    symbols = ca.SX.sym("f", len(parameters))
+    for k, each in enumerate(parameters):
+        mechanism = change_dimension(mechanism, each, symbols[k])
     work = LagrangianFunctions(mechanism, unit)
     rows = BalanceRows(work)
     slopes = ca.jacobian(work.residuals, work.q)
@@ -61,13 +72,14 @@ def force_data(mechanism: Mechanism, d: ca.SX, state: State, unit: float) -> tup
         "timed": any(load.varies is not None and load.varies.input is None for load in mechanism.loads),
         "untold": _undetermined_sentences(state),
         "choices": list(attachment_remarks(mechanism)),
+        "parameters": [parameter_data(each, filed, parameters) for each in parameters],
     }
     data["symbols"] = _symbol_data(mechanism, data)
     data["inertia"] = rows.add(work.inertia.T)[0]
     table = ca.vertcat(*rows.rows)
     data["row"], data["column"] = (list(each) for each in table.sparsity().get_triplet())
     told = ca.vertcat(table.nz[:], *rows.places)
-    given = [work.q, work.q1, work.q2, work.factors, work.spring_turns, d]
+    given = [work.q, work.q1, work.q2, work.factors, work.spring_turns, ca.vertcat(d, symbols)]
     data |= {"rows": rows.count, "told": told.numel()}
     return data, write_javascript("balance", ca.Function("balance", given, [told]))
 

@@ -12,11 +12,8 @@ from planar.assemblies.circuits.circuits import Circuits, circuits
 from planar.assemblies.modes import Mode, modes
 from planar.codegen.javascript import write_javascript
 from planar.document.dimensions import Dimension, change_dimension
-from planar.drawing.paper.scales import paper_unit
 from planar.equations.mechanism_numbers import scale_lengths, shapes_of_links
 from planar.equations.symbolic_equations import slice_length
-from planar.foundation.units import parse_unit
-from planar.model.file_units import FileUnits, display_unit
 from planar.model.link_graph import link_numbers
 from planar.model.link_shapes import PointPlacementError
 from planar.model.mechanism import Mechanism, links_counting_turns, named_points, pair_misfits
@@ -31,6 +28,7 @@ from planar.pages.data.polygon_data import polygon_data
 from planar.pages.data.scheme_data import motion_positions, scheme_data
 from planar.pages.data.stop_data import stop_data, stop_position_function
 from planar.pages.data.tolerance_data import tolerance_data
+from planar.pages.data.unit_data import unit_choices, unit_data
 from planar.solving.position import PositionSolver, solved_mechanism
 from planar.solving.rest_position import rest_position
 
@@ -41,20 +39,6 @@ PROBE_RATIO = 0.02
 MAX_HALVINGS = 40
 MAX_ASSEMBLIES = 64
 """Assemblies that a page offers."""
-
-
-SHOWN_KINDS = (
-    "length",
-    "angle",
-    "velocity",
-    "acceleration",
-    "angular velocity",
-    "angular acceleration",
-    "force",
-    "torque",
-    "power",
-)
-"""Of quantities that a page shows."""
 
 
 # long: one record after the other, as the scripts read them
@@ -87,9 +71,8 @@ def page_data(mechanism: Mechanism, z: np.ndarray | None = None) -> tuple[dict[s
         "scheme": scheme,
         "name": mechanism.name,
         "about": mechanism.about,
-        "units": _unit_data(mechanism),
-        "paces": _pace_data(mechanism.units),
-        "paper": dict(zip(("name", "mm"), paper_unit(mechanism.units.length), strict=True)),
+        **unit_data(mechanism.units),
+        "unit_choices": unit_choices(mechanism.units),
         "column": {
             link.name: [solver.column[link.name, part] for part in ("x", "y", "angle")]
             for link in mechanism.links
@@ -136,7 +119,7 @@ def page_data(mechanism: Mechanism, z: np.ndarray | None = None) -> tuple[dict[s
         "stops": stop_data(solver),
         "sizes": len(numbers.values),
     }
-    acting = force_data(numbers.mechanism, numbers.d, state, solver.unit)
+    acting = force_data(numbers, mechanism, state, solver.unit)
     data["forces"] = acting and acting[0]
     functions = [
         numbers.to_javascript(),
@@ -178,23 +161,6 @@ def _input_data(given: Any, slides: bool) -> dict[str, Any]:
         "velocity": given.velocity,
         "acceleration": given.acceleration,
     }
-
-
-def _unit_data(mechanism: Mechanism) -> dict[str, Any]:
-    """Of kinds of quantities as they are shown; a unit is `ratio[0] / ratio[1]` of the SI unit, `si` in one number."""
-    found = {kind: display_unit(kind, mechanism.units) for kind in SHOWN_KINDS}
-    return {
-        kind: {"name": name, "si": of.to_si(1.0), "ratio": [of.numerator, of.denominator]}
-        for kind, (name, of) in found.items()
-    }
-
-
-def _pace_data(units: FileUnits) -> dict[str, Any]:
-    """In what the pace of a page's inputs is told: what the file declares, else its length by the second, and rpm."""
-    own = f"{units.length}/s", parse_unit(units.length)
-    length = display_unit("velocity", units) if units.velocity else own
-    angle = display_unit("angular velocity", units) if units.angular_velocity else ("rpm", parse_unit("rpm"))
-    return {kind: {"name": name, "si": of.to_si(1.0)} for kind, (name, of) in (("length", length), ("angle", angle))}
 
 
 def _assembly_data(mechanism: Mechanism, solver: PositionSolver) -> dict[str, Any]:

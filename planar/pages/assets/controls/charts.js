@@ -45,10 +45,10 @@ class Charts {
     page.on("chosen", () => this.build());
     page.on("course", () => this.build());
     page.on("move", () => this.mark());
-    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.build());
+    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.build(), { signal: page.lifetime.signal });
     new ResizeObserver(() => this.fit()).observe(this.place);
     for (const [event, printed] of [["beforeprint", true], ["afterprint", false]]) {
-      addEventListener(event, () => { document.documentElement.classList.toggle("printed", this.printed = printed); this.build(); });
+      addEventListener(event, () => { document.documentElement.classList.toggle("printed", this.printed = printed); this.build(); }, { signal: page.lifetime.signal });
     }
     this.build();
   }

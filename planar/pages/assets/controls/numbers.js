@@ -67,10 +67,10 @@ function lengthTold(page, value) {
   return `${Number((value * by).toPrecision(3))} ${name}`;
 }
 
-/** Six figures, as tables have them. */
+/** As many figures as tables have. */
 function figures(value) {
   if (value === 0) return "0";
-  const text = value.toPrecision(6);
+  const text = value.toPrecision(Figures.count);
   return text.replace("-", "−").replace("e+", "e");
 }
 

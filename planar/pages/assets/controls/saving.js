@@ -17,8 +17,8 @@ const Files = (() => {
 
   /** The mechanism as it is on the page, as the JSON value of a file; as it came where nothing is changed. */
   function mechanism(page) {
-    const { data, linkage } = page, file = JSON.parse(JSON.stringify(data.document.value));
-    const length = (value) => shortest(value, data.units.length.ratio, "m");
+    const { data, linkage } = page, file = JSON.parse(JSON.stringify(data.document.value)), units = data.filed_units ?? data.units;
+    const length = (value) => shortest(value, units.length.ratio, "m");
     const put = (path, value) => {
       let at = file;
       for (const key of path.slice(0, -1)) at = at[key];
@@ -36,8 +36,14 @@ const Files = (() => {
       changed = true;
       for (const { path, at } of places) {
         const now = page.input(k) + (at - given.position);
-        put(path, given.slides ? length(now) : shortest(now, data.units.angle.ratio, "rad"));
+        put(path, given.slides ? length(now) : shortest(now, units.angle.ratio, "rad"));
       }
+    });
+    data.forces?.parameters.forEach(({ path, value, kind, unit }, k) => {
+      const now = page.acting?.values[k] ?? value;
+      if (now === value) return;
+      changed = true;
+      put(path, kind === "length" ? length(now) : `${now} ${unit}`);
     });
     if (!changed) return file;
     // `ids` and what was published are of the file's own position and dimensions
@@ -95,7 +101,7 @@ const Files = (() => {
 
   /** The motion of the input that runs, with the heads of `planar cycle -o motion.csv`; the other inputs stand still. */
   function motion(page) {
-    const { data, linkage, course, running } = page, { columns, column, counting, units } = data;
+    const { data, linkage, course, running } = page, { columns, column, counting } = data, units = data.filed_units ?? data.units;
     const own = new Page(data, linkage.program); // another one, so that what is looked at stays where it is
     own.linkage.d = Array.from(linkage.d);
     own.linkage.measure();
@@ -185,12 +191,18 @@ class Saving {
   }
 
   save(suffix, type, text) {
+    const name = this.offer(suffix, new Blob([text], { type }));
+    if (window !== window.top) this.copy(name, text);
+  }
+
+  /** Offer what was made for download, under the mechanism's name: the file's. */
+  offer(suffix, made) {
     const name = this.page.data.name.replace(/[^\p{L}\p{N}._-]+/gu, "-").replace(/^[-.]+|[-.]+$/g, "").slice(0, 80) || "mechanism";
-    const link = Forms.element("a", { download: `${name}.${suffix}`, href: URL.createObjectURL(new Blob([text], { type })) });
+    const link = Forms.element("a", { download: `${name}.${suffix}`, href: URL.createObjectURL(made) });
     link.click();
     setTimeout(() => URL.revokeObjectURL(link.href), 10000);
     // nothing tells whether a download came about; in a frame it may be forbidden
     this.page.say(`${link.download} is offered for download.`);
-    if (window !== window.top) this.copy(link.download, text);
+    return link.download;
   }
 }

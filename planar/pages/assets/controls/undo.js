@@ -1,5 +1,5 @@
 "use strict";
-/* Undo and redo of what was done to the mechanism: its dimensions, its inputs, its assembly. All that changes between
+/* Undo and redo of what was done to the mechanism: its dimensions, its inputs, its assembly, what acts on it. All that changes between
    the beginning of one act of the reader (a press, a key, a number entered) and the next is one step. */
 
 const MOST_STEPS = 200;
@@ -11,19 +11,20 @@ class UndoHistory {
     this.undoButton = this.button(bar, "Undo", "Control+Z", () => this.undo());
     this.redoButton = this.button(bar, "Redo", "Control+Shift+Z Control+Y", () => this.redo());
     // what plays on while a button of these is pressed belongs to the step that it takes back
+    const { signal } = page.lifetime, capture = { capture: true, signal };
     const own = ({ target }) => target === this.undoButton || target === this.redoButton;
     // the click that ends a drag parts it not from what still follows it
     const follows = ({ type }) => type === "click" && page.wanted?.waits;
-    for (const name of ["pointerdown", "click", "change"]) document.addEventListener(name, (event) => { if (!own(event) && !follows(event)) this.begin(); }, true);
+    for (const name of ["pointerdown", "click", "change"]) document.addEventListener(name, (event) => { if (!own(event) && !follows(event)) this.begin(); }, capture);
     document.addEventListener("keydown", (event) => {
       if (!event.repeat && !own(event)) this.begin();
       if (event.key === "Enter") this.changed.delete(event.target);
-    }, true);
-    document.addEventListener("keydown", (event) => this.key(event));
+    }, capture);
+    document.addEventListener("keydown", (event) => this.key(event), { signal });
     // a number that is being typed is the browser's to undo, until it is entered
-    document.addEventListener("input", ({ target }) => this.changed.add(target), true);
-    for (const event of ["change", "focusout"]) document.addEventListener(event, ({ target }) => this.changed.delete(target), true);
-    for (const event of ["move", "size", "wanted"]) page.on(event, () => this.note());
+    document.addEventListener("input", ({ target }) => this.changed.add(target), capture);
+    for (const event of ["change", "focusout"]) document.addEventListener(event, ({ target }) => this.changed.delete(target), capture);
+    for (const event of ["move", "size", "wanted", "acting"]) page.on(event, () => this.note());
     this.show();
   }
 
@@ -39,7 +40,7 @@ class UndoHistory {
 
   /** Something has changed. */
   note() {
-    if (this.restoring) return;
+    if (this.restoring || this.page.recording) return;
     const now = this.page.snapshot();
     if (!this.open && !samePosition(this.stood, now)) {
       this.done.push(this.stood);
@@ -85,5 +86,5 @@ class UndoHistory {
 /** Whether two snapshots are of one position of one mechanism, of which the same is wanted. */
 function samePosition(a, b) {
   const alike = (one, other) => one.every((each, k) => each === other[k]);
-  return alike(a.d, b.d) && alike(a.u, b.u) && alike(a.z, b.z) && alike(a.wanted, b.wanted);
+  return alike(a.d, b.d) && alike(a.u, b.u) && alike(a.z, b.z) && alike(a.wanted, b.wanted) && alike(a.acting, b.acting);
 }

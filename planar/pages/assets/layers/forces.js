@@ -9,11 +9,17 @@ const MOSTLY = 0.9;      // of the motion: what is greater in the rest, as at a 
 class PageForces {
   constructor(page) {
     this.page = page;
+    this.waits = null; // to tell that what acts is other
     this.solver = new Forces(page.data, page.linkage.program);
     const renew = () => { this.wound = this.solver.wound(page.state.w); this.state = null; };
     // nothing is told of inputs where links are held more than once
     this.inputs = this.solver.square ? page.data.forces.inputs : [];
     page.on("size", renew);
+    page.on("acting", () => {
+      renew();
+      page.course?.kept.delete("forces");
+      this.waits ??= requestAnimationFrame(() => { this.waits = null; if (page.course) page.emit("course"); });
+    });
     renew();
   }
 
@@ -22,7 +28,7 @@ class PageForces {
     const { page } = this;
     if (this.state !== page.state) {
       this.state = page.state;
-      this.found = this.solver.at(page.state, page.data.inputs.map((_, k) => page.input(k)), page.linkage.d, this.wound);
+      this.found = this.solver.at(page.state, page.data.inputs.map((_, k) => page.input(k)), page.linkage.d, this.wound, page.acting?.values);
     }
     return this.found;
   }
@@ -61,7 +67,7 @@ class PageForces {
     const { page, solver } = this, inputs = page.data.inputs.map((_, k) => page.input(k)), until = performance.now() + FORCES_SLICE;
     for (; known.done < course.count && performance.now() < until; known.done++) {
       const row = course.rows[known.done], there = inputs.map((each, k) => (k === course.input ? row.at : each));
-      const found = solver.at(row.state, there, page.linkage.d, this.wound);
+      const found = solver.at(row.state, there, page.linkage.d, this.wound, page.acting?.values);
       if (!found.efforts) continue;
       for (const each of found.inputs) known.efforts[each.pair][known.done] = this.clean(found, each);
       known.most[known.done] = greatestForce(found);
@@ -69,7 +75,7 @@ class PageForces {
     known.waiting = known.done < course.count;
     if (!known.waiting) return;
     setTimeout(() => {
-      if (page.course !== course) return;
+      if (page.course !== course || course.kept.get("forces") !== known) return;
       this.work(course, known);
       if (!known.waiting) page.emit("course");
     });

@@ -95,13 +95,13 @@ class Forces {
 
   /** The forces of a state (`Linkage.state`) with the inputs and dimensions there: {why, efforts, inputs, pairs, acting}.
       What is not told is NaN; where nothing is, `why` says so and there is nothing else. */
-  at({ w, w1, w2, why }, inputs, d, wound) {
+  at({ w, w1, w2, why }, inputs, d, wound, values = this.data.parameters.map((each) => each.value)) {
     const { data } = this;
     if (!this.square) return { why: data.untold.join("; ") || "the links are held more than once" };
     if (w1 === null || w2 === null) return { why: `not determined at a ${why}` };
     this.w = w;
     data.acting.forEach(({ course }, k) => { if (k < this.factors.length) this.factors[k] = course ? factorOf(course, inputs) : 1; });
-    this.program.balance(w, w1, w2, this.factors, wound, d, this.told);
+    this.program.balance(w, w1, w2, this.factors, wound, [...d, ...values], this.told);
     const wide = data.coordinates;
     this.table.fill(0);
     data.row.forEach((row, k) => { this.table[row * wide + data.column[k]] = this.told[k]; });

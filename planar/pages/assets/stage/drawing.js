@@ -3,6 +3,7 @@
    pins and letters above. `page.view` says where places in the world lie on the screen. */
 
 const HEIGHTS = ["ground", "plates", "wheels", "tubes", "bars", "springs", "sliders", "pins", "drives", "letters"];
+const LARGEST_MM = { page: 8, projected: 14 }; // px
 const MARGIN = 12;     // mm about everything that moves
 const FOOT = 6;        // mm below for the bar of the scale
 const FINGER = 24;     // px: as wide a link can be taken hold of
@@ -15,6 +16,7 @@ class Drawing {
     svg.prepend(this.root);
     svg.setAttribute("aria-label", page.data.name);
     this.sense = 1; // of the input that runs, for its arrow
+    this.lens = null; // {scale (px/m), at}: how near, and the place in the middle (m); null where everything is to be seen
     this.measure();
     page.on("size", () => this.renew());
     page.on("move", () => { if (!this.stale) this.place(); });
@@ -49,7 +51,8 @@ class Drawing {
   build() {
     const { page, svg } = this, width = svg.clientWidth, height = svg.clientHeight;
     if (!width || !height) return;
-    const mm = Math.max(3.2, Math.min(width / 150, height / 110, 8));
+    const largest = LARGEST_MM[document.documentElement.classList.contains("projected") ? "projected" : "page"];
+    const mm = Math.max(3.2, Math.min(width / 150, height / 110, largest));
     Object.assign(this, { mm, width, height, strokes: new Strokes(page.data.scheme) });
     svg.style.setProperty("--mm", mm);
     svg.setAttribute("viewBox", `0 0 ${width} ${height}`);
@@ -88,11 +91,11 @@ class Drawing {
     const span = [high[0] - low[0], high[1] - low[1]], room = [width - 2 * MARGIN * mm, height - (2 * MARGIN + FOOT) * mm];
     const scale = Math.min(room[0] / Math.max(span[0], 1e-9), room[1] / Math.max(span[1], 1e-9));
     this.scale = Math.min(scale, (0.6 * Math.min(...room)) / (0.02 * this.page.data.size)); // a single spot is not blown up
+    this.fitted = this.scale;
+    if (this.lens) ({ scale: this.scale } = this.lens);
     if (this.held) ({ scale: this.scale } = this.held); // what is dragged is not drawn away from the pointer
-    const origin = this.held ? this.held.origin : [
-      width / 2 - ((low[0] + high[0]) / 2) * this.scale,
-      (height - FOOT * mm) / 2 + ((low[1] + high[1]) / 2) * this.scale,
-    ];
+    const whole = [(low[0] + high[0]) / 2, (low[1] + high[1]) / 2 - (0.5 * FOOT * mm) / this.scale];
+    const [x, y] = this.lens?.at ?? whole, origin = this.held?.origin ?? [width / 2 - x * this.scale, height / 2 + y * this.scale];
     this.origin = origin;
     this.page.view = {
       scale: this.scale, mm, width, height,
@@ -189,7 +192,7 @@ class Drawing {
     for (const { group, link } of this.parts.values()) group.setAttribute("transform", matrices[link]);
     this.springs.place();
     this.avoid();
-    if (!this.inside() && !this.growing && !this.held) return this.grow();
+    if (!this.lens && !this.inside() && !this.growing && !this.held) return this.grow();
     const settled = this.letters.place(this.spots.map(([link, at]) => this.screen(link, at)), this.avoided, [this.width, this.height], jump);
     if (!settled && !this.settling) {
       this.settling = true;

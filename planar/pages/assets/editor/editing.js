@@ -1,0 +1,353 @@
+"use strict";
+/* A mechanism that is drawn: its file, what was done to it, and what Python says of it. Whatever changes the structure is
+   answered by the server of the page; a pin that is dragged is solved by the page itself. What is drawn stays in the
+   window's own store until it is saved, also where the server is gone. */
+
+const ALIVE_PAUSE = 45000;  // ms between two signs to the server that the page is open
+const FOLLOWED = 1e-6;      // sizes: as near to the pointer the page's own solution has to come
+const BLANK_WIDTH = 0.3;    // m that are seen of empty paper
+
+class Editing {
+  constructor(data, program) {
+    const { value, name, answer } = data.edited;
+    Object.assign(this, { file: value, fileName: name, answer, units: answer.units ?? { length: 1e-3, angle: Math.PI / 180 } });
+    Object.assign(this, { at: new Map(), done: [], undone: [], tool: "hand", chosen: null, changed: false, asked: 0, settled: true });
+    this.blank = document.querySelector("main").cloneNode(true);
+    this.blank.querySelector("#still")?.remove();
+    this.sketch = new Sketch(this);
+    this.hand = new Hand(this);
+    this.panel = new PencilPanel(this);
+    document.addEventListener("keydown", (event) => this.key(event), true);
+    addEventListener("beforeunload", (event) => { if (this.changed) event.preventDefault(); });
+    document.body.classList.add("sketching");
+    this.present();
+    let kept = null;
+    try { kept = JSON.parse(sessionStorage.getItem("drawing")); } catch { /* nothing is kept */ }
+    this.begin(data, program, !answer.problem);
+    if (!this.solved) this.guess();
+    if (kept?.file) this.take({ file: kept.file, at: new Map(kept.at) }, kept.changed);
+    else if (!Object.keys(this.placed.pins).length && !this.solved) this.use("bar");
+  }
+
+  // the page
+
+  /** Make the page anew of data; where nothing is solved they are those of an empty one, and the sketch stands there. */
+  begin(data, program, solved) {
+    const view = this.view ?? null, focused = document.activeElement?.id;
+    if (this.parts) {
+      this.parts.controls.pause();
+      this.parts.page.lifetime.abort();
+      for (const key of ["at", "view"]) memory.write(key, "");
+      const main = this.blank.cloneNode(true);
+      document.querySelector("main").replaceWith(main);
+      document.querySelector("h1").textContent = data.name;
+      document.title = data.name;
+    }
+    this.parts = startPage(data, program);
+    this.solved = solved;
+    const { page, svg, lens } = this.parts, stage = document.getElementById("stage");
+    document.querySelector(".left").prepend(this.panel.bar, this.panel.hint);
+    document.querySelector(".right").prepend(this.panel.section);
+    this.hand.attach(stage);
+    page.on("view", () => this.sketch.draw());
+    for (const event of ["move", "size"]) page.on(event, () => this.follow());
+    const width = page.view?.width ?? 600;
+    lens.base = view?.scale ?? (solved ? page.view?.scale : width / BLANK_WIDTH);
+    if (view) lens.look(Editing.lensOf(view));
+    else if (!solved && page.view) lens.look({ scale: width / BLANK_WIDTH, at: [0.35 * BLANK_WIDTH, 0.2 * BLANK_WIDTH] });
+    svg.setAttribute("aria-describedby", "pencil-hint");
+    this.show();
+    if (focused) document.getElementById(focused)?.focus({ preventScroll: true });
+  }
+
+  static lensOf({ scale, width, height, toWorld }) { return { scale, at: toWorld([width / 2, height / 2]) }; }
+
+  get svg() { return this.parts.svg; }
+  get view() { return this.parts?.page.view; }
+  get placed() { return new Placed(this.file, this.at, this.units); }
+  get unit() { return this.file.units?.length ?? "m"; }
+
+  /** Where all pins are, once the page has moved. */
+  follow() {
+    const { page } = this.parts;
+    if (this.solved && !this.hand.dragged) for (const name of Pins.all(this.file).keys()) if (page.data.points[name]) this.at.set(name, page.point(name).position);
+    if (!this.solved || this.tool !== "hand") this.sketch.draw();
+  }
+
+  /** Of a file that does not go together: where coordinates and the sketch put its pins. */
+  guess() {
+    const { file, units } = this, local = (spot) => spot.map((each) => Written.read(each, "length", units) ?? 0);
+    for (const [point, where] of Object.entries(file.links?.[file.frame]?.points ?? {})) if (Array.isArray(where)) this.at.set(Pins.of(Pins.all(file), file.frame, point), local(where));
+    for (const [pin, where] of Object.entries(file.sketch ?? {})) if (Array.isArray(where)) this.at.set(pin, local(where));
+    this.sketch.draw();
+  }
+
+  show() {
+    document.body.classList.toggle("unsolved", !this.solved);
+    document.body.classList.toggle("drawn", this.tool !== "hand");
+    if (this.tool !== "hand") this.svg.style.touchAction = "none";
+    this.follow();
+    this.panel.show();
+    this.sketch.draw();
+  }
+
+  say(sentence) { this.parts.page.say(sentence); }
+
+  /** Where the keys' cross is, for those who do not see it. */
+  tell({ pin, link, at }) {
+    const told = at.map((each) => Forms.shown(each / this.units.length)).join(", ");
+    this.say(pin !== null ? `Pin ${pin} at ${told} ${this.unit}` : `${told} ${this.unit}${link === null ? "" : `, on ${link}`}`);
+  }
+
+  use(tool) {
+    this.parts.controls.pause();
+    Object.assign(this.hand, { pending: [], dragged: null });
+    this.tool = tool;
+    this.chosen = tool === "pin" ? this.chosen : null;
+    this.parts.lens.show();
+    this.show();
+    if (tool !== "hand") this.say(TOOLS[tool].told);
+  }
+
+  choose(one) {
+    this.chosen = one;
+    this.panel.show();
+    this.sketch.draw();
+  }
+
+  // what is done
+
+  /** A copy to draw on, with the numbers that the page has been given by hand. */
+  draft() {
+    const file = structuredClone(this.file), { units, parts: { page } } = this;
+    if (this.solved) {
+      const { data, linkage } = page, holder = (path) => path.slice(0, -1).reduce((each, key) => each?.[key], file);
+      data.dimensions.forEach((each, k) => {
+        const path = data.document.dimensions[k], place = holder(path);
+        if (linkage.d[k] !== each.value && place && path[path.length - 1] in place) Written.put(place, path[path.length - 1], linkage.d[k], "length", units);
+      });
+      data.inputs.forEach((given, k) => {
+        if (file.inputs?.[k]) Written.put(file.inputs[k], "position", page.input(k), given.slides ? "length" : "angle", units);
+      });
+    }
+    return { file, at: new Map(this.at), units };
+  }
+
+  perform(make) {
+    this.parts.controls.pause();
+    const draft = this.draft();
+    try {
+      const said = make(draft);
+      this.commit({ file: new Placed(draft.file, draft.at, draft.units).sketched(), at: draft.at });
+      this.say(`${said}.`);
+    } catch (problem) {
+      this.say(`It was not drawn: ${problem.message}.`);
+      this.panel.shown = null; // what is typed is not so
+      this.panel.show();
+      this.sketch.draw();
+    }
+  }
+
+  commit(made) {
+    this.done.push({ file: this.file, at: new Map(this.at), changed: this.changed });
+    this.undone = [];
+    this.take(made, true);
+  }
+
+  undo() { this.step(this.done, this.undone, "Undone"); }
+  redo() { this.step(this.undone, this.done, "Redone"); }
+
+  step(from, to, said) {
+    const there = from.pop();
+    if (there === undefined) { this.say(`Nothing is left to be ${said.toLowerCase()}.`); return; }
+    to.push({ file: this.file, at: new Map(this.at), changed: this.changed });
+    this.hand.pending = [];
+    this.take(there, there.changed);
+    this.say(`${said}.`);
+  }
+
+  /** Another file: drawn at once, told of once Python has answered. */
+  take({ file, at }, changed) {
+    Object.assign(this, { file, at: new Map(at), changed });
+    if (this.chosen && !(this.chosen.kind === "pin" ? this.at.has(this.chosen.name) : file.links[this.chosen.name])) this.chosen = null;
+    try { sessionStorage.setItem("drawing", JSON.stringify({ file, at: [...at], changed })); } catch { /* no store: it lasts as long as the page */ }
+    this.solved = false;
+    this.show();
+    return this.ask();
+  }
+
+  async ask() {
+    const number = ++this.asked;
+    this.settled = false;
+    const answer = await this.post("answer", { document: this.file });
+    if (number !== this.asked) return; // something else is drawn by now
+    this.answer = answer;
+    if (answer.units) this.units = answer.units;
+    if (answer.data) {
+      const script = document.createElement("script"); // functions are run as those of any page are
+      script.textContent = `globalThis.answered = (() => { ${answer.functions}\nreturn program; })();`;
+      document.body.append(script);
+      script.remove();
+      const said = document.getElementById("said").textContent;
+      this.begin(answer.data, globalThis.answered, true);
+      this.say(said);
+    } else this.show();
+    this.settled = true;
+  }
+
+  /** Ask the server: its answer, or a sentence in place of one. */
+  async post(what, asked) {
+    try {
+      const response = await fetch(what, { method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify(asked) });
+      if (!response.ok) return { problem: await response.text() };
+      return await response.json();
+    } catch {
+      return { problem: "The server of this page does not answer: start `planar edit` again with the link that “Copy link” gives. What is drawn stays here." };
+    }
+  }
+
+  key(event) {
+    const letter = event.key.toLowerCase(), typed = event.target.closest?.("input:not([type=range]), textarea");
+    if (!(event.ctrlKey || event.metaKey) || event.altKey || typed || this.tool === "hand") return;
+    const back = letter === "z" && !event.shiftKey, on = letter === "y" || (letter === "z" && event.shiftKey);
+    if (!back && !on) return;
+    event.preventDefault();
+    event.stopImmediatePropagation();
+    if (back) this.undo(); else this.redo();
+  }
+
+  // pins
+
+  /** Hold a pin: what it is moved from. */
+  takePin(pin) {
+    this.parts.controls.pause();
+    const { file, at, units } = this.draft(), { page, drawing } = this.parts;
+    drawing.hold(true);
+    return { pin, placed: new Placed(file, at, units), inputs: this.solved ? page.data.inputs.map((_, k) => page.input(k)) : null, made: null, solved: this.solved };
+  }
+
+  /** Lead it: at the next frame, however often it is asked for. */
+  leadPin(held, to) {
+    held.to = to;
+    if (held.waits) return;
+    held.waits = true;
+    requestAnimationFrame(() => {
+      held.waits = false;
+      if (this.hand.dragged === held) this.pull(held);
+    });
+  }
+
+  pull(held) {
+    held.made = held.placed.moved(held.pin, held.to, held.inputs);
+    this.at = held.made.at;
+    const shown = held.solved && solvePlaced(this.parts.page, held.made, held.pin, this.units, FOLLOWED);
+    if (shown !== this.solved) { this.solved = shown; document.body.classList.toggle("unsolved", !shown); }
+    this.sketch.draw();
+  }
+
+  dropPin(held, to) {
+    held.to = to;
+    this.parts.drawing.hold(false);
+    this.at = held.placed.at;
+    this.commit(held.placed.moved(held.pin, to, held.inputs));
+    this.say(`${held.pin} moved.`);
+  }
+
+  movePin(pin, to) { this.dropPin(this.takePin(pin), to); }
+
+  revert() {
+    this.parts.drawing.hold(false);
+    this.take({ file: this.file, at: this.at }, this.changed);
+  }
+
+  rename(pin, name) {
+    this.perform((draft) => {
+      const said = Draw.renamePin(draft, pin, name);
+      this.chosen = { kind: "pin", name: name.trim() };
+      return said;
+    });
+  }
+
+  erase() {
+    const { kind, name } = this.chosen;
+    this.chosen = null;
+    this.perform((draft) => (kind === "pin" ? Draw.removePin(draft, name) : Draw.removeLink(draft, name)));
+  }
+
+  // the file
+
+  takeText(text) {
+    let file;
+    try { file = JSON.parse(text); } catch (problem) { this.say(`This is no JSON: ${problem.message}`); return; }
+    if (typeof file !== "object" || file === null || typeof file.links !== "object" || file.links === null || !(file.frame in file.links)) {
+      this.say("A mechanism has links, one of which is the frame.");
+      return;
+    }
+    this.commit({ file, at: new Map() });
+    this.guess();
+  }
+
+  /** Why it does not go together, and what mends it: found by a search, which may take seconds. */
+  async explain() {
+    const number = this.asked;
+    this.say("What is in conflict is looked for.");
+    const answer = await this.post("conflict", { document: this.file });
+    if (number !== this.asked) return;
+    Object.assign(this.answer, { remedies: answer.remedies ?? [answer.problem] });
+    this.panel.show();
+    this.say(this.answer.remedies.length ? "What is in conflict stands beside the drawing." : "Nothing in conflict was found.");
+  }
+
+  async save(name, replaces = false) {
+    const { file } = this.draft(), answer = await this.post("save", { document: file, name, replaces });
+    if (answer.taken) {
+      if (confirm(`There is a ${answer.taken} already. Replace it?`)) await this.save(name, true);
+      return;
+    }
+    if (answer.problem) { this.say(answer.problem); return; }
+    Object.assign(this, { fileName: answer.file, changed: false, file });
+    try { sessionStorage.removeItem("drawing"); } catch { /* there was none */ }
+    this.panel.show();
+    this.say(`Saved to ${answer.file}.`);
+  }
+
+  async copyLink() {
+    const link = await MechanismLink.write(this.draft().file), { panel } = this;
+    panel.link.hidden = false;
+    panel.link.value = link;
+    try {
+      await navigator.clipboard.writeText(link);
+      this.say("The link is copied: `planar view LINK` and `planar edit LINK` open it.");
+    } catch {
+      panel.link.select();
+      this.say("The link is selected: copy it with the keyboard.");
+    }
+  }
+
+  /** The server hears that the page is open, and when it goes. */
+  present() {
+    const page = crypto.randomUUID(), open = () => { this.post("open", { page }); };
+    open();
+    setInterval(open, ALIVE_PAUSE);
+    addEventListener("pagehide", () => navigator.sendBeacon("gone", JSON.stringify({ page })));
+    addEventListener("pageshow", ({ persisted }) => { if (persisted) open(); });
+  }
+}
+
+/** Bring a page to a file's numbers, from where it is; whether its own solution has the pin where it was led. */
+function solvePlaced(page, { file, at }, pin, units, slack) {
+  const { data, linkage } = page, value = (path) => path.reduce((each, key) => each?.[key], file) ?? null;
+  const d = data.document.dimensions.map((path, k) => Written.read(value(path), "length", units) ?? linkage.d[k]);
+  const u = data.inputs.map((given, k) => (Written.read(value(["inputs", k, "position"]), given.slides ? "length" : "angle", units) ?? page.input(k)) / linkage.scale[k]);
+  const made = linkage.copy();
+  made.d = d;
+  made.measure();
+  const { z, closed } = made.newton(u, linkage.z);
+  if (!closed) return false;
+  made.z = z;
+  made.u = u;
+  const [x, y] = page.place(data.points[pin].links[0], data.points[pin].at[0], page.framesOf(made.state()), made.sizes);
+  if (!(Plane.apart([x, y], at.get(pin)) <= slack * data.size)) return false;
+  page.adopt({ d, u, z });
+  return true;
+}

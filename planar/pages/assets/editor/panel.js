@@ -1,0 +1,115 @@
+"use strict";
+/* The tools above the drawing, and beside it what is said of what is drawn, the numbers of what is chosen, and its file. */
+
+class PencilPanel {
+  constructor(editing) {
+    this.editing = editing;
+    this.tools();
+    const { element } = Forms, section = (this.section = element("section", { id: "pencil", "aria-label": "Drawing" }));
+    this.mobility = element("p", { class: "mobility" });
+    this.problem = element("p", { class: "why" });
+    this.remedies = element("ul", { class: "remedies" });
+    this.chosen = element("div", { class: "chosen" });
+    this.why = this.button("What mends it?", () => editing.explain());
+    const told = element("div", { role: "status" }, this.mobility, this.problem, this.remedies);
+    section.append(element("h2", {}, "Drawing"), told, this.why, this.chosen, this.files(), this.text());
+  }
+
+  button(text, act, more = {}) {
+    const made = Forms.element("button", { type: "button", ...more }, text);
+    made.addEventListener("click", act);
+    return made;
+  }
+
+  tools() {
+    const { editing } = this;
+    this.bar = Forms.element("div", { class: "pencils", role: "toolbar", "aria-label": "Pencil" });
+    this.buttons = Object.entries(TOOLS).map(([key, { name, told }]) => {
+      const made = this.button(name, () => editing.use(key), { title: told, "aria-pressed": "false" });
+      this.bar.append(made);
+      return [key, made];
+    });
+    this.ratioField = Forms.element("input", { type: "number", step: "any", value: -2, "aria-label": "Ratio of wheels" });
+    this.undo = this.button("Undo drawing", () => editing.undo());
+    this.redo = this.button("Redo drawing", () => editing.redo());
+    this.bar.append(this.ratioField, this.undo, this.redo);
+    this.hint = Forms.element("p", { class: "hint", id: "pencil-hint" });
+    // one stop for the tab key, arrows from tool to tool
+    this.bar.addEventListener("keydown", (event) => {
+      const list = [...this.bar.querySelectorAll("button:enabled")], at = list.indexOf(document.activeElement);
+      const to = { ArrowRight: at + 1, ArrowLeft: at - 1, Home: 0, End: list.length - 1 }[event.key];
+      if (at < 0 || to === undefined) return;
+      event.preventDefault();
+      list[(to + list.length) % list.length].focus();
+    });
+  }
+
+  get ratio() { return Number(this.ratioField.value); }
+
+  files() {
+    const { editing } = this, { element } = Forms;
+    this.name = element("input", { type: "text", size: 18, "aria-label": "Name of the file", placeholder: "name.json" });
+    this.saved = element("span", { class: "hint" });
+    const box = element("p", { class: "files" }, this.button("Save", () => editing.save(null)), this.name,
+      this.button("Save as", () => editing.save(this.name.value)), this.button("Copy link", () => editing.copyLink()), this.saved);
+    this.link = element("textarea", { readonly: "", rows: 2, "aria-label": "Link of the mechanism", hidden: "" });
+    return element("div", {}, box, this.link);
+  }
+
+  text() {
+    const { element } = Forms;
+    this.area = element("textarea", { rows: 14, spellcheck: "false", "aria-label": "Text of the file" });
+    this.whole = element("details", {}, element("summary", {}, "Text of the file"), this.area, this.button("Take this text", () => this.editing.takeText(this.area.value)));
+    this.whole.addEventListener("toggle", () => this.show());
+    return this.whole;
+  }
+
+  show() {
+    const { editing, ratioField } = this, { answer, tool, file } = editing;
+    for (const [key, button] of this.buttons) button.setAttribute("aria-pressed", String(key === tool));
+    ratioField.hidden = tool !== "gear";
+    this.hint.textContent = tool === "hand" ? "" : `${TOOLS[tool].told} Keys: arrows lead the cross, Enter presses, N goes to the next pin, Esc leaves off.`;
+    this.hint.hidden = tool === "hand";
+    [this.undo.disabled, this.redo.disabled] = [!editing.done.length, !editing.undone.length];
+    this.mobility.textContent = answer?.mobility ?? "";
+    this.problem.textContent = answer?.problem ? `${answer.place ? `${answer.place}: ` : ""}${answer.problem}` : "";
+    this.problem.hidden = !answer?.problem;
+    this.remedies.replaceChildren(...(answer?.remedies ?? []).map((each) => Forms.element("li", {}, each)));
+    this.why.hidden = !answer?.conflicts || answer.remedies.length > 0;
+    this.saved.textContent = editing.fileName ? `${editing.fileName}${editing.changed ? ", not saved yet" : ""}` : "no file yet";
+    if (this.whole.open && document.activeElement !== this.area) this.area.value = JSON.stringify(file, null, 2);
+    this.fields();
+  }
+
+  /** The numbers of what is chosen, where they are typed. */
+  fields() {
+    const { editing, chosen } = this, { chosen: one, units } = editing, { unit } = editing, kept = document.activeElement;
+    if (chosen.contains(kept) && kept.tagName === "INPUT" && this.shown === JSON.stringify(one)) return;
+    this.shown = JSON.stringify(one);
+    chosen.replaceChildren();
+    const field = (label, value, act) => {
+      const input = Forms.element("input", { type: "text", size: 9, autocomplete: "off" });
+      input.value = value;
+      input.addEventListener("change", () => act(input.value));
+      chosen.append(Forms.element("label", { class: "choice" }, `${label} `, input));
+    };
+    const number = (label, value, act) => field(`${label} (${unit})`, Forms.shown(value / units.length), (text) => {
+      const given = Number(text.trim().replace(",", ".").replace("−", "-"));
+      if (text.trim() && Number.isFinite(given)) act(given * units.length);
+      else editing.say(`${label}: a number in ${unit} is wanted.`);
+    });
+    if (one?.kind === "pin" && editing.at.has(one.name)) {
+      const at = editing.at.get(one.name);
+      field("Pin", one.name, (text) => editing.rename(one.name, text));
+      at.forEach((each, k) => number("xy"[k], each, (value) => editing.movePin(one.name, at.map((own, i) => (i === k ? value : own)))));
+    } else if (one?.kind === "link" && editing.file.links[one.name]) {
+      chosen.append(Forms.element("strong", {}, one.name), " ");
+      const { ends } = editing.file.links[one.name], places = ends?.map((point) => editing.placed.place(one.name, point));
+      if (places?.every(Boolean)) {
+        const [a, b] = places, pin = Pins.of(editing.placed.pins, one.name, ends[1]);
+        number(`length ${ends.join("")}`, Plane.apart(a, b), (value) => editing.movePin(pin, Plane.on(a, Plane.unit(Plane.minus(b, a)), value)));
+      }
+    } else return;
+    chosen.append(this.button("Erase", () => editing.erase(), { "aria-label": `Erase ${one.name}` }));
+  }
+}

@@ -1,0 +1,38 @@
+"use strict";
+/* A page made of its data and functions; a name of its own for each part that others ask for. */
+
+/** Begin in the document as it came: all parts of a page, in the order in which they hear of what happens. */
+function startPage(data, program) {
+  document.documentElement.classList.toggle("compact", memory.read("compact") !== null);
+  const page = new Page(Figures.recall(data), program);
+  globalThis.page = page;
+  Keeping.recall(page);
+  page.wanted = Wanted.of(page);
+  const svg = document.getElementById("drawing"), drawing = new Drawing(page, svg), dragging = new Dragging(page, svg);
+  const controls = new Controls(page, document.getElementById("controls"), svg, drawing, dragging);
+  new Courses(page);
+  const lens = new Lens(page, svg, drawing, dragging);
+  page.acting = new Acting(page, document.getElementById("acting"));
+  new Dimensions(page, document.getElementById("dimensions"));
+  new Assemblies(page, document.getElementById("assemblies"));
+  const undo = new UndoHistory(page, controls.bar, () => controls.pause());
+  new Films(page, new Saving(page, document.getElementById("saving"), svg), svg, () => controls.pause());
+  page.tolerances = Tolerances.ofFile(page);
+  startLayers(page);
+  new Influence(page, document.getElementById("dimensions"));
+  if (page.wanted !== null) {
+    new WantedDrawing(page, svg, drawing);
+    new WantedTable(page, document.getElementById("wanted"));
+  }
+  page.keeping = new Keeping(page);
+  new Panels(page, document.querySelector(".right"));
+  document.getElementById("still")?.remove(); // what moves stands in its place
+  Object.assign(globalThis, { svg, drawing, dragging, controls, lens });
+  return { page, svg, drawing, dragging, controls, lens, undo };
+}
+
+/** Begin, with the pencil where the page is one to draw on. */
+function beginPage(data, program) {
+  if (data.edited) globalThis.editing = new Editing(data, program);
+  else startPage(data, program);
+}

@@ -1,0 +1,114 @@
+"""What is told of a mechanism while it is drawn: how it moves, what is loose or held twice, what is in conflict."""
+
+from __future__ import annotations
+
+from itertools import islice
+from typing import Any
+
+import numpy as np
+
+from planar.analysis.identity.mobility import closed_position, mobility
+from planar.assemblies.conflict import conflict
+from planar.document.files import from_dict
+from planar.foundation.errors import BadInput, NoAnswer, Outcome
+from planar.foundation.units import parse_unit
+from planar.model.mechanism import Mechanism
+from planar.model.wording import count_phrase, join_all_names, quote_names
+from planar.pages.data.page_data import page_data
+from planar.solving.checks.singular_values import null_space
+from planar.solving.full_constraints import FullConstraints
+from planar.solving.position import PositionSolver
+
+LOOSE_TOLERANCE = 1e-9
+"""Of a free motion of one: coordinates that move by less stand still."""
+MAX_REMEDIES = 3
+"""Changes of one number that are told where it does not go together."""
+BACKDROP = {
+    "planar": 1,
+    "name": "Mechanism",
+    "units": {"length": "mm", "angle": "deg"},
+    "frame": "frame",
+    "links": {"frame": {"points": {"O": [0, 0]}}},
+    "pairs": [],
+}
+"""What stands on the page where nothing is drawn yet that can be solved."""
+BLANK = {**BACKDROP, "links": {"frame": {"points": {}}}}
+"""What is drawn on where no model is named."""
+
+
+def edit_answer(value: Any) -> dict[str, Any]:
+    """What the page is told of a file's JSON value.
+
+    `problem` is a sentence, empty where it moves, `place` its JSON path; `mobility` says in words how it can move,
+    `loose` are the links that inputs leave free; `conflicts`: whether `conflict_answer` has more to say. `data` and
+    `functions` are those of a page, where there is a position; `units` the metres and radians of the file's units.
+    """
+    found: dict[str, Any] = {"problem": "", "place": "", "mobility": "", "loose": [], "remedies": []}
+    try:
+        mechanism = from_dict(value)
+        found["units"] = _units(mechanism)
+        data, functions = page_data(mechanism)
+    except BadInput as problem:
+        return found | {"problem": problem.sentence, "place": problem.place}
+    except NoAnswer as problem:
+        if problem.outcome is Outcome.CANNOT_BE_ASSEMBLED:
+            return found | {"problem": str(problem), "conflicts": True}
+        told = {"mobility": _mobility_words(mechanism), "loose": loose_links(mechanism)}
+        return found | told | {"problem": str(problem)}
+    shown = {"window": None, "layers": ["paths"], "wanted": None, "edited": None}
+    return found | {"mobility": _mobility_words(mechanism), "data": data | shown, "functions": functions}
+
+
+def loose_links(mechanism: Mechanism) -> list[str]:
+    """The links that can still move while the inputs stand still; none where it cannot be assembled."""
+    solver = PositionSolver(mechanism)
+    if solver.equations.open_rows:
+        return []
+    constraints = FullConstraints(solver)
+    try:
+        place = closed_position(solver, constraints)
+    except NoAnswer:
+        return []
+    drives = tuple(given.pair for given in mechanism.inputs)
+    rows = [constraints.jacobian(place)]
+    if drives:
+        rows.append(constraints.relative_jacobian(drives, place))
+    free = null_space(np.vstack(rows))
+    names = {link.name for link in mechanism.links}
+    moved = np.abs(free).max(axis=1, initial=0.0) > LOOSE_TOLERANCE
+    return list(
+        dict.fromkeys(
+            each.owner
+            for each, moves in zip(constraints.coordinates, moved, strict=True)
+            if moves and each.owner in names
+        )
+    )
+
+
+def _mobility_words(mechanism: Mechanism) -> str:
+    """How it moves, against its inputs, and what is held twice."""
+    try:
+        found = mobility(mechanism)
+    except NoAnswer:
+        return ""
+    told = [f"mobility {found.finite}, {count_phrase(len(mechanism.inputs), 'input')}"]
+    if found.redundant:
+        told.append(f"held twice: {join_all_names([quote_names(each) for each in found.redundant])}")
+    return "; ".join(told)
+
+
+def conflict_answer(value: Any) -> dict[str, list[str]]:
+    """What is in conflict in a file that does not go together, and the least changes of one number that mend it.
+
+    `remedies` in sentences, none where nothing in conflict was found. Raises BadInput, NoAnswer.
+    """
+    found = conflict(from_dict(value))
+    if found is None:
+        return {"remedies": []}
+    changes = islice((*found.dimensions, *found.positions), MAX_REMEDIES)
+    told = (f"it goes together with {each.name} = {each.shown}" for each in changes)
+    return {"remedies": [found.remarks[0], *told]}
+
+
+def _units(mechanism: Mechanism) -> dict[str, float]:
+    return {kind: parse_unit(getattr(mechanism.units, kind)).to_si(1.0) for kind in ("length", "angle")}

@@ -1,0 +1,210 @@
+"""The server of the page on which a mechanism is drawn: whom it answers, what it writes, when it ends; links."""
+
+from __future__ import annotations
+
+import http.client
+import json
+import shutil
+import subprocess
+
+import pytest
+from click.testing import CliRunner
+
+import planar
+from planar.cli import main
+from planar.document.files import read_asset
+from planar.document.texts.json_layout import format_json
+from planar.document.texts.mechanism_link import read_link, write_link
+from planar.foundation.errors import BadInput
+from planar.pages.editor import server as serving
+from planar.pages.editor.answer import BLANK, conflict_answer, edit_answer
+from planar.pages.editor.edit_page import edit_page
+from tests.hostile import HARMFUL_LINE, harmful_mechanism
+from tests.pencil import served
+
+FOUR_BAR = planar.to_dict("four-bar")
+
+
+def asked(server, method="POST", what="answer", body=None, token=None, **headers):
+    """The status and the body of an answer, to a request that is right but for what is said."""
+    line = http.client.HTTPConnection("127.0.0.1", server.server_port, timeout=20)
+    own = {"Host": server.origin.removeprefix("http://"), "Content-Type": "application/json"}
+    if method == "POST":
+        own["Origin"] = server.origin
+    sent = {key: value for key, value in {**own, **headers}.items() if value is not None}
+    content = None if method == "GET" else json.dumps({"document": FOUR_BAR} if body is None else body)
+    line.putrequest(method, f"/{token or server.token}/{what}", skip_host=True, skip_accept_encoding=True)
+    for key, value in sent.items():
+        line.putheader(key.replace("_", "-"), value)
+    if content is not None:
+        line.putheader("Content-Length", sent.get("Length", str(len(content))))
+    line.endheaders(None if content is None else content.encode())
+    answer = line.getresponse()
+    found = answer.status, answer.read().decode(), answer.headers
+    line.close()
+    return found
+
+
+@pytest.fixture(scope="module")
+def server(tmp_path_factory):
+    with served(FOUR_BAR, folder=tmp_path_factory.mktemp("drawn")) as running:
+        yield running
+
+
+def test_it_listens_on_this_machine_alone_and_its_token_cannot_be_guessed(server):
+    assert server.server_address[0] == "127.0.0.1"
+    assert len(server.token) >= 32
+    with served() as other:
+        assert other.token != server.token
+
+
+def test_its_own_page_is_answered_and_kept_by_nobody(server):
+    status, text, headers = asked(server, "GET", "")
+    assert status == 200
+    assert "<h1>Four-bar chain</h1>" in text
+    assert headers["Cache-Control"] == "no-store"
+    assert headers["X-Frame-Options"] == "DENY"
+    assert "Access-Control-Allow-Origin" not in headers
+    status, text, _ = asked(server)
+    assert status == 200
+    assert json.loads(text)["mobility"] == "mobility 1, 1 input"
+
+
+@pytest.mark.parametrize(
+    ("status", "changed"),
+    [
+        (404, {"token": "guessed"}),
+        (404, {"what": "../answer"}),
+        (404, {"what": "files"}),
+        (403, {"Host": "rebound.example:80"}),
+        (403, {"Host": None}),
+        (403, {"Origin": "https://other.example"}),
+        (403, {"Origin": "null"}),
+        (403, {"Origin": None}),
+        (403, {"Sec_Fetch_Site": "cross-site"}),
+        (403, {"method": "GET", "what": "", "Sec_Fetch_Site": "cross-site"}),
+        (403, {"method": "GET", "what": "", "Host": "localhost.other.example"}),
+        (404, {"method": "GET", "what": "answer"}),
+        (413, {"Length": "99999999999"}),
+    ],
+)
+def test_whoever_else_asks_is_refused_in_a_sentence(server, status, changed):
+    changed = dict(changed)
+    found, text, _ = asked(server, changed.pop("method", "POST"), changed.pop("what", "answer"), **changed)
+    assert found == status
+    assert "Traceback" not in text
+    assert "Four-bar" not in text
+
+
+@pytest.mark.parametrize("body", [[], {"document": 3}, {"other": 1}, {"document": {"links": 3}}])
+def test_what_is_no_mechanism_is_told_in_a_sentence(server, body):
+    status, text, _ = asked(server, body=body)
+    assert status == 200
+    assert json.loads(text)["problem"]
+
+
+def test_it_writes_only_what_is_saved_and_only_beside(tmp_path):
+    path = tmp_path / "own.json"
+    written = {"name": "Mine", **{key: value for key, value in FOUR_BAR.items() if key != "name"}}
+    path.write_text(json.dumps(written))
+    before = path.read_bytes()
+    with served(written, path, tmp_path) as server:
+        asked(server)
+        assert path.read_bytes() == before
+        for name in ("../out", "/tmp/out", "a/b.json", "..", "", "a\\b", "a\nb"):
+            answer = json.loads(asked(server, what="save", body={"document": written, "name": name})[1])
+            assert "name" in answer["problem"]
+        (tmp_path / "taken.json").write_text("{}")
+        save = {"document": written, "name": "taken"}
+        assert json.loads(asked(server, what="save", body=save)[1]) == {"taken": "taken.json"}
+        assert (tmp_path / "taken.json").read_text() == "{}"
+        assert json.loads(asked(server, what="save", body={"document": {"links": 1}})[1])["problem"]
+        assert path.read_bytes() == before
+        assert json.loads(asked(server, what="save", body={"document": written})[1]) == {"file": "own.json"}
+    assert sorted(each.name for each in tmp_path.iterdir()) == ["own.json", "taken.json"]
+    assert next(iter(json.loads(path.read_text()))) == "name"
+    assert planar.load(path).links == planar.load("four-bar").links
+
+
+def test_it_ends_when_its_page_is_closed_and_not_when_that_is_loaded_again(monkeypatch):
+    with served() as server:
+        assert not server.is_over()  # nobody has come yet
+        server.hear("one", True)
+        monkeypatch.setattr(serving, "CLOSING_PAUSE", -1.0)
+        assert not server.is_over()
+        server.hear("one", False)
+        server.hear("two", True)
+        assert not server.is_over()
+        monkeypatch.setattr(serving, "SILENCE", -1.0)  # a browser that is gone says nothing
+        assert server.is_over()
+
+
+# answers
+
+
+def test_what_is_loose_held_twice_and_in_conflict_is_told():
+    loose = {**FOUR_BAR, "inputs": []}
+    found = edit_answer(loose)
+    assert found["loose"] == ["AB", "BC", "DC"]
+    assert "give an input at 'A'" in found["problem"]
+    assert "data" not in found
+    value = planar.to_dict("crank-rocker")
+    value["links"]["coupler"]["length"] = 1000
+    assert edit_answer(value)["conflicts"]
+    found = conflict_answer(value)
+    assert any("it goes together with coupler.length" in each for each in found["remedies"])
+    assert edit_answer(BLANK)["place"] == "$.links.frame"
+    twice = edit_answer(planar.to_dict("three-parallel-cranks"))
+    assert "held twice" in twice["mobility"]
+    assert twice["data"]
+
+
+def test_texts_of_a_file_stay_texts_on_the_page():
+    text = edit_page(planar.to_dict(harmful_mechanism()), "<b>.json")
+    assert HARMFUL_LINE not in text
+    assert "<b>" not in text
+    assert text.count("</script>") == edit_page(FOUR_BAR, None).count("</script>")
+    assert "connect-src 'self'" in text
+
+
+# links and texts
+
+
+def test_a_link_holds_the_whole_file_and_one_cut_short_says_so():
+    link = write_link(FOUR_BAR)
+    assert json.loads(read_link(link)) == FOUR_BAR
+    assert planar.load(link) == planar.load("four-bar")
+    assert len(link) < len(json.dumps(FOUR_BAR))
+    for broken in (link[:-9], "planar:", "planar:???", f"{link}AAAA&"):
+        with pytest.raises(BadInput, match="holds no whole mechanism"):
+            read_link(broken)
+
+
+@pytest.mark.skipif(shutil.which("node") is None, reason="there is no node here to run a page's scripts in")
+def test_the_pages_own_links_are_read_by_python():
+    text = f"{read_asset('editor/links.js')}\nMechanismLink.write({json.dumps(FOUR_BAR)}).then(console.log);"
+    ran = subprocess.run(["node", "-"], input=text, capture_output=True, text=True, check=True, timeout=60)
+    assert json.loads(read_link(ran.stdout.strip())) == FOUR_BAR
+
+
+def test_a_link_is_viewed(tmp_path):
+    done = CliRunner().invoke(main, ["view", write_link(FOUR_BAR), "-o", str(tmp_path / "a.html")])
+    assert done.exit_code == 0, done.output
+    assert "<h1>Four-bar chain</h1>" in (tmp_path / "a.html").read_text(encoding="utf-8")
+
+
+def test_a_text_keeps_the_order_of_keys_and_short_lists_in_one_line():
+    value = {"b": [1, 2.5], "a": {"x" * 60: "y" * 60, "l": [{"m": "n" * 50}, {"o": "p" * 50}]}, "e": {}}
+    text = format_json(value)
+    assert json.loads(text) == value
+    assert list(json.loads(text)) == ["b", "a", "e"]
+    assert '"b": [1, 2.5],' in text.splitlines()[1]
+    assert max(map(len, text.splitlines())) <= 140
+
+
+def test_the_command_refuses_what_is_no_mechanism(tmp_path):
+    (tmp_path / "list.json").write_text("[1]")
+    for model in ("planar:x", str(tmp_path / "list.json"), "no-such-model"):
+        done = CliRunner().invoke(main, ["edit", "--no-browser", model])
+        assert done.exit_code == 2
+        assert "Traceback" not in done.output

@@ -1,0 +1,306 @@
+"""How a page is looked at and kept: zoom, the whole screen, reloading, units, pictures and films, what acts."""
+
+from __future__ import annotations
+
+import io
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from PIL import Image
+
+import planar
+from planar.foundation.units import parse_unit
+from tests.known import MODELS
+from tests.page_scripts import downloaded, same, settled
+
+
+def drawn_point(window, name):
+    """Where a point is on the screen (px)."""
+    return np.array(window.evaluate("(name) => page.view.toScreen(page.point(name).position)", name))
+
+
+def saved_bytes(window, button, path):
+    with window.expect_download() as coming:
+        window.get_by_role("button", name=button).click()
+    coming.value.save_as(path)
+    return path.read_bytes()
+
+
+# looked at
+
+
+def test_the_drawing_stays_in_sight_while_the_panels_scroll(shown):
+    window = shown(MODELS["watt-six-bar"])
+    for name in ("Numbers", "Dimensions", "Save"):
+        window.get_by_role("navigation", name="Panels").get_by_role("button", name=name).click()
+        settled(window)
+        box = window.locator("#drawing").bounding_box()
+        assert box["y"] >= 0.0
+        assert box["y"] + box["height"] <= 900.0
+        assert box["height"] > 400.0
+        assert window.get_by_role("button", name="Play").is_visible()
+    assert window.evaluate("scrollY") > 300.0
+    assert window.evaluate("document.activeElement.id") == "saving"
+
+
+def test_the_wheel_looks_nearer_about_the_pointer_and_what_is_dragged_stays_under_it(shown):
+    window = shown(MODELS["watt-six-bar"])
+    at, scale = drawn_point(window, "B"), window.evaluate("page.view.scale")
+    box = window.locator("#drawing").bounding_box()
+    window.mouse.move(box["x"] + at[0], box["y"] + at[1])
+    window.mouse.wheel(0.0, -600.0)
+    settled(window)
+    assert window.evaluate("page.view.scale") / scale == pytest.approx(np.exp(0.9), rel=1e-6)
+    assert drawn_point(window, "B") == pytest.approx(at, abs=1.5)  # whole px of the pointer
+    # empty paper is moved along by the pointer
+    empty = (box["x"] + 40.0, box["y"] + box["height"] - 60.0)
+    window.mouse.move(*empty)
+    window.mouse.down()
+    window.mouse.move(empty[0] + 100.0, empty[1] - 30.0, steps=4)
+    window.mouse.up()
+    settled(window)
+    assert drawn_point(window, "B") == pytest.approx(at + np.array([100.0, -30.0]), abs=2.0)
+    start = window.evaluate("page.input(0)")
+    window.mouse.move(*(np.array([box["x"], box["y"]]) + drawn_point(window, "B")))
+    window.mouse.down()
+    window.mouse.move(*(np.array([box["x"] - 60.0, box["y"]]) + drawn_point(window, "B")), steps=4)
+    window.mouse.up()
+    settled(window)
+    assert window.evaluate("page.input(0)") != start
+    window.get_by_role("button", name="Fit everything (0)").click()
+    settled(window)
+    assert window.evaluate("page.view.scale") == pytest.approx(scale)
+
+
+def test_keys_look_nearer_and_along_and_take_the_whole_screen(shown):
+    window = shown(MODELS["watt-six-bar"])
+    scale, height, mm = window.evaluate("[page.view.scale, page.view.height, page.view.mm]")
+    drawing = window.locator("#drawing")
+    drawing.focus()
+    window.keyboard.press("+")
+    settled(window)
+    assert window.evaluate("page.view.scale") == pytest.approx(1.25 * scale)
+    at = drawn_point(window, "B")
+    window.keyboard.press("Control+ArrowRight")
+    settled(window)
+    assert drawn_point(window, "B") == pytest.approx(at - [40.0, 0.0], abs=0.5)
+    window.keyboard.press("0")
+    window.keyboard.press("f")
+    settled(window)
+    assert window.locator(".left").bounding_box() == {"x": 0.0, "y": 0.0, "width": 1280.0, "height": 900.0}
+    assert window.evaluate("page.view.mm") > 1.3 * mm
+    assert (
+        window.get_by_role("button", name="Play").evaluate("(each) => parseFloat(getComputedStyle(each).fontSize)")
+        == 24.0
+    )
+    assert window.evaluate("document.querySelector('.right').inert")
+    window.keyboard.press("Escape")
+    settled(window)
+    assert not window.evaluate("document.querySelector('.right').inert")
+    assert window.evaluate("page.view.height") == height
+
+
+def test_two_fingers_look_nearer(shown):
+    window = shown(MODELS["watt-six-bar"], screen="phone")
+    scale = window.evaluate("page.view.scale")
+    touch = window.context.new_cdp_session(window)
+    box = window.locator("#drawing").bounding_box()
+    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+
+    def fingers(kind, far):
+        points = [] if far is None else [{"x": x - far, "y": y, "id": 0}, {"x": x + far, "y": y, "id": 1}]
+        touch.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
+
+    fingers("touchStart", 40)
+    for far in (50, 60, 70, 80):
+        fingers("touchMove", far)
+    fingers("touchEnd", None)
+    settled(window)
+    assert window.evaluate("page.view.scale") / scale == pytest.approx(2.0, rel=0.1)
+
+
+def test_compact_shows_the_drawing_and_what_moves_it_alone(shown):
+    window = shown(MODELS["four-bar"])
+    window.goto(f"{window.url}#compact=1")
+    window.reload()
+    assert window.get_by_role("button", name="Play").is_visible()
+    assert window.locator("#drawing").is_visible()
+    for hidden in ("h1", "#layers", "#numbers", "#dimensions"):
+        assert not window.locator(hidden).is_visible()
+    assert window.evaluate("document.documentElement.scrollHeight <= innerHeight")
+
+
+# kept
+
+
+def test_what_is_changed_and_looked_at_is_there_again_after_a_reload(shown):
+    window = shown(MODELS["watt-six-bar"])
+    window.get_by_label("AB: length, number, mm").fill("225")
+    window.get_by_label("AB: length, number, mm").press("Enter")
+    angle = window.get_by_label("A0 (deg)")
+    angle.fill("100")
+    angle.press("Enter")
+    window.get_by_role("button", name="Zoom in (+)").click()
+    window.get_by_label("Velocity arrows").check()
+    settled(window)
+    here = "[Array.from(page.linkage.d), page.input(0), Array.from(page.linkage.z), page.view.scale]"
+    window.wait_for_function("() => location.hash.includes('at=')")
+    stood = window.evaluate(here)
+    window.reload()
+    settled(window)
+    found = window.evaluate(here)
+    for one, other in zip(stood, found, strict=True):
+        assert other == pytest.approx(one, rel=1e-2 if one is stood[3] else 1e-12)
+    assert window.get_by_label("Velocity arrows").is_checked()
+    assert window.get_by_role("button", name="Undo").is_disabled()
+
+
+@pytest.mark.parametrize(
+    "kept", ['{"u":[1],"z":[9,9,9,9]}', '{"u":[null],"z":[]}', "[1", '{"d":3,"u":[1e999],"z":null}']
+)
+def test_an_address_that_is_not_of_this_mechanism_is_left_aside(shown, kept):
+    mechanism = MODELS["watt-six-bar"]
+    window = shown(mechanism)
+    window.goto(f"{window.url}#at={kept}&view=a,b&figures=x&units=ell")
+    window.reload()
+    settled(window)
+    same(window, planar.solve(mechanism))
+
+
+def test_figures_and_units_are_chosen_and_the_file_keeps_its_own(shown, tmp_path):
+    mechanism = MODELS["watt-six-bar"]
+    window = shown(mechanism)
+    window.get_by_label("Figures").select_option("3")
+    settled(window)
+    cell = window.locator("#numbers tbody td[data-si]").first
+    assert cell.inner_text() == "40.0"
+    with window.expect_navigation():
+        window.get_by_label("Units").select_option("in, deg")
+    settled(window)
+    length = parse_unit("in")
+    assert float(cell.inner_text()) == pytest.approx(length.from_si(0.04), rel=5e-3)
+    field = window.get_by_label("AB: length, number, in", exact=True)
+    field.fill("9")
+    field.press("Enter")
+    settled(window)
+    saved = planar.loads(downloaded(window, "Save: Mechanism (JSON)", tmp_path / "saved.json"))
+    assert saved.units == mechanism.units
+    assert planar.dimensions(saved)["AB.length"] == pytest.approx(length.to_si(9.0), rel=1e-15)
+
+
+# taken away
+
+
+def test_a_picture_of_dots_is_large_and_shows_the_drawing(shown, tmp_path):
+    window = shown(MODELS["crank-rocker"], scheme="dark")
+    image = Image.open(io.BytesIO(saved_bytes(window, "Save: Picture (PNG)", tmp_path / "a.png")))
+    box = window.locator("#drawing").bounding_box()
+    assert max(image.size) >= 1999
+    assert image.size[0] / image.size[1] == pytest.approx(box["width"] / box["height"], rel=0.01)
+    colours = image.convert("RGB").getcolors(1 << 24)
+    paper = max(colours)[1]
+    assert max(paper) < 60  # dark as the page is
+    assert sum(count for count, colour in colours if min(colour) > 200) > 3000  # bars and letters
+
+
+@pytest.mark.parametrize("stem", ["crank-rocker", "000-P1"])
+def test_the_motion_is_a_gif_that_comes_round_to_where_it_began(stem, shown, tmp_path):
+    window = shown(MODELS[stem])
+    window.set_viewport_size({"width": 1000, "height": 420})
+    window.wait_for_function("() => page.course")
+    window.evaluate("FILM.frames = 16")
+    stood = window.evaluate("page.snapshot()")
+    window.set_default_timeout(60_000)
+    film = Image.open(io.BytesIO(saved_bytes(window, "Save: Motion (GIF)", tmp_path / "a.gif")))
+    window.set_default_timeout(10_000)
+    assert film.n_frames == 16
+    assert film.info["loop"] == 0
+    frames = []
+    for k in (0, 1, 8, 15):
+        film.seek(k)
+        frames.append(np.asarray(film.convert("L"), dtype=float))
+    apart = [np.abs(each - frames[0]).mean() for each in frames]
+    assert 0.0 < apart[1] < apart[2]
+    assert apart[3] < apart[2]
+    assert (frames[0] > 200).mean() > 0.8
+    now = window.evaluate("page.snapshot()")
+    assert [now["u"], now["d"]] == [stood["u"], stood["d"]]
+    assert window.get_by_role("button", name="Undo").is_disabled()
+
+
+def test_the_motion_is_a_video(shown, tmp_path):
+    window = shown(MODELS["crank-rocker"])
+    if window.get_by_role("button", name="Save: Motion (video)").count() == 0:
+        pytest.skip("this browser records no video")
+    window.evaluate("Object.assign(FILM, { seconds: 1.5, frames: 30 })")
+    window.wait_for_function("() => page.course")
+    window.set_default_timeout(60_000)
+    film = saved_bytes(window, "Save: Motion (video)", tmp_path / "a.webm")
+    window.set_default_timeout(10_000)
+    assert film[:4] == bytes.fromhex("1a45dfa3") or film[4:8] == b"ftyp"  # what files of either form begin with
+    assert len(film) > 5000
+
+
+# what acts
+
+
+def test_loads_springs_and_masses_are_changed_and_forces_follow_and_are_saved(shown, tmp_path):
+    mechanism = MODELS["two-stroke-engine"]
+    window = shown(mechanism)
+    window.get_by_label("force on B along x, number, N").fill("-400")
+    window.get_by_label("force on B along x, number, N").press("Enter")
+    slider = window.get_by_role("slider", name="mass of rod, kg", exact=True)
+    slider.focus()
+    for _ in range(3):
+        window.keyboard.press("ArrowRight")
+    settled(window)
+    saved = planar.loads(downloaded(window, "Save: Mechanism (JSON)", tmp_path / "saved.json"))
+    numbers = planar.dimensions(saved)
+    assert numbers["loads.0.force.x"] == -400.0
+    assert numbers["masses.rod.mass"] > planar.dimensions(mechanism)["masses.rod.mass"]
+    (given,) = mechanism.inputs
+    effort = planar.forces(planar.solve(saved)).inputs[given.pair]
+    assert window.evaluate("(name) => page.forces.effort(name)", given.pair) == pytest.approx(float(effort), rel=1e-9)
+    assert float(effort) != pytest.approx(float(planar.forces(planar.solve(mechanism)).inputs[given.pair]), rel=0.01)
+    window.wait_for_function("() => location.hash.includes('at=')")
+    window.reload()
+    settled(window)
+    assert window.evaluate("(name) => page.forces.effort(name)", given.pair) == pytest.approx(float(effort), rel=1e-9)
+    window.get_by_role("button", name="Reset all of these").click()
+    settled(window)
+    filed = float(planar.forces(planar.solve(mechanism)).inputs[given.pair])
+    assert window.evaluate("(name) => page.forces.effort(name)", given.pair) == pytest.approx(filed, rel=1e-9)
+    window.keyboard.press("Control+z")
+    settled(window)
+    assert window.evaluate("(name) => page.forces.effort(name)", given.pair) == pytest.approx(float(effort), rel=1e-9)
+
+
+def test_a_mass_cannot_be_less_than_nothing(shown):
+    window = shown(MODELS["two-stroke-engine"])
+    field = window.get_by_label("mass of rod, number, kg")
+    field.fill("-1")
+    field.press("Enter")
+    settled(window)
+    assert window.locator("#said").inner_text() == "mass of rod cannot be -1 kg."
+    assert float(field.input_value()) > 0.0
+
+
+def test_a_spring_without_free_length_keeps_its_force_where_its_ends_meet(shown):
+    mechanism = MODELS["balanced-lamp"]
+    window = shown(mechanism)
+    names = window.evaluate("page.data.forces.parameters.map((each) => each.name)")
+    assert "springs.0.stiffness" in names
+    assert not {"springs.0.free", "springs.0.damping"} & set(names)
+    assert json.dumps(names).count("masses.arm.mass") == 1
+    field = window.get_by_label("mass of arm, number, kg")
+    field.fill("0.45")
+    field.press("Enter")
+    settled(window)
+    (given,) = mechanism.inputs
+    heavier = replace(
+        mechanism, masses=tuple(each._replace(mass=0.45) for each in mechanism.masses[:1]) + mechanism.masses[1:]
+    )
+    effort = float(planar.forces(planar.solve(heavier)).inputs[given.pair])
+    assert window.evaluate("(name) => page.forces.effort(name)", given.pair) == pytest.approx(effort, rel=1e-9)

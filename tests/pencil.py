@@ -1,0 +1,101 @@
+"""Hands that draw on the page of `planar edit` in a real browser: by mouse or by keys, at places in millimetres."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import planar
+from planar.pages.editor.answer import BLANK
+from planar.pages.editor.server import EditServer
+
+ANSWERED = "() => page && globalThis.editing.settled"
+
+
+@contextmanager
+def served(value: Any = None, path: Path | None = None, folder: Path | None = None) -> Iterator[EditServer]:
+    """A server of a file's value, or of empty paper, as long as it is wanted."""
+    server = EditServer(BLANK if value is None else value, path, folder or Path.cwd())
+    thread = threading.Thread(target=server.serve_forever, args=(0.05,), daemon=True)
+    thread.start()
+    try:
+        yield server
+    finally:
+        server.shutdown()
+        server.server_close()
+
+
+class Pencil:
+    """A window with the page of a server; what goes wrong there is in `wrong`."""
+
+    def __init__(self, context: Any, server: EditServer):
+        self.window, self.wrong = context.new_page(), []
+        self.window.set_default_timeout(10_000)
+        self.window.on("pageerror", lambda problem: self.wrong.append(str(problem)))
+        self.actions = 0
+        self.window.goto(server.address)
+        self.wait()
+
+    def wait(self) -> None:
+        """Wait for the server's answer to what is drawn."""
+        self.window.wait_for_function(ANSWERED)
+
+    def screen(self, x: float, y: float) -> tuple[float, float]:
+        """A place of the world (mm) on the screen (px)."""
+        box = self.window.locator("#drawing").bounding_box()
+        at = self.window.evaluate("([x, y]) => page.view.toScreen([x / 1000, y / 1000])", [x, y])
+        return box["x"] + at[0], box["y"] + at[1]
+
+    def tool(self, name: str) -> None:
+        """Take a tool."""
+        self.actions += 1
+        self.window.get_by_role("toolbar", name="Pencil").get_by_role("button", name=name, exact=True).click()
+
+    def drag(self, start: tuple[float, float], stop: tuple[float, float]) -> None:
+        """From one place to another."""
+        self.actions += 1
+        self.window.mouse.move(*self.screen(*start))
+        self.window.mouse.down()
+        self.window.mouse.move(*self.screen(*stop), steps=2)
+        self.window.mouse.up()
+        self.wait()
+
+    def click(self, *places: tuple[float, float]) -> None:
+        """One place after the other."""
+        for place in places:
+            self.actions += 1
+            self.window.mouse.click(*self.screen(*place))
+            self.wait()
+
+    def type(self, field: str, text: str) -> None:
+        """Type into a field, and enter it."""
+        self.actions += 1
+        place = self.window.get_by_label(field, exact=True)
+        place.fill(text)
+        place.press("Enter")
+        self.wait()
+
+    def button(self, name: str) -> None:
+        """Press a button."""
+        self.actions += 1
+        self.window.get_by_role("button", name=name, exact=True).click()
+        self.wait()
+
+    def said(self) -> str:
+        """What the page said last."""
+        return self.window.locator("#said").inner_text()
+
+    def told(self) -> str:
+        """What stands beside the drawing on how it moves."""
+        return self.window.locator("#pencil [role=status]").inner_text()
+
+    def file(self) -> Any:
+        """The file that is drawn."""
+        return self.window.evaluate("globalThis.editing.draft().file")
+
+    def mechanism(self) -> planar.Mechanism:
+        """The mechanism that is drawn."""
+        return planar.from_dict(self.file())
