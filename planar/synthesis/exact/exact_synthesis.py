@@ -25,6 +25,7 @@ from planar.synthesis.exact.tracking.exact_certificates import certify_member
 from planar.synthesis.exact.tracking.generic_store import FamilyRecord, family_record
 from planar.synthesis.exact.tracking.member_homotopy import affine_solutions, homogeneous_solutions
 from planar.synthesis.exact.tracking.member_solutions import MemberSolutions, solve_member
+from planar.synthesis.exact.tracking.monodromy import first_of_same
 from planar.synthesis.exact.tracking.symmetry import FamilyName, reordered
 from planar.synthesis.judgement.defects import Defect
 from planar.synthesis.judgement.judgement import DesignJudge
@@ -130,6 +131,8 @@ def _solve_all(components: Sequence[Component], say: Progress) -> list[Component
 def _solve(component: Component, record: FamilyRecord, say: Progress) -> ComponentSolutions:
     say(f"{count_phrase(len(record.classes), 'path')}")
     whole = solve_member(component.family, record, component.member)
+    if is_available() and len(whole.doubtful):
+        whole = _with_doubtful(component, whole)
     proved = np.zeros(len(whole.x), dtype=bool)
     x, is_real = whole.x, _is_real(whole.x)
     all_proved = 0
@@ -143,6 +146,15 @@ def _solve(component: Component, record: FamilyRecord, say: Progress) -> Compone
     if record.classes.shape[1] > 1 and len(real):
         real, sure = class_members(component, record, real, sure)
     return ComponentSolutions(component, record, whole, real, sure, all_proved, max(0, wanted - len(real)))
+
+
+def _with_doubtful(component: Component, whole: MemberSolutions) -> MemberSolutions:
+    """Ends that only look as if several met there, which balls of more digits tell from such, beside the others."""
+    proof = certify_member(component.family, component.member, whole.doubtful)
+    both = np.concatenate([whole.x, proof.x[proof.proved]])
+    kept = first_of_same(homogeneous_solutions(both)) == np.arange(len(both))
+    new = int(kept[len(whole.x) :].sum())
+    return whole._replace(x=both[kept], singular=whole.singular - new)
 
 
 def _is_real(x: ComplexArray) -> BoolArray:

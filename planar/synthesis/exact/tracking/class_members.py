@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 
+from planar.assemblies.polynomial.path_tracker import PathEnds
 from planar.foundation.arrays import BoolArray, ComplexArray
 from planar.synthesis.exact.relations.exact_problem import Component
+from planar.synthesis.exact.relations.family import Family, Member
 from planar.synthesis.exact.tracking.generic_store import FamilyRecord
 from planar.synthesis.exact.tracking.member_homotopy import affine_solutions, homogeneous_solutions
 from planar.synthesis.exact.tracking.monodromy import first_of_same, follow
 from planar.synthesis.exact.tracking.symmetry import exchange_images, representatives
 
-PRECISION = 1e-5
+PRECISION, CLOSER = 1e-5, 1e-7
+"""How far predictions may be off, and where paths are lost so."""
 
 
 def class_members(
@@ -22,7 +25,7 @@ def class_members(
     Which class a solution is of is seen where its path began."""
     images = exchange_images(record.name.exchanges)
     known = record.solutions
-    ends = follow(component.family, component.member, homogeneous_solutions(real), known.member, PRECISION)
+    ends = _follow_closely(component.family, component.member, homogeneous_solutions(real), known.member)
     both = np.concatenate([representatives(known.V, images), representatives(ends.V, images)])
     own = first_of_same(both)[len(known.V) :]
     seen = np.flatnonzero(ends.is_single & (own < len(known.V)))
@@ -31,10 +34,20 @@ def class_members(
     class_of[record.classes] = np.arange(len(record.classes))[:, None]
     others = [[k for k in record.classes[class_of[one]] if k != one] for one in own[seen].tolist()]
     rows = np.array(others, dtype=int).reshape(-1)
-    gone = follow(component.family, known.member, known.V[rows], component.member, PRECISION)
+    gone = _follow_closely(component.family, known.member, known.V[rows], component.member)
     proofs = np.repeat(sure[seen], members - 1)
     every = np.concatenate([homogeneous_solutions(real), representatives(gone.V[gone.is_single], images)])
     both_proofs = np.concatenate([sure, proofs[gone.is_single]])
     first = first_of_same(np.concatenate([representatives(every[: len(real)], images), every[len(real) :]]))
     kept = first == np.arange(len(every))
     return affine_solutions(every[kept]), both_proofs[kept]
+
+
+def _follow_closely(family: Family, begin: Member, V: ComplexArray, end: Member) -> PathEnds:
+    ends = follow(family, begin, V, end, PRECISION)
+    lost = ~ends.is_single
+    if lost.any():
+        again = follow(family, begin, V[lost], end, CLOSER)
+        for whole, part in zip(ends, again, strict=True):
+            whole[lost] = part
+    return ends

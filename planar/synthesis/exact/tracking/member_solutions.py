@@ -27,13 +27,14 @@ INFINITY = 1e-6
 
 class MemberSolutions(NamedTuple):
     """`x` (solutions, unknowns): those at finite places that count once; how many paths were followed, ended where
-    several meet or at infinity, and were lost."""
+    several meet or at infinity, and were lost. `doubtful` are those of `singular` where they ended."""
 
     x: ComplexArray
     followed: int
     singular: int
     at_infinity: int
     lost: int
+    doubtful: ComplexArray
 
     @property
     def is_whole(self) -> bool:
@@ -60,7 +61,7 @@ def solve_member(family: Family, record: FamilyRecord, member: Member, seed: int
         found, other = _followed(family, begin, member, found, images)
         whole = min(whole, other, key=lambda each: each.lost)._replace(x=affine_solutions(found))
     if len(found) >= many:
-        whole = whole._replace(singular=0, at_infinity=0, lost=0)
+        whole = whole._replace(singular=0, at_infinity=0, lost=0, doubtful=whole.doubtful[:0])
     return whole._replace(followed=many, lost=min(whole.lost, max(0, many - len(found))))
 
 
@@ -94,12 +95,14 @@ def _followed(
     finite = is_finite_solution(V, INFINITY)
     single = is_single & finite
     shared = _is_shared(V, single)
-    singular = int(np.sum(is_near & finite & ~is_single & (regularity < 1e3 * SINGULAR_TOLERANCE)))
+    is_singular = is_near & finite & ~is_single & (regularity < 1e3 * SINGULAR_TOLERANCE)
+    singular = int(np.sum(is_singular))
     infinite = int(np.sum(is_near & ~finite))
     both = np.concatenate([found, representatives(V[single], images)])
     kept = both[first_of_same(both) == np.arange(len(both))] if len(both) else both
     lost = len(V) - int(np.sum(single & ~shared)) - len({*first_of_same(V[shared]).tolist()}) - singular - infinite
-    return kept, MemberSolutions(affine_solutions(kept), len(V), singular, infinite, max(lost, 0))
+    doubtful = affine_solutions(V[is_singular])
+    return kept, MemberSolutions(affine_solutions(kept), len(V), singular, infinite, max(lost, 0), doubtful)
 
 
 def _member_beside(family: Family, member: Member, rng: np.random.Generator) -> Member:
