@@ -300,6 +300,6 @@ def _notes(plates: Sequence[Plate], meets: Sequence[tuple[str, str | int]], run:
 
 def _meeting(pin: str, what: str | int, plates: Sequence[Plate]) -> str:
     """That a pin meets a plate, or another pin."""
-    return (
-        f"pin {pin!r} meets plate {plates[what].name!r}" if isinstance(what, int) else f"pins {pin!r} and {what!r} meet"
-    )
+    if isinstance(what, int):
+        return f"pin {pin!r} meets plate {plates[what].name!r}"
+    return f"pins {pin!r} and {what!r} meet"
