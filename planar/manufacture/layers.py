@@ -6,8 +6,10 @@ from collections.abc import Mapping, Sequence
 from itertools import combinations
 from typing import NamedTuple
 
-SEARCH_LIMIT = 20_000
-"""Assignments of one plate that are tried, for a number of layers; ten plates that can be stacked take some hundred."""
+SEARCH_LIMIT = 60_000
+"""Assignments of one plate that are tried; ten plates that can be stacked take some hundred."""
+MOST_EXCHANGED = 16
+"""Plates that are exchanged in search of a better order, where none is clear."""
 
 
 class LayerRules(NamedTuple):
@@ -27,7 +29,7 @@ class LayerRules(NamedTuple):
     crowded: frozenset[tuple[str, str]]
 
 
-def find_layers(rules: LayerRules) -> tuple[list[int], list[str]]:
+def find_layers(rules: LayerRules) -> tuple[list[int], list[tuple[str, str | int]]]:
     """A layer for every plate, as few layers as can be, and the pins and plates that could not be kept clear.
 
     Where none is found each plate has a layer of its own, in an order that no exchange of two makes better, and what
@@ -35,8 +37,9 @@ def find_layers(rules: LayerRules) -> tuple[list[int], list[str]]:
     """
     groups = _groups(rules)
     order = sorted(groups, key=lambda group: -sum(_degree(rules, plate) for plate in group))
+    search = _Search(rules, order)
     for many in range(1, len(groups) + 1):
-        found = _search(rules, order, many)
+        found = search.layers(many)
         if found is not None:
             return found, []
     stack = sorted(groups)
@@ -44,7 +47,7 @@ def find_layers(rules: LayerRules) -> tuple[list[int], list[str]]:
     swapped = True
     while swapped and least:
         swapped = False
-        for one, other in combinations(range(len(stack)), 2):
+        for one, other in combinations(range(min(len(stack), MOST_EXCHANGED)), 2):
             tried = list(stack)
             tried[one], tried[other] = tried[other], tried[one]
             broken = len(broken_rules(rules, _stacked(rules, tried)))
@@ -63,15 +66,12 @@ def _stacked(rules: LayerRules, stack: Sequence[tuple[int, ...]]) -> list[int]:
     return found
 
 
-def broken_rules(rules: LayerRules, layers: Sequence[int]) -> list[str]:
-    """The pins that run through plates, and each other, at these layers, by name."""
-    found = [
-        f"{pin}|{plate}"
-        for pin, plates in rules.obstacles.items()
-        for plate in plates
-        if _runs_through(rules, layers, pin, plate)
-    ]
-    return found + [f"{one}|{other}" for one, other in rules.crowded if _share_gap(rules, layers, one, other)]
+def broken_rules(rules: LayerRules, layers: Sequence[int]) -> list[tuple[str, str | int]]:
+    """The pins that run through plates (by number) or beside other pins (by name) at these layers."""
+    found: list[tuple[str, str | int]] = []
+    for pin, plates in rules.obstacles.items():
+        found += [(pin, plate) for plate in sorted(plates) if _runs_through(rules, layers, pin, plate)]
+    return found + [two for two in sorted(rules.crowded) if _share_gap(rules, layers, *two)]
 
 
 def _groups(rules: LayerRules) -> list[tuple[int, ...]]:
@@ -90,47 +90,65 @@ def _degree(rules: LayerRules, plate: int) -> int:
     return sum(plate in pair for pair in rules.apart) + sum(plate in each for each in rules.obstacles.values())
 
 
-def _search(rules: LayerRules, order: list[tuple[int, ...]], many: int) -> list[int] | None:
-    """Layers from 1 to so many, by trying one group after the other; None where there are none, or too many to try."""
-    layers = [-1] * rules.number
-    layers[0] = 0
-    left = SEARCH_LIMIT
+class _Search:
+    """Layers by trying one group of plates after the other; so many tries for all numbers of layers together."""
 
-    def fits(group: tuple[int, ...], layer: int) -> bool:
+    def __init__(self, rules: LayerRules, order: list[tuple[int, ...]]) -> None:
+        self.rules, self.order, self.left = rules, order, SEARCH_LIMIT
+        self.held = [[pin for pin, plates in rules.pins.items() if plate in plates] for plate in range(rules.number)]
+        self.blocked = [
+            [pin for pin, plates in rules.obstacles.items() if plate in plates] for plate in range(rules.number)
+        ]
+        self.crowd = {pin: [two for two in rules.crowded if pin in two] for pin in rules.pins}
+        self.now = [-1] * rules.number
+
+    def layers(self, many: int) -> list[int] | None:
+        """Layers from 1 to so many; None where there are none, or no tries are left."""
+        self.now = [0] + [-1] * (self.rules.number - 1)
+        return list(self.now) if self._place(0, many) else None
+
+    def _place(self, number: int, many: int) -> bool:
+        if number == len(self.order):
+            return True
+        group = self.order[number]
+        for layer in range(1, many + 1):
+            self.left -= 1
+            if self.left < 0:
+                return False
+            if self._fits(group, layer):
+                for plate in group:
+                    self.now[plate] = layer
+                if self._is_clear(group) and self._place(number + 1, many):
+                    return True
+                for plate in group:
+                    self.now[plate] = -1
+        return False
+
+    def _fits(self, group: tuple[int, ...], layer: int) -> bool:
+        """Whether no plate that may not is in this layer, and those that lie beside these are beside it."""
         for plate in group:
-            for one, other in rules.apart:
-                if plate in (one, other) and layers[other if plate == one else one] == layer:
+            for one, other in self.rules.apart:
+                if plate in (one, other) and self.now[other if plate == one else one] == layer:
                     return False
-            for one, other in rules.beside:
+            for one, other in self.rules.beside:
                 if plate in (one, other):
-                    beside = layers[other if plate == one else one]
+                    beside = self.now[other if plate == one else one]
                     if beside >= 0 and abs(beside - layer) != 1:
                         return False
         return True
 
-    def clear() -> bool:
-        return not any(
-            _runs_through(rules, layers, pin, plate) for pin, plates in rules.obstacles.items() for plate in plates
-        ) and not any(_share_gap(rules, layers, one, other) for one, other in rules.crowded)
-
-    def place(number: int) -> bool:
-        nonlocal left
-        if number == len(order):
-            return True
-        for layer in range(1, many + 1):
-            left -= 1
-            if left < 0:
+    def _is_clear(self, group: tuple[int, ...]) -> bool:
+        """Whether the pins that these plates lengthen, and those that they may block, run clear."""
+        rules, now = self.rules, self.now
+        for plate in group:
+            if any(_runs_through(rules, now, pin, plate) for pin in self.blocked[plate]):
                 return False
-            if fits(order[number], layer):
-                for plate in order[number]:
-                    layers[plate] = layer
-                if clear() and place(number + 1):
-                    return True
-                for plate in order[number]:
-                    layers[plate] = -1
-        return False
-
-    return list(layers) if place(0) else None
+            for pin in self.held[plate]:
+                if any(_runs_through(rules, now, pin, each) for each in rules.obstacles.get(pin, ())):
+                    return False
+                if any(_share_gap(rules, now, one, other) for one, other in self.crowd[pin]):
+                    return False
+        return True
 
 
 def _span(rules: LayerRules, layers: Sequence[int], pin: str) -> tuple[int, int]:

@@ -19,11 +19,12 @@ from planar.foundation.errors import BadInput, NoAnswer, join_names
 from planar.foundation.geometry import Frame
 from planar.foundation.safe_files import save_file
 from planar.foundation.units import parse_unit
-from planar.manufacture.clearances import hull_rows, least_distance, places_over
-from planar.manufacture.layers import LayerRules, find_layers
+from planar.manufacture.clearances import places_over
+from planar.manufacture.layers import find_layers
 from planar.manufacture.nesting import nested
 from planar.manufacture.plate_making import Pin, Sizes, Travel, make_plates
 from planar.manufacture.plates import Plate
+from planar.manufacture.stacking import joined_plates, layer_rules
 from planar.model.mechanism import Mechanism
 from planar.results.motion import Motion
 from planar.solving.cycle import cycle
@@ -213,7 +214,11 @@ def _parts_at(mechanism: Mechanism, run: _Run, request: _Request, scale: float) 
         sheets = nested(plates, (1e3 * request.sheet[0], 1e3 * request.sheet[1]), 1e3 * request.gap)
     except BadInput:
         return None
-    layers, meets = find_layers(_rules(run, plates, pins, meshing, sizes, scale))
+
+    def places(link: str, points: tuple[tuple[float, float], ...]) -> np.ndarray:
+        return run.places(link, points, scale)
+
+    layers, meets = find_layers(layer_rules(places, plates, pins, meshing, sizes))
     placed = tuple(plate._replace(layer=layer) for plate, layer in zip(plates, layers, strict=True))
     by_name = {plate.name: plate.layer for plate in placed}
     notes = _notes(plates, meets, run, scale)
@@ -272,73 +277,17 @@ def _pin_diameter(linkage: DrawnLinkage) -> float:
     return min(NICE_PINS, key=lambda each: abs(each - wanted))
 
 
-def _rules(
-    run: _Run,
-    plates: Sequence[Plate],
-    pins: Sequence[Pin],
-    meshing: Sequence[tuple[str, str]],
-    sizes: Sizes,
-    scale: float,
-) -> LayerRules:
-    """What must not share a layer, and what no pin may run through, by the distances over the run."""
-    number = {plate.name: index for index, plate in enumerate(plates)}
-    together = tuple((number[one], number[other]) for one, other in meshing)
-    rows = [run.places(plate.link, hull_rows(plate.core), scale) for plate in plates]
-    apart, beside = set(), set()
-    for one, other in combinations(range(1, len(plates)), 2):
-        if plates[one].link == plates[other].link:
-            apart.add((one, other))
-            beside.add((one, other))
-        elif (one, other) not in together and (other, one) not in together:
-            room = plates[one].reach + plates[other].reach + sizes.play
-            if least_distance(rows[one], rows[other]) < room:
-                apart.add((one, other))
-    joins = {each.name: _joined_plates(each, plates) for each in pins}
-    spots = {each.name: run.places(each.on, (each.at,), scale) for each in pins}
-    obstacles = {}
-    for each in pins:
-        radius = sizes.diameter(each.name) / 2.0
-        near = [
-            index
-            for index, plate in enumerate(plates)
-            if index
-            and index not in joins[each.name]
-            and plate.link not in each.links
-            and least_distance(spots[each.name], rows[index]) < plate.reach + radius + sizes.play
-        ]
-        obstacles[each.name] = frozenset(near)
-    crowded = frozenset(
-        (one.name, other.name)
-        for one, other in combinations(pins, 2)
-        if least_distance(spots[one.name], spots[other.name])
-        < (sizes.diameter(one.name) + sizes.diameter(other.name)) / 2.0 + sizes.play
-    )
-    return LayerRules(len(plates), frozenset(apart), together, tuple(sorted(beside)), joins, obstacles, crowded)
-
-
-def _joined_plates(pin: Pin, plates: Sequence[Plate]) -> tuple[int, ...]:
-    """The plates with the pin's hole, or the slot in which it slides."""
-
-    def is_held(plate: Plate) -> bool:
-        drilled = any(hole.pin == pin.name for hole in plate.holes)
-        slid = any(pin.name in (slot.pin, f"{slot.pin} 2") for slot in plate.slots)
-        return plate.link in pin.links and (drilled or slid)
-
-    return tuple(index for index, plate in enumerate(plates) if is_held(plate))
-
-
 def _part_pin(pin: Pin, plates: Sequence[Plate], sizes: Sizes, thickness: float) -> PartPin:
-    layers = [plates[index].layer for index in _joined_plates(pin, plates)] or [0]
+    layers = [plates[index].layer for index in joined_plates(pin, plates)] or [0]
     low, high = min(layers), max(layers)
     return PartPin(pin.name, sizes.diameter(pin.name) / 1e3, thickness * (high - low + 1), (low, high))
 
 
-def _notes(plates: Sequence[Plate], meets: Sequence[str], run: _Run, scale: float) -> tuple[str, ...]:
+def _notes(plates: Sequence[Plate], meets: Sequence[tuple[str, str | int]], run: _Run, scale: float) -> tuple[str, ...]:
     found = [f"made at 1:{1.0 / scale:g}, so that each plate fits the sheet"] if scale != 1.0 else []
     if meets:
-        said = [each.partition("|")[::2] for each in meets]
-        told = [f"{one!r} and {plates[int(other)].name if other.isdecimal() else other!r}" for one, other in said]
-        found.append(f"no order of layers keeps everything clear: the pin meets what is named: {join_names(told)}")
+        told = [_meeting(pin, what, plates) for pin, what in meets]
+        found.append(f"no order of layers was found that keeps everything clear; in this one {join_names(told)}")
     if any(plate.kind == "disc" for plate in plates):
         found.append("wheels of belts and chains are discs of their pitch radius here; teeth and grooves are bought")
     few = sorted({plate.name for plate in plates if plate.kind == "wheel" and plate.teeth < 17})
@@ -347,3 +296,10 @@ def _notes(plates: Sequence[Plate], meets: Sequence[str], run: _Run, scale: floa
     if run.motion.outcome.value != "solved":
         found.append(f"clear as far as it runs: {run.motion.reason}")
     return tuple(found)
+
+
+def _meeting(pin: str, what: str | int, plates: Sequence[Plate]) -> str:
+    """That a pin meets a plate, or another pin."""
+    if isinstance(what, int):
+        return f"pin {pin!r} meets plate {plates[what].name!r}"
+    return f"pins {pin!r} and {what!r} meet"
