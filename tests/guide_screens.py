@@ -17,7 +17,7 @@ from tests.pencil import Pencil, served
 
 SCREENS = ("draw/bars", "draw/loose", "draw/moves")
 """Pictures by name, each after the step of the guide behind which it stands."""
-COLOURS = 64
+COLOURS = 200
 
 
 def draw_six_bar(hand: Pencil, see: Callable[[Pencil, str], None] = lambda *_: None) -> None:

@@ -93,6 +93,8 @@ SCRIPTS = (
     "controls/keeping.js",
     "controls/panels.js",
     "stage/lens.js",
+    "stage/places.js",
+    "stage/pins.js",
     "controls/undo.js",
     "controls/saving.js",
     "films/gif.js",
@@ -103,7 +105,6 @@ SCRIPTS = (
 
 START = 'beginPage(JSON.parse(document.getElementById("data").textContent), program);'
 EDITOR_SCRIPTS = (
-    "editor/places.js",
     "editor/document.js",
     "editor/links.js",
     "editor/sketch.js",

@@ -152,6 +152,7 @@ def test_what_is_loose_held_twice_and_in_conflict_is_told():
     value["links"]["coupler"]["length"] = 1000
     assert edit_answer(value)["conflicts"]
     found = conflict_answer(value)
+    assert "stays open by" in found["problem"]
     assert any("it goes together with coupler.length" in each for each in found["remedies"])
     assert edit_answer(BLANK)["place"] == "$.links.frame"
     twice = edit_answer(planar.to_dict("three-parallel-cranks"))

@@ -304,3 +304,53 @@ def test_a_spring_without_free_length_keeps_its_force_where_its_ends_meet(shown)
     )
     effort = float(planar.forces(planar.solve(heavier)).inputs[given.pair])
     assert window.evaluate("(name) => page.forces.effort(name)", given.pair) == pytest.approx(effort, rel=1e-9)
+
+
+# pins
+
+
+def test_pins_are_dragged_and_lengths_follow_while_all_others_stay(shown, tmp_path):
+    mechanism = MODELS["000-P1"]
+    window = shown(mechanism)
+    before = {name: point.position for name, point in planar.solve(mechanism).points.items()}
+    window.get_by_role("button", name="Pins").click()
+    box = window.locator("#drawing").bounding_box()
+    for name, by in (("C", (10.0, -6.0)), ("D", (-4.0, 3.0)), ("B", (2.0, 5.0))):
+        at = drawn_point(window, name) + [box["x"], box["y"]]
+        window.mouse.move(*at)
+        window.mouse.down()
+        window.mouse.move(*(at + by), steps=3)
+        settled(window)
+        window.mouse.up()
+        settled(window)
+        assert drawn_point(window, name) + [box["x"], box["y"]] == pytest.approx(at + by, abs=25.0)  # it is fitted anew
+        before[name] = np.array(window.evaluate("(name) => page.point(name).position", name))
+    saved = planar.loads(downloaded(window, "Save: Mechanism (JSON)", tmp_path / "saved.json"))
+    found = planar.solve(saved)
+    for name in ("A", "B", "C", "D"):
+        assert found.point(name).position == pytest.approx(before[name], abs=1e-10)
+    same(window, found)
+    assert planar.dimensions(saved)["BC.length"] != planar.dimensions(mechanism)["BC.length"]
+    for _ in range(3):
+        window.keyboard.press("Control+z")
+    settled(window)
+    same(window, planar.solve(mechanism))
+
+
+def test_pins_are_moved_by_keys_and_one_that_would_not_go_together_stays(shown):
+    mechanism = MODELS["slider-crank"]
+    window = shown(mechanism)
+    window.get_by_role("button", name="Pins").click()
+    window.locator("#drawing").focus()
+    names = window.evaluate("page.data.names")
+    for _ in range(1 + names.index("A")):
+        window.keyboard.press("n")
+    assert window.locator("#said").inner_text().startswith("Pin A ")
+    start = window.evaluate("page.point('A').position")
+    window.keyboard.press("Shift+ArrowRight")
+    settled(window)
+    there = window.evaluate("page.point('A').position")
+    assert there == pytest.approx([start[0] + 0.02 * window.evaluate("page.data.size"), start[1]], abs=1e-9)
+    assert "Pin A at" in window.locator("#said").inner_text()
+    window.keyboard.press("Escape")
+    assert window.locator(".pencil").count() == 0

@@ -15,6 +15,7 @@ function startPage(data, program) {
   page.acting = new Acting(page, document.getElementById("acting"));
   new Dimensions(page, document.getElementById("dimensions"));
   new Assemblies(page, document.getElementById("assemblies"));
+  if (!data.edited && !globalThis.editing) new PinDragging(page, svg, lens, () => controls.pause());
   const undo = new UndoHistory(page, controls.bar, () => controls.pause());
   new Films(page, new Saving(page, document.getElementById("saving"), svg), svg, () => controls.pause());
   page.tolerances = Tolerances.ofFile(page);

@@ -17,7 +17,7 @@ from planar.model.wording import count_phrase, join_all_names, quote_names
 from planar.pages.data.page_data import page_data
 from planar.solving.checks.singular_values import null_space
 from planar.solving.full_constraints import FullConstraints
-from planar.solving.position import PositionSolver
+from planar.solving.position import PositionSolver, solved_mechanism
 
 LOOSE_TOLERANCE = 1e-9
 """Of a free motion of one: coordinates that move by less stand still."""
@@ -52,7 +52,7 @@ def edit_answer(value: Any) -> dict[str, Any]:
         return found | {"problem": problem.sentence, "place": problem.place}
     except NoAnswer as problem:
         if problem.outcome is Outcome.CANNOT_BE_ASSEMBLED:
-            return found | {"problem": str(problem), "conflicts": True}
+            return found | {"problem": problem.outcome.value, "conflicts": True}
         told = {"mobility": _mobility_words(mechanism), "loose": loose_links(mechanism)}
         return found | told | {"problem": str(problem)}
     shown = {"window": None, "layers": ["paths"], "wanted": None, "edited": None}
@@ -97,17 +97,24 @@ def _mobility_words(mechanism: Mechanism) -> str:
     return "; ".join(told)
 
 
-def conflict_answer(value: Any) -> dict[str, list[str]]:
+def conflict_answer(value: Any) -> dict[str, Any]:
     """What is in conflict in a file that does not go together, and the least changes of one number that mend it.
 
-    `remedies` in sentences, none where nothing in conflict was found. Raises BadInput, NoAnswer.
+    `problem` is how far it stays open, `remedies` are in sentences, none where nothing in conflict was found. It takes a
+    search. Raises BadInput, NoAnswer.
     """
-    found = conflict(from_dict(value))
+    mechanism = from_dict(value)
+    try:
+        solved_mechanism(mechanism)
+        return {"problem": "", "remedies": []}
+    except NoAnswer as problem:
+        why = str(problem)
+    found = conflict(mechanism)
     if found is None:
-        return {"remedies": []}
+        return {"problem": why, "remedies": []}
     changes = islice((*found.dimensions, *found.positions), MAX_REMEDIES)
     told = (f"it goes together with {each.name} = {each.shown}" for each in changes)
-    return {"remedies": [found.remarks[0], *told]}
+    return {"problem": why, "remedies": [found.remarks[0], *told]}
 
 
 def _units(mechanism: Mechanism) -> dict[str, float]:

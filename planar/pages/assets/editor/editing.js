@@ -4,7 +4,7 @@
    window's own store until it is saved, also where the server is gone. */
 
 const ALIVE_PAUSE = 45000;  // ms between two signs to the server that the page is open
-const FOLLOWED = 1e-6;      // sizes: as near to the pointer the page's own solution has to come
+const EXPLAIN_PAUSE = 500;  // ms without a change, after which it is looked for what mends it
 const BLANK_WIDTH = 0.3;    // m that are seen of empty paper
 
 class Editing {
@@ -25,6 +25,7 @@ class Editing {
     try { kept = JSON.parse(sessionStorage.getItem("drawing")); } catch { /* nothing is kept */ }
     this.begin(data, program, !answer.problem);
     if (!this.solved) this.guess();
+    if (answer.conflicts) this.explain();
     if (kept?.file) this.take({ file: kept.file, at: new Map(kept.at) }, kept.changed);
     else if (!Object.keys(this.placed.pins).length && !this.solved) this.use("bar");
   }
@@ -119,18 +120,8 @@ class Editing {
 
   /** A copy to draw on, with the numbers that the page has been given by hand. */
   draft() {
-    const file = structuredClone(this.file), { units, parts: { page } } = this;
-    if (this.solved) {
-      const { data, linkage } = page, holder = (path) => path.slice(0, -1).reduce((each, key) => each?.[key], file);
-      data.dimensions.forEach((each, k) => {
-        const path = data.document.dimensions[k], place = holder(path);
-        if (linkage.d[k] !== each.value && place && path[path.length - 1] in place) Written.put(place, path[path.length - 1], linkage.d[k], "length", units);
-      });
-      data.inputs.forEach((given, k) => {
-        if (file.inputs?.[k]) Written.put(file.inputs[k], "position", page.input(k), given.slides ? "length" : "angle", units);
-      });
-    }
-    return { file, at: new Map(this.at), units };
+    const { file, units, parts: { page } } = this;
+    return { file: this.solved ? fileNow(page, file, units) : structuredClone(file), at: new Map(this.at), units };
   }
 
   perform(make) {
@@ -192,6 +183,7 @@ class Editing {
       this.begin(answer.data, globalThis.answered, true);
       this.say(said);
     } else this.show();
+    if (answer.conflicts) this.explain();
     this.settled = true;
   }
 
@@ -240,7 +232,7 @@ class Editing {
   pull(held) {
     held.made = held.placed.moved(held.pin, held.to, held.inputs);
     this.at = held.made.at;
-    const shown = held.solved && solvePlaced(this.parts.page, held.made, held.pin, this.units, FOLLOWED);
+    const shown = held.solved && solvePlaced(this.parts.page, held, this.units) === "";
     if (shown !== this.solved) { this.solved = shown; document.body.classList.toggle("unsolved", !shown); }
     this.sketch.draw();
   }
@@ -287,15 +279,15 @@ class Editing {
     this.guess();
   }
 
-  /** Why it does not go together, and what mends it: found by a search, which may take seconds. */
+  /** Why it does not go together, by how far, and what mends it: found by a search, once the hand rests. */
   async explain() {
     const number = this.asked;
-    this.say("What is in conflict is looked for.");
+    await new Promise((go) => setTimeout(go, EXPLAIN_PAUSE));
+    if (number !== this.asked) return;
     const answer = await this.post("conflict", { document: this.file });
     if (number !== this.asked) return;
-    Object.assign(this.answer, { remedies: answer.remedies ?? [answer.problem] });
+    Object.assign(this.answer, { problem: answer.problem || this.answer.problem, remedies: answer.remedies ?? [] });
     this.panel.show();
-    this.say(this.answer.remedies.length ? "What is in conflict stands beside the drawing." : "Nothing in conflict was found.");
   }
 
   async save(name, replaces = false) {
@@ -332,22 +324,4 @@ class Editing {
     addEventListener("pagehide", () => navigator.sendBeacon("gone", JSON.stringify({ page })));
     addEventListener("pageshow", ({ persisted }) => { if (persisted) open(); });
   }
-}
-
-/** Bring a page to a file's numbers, from where it is; whether its own solution has the pin where it was led. */
-function solvePlaced(page, { file, at }, pin, units, slack) {
-  const { data, linkage } = page, value = (path) => path.reduce((each, key) => each?.[key], file) ?? null;
-  const d = data.document.dimensions.map((path, k) => Written.read(value(path), "length", units) ?? linkage.d[k]);
-  const u = data.inputs.map((given, k) => (Written.read(value(["inputs", k, "position"]), given.slides ? "length" : "angle", units) ?? page.input(k)) / linkage.scale[k]);
-  const made = linkage.copy();
-  made.d = d;
-  made.measure();
-  const { z, closed } = made.newton(u, linkage.z);
-  if (!closed) return false;
-  made.z = z;
-  made.u = u;
-  const [x, y] = page.place(data.points[pin].links[0], data.points[pin].at[0], page.framesOf(made.state()), made.sizes);
-  if (!(Plane.apart([x, y], at.get(pin)) <= slack * data.size)) return false;
-  page.adopt({ d, u, z });
-  return true;
 }

@@ -10,9 +10,8 @@ class PencilPanel {
     this.problem = element("p", { class: "why" });
     this.remedies = element("ul", { class: "remedies" });
     this.chosen = element("div", { class: "chosen" });
-    this.why = this.button("What mends it?", () => editing.explain());
     const told = element("div", { role: "status" }, this.mobility, this.problem, this.remedies);
-    section.append(element("h2", {}, "Drawing"), told, this.why, this.chosen, this.files(), this.text());
+    section.append(element("h2", {}, "Drawing"), told, this.chosen, this.files(), this.text());
   }
 
   button(text, act, more = {}) {
@@ -75,7 +74,6 @@ class PencilPanel {
     this.problem.textContent = answer?.problem ? `${answer.place ? `${answer.place}: ` : ""}${answer.problem}` : "";
     this.problem.hidden = !answer?.problem;
     this.remedies.replaceChildren(...(answer?.remedies ?? []).map((each) => Forms.element("li", {}, each)));
-    this.why.hidden = !answer?.conflicts || answer.remedies.length > 0;
     this.saved.textContent = editing.fileName ? `${editing.fileName}${editing.changed ? ", not saved yet" : ""}` : "no file yet";
     if (this.whole.open && document.activeElement !== this.area) this.area.value = JSON.stringify(file, null, 2);
     this.fields();

@@ -37,7 +37,8 @@ class Drawing {
 
   /** Look where everything comes, and draw it anew. */
   measure() {
-    Object.assign(this, motions(this.page), { slack: 0 });
+    // what is held keeps its scale: where everything comes is looked at once it is let go
+    if (!this.held || !this.poses) Object.assign(this, motions(this.page), { slack: 0 });
     this.build();
   }
 

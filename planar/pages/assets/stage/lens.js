@@ -29,18 +29,20 @@ class Lens {
 
   buttons() {
     const box = Forms.element("div", { class: "lens", role: "group", "aria-label": "View of the drawing" });
-    const button = (text, name, act) => {
-      const made = Forms.element("button", { type: "button", "aria-label": name, title: name }, text);
-      made.addEventListener("click", act);
-      box.append(made);
-      return made;
-    };
-    button("+", "Zoom in (+)", () => this.zoom(ZOOM_STEP));
-    button("−", "Zoom out (−)", () => this.zoom(1 / ZOOM_STEP));
-    this.whole = button("Fit", "Fit everything (0)", () => this.fit());
-    this.screen = button("Full screen", "Full screen (F)", () => this.fill(!this.isFull));
+    this.box = box;
+    this.button("+", "Zoom in (+)", () => this.zoom(ZOOM_STEP));
+    this.button("−", "Zoom out (−)", () => this.zoom(1 / ZOOM_STEP));
+    this.whole = this.button("Fit", "Fit everything (0)", () => this.fit());
+    this.screen = this.button("Full screen", "Full screen (F)", () => this.fill(!this.isFull));
     this.svg.parentNode.append(box);
     this.show();
+  }
+
+  button(text, name, act) {
+    const made = Forms.element("button", { type: "button", "aria-label": name, title: name }, text);
+    made.addEventListener("click", act);
+    this.box.append(made);
+    return made;
   }
 
   get isFull() { return this.left.classList.contains("full"); }
@@ -86,6 +88,8 @@ class Lens {
     this.left.classList.toggle("full", full);
     for (const each of document.querySelectorAll(".page > header, .right")) each.inert = full;
     this.screen.setAttribute("aria-pressed", String(full));
+    if (full) this.former = this.drawing.lens;
+    this.drawing.lens = full ? null : this.former; // all of it, at first
     this.show();
     // a frame may forbid it: the page itself is filled then
     if (full) document.documentElement.requestFullscreen?.().catch(() => undefined);

@@ -5,6 +5,7 @@
 const SAME_NUMBER = 1e-11; // of the greatest: a number that is as near stays as it is written
 const FILE_FIGURES = 12;   // of a number that is written
 const ON_LINE = 1e-9;      // of a distance: a point as near to a line lies on it
+const FOLLOWED = 1e-6;      // sizes: as near to where a pin is led a page's own solution has to come
 const KNOWN_UNITS = {
   length: { m: 1, mm: 1e-3, cm: 1e-2, dm: 0.1, um: 1e-6, in: 0.0254, ft: 0.3048 },
   angle: { deg: Math.PI / 180, "°": Math.PI / 180, rad: 1 },
@@ -227,4 +228,43 @@ class Placed {
     }
     return file;
   }
+}
+
+/** A page's file, or the same as its author wrote it, with the numbers that the page has now. */
+function fileNow(page, file, units) {
+  const { data, linkage } = page, made = structuredClone(file);
+  data.dimensions.forEach((each, k) => {
+    const path = data.document.dimensions[k], key = path[path.length - 1], holder = path.slice(0, -1).reduce((one, part) => one?.[part], made);
+    if (linkage.d[k] !== each.value && holder && key in holder) Written.put(holder, key, linkage.d[k], "length", units);
+  });
+  data.inputs.forEach((given, k) => {
+    if (made.inputs?.[k]) Written.put(made.inputs[k], "position", page.input(k), given.slides ? "length" : "angle", units);
+  });
+  return made;
+}
+
+/** Bring a page to the numbers of a pin that is led, {pin, placed, made}, from where it is: "", or why not. */
+function solvePlaced(page, { pin, placed, made: { file, at } }, units) {
+  const { data, linkage } = page, value = (from, path) => path.reduce((each, key) => each?.[key], from) ?? null;
+  // what is written alike stays as exact as it was
+  const now = (path, kind, own) => {
+    const [was, is] = [placed.file, file].map((each) => Written.read(value(each, path), kind, units));
+    return is === null || is === was ? own : is;
+  };
+  const d = data.document.dimensions.map((path, k) => now(path, "length", linkage.d[k]));
+  const wrong = data.dimensions.find((each, k) => d[k] !== linkage.d[k] && (each.held || d[k] < (each.bounds[0] ?? -Infinity) || d[k] > (each.bounds[1] ?? Infinity)));
+  if (wrong) return `${wrong.link}: ${wrong.what} is held${wrong.held ? `: ${wrong.held}` : ""}`;
+  const u = data.inputs.map((given, k) => now(["inputs", k, "position"], given.slides ? "length" : "angle", page.input(k)) / linkage.scale[k]);
+  const made = linkage.copy();
+  made.d = d;
+  made.measure();
+  const { z, closed } = made.newton(u, linkage.z);
+  if (!closed) return "it does not go together";
+  if (beyondStops(made, z, u).length) return "a stop is in the way";
+  made.z = z;
+  made.u = u;
+  const [link] = data.points[pin].links, there = page.place(link, data.points[pin].at[0], page.framesOf(made.state()), made.sizes);
+  if (!(Plane.apart(there, at.get(pin)) <= FOLLOWED * data.size)) return "its lengths alone do not lead it there";
+  page.adopt({ d, u, z });
+  return "";
 }
