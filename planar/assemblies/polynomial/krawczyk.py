@@ -14,9 +14,10 @@ import numpy as np
 from planar.foundation.arrays import Array, BoolArray, ComplexArray, IntArray
 
 BALL_PRECISION_BITS = 128
-BOX_HALF_WIDTHS = (1e-7, 1e-9, 1e-11, 1e-13)
+BOX_HALF_WIDTHS = (1e-7, 1e-9, 1e-11, 1e-13, 1e-16, 1e-20)
 """Half widths of boxes that are tried, the widest first."""
-POLISHING_STEPS = 3
+POLISHING_STEPS, POLISHED = 12, 1e-26
+"""At most, and of a solution's entries: what moves it by less is the last."""
 
 BallEquations = Callable[[Sequence[Any]], tuple[list[Any], list[list[Any]]]]
 """The equations at a box of balls, and their Jacobian."""
@@ -71,18 +72,22 @@ def _inverse(slope: list[list[Any]]) -> Any | None:
 
 
 def polished_balls(equations: BallEquations, w: ComplexArray) -> list[Any] | None:
-    """A solution near w to the precision of balls, by Newton's method with one inverse."""
+    """A solution near w to the precision of balls, by Newton's method."""
     from flint import acb_mat
 
     at = [ball(complex(each)) for each in w]
-    near = None
     for _ in range(POLISHING_STEPS):
         left, slope = equations(at)
-        near = near if near is not None else _inverse(slope)
+        near = _inverse(slope)
         if near is None:
             return None
         step = (near * acb_mat([[each] for each in left])).entries()
         at = [(one - other).mid() for one, other in zip(at, step, strict=True)]
+        if all(
+            abs(complex(each.mid())) < POLISHED * max(1.0, abs(complex(one)))
+            for each, one in zip(step, at, strict=True)
+        ):
+            break
     return at
 
 

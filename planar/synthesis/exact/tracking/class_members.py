@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from planar.assemblies.polynomial.certification import is_available
 from planar.assemblies.polynomial.path_tracker import PathEnds
 from planar.foundation.arrays import BoolArray, ComplexArray
 from planar.synthesis.exact.relations.exact_problem import Component
 from planar.synthesis.exact.relations.family import Family, Member
+from planar.synthesis.exact.tracking.exact_certificates import certify_member
 from planar.synthesis.exact.tracking.generic_store import FamilyRecord
 from planar.synthesis.exact.tracking.member_homotopy import affine_solutions, homogeneous_solutions
 from planar.synthesis.exact.tracking.monodromy import first_of_same, follow
@@ -36,6 +38,7 @@ def class_members(
     rows = np.array(others, dtype=int).reshape(-1)
     gone = _follow_closely(component.family, known.member, known.V[rows], component.member)
     proofs = np.repeat(sure[seen], members - 1)
+    gone = _with_proved(component, gone)
     every = np.concatenate([homogeneous_solutions(real), representatives(gone.V[gone.is_single], images)])
     both_proofs = np.concatenate([sure, proofs[gone.is_single]])
     first = first_of_same(np.concatenate([representatives(every[: len(real)], images), every[len(real) :]]))
@@ -51,3 +54,16 @@ def _follow_closely(family: Family, begin: Member, V: ComplexArray, end: Member)
         for whole, part in zip(ends, again, strict=True):
             whole[lost] = part
     return ends
+
+
+def _with_proved(component: Component, ends: PathEnds) -> PathEnds:
+    """Ends, those that only look singular put in by what balls of more digits prove of them."""
+    open_ = np.flatnonzero(ends.is_near_end & ~ends.is_single)
+    if not len(open_) or not is_available():
+        return ends
+    proof = certify_member(component.family, component.member, affine_solutions(ends.V[open_]))
+    V, regularity, has_converged = ends.V.copy(), ends.regularity.copy(), ends.has_converged.copy()
+    own = open_[proof.proved]
+    V[own] = homogeneous_solutions(proof.x[proof.proved])
+    regularity[own], has_converged[own] = 1.0, True
+    return PathEnds(V, regularity, has_converged, ends.is_near_end)
