@@ -76,7 +76,8 @@ def answer_times() -> dict[str, float]:
     """Of changes of the structure the time (s) until the server has answered, in the median of several."""
     with served() as server:
         return {
-            f"{2 * count + 4} links": median(_answer_time(server, count, k) for k in range(5)) for count in range(DYADS + 1)
+            f"{2 * count + 4} links": median(_answer_time(server, count, k) for k in range(5))
+            for count in range(DYADS + 1)
         }
 
 
@@ -102,7 +103,9 @@ def _answer_time(server: EditServer, dyads: int, k: int) -> float:
 def main() -> None:
     """Measure and print."""
     times = drag_times()
-    print(f"a pin of a ten-link dragged: {median(times):.1f} ms in the median of {len(times)}, {max(times):.1f} at most")
+    print(
+        f"a pin of a ten-link dragged: {median(times):.1f} ms in the median of {len(times)}, {max(times):.1f} at most"
+    )
     for name, taken in answer_times().items():
         print(f"a change of structure, {name}: {taken:.3f} s")
 

@@ -300,8 +300,7 @@ def sensitivity(moving: Motion | Forces | Mechanism, of: str | None = None, resu
     """What a little more of each number of the file does to a result over a motion: the greatest influences.
 
     `of` is a point, link, pair or input (left out: the first slide or rocker that is an output, else the first point
-    that moves), `result` which of its results (left out: the first); of forces their efforts and reactions, too. Raises
-    Unknown and BadInput for a name that is not there.
+    that moves), `result` which of its results (left out: the first); of forces their efforts and reactions, too.
     """
     from planar.analysis.sensitivity.sensitivity import sensitivity as derivatives
     from planar.drawing.diagrams.sensitivity_curves import sensitivity_picture
@@ -323,8 +322,7 @@ def tolerance(
     """The band of a result within the tolerances of the file, or of a band: of a point's place round its path, wider by
     a factor that is told, else over the motion; and the share of the variance of each number and pin.
 
-    `of` and `result` are chosen as for `sensitivity`. Raises Unknown and BadInput for a name that is not there, a file
-    without tolerances, and a scale that is none.
+    `of` and `result` are chosen as for `sensitivity`. Raises Unknown and BadInput.
     """
     from planar.analysis.tolerance.tolerance import ToleranceBand
     from planar.analysis.tolerance.tolerance import tolerance as find_band
@@ -345,11 +343,10 @@ def diagrams(
     """S-t, V-t and a-t diagrams of a slide, point or link over a motion in time, or a run at the input's steady speed.
 
     `of` left out: the first slide on the frame that is not driven, else the angle of the link on a pin of the frame
-    that is farthest along. A slide on the frame is measured from its top dead centre, where the run starts. `width`
-    is the length of the time axis in mm on paper; `chords` adds graphical differentiation over so many intervals
-    (Machine Elements, 1.3.6 (iii)). Where the file gives no speed, rates are per radian (or metre) of the input.
-    Of a simulation the intervals are shaded in which friction holds the pair drawn, or else any. Raises BadInput
-    for a name that is not there, NoAnswer where there is no motion.
+    that is farthest along. A slide on the frame is measured from its top dead centre, where the run starts. `width` is
+    the length of the time axis in mm on paper; `chords` adds graphical differentiation over so many intervals (Machine
+    Elements, 1.3.6 (iii)). Where the file gives no speed, rates are per radian (or metre) of the input. Of a simulation
+    intervals in which friction holds the pair drawn, or else any, are shaded. Raises BadInput, and NoAnswer.
     """
     from planar.drawing.diagrams.kinematic_diagrams import diagrams as drawn
 
@@ -368,8 +365,7 @@ def solution(state: State, scale: ScaleTexts = None) -> list[Figure]:
 def two_directions(state: State, link: str, points: Sequence[str] | None = None, scale: ScaleTexts = None) -> Figure:
     """The construction of a link's centre C from the directions of two of its points' velocities (r, v, and ω = v / r).
 
-    `points` left out: the two joints of the link that lie farthest apart. Raises BadInput for a link or points that
-    there are not, a link at rest, and a scale that is none.
+    `points` left out: the two joints of the link that lie farthest apart. Raises BadInput, also for a link at rest.
     """
     from planar.drawing.centres.two_directions import directions_picture
 

@@ -441,7 +441,7 @@ def test_pages_of_a_book_are_the_figures_in_order_each_of_its_own_size():
 def test_what_cannot_be_saved_is_refused_in_one_sentence():
     made = draw_pictures([scheme()])
     for suffix in ("jpg", ".eps", "", "svgz"):
-        with pytest.raises(BadInput, match=r"can be written to files that end in \.png, \.svg or \.pdf"):
+        with pytest.raises(BadInput, match=r"can be written to files that end in \.png, \.svg, \.pdf or \.dxf"):
             encode_figure(made, suffix)
     for suffix in ("png", ".svg"):
         with pytest.raises(BadInput, match=r"2 sheets need pages, which only \.pdf has"):

@@ -146,7 +146,7 @@ def test_what_is_changed_and_looked_at_is_there_again_after_a_reload(shown):
     window.get_by_label("Velocity arrows").check()
     settled(window)
     here = "[Array.from(page.linkage.d), page.input(0), Array.from(page.linkage.z), page.view.scale]"
-    window.wait_for_function("() => location.hash.includes('at=')")
+    wait_for_address(window)
     stood = window.evaluate(here)
     window.reload()
     settled(window)
@@ -230,14 +230,27 @@ def test_the_motion_is_a_gif_that_comes_round_to_where_it_began(stem, shown, tmp
     assert window.get_by_role("button", name="Undo").is_disabled()
 
 
+def wait_for_address(window):
+    """The address is written a little after the last change; what stands there twice is the last."""
+    window.wait_for_function(
+        """() => { const before = window.addressBefore;
+        window.addressBefore = location.hash;
+        return location.hash.includes("at=") && before === location.hash; }""",
+        polling=1500,
+    )
+
+
 def test_the_motion_is_a_video(shown, tmp_path):
     window = shown(MODELS["crank-rocker"])
     if window.get_by_role("button", name="Save: Motion (video)").count() == 0:
         pytest.skip("this browser records no video")
-    window.evaluate("Object.assign(FILM, { seconds: 1.5, frames: 30 })")
     window.wait_for_function("() => page.course")
     window.set_default_timeout(60_000)
-    film = saved_bytes(window, "Save: Motion (video)", tmp_path / "a.webm")
+    for seconds in (1.5, 6.0, 24.0):  # a busy machine may encode nothing of a short one
+        window.evaluate("(seconds) => Object.assign(FILM, { seconds, frames: 30 })", seconds)
+        film = saved_bytes(window, "Save: Motion (video)", tmp_path / "a.webm")
+        if len(film) > 5000:
+            break
     window.set_default_timeout(10_000)
     assert film[:4] == bytes.fromhex("1a45dfa3") or film[4:8] == b"ftyp"  # what files of either form begin with
     assert len(film) > 5000
@@ -264,7 +277,7 @@ def test_loads_springs_and_masses_are_changed_and_forces_follow_and_are_saved(sh
     effort = planar.forces(planar.solve(saved)).inputs[given.pair]
     assert window.evaluate("(name) => page.forces.effort(name)", given.pair) == pytest.approx(float(effort), rel=1e-9)
     assert float(effort) != pytest.approx(float(planar.forces(planar.solve(mechanism)).inputs[given.pair]), rel=0.01)
-    window.wait_for_function("() => location.hash.includes('at=')")
+    wait_for_address(window)
     window.reload()
     settled(window)
     assert window.evaluate("(name) => page.forces.effort(name)", given.pair) == pytest.approx(float(effort), rel=1e-9)

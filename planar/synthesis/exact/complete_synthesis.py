@@ -14,7 +14,8 @@ from planar.synthesis.synthesis import Synthesis, SynthesisedDesign
 @dataclass(frozen=True, eq=False)
 class ExactDesign(SynthesisedDesign):
     """A linkage that meets a task exactly. `certified`: a box of its own is proved to hold it and no other; defective
-    ones are listed, too, and say so in `defects`."""
+    ones are listed, too, and say so in `defects` and `shortages`. `numbers` are those that were sought, by name (SI),
+    and `motion` says how it moves."""
 
     certified: bool = False
 
@@ -61,7 +62,8 @@ class CompleteSynthesis(Synthesis):
     `expected`: how many complex solutions a random task of this kind has, of the class that `counted` says; None where
     there are curves of them. `complete`: "complete" where it is proved that there are no others, "numerically complete"
     where all paths came to an end and a trace test says that these are all, else how far it is. `found`: how many of
-    those expected there are. `curves`: families of solutions with a parameter.
+    those expected there are. `curves`: families of solutions with a parameter. `seed` and `is_finished` are as of a
+    search: a list is made whole, without chance.
     """
 
     expected: int | None = None
