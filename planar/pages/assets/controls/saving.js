@@ -39,11 +39,11 @@ const Files = (() => {
         put(path, given.slides ? length(now) : shortest(now, units.angle.ratio, "rad"));
       }
     });
-    data.forces?.parameters.forEach(({ path, value, kind, unit }, k) => {
+    data.forces?.parameters.forEach(({ path, value, kind, unit, in_unit: ratio }, k) => {
       const now = page.acting?.values[k] ?? value;
       if (now === value) return;
       changed = true;
-      put(path, kind === "length" ? length(now) : `${now} ${unit}`);
+      put(path, kind === "length" ? length(now) : `${now * ratio} ${unit}`);
     });
     if (!changed) return file;
     // `ids` and what was published are of the file's own position and dimensions
