@@ -1,7 +1,7 @@
 """`python -m benchmarks.drawing`: a pin of a ten-link dragged on its page, and a change of structure answered.
 
-In a real browser without a window: the time from the pointer's place to a drawing that is laid out, in the median of many
-places round a circle; and that of the server's answers to drafts that differ in structure, each new to it.
+In a real browser without a window: the time from the pointer's place to a drawing that is laid out, in the median of
+many places round a circle; and that of the server's answers to drafts that differ in structure, each new to it.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ DRAG = """(places) => {
     const turn = (2 * Math.PI * k) / places, began = performance.now();
     held.to = [start[0] + 0.004 * Math.cos(turn), start[1] + 0.004 * Math.sin(turn)];
     editing.pull(held);
-    drawing.measure();
+    drawing.measure(); // as the next frame would
     document.getElementById("drawing").getBoundingClientRect();
     times.push(performance.now() - began);
     if (!editing.solved) throw new Error("not solved by the page");

@@ -376,6 +376,28 @@ def test_names_are_changed_and_pins_and_links_go(drawing):
     assert "Zapfen 1" in planar.solve(hand.mechanism()).points
 
 
+def test_a_link_is_copied_and_mirrored(drawing):
+    hand = drawing()
+    hand.tool("Plate")
+    hand.click((0, 0), (60, 0), (20, 40), (20, 40))
+    hand.tool("Pins")
+    hand.click((30, 0))
+    hand.button("Copy ABC")
+    hand.click((8, 16))
+    hand.button("Mirror ABC")
+    found = {name: [round(1000 * each, 6) for each in at] for name, at in hand.window.evaluate("[...editing.at]")}
+    step = round(1000 * hand.window.evaluate("editing.sketch.step"), 6)
+    assert [found[name] for name in "DEF"] == [
+        [2 * step, -2 * step],
+        [60 + 2 * step, -2 * step],
+        [20 + 2 * step, 40 - 2 * step],
+    ]
+    assert [found[name] for name in "GH"] == [[120, 0], [100, 40]]
+    assert hand.file()["pairs"] == [{"turning": "B"}]
+    mirrored = hand.file()["links"]["GBH"]
+    assert mirrored == {"ends": ["G", "B"], "length": 60, "points": {"H": [20, -40]}}
+
+
 # always alive
 
 

@@ -328,15 +328,16 @@ def test_pins_are_dragged_and_lengths_follow_while_all_others_stay(shown, tmp_pa
     before = {name: point.position for name, point in planar.solve(mechanism).points.items()}
     window.get_by_role("button", name="Pins").click()
     box = window.locator("#drawing").bounding_box()
+    corner = np.array([box["x"], box["y"]])
     for name, by in (("C", (10.0, -6.0)), ("D", (-4.0, 3.0)), ("B", (2.0, 5.0))):
-        at = drawn_point(window, name) + [box["x"], box["y"]]
+        at = drawn_point(window, name) + corner
         window.mouse.move(*at)
         window.mouse.down()
         window.mouse.move(*(at + by), steps=3)
         settled(window)
         window.mouse.up()
         settled(window)
-        assert drawn_point(window, name) + [box["x"], box["y"]] == pytest.approx(at + by, abs=25.0)  # it is fitted anew
+        assert drawn_point(window, name) + corner == pytest.approx(at + by, abs=25.0)  # it is fitted anew
         before[name] = np.array(window.evaluate("(name) => page.point(name).position", name))
     saved = planar.loads(downloaded(window, "Save: Mechanism (JSON)", tmp_path / "saved.json"))
     found = planar.solve(saved)

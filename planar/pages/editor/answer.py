@@ -100,8 +100,8 @@ def _mobility_words(mechanism: Mechanism) -> str:
 def conflict_answer(value: Any) -> dict[str, Any]:
     """What is in conflict in a file that does not go together, and the least changes of one number that mend it.
 
-    `problem` is how far it stays open, `remedies` are in sentences, none where nothing in conflict was found. It takes a
-    search. Raises BadInput, NoAnswer.
+    `problem` is how far it stays open, `remedies` are in sentences, none where nothing in conflict was found. It takes
+    a search. Raises BadInput, NoAnswer.
     """
     mechanism = from_dict(value)
     try:

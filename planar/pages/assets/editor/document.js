@@ -164,6 +164,25 @@ const Draw = {
     return `Wheels of ${links.join(" and ")}, ratio ${ratio}`;
   },
 
+  /** A link of the same form with pins of its own, so far aside. */
+  copyLink(draft, link, aside) {
+    return Draw.link(draft, Draw.spots(draft, link).map(({ at: [x, y] }) => ({ pin: null, at: [x + aside, y - aside] })));
+  },
+
+  /** Its mirror image, left for right, about its own pin farthest to the right, where both are joined. */
+  mirrorLink(draft, link) {
+    const spots = Draw.spots(draft, link), axis = cheapest(spots, ({ at }) => -at[0]);
+    return Draw.link(draft, spots.map((each) => (each === axis ? each : { pin: null, at: [2 * axis.at[0] - each.at[0], each.at[1]] })));
+  },
+
+  /** The pins of a link with their places. */
+  spots(draft, link) {
+    const pins = Pins.all(draft.file), spots = Pins.ofLink(draft.file.links[link]).map((point) => Pins.of(pins, link, point)).map((pin) => ({ pin, at: draft.at.get(pin) }));
+    if (link === draft.file.frame) throw new Error("there is one frame");
+    if (spots.length < 2 || spots.some(({ at }) => !at)) throw new Error(`${link} has too few pins to be drawn again`);
+    return spots;
+  },
+
   removeLink(draft, link) {
     if (link === draft.file.frame) throw new Error("the frame stays; its pins are made free by the tool Ground");
     delete draft.file.links[link];

@@ -27,7 +27,7 @@ class Editing {
     if (!this.solved) this.guess();
     if (answer.conflicts) this.explain();
     if (kept?.file) this.take({ file: kept.file, at: new Map(kept.at) }, kept.changed);
-    else if (!Object.keys(this.placed.pins).length && !this.solved) this.use("bar");
+    else if (!this.placed.pins.size) this.use("bar");
   }
 
   // the page
@@ -50,7 +50,7 @@ class Editing {
     document.querySelector(".left").prepend(this.panel.bar, this.panel.hint);
     document.querySelector(".right").prepend(this.panel.section);
     this.hand.attach(stage);
-    page.on("view", () => this.sketch.draw());
+    page.on("view", () => { if (!this.hand.dragged) this.sketch.draw(); });
     for (const event of ["move", "size"]) page.on(event, () => this.follow());
     const width = page.view?.width ?? 600;
     lens.base = view?.scale ?? (solved ? page.view?.scale : width / BLANK_WIDTH);
@@ -71,7 +71,8 @@ class Editing {
   /** Where all pins are, once the page has moved. */
   follow() {
     const { page } = this.parts;
-    if (this.solved && !this.hand.dragged) for (const name of Pins.all(this.file).keys()) if (page.data.points[name]) this.at.set(name, page.point(name).position);
+    if (this.hand.dragged) return; // who leads it draws
+    if (this.solved) for (const name of Pins.all(this.file).keys()) if (page.data.points[name]) this.at.set(name, page.point(name).position);
     if (!this.solved || this.tool !== "hand") this.sketch.draw();
   }
 

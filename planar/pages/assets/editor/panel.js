@@ -107,6 +107,9 @@ class PencilPanel {
         const [a, b] = places, pin = Pins.of(editing.placed.pins, one.name, ends[1]);
         number(`length ${ends.join("")}`, Plane.apart(a, b), (value) => editing.movePin(pin, Plane.on(a, Plane.unit(Plane.minus(b, a)), value)));
       }
+      const draw = (make) => editing.perform((draft) => make(draft, one.name, 2 * editing.sketch.step));
+      chosen.append(this.button("Copy", () => draw(Draw.copyLink), { "aria-label": `Copy ${one.name}` }));
+      chosen.append(this.button("Mirror", () => draw(Draw.mirrorLink), { "aria-label": `Mirror ${one.name}` }));
     } else return;
     chosen.append(this.button("Erase", () => editing.erase(), { "aria-label": `Erase ${one.name}` }));
   }
