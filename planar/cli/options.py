@@ -190,7 +190,10 @@ def output_option(help: str, required: bool = False) -> Callable[[Any], Any]:  #
 
 def refuse_overwriting(model: str, output: Path | None, what: str = "the mechanism's own file") -> None:
     """Refuse to write over a file that is read."""
-    if output is not None and output.exists() and Path(model).exists() and output.samefile(model):
+    from planar.document import LINK_PREFIX
+
+    is_file = not model.startswith(LINK_PREFIX) and Path(model).exists()
+    if output is not None and is_file and output.exists() and output.samefile(model):
         raise BadInput("-o", f"this is {what}, which would be lost; name another")
 
 

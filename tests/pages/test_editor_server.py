@@ -189,8 +189,14 @@ def test_the_pages_own_links_are_read_by_python():
 
 
 def test_a_link_is_viewed(tmp_path):
+    link = write_link(planar.to_dict("walschaerts-valve-gear"))
+    assert len(link) > 255  # no file has so long a name
+    (tmp_path / "a.html").touch()
     done = CliRunner().invoke(main, ["view", write_link(FOUR_BAR), "-o", str(tmp_path / "a.html")])
     assert done.exit_code == 0, done.output
+    done = CliRunner().invoke(main, ["gallery", link, "-o", str(tmp_path / "pages")])
+    assert done.exit_code == 0, done.output
+    assert (tmp_path / "pages" / "link.html").exists()
     assert "<h1>Four-bar chain</h1>" in (tmp_path / "a.html").read_text(encoding="utf-8")
 
 

@@ -67,13 +67,15 @@ def view(model: str, output: Path | None, at: tuple[str, ...], mode: int | None,
 )
 def gallery(models: tuple[str, ...], output: Path) -> None:
     """A page for each model, and an index of small moving pictures; without models of all that come along."""
+    from planar.document import LINK_PREFIX
     from planar.document.files import PIPED, find_model_file, model_files
     from planar.pages.gallery import write_gallery as write
 
     if not models:
         refuse_settings()
     named = models or tuple(map(str, model_files()))
-    files = ["piped" if model == PIPED else find_model_file(model).stem for model in named]
+    words = {PIPED: "piped"} | {model: "link" for model in named if model.startswith(LINK_PREFIX)}
+    files = [words.get(model) or find_model_file(model).stem for model in named]
     with show_progress(f"{len(files)} pages") as progress:
         each = [(name, read_model(model)) for name, model in zip(files, named, strict=True)]
         index, refused = write(each, output, progress)

@@ -104,11 +104,13 @@ def conflict_answer(value: Any) -> dict[str, Any]:
     a search. Raises BadInput, NoAnswer.
     """
     mechanism = from_dict(value)
+    why = ""
     try:
-        solved_mechanism(mechanism)
-        return {"problem": "", "remedies": []}
+        known = solved_mechanism(mechanism).assembly
     except NoAnswer as problem:
-        why = str(problem)
+        known, why = None, str(problem)
+    if known is not None:
+        return {"problem": "", "remedies": []}
     found = conflict(mechanism)
     if found is None:
         return {"problem": why, "remedies": []}

@@ -26,8 +26,8 @@ from planar.pages.editor.answer import conflict_answer, edit_answer
 from planar.pages.editor.edit_page import edit_page
 
 LOCAL = "127.0.0.1"
-CLOSING_PAUSE = 3.0
-"""s: a page that is loaded again is back by then."""
+CLOSING_PAUSE = 5.0
+"""s: a page that is loaded again is back by then, once it has been sent."""
 SILENCE = 200.0
 """s: an open page is heard of more often; browsers wake pages that nobody sees once a minute."""
 REQUEST_TIMEOUT = 30.0
@@ -75,6 +75,10 @@ class EditServer(ThreadingHTTPServer):
             self.open_pages[page] = self.last_heard
         else:
             self.open_pages.pop(page, None)
+
+    def hold(self) -> None:
+        """A page is on its way: wait for what it says."""
+        self.last_heard = time.monotonic()
 
     def is_over(self) -> bool:
         """Whether the page was open and is so no more."""
@@ -126,8 +130,10 @@ class _Handler(BaseHTTPRequestHandler):
             return
         with self.server.work:
             path = self.server.path
+            self.server.hold()
             text = edit_page(self.server.value, path.name if path else None)
         self._send(HTTPStatus.OK, text, "text/html; charset=utf-8")
+        self.server.hold()
 
     def do_POST(self) -> None:
         """What the page asks: an answer on a drawing, to save it; that it is there, or goes."""

@@ -70,7 +70,7 @@ const Draw = {
   /** A pin is fixed to the frame, or no longer. */
   ground(draft, spot) {
     const { file } = draft, pin = Draw.pin(draft, spot), points = (file.links[file.frame].points ??= {});
-    if (pin in points) {
+    if (Object.hasOwn(points, pin)) {
       delete points[pin];
       Draw.clean(draft);
       return `${pin} is fixed no longer`;
@@ -205,7 +205,7 @@ const Draw = {
 
   /** What refers to nothing any more goes, too. */
   clean(draft) {
-    const { file, at } = draft, has = (link) => link in file.links, carries = (link, point) => has(link) && Pins.ofLink(file.links[link]).includes(point);
+    const { file, at } = draft, has = (link) => Object.hasOwn(file.links, link), carries = (link, point) => has(link) && Pins.ofLink(file.links[link]).includes(point);
     for (const pair of file.pairs ?? []) if (pair.turning !== undefined && pair.links && !pair.points) pair.links = pair.links.filter((link) => carries(link, pair.turning));
     file.pairs = (file.pairs ?? []).filter((pair) => {
       if (pair.turning !== undefined) return pair.points ? pair.links.every((link, k) => carries(link, pair.points[k])) : (pair.links ?? Pins.carriers(file, pair.turning)).length > 1;

@@ -34,7 +34,7 @@ class Editing {
 
   /** Make the page anew of data; where nothing is solved they are those of an empty one, and the sketch stands there. */
   begin(data, program, solved) {
-    const view = this.view ?? null, focused = document.activeElement?.id;
+    const view = this.view ?? null, focused = document.activeElement;
     if (this.parts) {
       this.parts.controls.pause();
       this.parts.page.lifetime.abort();
@@ -58,7 +58,7 @@ class Editing {
     else if (!solved && page.view) lens.look({ scale: width / BLANK_WIDTH, at: [0.35 * BLANK_WIDTH, 0.2 * BLANK_WIDTH] });
     svg.setAttribute("aria-describedby", "pencil-hint");
     this.show();
-    if (focused) document.getElementById(focused)?.focus({ preventScroll: true });
+    (focused?.isConnected ? focused : document.getElementById(focused?.id))?.focus({ preventScroll: true });
   }
 
   static lensOf({ scale, width, height, toWorld }) { return { scale, at: toWorld([width / 2, height / 2]) }; }
