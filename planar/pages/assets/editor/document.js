@@ -131,16 +131,17 @@ const Draw = {
     const { file } = draft, pins = spots.map((spot) => spot.pin);
     if (pins.includes(null) || pins[0] === pins[1]) throw new Error("a spring goes from one pin to another");
     const far = Plane.apart(...pins.map((pin) => draft.at.get(pin)));
-    (file.springs ??= []).push({ points: pins, stiffness: "1000 N/m", free_length: Draw.length(draft, far) });
-    return `Spring between ${pins.join(" and ")}, 1000 N/m`;
+    (file.springs ??= []).push({ points: pins, stiffness: draft.usual.stiffness.join(" "), free_length: Draw.length(draft, far) });
+    return `Spring between ${pins.join(" and ")}, ${draft.usual.stiffness.join(" ")}`;
   },
 
-  /** A force on a pin: 100 N in a direction. */
+  /** A force on a pin in a direction. */
   load(draft, pin, to) {
     if (pin === null) throw new Error("a force acts on a pin");
-    const way = Plane.unit(Plane.minus(to, draft.at.get(pin))), force = way.map((each) => `${Number((100 * each).toPrecision(6)) || 0} N`);
+    const [most, unit] = draft.usual.force, way = Plane.unit(Plane.minus(to, draft.at.get(pin)));
+    const force = way.map((each) => `${Number((most * each).toPrecision(6)) || 0} ${unit}`);
     (draft.file.loads ??= []).push({ point: pin, force });
-    return `Force on ${pin}, 100 N`;
+    return `Force on ${pin}, ${most} ${unit}`;
   },
 
   /** A mass of a link, in the middle of its points. */
@@ -149,8 +150,8 @@ const Draw = {
     if (link === file.frame) throw new Error("the frame stands still: its mass is nothing to the motion");
     if (!axes) throw new Error(`nothing tells how ${link} lies`);
     const places = points.map((point) => placed.place(link, point)), middle = [0, 1].map((k) => places.reduce((sum, each) => sum + each[k], 0) / places.length);
-    (file.masses ??= []).push({ link, mass: "1 kg", at: Draw.spot(draft, Plane.local(axes, middle)) });
-    return `Mass of ${link}, 1 kg`;
+    (file.masses ??= []).push({ link, mass: draft.usual.mass.join(" "), at: Draw.spot(draft, Plane.local(axes, middle)) });
+    return `Mass of ${link}, ${draft.usual.mass.join(" ")}`;
   },
 
   /** Two links turn as wheels do; they meet as they stand. */
