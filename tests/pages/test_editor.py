@@ -602,3 +602,40 @@ def test_without_its_server_what_is_drawn_stays_and_leaves_as_a_link(drawing):
     link = hand.window.get_by_label("Link of the mechanism").input_value()
     equal(planar.load(link), SLIDER_CRANK)
     assert json.loads(read_link(link)) == hand.file()
+
+
+def test_a_slide_is_driven_from_where_it_stands(drawing):
+    hand = drawing()
+    draw_slider_crank(hand)
+    hand.click((0, 0), (150, 0))
+    (given,) = hand.mechanism().inputs
+    assert (given.pair, given.position, given.velocity) == ("C slide", 0.0, pytest.approx(0.1))
+    assert planar.solve(hand.mechanism()).point("B").position == pytest.approx([0.03, 0.04], abs=CLOSE)
+
+
+# what acts
+
+
+@pytest.mark.parametrize(("length", "units"), [("mm", ("N/m", "N", "kg")), ("in", ("lbf/in", "lbf", "lb"))])
+def test_springs_forces_and_masses_are_drawn_in_the_files_kind_of_units(length, units, drawing):
+    value = planar.to_dict("crank-rocker")
+    value["units"]["length"] = length
+    value["links"]["frame"]["points"] = {"A0": [0, 0], "B0": [200, 0]}
+    hand = drawing(value)
+    places = {name: point.position * 1000 for name, point in planar.solve(hand.mechanism()).points.items()}
+    hand.tool("Spring")
+    hand.drag(places["A"], places["B0"])
+    hand.tool("Force")
+    hand.drag(places["B"], places["B"] + np.array([0, -0.2 * places["B"][1]]))
+    hand.tool("Mass")
+    hand.click((places["A"] + places["B"]) / 2)
+    file = hand.file()
+    found = file["springs"][0]["stiffness"], file["loads"][0]["force"][1], file["masses"][0]["mass"]
+    assert tuple(each.split(" ", 1)[1] for each in found) == units
+    drawn = hand.mechanism()
+    assert drawn.springs[0].ends == ("A", "B0")
+    assert drawn.loads[0].point == "B"
+    assert drawn.masses[0].link == "coupler"
+    (given,) = drawn.inputs
+    effort = float(planar.forces(planar.solve(drawn)).inputs[given.pair])
+    assert hand.window.evaluate("(name) => page.forces.effort(name)", given.pair) == pytest.approx(effort, rel=1e-8)

@@ -6,7 +6,6 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 from planar.document.dimensions import Dimension, file_dimensions
-from planar.foundation.units import SI_UNITS
 from planar.model.mechanism import Mechanism
 
 LOAD_KINDS = frozenset({"force", "torque"})
@@ -36,7 +35,7 @@ def action_parameters(mechanism: Mechanism) -> Iterator[Dimension]:
 
 
 def parameter_data(each: Dimension, mechanism: Mechanism, parameters: Sequence[Dimension]) -> dict[str, Any]:
-    """What a page has of a parameter: `most` is how far its slider goes, `unit` the SI unit of its kind.
+    """What a page has of a parameter: `most` is how far its slider goes.
 
     A force goes to both sides; what is zero in the file goes as far as the greatest of its kind.
     """
@@ -49,7 +48,6 @@ def parameter_data(each: Dimension, mechanism: Mechanism, parameters: Sequence[D
         "value": float(each.value),
         "most": RANGE_RATIO * float(own or greatest),
         "positive": each.kind not in LOAD_KINDS,
-        "unit": SI_UNITS[each.kind],
         "path": list(each.path),
     }
 

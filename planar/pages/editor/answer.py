@@ -12,6 +12,7 @@ from planar.assemblies.conflict import conflict
 from planar.document.files import from_dict
 from planar.foundation.errors import BadInput, NoAnswer, Outcome
 from planar.foundation.units import parse_unit
+from planar.model.file_units import display_unit
 from planar.model.mechanism import Mechanism
 from planar.model.wording import count_phrase, join_all_names, quote_names
 from planar.pages.data.page_data import page_data
@@ -21,6 +22,8 @@ from planar.solving.position import PositionSolver, solved_mechanism
 
 LOOSE_TOLERANCE = 1e-9
 """Of a free motion of one: coordinates that move by less stand still."""
+USUAL_AMOUNTS = {"force": 100.0, "mass": 1.0, "stiffness": 1000.0}
+"""SI, before somebody says how much it is."""
 MAX_REMEDIES = 3
 """Changes of one number that are told where it does not go together."""
 BACKDROP = {
@@ -41,12 +44,13 @@ def edit_answer(value: Any) -> dict[str, Any]:
 
     `problem` is a sentence, empty where it moves, `place` its JSON path; `mobility` says in words how it can move,
     `loose` are the links that inputs leave free; `conflicts`: whether `conflict_answer` has more to say. `data` and
-    `functions` are those of a page, where there is a position; `units` the metres and radians of the file's units.
+    `functions` are those of a page, where there is a position; `units` the metres and radians of the file's units,
+    `usual` what is drawn of a force, a mass, a stiffness at first: a number and its unit.
     """
     found: dict[str, Any] = {"problem": "", "place": "", "mobility": "", "loose": [], "remedies": []}
     try:
         mechanism = from_dict(value)
-        found["units"] = _units(mechanism)
+        found |= {"units": _units(mechanism), "usual": _usual_amounts(mechanism)}
         data, functions = page_data(mechanism)
     except BadInput as problem:
         return found | {"problem": problem.sentence, "place": problem.place}
@@ -117,6 +121,15 @@ def conflict_answer(value: Any) -> dict[str, Any]:
     changes = islice((*found.dimensions, *found.positions), MAX_REMEDIES)
     told = (f"it goes together with {each.name} = {each.shown}" for each in changes)
     return {"problem": why, "remedies": [found.remarks[0], *told]}
+
+
+def _usual_amounts(mechanism: Mechanism) -> dict[str, tuple[float, str]]:
+    """A round number of the unit in which each is shown, and that unit."""
+    found = {}
+    for kind, value in USUAL_AMOUNTS.items():
+        name, unit = display_unit(kind, mechanism.units)
+        found[kind] = float(f"{unit.from_si(value):.1g}"), name
+    return found
 
 
 def _units(mechanism: Mechanism) -> dict[str, float]:

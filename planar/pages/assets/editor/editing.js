@@ -10,7 +10,7 @@ const BLANK_WIDTH = 0.3;    // m that are seen of empty paper
 class Editing {
   constructor(data, program) {
     const { value, name, answer } = data.edited;
-    Object.assign(this, { file: value, fileName: name, answer, units: answer.units ?? { length: 1e-3, angle: Math.PI / 180 } });
+    Object.assign(this, { file: value, fileName: name, answer, units: answer.units ?? { length: 1e-3, angle: Math.PI / 180 }, usual: answer.usual });
     Object.assign(this, { at: new Map(), done: [], undone: [], tool: "hand", chosen: null, changed: false, asked: 0, settled: true });
     this.blank = document.querySelector("main").cloneNode(true);
     this.blank.querySelector("#still")?.remove();
@@ -122,7 +122,7 @@ class Editing {
   /** A copy to draw on, with the numbers that the page has been given by hand. */
   draft() {
     const { file, units, parts: { page } } = this;
-    return { file: this.solved ? fileNow(page, file, units) : structuredClone(file), at: new Map(this.at), units };
+    return { file: this.solved ? fileNow(page, file, units) : structuredClone(file), at: new Map(this.at), units, usual: this.usual };
   }
 
   perform(make) {
@@ -174,7 +174,7 @@ class Editing {
     const answer = await this.post("answer", { document: this.file });
     if (number !== this.asked) return; // something else is drawn by now
     this.answer = answer;
-    if (answer.units) this.units = answer.units;
+    if (answer.units) Object.assign(this, { units: answer.units, usual: answer.usual });
     if (answer.data) {
       const script = document.createElement("script"); // functions are run as those of any page are
       script.textContent = `globalThis.answered = (() => { ${answer.functions}\nreturn program; })();`;
