@@ -225,7 +225,7 @@ def test_problem_sheets_and_answers_have_no_metric_unit() -> None:
 @pytest.mark.parametrize("model", ["motor-press", "toggle-clamp", "tipper"])
 def test_pages_of_motors_friction_and_stops_have_no_metric_unit(model: str) -> None:
     data, _ = page_data(replace(MODELS[model], units=MODEL_IN_FEET, about=None, notes=(), source=None))
-    assert not [text for text in strings({**data, "document": {}, "unit_choices": []}) if metric_words(text)]
+    assert not [text for text in strings({**data, "document": {}, "unit_choices": {}}) if metric_words(text)]
 
 
 def test_pages_take_every_unit_from_their_data() -> None:
@@ -233,7 +233,7 @@ def test_pages_take_every_unit_from_their_data() -> None:
     shown = {kind: unit["name"] for kind, unit in data["units"].items()}
     assert (shown["force"], shown["torque"], shown["power"]) == ("lbf", "lbf·in", "lbf·in/s")
     assert data["paper"] == {"name": "in", "mm": 25.4}
-    assert not [text for text in strings({**data, "document": {}, "unit_choices": []}) if metric_words(text)]
+    assert not [text for text in strings({**data, "document": {}, "unit_choices": {}}) if metric_words(text)]
     assert not [text for text in strings(data["document"]["value"]) if metric_words(text)]
     scripts = Path(planar.__file__).parent / "pages" / "assets"
     for script in scripts.rglob("*.js"):

@@ -604,6 +604,15 @@ def test_without_its_server_what_is_drawn_stays_and_leaves_as_a_link(drawing):
     assert json.loads(read_link(link)) == hand.file()
 
 
+def test_a_slide_is_driven_from_where_it_stands(drawing):
+    hand = drawing()
+    draw_slider_crank(hand)
+    hand.click((0, 0), (150, 0))
+    (given,) = hand.mechanism().inputs
+    assert (given.pair, given.position, given.velocity) == ("C slide", 0.0, pytest.approx(0.1))
+    assert planar.solve(hand.mechanism()).point("B").position == pytest.approx([0.03, 0.04], abs=CLOSE)
+
+
 # what acts
 
 

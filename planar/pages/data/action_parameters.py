@@ -6,7 +6,6 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 from planar.document.dimensions import Dimension, file_dimensions
-from planar.model.file_units import unit_of_kind
 from planar.model.mechanism import Mechanism
 
 LOAD_KINDS = frozenset({"force", "torque"})
@@ -36,12 +35,10 @@ def action_parameters(mechanism: Mechanism) -> Iterator[Dimension]:
 
 
 def parameter_data(each: Dimension, mechanism: Mechanism, parameters: Sequence[Dimension]) -> dict[str, Any]:
-    """What a page has of a parameter: `most` is how far its slider goes, `unit` the file's unit of its
-    kind, of which one of SI is so many as `in_unit`.
+    """What a page has of a parameter: `most` is how far its slider goes.
 
     A force goes to both sides; what is zero in the file goes as far as the greatest of its kind.
     """
-    unit, scale = unit_of_kind(each.kind, mechanism.units)
     greatest = max((abs(other.value) for other in parameters if other.kind == each.kind), default=0.0) or 1.0
     own = abs(each.value) if each.kind in NONNEGATIVE_KINDS or each.kind == "length" else greatest
     return {
@@ -51,8 +48,6 @@ def parameter_data(each: Dimension, mechanism: Mechanism, parameters: Sequence[D
         "value": float(each.value),
         "most": RANGE_RATIO * float(own or greatest),
         "positive": each.kind not in LOAD_KINDS,
-        "unit": unit,
-        "in_unit": float(scale.from_si(1.0)),
         "path": list(each.path),
     }
 

@@ -39,11 +39,12 @@ const Files = (() => {
         put(path, given.slides ? length(now) : shortest(now, units.angle.ratio, "rad"));
       }
     });
-    data.forces?.parameters.forEach(({ path, value, kind, unit, in_unit: ratio }, k) => {
+    data.forces?.parameters.forEach(({ path, value, kind }, k) => {
       const now = page.acting?.values[k] ?? value;
       if (now === value) return;
       changed = true;
-      put(path, kind === "length" ? length(now) : `${now * ratio} ${unit}`);
+      const { ratio, name } = units[kind];
+      put(path, kind === "length" ? length(now) : `${Number(((now * ratio[1]) / ratio[0]).toPrecision(15))} ${name}`);
     });
     if (!changed) return file;
     // `ids` and what was published are of the file's own position and dimensions

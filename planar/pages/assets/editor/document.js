@@ -117,7 +117,7 @@ const Draw = {
     const placed = new Placed(file, draft.at, units), at = placed.motion(name);
     if (at === null) throw new Error(`nothing tells how far ${name} has gone`);
     const position = Written.write(slides ? at : -Symbols.wrapped(-at), slides ? "length" : "angle", units, 0);
-    file.inputs = [...driven, { pair: name, position, velocity: slides ? Draw.length(draft, 1) : "10 rad/s" }];
+    file.inputs = [...driven, { pair: name, position, velocity: slides ? `${Number((0.1 / units.length).toPrecision(1))} ${file.units?.length ?? "m"}/s` : "10 rad/s" }];
     return `${name} is driven`;
   },
 
@@ -127,18 +127,24 @@ const Draw = {
     return links.slice(0, 2);
   },
 
+  /** A number and a unit, before somebody says how much it is. */
+  usual(draft, kind) {
+    if (!draft.usual) throw new Error("fix a pin to the frame first");
+    return draft.usual[kind];
+  },
+
   spring(draft, spots) {
     const { file } = draft, pins = spots.map((spot) => spot.pin);
     if (pins.includes(null) || pins[0] === pins[1]) throw new Error("a spring goes from one pin to another");
     const far = Plane.apart(...pins.map((pin) => draft.at.get(pin)));
-    (file.springs ??= []).push({ points: pins, stiffness: draft.usual.stiffness.join(" "), free_length: Draw.length(draft, far) });
+    (file.springs ??= []).push({ points: pins, stiffness: Draw.usual(draft, "stiffness").join(" "), free_length: Draw.length(draft, far) });
     return `Spring between ${pins.join(" and ")}, ${draft.usual.stiffness.join(" ")}`;
   },
 
   /** A force on a pin in a direction. */
   load(draft, pin, to) {
     if (pin === null) throw new Error("a force acts on a pin");
-    const [most, unit] = draft.usual.force, way = Plane.unit(Plane.minus(to, draft.at.get(pin)));
+    const [most, unit] = Draw.usual(draft, "force"), way = Plane.unit(Plane.minus(to, draft.at.get(pin)));
     const force = way.map((each) => `${Number((most * each).toPrecision(6)) || 0} ${unit}`);
     (draft.file.loads ??= []).push({ point: pin, force });
     return `Force on ${pin}, ${most} ${unit}`;
@@ -150,7 +156,7 @@ const Draw = {
     if (link === file.frame) throw new Error("the frame stands still: its mass is nothing to the motion");
     if (!axes) throw new Error(`nothing tells how ${link} lies`);
     const places = points.map((point) => placed.place(link, point)), middle = [0, 1].map((k) => places.reduce((sum, each) => sum + each[k], 0) / places.length);
-    (file.masses ??= []).push({ link, mass: draft.usual.mass.join(" "), at: Draw.spot(draft, Plane.local(axes, middle)) });
+    (file.masses ??= []).push({ link, mass: Draw.usual(draft, "mass").join(" "), at: Draw.spot(draft, Plane.local(axes, middle)) });
     return `Mass of ${link}, ${draft.usual.mass.join(" ")}`;
   },
 
