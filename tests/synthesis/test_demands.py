@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import planar
+from planar.synthesis.demands.output_transmissions import output_transmissions
 from planar.synthesis.demands.polygon import polygon_depths
 from planar.synthesis.design_search import DesignSearch
 from planar.synthesis.fitting.demand_polish import constrained_step
@@ -87,7 +88,7 @@ def test_transmission_angles_of_the_fit_are_those_of_the_general_path(model, poi
     inputs = motion.inputs[own.mechanism.inputs[0].pair].position / own.equations[0].input_scale
     y = np.concatenate([z[0], inputs[:, None]], axis=1)[1:-1]
     x = np.broadcast_to(own.free.values / own.equations[0].scale, (len(y), len(own.free.names)))
-    for each, angle in zip(rows.transmissions, rows.values(x, y).T, strict=True):
+    for each, angle in zip(output_transmissions(motion), rows.values(x, y).T, strict=True):
         np.testing.assert_allclose(angle, planar.transmission(motion, each.pair).angle[1:-1], atol=1e-9)
 
 

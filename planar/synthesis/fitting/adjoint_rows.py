@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from functools import cached_property
 from typing import NamedTuple
 
@@ -34,26 +34,22 @@ class _SystemFunctions(NamedTuple):
 
 
 class AdjointRows:
-    """Values at positions y of designs x (see `in_entries`), a column for each linear system.
+    """Values at positions y of designs x (see `in_entries`), a column for each of linear `systems`.
 
     Where a value is a(y, x, l) of what solves A(y, x) l = -b(y, x), with A^T w = a_l, it changes by the adjoint (A.
     Griewank, A. Walther, Evaluating Derivatives, SIAM 2008, ch. 15): da = (a - w^T (A l + b))_x dx, and with y alike.
     """
 
-    def __init__(self, free: Sequence[str], scale: Array):
-        self.free, self.scale = tuple(free), scale
+    def __init__(self, systems: Iterable[LinearSystem], free: Sequence[str], scale: Array):
+        self.systems, self.free, self.scale = tuple(systems), tuple(free), scale
 
     def __len__(self) -> int:
         """How many columns there are."""
-        raise NotImplementedError
-
-    def systems(self) -> Iterator[LinearSystem]:
-        """One for each column."""
-        raise NotImplementedError
+        return len(self.systems)
 
     @cached_property
     def _functions(self) -> list[_SystemFunctions]:
-        return [self._functions_of(each) for each in self.systems()]
+        return [self._functions_of(each) for each in self.systems]
 
     def _functions_of(self, of: LinearSystem) -> _SystemFunctions:
         y, x, (equations, value) = in_entries(of.design, self.free, self.scale, [of.equations, of.value])

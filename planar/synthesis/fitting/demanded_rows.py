@@ -11,9 +11,9 @@ from planar.solving.cycle import cycle
 from planar.synthesis.demands.output_transmissions import output_transmissions
 from planar.synthesis.fitting.adjoint_rows import AdjointRows
 from planar.synthesis.fitting.demand_guard import DemandGuard
-from planar.synthesis.fitting.rate_rows import RateRows
+from planar.synthesis.fitting.rate_rows import rate_rows
 from planar.synthesis.fitting.region_rows import RegionRows
-from planar.synthesis.fitting.transmission_rows import TransmissionRows
+from planar.synthesis.fitting.transmission_rows import transmission_rows
 from planar.synthesis.fitting.wanted_equations import WantedEquations, WantedRows
 from planar.synthesis.task.freedom import generic_start
 from planar.synthesis.task.starts import FreeNumbers
@@ -34,11 +34,11 @@ def demand_guards(
     demands, mechanism = task.demands, equations.design.mechanism
     kept: list[tuple[AdjointRows | RegionRows, float]] = []
     if demands.transmission is not None:
-        kept.append((_transmission_rows(equations, free), demands.transmission))
+        kept.append((_output_rows(equations, free), demands.transmission))
     if demands.inside is not None:
         kept.append((RegionRows(mechanism, demands.inside, size, equations.free, equations.scale), 0.0))
     if demands.whole_turn or kept:
-        kept.append((RateRows(mechanism, equations.free, equations.scale), LEAST_RATE))
+        kept.append((rate_rows(mechanism, equations.free, equations.scale), LEAST_RATE))
     is_guarded = bool(kept or task.needs_whole_turn or demands.one_branch)
     is_bound = bool(task.exact) or any(getattr(each, "in_order", False) for each in task.wanted)
     if not (is_guarded or is_bound):
@@ -50,11 +50,11 @@ def demand_guards(
     return {over_turn: DemandGuard(guarded, *told, over_range=not over_turn) for over_turn in (True, False)}
 
 
-def _transmission_rows(equations: WantedEquations, free: FreeNumbers) -> TransmissionRows:
+def _output_rows(equations: WantedEquations, free: FreeNumbers) -> AdjointRows:
     mechanism = equations.design.mechanism
     try:
         motion = cycle(generic_start(mechanism, free), SAMPLES, pair=mechanism.inputs[0].pair)
         told = tuple(output_transmissions(motion))
     except PlanarError:
         told = ()  # the judge tells
-    return TransmissionRows(mechanism, told, equations.free, equations.scale)
+    return transmission_rows(mechanism, told, equations.free, equations.scale)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 import casadi as ca
 
@@ -12,21 +12,12 @@ from planar.model.mechanism import Mechanism
 from planar.synthesis.fitting.adjoint_rows import AdjointRows, LinearSystem
 
 
-class RateRows(AdjointRows):
-    """The rate of the running input where all unknowns together go on by one."""
-
-    def __init__(self, mechanism: Mechanism, free: Sequence[str], scale: Array):
-        super().__init__(free, scale)
-        self.design = design_equations(mechanism)
-
-    def __len__(self) -> int:
-        """One, but of a mechanism without unknowns, of which nothing can stop."""
-        return int(self.design.z.numel() > 0)
-
-    def systems(self) -> Iterator[LinearSystem]:
-        """The velocities where the input goes on by one."""
-        design = self.design
-        velocities = ca.SX.sym("v", design.z.numel())
-        by_input = ca.jacobian(design.F, design.u)[:, 0] * float(design.input_scale[0])
-        equations = ca.jacobian(design.F, design.z) @ velocities + by_input
-        yield LinearSystem(design, equations, velocities, 1.0 / ca.sqrt(1.0 + ca.sumsqr(velocities)))
+def rate_rows(mechanism: Mechanism, free: Sequence[str], scale: Array) -> AdjointRows:
+    """The rate of the running input where all unknowns together go on by one: a column, but none of a mechanism without
+    unknowns, of which nothing can stop."""
+    design = design_equations(mechanism)
+    velocities = ca.SX.sym("v", design.z.numel())
+    by_input = ca.jacobian(design.F, design.u)[:, 0] * float(design.input_scale[0])
+    equations = ca.jacobian(design.F, design.z) @ velocities + by_input
+    rate = LinearSystem(design, equations, velocities, 1.0 / ca.sqrt(1.0 + ca.sumsqr(velocities)))
+    return AdjointRows([rate] if design.z.numel() else [], free, scale)

@@ -17,26 +17,22 @@ from planar.model.output_pair import find_output_pair
 from planar.synthesis.fitting.adjoint_rows import AdjointRows, LinearSystem
 
 
-class TransmissionRows(AdjointRows):
+def transmission_rows(
+    mechanism: Mechanism, transmissions: Sequence[Transmission], free: Sequence[str], scale: Array
+) -> AdjointRows:
     """Angles (rad), a column for each of the transmissions."""
+    return AdjointRows(_linear_systems(mechanism, transmissions), free, scale)
 
-    def __init__(self, mechanism: Mechanism, transmissions: Sequence[Transmission], free: Sequence[str], scale: Array):
-        super().__init__(free, scale)
-        self.mechanism, self.transmissions = mechanism, tuple(transmissions)
 
-    def __len__(self) -> int:
-        """How many outputs there are."""
-        return len(self.transmissions)
-
-    def systems(self) -> Iterator[LinearSystem]:
-        """The balance under an effort on each output."""
-        for each in self.transmissions:
-            pair = find_output_pair(self.mechanism, each.pair)[1]
-            system = TransmissionSystem(self.mechanism, each.link, pair, each.through)
-            balance, design = system.balance, system.design
-            given = [balance.work.factors, balance.constants, design.z1, design.z2]
-            known = [ca.SX.ones(given[0].numel()), *(ca.SX.zeros(other.numel()) for other in given[1:])]
-            acting, angle = ca.substitute(
-                [balance.in_unknowns(balance.acting), balance.in_unknowns(system.angle)], given, known
-            )
-            yield LinearSystem(design, acting, balance.unknowns, angle)
+def _linear_systems(mechanism: Mechanism, transmissions: Sequence[Transmission]) -> Iterator[LinearSystem]:
+    """The balance under an effort on each output."""
+    for each in transmissions:
+        pair = find_output_pair(mechanism, each.pair)[1]
+        system = TransmissionSystem(mechanism, each.link, pair, each.through)
+        balance, design = system.balance, system.design
+        given = [balance.work.factors, balance.constants, design.z1, design.z2]
+        known = [ca.SX.ones(given[0].numel()), *(ca.SX.zeros(other.numel()) for other in given[1:])]
+        acting, angle = ca.substitute(
+            [balance.in_unknowns(balance.acting), balance.in_unknowns(system.angle)], given, known
+        )
+        yield LinearSystem(design, acting, balance.unknowns, angle)
