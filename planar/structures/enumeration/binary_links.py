@@ -70,9 +70,13 @@ def _keep_movable(graph: ContractedGraph, rows: Array) -> Array:
     if not sets:
         return rows
     edges = [(i, j) for i, j, count in graph.bundles for _ in range(count)]
-    within = np.array([[i in each and j in each for each in sets] for i, j in edges], dtype=np.float32)
-    most = np.array([3 * len(each) - 4 for each in sets], dtype=np.float32)
-    held = np.maximum(2 - rows, 0).astype(np.float32) @ within
+    within = np.array([[i in each and j in each for each in sets] for i, j in edges], dtype=np.int8)
+    most = np.array([3 * len(each) - 4 for each in sets], dtype=np.int8)
+    missing = np.maximum(2 - rows, 0).astype(np.int8)
+    # A sum edge by edge: integers do not go through BLAS, whose padding may raise flags of numbers that are not there.
+    held = np.zeros((len(rows), len(sets)), dtype=np.int8)
+    for edge, row in enumerate(within):
+        held += missing[:, edge, None] * row
     kept: Array = rows[(held <= most).all(axis=1)]
     return kept
 
