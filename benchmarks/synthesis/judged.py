@@ -12,6 +12,8 @@ from benchmarks.synthesis.misses import Array, chord_distances, is_whole_turn, p
 ROUNDING = 2e-5
 """Of the extent: a place may lie further off than the search says by so much."""
 CHORDS = 5400
+MOST_TURNS = 8
+"""Of the input, where gears let a path close after several only."""
 
 
 def design_faults(mechanism: planar.Mechanism, point: str, places: Array, told: float, closed: bool) -> list[str]:
@@ -21,7 +23,7 @@ def design_faults(mechanism: planar.Mechanism, point: str, places: Array, told: 
     """
     again = planar.from_dict(json.loads(planar.dumps(mechanism)))
     try:
-        path = path_of(again, point, CHORDS)
+        path = path_of(again, point, CHORDS, MOST_TURNS)
         whole = is_whole_turn(again, planar.cycle(again, 90, pair=again.inputs[0].pair))
     except planar.PlanarError as problem:
         return [f"its file cannot be solved: {problem}"]

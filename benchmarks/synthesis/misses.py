@@ -19,6 +19,8 @@ Array = np.ndarray
 STEPS = 3600
 """Of a path: its chords are off a smooth one by 4e-7 of its extent or so."""
 WHOLE = 1e-9
+CLOSES = 1e-7
+"""Of the path's extent: after a turn that ends so near its beginning it repeats itself."""
 ON_END = 1e-5
 """Of the range: beside a dead point no position of the input is asked for but that of the end itself."""
 
@@ -35,17 +37,21 @@ def extent(places: Array) -> float:
     return float(np.hypot(*np.ptp(places, axis=0)))
 
 
-def path_of(mechanism: planar.Mechanism, point: str, steps: int = STEPS) -> Array:
+def path_of(mechanism: planar.Mechanism, point: str, steps: int = STEPS, most_turns: int = 1) -> Array:
     """The path (n, 2) of a point over all of the motion that the first input makes, from end to end on one branch.
 
     So many positions stand at equal ways along it, where it is fast beside the input, too; half as many are even in the
-    input, for its cusps.
+    input, for its cusps. Where gears let it close after several turns only, it is followed over so many at most.
     """
     running = mechanism.inputs[0].pair
     motion = planar.cycle(mechanism, steps // 2, pair=running)
     given, path = motion.inputs[running].position, np.asarray(motion.point(point).position)
     ends = None
-    if not is_whole_turn(mechanism, motion):  # close at both ends, which are dead points
+    if is_whole_turn(mechanism, motion):
+        if most_turns > 1 and np.hypot(*(path[-1] - path[0])) > CLOSES * np.ptp(path, axis=0).max():
+            given = _over_turns(mechanism, motion, most_turns)
+            path = np.asarray(motion_over_input(mechanism, given).point(point).position)
+    else:  # close at both ends, which are dead points
         low, high = float(given.min()), float(given.max())
         inner = 0.5 - (0.5 - ON_END) * np.cos(np.linspace(0.0, np.pi, steps // 2 + 1))
         ends, given = path[[0, -1]] if given[-1] > given[0] else path[[-1, 0]], low + (high - low) * inner
@@ -59,11 +65,31 @@ def path_of(mechanism: planar.Mechanism, point: str, steps: int = STEPS) -> Arra
     return found if ends is None else np.concatenate([ends[:1], found, ends[1:]])
 
 
+def _over_turns(mechanism: planar.Mechanism, motion: planar.Motion, most: int) -> Array:
+    """Positions of the first input over so many turns, those of a motion of one among them, as far as it goes each way.
+
+    What gears hold together may have dead points in a later turn only.
+    """
+    given = motion.inputs[mechanism.inputs[0].pair].position
+    first, last, step = float(given.min()), float(given.max()), TURN / (len(given) - 1)
+    for way in (1.0, -1.0):
+        stride = TURN
+        while stride > 1e-4 * TURN and last - first < most * TURN:
+            ends = (first, last + stride) if way > 0.0 else (first - stride, last)
+            try:
+                motion_over_input(mechanism, np.linspace(*ends, round((ends[1] - ends[0]) / step) + 1))
+            except planar.PlanarError:
+                stride *= 0.5
+            else:
+                first, last = ends
+    return np.linspace(first, last, round((last - first) / step) + 1)
+
+
 def is_whole_turn(mechanism: planar.Mechanism, motion: planar.Motion) -> bool:
-    """Whether the first input of a motion makes a whole turn."""
+    """Whether the first input of a motion makes a whole turn: between dead points it may go further than one."""
     running = mechanism.inputs[0].pair
     turns = not any(isinstance(pair, planar.SlidingPair) and pair.name == running for pair in mechanism.pairs)
-    return turns and float(np.ptp(motion.inputs[running].position)) > TURN * (1.0 - WHOLE)
+    return turns and abs(float(np.ptp(motion.inputs[running].position)) - TURN) < TURN * WHOLE
 
 
 def distances(path: Array, places: Array) -> Array:
