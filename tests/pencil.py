@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,10 @@ from planar.pages.editor.answer import BLANK
 from planar.pages.editor.server import EditServer
 
 ANSWERED = "() => page && globalThis.editing.settled"
+ON_SCREEN = """([x, y]) => {
+  const { left, top } = svg.getBoundingClientRect(), at = page.view.toScreen([x / 1000, y / 1000]);
+  return [left + at[0], top + at[1]];
+}"""
 
 
 @contextmanager
@@ -45,30 +50,43 @@ class Pencil:
 
     def screen(self, x: float, y: float) -> tuple[float, float]:
         """A place of the world (mm) on the screen (px)."""
-        box = self.window.locator("#drawing").bounding_box()
-        at = self.window.evaluate("([x, y]) => page.view.toScreen([x / 1000, y / 1000])", [x, y])
-        return box["x"] + at[0], box["y"] + at[1]
+        return tuple(self.window.evaluate(ON_SCREEN, [x, y]))
 
     def tool(self, name: str) -> None:
         """Take a tool."""
         self.actions += 1
         self.window.get_by_role("toolbar", name="Pencil").get_by_role("button", name=name, exact=True).click()
 
-    def drag(self, start: tuple[float, float], stop: tuple[float, float]) -> None:
-        """From one place to another."""
+    def drag(self, *places: tuple[float, float]) -> None:
+        """From one place to another, by way of those between."""
         self.actions += 1
-        self.window.mouse.move(*self.screen(*start))
+        self.window.mouse.move(*self.screen(*places[0]))
         self.window.mouse.down()
-        self.window.mouse.move(*self.screen(*stop), steps=2)
+        for place in places[1:]:
+            self.window.mouse.move(*self.screen(*place))
         self.window.mouse.up()
-        self.wait()
 
     def click(self, *places: tuple[float, float]) -> None:
         """One place after the other."""
         for place in places:
             self.actions += 1
             self.window.mouse.click(*self.screen(*place))
-            self.wait()
+
+    def bars(self, *places: tuple[float, float]) -> None:
+        """A bar from each place to the next."""
+        self.tool("Bar")
+        for start, stop in pairwise(places):
+            self.drag(start, stop)
+
+    def use(self, tool: str, *places: tuple[float, float]) -> None:
+        """Take a tool, and click one place after the other."""
+        self.tool(tool)
+        self.click(*places)
+
+    def drive(self, pin: tuple[float, float], *fixed: tuple[float, float]) -> None:
+        """Fix pins to the frame, and drive one of these."""
+        self.use("Ground", pin, *fixed)
+        self.use("Input", pin)
 
     def type(self, field: str, text: str) -> None:
         """Type into a field, and enter it."""
@@ -90,10 +108,12 @@ class Pencil:
 
     def told(self) -> str:
         """What stands beside the drawing on how it moves."""
+        self.wait()
         return self.window.locator("#pencil [role=status]").inner_text()
 
     def file(self) -> Any:
         """The file that is drawn."""
+        self.wait()
         return self.window.evaluate("globalThis.editing.draft().file")
 
     def mechanism(self) -> planar.Mechanism:

@@ -105,10 +105,12 @@ SCRIPTS = (
 
 START = 'beginPage(JSON.parse(document.getElementById("data").textContent), program);'
 EDITOR_SCRIPTS = (
+    "editor/server.js",
     "editor/document.js",
     "editor/links.js",
     "editor/sketch.js",
     "editor/hand.js",
+    "editor/filing.js",
     "editor/panel.js",
     "editor/editing.js",
 )

@@ -75,16 +75,9 @@ def driven(pair, position):
 
 
 def draw_four_bar(hand):
-    hand.tool("Bar")
-    hand.drag((0, 0), (20, 40))
-    hand.drag((20, 40), (100, 70))
-    hand.drag((100, 70), (120, 0))
-    hand.tool("Point")
-    hand.click((60, 55), (50, 90))
-    hand.tool("Ground")
-    hand.click((0, 0), (120, 0))
-    hand.tool("Input")
-    hand.click((0, 0))
+    hand.bars((0, 0), (20, 40), (100, 70), (120, 0))
+    hand.use("Point", (60, 55), (50, 90))
+    hand.drive((0, 0), (120, 0))
 
 
 FOUR_BAR = HEAD | {
@@ -102,15 +95,10 @@ FOUR_BAR = HEAD | {
 
 
 def draw_slider_crank(hand):
-    hand.tool("Bar")
-    hand.drag((0, 0), (30, 40))
-    hand.drag((30, 40), (150, 0))
-    hand.tool("Ground")
-    hand.click((0, 0))
+    hand.bars((0, 0), (30, 40), (150, 0))
     hand.tool("Slide")
     hand.drag((150, 0), (180, 0))
-    hand.tool("Input")
-    hand.click((0, 0))
+    hand.drive((0, 0))
 
 
 SLIDER_CRANK = HEAD | {
@@ -129,15 +117,11 @@ SLIDER_CRANK = HEAD | {
 
 
 def draw_quick_return(hand):
-    hand.tool("Bar")
-    hand.drag((0, 0), (0, 140))
-    hand.drag((60, 80), (0, 80))
-    hand.tool("Ground")
-    hand.click((0, 0), (60, 80))
+    hand.bars((0, 0), (0, 140))
+    hand.bars((60, 80), (0, 80))
     hand.tool("Slide")
     hand.drag((0, 80), (0, 120))
-    hand.tool("Input")
-    hand.click((60, 80))
+    hand.drive((60, 80), (0, 0))
 
 
 QUICK_RETURN = HEAD | {
@@ -172,16 +156,12 @@ SIX_BAR = HEAD | {
 
 
 def draw_wheels(hand):
-    hand.tool("Bar")
-    hand.drag((0, 0), (40, 0))
-    hand.drag((120, 0), (120, 30))
-    hand.tool("Ground")
-    hand.click((0, 0), (120, 0))
+    hand.bars((0, 0), (40, 0))
+    hand.bars((120, 0), (120, 30))
+    hand.drive((0, 0), (120, 0))
     hand.tool("Wheels")
     hand.window.get_by_label("Ratio of wheels").fill("-1.5")
     hand.click((20, 0), (120, 15))
-    hand.tool("Input")
-    hand.click((0, 0))
 
 
 WHEELS = HEAD | {
@@ -199,15 +179,10 @@ WHEELS = HEAD | {
 
 
 def draw_offset_slider_crank(hand):
-    hand.tool("Bar")
-    hand.drag((0, 0), (30, 40))
-    hand.drag((30, 40), (150, 20))
-    hand.tool("Ground")
-    hand.click((0, 0))
+    hand.bars((0, 0), (30, 40), (150, 20))
     hand.tool("Slide")
     hand.drag((150, 20), (180, 50))
-    hand.tool("Input")
-    hand.click((0, 0))
+    hand.drive((0, 0))
 
 
 OFFSET_SLIDER_CRANK = HEAD | {
@@ -226,18 +201,10 @@ OFFSET_SLIDER_CRANK = HEAD | {
 
 
 def draw_watt(hand):
-    hand.tool("Bar")
-    hand.drag((0, 0), (20, 40))
-    hand.drag((20, 40), (100, 70))
-    hand.tool("Plate")
-    hand.click((100, 70), (110, 0), (150, 60), (150, 60))
-    hand.tool("Bar")
-    hand.drag((150, 60), (220, 70))
-    hand.drag((220, 70), (210, 0))
-    hand.tool("Ground")
-    hand.click((0, 0), (110, 0), (210, 0))
-    hand.tool("Input")
-    hand.click((0, 0))
+    hand.bars((0, 0), (20, 40), (100, 70))
+    hand.use("Plate", (100, 70), (110, 0), (150, 60), (150, 60))
+    hand.bars((150, 60), (220, 70), (210, 0))
+    hand.drive((0, 0), (110, 0), (210, 0))
 
 
 WATT = HEAD | {
@@ -257,15 +224,9 @@ WATT = HEAD | {
 
 
 def draw_five_bar(hand):
-    hand.tool("Bar")
-    hand.drag((0, 0), (-20, 60))
-    hand.drag((-20, 60), (50, 110))
-    hand.drag((50, 110), (130, 60))
-    hand.drag((130, 60), (100, 0))
-    hand.tool("Ground")
-    hand.click((0, 0), (100, 0))
-    hand.tool("Input")
-    hand.click((0, 0), (100, 0))
+    hand.bars((0, 0), (-20, 60), (50, 110), (130, 60), (100, 0))
+    hand.drive((0, 0), (100, 0))
+    hand.click((100, 0))
 
 
 FIVE_BAR = HEAD | {
@@ -285,17 +246,11 @@ FIVE_BAR = HEAD | {
 
 
 def draw_toggle(hand):
-    hand.tool("Bar")
-    hand.drag((0, 0), (20, 30))
-    hand.drag((20, 30), (110, 40))
-    hand.drag((110, 40), (110, 100))
-    hand.drag((110, 40), (130, -40))
-    hand.tool("Ground")
-    hand.click((0, 0), (110, 100))
+    hand.bars((0, 0), (20, 30), (110, 40), (110, 100))
+    hand.bars((110, 40), (130, -40))
     hand.tool("Slide")
     hand.drag((130, -40), (130, -80))
-    hand.tool("Input")
-    hand.click((0, 0))
+    hand.drive((0, 0), (110, 100))
 
 
 TOGGLE = HEAD | {
@@ -505,10 +460,8 @@ def test_names_are_changed_and_pins_and_links_go(drawing):
 
 def test_a_link_is_copied_and_mirrored(drawing):
     hand = drawing()
-    hand.tool("Plate")
-    hand.click((0, 0), (60, 0), (20, 40), (20, 40))
-    hand.tool("Pins")
-    hand.click((30, 0))
+    hand.use("Plate", (0, 0), (60, 0), (20, 40), (20, 40))
+    hand.use("Pins", (30, 0))
     hand.button("Copy ABC")
     hand.click((8, 16))
     hand.button("Mirror ABC")
@@ -550,13 +503,8 @@ def test_what_does_not_go_together_is_shown_with_what_mends_it(drawing):
 
 def test_what_is_loose_is_coloured(drawing):
     hand = drawing()
-    hand.tool("Bar")
-    hand.drag((0, 0), (20, 40))
-    hand.drag((20, 40), (100, 70))
-    hand.tool("Ground")
-    hand.click((0, 0))
-    hand.tool("Input")
-    hand.click((0, 0))
+    hand.bars((0, 0), (20, 40), (100, 70))
+    hand.drive((0, 0))
     assert "mobility 2, 1 input" in hand.told()
     assert "'BC' hangs at 'B' alone" in hand.told()
     assert hand.window.locator(".pencil .link").count() == 2

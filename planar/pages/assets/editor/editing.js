@@ -3,7 +3,6 @@
    answered by the server of the page; a pin that is dragged is solved by the page itself. What is drawn stays in the
    window's own store until it is saved, also where the server is gone. */
 
-const ALIVE_PAUSE = 45000;  // ms between two signs to the server that the page is open
 const EXPLAIN_PAUSE = 500;  // ms without a change, after which it is looked for what mends it
 const BLANK_WIDTH = 0.3;    // m that are seen of empty paper
 
@@ -16,19 +15,25 @@ class Editing {
     this.blank.querySelector("#still")?.remove();
     this.sketch = new Sketch(this);
     this.hand = new Hand(this);
+    this.filing = new Filing(this);
     this.panel = new PencilPanel(this);
     document.addEventListener("keydown", (event) => this.key(event), true);
     addEventListener("beforeunload", (event) => { if (this.changed) event.preventDefault(); });
     document.body.classList.add("sketching");
-    this.present();
-    let kept = null;
-    try { kept = JSON.parse(sessionStorage.getItem("drawing")); } catch { /* nothing is kept */ }
+    EditServer.present();
+    const kept = Editing.recall();
     this.begin(data, program, !answer.problem);
     if (!this.solved) this.guess();
     if (answer.conflicts) this.explain();
     if (kept?.file) this.take({ file: kept.file, at: new Map(kept.at) }, kept.changed);
     else if (!this.placed.pins.size) this.use("bar");
   }
+
+  // what is kept in the window until it is saved; without a store it lasts as long as the page
+
+  static recall() { try { return JSON.parse(sessionStorage.getItem("drawing")); } catch { return null; } }
+  static keep(drawn) { try { sessionStorage.setItem("drawing", JSON.stringify(drawn)); } catch { /* no store */ } }
+  static forget() { try { sessionStorage.removeItem("drawing"); } catch { /* no store */ } }
 
   // the page
 
@@ -104,6 +109,7 @@ class Editing {
   use(tool) {
     this.parts.controls.pause();
     Object.assign(this.hand, { pending: [], dragged: null });
+    this.hand.rested();
     this.tool = tool;
     this.chosen = tool === "pin" ? this.chosen : null;
     this.parts.lens.show();
@@ -162,17 +168,30 @@ class Editing {
   take({ file, at }, changed) {
     Object.assign(this, { file, at: new Map(at), changed });
     if (this.chosen && !(this.chosen.kind === "pin" ? this.at.has(this.chosen.name) : file.links[this.chosen.name])) this.chosen = null;
-    try { sessionStorage.setItem("drawing", JSON.stringify({ file, at: [...at], changed })); } catch { /* no store: it lasts as long as the page */ }
+    Editing.keep({ file, at: [...at], changed });
     this.solved = false;
     this.show();
     return this.ask();
   }
 
+  /** Ask what Python says of what is drawn: one question at a time, of the last there is, however quick the hand. */
   async ask() {
-    const number = ++this.asked;
+    this.asked++;
     this.settled = false;
-    const answer = await this.post("answer", { document: this.file });
-    if (number !== this.asked) return; // something else is drawn by now
+    if (this.asking) return;
+    this.asking = true;
+    try {
+      for (let number = 0; number !== this.asked;) {
+        number = this.asked;
+        const answer = await EditServer.post("answer", { document: this.file });
+        await this.hand.rest(); // nothing is taken from under a hand that draws
+        if (number === this.asked) this.hear(answer);
+      }
+    } finally { this.asking = false; }
+    this.settled = true;
+  }
+
+  hear(answer) {
     this.answer = answer;
     if (answer.units) Object.assign(this, { units: answer.units, usual: answer.usual });
     if (answer.data) {
@@ -185,18 +204,6 @@ class Editing {
       this.say(said);
     } else this.show();
     if (answer.conflicts) this.explain();
-    this.settled = true;
-  }
-
-  /** Ask the server: its answer, or a sentence in place of one. */
-  async post(what, asked) {
-    try {
-      const response = await fetch(what, { method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify(asked) });
-      if (!response.ok) return { problem: await response.text() };
-      return await response.json();
-    } catch {
-      return { problem: "The server of this page does not answer: start `planar edit` again with the link that “Copy link” gives. What is drawn stays here." };
-    }
   }
 
   key(event) {
@@ -267,15 +274,8 @@ class Editing {
     this.perform((draft) => (kind === "pin" ? Draw.removePin(draft, name) : Draw.removeLink(draft, name)));
   }
 
-  // the file
-
-  takeText(text) {
-    let file;
-    try { file = JSON.parse(text); } catch (problem) { this.say(`This is no JSON: ${problem.message}`); return; }
-    if (typeof file !== "object" || file === null || typeof file.links !== "object" || file.links === null || !(file.frame in file.links)) {
-      this.say("A mechanism has links, one of which is the frame.");
-      return;
-    }
+  /** Another file in place of this one: one step. */
+  replace(file) {
     this.commit({ file, at: new Map() });
     this.guess();
   }
@@ -285,44 +285,9 @@ class Editing {
     const number = this.asked;
     await new Promise((go) => setTimeout(go, EXPLAIN_PAUSE));
     if (number !== this.asked) return;
-    const answer = await this.post("conflict", { document: this.file });
+    const answer = await EditServer.post("conflict", { document: this.file });
     if (number !== this.asked) return;
     Object.assign(this.answer, { problem: answer.problem || this.answer.problem, remedies: answer.remedies ?? [] });
     this.panel.show();
-  }
-
-  async save(name, replaces = false) {
-    const { file } = this.draft(), answer = await this.post("save", { document: file, name, replaces });
-    if (answer.taken) {
-      if (confirm(`There is a ${answer.taken} already. Replace it?`)) await this.save(name, true);
-      return;
-    }
-    if (answer.problem) { this.say(answer.problem); return; }
-    Object.assign(this, { fileName: answer.file, changed: false, file });
-    try { sessionStorage.removeItem("drawing"); } catch { /* there was none */ }
-    this.panel.show();
-    this.say(`Saved to ${answer.file}.`);
-  }
-
-  async copyLink() {
-    const link = await MechanismLink.write(this.draft().file), { panel } = this;
-    panel.link.hidden = false;
-    panel.link.value = link;
-    try {
-      await navigator.clipboard.writeText(link);
-      this.say("The link is copied: `planar view LINK` and `planar edit LINK` open it.");
-    } catch {
-      panel.link.select();
-      this.say("The link is selected: copy it with the keyboard.");
-    }
-  }
-
-  /** The server hears that the page is open, and when it goes. */
-  present() {
-    const page = crypto.randomUUID(), open = () => { this.post("open", { page }); };
-    open();
-    setInterval(open, ALIVE_PAUSE);
-    addEventListener("pagehide", () => navigator.sendBeacon("gone", JSON.stringify({ page })));
-    addEventListener("pageshow", ({ persisted }) => { if (persisted) open(); });
   }
 }

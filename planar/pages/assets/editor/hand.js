@@ -26,7 +26,7 @@ const TOOLS = {
 
 class Hand {
   constructor(editing) {
-    Object.assign(this, { editing, pending: [], cursor: null, spot: null, dragged: null, from: null });
+    Object.assign(this, { editing, pending: [], cursor: null, spot: null, dragged: null, from: null, waiting: [] });
   }
 
   /** Hear of a stage before anything on it does. */
@@ -53,11 +53,16 @@ class Hand {
       const far = Math.hypot(event.clientX - this.from[0], event.clientY - this.from[1]) > APART;
       this.from = null;
       this.release(this.at(event), far);
+      this.rested();
     }), true);
     stage.addEventListener("pointercancel", own(() => this.cancel()), true);
     stage.addEventListener("click", own((event) => event.stopPropagation()), true);
     stage.addEventListener("keydown", own((event) => this.key(event)), true);
   }
+
+  /** Once nothing is held. */
+  async rest() { if (this.from !== null || this.dragged !== null) await new Promise((go) => { this.waiting.push(go); }); }
+  rested() { for (const go of this.waiting.splice(0)) go(); }
 
   /** The place of an event: {pin, link, at}. */
   at(event) {
@@ -183,6 +188,7 @@ class Hand {
     this.pending = [];
     this.dragged = null;
     this.from = null;
+    this.rested();
     this.editing.revert();
   }
 
@@ -206,7 +212,7 @@ class Hand {
       show();
     } else if (event.key === "Enter" && this.cursor) {
       const spot = this.snapped(view.toScreen(this.cursor), { altKey: true });
-      if (this.dragged !== null) this.release(spot, true);
+      if (this.dragged !== null) { this.release(spot, true); this.rested(); }
       else this.press(spot);
       sketch.draw();
     } else if (event.key === "Escape") this.cancel();

@@ -49,8 +49,8 @@ class PencilPanel {
     const { editing } = this, { element } = Forms;
     this.name = element("input", { type: "text", size: 18, "aria-label": "Name of the file", placeholder: "name.json" });
     this.saved = element("span", { class: "hint" });
-    const box = element("p", { class: "files" }, this.button("Save", () => editing.save(null)), this.name,
-      this.button("Save as", () => editing.save(this.name.value)), this.button("Copy link", () => editing.copyLink()), this.saved);
+    const box = element("p", { class: "files" }, this.button("Save", () => editing.filing.save(null)), this.name,
+      this.button("Save as", () => editing.filing.save(this.name.value)), this.button("Copy link", () => editing.filing.copyLink()), this.saved);
     this.link = element("textarea", { readonly: "", rows: 2, "aria-label": "Link of the mechanism", hidden: "" });
     return element("div", {}, box, this.link);
   }
@@ -58,7 +58,7 @@ class PencilPanel {
   text() {
     const { element } = Forms;
     this.area = element("textarea", { rows: 14, spellcheck: "false", "aria-label": "Text of the file" });
-    this.whole = element("details", {}, element("summary", {}, "Text of the file"), this.area, this.button("Take this text", () => this.editing.takeText(this.area.value)));
+    this.whole = element("details", {}, element("summary", {}, "Text of the file"), this.area, this.button("Take this text", () => this.editing.filing.take(this.area.value)));
     this.whole.addEventListener("toggle", () => this.show());
     return this.whole;
   }
