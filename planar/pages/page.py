@@ -110,6 +110,7 @@ EDITOR_SCRIPTS = (
     "editor/links.js",
     "editor/sketch.js",
     "editor/hand.js",
+    "editor/underlay.js",
     "editor/filing.js",
     "editor/panel.js",
     "editor/editing.js",

@@ -6,6 +6,7 @@ import pytest
 
 from planar.pages.view import view
 from tests.page_scripts import SCREENS, Windows, browser
+from tests.pencil import Pencil, served
 
 
 @pytest.fixture(scope="module")
@@ -38,3 +39,25 @@ def shown(windows, tmp_path):
     for each in taken:
         windows.give_back(*each)
     assert not any(wrong), wrong
+
+
+@pytest.fixture
+def drawing(chromium, tmp_path):
+    """Opens the page of a file, or of empty paper, in which nothing must go wrong."""
+    opened, contexts = [], []
+
+    def begin(value=None, path=None, **context):
+        serving = served(value, path, tmp_path)
+        server = serving.__enter__()
+        contexts.append(chromium.new_context(**{"viewport": {"width": 1280, "height": 900}} | context))
+        pencil = Pencil(contexts[-1], server)
+        opened.append((serving, server, pencil))
+        return pencil
+
+    begin.opened = opened
+    yield begin
+    for each in contexts:
+        each.close()
+    for serving, _, _ in opened:
+        serving.__exit__(None, None, None)
+    assert not any(pencil.wrong for *_, pencil in opened), [pencil.wrong for *_, pencil in opened]

@@ -12,40 +12,12 @@ import planar
 from planar.document.texts.mechanism_link import read_link
 from tests.guide_screens import draw_six_bar, guide_steps
 from tests.hostile import harmful_mechanism
-from tests.page_scripts import browser, settled
-from tests.pencil import Pencil, served
+from tests.page_scripts import settled
+from tests.pencil import Pencil
 
 CLOSE = 1e-10
 """m: numbers of a drawn file have twelve figures."""
 HEAD = {"planar": 1, "name": "Mechanism", "units": {"length": "mm", "angle": "deg"}, "frame": "frame"}
-
-
-@pytest.fixture(scope="module")
-def chromium():
-    with browser() as running:
-        yield running
-
-
-@pytest.fixture
-def drawing(chromium, tmp_path):
-    """Opens the page of a file, or of empty paper, in which nothing must go wrong."""
-    opened, contexts = [], []
-
-    def begin(value=None, path=None, **context):
-        serving = served(value, path, tmp_path)
-        server = serving.__enter__()
-        contexts.append(chromium.new_context(**{"viewport": {"width": 1280, "height": 900}} | context))
-        pencil = Pencil(contexts[-1], server)
-        opened.append((serving, server, pencil))
-        return pencil
-
-    begin.opened = opened
-    yield begin
-    for each in contexts:
-        each.close()
-    for serving, _, _ in opened:
-        serving.__exit__(None, None, None)
-    assert not any(pencil.wrong for *_, pencil in opened), [pencil.wrong for *_, pencil in opened]
 
 
 def equal(drawn, written):

@@ -14,6 +14,12 @@ const Forms = {
     return round !== 0 && Math.abs(round) < Forms.SMALL ? round.toExponential() : String(round);
   },
 
+  /** A number that was typed, with a comma or a minus of any kind; null where it is none. */
+  typed(text) {
+    const given = Number(text.trim().replace(",", ".").replace("−", "-"));
+    return text.trim() && Number.isFinite(given) ? given : null;
+  },
+
   /** The round step (1, 2 or 5 of a power of ten) that divides a range finely enough. */
   roundStep(range) {
     const most = range / Forms.STEPS, power = 10 ** Math.floor(Math.log10(most));

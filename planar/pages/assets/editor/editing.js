@@ -16,6 +16,7 @@ class Editing {
     this.sketch = new Sketch(this);
     this.hand = new Hand(this);
     this.filing = new Filing(this);
+    this.underlay = new Underlay(this);
     this.panel = new PencilPanel(this);
     document.addEventListener("keydown", (event) => this.key(event), true);
     addEventListener("beforeunload", (event) => { if (this.changed) event.preventDefault(); });
@@ -55,6 +56,7 @@ class Editing {
     document.querySelector(".left").prepend(this.panel.bar, this.panel.hint);
     document.querySelector(".right").prepend(this.panel.section);
     this.hand.attach(stage);
+    this.underlay.attach(svg, page);
     page.on("view", () => { if (!this.hand.dragged) this.sketch.draw(); });
     for (const event of ["move", "size"]) page.on(event, () => this.follow());
     const width = page.view?.width ?? 600;

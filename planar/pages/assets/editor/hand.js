@@ -21,6 +21,7 @@ const TOOLS = {
   spring: { name: "Spring", told: "From one pin to another." },
   load: { name: "Force", told: "From a pin in the force's direction." },
   mass: { name: "Mass", told: "A click on a link." },
+  picture: { name: "Picture", told: "Two places of the picture underneath, whose distance is then typed beside the drawing." },
   erase: { name: "Erase", told: "A pin or a link goes." },
 };
 
@@ -72,6 +73,7 @@ class Hand {
 
   snapped(px, { altKey = false, shiftKey = false } = {}) {
     const { editing } = this, { view } = editing, to = view.toScreen, held = this.dragged?.pin ?? null;
+    if (editing.tool === "picture") return { pin: null, link: null, at: view.toWorld(px) };
     const pins = [...editing.at].filter(([name]) => name !== held);
     const [pin, near] = cheapest(pins, ([, at]) => Plane.apart(to(at), px)) ?? [];
     if (near && Plane.apart(to(near), px) <= REACH) return { pin, link: this.linkAt(px), at: near };
@@ -114,7 +116,7 @@ class Hand {
       if (spot.pin !== null) this.dragged = editing.takePin(spot.pin);
       return;
     }
-    if (["bar", "spring", "load", "slide", "point", "gear"].includes(tool)) {
+    if (["bar", "spring", "load", "slide", "point", "gear", "picture"].includes(tool)) {
       if (this.pending.length) this.finish(spot);
       else this.begin(spot);
     } else if (tool === "plate") this.corner(spot);
@@ -154,7 +156,8 @@ class Hand {
       gear: (draft) => Draw.gear(draft, [first.link, spot.link ?? file.frame], editing.panel.ratio),
     };
     this.pending = [];
-    editing.perform(acts[editing.tool]);
+    if (editing.tool === "picture") editing.underlay.mark([first.at, spot.at]);
+    else editing.perform(acts[editing.tool]);
   }
 
   /** The link on which a slide ends, if it is not one that carries the pin. */

@@ -11,7 +11,7 @@ class PencilPanel {
     this.remedies = element("ul", { class: "remedies" });
     this.chosen = element("div", { class: "chosen" });
     const told = element("div", { role: "status" }, this.mobility, this.problem, this.remedies);
-    section.append(element("h2", {}, "Drawing"), told, this.chosen, this.files(), this.text());
+    section.append(element("h2", {}, "Drawing"), told, this.chosen, this.files(), editing.underlay.form.box, this.text());
   }
 
   button(text, act, more = {}) {
@@ -76,6 +76,7 @@ class PencilPanel {
     this.remedies.replaceChildren(...(answer?.remedies ?? []).map((each) => Forms.element("li", {}, each)));
     this.saved.textContent = editing.fileName ? `${editing.fileName}${editing.changed ? ", not saved yet" : ""}` : "no file yet";
     if (this.whole.open && document.activeElement !== this.area) this.area.value = JSON.stringify(file, null, 2);
+    editing.underlay.form.show();
     this.fields();
   }
 
@@ -92,8 +93,8 @@ class PencilPanel {
       chosen.append(Forms.element("label", { class: "choice" }, `${label} `, input));
     };
     const number = (label, value, act) => field(`${label} (${unit})`, Forms.shown(value / units.length), (text) => {
-      const given = Number(text.trim().replace(",", ".").replace("−", "-"));
-      if (text.trim() && Number.isFinite(given)) act(given * units.length);
+      const given = Forms.typed(text);
+      if (given !== null) act(given * units.length);
       else editing.say(`${label}: a number in ${unit} is wanted.`);
     });
     if (one?.kind === "pin" && editing.at.has(one.name)) {

@@ -28,6 +28,7 @@ class Sketch {
       const [cx, cy] = px(at), { chosen } = editing;
       svgPart("circle", { cx, cy, r: HANDLE, class: chosen?.kind === "pin" && chosen.name === pin ? "handle chosen" : "handle" }, this.group);
     }
+    if (editing.tool === "picture" && editing.underlay.marks) this.marks(editing.underlay.marks.map(px));
     if (editing.chosen?.kind === "link") this.outline(editing.chosen.name, "outline", px);
     this.begun(px);
   }
@@ -72,6 +73,12 @@ class Sketch {
       svgPart("circle", { cx: x, cy: y, r: 4, class: "pin" }, this.group);
       svgPart("text", { x: x + 9, y: y - 9, class: "name" }, this.group, Letters.told(pin));
     }
+  }
+
+  /** The places by which the picture is laid. */
+  marks(places) {
+    svgPart("polyline", { points: places.map((each) => each.join(",")).join(" "), class: "begun" }, this.group);
+    for (const [x, y] of places) svgPart("path", { d: `M${x - 9} ${y}h18M${x} ${y - 9}v18`, class: "guide" }, this.group);
   }
 
   /** What is begun, and where the keys are. */
