@@ -109,7 +109,7 @@ class Pencil:
     def told(self) -> str:
         """What stands beside the drawing on how it moves."""
         self.wait()
-        return self.window.locator("#pencil [role=status]").inner_text()
+        return self.window.locator("#pencil > [role=status]").inner_text()
 
     def file(self) -> Any:
         """The file that is drawn."""

@@ -4,6 +4,10 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from planar.model.wording import amount
+from planar.synthesis.task.synthesis_task import SynthesisTask
+from planar.synthesis.task.task_numbers import miss_kind
+
 
 class SearchProgress(NamedTuple):
     """How far a search is: at which `start`, the `start_number`-th (from 1) of `start_count` (None: not known).
@@ -26,3 +30,14 @@ class SearchProgress(NamedTuple):
 def progress_of_list(stage: str) -> SearchProgress:
     """How far a complete list is, in words."""
     return SearchProgress("", 0, None, 0, stage, float("inf"), float("inf"))
+
+
+def progress_words(done: SearchProgress, task: SynthesisTask) -> str:
+    """How far a search is, in a line."""
+    number = f"start {done.start_number}" + (f" of {done.start_count}" if done.start_count else "")
+    where = f"{number} ({done.start}), catalogue {done.round}: {done.stage}"
+    if done.best == float("inf"):
+        return where
+    share = f"{100.0 * done.best_share:.3g} % of the size"
+    best = share if task.wants_places else amount(done.best, miss_kind(task), task.units)
+    return f"{where}; best error so far {best}"

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import io
+import json
+from math import cos, pi, sin
 
+import numpy as np
 import pytest
 from PIL import Image
 
-from tests.page_scripts import settled
+import planar
+from tests.page_scripts import downloaded, settled
 
 ON_PICTURE = """(places) => {
   const image = document.querySelector("#drawing .underlay image"), to = image.getScreenCTM();
@@ -68,7 +72,8 @@ DROP = """([kind, content]) => {
   return document.getElementById("drawing").dispatchEvent(event); // false: the page itself deals with it
 }"""
 HOSTILE_SVG = """<svg xmlns="http://www.w3.org/2000/svg" width="90" height="60" onload="parent.hacked = 1">
-<script>parent.hacked = 1</script><image href="http://other.example/a.png" width="9" height="9"/><path d="M0 0h9v9"/></svg>"""
+<script>parent.hacked = 1</script><image href="http://other.example/a.png" width="9" height="9"/>
+<path d="M0 0h9v9"/></svg>"""
 
 
 def test_what_is_dropped_is_read_here_and_nothing_of_another_site(drawing):
@@ -82,3 +87,96 @@ def test_what_is_dropped_is_read_here_and_nothing_of_another_site(drawing):
     assert hand.window.locator("#drawing .underlay image").get_attribute("href").startswith("data:image/png")
     assert hand.window.evaluate("typeof window.hacked") == "undefined"
     assert not [url for url in asked if "other.example" in url]
+
+
+# a path that is wanted
+
+ELLIPSE = [(45 + 20 * cos(2 * pi * k / 30), 20 + 10 * sin(2 * pi * k / 30)) for k in range(30)]
+"""mm"""
+
+
+def wished(drawing, *places):
+    """A four-bar, and a hand that has drawn a path freehand."""
+    hand = drawing(planar.to_dict("four-bar"))
+    hand.tool("Wanted path")
+    hand.drag(*(places or ELLIPSE))
+    hand.wait()
+    return hand
+
+
+def test_a_path_drawn_freehand_is_the_wanted_curve_of_a_point_and_a_task(drawing, tmp_path):
+    hand = wished(drawing)
+    (item,) = hand.window.evaluate("page.wanted.items")
+    assert item["is_closed"]
+    assert item["of"] in {"E", "F"}  # points of the coupler
+    wanted = planar.read_task(json.loads(downloaded(hand.window, "Task (JSON)", tmp_path / "task.json"))).wanted[0]
+    assert wanted.is_closed
+    assert wanted.point == item["of"]
+    off = (wanted.places * 1000 - [45, 20]) / [20, 10]
+    assert np.hypot(*off.T) == pytest.approx(1.0, abs=0.05)  # pixels of the pointer
+    steps = np.hypot(*np.diff(wanted.places, axis=0, append=wanted.places[:1]).T)
+    assert steps == pytest.approx(steps.mean(), rel=0.05)
+    hand.window.get_by_label("Point that is to trace it").select_option("B")
+    hand.wait()
+    assert hand.window.evaluate("page.wanted.items[0].of") == "B"
+    # a place is dragged as on any page, and undone by the pencil with the rest
+    hand.tool("Move")
+    x, y = (1000 * each for each in hand.window.evaluate("editing.wish.places[6]"))
+    hand.drag((x, y), (x, y + 4), (x, y + 8))
+    moved = np.array(hand.window.evaluate("editing.wish.places[6]")) * 1000
+    assert moved == pytest.approx([x, y + 8], abs=0.5)
+    hand.button("Undo drawing")
+    hand.button("Undo drawing")
+    assert hand.window.evaluate("page.wanted") is None
+    assert not hand.window.evaluate("editing.changed")
+
+
+def test_a_path_is_clicked_place_by_place_and_closed_at_its_first(drawing):
+    hand = drawing()
+    places = [(0, 0), (40, 0), (60, 30), (30, 50), (-10, 30)]
+    hand.use("Wanted path", *places)
+    wish = hand.window.evaluate("editing.wish")
+    assert np.array(wish["places"]) * 1000 == pytest.approx(np.array(places), abs=1e-9)  # of the grid
+    assert not wish["closed"]
+    hand.click(places[0])
+    assert hand.window.evaluate("editing.wish.closed")
+    assert hand.window.locator(".pencil polygon.wish").count() == 1
+    hand.button("Erase wanted path")
+    assert hand.window.locator(".pencil .wish").count() == 0
+
+
+def test_designs_that_the_server_finds_are_listed_and_taken_over_in_one_step(drawing):
+    hand = wished(drawing)
+    before, server, asked = hand.file(), drawing.opened[0][1], []
+    design = json.loads(json.dumps(before))
+    design["links"]["BC"]["length"] = 70
+
+    def begin(task):
+        asked.append(task)
+        return {"search": 1, "progress": "begins", "is_over": False}
+
+    def tell(number, stops):
+        asked.append(stops)
+        if not any(each is True for each in asked):
+            return {"search": number, "progress": "start 1", "is_over": False}
+        designs = [{"words": "misses by 1 mm (root mean square), by 2 mm at most", "document": design}]
+        return {"search": number, "progress": "", "is_over": True, "designs": designs, "remarks": ["stopped early"]}
+
+    server.begin_search, server.tell_search = begin, tell
+    hand.window.get_by_role("button", name="Synthesise").click()
+    hand.window.get_by_text("Searching: start 1").wait_for()
+    hand.window.get_by_role("button", name="Stop").click()
+    hand.window.get_by_text("1 design.").wait_for()
+    assert planar.read_task(asked[0]).wanted[0].is_closed
+    assert asked[0]["start"] == before
+    assert hand.window.get_by_text("stopped early").is_visible()
+    hand.button("Take design 1")
+    assert hand.file() == design
+    assert hand.window.evaluate("page.wanted.items.length") == 1
+    hand.button("Undo drawing")
+    assert hand.file() == before
+    server.shutdown()
+    server.server_close()
+    with hand.window.expect_download() as coming:
+        hand.window.get_by_role("button", name="Synthesise").click()
+    assert json.loads(coming.value.path().read_text())["start"] == before

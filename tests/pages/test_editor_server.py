@@ -6,6 +6,7 @@ import http.client
 import json
 import shutil
 import subprocess
+import time
 
 import pytest
 from click.testing import CliRunner
@@ -18,6 +19,7 @@ from planar.document.texts.mechanism_link import read_link, write_link
 from planar.foundation.errors import BadInput
 from planar.pages.editor import server as serving
 from planar.pages.editor.answer import BLANK, conflict_answer, edit_answer
+from planar.pages.editor.authors_file import carry_over
 from planar.pages.editor.edit_page import edit_page
 from tests.hostile import HARMFUL_LINE, harmful_mechanism
 from tests.pencil import served
@@ -137,6 +139,46 @@ def test_it_ends_when_its_page_is_closed_and_not_when_that_is_loaded_again(monke
         assert not server.is_over()
         monkeypatch.setattr(serving, "SILENCE", -1.0)  # a browser that is gone says nothing
         assert server.is_over()
+
+
+# searches
+
+WISHED = {
+    "planar": 1,
+    "name": "Wanted",
+    "units": {"length": "mm", "angle": "deg"},
+    "start": FOUR_BAR,
+    "wanted": [{"point": "E", "through": [[0, 25], [52, 10], [80, 4], [95, -20]], "in_order": True}],
+}
+
+
+def test_a_search_tells_how_far_it_is_and_what_it_has_found_once_it_is_stopped(server):
+    told = json.loads(asked(server, what="synthesise", body={"task": WISHED})[1])
+    stopped = {"search": told["search"], "stops": True}
+    while not told["is_over"]:
+        time.sleep(0.05)
+        told = json.loads(asked(server, what="search", body=stopped)[1])
+    assert "problem" not in told
+    assert "the search was interrupted" in told["remarks"][0] or told["designs"]
+    other = json.loads(asked(server, what="search", body={"search": told["search"] + 1})[1])
+    assert other["is_over"]
+    assert other["problem"]
+
+
+@pytest.mark.parametrize("task", [3, {"wanted": []}, WISHED | {"start": "four-bar"}, WISHED | {"wanted": [{}]}])
+def test_what_is_no_task_of_the_drawing_is_not_searched_for(server, task):
+    told = json.loads(asked(server, what="synthesise", body={"task": task})[1])
+    assert told["problem"].startswith("$.")
+
+
+def test_a_design_keeps_what_its_author_wrote_and_changes_only_what_differs():
+    own = {"name": "Mine", "links": {"b": {"length": "40 mm"}, "a": {"length": 2}}, "notes": [1], "sketch": {"C": 1}}
+    before = {"name": "Mine", "links": {"a": {"length": 2.0}, "b": {"length": 4.0}}, "filled": 1, "sketch": {"C": 1}}
+    after = {"name": "Mine", "links": {"a": {"length": 3.5}, "b": {"length": 4.0}}, "filled": 1, "sketch": {"D": 5}}
+    found = carry_over(own, before, after)
+    links = {"b": {"length": "40 mm"}, "a": {"length": 3.5}}
+    assert found == {"name": "Mine", "links": links, "notes": [1], "sketch": {"D": 5}}
+    assert list(found["links"]) == ["b", "a"]
 
 
 # answers

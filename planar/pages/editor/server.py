@@ -24,6 +24,7 @@ from planar.foundation.errors import BadInput, PlanarError
 from planar.foundation.safe_files import save_file
 from planar.pages.editor.answer import conflict_answer, edit_answer
 from planar.pages.editor.edit_page import edit_page
+from planar.pages.editor.search import BackgroundSearch
 
 LOCAL = "127.0.0.1"
 CLOSING_PAUSE = 5.0
@@ -53,6 +54,8 @@ class EditServer(ThreadingHTTPServer):
         self.token = token_urlsafe(24)
         self.work = threading.Lock()
         "one answer at a time: equations are built by a library that many threads must not enter"
+        self.search: BackgroundSearch | None = None
+        "the last one that a page has begun"
         self.open_pages: dict[str, float] = {}
         self.was_open = False
         self.last_heard = time.monotonic()
@@ -91,6 +94,28 @@ class EditServer(ThreadingHTTPServer):
         if self.is_over():
             self.was_open = False
             threading.Thread(target=self.shutdown, daemon=True).start()
+
+    def server_close(self) -> None:
+        """End, with a search that still runs."""
+        super().server_close()
+        if self.search is not None:
+            self.search.end()
+
+    def begin_search(self, task: Any) -> dict[str, Any]:
+        """Search for what a task's JSON value wants, in place of what was searched for before. Raises BadInput."""
+        begun = BackgroundSearch(task)
+        if self.search is not None:
+            self.search.end()
+        self.search = begun
+        return begun.tell()
+
+    def tell_search(self, number: Any, stops: bool) -> dict[str, Any]:
+        """How far a search is, by its number; stopped, if that is wanted."""
+        if self.search is None or self.search.number != number:
+            return {"is_over": True, "problem": "Another search has taken the place of this one."}
+        if stops:
+            self.search.stop()
+        return self.search.tell()
 
     def save(self, value: Any, name: str | None, replaces: bool) -> dict[str, Any]:
         """Write a file's JSON value: {file}, or {taken} where another file has that name and nothing is written."""
@@ -140,6 +165,8 @@ class _Handler(BaseHTTPRequestHandler):
         acts: dict[str, Callable[[Any], Any]] = {
             "answer": lambda asked: edit_answer(asked["document"]),
             "conflict": lambda asked: conflict_answer(asked["document"]),
+            "synthesise": lambda asked: self.server.begin_search(asked["task"]),
+            "search": lambda asked: self.server.tell_search(asked["search"], bool(asked.get("stops"))),
             "save": lambda asked: self.server.save(asked["document"], asked.get("name"), bool(asked.get("replaces"))),
             "open": lambda asked: self.server.hear(str(asked["page"]), True),
             "gone": lambda asked: self.server.hear(str(asked["page"]), False),

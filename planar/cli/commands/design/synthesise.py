@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from planar.synthesis.search_progress import SearchProgress
     from planar.synthesis.synthesis import Synthesis
     from planar.synthesis.synthesise import TaskSearch
-    from planar.synthesis.task.synthesis_task import SynthesisTask
 
 SHEET_SUFFIXES = (".png", ".svg", ".pdf")
 """What `-o` names where it is no folder: sheets of drawings."""
@@ -51,6 +50,7 @@ def synthesise(
 ) -> None:
     """The linkages that do best what a TASK wants: paths, poses or functions, of any structure."""
     from planar.reports.tables.design.synthesis import record, table
+    from planar.synthesis.search_progress import progress_words
     from planar.synthesis.synthesise import TaskSearch
     from planar.synthesis.synthesise import synthesise as find_all
     from planar.synthesis.task.task_reader import read_task
@@ -62,7 +62,7 @@ def synthesise(
 
         def show(done: SearchProgress) -> None:
             if status is not None:
-                status.update(f"{wanted.name}: {done.stage if complete else progress_text(done, wanted)}")
+                status.update(f"{wanted.name}: {done.stage if complete else progress_words(done, wanted)}")
 
         ended_by: int | None = None
         found: Synthesis
@@ -89,20 +89,6 @@ def synthesise(
         goes_on = "; the same command goes on where it was" if folder is not None else "; with -o FOLDER it could go on"
         click.echo(f"planar: interrupted: what was found till then is told{goes_on}", err=True)
         sys.exit(ended_by)
-
-
-def progress_text(done: SearchProgress, task: SynthesisTask) -> str:
-    """How far a search is, in a line."""
-    from planar.model.wording import amount
-    from planar.synthesis.task.task_numbers import miss_kind
-
-    number = f"start {done.start_number}" + (f" of {done.start_count}" if done.start_count else "")
-    where = f"{number} ({done.start}), catalogue {done.round}: {done.stage}"
-    if done.best == float("inf"):
-        return where
-    share = f"{100.0 * done.best_share:.3g} % of the size"
-    best = share if task.wants_places else amount(done.best, miss_kind(task), task.units)
-    return f"{where}; best error so far {best}"
 
 
 def _run(search: TaskSearch) -> int | None:

@@ -9,7 +9,7 @@ const BLANK_WIDTH = 0.3;    // m that are seen of empty paper
 class Editing {
   constructor(data, program) {
     const { value, name, answer } = data.edited;
-    Object.assign(this, { file: value, fileName: name, answer, units: answer.units ?? { length: 1e-3, angle: Math.PI / 180 }, usual: answer.usual });
+    Object.assign(this, { file: value, fileName: name, answer, units: answer.units ?? { length: 1e-3, angle: Math.PI / 180 }, usual: answer.usual, wish: null });
     Object.assign(this, { at: new Map(), done: [], undone: [], tool: "hand", chosen: null, changed: false, asked: 0, settled: true });
     this.blank = document.querySelector("main").cloneNode(true);
     this.blank.querySelector("#still")?.remove();
@@ -17,6 +17,7 @@ class Editing {
     this.hand = new Hand(this);
     this.filing = new Filing(this);
     this.underlay = new Underlay(this);
+    this.wishing = new DrawnWish(this);
     this.panel = new PencilPanel(this);
     document.addEventListener("keydown", (event) => this.key(event), true);
     addEventListener("beforeunload", (event) => { if (this.changed) event.preventDefault(); });
@@ -26,14 +27,14 @@ class Editing {
     this.begin(data, program, !answer.problem);
     if (!this.solved) this.guess();
     if (answer.conflicts) this.explain();
-    if (kept?.file) this.take({ file: kept.file, at: new Map(kept.at) }, kept.changed);
+    if (kept?.file) this.take({ file: kept.file, at: new Map(kept.at), wish: kept.wish ?? null }, kept.changed);
     else if (!this.placed.pins.size) this.use("bar");
   }
 
   // what is kept in the window until it is saved; without a store it lasts as long as the page
 
   static recall() { try { return JSON.parse(sessionStorage.getItem("drawing")); } catch { return null; } }
-  static keep(drawn) { try { sessionStorage.setItem("drawing", JSON.stringify(drawn)); } catch { /* no store */ } }
+  keep() { try { sessionStorage.setItem("drawing", JSON.stringify({ ...this.drawn, at: [...this.at] })); } catch { /* no store */ } }
   static forget() { try { sessionStorage.removeItem("drawing"); } catch { /* no store */ } }
 
   // the page
@@ -50,19 +51,21 @@ class Editing {
       document.querySelector("h1").textContent = data.name;
       document.title = data.name;
     }
-    this.parts = startPage(data, program);
+    this.parts = startPage({ ...data, wanted: solved ? Wish.data(this.wish, this.file, data) : null }, program);
     this.solved = solved;
     const { page, svg, lens } = this.parts, stage = document.getElementById("stage");
     document.querySelector(".left").prepend(this.panel.bar, this.panel.hint);
     document.querySelector(".right").prepend(this.panel.section);
     this.hand.attach(stage);
     this.underlay.attach(svg, page);
+    this.wishing.attach(page);
     page.on("view", () => { if (!this.hand.dragged) this.sketch.draw(); });
     for (const event of ["move", "size"]) page.on(event, () => this.follow());
     const width = page.view?.width ?? 600;
     lens.base = view?.scale ?? (solved ? page.view?.scale : width / BLANK_WIDTH);
-    if (view) lens.look(Editing.lensOf(view));
+    if (view && !(solved && this.fits)) lens.look(Editing.lensOf(view));
     else if (!solved && page.view) lens.look({ scale: width / BLANK_WIDTH, at: [0.35 * BLANK_WIDTH, 0.2 * BLANK_WIDTH] });
+    this.fits = this.fits && !solved;
     svg.setAttribute("aria-describedby", "pencil-hint");
     this.show();
     (focused?.isConnected ? focused : document.getElementById(focused?.id))?.focus({ preventScroll: true });
@@ -127,6 +130,9 @@ class Editing {
 
   // what is done
 
+  /** What there is, to come back to. */
+  get drawn() { return { file: this.file, at: new Map(this.at), wish: this.wish, changed: this.changed }; }
+
   /** A copy to draw on, with the numbers that the page has been given by hand. */
   draft() {
     const { file, units, parts: { page } } = this;
@@ -149,9 +155,9 @@ class Editing {
   }
 
   commit(made) {
-    this.done.push({ file: this.file, at: new Map(this.at), changed: this.changed });
+    this.done.push(this.drawn);
     this.undone = [];
-    this.take(made, true);
+    this.take(made, this.changed || made.file !== this.file);
   }
 
   undo() { this.step(this.done, this.undone, "Undone"); }
@@ -160,17 +166,17 @@ class Editing {
   step(from, to, said) {
     const there = from.pop();
     if (there === undefined) { this.say(`Nothing is left to be ${said.toLowerCase()}.`); return; }
-    to.push({ file: this.file, at: new Map(this.at), changed: this.changed });
+    to.push(this.drawn);
     this.hand.pending = [];
     this.take(there, there.changed);
     this.say(`${said}.`);
   }
 
   /** Another file: drawn at once, told of once Python has answered. */
-  take({ file, at }, changed) {
-    Object.assign(this, { file, at: new Map(at), changed });
+  take({ file, at, wish = this.wish }, changed) {
+    Object.assign(this, { file, at: new Map(at), wish, changed });
     if (this.chosen && !(this.chosen.kind === "pin" ? this.at.has(this.chosen.name) : file.links[this.chosen.name])) this.chosen = null;
-    Editing.keep({ file, at: [...at], changed });
+    this.keep();
     this.solved = false;
     this.show();
     return this.ask();
@@ -276,8 +282,9 @@ class Editing {
     this.perform((draft) => (kind === "pin" ? Draw.removePin(draft, name) : Draw.removeLink(draft, name)));
   }
 
-  /** Another file in place of this one: one step. */
-  replace(file) {
+  /** Another file in place of this one: one step. `fits`: all of it is to be seen. */
+  replace(file, fits = false) {
+    this.fits = fits;
     this.commit({ file, at: new Map() });
     this.guess();
   }

@@ -21,6 +21,7 @@ const TOOLS = {
   spring: { name: "Spring", told: "From one pin to another." },
   load: { name: "Force", told: "From a pin in the force's direction." },
   mass: { name: "Mass", told: "A click on a link." },
+  wish: { name: "Wanted path", told: "Where a point is to come: drawn freehand, or place after place; a click on the first closes it." },
   picture: { name: "Picture", told: "Two places of the picture underneath, whose distance is then typed beside the drawing." },
   erase: { name: "Erase", told: "A pin or a link goes." },
 };
@@ -65,15 +66,15 @@ class Hand {
   async rest() { if (this.from !== null || this.dragged !== null) await new Promise((go) => { this.waiting.push(go); }); }
   rested() { for (const go of this.waiting.splice(0)) go(); }
 
-  /** The place of an event: {pin, link, at}. */
+  /** The place of an event: {pin, link, at}, and the same not drawn to anything, `free`. */
   at(event) {
     const { left, top } = this.editing.svg.getBoundingClientRect();
-    return this.snapped([event.clientX - left, event.clientY - top], event);
+    const px = [event.clientX - left, event.clientY - top];
+    return { ...this.snapped(px, event), free: this.editing.view.toWorld(px) };
   }
 
   snapped(px, { altKey = false, shiftKey = false } = {}) {
     const { editing } = this, { view } = editing, to = view.toScreen, held = this.dragged?.pin ?? null;
-    if (editing.tool === "picture") return { pin: null, link: null, at: view.toWorld(px) };
     const pins = [...editing.at].filter(([name]) => name !== held);
     const [pin, near] = cheapest(pins, ([, at]) => Plane.apart(to(at), px)) ?? [];
     if (near && Plane.apart(to(near), px) <= REACH) return { pin, link: this.linkAt(px), at: near };
@@ -120,6 +121,7 @@ class Hand {
       if (this.pending.length) this.finish(spot);
       else this.begin(spot);
     } else if (tool === "plate") this.corner(spot);
+    else if (tool === "wish") { if (this.cursor === null) editing.wishing.press(spot); else editing.wishing.place(spot); }
     else this.once(spot);
   }
 
@@ -127,9 +129,11 @@ class Hand {
     this.spot = spot;
     if (this.dragged !== null) { if (this.from !== null || this.cursor !== null) this.editing.leadPin(this.dragged, spot.at); return; }
     if (this.pending.length) this.editing.sketch.draw();
+    else if (this.editing.tool === "wish" && this.from !== null) this.editing.wishing.lead(spot);
   }
 
   release(spot, far) {
+    if (this.editing.tool === "wish") { this.editing.wishing.release(spot); return; }
     if (this.dragged !== null) {
       const held = this.dragged;
       this.dragged = null;
@@ -156,7 +160,7 @@ class Hand {
       gear: (draft) => Draw.gear(draft, [first.link, spot.link ?? file.frame], editing.panel.ratio),
     };
     this.pending = [];
-    if (editing.tool === "picture") editing.underlay.mark([first.at, spot.at]);
+    if (editing.tool === "picture") editing.underlay.mark([first, spot].map((each) => each.free ?? each.at));
     else editing.perform(acts[editing.tool]);
   }
 

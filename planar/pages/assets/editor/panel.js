@@ -11,7 +11,7 @@ class PencilPanel {
     this.remedies = element("ul", { class: "remedies" });
     this.chosen = element("div", { class: "chosen" });
     const told = element("div", { role: "status" }, this.mobility, this.problem, this.remedies);
-    section.append(element("h2", {}, "Drawing"), told, this.chosen, this.files(), editing.underlay.form.box, this.text());
+    section.append(element("h2", {}, "Drawing"), told, this.chosen, this.files(), editing.wishing.form.box, editing.underlay.form.box, this.text());
   }
 
   button(text, act, more = {}) {
@@ -77,6 +77,7 @@ class PencilPanel {
     this.saved.textContent = editing.fileName ? `${editing.fileName}${editing.changed ? ", not saved yet" : ""}` : "no file yet";
     if (this.whole.open && document.activeElement !== this.area) this.area.value = JSON.stringify(file, null, 2);
     editing.underlay.form.show();
+    editing.wishing.show();
     this.fields();
   }
 

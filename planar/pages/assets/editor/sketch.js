@@ -23,6 +23,7 @@ class Sketch {
     const px = (at) => view.toScreen(at);
     if (editing.tool !== "hand") this.grid(px);
     if (!editing.solved) this.links(px);
+    this.wish(px);
     if (editing.tool === "hand") return;
     for (const [pin, at] of editing.at) {
       const [cx, cy] = px(at), { chosen } = editing;
@@ -73,6 +74,15 @@ class Sketch {
       svgPart("circle", { cx: x, cy: y, r: 4, class: "pin" }, this.group);
       svgPart("text", { x: x + 9, y: y - 9, class: "name" }, this.group, Letters.told(pin));
     }
+  }
+
+  /** The path that is wanted, as it is drawn, or where the page has no mechanism to show it of. */
+  wish(px) {
+    const { wish, wishing: { stroke }, parts: { page } } = this.editing, points = (places) => places.map((at) => px(at).join(",")).join(" ");
+    if (stroke.line) svgPart("polyline", { points: points(stroke.line), class: "wish" }, this.group);
+    if (!wish?.places.length || (this.editing.solved && page.wanted !== null)) return;
+    svgPart(Wish.isClosed(wish) ? "polygon" : "polyline", { points: points(wish.places), class: "wish" }, this.group);
+    for (const at of wish.places) { const [x, y] = px(at); svgPart("path", { d: `M${x - 5} ${y - 5}l10 10M${x - 5} ${y + 5}l10 -10`, class: "wish" }, this.group); }
   }
 
   /** The places by which the picture is laid. */

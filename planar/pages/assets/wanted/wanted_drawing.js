@@ -8,6 +8,7 @@ const WANTED_STEP = 2;      // px: a step by key, ten times that with Shift
 const WANTED_TURN = Math.PI / 180; // a step by key of a pose's angle
 const WANTED_ARM = 9;       // mm: how far from a pose's origin its angle is taken hold of
 const MOST_NUMBERED = 60;   // places of one item that have numbers
+const NUMBER_ROOM = 24;     // px from one number to the next
 
 class WantedDrawing {
   constructor(page, svg, drawing) {
@@ -73,6 +74,7 @@ class WantedDrawing {
         cross.setAttribute("d", `M${x - half} ${y - half}L${x + half} ${y + half}M${x - half} ${y + half}L${x + half} ${y - half}`);
         miss.setAttribute("d", there ? lineOf([[x, y], view.toScreen(there)]) : "");
         setAll(grip, { cx: x, cy: y, r: reach });
+        number?.setAttribute("visibility", i % Math.max(1, Math.ceil(NUMBER_ROOM / apart)) ? "hidden" : "visible");
         if (number) setAll(number, { "font-size": Math.max(11, 2.8 * view.mm), x: x + 1.6 * half, y: y - 0.8 * half });
         if (!ghost) return;
         const f = { x: item.places[i][0], y: item.places[i][1], cos: Math.cos(item.angles[i]), sin: Math.sin(item.angles[i]) };
