@@ -95,6 +95,7 @@ SCRIPTS = (
     "controls/keeping.js",
     "controls/panels.js",
     "stage/lens.js",
+    "stage/coupled.js",
     "stage/places.js",
     "stage/pins.js",
     "controls/undo.js",
@@ -109,12 +110,14 @@ START = 'beginPage(JSON.parse(document.getElementById("data").textContent), prog
 EDITOR_SCRIPTS = (
     "editor/server.js",
     "editor/document.js",
+    "editor/couplings.js",
     "editor/links.js",
     "editor/sketch.js",
     "editor/hand.js",
     "editor/underlay.js",
     "editor/synthesis.js",
     "editor/filing.js",
+    "editor/tool_numbers.js",
     "editor/panel.js",
     "editor/editing.js",
 )

@@ -21,14 +21,19 @@ HEAD = {"planar": 1, "name": "Mechanism", "units": {"length": "mm", "angle": "de
 
 
 def equal(drawn, written):
-    """A drawn mechanism has all points, rates and numbers of a written one."""
-    found, wanted = planar.solve(drawn), planar.solve(planar.from_dict(written))
-    assert set(found.points) == set(wanted.points)
-    assert found.mobility == wanted.mobility
-    for name, point in wanted.points.items():
-        assert found.point(name).position == pytest.approx(point.position, abs=CLOSE)
-        assert found.point(name).velocity == pytest.approx(point.velocity, abs=1e-9)
-        assert found.point(name).acceleration == pytest.approx(point.acceleration, abs=1e-7)
+    """A drawn mechanism has all points, rates and numbers of a written one, where it is drawn and a little farther."""
+    written = planar.from_dict(written)
+    first = f"{written.inputs[0].pair}.position"
+    for by in (0.0, 0.3):
+        found, wanted = (
+            planar.solve(each.with_values({first: planar.dimensions(each)[first] + by})) for each in (drawn, written)
+        )
+        assert set(found.points) == set(wanted.points)
+        assert found.mobility == wanted.mobility
+        for name, point in wanted.points.items():
+            assert found.point(name).position == pytest.approx(point.position, abs=CLOSE)
+            assert found.point(name).velocity == pytest.approx(point.velocity, abs=1e-9)
+            assert found.point(name).acceleration == pytest.approx(point.acceleration, abs=1e-7)
 
 
 def bar(*ends, length):
@@ -240,6 +245,160 @@ TOGGLE = HEAD | {
     "sketch": {"C": [110, 40], "E": [130, -40]},
     **driven("A", degrees(atan2(3, 2))),
 }
+
+
+def draw_epicyclic(hand):
+    hand.bars((0, 0), (60, 50), (80, 50), (180, 110), (200, 0))
+    hand.drive((0, 0), (200, 0))
+    hand.use("Wheels", (150, -30), (70, 50))  # empty paper: a wheel of the frame
+
+
+EPICYCLIC = HEAD | {
+    "links": {
+        "frame": {"points": {"A": [0, 0], "E": [200, 0]}},
+        "arm": bar("A", "B", length=hypot(60, 50)),
+        "planet": bar("B", "C", length=20),
+        "CD": bar("C", "D", length=hypot(100, 60)),
+        "ED": bar("E", "D", length=hypot(20, 110)),
+    },
+    "pairs": [
+        *pinned("A", "B", "C", "D", "E"),
+        {
+            "gear": "mesh",
+            "links": ["frame", "planet"],
+            "carrier": "arm",
+            "radii": [2 * hypot(60, 50) / 3, hypot(60, 50) / 3],
+            "mesh": {"frame": -degrees(atan2(50, 60)), "planet": -degrees(atan2(50, 60))},
+        },
+    ],
+    "sketch": {"D": [180, 110]},
+    **driven("A", degrees(atan2(50, 60))),
+}
+
+
+def draw_belt(hand):
+    hand.bars((0, 0), (20, 0))
+    hand.bars((110, 0), (110, 40))
+    hand.drive((0, 0), (110, 0))
+    hand.tool("Belt")
+    hand.window.get_by_label("Radius of the first pulley").fill("20")
+    hand.window.get_by_label("Radius of the second pulley").fill("45")
+    hand.window.get_by_label("Crossed").check()
+    hand.click((10, 0), (110, 20))
+
+
+BELT = HEAD | {
+    "links": {
+        "frame": {"points": {"A": [0, 0], "C": [110, 0]}},
+        "AB": bar("A", "B", length=20),
+        "CD": bar("C", "D", length=40),
+    },
+    "pairs": [
+        *pinned("A", "C"),
+        {"belt": "b", "links": ["AB", "CD"], "radii": [20, 45], "crossed": True, "mesh": {"AB": 0, "CD": 90}},
+    ],
+    **driven("A", 0),
+}
+
+
+def draw_rack(hand):
+    hand.bars((0, 30), (20, 30))
+    hand.bars((-40, 0), (80, 0))
+    hand.tool("Slide")
+    hand.drag((-40, 0), (-20, 0))
+    hand.drag((80, 0), (100, 0))
+    hand.drive((0, 30))
+    hand.tool("Rack")
+    hand.drag((10, 30), (10, 0))
+
+
+RACK = HEAD | {
+    "links": {
+        "frame": {"points": {"A": [0, 30]}},
+        "AB": bar("A", "B", length=20),
+        "CD": bar("C", "D", length=120),
+    },
+    "pairs": [
+        *pinned("A"),
+        {"sliding": "guide", "links": ["frame", "CD"], "line": {"through": [-40, 0], "angle": 0}, "point": "C"},
+        {
+            "rack": "rack",
+            "links": ["CD", "AB"],
+            "line": {"through": "C", "angle": 0},
+            "point": "A",
+            "radius": 30,
+            "mesh": {"displacement": 40, "angle": 0},
+        },
+    ],
+    "sketch": {"C": [-40, 0]},
+    **driven("A", 0),
+}
+
+
+def draw_cam(hand):
+    hand.bars((0, 0), (20, 0))
+    hand.bars((0, 60), (0, 120))
+    hand.tool("Slide")
+    hand.drag((0, 60), (0, 30))
+    hand.drag((0, 120), (0, 150))
+    hand.drive((0, 0))
+    hand.tool("Cam")
+    hand.window.get_by_label("Lift, a length or an angle").fill("20")
+    hand.window.get_by_label("Radius of the roller").fill("10")
+    hand.drag((10, 0), (0, 60))
+
+
+CAM = HEAD | {
+    "links": {
+        "frame": {"points": {"A": [0, 0]}},
+        "AB": bar("A", "B", length=20),
+        "CD": {"points": {"C": [0, 0], "D": [0, 60]}},
+    },
+    "pairs": [
+        *pinned("A"),
+        {"sliding": "guide", "links": ["frame", "CD"], "line": {"through": "A", "angle": 90}, "point": "C", "turn": -90},
+        {
+            "cam": "lift",
+            "links": ["AB", "CD"],
+            "line": {"through": "A", "angle": 90},
+            "point": "C",
+            "centre": "A",
+            "base_radius": 50,
+            "roller_radius": 10,
+            "law": [
+                {"motion": "cycloidal", "by": 20, "in": 120},
+                {"motion": "dwell", "in": 60},
+                {"motion": "cycloidal", "by": -20, "in": 120},
+                {"motion": "dwell", "in": 60},
+            ],
+        },
+    ],
+    "sketch": {"C": [0, 60], "D": [0, 120]},
+    **driven("A", 0),
+}
+
+
+def draw_slot(hand):
+    hand.bars((0, 0), (40, 0))
+    hand.bars((0, -40), (80, 40))
+    hand.drive((0, 0), (0, -40))
+    hand.tool("Slot")
+    hand.drag((40, 0), (60, 20))
+
+
+SLOT = HEAD | {
+    "links": {
+        "frame": {"points": {"A": [0, 0], "C": [0, -40]}},
+        "AB": bar("A", "B", length=40),
+        "CD": bar("C", "D", length=hypot(80, 80)),
+    },
+    "pairs": [
+        *pinned("A", "C"),
+        {"slot": "slot", "links": ["CD", "AB"], "line": {"through": "C", "to": "D"}, "point": "B"},
+    ],
+    "sketch": {"D": [80, 40]},
+    **driven("A", 0),
+}
 LINKAGES = {
     "four-bar": (draw_four_bar, FOUR_BAR),
     "slider-crank": (draw_slider_crank, SLIDER_CRANK),
@@ -250,6 +409,11 @@ LINKAGES = {
     "Watt": (draw_watt, WATT),
     "five-bar": (draw_five_bar, FIVE_BAR),
     "toggle": (draw_toggle, TOGGLE),
+    "epicyclic": (draw_epicyclic, EPICYCLIC),
+    "belt": (draw_belt, BELT),
+    "rack": (draw_rack, RACK),
+    "cam": (draw_cam, CAM),
+    "slot": (draw_slot, SLOT),
 }
 
 

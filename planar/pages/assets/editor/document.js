@@ -12,7 +12,7 @@ const Draw = {
   },
 
   freshLink(file, wanted) {
-    const taken = new Set([...Object.keys(file.links), ...(file.pairs ?? []).flatMap((pair) => [pair.sliding, pair.gear])]);
+    const taken = new Set([...Object.keys(file.links), ...(file.pairs ?? []).map(Pins.pairName)]);
     let name = wanted, count = 2;
     while (taken.has(name)) name = `${wanted} ${count++}`;
     return name;
@@ -86,17 +86,38 @@ const Draw = {
     const { file } = draft, pin = Draw.pin(draft, spot);
     if (guide !== file.frame && Pins.ofLink(file.links[guide]).includes(pin)) throw new Error(`${pin} is a point of ${guide}: it cannot slide on it`);
     if (!Pins.carriers(file, pin).length) throw new Error(`a bar is wanted at ${pin} that slides`);
-    const axes = new Placed(file, draft.at, draft.units).axes(guide), points = Pins.ofLink(file.links[guide]);
-    let line;
-    if (guide !== file.frame && points.length > 1) line = { through: points[0], to: points[1] };
-    else {
-      const [p, q] = [draft.at.get(pin), to].map((each) => Plane.local(axes, each)), angle = Math.atan2(q[1] - p[1], q[0] - p[0]);
-      line = { through: Draw.spot(draft, p), angle: Written.write(angle, "angle", draft.units, 0) };
-    }
+    const line = Draw.guideLine(draft, pin, guide, to);
     file.pairs = (file.pairs ?? []).filter((pair) => pair.turning !== pin);
-    if (guide !== file.frame && line.to) draft.at.set(pin, Draw.foot(draft, guide, line, draft.at.get(pin)));
-    file.pairs.push({ sliding: Draw.freshLink(file, `${pin} slide`), on: guide, block: pin, line });
-    return `${pin} slides on ${guide}`;
+    const made = { sliding: Draw.freshLink(file, `${pin} slide`), on: guide, block: pin, line };
+    file.pairs.push(made);
+    return Draw.slideWhole(draft, made) ?? `${pin} slides on ${guide}`;
+  },
+
+  /** A link of which two pins slide along one line slides as a whole: one pair in place of two. */
+  slideWhole({ file, at, units }, made) {
+    const placed = new Placed(file, at, units), links = Pins.carriers(file, made.block), [link] = links, line = placed.line(made);
+    const alone = ({ on, block }) => on === made.on && block !== undefined && block !== made.block && links.length === 1 && String(Pins.carriers(file, block)) === link;
+    const other = file.pairs.find(alone), before = other && placed.line(other), turned = link && placed.direction(link);
+    if (!before || !line || turned === null) return null;
+    const far = Plane.minus(at.get(made.block), before.start), across = (a, b) => Math.abs(a[0] * b[1] - a[1] * b[0]);
+    if (across(before.way, line.way) > ON_LINE || across(before.way, far) > ON_LINE * Math.max(Plane.length(far), 1e-3)) return null;
+    file.pairs.splice(file.pairs.indexOf(made), 1);
+    const turn = Written.write(Symbols.wrapped(turned - Math.atan2(before.way[1], before.way[0])), "angle", units, 0);
+    file.pairs[file.pairs.indexOf(other)] = { sliding: other.sliding, links: [other.on, link], line: other.line, point: other.block, turn };
+    return `${link} slides on ${other.on} as a whole`;
+  },
+
+  /** The line of a link on which a pin slides: through two points of the link, to which the pin comes, or through the pin. */
+  guideLine(draft, pin, guide, to) {
+    const { file, at } = draft, axes = new Placed(file, at, draft.units).axes(guide), points = Pins.ofLink(file.links[guide]);
+    if (guide !== file.frame && points.length > 1) {
+      const line = { through: points[0], to: points[1] };
+      at.set(pin, Draw.foot(draft, guide, line, at.get(pin)));
+      return line;
+    }
+    if (!axes) throw new Error(`nothing tells how ${guide} lies`);
+    const [p, q] = [at.get(pin), to].map((each) => Plane.local(axes, each)), angle = Math.atan2(q[1] - p[1], q[0] - p[0]);
+    return { through: Draw.spot(draft, p), angle: Written.write(angle, "angle", draft.units, 0) };
   },
 
   foot(draft, guide, { through, to }, at) {
@@ -106,15 +127,16 @@ const Draw = {
 
   /** The pair at a pin is driven, or no longer. */
   input(draft, pin) {
-    const { file, units } = draft, driven = file.inputs ?? [], pair = file.pairs.find((each) => each.turning === pin) ?? file.pairs.find((each) => each.block === pin);
+    const { file, units } = draft, driven = file.inputs ?? [], placed = new Placed(file, draft.at, units);
+    const pair = file.pairs.find((each) => each.turning === pin) ?? file.pairs.find((each) => each.sliding !== undefined && placed.sliderPin(each) === pin);
     if (!pair) throw new Error(`no two links are joined at ${pin}`);
-    const slides = pair.block === pin, many = slides ? 2 : Pins.carriers(file, pin).length;
+    const slides = pair.sliding !== undefined, many = slides ? 2 : Pins.carriers(file, pin).length;
     const name = slides ? pair.sliding : many > 2 ? `${pin}:${Draw.ofTwo(file, pin).join(",")}` : pin;
     if (driven.some((each) => each.pair === name)) {
       file.inputs = driven.filter((each) => each.pair !== name);
       return `${name} is driven no longer`;
     }
-    const placed = new Placed(file, draft.at, units), at = placed.motion(name);
+    const at = placed.motion(name);
     if (at === null) throw new Error(`nothing tells how far ${name} has gone`);
     const position = Written.write(slides ? at : -Symbols.wrapped(-at), slides ? "length" : "angle", units, 0);
     file.inputs = [...driven, { pair: name, position, velocity: slides ? `${Number((0.1 / units.length).toPrecision(1))} ${file.units?.length ?? "m"}/s` : "10 rad/s" }];
@@ -160,17 +182,6 @@ const Draw = {
     return `Mass of ${link}, ${draft.usual.mass.join(" ")}`;
   },
 
-  /** Two links turn as wheels do; they meet as they stand. */
-  gear(draft, links, ratio) {
-    const { file, units } = draft, placed = new Placed(file, draft.at, units), angles = links.map((link) => placed.direction(link));
-    if (links[0] === links[1] || links.includes(file.frame)) throw new Error("wheels are two links that move");
-    if (!Number.isFinite(ratio) || ratio === 0) throw new Error("the ratio of wheels is a number, and not 0");
-    if (angles.includes(null)) throw new Error("nothing tells how these links lie");
-    const mesh = Object.fromEntries(links.map((link, k) => [link, Written.write(angles[k], "angle", units, 0)]));
-    file.pairs.push({ gear: Draw.freshLink(file, `${links.join("-")} wheels`), links, ratio, mesh });
-    return `Wheels of ${links.join(" and ")}, ratio ${ratio}`;
-  },
-
   /** A link of the same form with pins of its own, so far aside. */
   copyLink(draft, link, aside) {
     return Draw.link(draft, Draw.spots(draft, link).map(({ at: [x, y] }) => ({ pin: null, at: [x + aside, y - aside] })));
@@ -210,17 +221,24 @@ const Draw = {
     return `${pin} is gone`;
   },
 
+  /** Whether all links and points of a pair are there. */
+  holds(file, pair) {
+    const has = (link) => link === undefined || Object.hasOwn(file.links, link), carries = (link, point) => point === undefined || (Object.hasOwn(file.links, link) && Pins.ofLink(file.links[link]).includes(point));
+    if (pair.turning !== undefined) return pair.points ? pair.links.every((link, k) => carries(link, pair.points[k])) : (pair.links ?? Pins.carriers(file, pair.turning)).length > 1;
+    if (![...(pair.links ?? []), pair.on, pair.carrier].every(has)) return false;
+    if (pair.block !== undefined && !Pins.carriers(file, pair.block).length) return false;
+    const [first, second] = pair.links ?? [], guide = Placed.guide(file, pair);
+    return carries(second, pair.point) && carries(first, pair.centre) && carries(second, pair.pivot)
+      && [pair.line?.through, pair.line?.to].every((point) => typeof point !== "string" || carries(guide, point));
+  },
+
   /** What refers to nothing any more goes, too. */
   clean(draft) {
     const { file, at } = draft, has = (link) => Object.hasOwn(file.links, link), carries = (link, point) => has(link) && Pins.ofLink(file.links[link]).includes(point);
     for (const pair of file.pairs ?? []) if (pair.turning !== undefined && pair.links && !pair.points) pair.links = pair.links.filter((link) => carries(link, pair.turning));
-    file.pairs = (file.pairs ?? []).filter((pair) => {
-      if (pair.turning !== undefined) return pair.points ? pair.links.every((link, k) => carries(link, pair.points[k])) : (pair.links ?? Pins.carriers(file, pair.turning)).length > 1;
-      if (pair.block !== undefined) return has(pair.on) && Pins.carriers(file, pair.block).length > 0;
-      return (pair.links ?? []).every(has);
-    });
+    file.pairs = (file.pairs ?? []).filter((pair) => Draw.holds(file, pair));
     // what is not joined by a slide any more is joined by a pin
-    const pins = Pins.all(file), names = new Set(file.pairs.map((pair) => pair.turning ?? pair.sliding));
+    const pins = Pins.all(file), names = new Set(file.pairs.map(Pins.pairName));
     const keep = (key, holds) => { if (file[key]) { file[key] = file[key].filter(holds); if (!file[key].length) delete file[key]; } };
     keep("inputs", (each) => { const [entry, two] = each.pair.split(":"); return names.has(entry) && (two?.split(",") ?? []).every((link) => carries(link, entry)); });
     keep("loads", (each) => (each.point === undefined || pins.has(each.point)) && (each.link === undefined || has(each.link)) && (each.pair === undefined || names.has(each.pair)));
@@ -235,7 +253,7 @@ const Draw = {
   renamePin(draft, from, to) {
     const { file, at } = draft, name = to.trim();
     if (!name || /[.:,]/.test(name)) throw new Error("a name has letters, and no . : or ,");
-    if (Pins.all(file).has(name) || file.pairs.some((pair) => [pair.sliding, pair.gear].includes(name))) throw new Error(`there is a ${name} already`);
+    if (Pins.all(file).has(name) || file.pairs.some((pair) => pair.turning === undefined && Pins.pairName(pair) === name)) throw new Error(`there is a ${name} already`);
     const members = Pins.all(file).get(from), swap = (each, old) => (each === old ? name : each);
     const keyed = (object, old) => Object.fromEntries(Object.entries(object).map(([key, value]) => [swap(key, old), value]));
     for (const [linkName, point] of members) {
@@ -249,8 +267,9 @@ const Draw = {
       for (const mass of file.masses ?? []) if (mass.link === linkName && mass.at === point) mass.at = name;
       for (const pair of file.pairs) {
         if (pair.points) pair.points = pair.points.map((each, k) => (pair.links[k] === linkName ? swap(each, point) : each));
-        if ((pair.on ?? pair.links?.[0]) === linkName && pair.line) for (const key of ["through", "to"]) if (pair.line[key] === point) pair.line[key] = name;
-        if (pair.links?.[1] === linkName && pair.point === point) pair.point = name;
+        if (Placed.guide(file, pair) === linkName && pair.line) for (const key of ["through", "to"]) if (pair.line[key] === point) pair.line[key] = name;
+        if (pair.links?.[1] === linkName) for (const key of ["point", "pivot"]) if (pair[key] === point) pair[key] = name;
+        if (pair.links?.[0] === linkName && pair.centre === point) pair.centre = name;
         if (pair.block === point) pair.block = name;
         if (pair.turning === point && from === point) pair.turning = name;
       }

@@ -16,8 +16,12 @@ const TOOLS = {
   point: { name: "Point", told: "A click on a link, then where its new point lies." },
   ground: { name: "Ground", told: "A pin is fixed to the frame, or made free again." },
   slide: { name: "Slide", told: "From a pin along its line; where that ends on a link, on that link." },
+  slot: { name: "Slot", told: "From a pin along the slot in which it runs; where that ends on a link, in a slot of that link." },
   input: { name: "Input", told: "A pin or slide is driven, or no longer." },
-  gear: { name: "Wheels", told: "A click on each of two links that turn as wheels do; their ratio stands beside." },
+  gear: { name: "Wheels", told: "A click on each of two links that turn as wheels do, on empty paper for the frame; their ratio stands beside." },
+  rack: { name: "Rack", told: "From a link that rolls, near the pin about which it turns, to the bar on which it rolls." },
+  belt: { name: "Belt", told: "A click on each of two pulleys; their radii stand beside, left empty they are chosen." },
+  cam: { name: "Cam", told: "From a link that is the cam to the pin of its follower, which slides or swings; lift and roller stand beside, left empty they are chosen." },
   spring: { name: "Spring", told: "From one pin to another." },
   load: { name: "Force", told: "From a pin in the force's direction." },
   mass: { name: "Mass", told: "A click on a link." },
@@ -117,7 +121,7 @@ class Hand {
       if (spot.pin !== null) this.dragged = editing.takePin(spot.pin);
       return;
     }
-    if (["bar", "spring", "load", "slide", "point", "gear", "picture"].includes(tool)) {
+    if (["bar", "spring", "load", "slide", "slot", "point", "gear", "belt", "rack", "cam", "picture"].includes(tool)) {
       if (this.pending.length) this.finish(spot);
       else this.begin(spot);
     } else if (tool === "plate") this.corner(spot);
@@ -143,21 +147,25 @@ class Hand {
   }
 
   begin(spot) {
-    const { tool } = this.editing, wanted = { spring: ["pin", "a spring begins at a pin"], load: ["pin", "a force acts on a pin"], point: ["link", "click a link first"], gear: ["link", "click a link first"] }[tool];
+    const { tool } = this.editing, wanted = { spring: ["pin", "a spring begins at a pin"], load: ["pin", "a force acts on a pin"], point: ["link", "click a link first"], rack: ["link", "a pinion is a link"], cam: ["link", "a cam is a link"], slot: ["pin", "a pin runs in a slot: begin at one"] }[tool];
     if (wanted && spot[wanted[0]] === null) { this.editing.say(`${wanted[1]}.`); return; }
     this.pending = [spot];
     this.editing.sketch.draw();
   }
 
   finish(spot) {
-    const { editing, pending: [first] } = this, { file } = editing;
+    const { editing, pending: [first] } = this, { file, panel: { numbers } } = editing, wheels = [first, spot].map(({ link }) => link ?? file.frame);
     const acts = {
       bar: (draft) => Draw.link(draft, [first, spot]),
       spring: (draft) => Draw.spring(draft, [first, spot]),
       load: (draft) => Draw.load(draft, first.pin, spot.at),
       slide: (draft) => Draw.slide(draft, first, this.guide(first, spot) ?? file.frame, spot.at),
       point: (draft) => Draw.point(draft, first.link, spot),
-      gear: (draft) => Draw.gear(draft, [first.link, spot.link ?? file.frame], editing.panel.ratio),
+      slot: (draft) => Couplings.slot(draft, first, this.guide(first, spot) ?? file.frame, spot.at),
+      gear: (draft) => Couplings.gear(draft, wheels, numbers.read("ratio")),
+      belt: (draft) => Couplings.belt(draft, wheels, ["first", "second"].map((key) => numbers.length(key)), numbers.read("crossed")),
+      rack: (draft) => Couplings.rack(draft, first.link, spot.link, first.at),
+      cam: (draft) => Couplings.cam(draft, first.link, spot.pin, { lift: numbers.lift(), roller: numbers.length("roller") }),
     };
     this.pending = [];
     if (editing.tool === "picture") editing.underlay.mark([first, spot].map((each) => each.free ?? each.at));

@@ -28,10 +28,10 @@ class PencilPanel {
       this.bar.append(made);
       return [key, made];
     });
-    this.ratioField = Forms.element("input", { type: "number", step: "any", value: -2, "aria-label": "Ratio of wheels" });
+    this.numbers = new ToolNumbers(editing);
     this.undo = this.button("Undo drawing", () => editing.undo());
     this.redo = this.button("Redo drawing", () => editing.redo());
-    this.bar.append(this.ratioField, this.undo, this.redo);
+    this.bar.append(...this.numbers.boxes, this.undo, this.redo);
     this.hint = Forms.element("p", { class: "hint", id: "pencil-hint" });
     // one stop for the tab key, arrows from tool to tool
     this.bar.addEventListener("keydown", (event) => {
@@ -42,8 +42,6 @@ class PencilPanel {
       list[(to + list.length) % list.length].focus();
     });
   }
-
-  get ratio() { return Number(this.ratioField.value); }
 
   files() {
     const { editing } = this, { element } = Forms;
@@ -64,9 +62,9 @@ class PencilPanel {
   }
 
   show() {
-    const { editing, ratioField } = this, { answer, tool, file } = editing;
+    const { editing } = this, { answer, tool, file } = editing;
     for (const [key, button] of this.buttons) button.setAttribute("aria-pressed", String(key === tool));
-    ratioField.hidden = tool !== "gear";
+    this.numbers.show(tool);
     this.hint.textContent = tool === "hand" ? "" : `${TOOLS[tool].told} Keys: arrows lead the cross, Enter presses, N goes to the next pin, Esc leaves off.`;
     this.hint.hidden = tool === "hand";
     [this.undo.disabled, this.redo.disabled] = [!editing.done.length, !editing.undone.length];

@@ -58,7 +58,7 @@ class Sketch {
     const { editing } = this, { file } = editing, loose = editing.answer?.loose ?? [];
     for (const link of Object.keys(file.links)) if (link !== file.frame) this.outline(link, loose.includes(link) ? "link loose" : "link", px);
     for (const pair of file.pairs ?? []) {
-      const line = pair.sliding === undefined ? null : editing.placed.line(pair), at = line && editing.placed.slider(pair);
+      const line = Placed.slides(pair) ? editing.placed.line(pair) : null, at = line && editing.placed.slider(pair);
       if (!at) continue;
       const ends = [-40, 40].map((far) => { const [x, y] = px(at); return `${x + far * line.way[0]},${y - far * line.way[1]}`; });
       svgPart("polyline", { points: ends.join(" "), class: "guide" }, this.group);

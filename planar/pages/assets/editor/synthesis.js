@@ -20,7 +20,7 @@ class DrawnWish {
     this.status = element("p", { role: "status" });
     this.remarks = element("ul", { class: "remarks" });
     this.designs = element("ol", { class: "designs" });
-    this.more = element("div", {}, element("p", { class: "files" }, this.begin, this.end), this.status, this.designs, this.remarks);
+    this.more = element("div", {}, element("p", { class: "row" }, this.begin, this.end), this.status, this.designs, this.remarks);
     form.box.append(this.more);
   }
 

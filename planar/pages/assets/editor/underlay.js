@@ -135,8 +135,8 @@ class UnderlayForm {
     this.opacity.addEventListener("change", () => underlay.keep());
     const remove = element("button", { type: "button" }, "Remove picture");
     remove.addEventListener("click", () => underlay.remove());
-    this.laid = element("p", { class: "files" }, element("label", { class: "choice" }, "Opacity ", this.opacity), remove);
-    this.fields = element("p", { class: "files" });
+    this.laid = element("p", { class: "row" }, element("label", { class: "choice" }, "Opacity ", this.opacity), remove);
+    this.fields = element("p", { class: "row" });
     this.hint = element("p", { class: "hint" });
     this.box = element("details", { class: "underlay" }, element("summary", {}, "Picture underneath"),
       element("p", {}, element("label", {}, "Picture ", this.file)), this.laid, this.fields, this.hint);

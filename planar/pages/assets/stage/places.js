@@ -36,8 +36,13 @@ const Written = {
   },
 };
 
+const PAIR_KINDS = ["turning", "sliding", "slot", "gear", "rack", "belt", "chain", "cam", "geneva"];
+
 /** Who carries the pins of a file. */
 const Pins = {
+  /** The name of a pair, which stands at its kind. */
+  pairName(pair) { return pair[PAIR_KINDS.find((kind) => pair[kind] !== undefined)]; },
+
   /** The names of a link's points. */
   ofLink(link) { return [...new Set([...(link.ends ?? []), ...Object.keys(link.points ?? {})])]; },
 
@@ -108,9 +113,15 @@ class Placed {
     return a && b ? Math.atan2(b[1] - a[1], b[0] - a[0]) : null;
   }
 
-  /** The line of a sliding pair: {start, way} in the world; null where it cannot be seen. */
+  /** The link in which the line of a pair lies. */
+  static guide(file, pair) { return pair.cam !== undefined ? pair.carrier ?? file.frame : pair.on ?? pair.links?.[0]; }
+
+  /** Whether a point of one link stays on a line of another. */
+  static slides(pair) { return pair.sliding !== undefined || pair.slot !== undefined; }
+
+  /** The line of a pair: {start, way} in the world; null where it cannot be seen. */
   line(pair) {
-    const on = pair.on ?? pair.links?.[0], axes = this.axes(on), { through, to, angle } = pair.line ?? {};
+    const on = Placed.guide(this.file, pair), axes = this.axes(on), { through, to, angle } = pair.line ?? {};
     const spot = (where) => (Array.isArray(where) ? axes && Plane.carry(axes, this.local(where)) : this.place(on, where));
     const start = through === undefined ? null : spot(through), end = to === undefined ? null : spot(to);
     if (!start || (to !== undefined && !end) || (to === undefined && !axes)) return null;
@@ -124,8 +135,8 @@ class Placed {
 
   /** How far the relative motion of a pair has gone, but for a constant; null where it cannot be seen. */
   motion(name) {
-    const [entry, two] = name.split(":"), pair = this.file.pairs.find((each) => [each.turning, each.sliding].includes(entry));
-    if (pair?.sliding !== undefined) {
+    const [entry, two] = name.split(":"), pair = this.file.pairs.find((each) => [each.turning, each.sliding, each.slot].includes(entry));
+    if (pair && Placed.slides(pair)) {
       const line = this.line(pair), at = line && this.slider(pair);
       return at ? Plane.dot(Plane.minus(at, line.start), line.way) : null;
     }
@@ -138,7 +149,7 @@ class Placed {
   /** Where a pin may go that is led to a place: on its line, where points lead that. */
   allowed(pin, to) {
     for (const pair of this.file.pairs) {
-      if (pair.sliding === undefined || Array.isArray(pair.line?.through) || this.sliderPin(pair) !== pin) continue;
+      if (!Placed.slides(pair) || Array.isArray(pair.line?.through) || this.sliderPin(pair) !== pin) continue;
       const line = this.line(pair);
       if (line) return Plane.on(line.start, line.way, Plane.dot(Plane.minus(to, line.start), line.way));
     }
@@ -164,10 +175,10 @@ class Placed {
       }
     }
     for (const pair of file.pairs ?? []) after.lead(pair);
-    for (const pair of file.pairs ?? []) if (pair.gear !== undefined) this.meshed(pair, after);
+    for (const pair of file.pairs ?? []) Coupled.follow(pair, this, after);
     (file.inputs ?? []).forEach((given, k) => {
       const [a, b] = [this.motion(given.pair), after.motion(given.pair)];
-      const slides = file.pairs.some((pair) => pair.sliding === given.pair), kind = slides ? "length" : "angle";
+      const slides = file.pairs.some((pair) => Placed.slides(pair) && Pins.pairName(pair) === given.pair), kind = slides ? "length" : "angle";
       const start = inputs?.[k] ?? Written.read(given.position, kind, units);
       if (a === null || b === null || start === null) return;
       Written.put(given, "position", start + (slides ? b - a : Symbols.wrapped(b - a)), kind, units);
@@ -200,20 +211,12 @@ class Placed {
 
   /** A line that is told by coordinates goes through what slides along it. */
   lead(pair) {
-    if (pair.sliding === undefined || !Array.isArray(pair.line?.through)) return;
+    if (!Placed.slides(pair) || !Array.isArray(pair.line?.through)) return;
     const line = this.line(pair), at = line && this.slider(pair);
     if (!at) return;
     const normal = [-line.way[1], line.way[0]], off = Plane.dot(Plane.minus(at, line.start), normal);
     if (Math.abs(off) <= ON_LINE * Math.max(Plane.apart(at, line.start), 1e-3)) return;
     Plane.local(line.axes, Plane.on(line.start, normal, off)).forEach((each, k) => Written.put(pair.line.through, k, each, "length", this.units));
-  }
-
-  /** Wheels meet as they did, each turned with its link. */
-  meshed(pair, after) {
-    const turned = pair.links.map((link) => [link, Symbols.wrapped((after.direction(link) ?? 0) - (this.direction(link) ?? 0))]);
-    if (turned.every(([, by]) => Math.abs(by) < 1e-12)) return;
-    pair.mesh ??= Object.fromEntries(pair.links.map((link) => [link, 0]));
-    for (const [link, by] of turned) Written.put(pair.mesh, link, (Written.read(pair.mesh[link] ?? 0, "angle", this.units) ?? 0) + by, "angle", this.units);
   }
 
   /** The file with a sketch of all pins that move. */

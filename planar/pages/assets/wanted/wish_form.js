@@ -16,7 +16,7 @@ class WishForm {
     this.ordered = this.tick("in this order", (ordered) => this.change({ ordered }));
     this.save = this.button("Task (JSON)", () => host.offer("task.json", `${JSON.stringify(this.task(), null, 2)}\n`));
     this.away = this.button("Erase wanted path", () => host.takeWish(null));
-    this.about = element("p", { class: "files" }, element("label", { class: "choice" }, "Traced by ", this.point), this.closed.label, this.ordered.label, this.save, this.away);
+    this.about = element("p", { class: "row" }, element("label", { class: "choice" }, "Traced by ", this.point), this.closed.label, this.ordered.label, this.save, this.away);
     this.box = element("details", { class: "wish" }, element("summary", {}, "Wanted path"), this.hint, this.about);
   }
 
