@@ -97,6 +97,7 @@ SCRIPTS = (
     "stage/lens.js",
     "stage/coupled.js",
     "stage/places.js",
+    "stage/placed_pages.js",
     "stage/pins.js",
     "controls/undo.js",
     "controls/saving.js",

@@ -356,7 +356,13 @@ CAM = HEAD | {
     },
     "pairs": [
         *pinned("A"),
-        {"sliding": "guide", "links": ["frame", "CD"], "line": {"through": "A", "angle": 90}, "point": "C", "turn": -90},
+        {
+            "sliding": "guide",
+            "links": ["frame", "CD"],
+            "line": {"through": "A", "angle": 90},
+            "point": "C",
+            "turn": -90,
+        },
         {
             "cam": "lift",
             "links": ["AB", "CD"],
@@ -727,3 +733,25 @@ def test_springs_forces_and_masses_are_drawn_in_the_files_kind_of_units(length, 
     (given,) = drawn.inputs
     effort = float(planar.forces(planar.solve(drawn)).inputs[given.pair])
     assert hand.window.evaluate("(name) => page.forces.effort(name)", given.pair) == pytest.approx(effort, rel=1e-8)
+
+
+@pytest.mark.parametrize(("pin", "changed"), [("D", {"AD.D.x", "AD.D.y"}), ("B", {"AB.length", "A.position"})])
+def test_the_rest_goes_along_with_a_pin_and_keeps_its_lengths(pin, changed, drawing):
+    hand = drawing(planar.to_dict("four-bar"))
+    start = planar.solve(hand.mechanism()).point(pin).position * 1000
+    hand.tool("Pins")
+    hand.window.get_by_label("The rest goes along").check()
+    hand.click(start)
+    hand.type("x (mm)", str(start[0] + 6))
+    hand.type("y (mm)", str(start[1] + 4))
+    drawn = hand.mechanism()
+    before, after = planar.dimensions(planar.load("four-bar")), planar.dimensions(drawn)
+    gone = {name for name in before if not name.startswith("sketch") and after[name] != pytest.approx(before[name])}
+    assert gone == changed
+    found = planar.solve(drawn)
+    assert found.point(pin).position * 1000 == pytest.approx(start + [6, 4], abs=1e-6)
+    for name, at in hand.window.evaluate("[...editing.at]"):
+        assert found.point(name).position == pytest.approx(at, abs=CLOSE)
+    hand.button("Undo drawing")
+    hand.button("Undo drawing")
+    assert planar.dimensions(hand.mechanism()) == before

@@ -370,5 +370,17 @@ def test_pins_are_moved_by_keys_and_one_that_would_not_go_together_stays(shown):
     there = window.evaluate("page.point('A').position")
     assert there == pytest.approx([start[0] + 0.02 * window.evaluate("page.data.size"), start[1]], abs=1e-9)
     assert "Pin A at" in window.locator("#said").inner_text()
+    # the rest goes along: only a place of the frame changes
+    before = window.evaluate("Array.from(page.linkage.d)")
+    window.get_by_role("button", name="The rest keeps its lengths").click()
+    window.locator("#drawing").focus()
+    for _ in range(len(names) + names.index("O") - names.index("A")):
+        window.keyboard.press("n")
+    rod = window.evaluate("page.point('B').position")
+    window.keyboard.press("Shift+ArrowUp")
+    moved = np.array(window.evaluate("Array.from(page.linkage.d)")) != before
+    changed = np.array(window.evaluate("page.data.dimensions.map((each) => each.name)"))[moved]
+    assert list(changed) == ["frame.O.y"]
+    assert window.evaluate("page.point('B').position") != rod
     window.keyboard.press("Escape")
     assert window.locator(".pencil").count() == 0

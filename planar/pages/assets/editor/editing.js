@@ -10,7 +10,7 @@ class Editing {
   constructor(data, program) {
     const { value, name, answer } = data.edited;
     Object.assign(this, { file: value, fileName: name, answer, units: answer.units ?? { length: 1e-3, angle: Math.PI / 180 }, usual: answer.usual, wish: null });
-    Object.assign(this, { at: new Map(), done: [], undone: [], tool: "hand", chosen: null, changed: false, asked: 0, settled: true });
+    Object.assign(this, { at: new Map(), done: [], undone: [], tool: "hand", chosen: null, linkBefore: null, changed: false, asked: 0, settled: true });
     this.blank = document.querySelector("main").cloneNode(true);
     this.blank.querySelector("#still")?.remove();
     this.sketch = new Sketch(this);
@@ -226,12 +226,13 @@ class Editing {
 
   // pins
 
-  /** Hold a pin: what it is moved from. */
+  /** Hold a pin: what it is moved from, and whether the rest goes along. */
   takePin(pin) {
     this.parts.controls.pause();
-    const { file, at, units } = this.draft(), { page, drawing } = this.parts;
+    const { file, at, units } = this.draft(), { page, drawing } = this.parts, { solved } = this;
     drawing.hold(true);
-    return { pin, placed: new Placed(file, at, units), inputs: this.solved ? page.data.inputs.map((_, k) => page.input(k)) : null, made: null, solved: this.solved };
+    const held = { pin, placed: new Placed(file, at, units), inputs: solved ? page.data.inputs.map((_, k) => page.input(k)) : null, made: null, solved };
+    return { ...held, along: solved && this.panel.numbers.read("along"), link: this.linkBefore };
   }
 
   /** Lead it: at the next frame, however often it is asked for. */
@@ -246,6 +247,7 @@ class Editing {
   }
 
   pull(held) {
+    if (held.along) { this.pullAlong(held); return; }
     held.made = held.placed.moved(held.pin, held.to, held.inputs);
     this.at = held.made.at;
     const shown = held.solved && solvePlaced(this.parts.page, held, this.units) === "";
@@ -253,12 +255,31 @@ class Editing {
     this.sketch.draw();
   }
 
+  /** As far as the rest goes along. */
+  pullAlong(held) {
+    const { page } = this.parts;
+    held.made = held.placed.along(held.pin, held.to, held.inputs, held.link);
+    const why = solveAlong(page, held, this.units);
+    if (why === "") held.reached = held.made.file;
+    this.say(why ? `${held.pin} stays: ${why}.` : "");
+    this.at = new Map([...this.at].map(([name, at]) => [name, page.data.points[name] ? page.point(name).position : at]));
+    this.sketch.draw();
+  }
+
   dropPin(held, to) {
     held.to = to;
     this.parts.drawing.hold(false);
-    this.at = held.placed.at;
-    this.commit(held.placed.moved(held.pin, to, held.inputs));
-    this.say(`${held.pin} moved.`);
+    if (held.along) {
+      this.pullAlong(held);
+      if (!held.reached) return;
+      const at = new Map(this.at), file = new Placed(held.reached, at, this.units).sketched();
+      this.at = held.placed.at;
+      this.commit({ file, at });
+    } else {
+      this.at = held.placed.at;
+      this.commit(held.placed.moved(held.pin, to, held.inputs));
+    }
+    this.say(`${held.pin} moved${held.along ? ", and what hangs on it" : ""}.`);
   }
 
   movePin(pin, to) { this.dropPin(this.takePin(pin), to); }

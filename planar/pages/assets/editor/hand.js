@@ -117,6 +117,7 @@ class Hand {
     const { editing } = this, { tool } = editing;
     this.spot = spot;
     if (tool === "pin") {
+      editing.linkBefore = editing.chosen?.kind === "link" ? editing.chosen.name : null;
       editing.choose(spot.pin !== null ? { kind: "pin", name: spot.pin } : spot.link !== null ? { kind: "link", name: spot.link } : null);
       if (spot.pin !== null) this.dragged = editing.takePin(spot.pin);
       return;

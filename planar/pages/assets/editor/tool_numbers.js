@@ -2,6 +2,7 @@
 /* Numbers that stand beside the tools, for what is drawn next: {key, tool, label, value; kind: "tick", or a number}. */
 
 const TOOL_NUMBERS = [
+  { key: "along", tool: "pin", label: "The rest goes along", kind: "tick" },
   { key: "ratio", tool: "gear", label: "Ratio of wheels", value: -2 },
   { key: "first", tool: "belt", label: "Radius of the first pulley", value: "" },
   { key: "second", tool: "belt", label: "Radius of the second pulley", value: "" },

@@ -7,10 +7,12 @@ const PIN_STEP = 0.002; // sizes: as far an arrow moves a pin, ten times as far 
 
 class PinDragging {
   constructor(page, svg, lens, before) {
-    Object.assign(this, { page, svg, before, on: false, held: null, chosen: null });
+    Object.assign(this, { page, svg, before, on: false, along: false, held: null, chosen: null });
     if (!page.data.dimensions.length) return; // its numbers are no page's to change
     this.button = lens.button("Pins", "Pins: drag them, and lengths follow", () => this.turn(!this.on));
-    this.button.setAttribute("aria-pressed", "false");
+    this.rest = lens.button("Rest along", "The rest keeps its lengths and goes along with a pin", () => this.goAlong(!this.along));
+    this.goAlong(false);
+    this.turn(false);
     const { filed_units: { length, angle } } = page.data, stage = svg.parentNode;
     this.units = { length: length.si, angle: angle.si };
     const own = (act) => (event) => { if (this.on && event.target.closest("#drawing")) act(event); };
@@ -22,12 +24,20 @@ class PinDragging {
   }
 
   turn(on) {
-    this.on = on;
-    this.chosen = null;
+    Object.assign(this, { on, chosen: null });
     this.button.setAttribute("aria-pressed", String(on));
-    this.page.say(on ? "Drag a pin, and the lengths of its links follow. Keys: N chooses the next pin, arrows move it." : "");
-    this.before();
+    this.rest.hidden = !on;
+    if (on) {
+      this.before();
+      this.page.say("Drag a pin, and the lengths of its links follow. Keys: N chooses the next pin, arrows move it.");
+    }
     this.draw();
+  }
+
+  /** Whether the rest keeps its lengths and goes along, or stays where it is. */
+  goAlong(along) {
+    this.along = along;
+    this.rest.setAttribute("aria-pressed", String(along));
   }
 
   draw() {
@@ -88,8 +98,9 @@ class PinDragging {
   /** As far as it goes together. */
   pull(held) {
     held.waits = false;
-    held.made = held.placed.moved(held.pin, held.to, held.inputs);
-    const why = solvePlaced(this.page, held, this.units);
+    const { pin, to, inputs, placed } = held;
+    held.made = this.along ? placed.along(pin, to, inputs, null) : placed.moved(pin, to, inputs);
+    const why = (this.along ? solveAlong : solvePlaced)(this.page, held, this.units);
     this.page.say(why ? `${held.pin} stays: ${why}.` : "");
   }
 

@@ -5,7 +5,6 @@
 const SAME_NUMBER = 1e-11; // of the greatest: a number that is as near stays as it is written
 const FILE_FIGURES = 12;   // of a number that is written
 const ON_LINE = 1e-9;      // of a distance: a point as near to a line lies on it
-const FOLLOWED = 1e-6;      // sizes: as near to where a pin is led a page's own solution has to come
 const KNOWN_UNITS = {
   length: { m: 1, mm: 1e-3, cm: 1e-2, dm: 0.1, um: 1e-6, in: 0.0254, ft: 0.3048 },
   angle: { deg: Math.PI / 180, "°": Math.PI / 180, rad: 1 },
@@ -141,8 +140,8 @@ class Placed {
       return at ? Plane.dot(Plane.minus(at, line.start), line.way) : null;
     }
     if (pair === undefined) return null;
-    const members = (pair.links ?? Pins.carriers(this.file, entry)).slice().sort((a, b) => Number(b === this.file.frame) - Number(a === this.file.frame));
-    const [first, second] = (two?.split(",") ?? members).map((link) => this.direction(link));
+    const members = two?.split(",") ?? pair.links ?? Pins.carriers(this.file, entry); // against the frame, whichever is written first
+    const [first, second] = members.slice().sort((a, b) => Number(b === this.file.frame) - Number(a === this.file.frame)).map((link) => this.direction(link));
     return first === null || second === null || first === undefined || second === undefined ? null : second - first;
   }
 
@@ -176,14 +175,46 @@ class Placed {
     }
     for (const pair of file.pairs ?? []) after.lead(pair);
     for (const pair of file.pairs ?? []) Coupled.follow(pair, this, after);
-    (file.inputs ?? []).forEach((given, k) => {
-      const [a, b] = [this.motion(given.pair), after.motion(given.pair)];
-      const slides = file.pairs.some((pair) => Placed.slides(pair) && Pins.pairName(pair) === given.pair), kind = slides ? "length" : "angle";
-      const start = inputs?.[k] ?? Written.read(given.position, kind, units);
-      if (a === null || b === null || start === null) return;
-      Written.put(given, "position", start + (slides ? b - a : Symbols.wrapped(b - a)), kind, units);
-    });
+    (file.inputs ?? []).forEach((given, k) => this.driven(given, inputs?.[k], after));
     return { file: after.sketched(), at };
+  }
+
+  /** The position of an input goes on by as far as its pair has moved; `start` (SI) is where it is, left out that in the file. */
+  driven(given, start, after) {
+    const [a, b] = [this.motion(given.pair), after.motion(given.pair)], slides = this.file.pairs.some((pair) => Placed.slides(pair) && Pins.pairName(pair) === given.pair);
+    const kind = slides ? "length" : "angle", from = start ?? Written.read(given.position, kind, this.units);
+    if (a === null || b === null || from === null) return;
+    Written.put(given, "position", from + (slides ? b - a : Symbols.wrapped(b - a)), kind, this.units);
+  }
+
+  /** The link whose number follows where all else keeps its lengths: one that is chosen, the frame, one that is driven from
+      there, or the first. */
+  owner(pin, chosen) {
+    const { frame } = this.file, links = this.pins.get(pin).map(([link]) => link), driven = (this.file.inputs ?? []).flatMap((given) => (this.isOf(given, pin) ? [] : this.members(given.pair)));
+    return links.find((link) => link === chosen) ?? links.find((link) => link === frame) ?? links.find((link) => driven.includes(link) && driven.includes(frame)) ?? links[0];
+  }
+
+  /** The links of a turning pair between which its motion is. */
+  members(name) {
+    const [entry, two] = name.split(":"), pair = this.file.pairs.find((each) => each.turning === entry);
+    return pair ? two?.split(",") ?? pair.links ?? Pins.carriers(this.file, entry) : [];
+  }
+
+  isOf({ pair }, pin) { return pair.split(":")[0] === pin; }
+
+  /** The file with one number of a pin that is led to a place, and the inputs that turn its link from the frame or slide
+      it: all else keeps its lengths, and goes along. */
+  along(pin, to, inputs, chosen) {
+    const { units } = this, file = structuredClone(this.file), owner = this.owner(pin, chosen), after = new Placed(file, new Map(this.at).set(pin, to), units);
+    const [, point] = this.pins.get(pin).find(([link]) => link === owner), link = file.links[owner], where = link.points?.[point], axes = this.axes(owner);
+    if (where === undefined) Written.put(link, "length", Plane.apart(...link.ends.map((each) => after.place(owner, each))), "length", units);
+    else if (axes) after.describe(owner, link, point, where, to, axes);
+    (file.inputs ?? []).forEach((given, k) => {
+      const members = this.members(given.pair), pair = file.pairs.find((each) => Pins.pairName(each) === given.pair);
+      const turns = where === undefined && members.includes(owner) && members.includes(file.frame), slides = pair && Placed.slides(pair) && this.sliderPin(pair) === pin;
+      if (turns || slides) this.driven(given, inputs?.[k], after);
+    });
+    return { file, at: after.at, owner };
   }
 
   /** The numbers by which a link describes a point. */
@@ -231,43 +262,4 @@ class Placed {
     }
     return file;
   }
-}
-
-/** A page's file, or the same as its author wrote it, with the numbers that the page has now. */
-function fileNow(page, file, units) {
-  const { data, linkage } = page, made = structuredClone(file);
-  data.dimensions.forEach((each, k) => {
-    const path = data.document.dimensions[k], key = path[path.length - 1], holder = path.slice(0, -1).reduce((one, part) => one?.[part], made);
-    if (linkage.d[k] !== each.value && holder && key in holder) Written.put(holder, key, linkage.d[k], "length", units);
-  });
-  data.inputs.forEach((given, k) => {
-    if (made.inputs?.[k]) Written.put(made.inputs[k], "position", page.input(k), given.slides ? "length" : "angle", units);
-  });
-  return made;
-}
-
-/** Bring a page to the numbers of a pin that is led, {pin, placed, made}, from where it is: "", or why not. */
-function solvePlaced(page, { pin, placed, made: { file, at } }, units) {
-  const { data, linkage } = page, value = (from, path) => path.reduce((each, key) => each?.[key], from) ?? null;
-  // what is written alike stays as exact as it was
-  const now = (path, kind, own) => {
-    const [was, is] = [placed.file, file].map((each) => Written.read(value(each, path), kind, units));
-    return is === null || is === was ? own : is;
-  };
-  const d = data.document.dimensions.map((path, k) => now(path, "length", linkage.d[k]));
-  const wrong = data.dimensions.find((each, k) => d[k] !== linkage.d[k] && (each.held || d[k] < (each.bounds[0] ?? -Infinity) || d[k] > (each.bounds[1] ?? Infinity)));
-  if (wrong) return `${wrong.link}: ${wrong.what} is held${wrong.held ? `: ${wrong.held}` : ""}`;
-  const u = data.inputs.map((given, k) => now(["inputs", k, "position"], given.slides ? "length" : "angle", page.input(k)) / linkage.scale[k]);
-  const made = linkage.copy();
-  made.d = d;
-  made.measure();
-  const { z, closed } = made.newton(u, linkage.z);
-  if (!closed) return "it does not go together";
-  if (beyondStops(made, z, u).length) return "a stop is in the way";
-  made.z = z;
-  made.u = u;
-  const [link] = data.points[pin].links, there = page.place(link, data.points[pin].at[0], page.framesOf(made.state()), made.sizes);
-  if (!(Plane.apart(there, at.get(pin)) <= FOLLOWED * data.size)) return "its lengths alone do not lead it there";
-  page.adopt({ d, u, z });
-  return "";
 }
