@@ -26,6 +26,7 @@ LOGIC = (
     "solve/linkage.js",
     "page.js",
     "controls/dimensions.js",
+    "controls/input_rates.js",
     "controls/saving.js",
 )
 """The scripts of a page that need no document."""

@@ -225,9 +225,11 @@ def test_a_link_holds_the_whole_file_and_one_cut_short_says_so():
 
 @pytest.mark.skipif(shutil.which("node") is None, reason="there is no node here to run a page's scripts in")
 def test_the_pages_own_links_are_read_by_python():
-    text = f"{read_asset('editor/links.js')}\nMechanismLink.write({json.dumps(FOUR_BAR)}).then(console.log);"
+    text = f"{read_asset('controls/links.js')}\nMechanismLink.write({json.dumps(FOUR_BAR)}).then((link) => "
+    text += "{ console.log(link); MechanismLink.read(link).then((file) => console.log(JSON.stringify(file))); });"
     ran = subprocess.run(["node", "-"], input=text, capture_output=True, text=True, check=True, timeout=60)
-    assert json.loads(read_link(ran.stdout.strip())) == FOUR_BAR
+    link, read = ran.stdout.splitlines()
+    assert json.loads(read_link(link)) == json.loads(read) == FOUR_BAR
 
 
 def test_a_link_is_viewed(tmp_path):

@@ -372,7 +372,7 @@ def test_pins_are_moved_by_keys_and_one_that_would_not_go_together_stays(shown):
     assert "Pin A at" in window.locator("#said").inner_text()
     # the rest goes along: only a place of the frame changes
     before = window.evaluate("Array.from(page.linkage.d)")
-    window.get_by_role("button", name="The rest keeps its lengths").click()
+    window.get_by_role("button", name="Rest along").click()
     window.locator("#drawing").focus()
     for _ in range(len(names) + names.index("O") - names.index("A")):
         window.keyboard.press("n")

@@ -13,6 +13,7 @@ class Page {
     this.listeners = { move: [], size: [], said: [], course: [], chosen: [], shown: [], view: [], tolerance: [], wanted: [], acting: [] };
     this.lifetime = new AbortController(); // ended where another page takes its place: of what it hears beside its own parts
     this.running = 0; // which input is moved
+    this.given = data.inputs.map((each) => [each.velocity, each.acceleration]); // rates of the inputs
     this.acting = null; // the numbers of what acts
     this.recording = false; // whether the motion is gone through for a film: nobody is to remember that
     this.wanted = null; // what is wanted of the mechanism, if anything is
@@ -40,7 +41,15 @@ class Page {
   }
 
   /** Velocity and acceleration of every input, SI. */
-  inputRates() { return this.data.inputs.map((each) => [each.velocity, each.acceleration]); }
+  inputRates() { return this.given; }
+
+  /** Give the inputs other rates: all that was remembered of the motion is void. */
+  give(rates) {
+    this.given = rates.map((each) => [...each]);
+    this.update();
+    this.emit("size", { reached: 1, open: 0 });
+    this.emit("move");
+  }
 
   /** The links' own axes in a state: {x, y, angle, cos, sin, v: [vx, vy, w], a} by name. */
   framesOf({ w, w1, w2 }) {
@@ -104,20 +113,20 @@ class Page {
 
   /** Where the mechanism is, and what is wanted of it, to come back to. */
   snapshot() {
-    const { linkage: { d, u, z, last, stop }, running, assembly } = this;
+    const { linkage: { d, u, z, last, stop }, running, assembly, given } = this;
     const wanted = this.wanted?.numbers() ?? [], acting = this.acting?.values ?? [];
-    return { d: Array.from(d), u: Array.from(u), z: Float64Array.from(z), last, stop, of: z, running, assembly, wanted, acting };
+    return { d: Array.from(d), u: Array.from(u), z: Float64Array.from(z), last, stop, of: z, running, assembly, wanted, acting, given };
   }
 
   /** Take the mechanism back to a snapshot. */
-  restore({ d, u, z, last, stop, of, running, assembly, wanted, acting }) {
+  restore({ d, u, z, last, stop, of, running, assembly, wanted, acting, given }) {
     const { linkage } = this;
     Object.assign(linkage, { d: Array.from(d), u: Array.from(u), z: Float64Array.from(z) });
     linkage.measure();
     // what is known of the way there holds for the very same unknowns
     linkage.last = last && last.to === of ? { ...last, to: linkage.z } : null;
     linkage.stop = stop && stop.to === of ? { ...stop, to: linkage.z } : null;
-    Object.assign(this, { running, assembly });
+    Object.assign(this, { running, assembly, given });
     this.wanted?.take(wanted);
     this.acting?.take(acting);
     this.update();

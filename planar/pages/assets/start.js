@@ -12,12 +12,14 @@ function startPage(data, program) {
   const controls = new Controls(page, document.getElementById("controls"), svg, drawing, dragging);
   new Courses(page);
   const lens = new Lens(page, svg, drawing, dragging);
+  new InputRates(page, document.getElementById("acting"));
   page.acting = new Acting(page, document.getElementById("acting"));
   new Dimensions(page, document.getElementById("dimensions"));
   new Assemblies(page, document.getElementById("assemblies"));
   if (!data.edited && !globalThis.editing) new PinDragging(page, svg, lens, () => controls.pause());
   const undo = new UndoHistory(page, controls.bar, () => controls.pause());
-  new Films(page, new Saving(page, document.getElementById("saving"), svg), svg, () => controls.pause());
+  const saving = new Saving(page, document.getElementById("saving"), svg);
+  new Films(page, saving, svg, () => controls.pause());
   page.tolerances = Tolerances.ofFile(page);
   startLayers(page);
   new Influence(page, document.getElementById("dimensions"));
@@ -26,14 +28,31 @@ function startPage(data, program) {
     new WantedTable(page, document.getElementById("wanted"));
   }
   page.keeping = new Keeping(page);
+  globalThis.additions?.attach({ page, svg, lens });
   new Panels(page, document.querySelector(".right"));
   document.getElementById("still")?.remove(); // what moves stands in its place
   Object.assign(globalThis, { svg, drawing, dragging, controls, lens });
-  return { page, svg, drawing, dragging, controls, lens, undo };
+  return { page, svg, drawing, dragging, controls, lens, undo, saving };
 }
+
+/** The main part of the document as it came, for pages that take the place of others. */
+const MainPart = {
+  keep() {
+    this.blank = document.querySelector("main").cloneNode(true);
+    this.blank.querySelector("#still")?.remove();
+  },
+
+  /** Blank again, and the page that was there at its end. */
+  renew({ controls, page }) {
+    controls.pause();
+    page.lifetime.abort();
+    document.querySelector("main").replaceWith(this.blank.cloneNode(true));
+  },
+};
 
 /** Begin, with the pencil where the page is one to draw on. */
 function beginPage(data, program) {
+  MainPart.keep();
   if (data.edited) globalThis.editing = new Editing(data, program);
-  else startPage(data, program);
+  else globalThis.additions = new Additions(data, program);
 }

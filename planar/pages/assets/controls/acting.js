@@ -11,7 +11,11 @@ class Acting {
       const k = list.findIndex((each) => each.name === name);
       if (k >= 0 && this.possible(value, k)) this.values[k] = value;
     }
-    if (!list.length) { section.remove(); this.rows = []; return; }
+    if (!list.length) {
+      if (!section.childElementCount) section.remove();
+      this.rows = [];
+      return;
+    }
     this.rows = list.map((each, k) => this.row(each, k));
     const box = Forms.element("details", { class: "dimensions" }, Forms.element("summary", {}, "Loads, springs and masses"));
     this.all = Forms.element("button", { type: "button" }, "Reset all of these");

@@ -151,7 +151,7 @@ class Controls {
   show() {
     if (this.ran !== this.page.running) { // whoever has chosen it
       this.ran = this.page.running;
-      this.sense = this.page.data.inputs[this.ran]?.velocity < 0 ? -1 : 1; // as the file has it
+      this.sense = this.page.inputRates()[this.ran]?.[0] < 0 ? -1 : 1; // as the file has it
       this.arrow();
     }
     this.rows?.forEach(({ slider, number, chosen }, k) => {
@@ -174,9 +174,9 @@ class Controls {
   told() {
     const { page, pace } = this, given = page.data.inputs[page.running];
     if (!given) return;
-    const rate = this.rate(), { name, si } = page.data.paces[given.slides ? "length" : "angle"];
+    const [own] = page.inputRates()[page.running], rate = this.rate(), { name, si } = page.data.paces[given.slides ? "length" : "angle"];
     let text = `${readable(+(rate / si).toPrecision(2))} ${name}`;
-    if (given.velocity) text += `, ${+(rate / Math.abs(given.velocity)).toPrecision(2)} times the file's`;
+    if (own) text += `, ${+(rate / Math.abs(own)).toPrecision(2)} times the input's`;
     pace.told.textContent = text;
     pace.slider.setAttribute("aria-valuetext", text);
     const [forth, back] = given.slides ? ["→ forwards", "← backwards"] : ["↺ anticlockwise", "↻ clockwise"];

@@ -20,11 +20,13 @@ class Keeping {
     const { data, linkage, running } = page, kept = { u: Array.from(linkage.u), z: Array.from(linkage.z) };
     const moved = data.inputs.some((each, k) => each.position / linkage.scale[k] !== linkage.u[k]) || linkage.z.some((each, k) => each !== data.z[k]);
     const changed = data.dimensions.flatMap((each, k) => (each.value === linkage.d[k] ? [] : [[each.name, linkage.d[k]]]));
-    const acting = page.acting?.changes() ?? [];
+    const acting = page.acting?.changes() ?? [], given = page.inputRates().flat();
     if (changed.length) kept.d = changed;
     if (acting.length) kept.f = acting;
     if (running) kept.run = running;
-    memory.write("at", moved || changed.length || acting.length || running ? JSON.stringify(kept) : "");
+    const rated = data.inputs.some((each, k) => each.velocity !== given[2 * k] || each.acceleration !== given[2 * k + 1]);
+    if (rated) kept.v = given;
+    memory.write("at", moved || changed.length || acting.length || running || rated ? JSON.stringify(kept) : "");
   }
 
   /** What the address keeps, if it is of this mechanism: the page stands there from the first; the numbers of what acts. */
@@ -41,6 +43,7 @@ class Keeping {
     made.measure();
     const { z, closed } = made.newton(kept.u, kept.z);
     if (!closed || z.some((each, k) => !(Math.abs(each - kept.z[k]) <= KEPT_NEAR)) || beyondStops(made, z, kept.u).length) return;
+    if (numbers(kept.v, 2 * data.inputs.length)) page.given = data.inputs.map((_, k) => [kept.v[2 * k], kept.v[2 * k + 1]]);
     page.keptActions = Array.isArray(kept.f) ? kept.f : [];
     if (Number.isInteger(kept.run) && data.inputs[kept.run]) page.running = kept.run;
     Object.assign(linkage, { d, u: kept.u, z: Float64Array.from(z) });

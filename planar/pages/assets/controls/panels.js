@@ -1,7 +1,7 @@
 "use strict";
 /* Quick ways to the panels beside the drawing, and in which figures and units they tell their numbers. */
 
-const PANELS = [["layers", "Layers"], ["wanted", "Wanted"], ["numbers", "Numbers"], ["acting", "Loads"], ["dimensions", "Dimensions"], ["saving", "Save"]];
+const PANELS = [["layers", "Layers"], ["wanted", "Wanted"], ["numbers", "Numbers"], ["acting", "Loads and speeds"], ["dimensions", "Dimensions"], ["saving", "Save"]];
 
 class Panels {
   constructor(page, right) {

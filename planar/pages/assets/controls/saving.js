@@ -46,6 +46,11 @@ const Files = (() => {
       const { ratio, name } = units[kind];
       put(path, kind === "length" ? length(now) : `${Number(((now * ratio[1]) / ratio[0]).toPrecision(15))} ${name}`);
     });
+    page.inputRates().forEach((rates, k) => rates.forEach((now, order) => {
+      const given = data.inputs[k], kind = InputRates.kind(given, order), { ratio, name } = units[kind];
+      if (now !== (order ? given.acceleration : given.velocity)) file.inputs[k][RATE_KEYS[order]] = `${Number(((now * ratio[1]) / ratio[0]).toPrecision(15))} ${name}`;
+    }));
+    for (const { link, name, at } of data.added ?? []) (file.links[link].points ??= {})[name] = at.map(length);
     if (!changed) return file;
     // `ids` and what was published are of the file's own position and dimensions
     delete file.ids;
@@ -107,16 +112,16 @@ const Files = (() => {
     own.linkage.d = Array.from(linkage.d);
     own.linkage.measure();
     own.linkage.u = Array.from(linkage.u);
-    const rates = data.inputs.map((each, k) => (k === running ? each : { velocity: 0, acceleration: 0 }));
+    const rates = page.inputRates().map((each, k) => (k === running ? each : [0, 0]));
     const links = data.links.filter((link) => link !== data.frame), first = new Map();
     const told = new Float64Array(columns.length);
     const rows = course.rows.map(({ z, at }) => {
       own.linkage.z = Float64Array.from(z);
       own.linkage.u[running] = at / linkage.scale[running];
-      own.state = own.linkage.state(rates.map((each) => each.velocity), rates.map((each) => each.acceleration));
+      own.state = own.linkage.state(rates.map((each) => each[0]), rates.map((each) => each[1]));
       own.frames = own.framesOf(own.state);
       const { w, w1, w2 } = own.state, none = new Float64Array(w.length).fill(NaN), lost = [NaN, NaN];
-      const values = rates.flatMap(({ velocity, acceleration }, k) => [own.input(k), velocity, acceleration]);
+      const values = rates.flatMap(([velocity, acceleration], k) => [own.input(k), velocity, acceleration]);
       for (const name of data.names) {
         const { position, velocity, acceleration } = own.point(name);
         values.push(...position, ...(velocity ?? lost), ...(acceleration ?? lost));
@@ -152,6 +157,7 @@ class Saving {
     this.waits = false;
     section.append(Forms.element("h2", {}, "Save"));
     this.button(section, "Mechanism (JSON)", () => this.save("json", "application/json", `${JSON.stringify(Files.mechanism(page), null, 2)}\n`));
+    this.link = new LinkSaving(page, section);
     this.button(section, "Picture (SVG)", () => this.save("svg", "image/svg+xml", Files.picture(page, drawing)));
     this.button(section, "Motion (CSV)", () => this.motion());
     page.on("course", () => { if (this.waits && page.course) this.motion(); });

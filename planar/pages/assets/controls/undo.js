@@ -86,5 +86,5 @@ class UndoHistory {
 /** Whether two snapshots are of one position of one mechanism, of which the same is wanted. */
 function samePosition(a, b) {
   const alike = (one, other) => one.every((each, k) => each === other[k]);
-  return alike(a.d, b.d) && alike(a.u, b.u) && alike(a.z, b.z) && alike(a.wanted, b.wanted) && alike(a.acting, b.acting);
+  return alike(a.d, b.d) && alike(a.u, b.u) && alike(a.z, b.z) && alike(a.wanted, b.wanted) && alike(a.acting, b.acting) && alike(a.given.flat(), b.given.flat());
 }

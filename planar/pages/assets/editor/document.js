@@ -2,15 +2,7 @@
 /* What the pencil does to a mechanism's file. Each takes a draft {file, at, units}, changes its own copy, and gives it back;
    what cannot be done is an Error with a sentence. */
 
-const LETTERS = "ABCDEFGHIJKLMNPQRSTUVWXYZ";
-
 const Draw = {
-  /** A name that no point, link or pair has yet. */
-  freshPoint(file) {
-    const taken = new Set([...Pins.all(file).keys(), ...Object.values(file.links).flatMap(Pins.ofLink), ...Object.keys(file.links)]);
-    for (let round = 0; ; round++) for (const letter of LETTERS) if (!taken.has(`${letter}${round || ""}`)) return `${letter}${round || ""}`;
-  },
-
   freshLink(file, wanted) {
     const taken = new Set([...Object.keys(file.links), ...(file.pairs ?? []).map(Pins.pairName)]);
     let name = wanted, count = 2;
@@ -24,7 +16,7 @@ const Draw = {
       if (spot.pin.includes(".")) throw new Error(`several points are called ${spot.pin.split(".")[1]}; give this one a name of its own first`);
       return spot.pin;
     }
-    const name = Draw.freshPoint({ ...draft.file, links: { ...draft.file.links, "": { points: Object.fromEntries(Array.from(draft.at.keys(), (each) => [each, 0])) } } });
+    const name = Pins.fresh(draft.file, draft.at.keys());
     draft.at.set(name, spot.at);
     return name;
   },

@@ -11,8 +11,6 @@ class Editing {
     const { value, name, answer } = data.edited;
     Object.assign(this, { file: value, fileName: name, answer, units: answer.units ?? { length: 1e-3, angle: Math.PI / 180 }, usual: answer.usual, wish: null });
     Object.assign(this, { at: new Map(), done: [], undone: [], tool: "hand", chosen: null, linkBefore: null, changed: false, asked: 0, settled: true });
-    this.blank = document.querySelector("main").cloneNode(true);
-    this.blank.querySelector("#still")?.remove();
     this.sketch = new Sketch(this);
     this.hand = new Hand(this);
     this.filing = new Filing(this);
@@ -43,11 +41,8 @@ class Editing {
   begin(data, program, solved) {
     const view = this.view ?? null, focused = document.activeElement;
     if (this.parts) {
-      this.parts.controls.pause();
-      this.parts.page.lifetime.abort();
+      MainPart.renew(this.parts);
       for (const key of ["at", "view"]) memory.write(key, "");
-      const main = this.blank.cloneNode(true);
-      document.querySelector("main").replaceWith(main);
       document.querySelector("h1").textContent = data.name;
       document.title = data.name;
     }

@@ -102,7 +102,7 @@ const centres = {
 /** The links' motions with the file's rates, or if nothing moves at those with the running input at unit speed. */
 function standardFrames(page) {
   const { inputs } = page.data;
-  if (!inputs.length || inputs.some((each) => each.velocity !== 0)) return page.frames;
+  if (!inputs.length || page.inputRates().some(([velocity]) => velocity !== 0)) return page.frames;
   const still = inputs.map(() => 0);
   return page.framesOf(page.linkage.state(still.map((_, k) => (k === page.running ? 1 : 0)), still));
 }

@@ -193,7 +193,7 @@ class Courses {
     const { page, running } = this, { inputs } = page.data;
     const rates = page.inputRates(), still = inputs.map(() => 0);
     const state = made.state(rates.map((each) => each[0]), rates.map((each) => each[1])), frames = page.framesOf(state);
-    const same = inputs.length === 1 && inputs[0].velocity !== 0;
+    const same = inputs.length === 1 && rates[0][0] !== 0;
     const alone = same ? frames : page.framesOf(made.state(still.map((_, k) => (k === running ? 1 : 0)), still));
     return { at, z: Float64Array.from(made.z), state, frames, alone };
   }

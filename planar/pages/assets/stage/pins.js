@@ -10,7 +10,7 @@ class PinDragging {
     Object.assign(this, { page, svg, before, on: false, along: false, held: null, chosen: null });
     if (!page.data.dimensions.length) return; // its numbers are no page's to change
     this.button = lens.button("Pins", "Pins: drag them, and lengths follow", () => this.turn(!this.on));
-    this.rest = lens.button("Rest along", "The rest keeps its lengths and goes along with a pin", () => this.goAlong(!this.along));
+    this.rest = lens.button("Rest along", "Rest along: it keeps its lengths and goes with a pin", () => this.goAlong(!this.along));
     this.goAlong(false);
     this.turn(false);
     const { filed_units: { length, angle } } = page.data, stage = svg.parentNode;

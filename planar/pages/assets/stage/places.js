@@ -35,6 +35,7 @@ const Written = {
   },
 };
 
+const LETTERS = "ABCDEFGHIJKLMNPQRSTUVWXYZ";
 const PAIR_KINDS = ["turning", "sliding", "slot", "gear", "rack", "belt", "chain", "cam", "geneva"];
 
 /** Who carries the pins of a file. */
@@ -67,6 +68,12 @@ const Pins = {
       found.get(name).push([link, point]);
     }
     return found;
+  },
+
+  /** A name that no point, link or pair has yet; `more` are taken, too. */
+  fresh(file, more = []) {
+    const taken = new Set([...Pins.all(file).keys(), ...Object.values(file.links).flatMap(Pins.ofLink), ...Object.keys(file.links), ...more]);
+    for (let round = 0; ; round++) for (const letter of LETTERS) if (!taken.has(`${letter}${round || ""}`)) return `${letter}${round || ""}`;
   },
 
   /** The pin of a point of a link. */

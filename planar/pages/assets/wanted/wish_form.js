@@ -2,8 +2,6 @@
 /* What is told beside the drawing of a path drawn by hand: of which point it is wanted, whether it closes, in what order;
    and the task's file. `host` has the wish, the file and its units, and takes another wish. */
 
-const STROKE_APART = 12; // px: what goes no farther is a click
-
 class WishForm {
   /** `host`: {wish, file, units, say(text), takeWish(wish or null), offer(name, text)}. */
   constructor(host) {
@@ -48,28 +46,5 @@ class WishForm {
     this.closed.box.disabled = count < WISH_LEAST_CLOSED;
     this.ordered.box.checked = wish.ordered || this.closed.box.checked;
     this.ordered.box.disabled = this.closed.box.checked;
-  }
-}
-
-/** The hand that draws a path: a line freehand is a new one, a click is one place more. */
-class WishStroke {
-  constructor() { this.line = null; }
-
-  begin(at) { this.line = [at]; }
-  lead(at) { this.line?.push(at); }
-
-  /** The path after the hand is let go: that before with one more place, or a new one. `scale`: px to a metre. */
-  end(wish, at, scale, isNear) {
-    const { line } = this, { places = [], ...told } = wish ?? {};
-    this.line = null;
-    if (line.length > 2 && line.some((each) => Plane.apart(each, line[0]) * scale > STROKE_APART)) return { ...told, ...Wish.ofStroke(line) };
-    return WishStroke.more({ ordered: true, closed: false, ...told, places }, at, isNear);
-  }
-
-  /** One more place; the first again closes. */
-  static more(wish, at, isNear) {
-    const { places } = wish;
-    if (places.length >= WISH_LEAST_CLOSED && isNear(places[0])) return { ...wish, closed: true };
-    return places.some(isNear) ? wish : { ...wish, places: [...places, at] };
   }
 }
