@@ -697,7 +697,7 @@ def test_within_a_frame_that_lets_no_download_through_the_text_is_there_to_be_co
     assert "offered for download" in said
     assert "Saved" not in said
     assert planar.loads(frame.locator("textarea").input_value()) == mechanism
-    assert frame.get_by_role("button", name="Copy").count() == 1
+    assert frame.get_by_role("button", name="Copy", exact=True).count() == 1
     context.close()
 
 

@@ -8,8 +8,8 @@ class StageTools {
   /** `host` takes what is drawn: addPoint(link, place), wish, takeWish(wish). */
   constructor({ page, svg, lens }, host) {
     Object.assign(this, { page, svg, host, tool: null, link: null, stroke: new WishStroke() });
-    this.buttons = new Map([["point", lens.button("Point", "Add a point to a link", () => this.use("point"))]]);
-    if (host.mayWish) this.buttons.set("wish", lens.button("Path", "Draw the wanted path", () => this.use("wish")));
+    this.buttons = new Map([["point", lens.tool("Point", "Add a point to a link", () => this.use("point"))]]);
+    if (host.mayWish) this.buttons.set("wish", lens.tool("Path", "Draw the wanted path", () => this.use("wish")));
     const own = (act) => (event) => { if (this.tool !== null && event.target.closest("#drawing")) { event.stopPropagation(); act(event); } };
     const stage = svg.parentNode;
     stage.addEventListener("pointerdown", own((event) => this.press(event)), true);

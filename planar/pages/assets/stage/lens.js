@@ -29,21 +29,25 @@ class Lens {
 
   buttons() {
     const box = Forms.element("div", { class: "lens", role: "group", "aria-label": "View of the drawing" });
+    this.tools = Forms.element("div", { class: "lens tools", role: "group", "aria-label": "Tools of the drawing" });
     this.box = box;
     this.button("+", "Zoom in (+)", () => this.zoom(ZOOM_STEP));
     this.button("−", "Zoom out (−)", () => this.zoom(1 / ZOOM_STEP));
     this.whole = this.button("Fit", "Fit everything (0)", () => this.fit());
     this.screen = this.button("Full screen", "Full screen (F)", () => this.fill(!this.isFull));
-    this.svg.parentNode.append(box);
+    this.svg.parentNode.append(box, this.tools);
     this.show();
   }
 
-  button(text, name, act) {
+  button(text, name, act, box = this.box) {
     const made = Forms.element("button", { type: "button", "aria-label": name, title: name }, text);
     made.addEventListener("click", act);
-    this.box.append(made);
+    box.append(made);
     return made;
   }
+
+  /** A button that takes another tool in hand. */
+  tool(text, name, act) { return this.button(text, name, act, this.tools); }
 
   get isFull() { return this.left.classList.contains("full"); }
   get middle() { return [this.drawing.width / 2, this.drawing.height / 2]; }

@@ -9,8 +9,8 @@ class PinDragging {
   constructor(page, svg, lens, before) {
     Object.assign(this, { page, svg, before, on: false, along: false, held: null, chosen: null });
     if (!page.data.dimensions.length) return; // its numbers are no page's to change
-    this.button = lens.button("Pins", "Pins: drag them, and lengths follow", () => this.turn(!this.on));
-    this.rest = lens.button("Rest along", "Rest along: it keeps its lengths and goes with a pin", () => this.goAlong(!this.along));
+    this.button = lens.tool("Pins", "Pins: drag them, and lengths follow", () => this.turn(!this.on));
+    this.rest = lens.tool("Rest along", "Rest along: it keeps its lengths and goes with a pin", () => this.goAlong(!this.along));
     this.goAlong(false);
     this.turn(false);
     const { filed_units: { length, angle } } = page.data, stage = svg.parentNode;
