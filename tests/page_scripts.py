@@ -33,6 +33,40 @@ LOGIC = (
 
 SCREENS = {"phone": (390, 844), "desk": (1280, 900), "projector": (1920, 1080)}
 PLACES = "page.data.names.map((name) => Object.values(page.point(name)))"
+FAINT = r"""() => {
+const parts = (colour) => colour.match(/[\d.]+/g).map(Number);
+const light = (colour) => {
+  const linear = (each) => (each <= 0.04045 ? each / 12.92 : ((each + 0.055) / 1.055) ** 2.4);
+  const [r, g, b] = parts(colour).map((each) => linear(each / 255));
+  return 0.2126 * r + 0.7152 * g + 0.0722 * b + 0.05;
+};
+const paper = (each) => {
+  const colour = getComputedStyle(each).backgroundColor;
+  return each.parentElement && parts(colour)[3] === 0 ? paper(each.parentElement) : colour;
+};
+const fields = "[type=text], [type=number], select";
+const text = (node) => node.nodeType === 3 && node.data.trim() !== "";
+const lettered = (each) => Array.from(each.childNodes).some(text);
+const texts = Array.from(document.querySelectorAll("body *")).filter(
+  (each) => each.getClientRects().length && !each.disabled && (each.matches(fields) || lettered(each)),
+);
+const found = texts.map((each) => {
+  const style = getComputedStyle(each), ink = each.ownerSVGElement ? style.fill : style.color;
+  const ratio = light(ink) / light(paper(each));
+  return [each.textContent.trim().slice(0, 20), Math.max(ratio, 1 / ratio)];
+});
+return { count: found.length, least: found.filter(([, ratio]) => ratio < 4.5) };
+}"""
+"""How many texts there are, and those with less contrast than WCAG 2, 1.4.3, wants, but for what cannot be used now."""
+NAMELESS = """Array.from(document.querySelectorAll("button, input, select, textarea, summary, [role=slider]"))
+  .filter((each) => !each.textContent.trim() && !each.getAttribute("aria-label") && !each.labels?.length)
+  .map((each) => each.outerHTML)"""
+"""Controls of a page that have no name."""
+MISNAMED = r"""Array.from(document.querySelectorAll(":is(button, a, summary)[aria-label]"))
+  .map((each) => [each.textContent, each.getAttribute("aria-label")]
+    .map((text) => text.toLowerCase().replaceAll(/[^\p{L}\p{N}]+/gu, " ").trim()))
+  .filter(([written, name]) => written && !name.includes(written))"""
+"""Those that are not called as they are lettered: who speaks that means the control (WCAG 2, 2.5.3)."""
 CLOSE = 1e-12
 """Of the greatest of its kind: as nearly a page's numbers are Python's."""
 

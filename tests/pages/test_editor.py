@@ -749,7 +749,7 @@ def test_the_rest_goes_along_with_a_pin_and_keeps_its_lengths(pin, changed, draw
     gone = {name for name in before if not name.startswith("sketch") and after[name] != pytest.approx(before[name])}
     assert gone == changed
     found = planar.solve(drawn)
-    assert found.point(pin).position * 1000 == pytest.approx(start + [6, 4], abs=1e-6)
+    assert found.point(pin).position * 1000 == pytest.approx(start + np.array([6, 4]), abs=1e-6)
     for name, at in hand.window.evaluate("[...editing.at]"):
         assert found.point(name).position == pytest.approx(at, abs=CLOSE)
     hand.button("Undo drawing")

@@ -11,7 +11,7 @@ import pytest
 from PIL import Image
 
 import planar
-from tests.page_scripts import downloaded, settled
+from tests.page_scripts import FAINT, MISNAMED, NAMELESS, downloaded, settled
 
 ON_PICTURE = """(places) => {
   const image = document.querySelector("#drawing .underlay image"), to = image.getScreenCTM();
@@ -180,3 +180,33 @@ def test_designs_that_the_server_finds_are_listed_and_taken_over_in_one_step(dra
     with hand.window.expect_download() as coming:
         hand.window.get_by_role("button", name="Synthesise").click()
     assert json.loads(coming.value.path().read_text())["start"] == before
+
+
+# without a mouse, and for all eyes
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_whatever_the_pencil_shows_has_a_name_is_legible_and_reached_by_keys(scheme, drawing):
+    hand = drawing(planar.to_dict("four-bar"), color_scheme=scheme)
+    hand.use("Wanted path", (40, 20), (60, 30))
+    hand.use("Pins", (0, 0))
+    hand.wait()
+    hand.window.evaluate("document.querySelectorAll('.page :is(details, label)').forEach((each) => each.open = true)")
+    hand.window.evaluate("for (const each of editing.panel.numbers.boxes) each.hidden = false")
+    assert hand.window.evaluate(NAMELESS) == []
+    assert hand.window.evaluate(MISNAMED) == []
+    assert hand.window.evaluate(FAINT)["least"] == []
+    # what is a picture holds nothing that takes the focus, and no two parts are one
+    assert hand.window.locator("[role=img] [tabindex]").count() == 0
+    assert hand.window.evaluate(
+        "[...document.querySelectorAll('[id]')].map((each) => each.id).every((id, k, all) => all.indexOf(id) === k)"
+    )
+    hand.window.get_by_role("button", name="Pins", exact=True).focus()
+    hand.window.keyboard.press("ArrowRight")  # from tool to tool, of which Tab stops at one
+    assert hand.window.evaluate("document.activeElement.textContent") == "Bar"
+    reached = []
+    while "Play" not in reached and len(reached) < 30:
+        hand.window.keyboard.press("Tab")
+        reached.append(hand.window.evaluate("document.activeElement.id || document.activeElement.textContent"))
+    stops = [each for each in reached if each in ("Plate", "Undo drawing", "Full screen", "drawing", "Play")]
+    assert stops == ["Undo drawing", "drawing", "Full screen", "Play"]

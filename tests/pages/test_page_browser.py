@@ -25,7 +25,7 @@ from planar.pages.view import view
 from tests.builders import triangle
 from tests.hostile import harmful_mechanism
 from tests.known import MODELS
-from tests.page_scripts import CLOSE, PLACES, SCREENS, downloaded, opened, same, settled
+from tests.page_scripts import CLOSE, FAINT, MISNAMED, NAMELESS, PLACES, SCREENS, downloaded, opened, same, settled
 
 STEMS = ("crank-rocker", "slider-crank", "scotch-yoke", "watt-six-bar", "whitworth", "planetary-gear-set", "open-arm")
 """Of the gallery."""
@@ -446,32 +446,7 @@ def test_texts_stand_out_from_their_paper(scheme, shown):
     for box in window.locator("#layers").get_by_role("checkbox").all():
         box.check()
     settled(window)
-    faint = window.evaluate(
-        r"""() => {
-          const parts = (colour) => colour.match(/[\d.]+/g).map(Number);
-          const light = (colour) => {
-            const linear = (each) => (each <= 0.04045 ? each / 12.92 : ((each + 0.055) / 1.055) ** 2.4);
-            const [r, g, b] = parts(colour).map((each) => linear(each / 255));
-            return 0.2126 * r + 0.7152 * g + 0.0722 * b + 0.05;
-          };
-          const paper = (each) => {
-            const colour = getComputedStyle(each).backgroundColor;
-            return each.parentElement && parts(colour)[3] === 0 ? paper(each.parentElement) : colour;
-          };
-          const fields = "[type=text], [type=number], select";
-          const text = (node) => node.nodeType === 3 && node.data.trim() !== "";
-          const lettered = (each) => Array.from(each.childNodes).some(text);
-          const texts = Array.from(document.querySelectorAll("body *")).filter(
-            (each) => each.getClientRects().length && !each.disabled && (each.matches(fields) || lettered(each)),
-          );
-          const found = texts.map((each) => {
-            const style = getComputedStyle(each), ink = each.ownerSVGElement ? style.fill : style.color;
-            const ratio = light(ink) / light(paper(each));
-            return [each.textContent.trim().slice(0, 20), Math.max(ratio, 1 / ratio)];
-          });
-          return { count: found.length, least: found.filter(([, ratio]) => ratio < 4.5) };
-        }"""
-    )
+    faint = window.evaluate(FAINT)
     assert faint["count"] > 100
     assert faint["least"] == []
 
@@ -495,20 +470,8 @@ def test_long_names_stay_in_the_picture_and_letters_stand_above_the_layers(shown
 
 def test_every_control_has_a_name(shown):
     window = shown(MODELS["000-P2"])
-    nameless = window.evaluate(
-        """Array.from(document.querySelectorAll("button, input, select, summary, [role=slider]"))
-          .filter((each) => !each.textContent.trim() && !each.getAttribute("aria-label") && !each.labels?.length)
-          .map((each) => each.outerHTML)"""
-    )
-    assert nameless == []
-    # WCAG 2, 2.5.3: who speaks what is written on a control means that control
-    misnamed = window.evaluate(
-        r"""Array.from(document.querySelectorAll(":is(button, a, summary)[aria-label]"))
-          .map((each) => [each.textContent, each.getAttribute("aria-label")]
-            .map((text) => text.toLowerCase().replaceAll(/[^\p{L}\p{N}]+/gu, " ").trim()))
-          .filter(([written, name]) => written && !name.includes(written))"""
-    )
-    assert misnamed == []
+    assert window.evaluate(NAMELESS) == []
+    assert window.evaluate(MISNAMED) == []
 
 
 # diagrams

@@ -63,7 +63,10 @@ class PencilPanel {
 
   show() {
     const { editing } = this, { answer, tool, file } = editing;
-    for (const [key, button] of this.buttons) button.setAttribute("aria-pressed", String(key === tool));
+    for (const [key, button] of this.buttons) {
+      button.setAttribute("aria-pressed", String(key === tool));
+      button.tabIndex = key === tool ? 0 : -1;
+    }
     this.numbers.show(tool);
     this.hint.textContent = tool === "hand" ? "" : `${TOOLS[tool].told} Keys: arrows lead the cross, Enter presses, N goes to the next pin, Esc leaves off.`;
     this.hint.hidden = tool === "hand";

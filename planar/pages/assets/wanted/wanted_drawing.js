@@ -13,6 +13,7 @@ const NUMBER_ROOM = 24;     // px from one number to the next
 class WantedDrawing {
   constructor(page, svg, drawing) {
     Object.assign(this, { page, svg, drawing, wanted: page.wanted, held: null });
+    svg.setAttribute("role", "group"); // what is in it takes the focus
     this.group = svgPart("g", { class: "wanted" });
     this.grips = svgPart("g", { class: "wanted handles" });
     this.group.addEventListener("pointerdown", (event) => this.take(event));
