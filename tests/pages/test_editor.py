@@ -385,24 +385,24 @@ CAM = HEAD | {
 
 
 def draw_slot(hand):
-    hand.bars((0, 0), (40, 0))
-    hand.bars((0, -40), (80, 40))
-    hand.drive((0, 0), (0, -40))
+    hand.bars((0, 30), (20, 30))
+    hand.bars((0, -10), (60, 110))
+    hand.drive((0, 30), (0, -10))
     hand.tool("Slot")
-    hand.drag((40, 0), (60, 20))
+    hand.drag((20, 30), (40, 70))
 
 
 SLOT = HEAD | {
     "links": {
-        "frame": {"points": {"A": [0, 0], "C": [0, -40]}},
-        "AB": bar("A", "B", length=40),
-        "CD": bar("C", "D", length=hypot(80, 80)),
+        "frame": {"points": {"A": [0, 30], "C": [0, -10]}},
+        "AB": bar("A", "B", length=20),
+        "CD": bar("C", "D", length=hypot(60, 120)),
     },
     "pairs": [
         *pinned("A", "C"),
         {"slot": "slot", "links": ["CD", "AB"], "line": {"through": "C", "to": "D"}, "point": "B"},
     ],
-    "sketch": {"D": [80, 40]},
+    "sketch": {"D": [60, 110]},
     **driven("A", 0),
 }
 LINKAGES = {

@@ -16,7 +16,7 @@ from planar.cli import main
 from planar.document.files import read_asset
 from planar.document.texts.json_layout import format_json
 from planar.document.texts.mechanism_link import read_link, write_link
-from planar.foundation.errors import BadInput
+from planar.foundation.errors import BadInput, NoAnswer
 from planar.pages.editor import server as serving
 from planar.pages.editor.answer import BLANK, conflict_answer, edit_answer
 from planar.pages.editor.authors_file import carry_over
@@ -200,6 +200,24 @@ def test_what_is_loose_held_twice_and_in_conflict_is_told():
     twice = edit_answer(planar.to_dict("three-parallel-cranks"))
     assert "held twice" in twice["mobility"]
     assert twice["data"]
+
+
+def test_what_is_driven_and_cannot_move_is_told_at_once():
+    """A crank's pin in a slot of the frame: nothing moves, and no motion is looked for."""
+    value = BLANK | {
+        "links": {"frame": {"points": {"A": [0, 0]}}, "AB": {"ends": ["A", "B"], "length": 40}},
+        "pairs": [
+            {"turning": "A"},
+            {"slot": "slot", "links": ["frame", "AB"], "line": {"through": [40, 0], "angle": 45}, "point": "B"},
+        ],
+        "inputs": [{"pair": "A", "position": 0, "velocity": "10 rad/s"}],
+    }
+    found = edit_answer(value)
+    assert "too many inputs" in found["problem"]
+    assert found["mobility"] == "mobility 0, 1 input"
+    assert "data" not in found
+    with pytest.raises(NoAnswer, match="cannot move"):
+        planar.circuits(planar.from_dict(value))
 
 
 def test_texts_of_a_file_stay_texts_on_the_page():

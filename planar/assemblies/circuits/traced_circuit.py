@@ -139,6 +139,9 @@ def trace_circuit(solver: PositionSolver, index: int, z: Array) -> TracedCircuit
     except NoAnswer as problem:
         return _trace_open_circuit(solver, index, z, problem.reason.split(";")[0])
     legs = [BranchLeg(walk.curve, stretch.pieces, first, 1.0) for stretch in whole.branches]
+    if not legs:
+        given = solver.mechanism.inputs[index].pair
+        raise NoAnswer(Outcome.TOO_MANY_INPUTS, f"the input at {given!r} cannot move; leave it out")
     rests = tuple(leg.ends[1] for leg in (legs if whole.starts_at_dead_point else legs[:-1]))
     if len(legs) == 1 or whole.starts_at_dead_point:
         branches: list[tuple[BranchLeg, ...]] = [(leg,) for leg in legs]

@@ -29,7 +29,7 @@ from planar.pages.data.scheme_data import motion_positions, scheme_data
 from planar.pages.data.stop_data import stop_data, stop_position_function
 from planar.pages.data.tolerance_data import tolerance_data
 from planar.pages.data.unit_data import unit_choices, unit_data
-from planar.solving.position import PositionSolver, solved_mechanism
+from planar.solving.position import PositionSolver, solve, solved_mechanism
 from planar.solving.rest_position import rest_position
 
 MAX_DIMENSION_RATIO, MIN_DIMENSION_RATIO = 2.0, 0.25
@@ -46,11 +46,13 @@ def page_data(mechanism: Mechanism, z: np.ndarray | None = None) -> tuple[dict[s
     """The data of a page, and its functions.
 
     `z` are the unknowns of an assembly; left out, that nearest to the sketch. Raises NoAnswer where the mechanism has
-    no position to start from.
+    no position to start from, or does not move.
     """
     known = solved_mechanism(mechanism)
     solver, z = known.solver, known.assembly.z if z is None else z
     e, program, state = solver.equations, solver.functions, rest_position(mechanism)
+    if state.mobility < len(mechanism.inputs):
+        solve(mechanism)  # which says why nothing moves
     # other lengths might agree less than the file allows, and some pairs take plain numbers alone
     is_live = not e.open_rows and all(pair.measures_symbols for pair in mechanism.pairs)
     numbers = DimensionNumbers(mechanism, live=is_live)
