@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planar.foundation.arrays import Array
-from planar.foundation.errors import NoAnswer, TrackingEnd, join_names
+from planar.foundation.errors import NoAnswer, Outcome, TrackingEnd, join_names
 from planar.solving.continuation.path_pieces import PathPiece
 from planar.solving.continuation.period import MAX_PIECES
 from planar.solving.continuation.predictor_corrector import CurveTracker
