@@ -207,6 +207,10 @@ def test_whatever_the_pencil_shows_has_a_name_is_legible_and_reached_by_keys(sch
     reached = []
     while "Play" not in reached and len(reached) < 30:
         hand.window.keyboard.press("Tab")
-        reached.append(hand.window.evaluate("document.activeElement.id || document.activeElement.textContent"))
-    stops = [each for each in reached if each in ("Plate", "Undo drawing", "Full screen", "drawing", "Play")]
-    assert stops == ["Undo drawing", "drawing", "Full screen", "Play"]
+        reached.append(
+            hand.window.evaluate(
+                "document.activeElement.id || document.activeElement.ariaLabel || document.activeElement.textContent"
+            )
+        )
+    stops = [each for each in reached if each in ("Plate", "Undo drawing", "Full screen (F)", "drawing", "Play")]
+    assert stops == ["Undo drawing", "drawing", "Full screen (F)", "Play"]

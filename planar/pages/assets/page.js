@@ -16,6 +16,7 @@ class Page {
     this.given = data.inputs.map((each) => [each.velocity, each.acceleration]); // rates of the inputs
     this.acting = null; // the numbers of what acts
     this.recording = false; // whether the motion is gone through for a film: nobody is to remember that
+    this.besides = () => []; // places that the drawing is to show, too
     this.wanted = null; // what is wanted of the mechanism, if anything is
     this.assembly = null; // the number of the assembly that it was moved from, if it is one of those listed
     this.update();

@@ -48,6 +48,7 @@ class Editing {
     }
     this.parts = startPage({ ...data, wanted: solved ? Wish.data(this.wish, this.file, data) : null }, program);
     this.solved = solved;
+    this.parts.page.besides = () => (this.solved ? [] : [...this.at.values(), ...(this.wish?.places ?? [])]);
     const { page, svg, lens } = this.parts, stage = document.getElementById("stage");
     document.querySelector(".left").prepend(this.panel.bar, this.panel.hint);
     document.querySelector(".right").prepend(this.panel.section);

@@ -29,8 +29,8 @@ class PencilPanel {
       return [key, made];
     });
     this.numbers = new ToolNumbers(editing);
-    this.undo = this.button("Undo drawing", () => editing.undo());
-    this.redo = this.button("Redo drawing", () => editing.redo());
+    this.undo = this.button("Undo", () => editing.undo(), { "aria-label": "Undo drawing" });
+    this.redo = this.button("Redo", () => editing.redo(), { "aria-label": "Redo drawing" });
     this.bar.append(...this.numbers.boxes, this.undo, this.redo);
     this.hint = Forms.element("p", { class: "hint", id: "pencil-hint" });
     // one stop for the tab key, arrows from tool to tool
