@@ -26,7 +26,7 @@ LOGIC = (
     "solve/linkage.js",
     "page.js",
     "controls/dimensions.js",
-    "controls/input_rates.js",
+    "additions/input_rates.js",
     "controls/saving.js",
 )
 """The scripts of a page that need no document."""

@@ -243,7 +243,7 @@ def test_a_link_holds_the_whole_file_and_one_cut_short_says_so():
 
 @pytest.mark.skipif(shutil.which("node") is None, reason="there is no node here to run a page's scripts in")
 def test_the_pages_own_links_are_read_by_python():
-    text = f"{read_asset('controls/links.js')}\nMechanismLink.write({json.dumps(FOUR_BAR)}).then((link) => "
+    text = f"{read_asset('additions/links.js')}\nMechanismLink.write({json.dumps(FOUR_BAR)}).then((link) => "
     text += "{ console.log(link); MechanismLink.read(link).then((file) => console.log(JSON.stringify(file))); });"
     ran = subprocess.run(["node", "-"], input=text, capture_output=True, text=True, check=True, timeout=60)
     link, read = ran.stdout.splitlines()

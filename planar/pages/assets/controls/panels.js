@@ -1,7 +1,7 @@
 "use strict";
 /* Quick ways to the panels beside the drawing, and in which figures and units they tell their numbers. */
 
-const PANELS = [["layers", "Layers"], ["wanted", "Wanted"], ["numbers", "Numbers"], ["acting", "Loads and speeds"], ["dimensions", "Dimensions"], ["saving", "Save"]];
+const PANELS = [["layers", "Layers"], ["wanted", "Wanted"], ["numbers", "Numbers"], ["acting", "Loads"], ["dimensions", "Dimensions"], ["saving", "Save"]];
 
 class Panels {
   constructor(page, right) {
@@ -9,7 +9,8 @@ class Panels {
     for (const [id, text] of PANELS) {
       const section = document.getElementById(id);
       if (!section?.firstElementChild) continue;
-      const press = Forms.element("button", { type: "button" }, text);
+      const told = id === "acting" && !page.acting.list.length ? "Speeds" : text;
+      const press = Forms.element("button", { type: "button" }, told);
       press.addEventListener("click", () => {
         section.scrollIntoView({ block: "start" });
         if (!section.hasAttribute("tabindex")) section.tabIndex = -1;

@@ -25,7 +25,7 @@ class Editing {
     this.begin(data, program, !answer.problem);
     if (!this.solved) this.guess();
     if (answer.conflicts) this.explain();
-    if (kept?.file) this.take({ file: kept.file, at: new Map(kept.at), wish: kept.wish ?? null }, kept.changed);
+    if (kept?.file) this.take({ file: kept.file, at: new Map(kept.at), wish: Wish.valid(kept.wish) }, kept.changed);
     else if (!this.placed.pins.size) this.use("bar");
   }
 

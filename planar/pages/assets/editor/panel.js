@@ -72,7 +72,9 @@ class PencilPanel {
     this.hint.hidden = tool === "hand";
     [this.undo.disabled, this.redo.disabled] = [!editing.done.length, !editing.undone.length];
     this.mobility.textContent = answer?.mobility ?? "";
-    this.problem.textContent = answer?.problem ? `${answer.place ? `${answer.place}: ` : ""}${answer.problem}` : "";
+    const unfixed = answer?.place === `$.links.${file.frame}` && !Pins.ofLink(file.links[file.frame]).length;
+    const why = unfixed ? "Nothing is fixed yet: take Ground, and click the pins that stand still." : `${answer?.place ? `${answer.place}: ` : ""}${answer?.problem}`;
+    this.problem.textContent = answer?.problem ? why : "";
     this.problem.hidden = !answer?.problem;
     this.remedies.replaceChildren(...(answer?.remedies ?? []).map((each) => Forms.element("li", {}, each)));
     this.saved.textContent = editing.fileName ? `${editing.fileName}${editing.changed ? ", not saved yet" : ""}` : "no file yet";

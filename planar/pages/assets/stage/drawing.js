@@ -86,7 +86,7 @@ class Drawing {
         for (const k of [0, 1]) { low[k] = Math.min(low[k], at[k] - r); high[k] = Math.max(high[k], at[k] + r); }
       }
     }
-    for (const at of [...(this.page.wanted?.spots() ?? []), ...this.page.besides()]) {
+    for (const at of [...(this.page.wanted?.spots() ?? []), ...(this.page.besides?.() ?? [])]) {
       for (const k of [0, 1]) { low[k] = Math.min(low[k], at[k]); high[k] = Math.max(high[k], at[k]); }
     }
     for (const k of [0, 1]) { low[k] -= this.slack; high[k] += this.slack; }

@@ -26,6 +26,12 @@ const Wish = {
     return { places, closed, ordered: true };
   },
 
+  /** One that an address or the window has kept; null where that is none. */
+  valid(kept) {
+    const numbers = (at) => Array.isArray(at) && at.length === 2 && at.every(Number.isFinite);
+    return Array.isArray(kept?.places) && kept.places.every(numbers) ? { of: String(kept.of ?? ""), places: kept.places, closed: Boolean(kept.closed), ordered: Boolean(kept.ordered) } : null;
+  },
+
   /** The points of a mechanism that may be wanted somewhere: those that move, the points of couplers first. */
   points(file) {
     const moving = [...Pins.all(file)].filter(([, members]) => members.every(([link]) => link !== file.frame));

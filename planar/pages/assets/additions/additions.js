@@ -2,9 +2,11 @@
 /* What a reader adds to a page: points of links, and a path that is wanted of one. The page is made anew with them where it
    stands; they stay in its address, and go with the file that is saved or copied. */
 
+const ADDED_NAME = /^[A-Z]\d*$/; // as they are given
+
 class Additions {
   constructor(data, program) {
-    Object.assign(this, { data, program, parts: null, points: this.recall(data), wish: Additions.parse("wish"), tool: null });
+    Object.assign(this, { data, program, parts: null, points: this.recall(data), wish: Wish.valid(Additions.parse("wish")), tool: null });
     globalThis.additions = this;
     this.parts = startPage(this.whole(), program);
   }
@@ -13,7 +15,7 @@ class Additions {
 
   /** Points of an address that fit the page's mechanism. */
   recall({ links, names, frame }) {
-    const kept = Additions.parse("points"), fits = ({ link, name, at }) => link !== frame && links.includes(link) && typeof name === "string" && !names.includes(name) && Array.isArray(at) && at.length === 2 && at.every(Number.isFinite);
+    const kept = Additions.parse("points"), fits = ({ link, name, at }) => link !== frame && links.includes(link) && ADDED_NAME.test(name) && !names.includes(name) && Array.isArray(at) && at.length === 2 && at.every(Number.isFinite);
     return Array.isArray(kept) ? kept.map(([link, name, ...at]) => ({ link, name, at })).filter(fits) : [];
   }
 
