@@ -13,10 +13,12 @@ from time import perf_counter
 from typing import Any
 
 from planar.pages.editor.server import EditServer
+from tests.drawn_linkages import LINKAGES
 from tests.page_scripts import browser
 from tests.pencil import served
 
 PLACES = 120
+COUPLED = ("epicyclic", "belt", "rack", "cam", "slot")
 DYADS = 3
 DRAG = """(places) => {
   const { pin } = { pin: "C" }, start = page.point(pin).position, times = [];
@@ -75,20 +77,28 @@ def drag_times() -> list[float]:
 def answer_times() -> dict[str, float]:
     """Of changes of the structure the time (s) until the server has answered, in the median of several."""
     with served() as server:
-        return {
-            f"{2 * count + 4} links": median(_answer_time(server, count, k) for k in range(5))
+        found = {
+            f"{2 * count + 4} links": median(_answer_time(server, _with_dyads(count, k)) for k in range(5))
             for count in range(DYADS + 1)
         }
+        for name in COUPLED:
+            drafts = ({**LINKAGES[name][1], "name": f"{name} {k}"} for k in range(5))
+            found[name] = median(_answer_time(server, each) for each in drafts)
+        return found
 
 
-def _answer_time(server: EditServer, dyads: int, k: int) -> float:
-    """Of one with so many dyads; `k` makes its numbers new."""
+def _with_dyads(dyads: int, k: int) -> dict[str, Any]:
+    """The ten-link with so many of its dyads; `k` makes its numbers new."""
     value = ten_link(0.01 * (k + 1))
     for gone in range(dyads, DYADS):
         for link in (f"rod {gone}", f"rocker {gone}"):
             del value["links"][link]
         del value["links"]["frame"]["points"][f"G{gone}"], value["sketch"][f"F{gone}"]
         value["pairs"] = [each for each in value["pairs"] if each["turning"][1:] != str(gone)]
+    return value
+
+
+def _answer_time(server: EditServer, value: dict[str, Any]) -> float:
     line = http.client.HTTPConnection("127.0.0.1", server.server_port)
     headers = {"Origin": server.origin, "Content-Type": "application/json"}
     began = perf_counter()

@@ -143,7 +143,7 @@ def test_a_pin_is_led_and_lengths_follow_while_the_rest_stays(drawing):
         hand.window.mouse.move(*hand.screen(*(1000 * start[name])))
         hand.window.mouse.down()
         hand.window.keyboard.down("Alt")
-        for part in (0.3, 0.7, 1.0):
+        for part in (0.4, 1.0):
             hand.window.mouse.move(*hand.screen(*(1000 * (start[name] + part * np.array(by)))))
             settled(hand.window)
         assert hand.window.evaluate("editing.solved")  # by the page itself

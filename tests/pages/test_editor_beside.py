@@ -91,7 +91,7 @@ def test_what_is_dropped_is_read_here_and_nothing_of_another_site(drawing):
 
 # a path that is wanted
 
-ELLIPSE = [(45 + 20 * cos(2 * pi * k / 30), 20 + 10 * sin(2 * pi * k / 30)) for k in range(30)]
+ELLIPSE = [(45 + 20 * cos(2 * pi * k / 18), 20 + 10 * sin(2 * pi * k / 18)) for k in range(18)]
 """mm"""
 
 

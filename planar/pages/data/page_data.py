@@ -176,7 +176,9 @@ def _assembly_data(mechanism: Mechanism, solver: PositionSolver) -> dict[str, An
     small = (
         len(stages) <= 1 and all(slice_length(stage.unknowns) <= 2 for stage in stages) and len(mechanism.inputs) == 1
     )
-    every = circuits(mechanism) if small else None
+    # a rack goes on without end, and comes back nowhere
+    goes_on = any(pair.counts_turns and MeasureKind.LENGTH in pair.residual_kinds for pair in mechanism.pairs)
+    every = circuits(mechanism) if small and not goes_on else None
     return {
         "more": len(listed) > MAX_ASSEMBLIES,
         "list": [
