@@ -7,6 +7,8 @@ from itertools import combinations
 from math import hypot
 from typing import NamedTuple
 
+import numpy as np
+
 from planar.drawing.labels.placement import SAME_POINT_TOLERANCE
 from planar.drawing.paper.picture import Label, Mark, Pen, Picture, Polyline, paper_point
 from planar.drawing.paper.scales import DRAWING_HEIGHT, DRAWING_WIDTH, Scale, round_scale
@@ -128,14 +130,20 @@ def extent_places(
 
 def extent_corners(places: Sequence[ExtentPlace], positions: Iterable[Mapping[str, Frame]]) -> tuple[Vector, Vector]:
     """The lower left and the upper right corner (m) of places in some positions of the links."""
-    corners = [(0.0, 0.0)] if not places else []
-    spots = [(link, Vector(*paper_point(at)), float(radius)) for link, at, radius in places]
+    if not places:
+        return Vector(0.0, 0.0), Vector(0.0, 0.0)
+    spots: dict[str, list[tuple[float, float, float]]] = {}
+    for link, at, radius in places:
+        spots.setdefault(link, []).append((*paper_point(at), float(radius)))
+    groups = {link: np.array(own).T for link, own in spots.items()}
+    corners = []
     for frames in positions:
-        for link, at, r in spots:
-            x, y = frames[link].to_world(at)
-            corners += [(x - r, y - r), (x + r, y + r)]
-    xs, ys = zip(*corners, strict=True)
-    return Vector(min(xs), min(ys)), Vector(max(xs), max(ys))
+        for link, (x, y, r) in groups.items():
+            at = frames[link].to_world(Vector(x, y))
+            corners.append([f(each + sign * r) for f, sign in ((np.min, -1), (np.max, 1)) for each in at])
+    every = np.array(corners)
+    low, high = every[:, :2].min(axis=0), every[:, 2:].max(axis=0)
+    return Vector(float(low[0]), float(low[1])), Vector(float(high[0]), float(high[1]))
 
 
 def scheme_scale(state: State) -> Scale:

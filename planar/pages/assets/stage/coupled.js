@@ -74,7 +74,8 @@ const Coupled = {
 
 /** How far from a cam a sliding follower now rests, which rested so far from it, and is lifted as it was. */
 function restingSlide({ O, P, line }, now, far) {
-  const split = ({ O: o, P: p, line: { way } }) => { const off = Plane.minus(p, o), along = Plane.dot(off, way); return [along, way[0] * off[1] - way[1] * off[0]]; };
+  // the line lies aside of the cam's centre, and the follower is lifted along it
+  const split = ({ O: o, P: p, line: { start, way } }) => { const to = Plane.minus(o, start); return [Plane.dot(Plane.minus(p, o), way), way[0] * to[1] - way[1] * to[0]]; };
   const [along, aside] = split({ O, P, line }), [along2, aside2] = split(now), lift = along - Math.sqrt(Math.max(0, far * far - aside * aside));
   return Math.hypot(along2 - lift, aside2);
 }

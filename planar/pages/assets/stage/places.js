@@ -164,8 +164,23 @@ class Placed {
 
   sliderPin(pair) { return pair.block ?? Pins.of(this.pins, pair.links?.[1], pair.point); }
 
-  /** The file and places with a pin elsewhere, all others where they are; `inputs` are the positions that there are. */
-  moved(pin, to, inputs) { return this.changed(new Map(this.at).set(pin, this.allowed(pin, to)), inputs); }
+  /** The file and places with a pin elsewhere, all others where they are, but for what slides on a line that moves with
+      the pin; `inputs` are the positions that there are. */
+  moved(pin, to, inputs) {
+    const at = new Map(this.at).set(pin, this.allowed(pin, to));
+    for (const pair of this.file.pairs ?? []) if (Placed.slides(pair) && !Array.isArray(pair.line?.through)) this.slid(pair, pin, at);
+    return this.changed(at, inputs);
+  }
+
+  /** What slides in a pair comes to its line where that lies elsewhere now; a link that slides as a whole with all pins that it alone has. */
+  slid(pair, pin, at) {
+    const slider = this.sliderPin(pair), from = at.get(slider), line = new Placed(this.file, at, this.units).line(pair);
+    if (slider === pin || !from || !line) return;
+    const by = Plane.minus(Plane.on(line.start, line.way, Plane.dot(Plane.minus(from, line.start), line.way)), from);
+    if (Plane.length(by) <= ON_LINE * Math.max(Plane.apart(from, line.start), 1e-3)) return;
+    const own = [...this.pins].filter(([name, members]) => name !== pin && members.length === 1 && members[0][0] === pair.links?.[1]).map(([name]) => name);
+    for (const name of new Set([slider, ...own])) if (at.has(name)) at.set(name, Plane.on(at.get(name), by, 1));
+  }
 
   /** The file with its pins at other places. */
   changed(at, inputs) {

@@ -1,0 +1,82 @@
+"""The numbers of a file after one of its pins has moved, as pages find them: all other pins stay where they are."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+
+import numpy as np
+import pytest
+
+import planar
+from planar.document.files import read_asset
+from planar.foundation.units import parse_unit
+from tests.known import MODELS
+from tests.page_scripts import NODE, needs_node
+
+COUPLED = {
+    "epicyclic-coupler": ("O", "P", "E", "B"),
+    "geared-five-bar": ("O", "A", "P"),
+    "sun-and-planet": ("O", "E", "P"),
+    "rack-steering": ("O", "A", "L"),
+    "belt-arm": ("O", "E"),
+    "chain-swing-arm": ("O", "W"),
+    "gear-reducer": ("O2", "M"),
+    "slotted-lever": ("O", "D", "C"),
+    "valve-cam": ("O", "P"),
+    "whitworth": ("C", "S"),
+}
+"""Pins of files with wheels, racks, belts, slots and cams, each led aside."""
+SLID = {("slotted-lever", "D"): "A", ("slotted-lever", "C"): "A", ("valve-cam", "O"): "PT", ("whitworth", "C"): "AR"}
+SLID[("whitworth", "S")] = "A"
+"""What slides on lines that move with a pin, and so has to come along."""
+SCRIPTS = ("stage/plane.js", "stage/symbols.js", "stage/coupled.js", "stage/places.js")
+LED = """const led = cases.map(({ file, at, units, pin, to, along }) => {
+  const placed = new Placed(file, new Map(Object.entries(at)), units);
+  return along ? placed.along(pin, to, null, null).file : placed.moved(pin, to, null).file;
+});
+process.stdout.write(JSON.stringify(led));"""
+
+
+def led(cases):
+    """The files after pins have moved."""
+    scripts = "\n".join(map(read_asset, SCRIPTS))
+    text = f"{scripts}\nconst cases = {json.dumps(cases)};\n{LED}"
+    ran = subprocess.run([NODE, "-"], input=text, capture_output=True, text=True, check=False, timeout=60)
+    assert ran.returncode == 0, ran.stderr[-2000:]
+    return json.loads(ran.stdout)
+
+
+def case(mechanism, pin, along=False):
+    """A pin a little aside, as the scripts read it."""
+    points = {name: point.position for name, point in planar.solve(mechanism).points.items()}
+    size = float(np.ptp(np.array(list(points.values())), axis=0).max())
+    to = points[pin] + size * np.array([0.05, 0.03])
+    units = {kind: parse_unit(getattr(mechanism.units, kind)).to_si(1.0) for kind in ("length", "angle")}
+    at = {name: place.tolist() for name, place in points.items()}
+    value = {"file": planar.to_dict(mechanism), "at": at, "units": units, "pin": pin, "to": to.tolist(), "along": along}
+    return value, points, to
+
+
+@needs_node
+def test_wheels_racks_belts_slots_and_cams_follow_a_pin_and_all_others_stay():
+    every = [(stem, pin, *case(MODELS[stem], pin)) for stem, pins in COUPLED.items() for pin in pins]
+    for (stem, pin, _, points, to), file in zip(every, led([each[2] for each in every]), strict=True):
+        found = planar.solve(planar.from_dict(file))
+        size = float(np.ptp(np.array(list(points.values())), axis=0).max())
+        for name, place in points.items():
+            if name in SLID.get((stem, pin), ""):
+                continue
+            wanted = to if name == pin else place
+            assert found.point(name).position == pytest.approx(wanted, abs=1e-9 * size), (stem, pin, name)
+
+
+@needs_node
+def test_a_pin_with_the_rest_changes_numbers_of_one_link_alone():
+    stems = ("000-P1", "slider-crank", "watt-six-bar")
+    every = [(stem, pin, *case(MODELS[stem], pin, along=True)) for stem in stems for pin in ("A", "B")]
+    for (stem, pin, *_), file in zip(every, led([each[2] for each in every]), strict=True):
+        before, after = (planar.dimensions(each) for each in (MODELS[stem], planar.from_dict(file)))
+        changed = [name for name in before if after[name] != pytest.approx(before[name], rel=1e-12, abs=1e-15)]
+        links = {name.split(".")[0] for name in changed if not name.endswith(".position")}
+        assert len(links) == 1, (stem, pin, changed)
