@@ -23,12 +23,12 @@ DYADS = 3
 DRAG = """(places) => {
   const { pin } = { pin: "C" }, start = page.point(pin).position, times = [];
   editing.use("pin");
-  const held = editing.takePin(pin);
+  const held = editing.leading.take(pin);
   editing.hand.dragged = held;
   for (let k = 0; k < places; k++) {
     const turn = (2 * Math.PI * k) / places, began = performance.now();
     held.to = [start[0] + 0.004 * Math.cos(turn), start[1] + 0.004 * Math.sin(turn)];
-    editing.pull(held);
+    editing.leading.pull(held);
     drawing.measure(); // as the next frame would
     document.getElementById("drawing").getBoundingClientRect();
     times.push(performance.now() - began);

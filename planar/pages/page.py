@@ -118,6 +118,7 @@ EDITOR_SCRIPTS = (
     "editor/document.js",
     "editor/couplings.js",
     "editor/sketch.js",
+    "editor/leading.js",
     "editor/hand.js",
     "editor/underlay.js",
     "editor/synthesis.js",

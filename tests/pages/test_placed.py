@@ -80,3 +80,41 @@ def test_a_pin_with_the_rest_changes_numbers_of_one_link_alone():
         changed = [name for name in before if after[name] != pytest.approx(before[name], rel=1e-12, abs=1e-15)]
         links = {name.split(".")[0] for name in changed if not name.endswith(".position")}
         assert len(links) == 1, (stem, pin, changed)
+
+
+REFUSED = {
+    'Couplings.gear(draft, ["AB", "AB"], -2)': "wheels are two links",
+    'Couplings.gear(draft, ["AB", "CD"], 0)': "a number, and not 0",
+    'Couplings.gear(draft, ["frame", "AB"], 2)': "no link carries both",
+    'Couplings.belt(draft, ["AB", "CD"], [-1, 2], false)': "radii above zero",
+    'Couplings.rack(draft, "AB", "AB", [0, 0])': "rolls on another link",
+    'Couplings.rack(draft, "CD", "AB", [0.1, 0])': "lies on AB",
+    'Couplings.slot(draft, { pin: "B" }, "AB", [0, 0])': "a link is wanted at B",
+    'Couplings.cam(draft, "AB", "A", { lift: {}, roller: null })': "the pin of its follower",
+    'Couplings.cam(draft, "AB", "D", { lift: {}, roller: 1 })': "larger than what is between",
+    'Draw.slide(draft, { pin: "B" }, "AB", [0, 0])': "it cannot slide on it",
+}
+"""What cannot be drawn of two bars on the frame, one in line with the other's pin, and why."""
+
+
+@needs_node
+def test_what_cannot_be_drawn_is_refused_in_a_sentence():
+    links = {
+        "frame": {"points": {"A": [0, 0], "C": [100, 0]}},
+        "AB": {"ends": ["A", "B"], "length": 40},
+        "CD": {"ends": ["C", "D"], "length": 30},
+    }
+    file = {"planar": 1, "frame": "frame", "links": links, "pairs": [{"turning": "A"}, {"turning": "C"}]}
+    at = {"A": [0, 0], "B": [0.04, 0], "C": [0.1, 0], "D": [0.1, 0.03]}
+    scripts = "\n".join(map(read_asset, (*SCRIPTS, "editor/document.js", "editor/couplings.js")))
+    acts = ", ".join(f"(draft) => {act}" for act in REFUSED)
+    text = f"""{scripts}
+    const told = [{acts}].map((act) => {{
+      const draft = {{ file: {json.dumps(file)}, at: new Map(Object.entries({json.dumps(at)})) }};
+      draft.units = {{ length: 1e-3, angle: Math.PI / 180 }};
+      try {{ return `drawn: ${{act(draft)}}`; }} catch (problem) {{ return problem.message; }}
+    }});
+    process.stdout.write(JSON.stringify(told));"""
+    ran = subprocess.run([NODE, "-"], input=text, capture_output=True, text=True, check=True, timeout=60)
+    for act, told, wanted in zip(REFUSED, json.loads(ran.stdout), REFUSED.values(), strict=True):
+        assert wanted in told, act

@@ -12,6 +12,7 @@ class Editing {
     Object.assign(this, { file: value, fileName: name, answer, units: answer.units ?? { length: 1e-3, angle: Math.PI / 180 }, usual: answer.usual, wish: null });
     Object.assign(this, { at: new Map(), done: [], undone: [], tool: "hand", chosen: null, linkBefore: null, changed: false, asked: 0, settled: true });
     this.sketch = new Sketch(this);
+    this.leading = new PinLeading(this);
     this.hand = new Hand(this);
     this.filing = new Filing(this);
     this.underlay = new Underlay(this);
@@ -218,71 +219,6 @@ class Editing {
     event.preventDefault();
     event.stopImmediatePropagation();
     if (back) this.undo(); else this.redo();
-  }
-
-  // pins
-
-  /** Hold a pin: what it is moved from, and whether the rest goes along. */
-  takePin(pin) {
-    this.parts.controls.pause();
-    const { file, at, units } = this.draft(), { page, drawing } = this.parts, { solved } = this;
-    drawing.hold(true);
-    const held = { pin, placed: new Placed(file, at, units), inputs: solved ? page.data.inputs.map((_, k) => page.input(k)) : null, made: null, solved };
-    return { ...held, along: solved && this.panel.numbers.read("along"), link: this.linkBefore };
-  }
-
-  /** Lead it: at the next frame, however often it is asked for. */
-  leadPin(held, to) {
-    held.to = to;
-    if (held.waits) return;
-    held.waits = true;
-    requestAnimationFrame(() => {
-      held.waits = false;
-      if (this.hand.dragged === held) this.pull(held);
-    });
-  }
-
-  pull(held) {
-    if (held.along) { this.pullAlong(held); return; }
-    held.made = held.placed.moved(held.pin, held.to, held.inputs);
-    this.at = held.made.at;
-    const shown = held.solved && solvePlaced(this.parts.page, held, this.units) === "";
-    if (shown !== this.solved) { this.solved = shown; document.body.classList.toggle("unsolved", !shown); }
-    this.sketch.draw();
-  }
-
-  /** As far as the rest goes along. */
-  pullAlong(held) {
-    const { page } = this.parts;
-    held.made = held.placed.along(held.pin, held.to, held.inputs, held.link);
-    const why = solveAlong(page, held, this.units);
-    if (why === "") held.reached = held.made.file;
-    this.say(why ? `${held.pin} stays: ${why}.` : "");
-    this.at = new Map([...this.at].map(([name, at]) => [name, page.data.points[name] ? page.point(name).position : at]));
-    this.sketch.draw();
-  }
-
-  dropPin(held, to) {
-    held.to = to;
-    this.parts.drawing.hold(false);
-    if (held.along) {
-      this.pullAlong(held);
-      if (!held.reached) return;
-      const at = new Map(this.at), file = new Placed(held.reached, at, this.units).sketched();
-      this.at = held.placed.at;
-      this.commit({ file, at });
-    } else {
-      this.at = held.placed.at;
-      this.commit(held.placed.moved(held.pin, to, held.inputs));
-    }
-    this.say(`${held.pin} moved${held.along ? ", and what hangs on it" : ""}.`);
-  }
-
-  movePin(pin, to) { this.dropPin(this.takePin(pin), to); }
-
-  revert() {
-    this.parts.drawing.hold(false);
-    this.take({ file: this.file, at: this.at }, this.changed);
   }
 
   rename(pin, name) {

@@ -119,7 +119,7 @@ class Hand {
     if (tool === "pin") {
       editing.linkBefore = editing.chosen?.kind === "link" ? editing.chosen.name : null;
       editing.choose(spot.pin !== null ? { kind: "pin", name: spot.pin } : spot.link !== null ? { kind: "link", name: spot.link } : null);
-      if (spot.pin !== null) this.dragged = editing.takePin(spot.pin);
+      if (spot.pin !== null) this.dragged = editing.leading.take(spot.pin);
       return;
     }
     if (["bar", "spring", "load", "slide", "slot", "point", "gear", "belt", "rack", "cam", "picture"].includes(tool)) {
@@ -132,7 +132,7 @@ class Hand {
 
   lead(spot) {
     this.spot = spot;
-    if (this.dragged !== null) { if (this.from !== null || this.cursor !== null) this.editing.leadPin(this.dragged, spot.at); return; }
+    if (this.dragged !== null) { if (this.from !== null || this.cursor !== null) this.editing.leading.lead(this.dragged, spot.at); return; }
     if (this.pending.length) this.editing.sketch.draw();
     else if (this.editing.tool === "wish" && this.from !== null) this.editing.wishing.lead(spot);
   }
@@ -142,7 +142,7 @@ class Hand {
     if (this.dragged !== null) {
       const held = this.dragged;
       this.dragged = null;
-      if (far) this.editing.dropPin(held, spot.at);
+      if (far) this.editing.leading.drop(held, spot.at);
       else this.editing.sketch.draw();
     } else if (far && this.pending.length === 1 && this.editing.tool !== "plate") this.finish(spot);
   }
@@ -205,7 +205,7 @@ class Hand {
     this.dragged = null;
     this.from = null;
     this.rested();
-    this.editing.revert();
+    this.editing.leading.revert();
   }
 
   /** Arrows lead the cross by the grid, Shift ten times as far; N to the next pin; Enter presses, Escape leaves off. */

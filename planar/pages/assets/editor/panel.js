@@ -104,13 +104,13 @@ class PencilPanel {
     if (one?.kind === "pin" && editing.at.has(one.name)) {
       const at = editing.at.get(one.name);
       field("Pin", one.name, (text) => editing.rename(one.name, text));
-      at.forEach((each, k) => number("xy"[k], each, (value) => editing.movePin(one.name, at.map((own, i) => (i === k ? value : own)))));
+      at.forEach((each, k) => number("xy"[k], each, (value) => editing.leading.move(one.name, at.map((own, i) => (i === k ? value : own)))));
     } else if (one?.kind === "link" && editing.file.links[one.name]) {
       chosen.append(Forms.element("strong", {}, one.name), " ");
       const { ends } = editing.file.links[one.name], places = ends?.map((point) => editing.placed.place(one.name, point));
       if (places?.every(Boolean)) {
         const [a, b] = places, pin = Pins.of(editing.placed.pins, one.name, ends[1]);
-        number(`length ${ends.join("")}`, Plane.apart(a, b), (value) => editing.movePin(pin, Plane.on(a, Plane.unit(Plane.minus(b, a)), value)));
+        number(`length ${ends.join("")}`, Plane.apart(a, b), (value) => editing.leading.move(pin, Plane.on(a, Plane.unit(Plane.minus(b, a)), value)));
       }
       const draw = (make) => editing.perform((draft) => make(draft, one.name, 2 * editing.sketch.step));
       chosen.append(this.button("Copy", () => draw(Draw.copyLink), { "aria-label": `Copy ${one.name}` }));
