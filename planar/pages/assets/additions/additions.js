@@ -96,7 +96,7 @@ class Additions {
     this.tools = new StageTools({ page, svg, lens }, this);
     page.on("wanted", () => {
       const [item] = page.wanted?.items ?? [];
-      if (!item || !this.wish || !this.mayWish) return;
+      if (!item || !this.wish || !this.mayWish || page !== globalThis.page) return; // not one that was before
       this.wish = { ...this.wish, places: item.places.map((at) => [...at]) };
       clearTimeout(this.waits);
       this.waits = setTimeout(() => this.keep(), KEEPING_PAUSE);

@@ -54,7 +54,7 @@ class DrawnWish {
   attach(page) {
     page.on("wanted", () => {
       const [item] = page.wanted?.items ?? [], { editing } = this;
-      if (!item || !editing.wish) return;
+      if (!item || !editing.wish || page !== globalThis.page) return; // not one that was before
       editing.wish = { ...editing.wish, places: item.places.map((at) => [...at]) };
       editing.keep();
     });
