@@ -9,13 +9,13 @@ from tests.page_scripts import SCREENS, Windows, browser
 from tests.pencil import Pencil, served
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="package")
 def chromium():
     with browser() as running:
         yield running
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="package")
 def windows(chromium):
     return Windows(chromium)
 

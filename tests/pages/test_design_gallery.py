@@ -21,7 +21,7 @@ from planar.synthesis.judgement.defects import Defect
 from planar.synthesis.judgement.judgement import DesignJudge
 from planar.synthesis.synthesis import Synthesis, SynthesisedDesign
 from planar.synthesis.task.task_numbers import miss_kind
-from tests.page_scripts import browser, watched_window
+from tests.page_scripts import watched_window
 
 HOSTILE = "<script>alert(1)</script> & \"Lid\" 'x'"
 OFF = 1e-3 * np.array([[0.2, 0.1], [-0.3, 0.0], [0.0, 0.4], [0.1, -0.1]])
@@ -253,18 +253,17 @@ def test_sheets_of_drawings(path, function):
         planar.plot.designs([])
 
 
-def test_the_gallery_in_a_browser(folder):
-    with browser() as running:
-        for scheme in ("light", "dark"):
-            context = running.new_context(viewport={"width": 390, "height": 800}, color_scheme=scheme)
-            window, wrong = watched_window(context)
-            window.goto((folder / "index.html").as_uri())
-            assert window.evaluate("document.documentElement.scrollWidth") <= 390, "only the table is scrolled"
-            line = window.locator("#designs svg [stroke*='--pen-c2185b']").first
-            colour = line.evaluate("each => getComputedStyle(each).stroke")
-            assert colour == {"light": "rgb(194, 24, 91)", "dark": "rgb(255, 138, 180)"}[scheme]
-            window.get_by_role("link", name="Page").click()
-            window.locator("#drawing .wanted path.cross").first.wait_for()
-            window.get_by_role("link", name="All designs").click()
-            window.locator("#designs").wait_for()
-            assert wrong == []
+def test_the_gallery_in_a_browser(folder, chromium):
+    for scheme in ("light", "dark"):
+        context = chromium.new_context(viewport={"width": 390, "height": 800}, color_scheme=scheme)
+        window, wrong = watched_window(context)
+        window.goto((folder / "index.html").as_uri())
+        assert window.evaluate("document.documentElement.scrollWidth") <= 390, "only the table is scrolled"
+        line = window.locator("#designs svg [stroke*='--pen-c2185b']").first
+        colour = line.evaluate("each => getComputedStyle(each).stroke")
+        assert colour == {"light": "rgb(194, 24, 91)", "dark": "rgb(255, 138, 180)"}[scheme]
+        window.get_by_role("link", name="Page").click()
+        window.locator("#drawing .wanted path.cross").first.wait_for()
+        window.get_by_role("link", name="All designs").click()
+        window.locator("#designs").wait_for()
+        assert wrong == []

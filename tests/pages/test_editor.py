@@ -50,12 +50,13 @@ def test_what_was_drawn_is_undone_to_nothing_and_done_again(drawing):
     hand = drawing()
     draw_quick_return(hand)
     drawn, steps = hand.file(), 0
-    while hand.window.get_by_role("button", name="Undo drawing").is_enabled():
-        hand.button("Undo drawing")
+    undo = hand.window.get_by_role("button", name="Undo drawing")
+    while undo.is_enabled():
+        undo.click()
         steps += 1
     assert hand.file()["links"] == {"frame": {"points": {}}}
     for _ in range(steps):
-        hand.button("Redo drawing")
+        hand.window.get_by_role("button", name="Redo drawing").click()
     assert hand.file() == drawn
     assert hand.told() == "mobility 1, 1 input"
 
@@ -348,8 +349,8 @@ def test_springs_forces_and_masses_are_drawn_in_the_files_kind_of_units(length, 
     assert hand.window.evaluate("(name) => page.forces.effort(name)", given.pair) == pytest.approx(effort, rel=1e-8)
 
 
-@pytest.mark.parametrize(("pin", "changed"), [("D", {"AD.D.x", "AD.D.y"}), ("B", {"AB.length", "A.position"})])
-def test_the_rest_goes_along_with_a_pin_and_keeps_its_lengths(pin, changed, drawing):
+def test_the_rest_goes_along_with_a_pin_and_keeps_its_lengths(drawing):
+    pin, changed = "B", {"AB.length", "A.position"}
     hand = drawing(planar.to_dict("four-bar"))
     start = planar.solve(hand.mechanism()).point(pin).position * 1000
     hand.tool("Pins")

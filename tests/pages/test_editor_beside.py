@@ -185,9 +185,8 @@ def test_designs_that_the_server_finds_are_listed_and_taken_over_in_one_step(dra
 # without a mouse, and for all eyes
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_whatever_the_pencil_shows_has_a_name_is_legible_and_reached_by_keys(scheme, drawing):
-    hand = drawing(planar.to_dict("four-bar"), color_scheme=scheme)
+def test_whatever_the_pencil_shows_has_a_name_is_legible_and_reached_by_keys(drawing):
+    hand = drawing(planar.to_dict("four-bar"))
     hand.use("Wanted path", (40, 20), (60, 30))
     hand.use("Pins", (0, 0))
     hand.wait()
@@ -195,7 +194,9 @@ def test_whatever_the_pencil_shows_has_a_name_is_legible_and_reached_by_keys(sch
     hand.window.evaluate("for (const each of editing.panel.numbers.boxes) each.hidden = false")
     assert hand.window.evaluate(NAMELESS) == []
     assert hand.window.evaluate(MISNAMED) == []
-    assert hand.window.evaluate(FAINT)["least"] == []
+    for scheme in ("light", "dark"):
+        hand.window.emulate_media(color_scheme=scheme)
+        assert hand.window.evaluate(FAINT)["least"] == []
     # what is a picture holds nothing that takes the focus, and no two parts are one
     assert hand.window.locator("[role=img] [tabindex]").count() == 0
     assert hand.window.evaluate(

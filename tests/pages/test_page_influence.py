@@ -13,7 +13,7 @@ from planar.analysis.tolerance.variations import find_variations
 from planar.foundation.errors import NoAnswer, PlanarError
 from planar.pages.view import view
 from tests.known import MODELS, some_models
-from tests.page_scripts import browser, in_node, needs_node, watched_window
+from tests.page_scripts import in_node, needs_node, watched_window
 
 SCRIPTS = ("layers/ink.js", "solve/slopes.js", "controls/influence.js", "layers/bands.js")
 STEMS = ("four-bar", "whitworth", "scotch-yoke", "geared-five-bar", "double-butterfly", "ten-link", "klann-leg")
@@ -82,12 +82,6 @@ WORST = """
   [...document.querySelectorAll(".influence tbody tr:last-child td")].slice(0, 2)
     .map(({ dataset }) => JSON.parse(dataset.si))
 """
-
-
-@pytest.fixture(scope="module")
-def chromium():
-    with browser() as running:
-        yield running
 
 
 @pytest.fixture

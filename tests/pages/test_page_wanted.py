@@ -17,7 +17,7 @@ from planar.pages.page import page
 from planar.synthesis.task.synthesis_task import WantedFunction, WantedPath, WantedPoses
 from tests.command import run
 from tests.known import MODELS
-from tests.page_scripts import browser, in_node, needs_node, watched_window
+from tests.page_scripts import in_node, needs_node, watched_window
 
 SCRIPTS = ("solve/course.js", "solve/slopes.js", "wanted/wanted_fit.js", "wanted/wanted.js")
 FIT = """
@@ -209,12 +209,6 @@ def test_a_task_is_shown_under_a_mechanism(tmp_path):
     assert run(tmp_path, "view", "slider-crank", "--task", "lid.json", "-o", "lid.html").status == 2
     with pytest.raises(planar.BadInput, match="no input"):
         planar.view(replace(planar.load("four-bar"), inputs=()), tmp_path / "page.html", task=LID)
-
-
-@pytest.fixture(scope="module")
-def chromium():
-    with browser() as running:
-        yield running
 
 
 @pytest.fixture
