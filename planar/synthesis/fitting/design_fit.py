@@ -63,7 +63,7 @@ class DesignFit:
         state = MovingDesigns(self.problem, numbers, list(unknowns), list(zeros), guarded)
 
         def halve(step: int) -> None:
-            if state.demands is not None and step and step % WATCH_STEPS == 0 and state.demands.guard.rows:
+            if state.demands is not None and step % WATCH_STEPS == 0 and state.demands.guard.rows:
                 state.relocate_demands()
             if step in HALVING_STEPS:
                 state.keep_best(max(keep, FEW, (len(state.numbers) + 1) // 2))

@@ -32,7 +32,7 @@ FEET, FOOT_POSITIONS = 4, 13
 """How often, and at how many positions of the input, the nearest one to an entry is looked for."""
 EXACT = 1e-9
 """The same of what is to be met exactly."""
-REACH, ORDER = "the reach", "the order"
+REACH, ORDER, WHOLE_TURN, ONE_BRANCH = "the reach", "the order", "the whole turn", "one branch"
 OTHER_ASSEMBLY = 0.01
 """Of the extent of what is wanted, or rad: what misses an entry by so much more than the fit is another assembly."""
 NOWHERE_NEAR = 0.5
@@ -94,7 +94,7 @@ class DesignJudge:
         if self.task.needs_whole_turn and not reach.is_whole_turn:
             low, high = (amount(each, reach.kind, mechanism.units) for each in (reach.low, reach.high))
             told = f"no whole turn: {running} goes from {low} to {high} only"
-            defects.append(Defect("the whole turn", told, reach.high - reach.low, TURN))
+            defects.append(Defect(WHOLE_TURN, told, reach.high - reach.low, TURN))
         defects += [*self._motion_defects(motion, reach, there), *self._rest_defects(misses)]
         return Judgement(tuple(misses), tuple(there), tuple(defects))
 
@@ -121,7 +121,7 @@ class DesignJudge:
                 entry = int(np.argmax(beyond))
                 ends = " to ".join(amount(each, reach.kind, mechanism.units) for each in (reach.low, reach.high))
                 yield Defect(
-                    "one branch",
+                    ONE_BRANCH,
                     f"branch defect: entry {entry + 1} of {wanted.of} lies beyond a dead point; the branch of the "
                     f"first goes from {reach.pair} = {ends}",
                 )
@@ -179,7 +179,7 @@ class DesignJudge:
         demands = self.task.demands
         names = ["the region"] * (demands.inside is not None)
         names += ["the transmission angle"] * (demands.transmission is not None)
-        names += ["the whole turn"] * self.task.needs_whole_turn
+        names += [WHOLE_TURN] * self.task.needs_whole_turn
         names += ["the bounds"] * bool(self.task.within)
         return " or ".join(names) or "what is wanted"
 
