@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from time import monotonic
@@ -12,6 +12,7 @@ import numpy as np
 
 from planar import __version__
 from planar.document.dimensions import file_dimensions
+from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput, PlanarError
 from planar.model.mechanism import Mechanism
 from planar.synthesis.catalogue.catalogue import Catalogue
@@ -33,8 +34,10 @@ DRAWS = 6000
 """Of designs at random for a catalogue."""
 MATCHES = 96
 """Of a catalogue that are fitted."""
-ROUNDS = 4
-"""Catalogues at most, each of other designs, where those before led to nothing sound or good."""
+FAIR, IDLE_ROUNDS = 1e-2, 2
+"""The same, at which no other one is looked at after so many that led to nothing better."""
+FEWEST_ROUNDS, ROUNDS = 2, 4
+"""Catalogues, each of other designs, where those before led to nothing good: so many at least, and at most."""
 GOOD = 2e-3
 """Root mean square of the misses beside the extent of what is wanted, at which no other catalogue is looked at."""
 SETTLED, SAME = 3, 1e-3
@@ -97,6 +100,7 @@ class TaskSearch:
         """Search the designs of one start; whether that was finished."""
         search: DesignSearch | None = None
         before = len(self.sound)
+        bests: list[float] = []
         for turn in range(ROUNDS):
             self._at = mechanism.name, number, turn + 1
             kept = None if self.folder is None else self.folder.read(number, turn + 1)
@@ -114,7 +118,8 @@ class TaskSearch:
                 self.size = search.size
                 self.starts[mechanism.name] = mechanism
                 self._search_round(search, turn, before)
-            if self._is_settled(before):
+            bests.append(min((each.error for each in self.sound[before:]), default=float("inf")))
+            if self._is_settled(before, bests):
                 break
         return True
 
@@ -131,11 +136,15 @@ class TaskSearch:
             return None
         return search
 
-    def _is_settled(self, before: int) -> bool:
-        """Whether no other catalogue is looked at: the best design of a start is good, or several fits led to it."""
-        errors = np.array([each.error for each in self.sound[before:]])
-        best = float(errors.min(initial=np.inf))
-        return best <= GOOD * self.size or int(np.sum(errors <= (1.0 + SAME) * best)) >= SETTLED
+    def _is_settled(self, before: int, bests: list[float]) -> bool:
+        """Whether no other catalogue is looked at: the best design of a start is good, or several fits led to it, or
+        it is fair, and catalogues since led to none that is better. `bests` are the least errors after each."""
+        best = bests[-1]
+        if best <= GOOD * self.size:
+            return True
+        alike = sum(each.error <= (1.0 + SAME) * best for each in self.sound[before:])
+        idle = sum(each <= (1.0 + SAME) * best for each in bests) - 1
+        return len(bests) >= FEWEST_ROUNDS and (alike >= SETTLED or (best <= FAIR * self.size and idle >= IDLE_ROUNDS))
 
     def _search_round(self, search: DesignSearch, turn: int, before: int) -> None:
         """The designs of one more catalogue, kept when all are judged; so many were sound `before` this start."""
@@ -161,7 +170,10 @@ class TaskSearch:
             found = []
             for each in search.fit(catalogue, wanted, KEPT_SHARE * self.many, keeps_turn, keeps_order):
                 self._tell("judgement")
-                design = self._judge(search, judge, each)
+                values = tuple(search.shown(k, each) for k in range(len(search.equations)))
+                if judge.fit_error(values) > self._worst_wanted(before):
+                    continue
+                design = self._judge(search, judge, each, values)
                 if design is not None:
                     found.append((each, {one.demand for one in design.shortages}))
                 if len(self.sound) - before >= most:
@@ -187,13 +199,20 @@ class TaskSearch:
             share = best / self.size if self.task.wants_places else best
             self.progress(SearchProgress(start, number, self.count, turn, stage, best, share))
 
-    def _judge(self, search: DesignSearch, judge: DesignJudge, candidate: Candidate) -> SynthesisedDesign | None:
-        """A candidate judged; None where no file could say it."""
+    def _worst_wanted(self, before: int) -> float:
+        """The error beyond which a design does not come among the best of its start, before which so many were sound;
+        a judged one is never less than that of its fit."""
+        best = rank_designs(self.sound[before:], self.many)
+        return best[-1].error if len(best) == self.many else float("inf")
+
+    def _judge(
+        self, search: DesignSearch, judge: DesignJudge, candidate: Candidate, values: Sequence[Array]
+    ) -> SynthesisedDesign | None:
+        """A candidate with the results `values` judged; None where no file could say it."""
         design = search.equations[0].design
         number = len(self.sound) + len(self.rejected) + 1
         name = f"{self.task.name}: {search.mechanism.name} {number}"
         inputs = [y[:, -1] * each.input_scale for each, y in zip(search.equations, candidate.unknowns, strict=True)]
-        values = [search.shown(k, candidate) for k in range(len(search.equations))]
         y = search.most_regular(candidate)
         try:
             at, digits = float(y[-1] * search.equations[0].input_scale), EXACT_DIGITS if self.task.exact else DIGITS
@@ -245,6 +264,13 @@ class TaskSearch:
 
 def _plan(many: int, seed: int) -> dict[str, Any]:
     """What makes a search what it is, beside its task."""
-    settings = {"draws": DRAWS, "matches": MATCHES, "rounds": ROUNDS, "good": GOOD, "settled": SETTLED, "same": SAME}
+    settings = {
+        "draws": DRAWS,
+        "matches": MATCHES,
+        "rounds": [FEWEST_ROUNDS, ROUNDS],
+        "good": [GOOD, FAIR, IDLE_ROUNDS],
+        "settled": SETTLED,
+        "same": SAME,
+    }
     settings |= {"spare": ALIKE_SPARE, "kept": KEPT_SHARE}
     return {"version": __version__, "many": many, "seed": seed, "settings": settings}

@@ -54,6 +54,11 @@ class DesignJudge:
     def __init__(self, task: SynthesisTask, size: float):
         self.task, self.size = task, size
 
+    def fit_error(self, values: Sequence[Array]) -> float:
+        """The root mean square of the misses of results `values` (n, parts) of a fit, SI."""
+        every = [entry_misses(*each, self.size) for each in zip(self.task.wanted, values, strict=True)]
+        return float(np.sqrt(np.mean(np.concatenate(every) ** 2)))
+
     def judge(self, mechanism: Mechanism, inputs: Sequence[Array], values: Sequence[Array]) -> Judgement:
         """The judgement of a mechanism of which a fit has results `values` (n, parts) at `inputs` (n,), SI."""
         try:
@@ -89,7 +94,8 @@ class DesignJudge:
                 told = f"circuit defect: {wanted.of} meets entry {entry + 1} in another assembly only"
                 defects.append(Defect("one circuit", told))
             misses.append(off)
-        defects += [*self._put_in_order(motion, reach, there, misses)]
+        if not self.task.needs_whole_turn or reach.is_whole_turn:  # else it is rejected in whatever order
+            defects += [*self._put_in_order(motion, reach, there, misses)]
         defects += [*self._tolerance_defects(misses)]
         if self.task.needs_whole_turn and not reach.is_whole_turn:
             low, high = (amount(each, reach.kind, mechanism.units) for each in (reach.low, reach.high))
