@@ -28,7 +28,7 @@ FIRST_DAMPING, LEAST_DAMPING, GREATEST_DAMPING = 1e-2, 1e-14, 1e8
 CLOSING_STEPS = 4
 MAX_CHANGE, MAX_MOVE = 0.3, 0.5
 """Of a free number, and of an entry's unknowns (rad, or of the size), in one step."""
-ENOUGH_GAIN = 1e-10
+ENOUGH_GAIN = 1e-7
 """Of the sum of squares: steps that win less, so often one after the other, are the last."""
 IDLE_STEPS = 4
 NEAR_DEAD_POINT = 0.02
