@@ -34,7 +34,7 @@ DRAWS = 6000
 """Of designs at random for a catalogue."""
 MATCHES = 96
 """Of a catalogue that are fitted."""
-FAIR, IDLE_ROUNDS = 2e-2, 2
+FAIR, IDLE_ROUNDS = 1e-2, 2
 """The same, at which no other one is looked at after so many that led to nothing better."""
 FEWEST_ROUNDS, ROUNDS = 2, 4
 """Catalogues, each of other designs, where those before led to nothing good: so many at least, and at most."""
