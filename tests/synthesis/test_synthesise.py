@@ -13,6 +13,7 @@ from tests.command import run
 def few_designs(monkeypatch):
     """A small catalogue, which is enough for tasks as easy as these."""
     monkeypatch.setattr("planar.synthesis.task_search.DRAWS", 600)
+    monkeypatch.setattr("planar.synthesis.task_search.MATCHES", 24)
     monkeypatch.setattr("planar.synthesis.task_search.ROUNDS", 1)
 
 
