@@ -35,13 +35,13 @@ DRAWS = 6000
 MATCHES = 96
 """Of a catalogue that are fitted."""
 FAIR, IDLE_ROUNDS = 1e-2, 2
-"""The same, at which no other one is looked at after so many that led to nothing better."""
+"""The same of a fair design, at which no other one is looked at after so many that led to nothing better."""
 FEWEST_ROUNDS, ROUNDS = 2, 4
 """Catalogues, each of other designs, where those before led to nothing good: so many at least, and at most."""
 GOOD = 2e-3
 """Root mean square of the misses beside the extent of what is wanted, at which no other catalogue is looked at."""
 SETTLED, SAME = 3, 1e-3
-"""Fits that lead to the best design, to this part of its error, at which no other catalogue is looked at: where several
+"""Fits that lead to a fair best design, to this part of its error, at which no other is looked at: where several
 of many starts at random lead to the best of their optima, a better one is not likely to have been missed (C. G. E.
 Boender, A. H. G. Rinnooy Kan, Bayesian stopping rules for multistart global optimization methods, Mathematical
 Programming 37 (1987) 59)."""
@@ -137,14 +137,15 @@ class TaskSearch:
         return search
 
     def _is_settled(self, before: int, bests: list[float]) -> bool:
-        """Whether no other catalogue is looked at: the best design of a start is good, or several fits led to it, or
-        it is fair, and catalogues since led to none that is better. `bests` are the least errors after each."""
+        """Whether no other catalogue is looked at: the best design of a start is good; or it is fair, and several fits
+        led to it or catalogues since led to none that is better. `bests` are the least errors after each."""
         best = bests[-1]
         if best <= GOOD * self.size:
             return True
         alike = sum(each.error <= (1.0 + SAME) * best for each in self.sound[before:])
         idle = sum(each <= (1.0 + SAME) * best for each in bests) - 1
-        return len(bests) >= FEWEST_ROUNDS and (alike >= SETTLED or (best <= FAIR * self.size and idle >= IDLE_ROUNDS))
+        is_fair = len(bests) >= FEWEST_ROUNDS and best <= FAIR * self.size
+        return is_fair and (alike >= SETTLED or idle >= IDLE_ROUNDS)
 
     def _search_round(self, search: DesignSearch, turn: int, before: int) -> None:
         """The designs of one more catalogue, kept when all are judged; so many were sound `before` this start."""
