@@ -34,12 +34,12 @@ DRAWS = 6000
 """Of designs at random for a catalogue."""
 MATCHES = 96
 """Of a catalogue that are fitted."""
-FAIR, IDLE_ROUNDS = 1e-2, 2
-"""The same of a fair design, at which no other one is looked at after so many that led to nothing better."""
 FEWEST_ROUNDS, ROUNDS = 2, 4
 """Catalogues, each of other designs, where those before led to nothing good: so many at least, and at most."""
 GOOD = 2e-3
 """Root mean square of the misses beside the extent of what is wanted, at which no other catalogue is looked at."""
+FAIR, IDLE_ROUNDS = 1e-2, 2
+"""The same of a fair design, at which no other one is looked at after so many that led to nothing better."""
 SETTLED, SAME = 3, 1e-3
 """Fits that lead to a fair best design, to this part of its error, at which no other is looked at: where several
 of many starts at random lead to the best of their optima, a better one is not likely to have been missed (C. G. E.
