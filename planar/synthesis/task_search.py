@@ -28,7 +28,7 @@ from planar.synthesis.search_progress import SearchProgress
 from planar.synthesis.synthesis import Synthesis, SynthesisedDesign, rank_designs
 from planar.synthesis.task.freedom import count_freedom, exactness_in_excess
 from planar.synthesis.task.starts import start_mechanisms
-from planar.synthesis.task.synthesis_task import ChainStart, SynthesisTask
+from planar.synthesis.task.synthesis_task import ChainStart, SynthesisTask, WantedFunction
 
 DRAWS = 6000
 """Of designs at random for a catalogue."""
@@ -40,6 +40,8 @@ GOOD = 2e-3
 """Root mean square of the misses beside the extent of what is wanted, at which no other catalogue is looked at."""
 FAIR, IDLE_ROUNDS = 1e-2, 2
 """The same of a fair design, at which no other one is looked at after so many that led to nothing better."""
+FUNCTION_SHARE = 0.1
+"""Of the widest range of values, that counts as extent where functions alone are wanted: they are met more closely."""
 SETTLED, SAME = 3, 1e-3
 """Fits that lead to a fair best design, to this part of its error, at which no other is looked at: where several
 of many starts at random lead to the best of their optima, a better one is not likely to have been missed (C. G. E.
@@ -139,12 +141,12 @@ class TaskSearch:
     def _is_settled(self, before: int, bests: list[float]) -> bool:
         """Whether no other catalogue is looked at: the best design of a start is good; or it is fair, and several fits
         led to it or catalogues since led to none that is better. `bests` are the least errors after each."""
-        best = bests[-1]
-        if best <= GOOD * self.size:
+        best, extent = bests[-1], self.size if self.task.wants_places else FUNCTION_SHARE * _widest_range(self.task)
+        if best <= GOOD * extent:
             return True
         alike = sum(each.error <= (1.0 + SAME) * best for each in self.sound[before:])
         idle = sum(each <= (1.0 + SAME) * best for each in bests) - 1
-        is_fair = len(bests) >= FEWEST_ROUNDS and best <= FAIR * self.size
+        is_fair = len(bests) >= FEWEST_ROUNDS and best <= FAIR * extent
         return is_fair and (alike >= SETTLED or idle >= IDLE_ROUNDS)
 
     def _search_round(self, search: DesignSearch, turn: int, before: int) -> None:
@@ -263,13 +265,18 @@ class TaskSearch:
         return f"{why} at {where}: what is told was found till then"
 
 
+def _widest_range(task: SynthesisTask) -> float:
+    """Of the values of functions, rad or m."""
+    return max(float(np.ptp(each.values)) for each in task.wanted if isinstance(each, WantedFunction))
+
+
 def _plan(many: int, seed: int) -> dict[str, Any]:
     """What makes a search what it is, beside its task."""
     settings = {
         "draws": DRAWS,
         "matches": MATCHES,
         "rounds": [FEWEST_ROUNDS, ROUNDS],
-        "good": [GOOD, FAIR, IDLE_ROUNDS],
+        "good": [GOOD, FAIR, IDLE_ROUNDS, FUNCTION_SHARE],
         "settled": SETTLED,
         "same": SAME,
     }
