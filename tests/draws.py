@@ -9,10 +9,10 @@ from hypothesis import settings
 SEARCH = os.environ.get("PLANAR_TESTS") == "search"
 TIMES = 10
 """As many more where one searches."""
-SHARE = 0.25
+SHARE = 0.15
 """Of the examples that a test names, so many are tried where nobody searches: the suite has five minutes."""
 
-settings.register_profile("repeatable", derandomize=True, deadline=None, max_examples=15)
+settings.register_profile("repeatable", derandomize=True, deadline=None, max_examples=10)
 settings.register_profile("search", deadline=None, max_examples=100 * TIMES)
 
 

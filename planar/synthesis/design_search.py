@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -17,6 +16,7 @@ from planar.synthesis.catalogue.catalogue_store import kept_catalogue
 from planar.synthesis.catalogue.matches import Match, find_matches
 from planar.synthesis.catalogue.moved_numbers import moved_numbers
 from planar.synthesis.catalogue.step_choices import WantedItem
+from planar.synthesis.fitting.demand_guard import DemandGuard
 from planar.synthesis.fitting.demanded_rows import demand_guards
 from planar.synthesis.fitting.design_fit import DesignFit, FittedDesigns
 from planar.synthesis.fitting.kept_demands import lacks
@@ -35,8 +35,10 @@ class Candidate(NamedTuple):
     unknowns: tuple[Array, ...]
     "of each wanted item (n, unknowns)"
     squares: float
-    lack: float = 0.0
+    lack: float
     "by how much a demand is missed, rad or of the extent of what is wanted"
+    match: Match
+    "from which it was fitted"
 
 
 DEMANDING, LACK_WEIGHT = 6, 0.3
@@ -51,6 +53,7 @@ class _FitStart(NamedTuple):
     unknowns: list[Array]
     guarded: Array
     over_turn: bool
+    match: Match
 
 
 class DesignSearch:
@@ -89,7 +92,7 @@ class DesignSearch:
             for each in self.equations
         ]
         factors = self._factors(catalogue) if self.can_move else None
-        if self.guards is None or not self.guards[True].rows:
+        if self.guards is None or not self.guards[True].kept_by(False, False).rows:
             return find_matches(catalogue, items, factors, many, self.task.needs_whole_turn)
         found = find_matches(catalogue, items, factors, DEMANDING * many, self.task.needs_whole_turn)
         scores = np.hypot([each.distance for each in found], LACK_WEIGHT * self._lacks(catalogue, found))
@@ -111,24 +114,30 @@ class DesignSearch:
         scale = self.equations[0].scale
         return self.moves.factors(catalogue.numbers, self.free.lower / scale, self.free.upper / scale)
 
-    def fit(self, catalogue: Catalogue, matches: list[Match], keep: int, keeps_order: bool = False) -> list[Candidate]:
+    def fit(
+        self, catalogue: Catalogue, matches: list[Match], keep: int, keeps_turn: bool = False, keeps_order: bool = False
+    ) -> list[Candidate]:
         """The matches fitted, the best so many; of those that turn fully, and of others, where demands are kept.
 
-        With `keeps_order` entries are met in their order all the way, which may end in a worse optimum.
-        What comes to turn fully is fitted once more, since its demands are kept all round the turn then."""
+        With `keeps_turn` designs turn fully all the way, with `keeps_order` entries are met in their order, where that
+        is wanted; both may end in a worse optimum. What comes to turn fully is fitted once more, since its demands are
+        kept all round the turn then."""
+        guards = self.guards
+        if guards is not None:
+            guards = {key: each.kept_by(keeps_turn, keeps_order) for key, each in guards.items()}
         groups = self._fit_starts(catalogue, matches)
         found: list[Candidate] = []
         for over_turn in (False, True):
             own = [each for each in groups if each.over_turn is over_turn]
             if not own:
                 continue
-            fitted = self._fit_alike(own, keep, over_turn, keeps_order)
+            fitted = self._fit_alike(own, keep, None if guards is None else guards[over_turn])
             turned: dict[int, _FitStart] = {}
-            if not over_turn and self.guards is not None and self.guards[True].rows:
-                turned = self._turned(fitted)
+            if not over_turn and guards is not None and guards[True].rows:
+                turned = self._turned(fitted, own)
             groups += turned.values()
             known = np.flatnonzero(np.isfinite(fitted.squares)).tolist()
-            found += [self._candidate(fitted, k) for k in known if k not in turned]
+            found += [self._candidate(fitted, k, own[fitted.order[k]].match) for k in known if k not in turned]
         return sorted(found, key=lambda each: (each.lack > 0.0, each.squares))[:keep]
 
     def _fit_starts(self, catalogue: Catalogue, matches: list[Match]) -> list[_FitStart]:
@@ -141,7 +150,7 @@ class DesignSearch:
             ys = [y[steps] for steps in match.steps]
             over_turn = self.guards is not None and bool(catalogue.is_whole[match.design])
             branch = y[np.isfinite(y).all(axis=1)]
-            found.append(_FitStart(moved, ys, self._guarded(branch, ys, over_turn), over_turn))
+            found.append(_FitStart(moved, ys, self._guarded(branch, ys, over_turn), over_turn, match))
         return found
 
     def _guarded(self, branch: Array, unknowns: list[Array], over_turn: bool) -> Array:
@@ -155,19 +164,18 @@ class DesignSearch:
         found: Array = np.stack([np.interp(wanted, branch[:, -1], part) for part in branch.T], axis=1)
         return found
 
-    def _fit_alike(self, starts: list[_FitStart], keep: int, over_turn: bool, keeps_order: bool) -> FittedDesigns:
+    def _fit_alike(self, starts: list[_FitStart], keep: int, guard: DemandGuard | None) -> FittedDesigns:
         """Designs fitted that all turn fully, or are all seen between their entries only."""
         x = np.array([each.numbers for each in starts])
         ys = [np.array(each) for each in zip(*(each.unknowns for each in starts), strict=True)]
         zeros = self._zeros(x, ys)
         scale = self.equations[0].scale
-        guard = None if self.guards is None else replace(self.guards[over_turn], keeps_order=keeps_order)
         fit = DesignFit(self.equations, self.free.lower / scale, self.free.upper / scale, guard)
         positions = np.array([each.guarded for each in starts])
         shares = np.broadcast_to(np.linspace(0.0, 1.0, positions.shape[1]), positions.shape[:2])
         return fit.fit(x, ys, zeros, keep, (positions, shares) if guard is not None else None)
 
-    def _turned(self, found: FittedDesigns) -> dict[int, _FitStart]:
+    def _turned(self, found: FittedDesigns, starts: list[_FitStart]) -> dict[int, _FitStart]:
         """Those of fitted designs that turn fully, by their number."""
         if not len(found.numbers):
             return {}
@@ -175,7 +183,8 @@ class DesignSearch:
         told = {}
         for k in np.flatnonzero(is_whole & np.isfinite(found.squares)).tolist():
             branch, ys = branches[k][np.isfinite(branches[k]).all(axis=1)], [each[k] for each in found.unknowns]
-            told[k] = _FitStart(found.numbers[k], ys, self._guarded(branch, ys, True), True)
+            match = starts[found.order[k]].match
+            told[k] = _FitStart(found.numbers[k], ys, self._guarded(branch, ys, True), True, match)
         return told
 
     def most_regular(self, candidate: Candidate) -> Array:
@@ -211,7 +220,7 @@ class DesignSearch:
             found.append(zeros)
         return found
 
-    def _candidate(self, found: FittedDesigns, k: int) -> Candidate:
+    def _candidate(self, found: FittedDesigns, k: int, match: Match) -> Candidate:
         numbers = found.numbers[k] * self.equations[0].scale
         return Candidate(
             self.mechanism,
@@ -219,4 +228,5 @@ class DesignSearch:
             tuple(each[k] for each in found.unknowns),
             float(found.squares[k]),
             float(found.lacks[k]),
+            match,
         )

@@ -104,7 +104,7 @@ CHOICES = part(
     [
         (links, extra, slides, chain.number, frame, drives)
         for links, extra, slides in ((6, 1, 0), (6, 2, 0), (6, 1, 1), (8, 2, 0), (8, 1, 2))
-        for chain in part(planar.chains(links, slides=slides, multiple_pins=extra), one_in=1 if links < 8 else 10)
+        for chain in part(planar.chains(links, slides=slides, multiple_pins=extra), one_in=1 if links < 8 else 50)
         for frame, drives, _, _ in chain.mechanisms(moving_drives=True)
     ],
     one_in=12,

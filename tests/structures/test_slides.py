@@ -130,7 +130,7 @@ CHOICES = part(
     [
         (links, slides, chain.number, frame, drives)
         for links, slides in ((4, 1), (4, 2), (6, 1), (6, 2), (6, 4), (8, 2))
-        for chain in part(planar.chains(links, slides=slides), one_in=1 if links < 8 else 10)
+        for chain in part(planar.chains(links, slides=slides), one_in=1 if links < 8 else 50)
         for frame, drives, _, _ in chain.mechanisms()
     ],
     one_in=5,

@@ -17,9 +17,9 @@ from planar.model.wording import amount
 from planar.pages.editor.authors_file import carry_over
 from planar.synthesis.search_progress import SearchProgress, progress_words
 from planar.synthesis.synthesis import Synthesis, SynthesisedDesign
-from planar.synthesis.synthesise import TaskSearch
 from planar.synthesis.task.task_numbers import miss_kind
 from planar.synthesis.task.task_reader import read_task
+from planar.synthesis.task_search import TaskSearch
 
 DESIGNS = 6
 """That are listed."""

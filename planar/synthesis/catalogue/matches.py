@@ -16,10 +16,21 @@ MAX_FACTOR = 12.0
 """By which a mechanism of about the size of what is wanted is made larger at most: curves are no tiny wiggles."""
 CHUNK = 256
 """Designs that are compared at once."""
-COARSE_ENTRIES = 12
-"""Of an item that all designs are compared by, evenly; what comes near by these is compared by all."""
-COARSE_SHARE = 6
-"""So many times as many designs as are wanted are compared by all entries."""
+
+
+class _Level(NamedTuple):
+    """A comparison by so many entries of an item, evenly, from every so-many-th of the places where the first may be
+    met; so many times as many designs as are wanted go on to the next."""
+
+    entries: int
+    stride: int
+    share: int
+
+
+LEVELS = (_Level(12, 2, 6), _Level(36, 1, 2))
+"""By which designs are compared before all entries are, from all places."""
+SHARE_OF_ITEMS = 6
+"""So many times as many designs as are wanted are compared by all items, where there are several."""
 
 
 class Match(NamedTuple):
@@ -53,12 +64,15 @@ def find_matches(
     order = sorted(range(len(items)), key=lambda k: -len(items[k].target))
     first = items[order[0]]
     designs = np.flatnonzero(catalogue.is_whole) if whole_only or first.is_closed else np.arange(len(catalogue))
-    if len(first.target) > COARSE_ENTRIES:
-        coarse = _nearest_choices(catalogue, designs, order[0], first, factors, COARSE_ENTRIES)
-        designs = designs[_best(coarse.distance, COARSE_SHARE * many)]
-    nearest = _nearest_choices(catalogue, designs, order[0], first, factors, len(first.target))
+    share = SHARE_OF_ITEMS if len(items) > 1 else 1
+    for level in LEVELS:
+        if len(first.target) > level.entries or (level.stride > 1 and first.inputs is None):
+            coarse = _nearest_choices(catalogue, designs, order[0], first, factors, level)
+            designs = designs[_best(coarse.distance, max(level.share, share) * many)]
+    whole = _Level(len(first.target), 1, share)
+    nearest = _nearest_choices(catalogue, designs, order[0], first, factors, whole)
     matches = []
-    for row in _best(nearest.distance, COARSE_SHARE * many if len(items) > 1 else many).tolist():
+    for row in _best(nearest.distance, share * many).tolist():
         steps: list[IntArray] = [np.zeros(0, int)] * len(items)
         steps[order[0]] = nearest.steps[row]
         factor, offset = complex(nearest.factor[row]), complex(nearest.offset[row])
@@ -78,9 +92,9 @@ def _best(distance: Array, many: int) -> IntArray:
 
 
 def _nearest_choices(
-    catalogue: Catalogue, designs: IntArray, k: int, item: WantedItem, factors: Array | None, most: int
+    catalogue: Catalogue, designs: IntArray, k: int, item: WantedItem, factors: Array | None, level: _Level
 ) -> _NearestChoices:
-    """The nearest choice of each design for the item k, of which at most so many entries are looked at."""
+    """The nearest choice of each design for the item k, looked at as the level says."""
     many, entries = len(designs), len(item.target)
     nearest = _NearestChoices(
         np.full(many, np.inf), np.ones(many, complex), np.zeros(many, complex), np.zeros((many, entries), int)
@@ -89,7 +103,7 @@ def _nearest_choices(
         rows = slice(first, first + CHUNK)
         few = catalogue.take(designs[rows])
         own = None if factors is None else factors[designs[rows]]
-        for choices in step_choices(few, item, few.values[k], most):
+        for choices in step_choices(few, item, few.values[k], level.entries, level.stride):
             _take_better(nearest, rows, few.values[k], choices.steps, choices.entries, item, own)
     return nearest
 

@@ -47,9 +47,11 @@ class StepChoices(NamedTuple):
     steps: IntArray
 
 
-def step_choices(catalogue: Catalogue, item: WantedItem, values: Array, most: int) -> Iterator[StepChoices]:
+def step_choices(
+    catalogue: Catalogue, item: WantedItem, values: Array, most: int, stride: int
+) -> Iterator[StepChoices]:
     """Where the entries of an item may be met along the branches of designs that show `values` (designs, steps, parts),
-    of at most so many entries evenly."""
+    of at most so many entries evenly, and of every so-many-th place along a branch where the first may be met."""
     if item.inputs is not None:
         entries = _evenly(len(item.target), most)
         given = item.inputs[entries]
@@ -63,9 +65,9 @@ def step_choices(catalogue: Catalogue, item: WantedItem, values: Array, most: in
         few = _evenly(len(order), most)
         fractions, entries = _entry_fractions(item, order)[few], order[few]
         if item.is_closed:
-            yield StepChoices(entries, _closed_steps(along, fractions, catalogue.is_whole))
+            yield StepChoices(entries, _closed_steps(along, fractions, catalogue.is_whole, stride))
         else:
-            for steps in _arc_steps(along, fractions, catalogue.is_whole):
+            for steps in _arc_steps(along, fractions, catalogue.is_whole, stride):
                 yield StepChoices(entries, steps)
 
 
@@ -159,18 +161,18 @@ def _entry_fractions(item: WantedItem, order: IntArray) -> Array:
     return fractions
 
 
-def _closed_steps(along: Array, fractions: Array, is_whole: BoolArray) -> IntArray:
+def _closed_steps(along: Array, fractions: Array, is_whole: BoolArray, stride: int) -> IntArray:
     """All round the curves of designs that turn fully, from every start, both ways."""
-    shifts = np.arange(CURVE_STARTS) / CURVE_STARTS
+    shifts = np.arange(0, CURVE_STARTS, stride) / CURVE_STARTS
     wanted = np.concatenate([shifts[:, None] + fractions, shifts[:, None] - fractions]) % 1.0
     steps = _steps_at(along, np.broadcast_to(wanted, (len(along), *wanted.shape)))
     steps[~is_whole] = -1
     return steps
 
 
-def _arc_steps(along: Array, fractions: Array, is_whole: BoolArray) -> Iterator[IntArray]:
+def _arc_steps(along: Array, fractions: Array, is_whole: BoolArray, stride: int) -> Iterator[IntArray]:
     """Along arcs of every start and share of the branch, both ways; a whole turn goes on over its end."""
-    starts = np.arange(ARC_STARTS) / ARC_STARTS
+    starts = np.arange(0, ARC_STARTS, stride) / ARC_STARTS
     for share in ARC_SHARES:
         wanted = starts[:, None] + share * fractions
         wanted = np.concatenate([wanted, starts[:, None] + share * (fractions.max() - fractions)])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -47,8 +47,15 @@ class DemandGuard:
     rows: tuple[AdjointRows | RegionRows, ...] = ()
     least: tuple[float, ...] = ()
     over_range: bool = False
+    turns_only: bool = False
+    "whether nothing is demanded but that a design turns fully"
     keeps_order: bool = True
     "whether entries that are wanted in their order keep it while a design is fitted"
+
+    def kept_by(self, turn: bool, order: bool) -> DemandGuard:
+        """The guard of a fit that keeps a whole turn, where only that is demanded, and an order if it says so."""
+        rows, least = (self.rows, self.least) if turn or not self.turns_only else ((), ())
+        return replace(self, rows=rows, least=least, keeps_order=order)
 
     @property
     def position_count(self) -> int:

@@ -11,7 +11,7 @@ import numpy as np
 
 from planar.foundation.arrays import Array, BoolArray
 from planar.synthesis.fitting.kept_demands import KEPT, lacks
-from planar.synthesis.fitting.moving_designs import MovingDesigns
+from planar.synthesis.fitting.moving_designs import STRICTER, MovingDesigns
 from planar.synthesis.fitting.normal_equations import damped_matrices, exact_rows
 
 POLISHING_STEPS = 20
@@ -35,7 +35,7 @@ def polish_demands(state: MovingDesigns) -> None:
     """Designs that keep their demands, where that is to be had near by, and meet what is to be met exactly."""
     demands = state.demands
     assert demands is not None
-    demands.relocate(state.numbers, state.unknowns)
+    state.relocate_demands()
     squares = state.misses(state.numbers, state.unknowns, state.zeros)
     short = _shortage(demands.slack, state.inexactness(state.numbers, state.unknowns, state.zeros))
     is_exact = any(each.rows.wanted.tolerance == 0.0 for each in state.fit.equations)
@@ -67,7 +67,10 @@ def polish_demands(state: MovingDesigns) -> None:
         squares[rows[is_better]] = after[is_better]
         damping[rows] *= np.where(is_better, 0.3, 8.0)
         is_moving[rows] = ~is_last & (damping[rows] < GREATEST_DAMPING)
-        demands.relocate(state.numbers, state.unknowns)
+        is_broken = ~state.relocate_demands()
+        if is_broken.any():
+            damping[is_broken] *= STRICTER
+            squares = state.misses(state.numbers, state.unknowns, state.zeros)
         short = _shortage(demands.slack, state.inexactness(state.numbers, state.unknowns, state.zeros))
 
 

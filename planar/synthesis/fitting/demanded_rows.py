@@ -37,9 +37,10 @@ def demand_guards(
         kept.append((_output_rows(equations, free), demands.transmission))
     if demands.inside is not None:
         kept.append((RegionRows(mechanism, demands.inside, size, equations.free, equations.scale), 0.0))
-    if demands.whole_turn or kept:
+    turns_only = not kept
+    if task.needs_whole_turn or kept:
         kept.append((rate_rows(mechanism, equations.free, equations.scale), LEAST_RATE))
-    is_guarded = bool(kept or task.needs_whole_turn or demands.one_branch)
+    is_guarded = bool(kept or demands.one_branch)
     is_bound = bool(task.exact) or any(getattr(each, "in_order", False) for each in task.wanted)
     if not (is_guarded or is_bound):
         return None
@@ -47,7 +48,7 @@ def demand_guards(
     guarded = WantedEquations(mechanism, positions, equations.free, equations.unit)
     kept = [each for each in kept if len(each[0])]
     told = tuple(each for each, _ in kept), tuple(least for _, least in kept)
-    return {over_turn: DemandGuard(guarded, *told, over_range=not over_turn) for over_turn in (True, False)}
+    return {over_turn: DemandGuard(guarded, *told, not over_turn, turns_only) for over_turn in (True, False)}
 
 
 def _output_rows(equations: WantedEquations, free: FreeNumbers) -> AdjointRows:

@@ -13,9 +13,11 @@ from planar.synthesis.fitting.demand_polish import polish_demands
 from planar.synthesis.fitting.moving_designs import FitProblem, MovingDesigns
 from planar.synthesis.fitting.wanted_equations import WantedEquations
 
-MAX_STEPS = 150
+MAX_STEPS = 400
 HALVING_STEPS = (10, 20, 40)
 """Steps after which only the better half goes on, where there are many."""
+LONG_STEPS, NEAR_BEST = 100, 4.0
+"""Steps after which only designs go on whose sum of squares is at most so many times the least."""
 FEW = 4
 WATCH_STEPS = 10
 """Steps after which it is looked anew where demands are kept least."""
@@ -63,8 +65,10 @@ class DesignFit:
         state = MovingDesigns(self.problem, numbers, list(unknowns), list(zeros), guarded)
 
         def halve(step: int) -> None:
-            if state.demands is not None and step and step % WATCH_STEPS == 0 and state.demands.guard.rows:
+            if state.demands is not None and step % WATCH_STEPS == 0 and state.demands.guard.rows:
                 state.relocate_demands()
+            if step >= LONG_STEPS:
+                state.is_moving &= state.squares <= NEAR_BEST * state.squares.min()
             if step in HALVING_STEPS:
                 state.keep_best(max(keep, FEW, (len(state.numbers) + 1) // 2))
 

@@ -78,6 +78,11 @@ class KeptDemands:
         """Designs go to where they were placed."""
         self.y[rows], self.slack[rows] = y, slack
 
+    def put(self, rows: IntArray, numbers: Array, unknowns: Sequence[Array], y: Array, shares: Array) -> None:
+        """Designs go to positions where they were before."""
+        self.y[rows], self.shares[rows] = y, shares
+        self.slack[rows] = self._slacks(numbers, y, unknowns, rows)
+
     def penalty(self, slack: Array, rows: IntArray) -> Array:
         """What slacks add to the sum of squares (designs,)."""
         weight, own = self.weight[rows, None], self.multipliers[rows]

@@ -28,13 +28,16 @@ FIRST_DAMPING, LEAST_DAMPING, GREATEST_DAMPING = 1e-2, 1e-14, 1e8
 CLOSING_STEPS = 4
 MAX_CHANGE, MAX_MOVE = 0.3, 0.5
 """Of a free number, and of an entry's unknowns (rad, or of the size), in one step."""
-ENOUGH_GAIN = 1e-10
+ENOUGH_GAIN = 1e-7
 """Of the sum of squares: steps that win less, so often one after the other, are the last."""
 IDLE_STEPS = 4
 NEAR_DEAD_POINT = 0.02
 """Of the input beside all unknowns, along the path: where it is less a dead point is near."""
 PERFECT = 1e-22
 """Of the sum of squares: there is nothing left to win."""
+STRICTER, MOST_RETURNS = 30.0, 8
+"""By how much a design is damped more that came not to go together between its positions, and how often it goes back to
+where it did."""
 SETTLED = 1e-6
 """Of the greatest multiplier of a demand: a change that is less is none."""
 TINY = float(np.finfo(float).tiny)
@@ -95,6 +98,8 @@ class MovingDesigns:
             self.tangents[k] = np.where(way[..., -1:] < 0.0, -way, way)
             is_closed &= own
         self.demands: KeptDemands | None = None
+        self.whole: list[Array] | None = None
+        "where designs were when they last went together everywhere between their positions"
         if fit.guard is not None and guarded is not None:
             order = OrderSlacks(fit.equations, self.unknowns, not fit.guard.over_range, fit.guard.keeps_order)
             self.demands = KeptDemands(fit.guard, order, self.numbers, self.unknowns, *guarded)
@@ -102,6 +107,7 @@ class MovingDesigns:
         self.squares = np.full(len(numbers), np.inf)
         self.damping = np.full(len(numbers), FIRST_DAMPING)
         self.idle = np.zeros(len(numbers), int)
+        self.returns = np.zeros(len(numbers), int)
         self.is_moving = is_closed
         self.squares[is_closed] = self.merits()[is_closed]
         self.take(np.flatnonzero(is_closed))
@@ -126,23 +132,55 @@ class MovingDesigns:
 
     def take(self, rows: IntArray) -> None:
         """Only these designs go on."""
-        for name in ("numbers", "squares", "damping", "idle", "is_moving", "order"):
+        for name in ("numbers", "squares", "damping", "idle", "returns", "is_moving", "order"):
             setattr(self, name, getattr(self, name)[rows])
         for many in (self.unknowns, self.zeros, self.tangents, self.headings):
             many[:] = [each[rows] for each in many]
         if self.demands is not None:
             self.demands.take(rows)
+        if self.whole is not None:
+            self.whole = [each[rows] for each in self.whole]
 
     def keep_best(self, many: int) -> None:
         """Only the best so many go on."""
         self.take(np.argsort(self.squares, kind="stable")[:many])
 
-    def relocate_demands(self) -> None:
-        """Watch designs where they keep demands least; those that do not go together there are out."""
+    def relocate_demands(self) -> BoolArray:
+        """Watch designs where they keep demands least; those that do not go together everywhere between go back to
+        where they last did, or are out where they never did. Which of them went together (designs,)."""
         assert self.demands is not None
         is_whole = self.demands.relocate(self.numbers, self.unknowns)
-        self.squares = np.where(is_whole, self.merits(), np.inf)
-        self.is_moving &= is_whole
+        own, known = np.flatnonzero(is_whole), self.whole is not None
+        broken = np.flatnonzero(~is_whole)
+        if self.whole is None:
+            self.whole = self._places()
+        self._put(broken, self.whole)
+        self.squares = self.merits()
+        if known:
+            self.damping[broken] = np.maximum(self.damping[broken], FIRST_DAMPING) * STRICTER
+            self.returns[broken] += 1
+            self.idle[broken], self.is_moving[broken] = 0, self.returns[broken] <= MOST_RETURNS
+        else:
+            self.squares[broken], self.is_moving[broken] = np.inf, False
+        for k, each in enumerate(self._places()):
+            self.whole[k][own] = each[own]
+        return is_whole
+
+    def _places(self) -> list[Array]:
+        """What tells where designs are."""
+        assert self.demands is not None
+        every = [self.numbers, *self.unknowns, *self.zeros, *self.tangents, self.demands.y, self.demands.shares]
+        return [each.copy() for each in every]
+
+    def _put(self, rows: IntArray, places: Sequence[Array]) -> None:
+        """Designs (rows) to where they were."""
+        assert self.demands is not None
+        many, parts = len(self.unknowns), [each[rows] for each in places]
+        self.numbers[rows] = parts[0]
+        for own, first in ((self.unknowns, 1), (self.zeros, 1 + many), (self.tangents, 1 + 2 * many)):
+            for k, each in enumerate(own):
+                each[rows] = parts[first + k]
+        self.demands.put(rows, self.numbers[rows], [each[rows] for each in self.unknowns], *parts[-2:])
 
     def press(self) -> bool:
         """Begin anew with multipliers by which demands are kept better; whether there is anything to be won."""

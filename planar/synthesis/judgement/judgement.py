@@ -32,7 +32,7 @@ FEET, FOOT_POSITIONS = 4, 13
 """How often, and at how many positions of the input, the nearest one to an entry is looked for."""
 EXACT = 1e-9
 """The same of what is to be met exactly."""
-REACH, ORDER = "the reach", "the order"
+REACH, ORDER, WHOLE_TURN, ONE_BRANCH = "the reach", "the order", "the whole turn", "one branch"
 OTHER_ASSEMBLY = 0.01
 """Of the extent of what is wanted, or rad: what misses an entry by so much more than the fit is another assembly."""
 NOWHERE_NEAR = 0.5
@@ -53,6 +53,11 @@ class DesignJudge:
 
     def __init__(self, task: SynthesisTask, size: float):
         self.task, self.size = task, size
+
+    def fit_error(self, values: Sequence[Array]) -> float:
+        """The root mean square of the misses of results `values` (n, parts) of a fit, SI."""
+        every = [entry_misses(*each, self.size) for each in zip(self.task.wanted, values, strict=True)]
+        return float(np.sqrt(np.mean(np.concatenate(every) ** 2)))
 
     def judge(self, mechanism: Mechanism, inputs: Sequence[Array], values: Sequence[Array]) -> Judgement:
         """The judgement of a mechanism of which a fit has results `values` (n, parts) at `inputs` (n,), SI."""
@@ -89,12 +94,13 @@ class DesignJudge:
                 told = f"circuit defect: {wanted.of} meets entry {entry + 1} in another assembly only"
                 defects.append(Defect("one circuit", told))
             misses.append(off)
-        defects += [*self._put_in_order(motion, reach, there, misses)]
+        if not self.task.needs_whole_turn or reach.is_whole_turn:  # else it is rejected in whatever order
+            defects += [*self._put_in_order(motion, reach, there, misses)]
         defects += [*self._tolerance_defects(misses)]
         if self.task.needs_whole_turn and not reach.is_whole_turn:
             low, high = (amount(each, reach.kind, mechanism.units) for each in (reach.low, reach.high))
             told = f"no whole turn: {running} goes from {low} to {high} only"
-            defects.append(Defect("the whole turn", told, reach.high - reach.low, TURN))
+            defects.append(Defect(WHOLE_TURN, told, reach.high - reach.low, TURN))
         defects += [*self._motion_defects(motion, reach, there), *self._rest_defects(misses)]
         return Judgement(tuple(misses), tuple(there), tuple(defects))
 
@@ -121,7 +127,7 @@ class DesignJudge:
                 entry = int(np.argmax(beyond))
                 ends = " to ".join(amount(each, reach.kind, mechanism.units) for each in (reach.low, reach.high))
                 yield Defect(
-                    "one branch",
+                    ONE_BRANCH,
                     f"branch defect: entry {entry + 1} of {wanted.of} lies beyond a dead point; the branch of the "
                     f"first goes from {reach.pair} = {ends}",
                 )
@@ -179,7 +185,7 @@ class DesignJudge:
         demands = self.task.demands
         names = ["the region"] * (demands.inside is not None)
         names += ["the transmission angle"] * (demands.transmission is not None)
-        names += ["the whole turn"] * self.task.needs_whole_turn
+        names += [WHOLE_TURN] * self.task.needs_whole_turn
         names += ["the bounds"] * bool(self.task.within)
         return " or ".join(names) or "what is wanted"
 

@@ -18,7 +18,7 @@ from planar.cli.streams import print_json
 if TYPE_CHECKING:
     from planar.synthesis.search_progress import SearchProgress
     from planar.synthesis.synthesis import Synthesis
-    from planar.synthesis.synthesise import TaskSearch
+    from planar.synthesis.task_search import TaskSearch
 
 SHEET_SUFFIXES = (".png", ".svg", ".pdf")
 """What `-o` names where it is no folder: sheets of drawings."""
@@ -51,9 +51,9 @@ def synthesise(
     """The linkages that do best what a TASK wants: paths, poses or functions, of any structure."""
     from planar.reports.tables.design.synthesis import record, table
     from planar.synthesis.search_progress import progress_words
-    from planar.synthesis.synthesise import TaskSearch
     from planar.synthesis.synthesise import synthesise as find_all
     from planar.synthesis.task.task_reader import read_task
+    from planar.synthesis.task_search import TaskSearch
 
     wanted = read_task(task)
     is_sheet = output is not None and output.suffix.lower() in SHEET_SUFFIXES
