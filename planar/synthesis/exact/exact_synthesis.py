@@ -20,12 +20,12 @@ from planar.synthesis.exact.dyad_curves import dyad_curve
 from planar.synthesis.exact.exact_linkage import ExactLinkage, exact_linkage
 from planar.synthesis.exact.relations.exact_problem import Component, ExactProblem
 from planar.synthesis.exact.relations.family import Member
-from planar.synthesis.exact.tracking.class_members import class_members
 from planar.synthesis.exact.tracking.exact_certificates import certify_member
 from planar.synthesis.exact.tracking.generic_store import FamilyRecord, family_record
 from planar.synthesis.exact.tracking.member_homotopy import affine_solutions, homogeneous_solutions
 from planar.synthesis.exact.tracking.member_solutions import MemberSolutions, solve_member
 from planar.synthesis.exact.tracking.monodromy import first_of_same
+from planar.synthesis.exact.tracking.other_ways import UNKNOWN
 from planar.synthesis.exact.tracking.symmetry import FamilyName, reordered
 from planar.synthesis.judgement.defects import Defect
 from planar.synthesis.judgement.judgement import DesignJudge
@@ -82,7 +82,7 @@ def synthesise_all(task: SynthesisTask, progress: Progress | None = None) -> Com
         problem.size,
         _remarks(solved, told),
         expected=_count(solved, [len(each.record.classes) for each in solved]),
-        found=_count(solved, [len(each.whole.x) for each in solved]),
+        found=_count(solved, [each.whole.found for each in solved]),
         complete=_completeness(solved),
         counted=_counted(solved),
     )
@@ -129,7 +129,7 @@ def _solve_all(components: Sequence[Component], say: Progress) -> list[Component
 
 
 def _solve(component: Component, record: FamilyRecord, say: Progress) -> ComponentSolutions:
-    say(f"{count_phrase(len(record.classes), 'path')}")
+    say(f"{count_phrase(record.classes.size, 'path')}")
     whole = solve_member(component.family, record, component.member)
     if is_available() and len(whole.doubtful):
         whole = _with_doubtful(component, whole)
@@ -141,20 +141,19 @@ def _solve(component: Component, record: FamilyRecord, say: Progress) -> Compone
         proof = certify_member(component.family, component.member, x)
         x, proved, all_proved = proof.x, proof.proved & proof.is_real, int(proof.proved.sum())
         is_real = np.where(proof.proved, proof.is_real, is_real)
-    real, sure = x[is_real], proved[is_real]
-    wanted = record.classes.shape[1] * len(real)
-    if record.classes.shape[1] > 1 and len(real):
-        real, sure = class_members(component, record, real, sure)
-    return ComponentSolutions(component, record, whole, real, sure, all_proved, max(0, wanted - len(real)))
+    wanted = whole.members * len({*whole.classes[is_real].tolist()} - {UNKNOWN})
+    missing = max(0, wanted - int(is_real.sum()))
+    return ComponentSolutions(component, record, whole, x[is_real], proved[is_real], all_proved, missing)
 
 
 def _with_doubtful(component: Component, whole: MemberSolutions) -> MemberSolutions:
     """Ends that only look as if several met there, which balls of more digits tell from such, beside the others."""
     proof = certify_member(component.family, component.member, whole.doubtful)
     both = np.concatenate([whole.x, proof.x[proof.proved]])
+    classes = np.concatenate([whole.classes, whole.doubtful_classes[proof.proved]])
     kept = first_of_same(homogeneous_solutions(both)) == np.arange(len(both))
-    new = int(kept[len(whole.x) :].sum())
-    return whole._replace(x=both[kept], singular=whole.singular - new)
+    told = whole._replace(x=both[kept], classes=classes[kept])
+    return told._replace(singular=max(0, whole.singular - (told.found - whole.found)))
 
 
 def _is_real(x: ComplexArray) -> BoolArray:
@@ -290,11 +289,11 @@ def _counted(solved: Sequence[ComponentSolutions]) -> str:
 
 
 def _completeness(solved: Sequence[ComponentSolutions]) -> str:
-    if any(len(each.whole.x) > each.whole.followed for each in solved):
+    if any(len(each.whole.x) > each.record.classes.size for each in solved):
         return "incomplete: there are more solutions than a random task was known to have"
     lost = sum(each.whole.lost for each in solved)
     if lost:
-        return f"incomplete: {lost} of {sum(each.whole.followed for each in solved)} paths were lost"
+        return f"incomplete: {lost} of {sum(each.whole.class_count for each in solved)} are missing, whose paths were lost"
     missing = sum(each.missing for each in solved)
     if missing:
         return f"incomplete: {count_phrase(missing, 'cognate')} of real linkages were not reached"
@@ -313,7 +312,8 @@ def _remarks(solved: Sequence[ComponentSolutions], designs: Sequence[ExactDesign
         ends += [f"{whole.at_infinity} at infinity"] * bool(whole.at_infinity)
         ends += [f"{whole.singular} where several meet or a curve passes"] * bool(whole.singular)
         ends += [f"{whole.lost} lost"] * bool(whole.lost)
-        told = f"{count_phrase(whole.followed, 'path')}: {', '.join(ends)}"
+        classes = f" of {whole.class_count} classes" if whole.members > 1 else ""
+        told = f"{count_phrase(each.record.classes.size, 'path')}{classes}: {', '.join(ends)}"
         if is_available():
             told += f"; {each.all_proved} proved, each to be the only one in a box of its own"
         else:
