@@ -13,10 +13,10 @@ import numpy as np
 
 from planar.foundation.arrays import Array, BoolArray, ComplexArray, IntArray
 
-BALL_PRECISION_BITS = 128
-BOX_HALF_WIDTHS = (1e-7, 1e-9, 1e-11, 1e-13, 1e-16, 1e-20)
+BALL_PRECISION_BITS = 192
+BOX_HALF_WIDTHS = (1e-7, 1e-9, 1e-11, 1e-13, 1e-16, 1e-20, 1e-24, 1e-28)
 """Half widths of boxes that are tried, the widest first."""
-POLISHING_STEPS, POLISHED = 12, 1e-26
+POLISHING_STEPS, POLISHED = 12, 1e-36
 """At most, and of a solution's entries: what moves it by less is the last."""
 
 BallEquations = Callable[[Sequence[Any]], tuple[list[Any], list[list[Any]]]]
