@@ -59,11 +59,13 @@ def _picture(found: CompleteSynthesis, curve: DyadCurve, scale: Scale | None) ->
     marks += _pose_marks(poses, AXIS_LENGTH * found.size, scale)
     same = [each for each in found.curves if _is_same(each, curve)]
     names = " and ".join(f"{each.joint} about {each.pivot}" for each in same)
-    notes = (
-        f"Dyads {names}",
-        f"Full: {CENTRE}, where the pivot may be fixed. Dashed: {CIRCLE}, where the joint is at pose 1",
-        f"{scale}",
-    )
+    told = {
+        CENTRE: f"Full: {CENTRE}, where the pivot may be fixed.",
+        CIRCLE: f"Dashed: {CIRCLE}, where the joint is at pose 1.",
+    }
+    drawn = [each for each, places in ((CENTRE, curve.centre_points), (CIRCLE, curve.circle_points)) if len(places)]
+    slides = [" Through each goes a line of its own, on which it stays."] * curve.has_slide
+    notes = (f"Dyads {names}", " ".join(told[each] for each in drawn) + "".join(slides), f"{scale}")
     return Picture(tuple(marks), "", notes)
 
 

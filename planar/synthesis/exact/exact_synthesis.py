@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from itertools import combinations, permutations, product
 from math import comb, prod
 from typing import NamedTuple
@@ -16,7 +17,7 @@ from planar.model.mechanism import Mechanism
 from planar.model.wording import count_phrase
 from planar.synthesis.design_motion import design_motion
 from planar.synthesis.exact.complete_synthesis import CompleteSynthesis, DyadCurve, ExactDesign
-from planar.synthesis.exact.dyad_curves import dyad_curve
+from planar.synthesis.exact.dyad_curves import dyad_curve, is_dyad
 from planar.synthesis.exact.exact_linkage import ExactLinkage, exact_linkage
 from planar.synthesis.exact.relations.exact_problem import Component, ExactProblem
 from planar.synthesis.exact.relations.family import Member
@@ -101,17 +102,13 @@ def _check_freedom(problem: ExactProblem) -> None:
         raise BadInput("$.wanted", f"what is wanted sets {told} with the numbers that are free")
     left = [each for each in problem.components if each.freedom > 0]
     is_for_poses = len(problem.items) == 1 and isinstance(problem.items[0], WantedPoses)
-    if left and not (is_for_poses and all(_is_dyad(each) for each in left)):
+    if left and not (is_for_poses and all(is_dyad(problem, each) for each in left)):
         most = max(each.freedom for each in left)
         raise BadInput(
             "$.wanted",
             f"{count_phrase(most, 'number')} of {problem.mechanism.name!r} would stay open, so that there is no list; "
             "want more, or give some of the numbers by leaving them out of 'free'",
         )
-
-
-def _is_dyad(component: Component) -> bool:
-    return component.family.size == 2 and component.family.parts[0].rows.equation_count == 0
 
 
 def _solve_all(components: Sequence[Component], say: Progress) -> list[ComponentSolutions]:
@@ -227,7 +224,8 @@ def _best_design(
         found.append(_judged(problem, judge, linkage, certified))
         if not found[-1].defects:
             break
-    return min(found, key=lambda each: len(each.defects))
+    best = min(found, key=lambda each: len(each.defects))
+    return replace(best, motion=design_motion(best.mechanism, best.inputs) if best.numbers else None)
 
 
 def _unwritten(problem: ExactProblem, certified: bool, why: str) -> ExactDesign:
@@ -253,7 +251,6 @@ def _judged(problem: ExactProblem, judge: DesignJudge, linkage: ExactLinkage, ce
         defects,
         problem.mechanism.name,
         linkage.numbers,
-        design_motion(linkage.mechanism, found.inputs),
         certified=certified,
     )
 
@@ -289,6 +286,10 @@ def _counted(solved: Sequence[ComponentSolutions]) -> str:
 
 
 def _completeness(solved: Sequence[ComponentSolutions]) -> str:
+    for own in _alike(solved):
+        if len(solved[own[0]].record.classes) < len(own):
+            many = count_phrase(len(solved[own[0]].record.classes), "solution")
+            return f"there is none in general: {len(own)} parts that are alike would have to differ, and have {many}"
     if any(len(each.whole.x) > each.record.classes.size for each in solved):
         return "incomplete: there are more solutions than a random task was known to have"
     lost = sum(each.whole.lost for each in solved)
