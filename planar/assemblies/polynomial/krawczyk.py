@@ -58,7 +58,7 @@ def direction_ball(angle: float) -> Any:
 
 
 def _inverse(slope: list[list[Any]]) -> Any | None:
-    """A matrix near the inverse of a Jacobian, in the digits of balls: far solutions leave fewer to double precision."""
+    """A matrix near the inverse of a Jacobian, in the digits of balls: far solutions leave doubles too few."""
     from flint import acb_mat
 
     try:

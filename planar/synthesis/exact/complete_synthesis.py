@@ -48,7 +48,7 @@ class DyadCurve:
     @property
     def has_slide(self) -> bool:
         """Whether one of its pairs is a slide."""
-        return self.rows.shape[2] == 2
+        return bool(self.rows.shape[2] == 2)
 
     def centres(self, joints: Array) -> Array:
         """The fixed pivots (n, 2) m that go with places of the joint at the first pose (n, 2) m; by least squares where

@@ -290,19 +290,25 @@ def _completeness(solved: Sequence[ComponentSolutions]) -> str:
         if len(solved[own[0]].record.classes) < len(own):
             many = count_phrase(len(solved[own[0]].record.classes), "solution")
             return f"there is none in general: {len(own)} parts that are alike would have to differ, and have {many}"
-    if any(len(each.whole.x) > each.record.classes.size for each in solved):
-        return "incomplete: there are more solutions than a random task was known to have"
-    lost = sum(each.whole.lost for each in solved)
-    if lost:
-        return f"incomplete: {lost} of {sum(each.whole.class_count for each in solved)} are missing, whose paths were lost"
-    missing = sum(each.missing for each in solved)
-    if missing:
-        return f"incomplete: {count_phrase(missing, 'cognate')} of real linkages were not reached"
+    gap = _gap(solved)
+    if gap:
+        return f"incomplete: {gap}"
     if any(each.whole.singular for each in solved):
         return "numerically complete but for singular solutions, where several meet or a curve of them passes"
     if not all(each.record.is_traced for each in solved):
         return "all of a number that is a lower bound: it was found by monodromy without a trace test"
     return "numerically complete"
+
+
+def _gap(solved: Sequence[ComponentSolutions]) -> str:
+    """What is known to be wrong with the list as a whole."""
+    if any(len(each.whole.x) > each.record.classes.size for each in solved):
+        return "there are more solutions than a random task was known to have"
+    lost = sum(each.whole.lost for each in solved)
+    if lost:
+        return f"paths to {lost} of {sum(each.whole.class_count for each in solved)} were lost"
+    missing = sum(each.missing for each in solved)
+    return f"{count_phrase(missing, 'cognate')} of real linkages were not reached" if missing else ""
 
 
 def _remarks(solved: Sequence[ComponentSolutions], designs: Sequence[ExactDesign]) -> tuple[str, ...]:

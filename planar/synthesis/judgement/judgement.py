@@ -101,7 +101,7 @@ class DesignJudge:
     def _nearest_on_branch(
         self, motion: Motion, reach: InputRange, wanted: Wanted, entries: IntArray
     ) -> tuple[Array, Array]:
-        """Where the input is nearest to each entry, and how far off that is; a fit beyond a dead point tells neither."""
+        """Where the input is nearest to entries, and how far off that is; a fit beyond a dead point tells neither."""
         nearest, least = np.empty(len(entries)), np.empty(len(entries))
         tried = [np.linspace(reach.low + reach.margin, reach.high - reach.margin, len(motion))] * len(entries)
         shown = _results(motion.mechanism, [wanted], tried[:1]) * len(entries)

@@ -31,7 +31,8 @@ class ClassedSolutions(NamedTuple):
     @property
     def known_classes(self) -> IntArray:
         """The classes that are known, each as often as it has solutions."""
-        return self.classes[self.classes != UNKNOWN]
+        known: IntArray = self.classes[self.classes != UNKNOWN]
+        return known
 
     def merge(self, other: ClassedSolutions) -> ClassedSolutions:
         """With others of the same numbers of classes; a class that is known stays."""
@@ -46,7 +47,12 @@ class ClassedSolutions(NamedTuple):
 
 
 def with_members(
-    family: Family, record: FamilyRecord, member: Member, found: ClassedSolutions, wanted: BoolArray, rng: np.random.Generator
+    family: Family,
+    record: FamilyRecord,
+    member: Member,
+    found: ClassedSolutions,
+    wanted: BoolArray,
+    rng: np.random.Generator,
 ) -> ClassedSolutions:
     """What was found with all linkages of those wanted classes (classes,) of which there is one."""
     images, known = exchange_images(record.name.exchanges), record.solutions
