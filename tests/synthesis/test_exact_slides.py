@@ -5,11 +5,16 @@ import pytest
 
 import planar
 from planar.foundation.jets import value_and_rates
-from tests.synthesis.test_exact import POSES, UNITS, task
 
+UNITS = {"length": "mm", "angle": "deg"}
+POSES = [(0, 0, 0), (30, 20, 25), (70, 25, 60), (95, 5, 80)]
 TURNS = np.radians([angle for _, _, angle in POSES])
 PLACES = 1e-3 * np.array([[x, y] for x, y, _ in POSES])
 SWING = {"sliding": "swing", "on": "rod", "block": "D", "line": {"through": "G", "angle": 10}}
+
+
+def task(start, wanted):
+    return {"planar": 1, "units": UNITS, "start": start, "wanted": [wanted]}
 
 
 def turned(places, angle):
@@ -85,6 +90,8 @@ def test_three_poses_leave_a_circle_of_pins_that_stay_on_lines_of_the_frame():
     for pose in (1, 2):
         assert np.abs(across(to_world(own, pose) - pins, curve.directions)).max() < 1e-14
     assert np.isnan(curve.centres(pins)).all()
+    texts = planar.plot.dyad_curves(found).findobj(lambda one: hasattr(one, "get_text"))
+    assert "Dyads B on stroke" in " ".join(" ".join(each.get_text().split()) for each in texts)
 
 
 def test_three_poses_leave_a_circle_of_pivots_that_stay_on_lines_of_the_link():
