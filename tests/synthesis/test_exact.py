@@ -10,8 +10,8 @@ from planar.foundation.jets import value_and_rates
 from planar.synthesis.exact.relations.exact_problem import ExactProblem
 from planar.synthesis.exact.tracking.exact_certificates import certify_member
 from planar.synthesis.exact.tracking.generic_store import family_record
-from planar.synthesis.exact.tracking.member_homotopy import affine_solutions
-from planar.synthesis.exact.tracking.monodromy import follow
+from planar.synthesis.exact.tracking.member_homotopy import affine_solutions, homogeneous_solutions
+from planar.synthesis.exact.tracking.monodromy import first_of_same, follow
 from planar.synthesis.exact.tracking.other_ways import ClassedSolutions, with_members
 from planar.synthesis.exact.tracking.symmetry import exchange_images, name_family, representatives
 from planar.synthesis.task.starts import start_mechanisms
@@ -246,3 +246,9 @@ def test_paths_end_at_the_same_places_in_more_digits():
     plain, more = (follow(component.family, known.member, known.V, component.member, 1e-4, each) for each in (0, 1))
     assert plain.is_single.all() and more.is_single.all()
     np.testing.assert_allclose(affine_solutions(plain.V), affine_solutions(more.V), rtol=1e-12)
+
+
+def test_solutions_that_are_nearly_real_are_told_from_their_images():
+    one = np.array([0.3 + 1e-5j, -1.2, 0.3 - 1e-5j, -1.2])
+    V = homogeneous_solutions(np.array([one, one[[2, 3, 0, 1]], one + 1e-12]))
+    assert first_of_same(V).tolist() == [0, 1, 0]

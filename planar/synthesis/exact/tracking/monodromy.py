@@ -21,7 +21,8 @@ from planar.synthesis.exact.tracking.symmetry import Images, representatives, so
 FIRST_NODES, IDLE_NODES = 4, 2
 """Members at first, and how many more must bring nothing new."""
 SAME = 1e-7
-"""Of directions of length one: solutions nearer to each other are one."""
+"""Of directions of length one: solutions nearer to each other are one. Two that are nearly real are no farther apart
+than their imaginary parts."""
 BLOCK = 4096
 """Paths that are followed side by side."""
 CORRECTION = 1e-7
@@ -123,7 +124,7 @@ def first_of_same(V: ComplexArray) -> IntArray:
         for other in order[at + 1 :].tolist():
             if key[other].real - key[k].real > room[k]:
                 break
-            apart = max(1.0 - abs(np.vdot(each[k], each[other])) ** 2 for each in unit)
+            apart = max(np.linalg.norm(each[other] - np.vdot(each[k], each[other]) * each[k]) for each in unit)
             if apart < SAME:
                 low = min(found[k], found[other])
                 found[k] = found[other] = low
