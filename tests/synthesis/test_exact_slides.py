@@ -94,6 +94,16 @@ def test_three_poses_leave_a_circle_of_pins_that_stay_on_lines_of_the_frame():
     assert "Dyads B on stroke" in " ".join(" ".join(each.get_text().split()) for each in texts)
 
 
+def test_poses_that_leave_no_curve_or_every_place_say_so():
+    line = {"sliding": "stroke", "on": "frame", "block": "B", "line": {"through": "D", "angle": 0}}
+    for places, said in (([[0, 0], [10, 1], [20, 4]], "stroke have no curve"), ([[0, 0], [10, 0], [20, 0]], "any")):
+        shifted = {"link": "rod", "poses": [{"at": at, "angle": 0} for at in places]}
+        found = planar.synthesise(task(crank_and(line, B=[60, 0]), shifted), complete=True)
+        (curve,) = (each for each in found.curves if each.has_slide)
+        assert "the poses are special" in found.complete and said in found.complete
+        assert not len(curve.circle_points) and not len(curve.directions)
+
+
 def test_three_poses_leave_a_circle_of_pivots_that_stay_on_lines_of_the_link():
     found = planar.synthesise(task(crank_and(SWING, G=[5, 10]), poses(3, "rod")), complete=True)
     (curve,) = (each for each in found.curves if each.has_slide)

@@ -22,6 +22,8 @@ DIRECTIONS = 1440
 """Of lines through one place of a cubic."""
 REACH = 40.0
 """Of the extent of the poses: what is farther is left out."""
+SPECIAL, ON_CURVE = 1e-10, 1e-8
+"""Of what rows could make of a determinant, below which it vanishes everywhere; of its size, on the curve."""
 BREAK = 2.0
 """The same, between places one after the other: farther apart they are on two parts of the curve."""
 
@@ -115,12 +117,31 @@ class _Dyad:
         found: Array = np.einsum("ia,rij->raj", moved, self.rows)
         return found if self.has_slide else np.einsum("raj,jb->rab", found, moved)
 
+    def _rows_at(self, pins: Array) -> Array:
+        found: Array = np.einsum("na,rab->nrb", np.insert(pins, 0, 1.0, axis=1), self.rows)
+        return found
+
     def _determinant(self, pins: Array) -> Array:
-        found: Array = np.linalg.det(np.einsum("na,rab->nrb", np.insert(pins, 0, 1.0, axis=1), self.rows))
+        found: Array = np.linalg.det(self._rows_at(pins))
         return found
 
     def trace(self) -> Array:
-        """The places of the pin (n, 2) in units of the problem, not numbers between parts."""
+        """The places of the pin (n, 2) in units of the problem, not numbers between parts; none where the poses are
+        special, so that there is no curve, or any place will do."""
+        near = np.random.default_rng(11).uniform(-1.0, 1.0, (24, 2))
+        size = float(np.median(np.abs(self._determinant(near))))
+        whole = float(np.median(np.prod(np.linalg.norm(self._rows_at(near), axis=2), axis=1)))
+        if size <= SPECIAL * whole:
+            return np.zeros((0, 2))
+        places = self._trace()
+        known = np.isfinite(places).all(axis=1)
+        reach = np.maximum(1.0, np.linalg.norm(places[known], axis=1)) ** self.rows.shape[2]
+        off = np.abs(self._determinant(places[known])) > ON_CURVE * size * reach
+        if off.any():
+            return np.zeros((0, 2))
+        return places[known][:1] if np.ptp(places[known], axis=0).max(initial=0.0) < ON_CURVE else places
+
+    def _trace(self) -> Array:
         start = self._one_place()
         angles = np.linspace(0.0, np.pi, DIRECTIONS + 1)
         way = np.stack([np.cos(angles), np.sin(angles)], axis=-1)

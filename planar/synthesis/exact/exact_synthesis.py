@@ -41,6 +41,8 @@ from planar.synthesis.task.synthesis_task import (
 MET = 1e-6
 """Of the extent of what is wanted, or rad: an exact linkage that misses more is in another assembly there."""
 
+FAMILY = "a family of linkages with parameters; its dyads stand in curves"
+
 
 def synthesise_all(task: SynthesisTask, progress: Progress | None = None) -> CompleteSynthesis:
     """All linkages of a task's start that meet it exactly. Raises BadInput where there is no such list."""
@@ -184,6 +186,15 @@ def _wanted_values(wanted: Wanted) -> Array:
     return np.concatenate([wanted.places, wanted.angles[:, None]], axis=1)
 
 
+def _special(curves: Sequence[DyadCurve], solved: Sequence[ComponentSolutions]) -> Iterator[str]:
+    """Where poses are special, in words."""
+    for each in curves:
+        if each.dimension == 1 and not len(each.circle_points) + len(each.centre_points):
+            yield f"the poses are special: dyads {each.joint}, {each.pivot} have no curve, or any place will do"
+    if any(len(each.whole.x) < each.whole.class_count for each in solved):
+        yield "the poses are special: a dyad that others leave one of has none, or more"
+
+
 def _with_curves(problem: ExactProblem, solved: Sequence[ComponentSolutions]) -> CompleteSynthesis:
     curves: list[DyadCurve] = [dyad_curve(problem, each) for each in problem.components if each.freedom > 0]
     for each in solved:
@@ -195,7 +206,9 @@ def _with_curves(problem: ExactProblem, solved: Sequence[ComponentSolutions]) ->
         problem.size,
         (),
         expected=None,
-        complete="a family of linkages with parameters; its dyads stand in curves",
+        complete="; ".join(
+            ["a family of linkages with parameters; its dyads stand in curves", *_special(curves, solved)]
+        ),
         counted="",
         curves=tuple(curves),
     )

@@ -80,5 +80,5 @@ def list_remarks(solved: Sequence[ComponentSolutions], designs: Sequence[ExactDe
             found.append(each.record.source)
     marked = sum(bool(each.defects) for each in designs)
     if marked:
-        found.append(f"{marked} of {count_phrase(len(designs), 'real linkage')} have a defect")
+        found.append(f"with a defect: {marked} of {count_phrase(len(designs), 'real linkage')}")
     return tuple(found)
