@@ -35,7 +35,7 @@ def main() -> None:
     task = {"planar": 1, "units": UNITS, "start": "four-bar", "wanted": wanted}
 
     def say(done: planar.SearchProgress) -> None:
-        console.print(f"{process_time() - began:7.1f} s  {done}", highlight=False)
+        console.print(f"{process_time() - began:7.1f} s  {done.stage}", highlight=False)
 
     found = planar.synthesise(task, complete=True, progress=say)
     seconds = process_time() - began
