@@ -25,9 +25,11 @@ SAME = 1e-5
 """By how much a number of the linkage that made a task may differ from that of the one which is it."""
 NUMBERS = ("AD.A.x", "AD.A.y", "AD.D.x", "AD.D.y", "AB.length", "BC.length", "DC.length")
 NUMBERS = (*NUMBERS, "frame.O.x", "frame.O.y", "crank.length", "rod.length")
+NUMBERS = (*NUMBERS, "frame.D.x", "frame.D.y", "rod.A.x", "rod.A.y", "BC.B.x", "BC.B.y", "BC.C.x", "BC.C.y")
 EXCHANGED = {"AD.A.x": "AD.D.x", "AD.A.y": "AD.D.y", "AB.length": "DC.length"}
+EXCHANGED = EXCHANGED | {"BC.B.x": "BC.C.x", "BC.B.y": "BC.C.y"}
 
-Made = tuple[dict[str, Any], dict[str, Any], dict[str, Any]]
+Made = tuple[dict[str, Any], list[dict[str, Any]], dict[str, Any]]
 """A mechanism's file, what is wanted, and more of the task."""
 
 
@@ -84,20 +86,75 @@ def slider_crank(rng: np.random.Generator) -> dict[str, Any]:
     }
 
 
-def _run(value: dict[str, Any], count: int, rng: np.random.Generator) -> tuple[planar.Motion, Array]:
-    """The motion of a linkage, and rows of it at random."""
-    motion = planar.cycle(planar.from_dict(value), STEPS)
+def slide_and_swing(rng: np.random.Generator) -> dict[str, Any]:
+    """A rod with a pin on a line of the frame, and a line of its own through a pivot."""
+    a, d, g = rng.uniform(-1.0, 1.0, (3, 2))
+    angle, own = rng.uniform(0.0, np.pi, 2).tolist()
+    through = a - rng.uniform(0.2, 1.0) * np.array([np.cos(angle), np.sin(angle)])
+    # the rod's axes stand along the world's where it is drawn, with their origin at g
+    along = d - rng.uniform(0.2, 1.0) * np.array([np.cos(own), np.sin(own)])
+    return {
+        "planar": 1,
+        "units": UNITS,
+        "frame": "frame",
+        "links": {
+            "frame": {"points": {"P": through.tolist(), "D": d.tolist()}},
+            "rod": {"points": {"A": (a - g).tolist(), "G": (along - g).tolist()}},
+        },
+        "pairs": [
+            {"sliding": "slide", "on": "frame", "block": "A", "line": {"through": "P", "angle": angle}},
+            {"sliding": "swing", "on": "rod", "block": "D", "line": {"through": "G", "angle": own}},
+        ],
+        "inputs": [{"pair": "slide", "position": float(np.linalg.norm(a - through))}],
+        "sketch": {"A": a.tolist(), "G": along.tolist()},
+    }
+
+
+def _run(
+    value: dict[str, Any], count: int, rng: np.random.Generator, reach: float | None = None
+) -> tuple[planar.Motion, Array]:
+    """The motion of a linkage, or that so far to both sides, and rows of it at random."""
+    here = value["inputs"][0]["position"]
+    ends = {} if reach is None else {"start": here - reach, "stop": here + reach}
+    motion = planar.cycle(planar.from_dict(value), STEPS, **ends)
     return motion, np.sort(rng.choice(np.arange(2, len(motion) - 2), count, replace=False))
+
+
+def _poses(motion: planar.Motion, link: str, rows: Array) -> dict[str, Any]:
+    frame = motion.frames[link]
+    x, y, angle = (np.asarray(value_and_rates(getattr(frame, part))[0]) for part in ("x", "y", "angle"))
+    told = [{"at": [float(x[k]), float(y[k])], "angle": float(angle[k])} for k in rows]
+    return {"link": link, "poses": told}
 
 
 def poses(rng: np.random.Generator) -> Made:
     """Five poses of a coupler."""
     value = four_bar(rng, True)
     motion, rows = _run(value, 5, rng)
-    frame = motion.frames["BC"]
-    x, y, angle = (np.asarray(value_and_rates(getattr(frame, part))[0]) for part in ("x", "y", "angle"))
-    told = [{"at": [float(x[k]), float(y[k])], "angle": float(angle[k])} for k in rows]
-    return value, {"link": "BC", "poses": told}, {}
+    return value, [_poses(motion, "BC", rows)], {}
+
+
+def slide_poses(rng: np.random.Generator) -> Made:
+    """Four poses of a rod that slides at both ends."""
+    value = slide_and_swing(rng)
+    motion, rows = _run(value, 4, rng, 0.4)
+    return value, [_poses(motion, "rod", rows)], {}
+
+
+def poses_and_places(pose_count: int, place_count: int) -> Callable[..., Made]:
+    """Poses of a coupler, and places of the origin of its axes (Alt and Burmester's problems)."""
+
+    def made(rng: np.random.Generator) -> Made:
+        value = four_bar(rng, True)
+        value["links"]["BC"]["points"]["E"] = [0.0, 0.0]
+        motion, rows = _run(value, pose_count + place_count, rng)
+        order = rng.permutation(rows)
+        through = motion.point("E").position[order[pose_count:]].tolist()
+        wanted = [_poses(motion, "BC", order[:pose_count]), {"point": "E", "through": through}]
+        free = ["AD.A", "AD.D", "AB.length", "BC.B", "BC.C", "DC.length"]
+        return value, wanted, {"free": free}
+
+    return made
 
 
 def path(make: Callable[[np.random.Generator], dict[str, Any]], count: int, **more: Any) -> Callable[..., Made]:
@@ -106,7 +163,7 @@ def path(make: Callable[[np.random.Generator], dict[str, Any]], count: int, **mo
     def made(rng: np.random.Generator) -> Made:
         value = make(rng)
         motion, rows = _run(value, count, rng)
-        return value, {"point": "E", "through": motion.point("E").position[rows].tolist()}, more
+        return value, [{"point": "E", "through": motion.point("E").position[rows].tolist()}], more
 
     return made
 
@@ -119,7 +176,7 @@ def four_bar_function(count: int, absolute: bool) -> Callable[..., Made]:
         motion, rows = _run(value, count, rng)
         given, shown = motion.inputs["A"].position, motion.link("DC").angle
         pairs = [[float(given[k]), float(shown[k])] for k in rows]
-        return value, {"from": "A", "to": "D", "pairs": pairs, "absolute": absolute}, {}
+        return value, [{"from": "A", "to": "D", "pairs": pairs, "absolute": absolute}], {}
 
     return made
 
@@ -129,11 +186,13 @@ def slider_function(rng: np.random.Generator) -> Made:
     value = slider_crank(rng)
     motion, rows = _run(value, 5, rng)
     given, shown = motion.inputs["O"].position, motion.pair("stroke")["displacement"]
-    return value, {"from": "O", "to": "stroke", "pairs": [[float(given[k]), float(shown[k])] for k in rows]}, {}
+    return value, [{"from": "O", "to": "stroke", "pairs": [[float(given[k]), float(shown[k])] for k in rows]}], {}
 
 
 KINDS: dict[str, Callable[[np.random.Generator], Made]] = {
     "five poses": poses,
+    "four poses of slides": slide_poses,
+    "four poses and two places": poses_and_places(4, 2),
     "three pairs": four_bar_function(3, True),
     "five pairs": four_bar_function(5, False),
     "five pairs of a slider-crank": slider_function,
@@ -166,7 +225,7 @@ def try_maker(kind: str, seed: int) -> dict[str, Any]:
     except planar.NoAnswer as problem:
         return {"kind": kind, "seed": seed, "refused": problem.outcome.value}
     began = process_time()
-    task = {"planar": 1, "units": UNITS, "start": value, "wanted": [wanted]} | more
+    task = {"planar": 1, "units": UNITS, "start": value, "wanted": wanted} | more
     found = planar.synthesise(task, complete=True)
     off = distance_to_maker(found, planar.from_dict(value))
     return {

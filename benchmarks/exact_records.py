@@ -67,8 +67,8 @@ def main() -> None:
     parser.add_argument("--enough", type=int, default=None, help="the number that is known, where the search may end")
     parser.add_argument("--source", default="", help="where their number is published")
     wanted = parser.parse_args()
-    value, entry, more = KINDS[wanted.kind](np.random.default_rng(0))
-    task = planar.read_task({"planar": 1, "units": UNITS, "start": value, "wanted": [entry]} | more)
+    value, entries, more = KINDS[wanted.kind](np.random.default_rng(0))
+    task = planar.read_task({"planar": 1, "units": UNITS, "start": value, "wanted": entries} | more)
     problem = ExactProblem(task, next(iter(start_mechanisms(task))))
     for component in {name_family(each.family).text: each for each in problem.components}.values():
         name = name_family(component.family)

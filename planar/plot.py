@@ -236,7 +236,7 @@ def cognates(found: Cognates | Mechanism, of: str | None = None, scale: ScaleTex
 
 
 def dyad_curves(found: CompleteSynthesis, scale: ScaleTexts = None) -> Figure:
-    """Burmester's curves of four poses: where joints may be, and their pivots. Raises BadInput where there is none."""
+    """The curves that poses leave of dyads: where joints may be, and their pivots. Raises BadInput without any."""
     from planar.drawing.diagrams.dyad_drawing import dyad_pictures
 
     return draw_pictures(*dyad_pictures(found, scale))

@@ -13,7 +13,7 @@ from planar.model.mechanism import Mechanism
 from planar.results.motion import Motion
 from planar.solving.cycle import cycle
 from planar.synthesis.demands.output_transmissions import output_transmissions
-from planar.synthesis.judgement.input_range import input_range
+from planar.synthesis.judgement.input_range import input_range, range_motion
 from planar.synthesis.synthesis import DesignMotion
 
 STEPS = 90
@@ -23,7 +23,7 @@ def design_motion(mechanism: Mechanism, inputs: Sequence[Array]) -> DesignMotion
     """How a design moves that is to come to positions (n,) of its input; None where it cannot be solved."""
     running = mechanism.inputs[0].pair
     try:
-        motion = cycle(mechanism, STEPS, pair=running)
+        motion = range_motion(mechanism, inputs, STEPS)
     except (NoAnswer, BadInput):
         return None
     reach = input_range(motion, inputs)

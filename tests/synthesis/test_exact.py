@@ -10,8 +10,10 @@ from planar.foundation.jets import value_and_rates
 from planar.synthesis.exact.relations.exact_problem import ExactProblem
 from planar.synthesis.exact.tracking.exact_certificates import certify_member
 from planar.synthesis.exact.tracking.generic_store import family_record
-from planar.synthesis.exact.tracking.member_homotopy import affine_solutions
-from planar.synthesis.exact.tracking.symmetry import name_family
+from planar.synthesis.exact.tracking.member_homotopy import affine_solutions, homogeneous_solutions
+from planar.synthesis.exact.tracking.monodromy import first_of_same, follow
+from planar.synthesis.exact.tracking.other_ways import ClassedSolutions, with_members
+from planar.synthesis.exact.tracking.symmetry import exchange_images, name_family, representatives
 from planar.synthesis.task.starts import start_mechanisms
 from tests.command import run
 
@@ -206,3 +208,47 @@ def test_a_picture_shows_each_curve_once():
     assert sum("Dyads B about A and C about D" in each for each in texts) == 1
     with pytest.raises(planar.BadInput, match="no curve"):
         planar.plot.dyad_curves(planar.synthesise(task(with_points_on_coupler(), poses(3)), complete=True))
+
+
+def test_what_moves_alike_comes_round_together_and_is_roberts_cognates():
+    """S. Roberts, Three-bar motion in plane space, 1875: the three fixed pivots are a triangle like the coupler's."""
+    places = [[k * k % 17, 3 * k * k % 19] for k in range(9)]
+    component = family_of(task("four-bar", {"point": "E", "through": places}))
+    family, record = component.family, family_record(component.family)
+    rng = np.random.default_rng(2)
+    member = family.random_member(rng)
+    one = follow(family, record.solutions.member, record.representatives.V[:1], member, 1e-4)
+    images = exchange_images(record.name.exchanges)
+    known = ClassedSolutions(representatives(one.V, images), np.zeros(1, dtype=int))
+    found = with_members(family, record, member, known, np.arange(1442) < 1, rng)
+    assert found.classes.tolist() == [0, 0, 0]
+    own = affine_solutions(found.V)[:, : family.size]
+    order = [each.own for each in component.unknowns]
+    (a, d, b, c) = (order.index(k) for k in dyad_symbols(component))
+    place = member.parts[0][0, 0, 0]
+    third = own[:, a] + (place - own[:, b]) / (own[:, c] - own[:, b]) * (own[:, d] - own[:, a])
+    corners = np.sort_complex(np.stack([own[:, a], own[:, d], third], axis=1))
+    np.testing.assert_allclose(corners, corners[[0, 0, 0]], rtol=1e-8)
+
+
+def dyad_symbols(component):
+    """The symbols of both pivots of nine places, and of the joints that go with them."""
+    places = [[k * k % 17, 3 * k * k % 19] for k in range(9)]
+    wanted = planar.read_task(task("four-bar", {"point": "E", "through": places}))
+    pose = ExactProblem(wanted, next(iter(start_mechanisms(wanted)))).pose
+    return [min(pose.place(*each).symbols) for each in (("AD", "A"), ("AD", "D"), ("AB", "B"), ("DC", "C"))]
+
+
+def test_paths_end_at_the_same_places_in_more_digits():
+    wanted = {"link": "BC", "poses": [*poses(4)["poses"], {"at": [99, -30], "angle": 99}]}
+    component = family_of(task(with_points_on_coupler(), wanted))
+    known = family_record(component.family).solutions
+    plain, more = (follow(component.family, known.member, known.V, component.member, 1e-4, each) for each in (0, 1))
+    assert plain.is_single.all() and more.is_single.all()
+    np.testing.assert_allclose(affine_solutions(plain.V), affine_solutions(more.V), rtol=1e-12)
+
+
+def test_solutions_that_are_nearly_real_are_told_from_their_images():
+    one = np.array([0.3 + 1e-5j, -1.2, 0.3 - 1e-5j, -1.2])
+    V = homogeneous_solutions(np.array([one, one[[2, 3, 0, 1]], one + 1e-12]))
+    assert first_of_same(V).tolist() == [0, 1, 0]

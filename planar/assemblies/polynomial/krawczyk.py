@@ -13,10 +13,10 @@ import numpy as np
 
 from planar.foundation.arrays import Array, BoolArray, ComplexArray, IntArray
 
-BALL_PRECISION_BITS = 128
-BOX_HALF_WIDTHS = (1e-7, 1e-9, 1e-11, 1e-13, 1e-16, 1e-20)
+BALL_PRECISION_BITS = 192
+BOX_HALF_WIDTHS = (1e-7, 1e-9, 1e-11, 1e-13, 1e-16, 1e-20, 1e-24, 1e-28)
 """Half widths of boxes that are tried, the widest first."""
-POLISHING_STEPS, POLISHED = 12, 1e-26
+POLISHING_STEPS, POLISHED = 12, 1e-36
 """At most, and of a solution's entries: what moves it by less is the last."""
 
 BallEquations = Callable[[Sequence[Any]], tuple[list[Any], list[list[Any]]]]
@@ -58,17 +58,13 @@ def direction_ball(angle: float) -> Any:
 
 
 def _inverse(slope: list[list[Any]]) -> Any | None:
-    """A matrix near the inverse of a Jacobian."""
+    """A matrix near the inverse of a Jacobian, in the digits of balls: far solutions leave doubles too few."""
     from flint import acb_mat
 
-    there = np.array([[complex(each.mid()) for each in row] for row in slope])
     try:
-        inverse = np.linalg.inv(there)
-    except np.linalg.LinAlgError:
+        return acb_mat([[each.mid() for each in row] for row in slope]).inv().mid()
+    except (ZeroDivisionError, ValueError):
         return None
-    if not np.all(np.isfinite(inverse)):
-        return None
-    return acb_mat([[ball(complex(each)) for each in row] for row in inverse])
 
 
 def polished_balls(equations: BallEquations, w: ComplexArray) -> list[Any] | None:

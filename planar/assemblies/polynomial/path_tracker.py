@@ -28,6 +28,8 @@ END_VISIBLE_DISTANCE = 1e-6
 """Of the way: paths that come nearer to the end than this are not lost."""
 CORRECTION_TOLERANCE = 1e-9
 """What Newton's second step may still move a solution by."""
+STEP_SAFETY, STEP_FACTORS, SHRINKING_FACTORS = 0.9, (0.5, 2.5), (0.1, 0.6)
+"""Of the step that corrections call for; bounds of a step over the one before it, and over one that failed."""
 SINGULAR_TOLERANCE = 1e-9
 """Least singular value, of the largest, at which a solution counts as single."""
 SAME_SOLUTION_DISTANCE = 1e-6
@@ -131,8 +133,17 @@ class ProductHomotopy:
         return np.concatenate([np.array(X), np.array(Y)], axis=1)
 
 
-def track_paths(homotopy: Homotopy, V: ComplexArray, near: float = PREDICTION_TOLERANCE) -> PathEnds:
-    """The solutions at the end of the way from those at its beginning."""
+def track_paths(
+    homotopy: Homotopy,
+    V: ComplexArray,
+    near: float = PREDICTION_TOLERANCE,
+    correction: float = CORRECTION_TOLERANCE,
+) -> PathEnds:
+    """The solutions at the end of the way from those at its beginning; in as many digits as V has, where the homotopy
+    keeps them, though linear systems are solved in double precision.
+
+    `near` is how far a prediction may be off, `correction` what Newton's second step may still move a solution by.
+    """
     V = normalize(V)
     way, step = np.zeros(len(V)), np.full(len(V), FIRST_STEP)
     busy = np.arange(len(V))
@@ -144,13 +155,23 @@ def track_paths(homotopy: Homotopy, V: ComplexArray, near: float = PREDICTION_TO
         ahead = np.where(h == 1.0 - t, 1.0, t + h)
         with np.errstate(all="ignore"):
             tried, first, second = _runge_kutta_step(homotopy, here, t, h, ahead)
-        good = (first < near) & (second < CORRECTION_TOLERANCE)
+        good = (first < near) & (second < correction)
         taken = busy[good]
         V[taken], way[taken] = tried[good], ahead[good]
-        growth = np.clip((0.25 * near / np.maximum(first, 1e-300)) ** 0.2, 1.0, 2.5)
-        step[busy] = np.where(good, h * growth, h * 0.4)
+        step[busy] = h * _step_factors(first / near, second / correction, good)
         busy = busy[(way[busy] < 1.0) & (step[busy] > MIN_STEP * np.maximum(1.0 - way[busy], 1e-3))]
     return refine_ends(homotopy, V, way >= 1.0)._replace(is_near_end=way > 1.0 - END_VISIBLE_DISTANCE)
+
+
+def _step_factors(first: Array, second: Array, good: BoolArray) -> Array:
+    """The next step over the last, by corrections over what they may be. The first grows with the fifth power of the
+    step, the second with the tenth, and is what most steps fail by."""
+    with np.errstate(all="ignore"):
+        factors = STEP_SAFETY * np.minimum(
+            (0.25 / np.maximum(first, 1e-300)) ** 0.2, (0.1 / np.maximum(second, 1e-300)) ** 0.1
+        )
+    factors = np.where(np.isfinite(factors), factors, 0.0)
+    return np.where(good, np.clip(factors, *STEP_FACTORS), np.clip(factors, *SHRINKING_FACTORS))
 
 
 def refine_ends(homotopy: Homotopy, V: ComplexArray, arrived: BoolArray) -> PathEnds:

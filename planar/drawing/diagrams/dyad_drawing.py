@@ -33,7 +33,7 @@ def dyad_pictures(found: CompleteSynthesis, scale: ScaleTexts = None) -> tuple[l
         if each.dimension == 1 and not any(_is_same(each, other) for other in curves):
             curves.append(each)
     if not curves:
-        raise BadInput("found", "there is no curve of dyads; four poses of a link leave one")
+        raise BadInput("found", "there is no curve of dyads; four poses of a link leave one, three where it slides")
     return [_picture(found, each, known) for each in curves], f"{found.task.name}: dyads for the poses"
 
 
@@ -58,12 +58,15 @@ def _picture(found: CompleteSynthesis, curve: DyadCurve, scale: Scale | None) ->
             marks.append(Polyline(tuple(paper_point(each / scale.per_mm) for each in piece), pen, about))
     marks += _pose_marks(poses, AXIS_LENGTH * found.size, scale)
     same = [each for each in found.curves if _is_same(each, curve)]
-    names = " and ".join(f"{each.joint} about {each.pivot}" for each in same)
-    notes = (
-        f"Dyads {names}",
-        f"Full: {CENTRE}, where the pivot may be fixed. Dashed: {CIRCLE}, where the joint is at pose 1",
-        f"{scale}",
-    )
+    between = "about" if not curve.has_slide else "on" if len(curve.circle_points) else "through"
+    names = " and ".join(f"{each.joint} {between} {each.pivot}" for each in same)
+    told = {
+        CENTRE: f"Full: {CENTRE}, where the pivot may be fixed.",
+        CIRCLE: f"Dashed: {CIRCLE}, where the joint is at pose 1.",
+    }
+    drawn = [each for each, places in ((CENTRE, curve.centre_points), (CIRCLE, curve.circle_points)) if len(places)]
+    slides = [" Through each goes a line of its own, on which it stays."] * curve.has_slide
+    notes = (f"Dyads {names}", " ".join(told[each] for each in drawn) + "".join(slides), f"{scale}")
     return Picture(tuple(marks), "", notes)
 
 

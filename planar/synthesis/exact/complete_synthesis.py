@@ -30,9 +30,11 @@ class DyadCurve:
     """The dyads that carry a link through poses where these leave `dimension` parameters of them open: 0, 1 or 2.
 
     `circle_points` (n, 2) are places of the `joint` at the first pose, `centre_points` (n, 2) those of its fixed
-    `pivot` (m), not numbers between parts of a curve. Where two parameters are open every place of the joint will do,
-    and none stand here; `centres` gives the pivots that go with them. `rows` (poses - 1, 3, 3): (1, x, y) of the joint
-    times this times (1, x, y) of the pivot vanishes; none where the pivot is a line.
+    `pivot` (m), not numbers between parts of a curve. Of a dyad with a slide one of both is a line: `joint` or `pivot`
+    names the slide, there are no such points, and `directions` (n,) rad is where the line goes at the first pose, on
+    which the other's pin lies. Where two parameters are open every place of the pin will do, and none stand here;
+    `centres` and `lines` give what goes with it. `rows`: (1, x, y) of the pin times this times (1, x, y) of the pivot,
+    (poses - 1, 3, 3), or times (cos, sin) of the line, (poses - 1, 3, 2), vanishes.
     """
 
     pivot: str
@@ -40,18 +42,40 @@ class DyadCurve:
     dimension: int
     circle_points: Array = field(repr=False)
     centre_points: Array = field(repr=False)
+    directions: Array = field(repr=False)
     rows: Array = field(repr=False)
+
+    @property
+    def has_slide(self) -> bool:
+        """Whether one of its pairs is a slide."""
+        return bool(self.rows.shape[2] == 2)
 
     def centres(self, joints: Array) -> Array:
         """The fixed pivots (n, 2) m that go with places of the joint at the first pose (n, 2) m; by least squares where
-        these are none of the curve."""
+        these are none of the curve, not numbers where there is a slide."""
         places = np.atleast_2d(np.asarray(joints, float))
         found = np.full(places.shape, np.nan)
         known = np.isfinite(places).all(axis=1)
-        if len(self.rows) < 2:
+        if self.has_slide or len(self.rows) < 2:
             return found
-        whole = np.einsum("na,rab->nrb", np.insert(places[known], 0, 1.0, axis=1), self.rows)
+        whole = self._rows_at(places[known])
         found[known] = -np.einsum("nij,nj->ni", np.linalg.pinv(whole[:, :, 1:]), whole[:, :, 0])
+        return found
+
+    def lines(self, pins: Array) -> Array:
+        """The directions (n,) rad of the lines, at the first pose, that go with places of the pin (n, 2) m; by least
+        squares where these are none of the curve, not numbers where there is no slide."""
+        places = np.atleast_2d(np.asarray(pins, float))
+        found = np.full(len(places), np.nan)
+        known = np.isfinite(places).all(axis=1)
+        if not self.has_slide or not len(self.rows):
+            return found
+        way = np.linalg.svd(self._rows_at(places[known]))[2][:, -1]
+        found[known] = np.arctan2(way[:, 1], way[:, 0])
+        return found
+
+    def _rows_at(self, places: Array) -> Array:
+        found: Array = np.einsum("na,rab->nrb", np.insert(places, 0, 1.0, axis=1), self.rows)
         return found
 
 

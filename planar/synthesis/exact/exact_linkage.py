@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from cmath import exp, phase
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -11,7 +11,7 @@ import numpy as np
 
 from planar.document.revised.changed_numbers import with_values
 from planar.foundation.arrays import Array, ComplexArray
-from planar.model.link_shapes import Link, link_shape
+from planar.model.link_shapes import Link, PointReference, link_shape
 from planar.model.mechanism import Mechanism, named_points
 from planar.synthesis.exact.relations.entry_relations import EntryRelations, turned_link
 from planar.synthesis.exact.relations.exact_problem import ExactProblem
@@ -75,9 +75,10 @@ class _LinkageWriter:
         self.problem, self.pose, self.values = problem, problem.pose, values
         self.mechanism = problem.mechanism
         self.axes: dict[str, complex] = {}
-        "x-axes of moving links at the first entry"
+        self.origins: dict[str, complex] = {}
+        "x-axes and origins of moving links at the first entry"
         self.lines: dict[str, complex] = {}
-        "directions of lines, as they are written"
+        "directions of lines at the first entry, as they are written"
 
     def _world(self, place: Polynomial) -> complex:
         return evaluate(place.substitute(self.pose.values), self.values) * self.problem.size + self.problem.origin
@@ -93,9 +94,9 @@ class _LinkageWriter:
         running = self.mechanism.inputs[0].pair
         start = first[running] if running in first else phase(self.axes[turned_link(self.pose, running)])
         chosen = {key: value for key, value in numbers.items() if key in self.pose.free}
-        sketch = tuple(self._sketch())
-        base = replace(self.mechanism, sketch=sketch, name=name, about=None, source=None, published=(), ids=())
+        base = replace(self.mechanism, name=name, about=None, source=None, published=(), ids=())
         whole = with_values(base, chosen | {f"{running}.position": start})
+        whole = replace(whole, sketch=tuple(self._sketch(whole)))
         return ExactLinkage(whole, chosen, self._inputs(running, start))
 
     def _places(self, link: Link) -> dict[str, complex]:
@@ -115,7 +116,7 @@ class _LinkageWriter:
                 found[f"{link.name}.length"] = places[link.ends[1]].real
             return found
         origin, way = self._link_axes(link, places)
-        self.axes[link.name] = way
+        self.origins[link.name], self.axes[link.name] = origin, way
         found = {}
         for name, at in places.items():
             own = (at - origin) / way
@@ -149,62 +150,64 @@ class _LinkageWriter:
     def _line_numbers(
         self, slide: SlidingRow, numbers: Mapping[str, float], first: dict[str, float]
     ) -> dict[str, float]:
-        """The direction of a line, and the point that it goes through; `first` gets the displacement."""
-        frame, name = self.mechanism.frame, slide.through
+        """The direction of a line, and the point that it goes through, in its link's axes; `first` gets the
+        displacement."""
+        link, name = slide.pair.bodies[0], slide.through
+        axis, origin = self.axes.get(link, 1.0), self.origins.get(link, 0.0)
         way = evaluate(slide.direction, self.values)
-        way /= abs(way)
-        slider = self._world(slide.slider)
-        shape = link_shape({each.name: each for each in self.mechanism.links}[frame])
-        at_start = shape.position(name)
+        way /= abs(way) * axis
+        slider = (self._world(slide.slider) - origin) / axis
+        at_start = link_shape(self.pose.links[link]).position(name)
         through = complex(at_start.x, at_start.y)
-        free = self.pose.free_coordinates(name)
-        angle = self._angle_name(slide)
+        free = self._free_coordinates(link, name)
+        angle = self.pose.line_angle(slide.pair.name)
         found: dict[str, float] = {}
         given = self.problem.first_slides.get(slide.pair.name)
-        if isinstance(name, str) and f"{frame}.{name}.x" in numbers:
-            through = complex(numbers[f"{frame}.{name}.x"], numbers[f"{frame}.{name}.y"])
+        if isinstance(name, str) and f"{link}.{name}.x" in numbers:
+            through = complex(numbers[f"{link}.{name}.x"], numbers[f"{link}.{name}.y"])
         elif any(free):
-            through = self._place_on_line(slider, way, through, free, given)
-            found |= {f"{frame}.{name}.x": through.real, f"{frame}.{name}.y": through.imag}
+            through = self._place_on_line(slider, way, through, free, given, link)
+            found |= {f"{link}.{name}.x": through.real, f"{link}.{name}.y": through.imag}
         along = ((slider - through) * way.conjugate()).real
-        if angle in self.pose.free:
+        if angle is not None and angle in self.pose.free:
             if along < 0.0 and given is None:
                 way, along = -way, -along
             found[angle] = phase(way)
         first[slide.pair.name] = along
-        self.lines[slide.pair.name] = way
+        self.lines[slide.pair.name] = way * axis
         return found
 
+    def _free_coordinates(self, link: str, name: PointReference) -> tuple[bool, bool]:
+        if link == self.mechanism.frame:
+            return self.pose.free_coordinates(name)
+        x, y = (f"{link}.{name}.{axis}" in self.pose.free for axis in "xy")
+        return x, y
+
     def _place_on_line(
-        self, slider: complex, way: complex, start: complex, free: tuple[bool, bool], given: float | None
+        self, slider: complex, way: complex, start: complex, free: tuple[bool, bool], given: float | None, link: str
     ) -> complex:
         if given is not None and all(free):
             return slider - given * way
-        if all(free):  # where it comes nearest to a fixed pin
-            pins = [self._world(p) for (own, _), p in self.pose.places.items() if own == self.mechanism.frame]
-            near = pins[0] if pins else start
+        if all(free):  # where it comes nearest to a fixed pin, or to the origin of a link that moves
+            frame = self.mechanism.frame
+            pins = [self._world(p) for (own, _), p in self.pose.places.items() if own == frame == link]
+            near = pins[0] if pins else 0.0j if link != frame else start
             return slider + ((near - slider) * way.conjugate()).real * way
         part = way.real if not free[0] else way.imag
         off = (start - slider).real if not free[0] else (start - slider).imag
         return slider + (off / part) * way if part else slider
 
-    def _angle_name(self, slide: SlidingRow) -> str:
-        index = [each.name for each in self.mechanism.pairs].index(slide.pair.name)
-        own = [
-            name
-            for name, each in self.pose.numbers.items()
-            if each.address[:2] == ("pairs", index) and each.kind == "angle" and "line" in each.address
-        ]
-        return own[0] if own else ""
-
-    def _sketch(self) -> list[tuple[str, float, float]]:
-        found = []
-        for each in named_points(self.mechanism):
-            moving = [one for one in each.members if one[0] != self.mechanism.frame and one in self.pose.places]
-            if len(each.members) > 1 and len(moving) == len(each.members):
-                at = self._world(self.pose.places[moving[0]])
-                found.append((each.name, at.real, at.imag))
-        return found
+    def _sketch(self, mechanism: Mechanism) -> Iterator[tuple[str, float, float]]:
+        """Where every point stands that is not on the frame: joints alone may not tell two assemblies apart."""
+        shapes = {link.name: link_shape(link) for link in mechanism.links}
+        placed = {link for link, _ in self.pose.places}
+        for each in named_points(mechanism):
+            links = [(link, point) for link, point in each.members if link in placed]
+            if links and all(link != mechanism.frame for link, _ in each.members):
+                link, point = links[0]
+                own = shapes[link].position(point)
+                at = self.origins[link] + complex(float(own.x), float(own.y)) * self.axes[link]
+                yield each.name, at.real, at.imag
 
     def _inputs(self, running: str, start: float) -> tuple[Array, ...]:
         """Where the input is at every entry of the task's items, in the task's order."""

@@ -2,31 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from itertools import combinations, permutations, product
-from math import comb, prod
-from typing import NamedTuple
 
 import numpy as np
 
-from planar.assemblies.polynomial.certification import is_available
-from planar.foundation.arrays import Array, BoolArray, ComplexArray
+from planar.foundation.arrays import Array, ComplexArray
 from planar.foundation.errors import BadInput
 from planar.model.mechanism import Mechanism
 from planar.model.wording import count_phrase
 from planar.synthesis.design_motion import design_motion
 from planar.synthesis.exact.complete_synthesis import CompleteSynthesis, DyadCurve, ExactDesign
-from planar.synthesis.exact.dyad_curves import dyad_curve
+from planar.synthesis.exact.component_solutions import (
+    ComponentSolutions,
+    Progress,
+    alike_components,
+    solve_components,
+)
+from planar.synthesis.exact.dyad_curves import dyad_curve, is_dyad
 from planar.synthesis.exact.exact_linkage import ExactLinkage, exact_linkage
+from planar.synthesis.exact.list_words import completeness, counted_class, list_remarks, solution_count
 from planar.synthesis.exact.relations.exact_problem import Component, ExactProblem
-from planar.synthesis.exact.relations.family import Member
-from planar.synthesis.exact.tracking.class_members import class_members
-from planar.synthesis.exact.tracking.exact_certificates import certify_member
-from planar.synthesis.exact.tracking.generic_store import FamilyRecord, family_record
 from planar.synthesis.exact.tracking.member_homotopy import affine_solutions, homogeneous_solutions
-from planar.synthesis.exact.tracking.member_solutions import MemberSolutions, solve_member
-from planar.synthesis.exact.tracking.monodromy import first_of_same
-from planar.synthesis.exact.tracking.symmetry import FamilyName, reordered
+from planar.synthesis.exact.tracking.symmetry import reordered
 from planar.synthesis.judgement.defects import Defect
 from planar.synthesis.judgement.judgement import DesignJudge
 from planar.synthesis.task.starts import start_mechanisms
@@ -39,24 +38,10 @@ from planar.synthesis.task.synthesis_task import (
     WantedPoses,
 )
 
-REAL = 1e-7
-"""Of a solution's size: one that differs from its own conjugate by less is real."""
 MET = 1e-6
 """Of the extent of what is wanted, or rad: an exact linkage that misses more is in another assembly there."""
-Progress = Callable[[str], None]
 
-
-class ComponentSolutions(NamedTuple):
-    """The real solutions x (solutions, unknowns) of a component, whether each is proved, and what is known of all."""
-
-    component: Component
-    record: FamilyRecord
-    whole: MemberSolutions
-    x: ComplexArray
-    proved: BoolArray
-    all_proved: int
-    missing: int
-    "of classes of real ones, linkages that were not reached"
+FAMILY = "a family of linkages with parameters; its dyads stand in curves"
 
 
 def synthesise_all(task: SynthesisTask, progress: Progress | None = None) -> CompleteSynthesis:
@@ -65,7 +50,7 @@ def synthesise_all(task: SynthesisTask, progress: Progress | None = None) -> Com
     problem = ExactProblem(task, mechanism)
     _check_freedom(problem)
     say = progress or (lambda _: None)
-    solved = _solve_all([each for each in problem.components if each.freedom == 0], say)
+    solved = solve_components([each for each in problem.components if each.freedom == 0], say)
     if any(each.freedom for each in problem.components):
         return _with_curves(problem, solved)
     judge = DesignJudge(task, problem.size)
@@ -80,11 +65,11 @@ def synthesise_all(task: SynthesisTask, progress: Progress | None = None) -> Com
         tuple(told),
         (),
         problem.size,
-        _remarks(solved, told),
-        expected=_count(solved, [len(each.record.classes) for each in solved]),
-        found=_count(solved, [len(each.whole.x) for each in solved]),
-        complete=_completeness(solved),
-        counted=_counted(solved),
+        list_remarks(solved, told),
+        expected=solution_count(solved, [len(each.record.classes) for each in solved]),
+        found=solution_count(solved, [each.whole.found for each in solved]),
+        complete=completeness(solved),
+        counted=counted_class(solved),
     )
 
 
@@ -101,67 +86,13 @@ def _check_freedom(problem: ExactProblem) -> None:
         raise BadInput("$.wanted", f"what is wanted sets {told} with the numbers that are free")
     left = [each for each in problem.components if each.freedom > 0]
     is_for_poses = len(problem.items) == 1 and isinstance(problem.items[0], WantedPoses)
-    if left and not (is_for_poses and all(_is_dyad(each) for each in left)):
+    if left and not (is_for_poses and all(is_dyad(problem, each) for each in left)):
         most = max(each.freedom for each in left)
         raise BadInput(
             "$.wanted",
             f"{count_phrase(most, 'number')} of {problem.mechanism.name!r} would stay open, so that there is no list; "
             "want more, or give some of the numbers by leaving them out of 'free'",
         )
-
-
-def _is_dyad(component: Component) -> bool:
-    return component.family.size == 2 and component.family.parts[0].rows.equation_count == 0
-
-
-def _solve_all(components: Sequence[Component], say: Progress) -> list[ComponentSolutions]:
-    known: dict[tuple[str, bytes], ComponentSolutions] = {}
-    solved = []
-    for each in components:
-        record = family_record(each.family, lambda many: say(f"{many} solutions of a random task"))
-        key = _member_key(record.name, each.member)
-        found = known.get(key)
-        if found is None or found.record.name != record.name:
-            found = _solve(each, record, say)
-            known[key] = found
-        solved.append(found._replace(component=each))
-    return solved
-
-
-def _solve(component: Component, record: FamilyRecord, say: Progress) -> ComponentSolutions:
-    say(f"{count_phrase(len(record.classes), 'path')}")
-    whole = solve_member(component.family, record, component.member)
-    if is_available() and len(whole.doubtful):
-        whole = _with_doubtful(component, whole)
-    proved = np.zeros(len(whole.x), dtype=bool)
-    x, is_real = whole.x, _is_real(whole.x)
-    all_proved = 0
-    if is_available() and len(x):
-        say(f"{count_phrase(len(x), 'solution')} to be certified")
-        proof = certify_member(component.family, component.member, x)
-        x, proved, all_proved = proof.x, proof.proved & proof.is_real, int(proof.proved.sum())
-        is_real = np.where(proof.proved, proof.is_real, is_real)
-    real, sure = x[is_real], proved[is_real]
-    wanted = record.classes.shape[1] * len(real)
-    if record.classes.shape[1] > 1 and len(real):
-        real, sure = class_members(component, record, real, sure)
-    return ComponentSolutions(component, record, whole, real, sure, all_proved, max(0, wanted - len(real)))
-
-
-def _with_doubtful(component: Component, whole: MemberSolutions) -> MemberSolutions:
-    """Ends that only look as if several met there, which balls of more digits tell from such, beside the others."""
-    proof = certify_member(component.family, component.member, whole.doubtful)
-    both = np.concatenate([whole.x, proof.x[proof.proved]])
-    kept = first_of_same(homogeneous_solutions(both)) == np.arange(len(both))
-    new = int(kept[len(whole.x) :].sum())
-    return whole._replace(x=both[kept], singular=whole.singular - new)
-
-
-def _is_real(x: ComplexArray) -> BoolArray:
-    half = x.shape[1] // 2
-    off = np.abs(x[:, :half] - x[:, half:].conj()).max(axis=1, initial=0.0)
-    found: BoolArray = off < REAL * np.maximum(1.0, np.abs(x).max(axis=1, initial=0.0))
-    return found
 
 
 def _values(component: Component, x: ComplexArray) -> dict[int, complex]:
@@ -176,7 +107,7 @@ def _values(component: Component, x: ComplexArray) -> dict[int, complex]:
 
 def _linkages(solved: Sequence[ComponentSolutions]) -> Iterator[tuple[list[dict[int, complex]], bool]]:
     """Every linkage as the values of its symbols, in all ways in which its links may bear their names."""
-    groups = _alike(solved)
+    groups = alike_components(solved)
     choices = [[*combinations(range(len(solved[own[0]].x)), len(own))] for own in groups]
     for chosen in product(*choices):
         certified = True
@@ -188,18 +119,6 @@ def _linkages(solved: Sequence[ComponentSolutions]) -> Iterator[tuple[list[dict[
         if len(solved) == 1:
             labelled = _exchanged(solved[0], chosen[0][0])
         yield labelled, certified
-
-
-def _alike(solved: Sequence[ComponentSolutions]) -> list[list[int]]:
-    """Components that are the same member of one family, together."""
-    groups: dict[tuple[str, bytes], list[int]] = {}
-    for k, each in enumerate(solved):
-        groups.setdefault(_member_key(each.record.name, each.component.member), []).append(k)
-    return [*groups.values()]
-
-
-def _member_key(name: FamilyName, member: Member) -> tuple[str, bytes]:
-    return name.text, b"".join(np.round(part, 12).tobytes() for part in member.parts)
 
 
 def _joined(solved: Sequence[ComponentSolutions], own: Sequence[int], rows: Sequence[int]) -> dict[int, complex]:
@@ -228,7 +147,8 @@ def _best_design(
         found.append(_judged(problem, judge, linkage, certified))
         if not found[-1].defects:
             break
-    return min(found, key=lambda each: len(each.defects))
+    best = min(found, key=lambda each: len(each.defects))
+    return replace(best, motion=design_motion(best.mechanism, best.inputs) if best.numbers else None)
 
 
 def _unwritten(problem: ExactProblem, certified: bool, why: str) -> ExactDesign:
@@ -254,7 +174,6 @@ def _judged(problem: ExactProblem, judge: DesignJudge, linkage: ExactLinkage, ce
         defects,
         problem.mechanism.name,
         linkage.numbers,
-        design_motion(linkage.mechanism, found.inputs),
         certified=certified,
     )
 
@@ -267,64 +186,13 @@ def _wanted_values(wanted: Wanted) -> Array:
     return np.concatenate([wanted.places, wanted.angles[:, None]], axis=1)
 
 
-def _count(solved: Sequence[ComponentSolutions], counts: Sequence[int]) -> int:
-    """How many choices there are of one solution of each component, all different where components are alike."""
-    return prod(comb(counts[own[0]], len(own)) for own in _alike(solved))
-
-
-def _counted(solved: Sequence[ComponentSolutions]) -> str:
-    """What is counted, in words."""
-    parts = []
-    for own in _alike(solved):
-        record = solved[own[0]].record
-        many, members = record.classes.shape
-        told = count_phrase(many, "complex solution")
-        if members > 1:
-            told = f"{many} classes of {members} linkages each, which move alike"
-        if len(record.name.exchanges) > 1:
-            told += ", those that differ in the names of links alone counted once"
-        if len(own) > 1:
-            told = f"choices of {len(own)} of {told}"
-        parts.append(told)
-    return ", each with each of ".join(parts)
-
-
-def _completeness(solved: Sequence[ComponentSolutions]) -> str:
-    if any(len(each.whole.x) > each.whole.followed for each in solved):
-        return "incomplete: there are more solutions than a random task was known to have"
-    lost = sum(each.whole.lost for each in solved)
-    if lost:
-        return f"incomplete: {lost} of {sum(each.whole.followed for each in solved)} paths were lost"
-    missing = sum(each.missing for each in solved)
-    if missing:
-        return f"incomplete: {count_phrase(missing, 'cognate')} of real linkages were not reached"
-    if any(each.whole.singular for each in solved):
-        return "numerically complete but for singular solutions, where several meet or a curve of them passes"
-    if not all(each.record.is_traced for each in solved):
-        return "all of a number that is a lower bound: it was found by monodromy without a trace test"
-    return "numerically complete"
-
-
-def _remarks(solved: Sequence[ComponentSolutions], designs: Sequence[ExactDesign]) -> tuple[str, ...]:
-    found = []
-    for each in [solved[own[0]] for own in _alike(solved)]:
-        whole = each.whole
-        ends = [count_phrase(len(whole.x), "solution") + " at finite places"]
-        ends += [f"{whole.at_infinity} at infinity"] * bool(whole.at_infinity)
-        ends += [f"{whole.singular} where several meet or a curve passes"] * bool(whole.singular)
-        ends += [f"{whole.lost} lost"] * bool(whole.lost)
-        told = f"{count_phrase(whole.followed, 'path')}: {', '.join(ends)}"
-        if is_available():
-            told += f"; {each.all_proved} proved, each to be the only one in a box of its own"
-        else:
-            told += "; python-flint is not there to certify them"
-        found.append(told)
-        if each.record.source:
-            found.append(each.record.source)
-    marked = sum(bool(each.defects) for each in designs)
-    if marked:
-        found.append(f"{marked} of {count_phrase(len(designs), 'real linkage')} have a defect")
-    return tuple(found)
+def _special(curves: Sequence[DyadCurve], solved: Sequence[ComponentSolutions]) -> Iterator[str]:
+    """Where poses are special, in words."""
+    for each in curves:
+        if each.dimension == 1 and not len(each.circle_points) + len(each.centre_points):
+            yield f"the poses are special: dyads {each.joint}, {each.pivot} have no curve, or any place will do"
+    if any(len(each.whole.x) < each.whole.class_count for each in solved):
+        yield "the poses are special: a dyad that others leave one of has none, or more"
 
 
 def _with_curves(problem: ExactProblem, solved: Sequence[ComponentSolutions]) -> CompleteSynthesis:
@@ -338,7 +206,9 @@ def _with_curves(problem: ExactProblem, solved: Sequence[ComponentSolutions]) ->
         problem.size,
         (),
         expected=None,
-        complete="a family of linkages with parameters; its dyads stand in curves",
+        complete="; ".join(
+            ["a family of linkages with parameters; its dyads stand in curves", *_special(curves, solved)]
+        ),
         counted="",
         curves=tuple(curves),
     )

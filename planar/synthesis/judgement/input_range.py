@@ -10,11 +10,15 @@ import numpy as np
 
 from planar.dynamics.flywheel import whole_turns
 from planar.foundation.arrays import Array, BoolArray
+from planar.foundation.errors import BadInput, NoAnswer
 from planar.foundation.jets import TURN
-from planar.model.mechanism import links_counting_turns, relative_motions
+from planar.model.mechanism import Mechanism, links_counting_turns, relative_motions
 from planar.model.pairs import MeasureKind
 from planar.results.motion import Motion
+from planar.solving.cycle import cycle
 
+WITHOUT_END = 0.5
+"""Of the span of the entries: how much more of a range that has no end is looked at, to both sides."""
 ON_END = 1e-6
 """Of the range: an entry so little beyond the end of a branch is on it."""
 
@@ -77,6 +81,22 @@ class InputRange:
             return bool((steps > -1e-9).all() or (steps < 1e-9).all())
         rounds = float(np.mod(steps, TURN).sum()) / TURN, float(np.mod(-steps, TURN).sum()) / TURN
         return min(rounds) < 1.0 + 1e-9
+
+
+def range_motion(mechanism: Mechanism, inputs: Sequence[Array], steps: int) -> Motion:
+    """The motion through all of the running input's range; where that has no end, from the first of its positions (n,)
+    to the last, and some more if it goes so far. Raises NoAnswer."""
+    pair = mechanism.inputs[0].pair
+    try:
+        return cycle(mechanism, steps, pair=pair)
+    except BadInput:
+        every = np.concatenate(inputs)
+    low, high = float(every.min()), float(every.max())
+    room = WITHOUT_END * max(high - low, 1e-6)
+    try:
+        return cycle(mechanism, steps, low - room, high + room, pair)
+    except NoAnswer:
+        return cycle(mechanism, steps, low, high, pair)
 
 
 def input_range(motion: Motion, inputs: Sequence[Array]) -> InputRange:

@@ -8,7 +8,7 @@ from functools import partial
 
 import numpy as np
 
-from planar.foundation.arrays import Array
+from planar.foundation.arrays import Array, IntArray
 from planar.foundation.errors import BadInput, NoAnswer
 from planar.foundation.jets import TURN, Scalar, value_and_rates
 from planar.model.mechanism import Mechanism, relative_motions
@@ -18,7 +18,7 @@ from planar.solving.cycle import cycle
 from planar.solving.grids.grid_motion import motion_over_input
 from planar.synthesis.judgement.defects import Defect
 from planar.synthesis.judgement.entry_order import ordered_inputs
-from planar.synthesis.judgement.input_range import InputRange, input_range
+from planar.synthesis.judgement.input_range import InputRange, input_range, range_motion
 from planar.synthesis.judgement.misses import entry_misses, repeat_entry, resting_misses
 from planar.synthesis.judgement.motion_demands import region_defects, transmission_defects
 from planar.synthesis.task.synthesis_task import SynthesisTask, Wanted, WantedFunction, WantedPath
@@ -69,7 +69,7 @@ class DesignJudge:
     def _judgement(self, mechanism: Mechanism, inputs: Sequence[Array], values: Sequence[Array]) -> Judgement:
         running = mechanism.inputs[0].pair
         try:
-            motion = cycle(mechanism, STEPS, pair=running)
+            motion = range_motion(mechanism, inputs, STEPS)
         except NoAnswer as problem:
             return self._unreached(inputs, Defect(REACH, f"it cannot be solved: {problem}"))
         reach = input_range(motion, inputs)
@@ -85,9 +85,9 @@ class DesignJudge:
         for k, (wanted, own, fitted) in enumerate(zip(self.task.wanted, shown, values, strict=True)):
             off, fit_off = entry_misses(wanted, own, self.size), entry_misses(wanted, fitted, self.size)
             scale = 1.0 if isinstance(wanted, WantedFunction) else self.size
-            for entry in np.flatnonzero(off > fit_off + SAME * scale).tolist():
-                if not isinstance(wanted, WantedFunction) and wanted.inputs is None:
-                    there[k][entry], off[entry] = self._nearest_on_branch(motion, reach, k, entry)
+            missed = np.flatnonzero(off > fit_off + SAME * scale)
+            if len(missed) and not isinstance(wanted, WantedFunction) and wanted.inputs is None:
+                there[k][missed], off[missed] = self._nearest_on_branch(motion, reach, wanted, missed)
             more = off - fit_off
             if float(more.max(initial=0.0)) > OTHER_ASSEMBLY * scale:
                 entry = int(np.argmax(more))
@@ -104,18 +104,23 @@ class DesignJudge:
         defects += [*self._motion_defects(motion, reach, there), *self._rest_defects(misses)]
         return Judgement(tuple(misses), tuple(there), tuple(defects))
 
-    def _nearest_on_branch(self, motion: Motion, reach: InputRange, item: int, entry: int) -> tuple[float, float]:
-        """Where the input is nearest to an entry, and how far off that is; a fit beyond a dead point tells neither."""
-        wanted = self.task.wanted[item]
-        tried = np.linspace(reach.low + reach.margin, reach.high - reach.margin, len(motion))
-        for _ in range(FEET):
-            shown = _results(motion.mechanism, [wanted], [tried])[0]
-            off = entry_misses(repeat_entry(wanted, entry, len(tried)), shown, self.size)
-            best = int(np.nanargmin(off))
-            around = tried[max(best - 1, 0)], tried[min(best + 1, len(tried) - 1)]
-            nearest = float(tried[best]), float(off[best])
-            tried = np.linspace(*around, FOOT_POSITIONS)
-        return nearest
+    def _nearest_on_branch(
+        self, motion: Motion, reach: InputRange, wanted: Wanted, entries: IntArray
+    ) -> tuple[Array, Array]:
+        """Where the input is nearest to entries, and how far off that is; a fit beyond a dead point tells neither."""
+        nearest, least = np.empty(len(entries)), np.empty(len(entries))
+        tried = [np.linspace(reach.low + reach.margin, reach.high - reach.margin, len(motion))] * len(entries)
+        shown = _results(motion.mechanism, [wanted], tried[:1]) * len(entries)
+        for foot in range(FEET):
+            if foot:
+                shown = _results(motion.mechanism, [wanted] * len(entries), tried)
+            for k, entry in enumerate(entries.tolist()):
+                at = tried[k]
+                off = entry_misses(repeat_entry(wanted, entry, len(at)), shown[k], self.size)
+                best = int(np.nanargmin(off))
+                nearest[k], least[k] = at[best], off[best]
+                tried[k] = np.linspace(at[max(best - 1, 0)], at[min(best + 1, len(at) - 1)], FOOT_POSITIONS)
+        return nearest, least
 
     def _unreached(self, inputs: Sequence[Array], *defects: Defect) -> Judgement:
         return Judgement(tuple(np.full(len(each), np.nan) for each in inputs), tuple(inputs), defects)

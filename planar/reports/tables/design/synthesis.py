@@ -80,7 +80,8 @@ def _complete_parts(found: CompleteSynthesis, files: Sequence[Path]) -> Iterator
         yield Text()
         rows = plain_table("Dyads", "pivot", "joint", "dimension", "points", left=(0, 1), keys=2)
         for curve in found.curves:
-            places = int(np.isfinite(curve.circle_points).all(axis=1).sum())
+            pins = curve.circle_points if len(curve.circle_points) else curve.centre_points
+            places = int(np.isfinite(pins).all(axis=1).sum())
             rows.add_row(curve.pivot, curve.joint, str(curve.dimension), str(places))
         yield rows
 
@@ -170,6 +171,7 @@ def _complete_record(found: CompleteSynthesis) -> dict[str, Any]:
                 "dimension": each.dimension,
                 "circle_points": _points(each.circle_points),
                 "centre_points": _points(each.centre_points),
+                "directions": [float(way) if np.isfinite(way) else None for way in each.directions],
             }
             for each in found.curves
         ],

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from planar.model.link_shapes import At, Link
+from planar.model.link_shapes import At, Link, link_shape
 from planar.synthesis.exact.relations.polynomials import Polynomial, as_polynomial
 from planar.synthesis.exact.relations.reference_pose import ReferencePose, SlidingRow
 from planar.synthesis.exact.relations.unknowns import NumberKind, refuse
@@ -24,7 +24,10 @@ def add_given_numbers(pose: ReferencePose, axes: dict[str, KnownAxes], slides: d
         if link.name != pose.mechanism.frame:
             _add_link(pose, link, axes.get(link.name))
     for each in pose.slides:
-        _add_line(pose, each, slides.get(each.pair.name))
+        if each.pair.bodies[0] == pose.mechanism.frame:
+            _add_line(pose, each, slides.get(each.pair.name))
+        else:
+            _add_moving_line(pose, each, axes.get(each.pair.bodies[0]), each.pair.name in slides)
 
 
 def _add_link(pose: ReferencePose, link: Link, axes: KnownAxes | None) -> None:
@@ -124,6 +127,35 @@ def _add_line(pose: ReferencePose, slide: SlidingRow, displacement: float | None
             pose.conditions.append(_now(pose, off * slide.direction.conjugate - off.conjugate * slide.direction))
         return
     pose.conditions.append(off + off.conjugate if not free[0] else off - off.conjugate)
+
+
+def _add_moving_line(pose: ReferencePose, slide: SlidingRow, axes: KnownAxes | None, has_displacement: bool) -> None:
+    """The direction of a line of a moving link, and where it goes through, as far as they are given."""
+    link, name = slide.pair.bodies[0], slide.through
+    if has_displacement:
+        raise refuse(f"where {slide.pair.name!r} stands on a link that moves is given")
+    angle = pose.line_angle(slide.pair.name)
+    has_angle = angle is not None and not _is_free(pose, angle)
+    if not isinstance(name, str):
+        raise refuse(f"the line of {slide.pair.name!r} goes through a place without a name")
+    has_place = not any(_is_free(pose, f"{link}.{name}.{axis}") for axis in "xy")
+    is_elsewhere = any(own == link and other == name for own, other in pose.places)
+    if is_elsewhere:
+        off = _now(pose, slide.slider - pose.place(link, name))
+        pose.conditions.append(_now(pose, off * slide.direction.conjugate - off.conjugate * slide.direction))
+    if not has_angle and (is_elsewhere or not has_place):
+        return
+    if axes is None or axes.origin is None:
+        raise refuse(f"the line of {slide.pair.name!r} is given on {link!r}, and how that stands is not")
+    if has_angle:
+        assert angle is not None
+        turned = pose.table.add_given(NumberKind.TURN, float(pose.numbers[angle].value)).value
+        pose.tie(slide.direction - axes.direction * turned)
+    if has_place and not is_elsewhere:
+        at = link_shape(pose.links[link]).position(name)
+        own = pose.table.add_given(NumberKind.VECTOR, complex(at.x, at.y)).value
+        off = _now(pose, slide.slider - axes.origin - own * axes.direction)
+        pose.conditions.append(_now(pose, off * slide.direction.conjugate - off.conjugate * slide.direction))
 
 
 def _now(pose: ReferencePose, row: Polynomial) -> Polynomial:

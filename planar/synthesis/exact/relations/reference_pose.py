@@ -136,18 +136,29 @@ class ReferencePose:
             numbers = changed.measure(shapes)
             if not any(isinstance(n, Polynomial) and trial.symbol.own in n.symbols for n in numbers):
                 continue
-            if pair.bodies[0] != self.mechanism.frame:
-                raise refuse(f"{pair.name!r} slides along a link that moves")
-            if each.name in self.free and not self.pins_are_kept:
+            moves = pair.bodies[0] != self.mechanism.frame
+            if each.name in self.free and (moves or not self.pins_are_kept):
                 way = self.table.add_unknown()
                 patch = self.table.add_given(NumberKind.TURN, PATCH_ANGLE).value
                 along = way.value * patch.conjugate
                 self.conditions.append(along + along.conjugate - 2.0)
+            elif moves:  # along its link's axes, which tie it
+                way = self.table.add()
             else:
                 way = self.table.add_given(NumberKind.TURN, float(each.value))
             self.directions[pair.name] = Direction(way)
             return change_dimension(self.mechanism, each, self.directions[pair.name]).pairs[index]
         return pair
+
+    def line_angle(self, pair: str) -> str | None:
+        """The number of the file that is the direction of a pair's line."""
+        index = [each.name for each in self.mechanism.pairs].index(pair)
+        own = [
+            name
+            for name, each in self.numbers.items()
+            if each.address[:2] == ("pairs", index) and each.kind == "angle" and "line" in each.address
+        ]
+        return own[0] if own else None
 
     def pair_rows(
         self, pair: Pair, frames: dict[str, Frame], own: Sequence[Polynomial]

@@ -21,9 +21,12 @@ from planar.synthesis.exact.tracking.symmetry import Images, representatives, so
 FIRST_NODES, IDLE_NODES = 4, 2
 """Members at first, and how many more must bring nothing new."""
 SAME = 1e-7
-"""Of directions of length one: solutions nearer to each other are one."""
+"""Of directions of length one: solutions nearer to each other are one. Two that are nearly real are no farther apart
+than their imaginary parts."""
 BLOCK = 4096
 """Paths that are followed side by side."""
+CORRECTION = 1e-7
+"""What Newton's second step may still move a solution by: paths that leap for it are seen, as two come to one."""
 
 
 class GenericSolutions(NamedTuple):
@@ -121,15 +124,19 @@ def first_of_same(V: ComplexArray) -> IntArray:
         for other in order[at + 1 :].tolist():
             if key[other].real - key[k].real > room[k]:
                 break
-            apart = max(1.0 - abs(np.vdot(each[k], each[other])) ** 2 for each in unit)
+            apart = max(np.linalg.norm(each[other] - np.vdot(each[k], each[other]) * each[k]) for each in unit)
             if apart < SAME:
                 low = min(found[k], found[other])
                 found[k] = found[other] = low
     return found
 
 
-def follow(family: Family, begin: Member, V: ComplexArray, end: Member, near: float) -> PathEnds:
-    """Solutions of one member followed to another, many at a time."""
+def follow(
+    family: Family, begin: Member, V: ComplexArray, end: Member, near: float, has_more_digits: bool = False
+) -> PathEnds:
+    """Solutions of one member followed to another, many at a time; with the digits of long doubles where asked for."""
     between = MemberHomotopy(family, begin, end)
-    blocks = [track_paths(between, V[k : k + BLOCK], near) for k in range(0, max(len(V), 1), BLOCK)]
-    return PathEnds(*(np.concatenate(each) for each in zip(*blocks, strict=True)))
+    start = V.astype(np.clongdouble) if has_more_digits else V
+    blocks = [track_paths(between, start[k : k + BLOCK], near, CORRECTION) for k in range(0, max(len(V), 1), BLOCK)]
+    ends = PathEnds(*(np.concatenate(each) for each in zip(*blocks, strict=True)))
+    return ends._replace(V=ends.V.astype(complex))

@@ -43,8 +43,9 @@ def name_family(family: Family) -> FamilyName:
         if [given[k].value for k in order] != sorted(each.value for each in given):
             continue
         ratios = _row_values(family, np.array(orders), np.array(order, dtype=int))
-        if not exchanges:
-            same = np.abs(ratios - ratios[0]).max(axis=1, initial=0.0) < 1e-8 * np.abs(ratios[0]).max(initial=1.0)
+        if not exchanges:  # which may exchange rows of an entry, too
+            rows = np.take_along_axis(ratios, np.argsort(ratios.real, axis=1), axis=1)
+            same = np.abs(rows - rows[0]).max(axis=1, initial=0.0) < 1e-8 * np.abs(rows[0]).max(initial=1.0)
             exchanges = tuple(each for each, is_same in zip(orders, same, strict=True) if is_same)
         for unknowns, values in zip(orders, ratios, strict=True):
             told = tuple(sorted((_rounded(v.real), _rounded(v.imag)) for v in values))

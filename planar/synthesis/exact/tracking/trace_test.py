@@ -23,7 +23,7 @@ from planar.synthesis.exact.tracking.symmetry import exchange_images
 
 MAX_POINTS = 1500
 """Of a slice; with more the test is not made."""
-ROUNDS, IDLE_ROUNDS = 60, 6
+ROUNDS, IDLE_ROUNDS = 60, 15
 FINITE = 1e-6
 """Of solutions of length one: what is nearer to infinity is there."""
 EVEN = 1e-7

@@ -1,0 +1,100 @@
+"""The real solutions of the parts of a structure, each a member of its family, and what is known of all of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from planar.assemblies.polynomial.certification import is_available
+from planar.foundation.arrays import BoolArray, ComplexArray
+from planar.model.wording import count_phrase
+from planar.synthesis.exact.relations.exact_problem import Component
+from planar.synthesis.exact.relations.family import Member
+from planar.synthesis.exact.tracking.exact_certificates import certify_member
+from planar.synthesis.exact.tracking.generic_store import FamilyRecord, family_record
+from planar.synthesis.exact.tracking.member_homotopy import homogeneous_solutions
+from planar.synthesis.exact.tracking.member_solutions import MemberSolutions, solve_member
+from planar.synthesis.exact.tracking.monodromy import first_of_same
+from planar.synthesis.exact.tracking.other_ways import UNKNOWN
+from planar.synthesis.exact.tracking.symmetry import FamilyName
+
+REAL = 1e-7
+"""Of a solution's size: one that differs from its own conjugate by less is real."""
+Progress = Callable[[str], None]
+
+
+class ComponentSolutions(NamedTuple):
+    """The real solutions x (solutions, unknowns) of a component, whether each is proved, and what is known of all."""
+
+    component: Component
+    record: FamilyRecord
+    whole: MemberSolutions
+    x: ComplexArray
+    proved: BoolArray
+    all_proved: int
+    missing: int
+    "of classes of real ones, linkages that were not reached"
+
+
+def solve_components(components: Sequence[Component], say: Progress) -> list[ComponentSolutions]:
+    """The solutions of each component; those that are the same member of a family are solved once."""
+    known: dict[tuple[str, bytes], ComponentSolutions] = {}
+    solved = []
+    for each in components:
+        record = family_record(each.family, lambda many: say(f"{many} solutions of a random task"))
+        key = _member_key(record.name, each.member)
+        found = known.get(key)
+        if found is None or found.record.name != record.name:
+            found = _solve(each, record, say)
+            known[key] = found
+        solved.append(found._replace(component=each))
+    return solved
+
+
+def _solve(component: Component, record: FamilyRecord, say: Progress) -> ComponentSolutions:
+    say(f"{count_phrase(record.classes.size, 'path')}")
+    whole = solve_member(component.family, record, component.member)
+    if is_available() and len(whole.doubtful):
+        whole = _with_doubtful(component, whole)
+    proved = np.zeros(len(whole.x), dtype=bool)
+    x, is_real = whole.x, _is_real(whole.x)
+    all_proved = 0
+    if is_available() and len(x):
+        say(f"{count_phrase(len(x), 'solution')} to be certified")
+        proof = certify_member(component.family, component.member, x)
+        x, proved, all_proved = proof.x, proof.proved & proof.is_real, int(proof.proved.sum())
+        is_real = np.where(proof.proved, proof.is_real, is_real)
+    wanted = whole.members * len({*whole.classes[is_real].tolist()} - {UNKNOWN})
+    missing = max(0, wanted - int(is_real.sum()))
+    return ComponentSolutions(component, record, whole, x[is_real], proved[is_real], all_proved, missing)
+
+
+def _with_doubtful(component: Component, whole: MemberSolutions) -> MemberSolutions:
+    """Ends that only look as if several met there, which balls of more digits tell from such, beside the others."""
+    proof = certify_member(component.family, component.member, whole.doubtful)
+    both = np.concatenate([whole.x, proof.x[proof.proved]])
+    classes = np.concatenate([whole.classes, whole.doubtful_classes[proof.proved]])
+    kept = first_of_same(homogeneous_solutions(both)) == np.arange(len(both))
+    told = whole._replace(x=both[kept], classes=classes[kept])
+    return told._replace(singular=max(0, whole.singular - (told.found - whole.found)))
+
+
+def _is_real(x: ComplexArray) -> BoolArray:
+    half = x.shape[1] // 2
+    off = np.abs(x[:, :half] - x[:, half:].conj()).max(axis=1, initial=0.0)
+    found: BoolArray = off < REAL * np.maximum(1.0, np.abs(x).max(axis=1, initial=0.0))
+    return found
+
+
+def alike_components(solved: Sequence[ComponentSolutions]) -> list[list[int]]:
+    """Components that are the same member of one family, together."""
+    groups: dict[tuple[str, bytes], list[int]] = {}
+    for k, each in enumerate(solved):
+        groups.setdefault(_member_key(each.record.name, each.component.member), []).append(k)
+    return [*groups.values()]
+
+
+def _member_key(name: FamilyName, member: Member) -> tuple[str, bytes]:
+    return name.text, b"".join(np.round(part, 12).tobytes() for part in member.parts)

@@ -1,0 +1,84 @@
+"""What a complete list says of itself: how many are expected, what is counted, and how far it is complete."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import comb, prod
+
+from planar.assemblies.polynomial.certification import is_available
+from planar.model.wording import count_phrase
+from planar.synthesis.exact.complete_synthesis import ExactDesign
+from planar.synthesis.exact.component_solutions import ComponentSolutions, alike_components
+
+
+def solution_count(solved: Sequence[ComponentSolutions], counts: Sequence[int]) -> int:
+    """How many choices there are of one solution of each component, all different where components are alike."""
+    return prod(comb(counts[own[0]], len(own)) for own in alike_components(solved))
+
+
+def counted_class(solved: Sequence[ComponentSolutions]) -> str:
+    """What is counted, in words."""
+    parts = []
+    for own in alike_components(solved):
+        record = solved[own[0]].record
+        many, members = record.classes.shape
+        told = count_phrase(many, "complex solution")
+        if members > 1:
+            told = f"{many} classes of {members} linkages each, which move alike"
+        if len(record.name.exchanges) > 1:
+            told += ", those that differ in the names of links alone counted once"
+        if len(own) > 1:
+            told = f"choices of {len(own)} of {told}"
+        parts.append(told)
+    return ", each with each of ".join(parts)
+
+
+def completeness(solved: Sequence[ComponentSolutions]) -> str:
+    """How far a list is complete."""
+    for own in alike_components(solved):
+        if len(solved[own[0]].record.classes) < len(own):
+            many = count_phrase(len(solved[own[0]].record.classes), "solution")
+            return f"there is none in general: {len(own)} parts that are alike would have to differ, and have {many}"
+    gap = _gap(solved)
+    if gap:
+        return f"incomplete: {gap}"
+    if any(each.whole.singular for each in solved):
+        return "numerically complete but for singular solutions, where several meet or a curve of them passes"
+    if not all(each.record.is_traced for each in solved):
+        return "all of a number that is a lower bound: it was found by monodromy without a trace test"
+    return "numerically complete"
+
+
+def _gap(solved: Sequence[ComponentSolutions]) -> str:
+    """What is known to be wrong with the list as a whole."""
+    if any(len(each.whole.x) > each.record.classes.size for each in solved):
+        return "there are more solutions than a random task was known to have"
+    lost = sum(each.whole.lost for each in solved)
+    if lost:
+        return f"paths to {lost} of {sum(each.whole.class_count for each in solved)} were lost"
+    missing = sum(each.missing for each in solved)
+    return f"{count_phrase(missing, 'cognate')} of real linkages were not reached" if missing else ""
+
+
+def list_remarks(solved: Sequence[ComponentSolutions], designs: Sequence[ExactDesign]) -> tuple[str, ...]:
+    """How the paths of each part ended, where their number is published, and how many linkages have a defect."""
+    found = []
+    for each in [solved[own[0]] for own in alike_components(solved)]:
+        whole = each.whole
+        ends = [count_phrase(len(whole.x), "solution") + " at finite places"]
+        ends += [f"{whole.at_infinity} at infinity"] * bool(whole.at_infinity)
+        ends += [f"{whole.singular} where several meet or a curve passes"] * bool(whole.singular)
+        ends += [f"{whole.lost} lost"] * bool(whole.lost)
+        classes = f" of {whole.class_count} classes" if whole.members > 1 else ""
+        told = f"{count_phrase(each.record.classes.size, 'path')}{classes}: {', '.join(ends)}"
+        if is_available():
+            told += f"; {each.all_proved} proved, each to be the only one in a box of its own"
+        else:
+            told += "; python-flint is not there to certify them"
+        found.append(told)
+        if each.record.source:
+            found.append(each.record.source)
+    marked = sum(bool(each.defects) for each in designs)
+    if marked:
+        found.append(f"with a defect: {marked} of {count_phrase(len(designs), 'real linkage')}")
+    return tuple(found)
