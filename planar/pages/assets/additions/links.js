@@ -110,8 +110,17 @@ class OtherFile {
     const [, value, unit] = /^\s*([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*(\S.*?)?\s*$/.exec(String(number)) ?? [], { name, si } = this.units[kind];
     if (value === undefined) return null;
     if (unit === undefined) return Number(value) === 0 || typeof number === "number" ? Number(value) : null;
-    const by = unit === name ? si : KNOWN_RATES[unit];
+    const by = unit === name ? si : this.factor(unit, kind);
     return by === undefined ? null : Number(value) * by;
+  }
+
+  /** By what a number in a unit comes into SI: one that pages show of its kind, a length or an angle by the second or its
+   * square, or the pace of an input; undefined for others. */
+  factor(unit, kind) {
+    const { data } = this.page, base = unit.replace(/\/s(\^2|\u00b2)?$/, "");
+    const known = [data, ...data.unit_choices].flatMap(({ units, paces }) => (
+      base === unit ? [units?.[kind], ...Object.values(paces ?? {})] : [units?.length, units?.angle]));
+    return known.find((each) => each?.name === base)?.si;
   }
 
   /** Where two files differ in what is no number of the page. */
@@ -128,5 +137,3 @@ class OtherFile {
     }
   }
 }
-
-const KNOWN_RATES = { "rad/s": 1, "deg/s": Math.PI / 180, rpm: Math.PI / 30, "m/s": 1, "mm/s": 1e-3, "cm/s": 1e-2, "in/s": 0.0254, "rad/s^2": 1, "deg/s^2": Math.PI / 180, "m/s^2": 1, "mm/s^2": 1e-3 };
