@@ -30,6 +30,14 @@ def test_entries_round_a_circle_are_met_where_they_are_though_one_goes_back_a_li
     assert off[[2, 3]].max() < 0.021
 
 
+@pytest.mark.parametrize("sense", [1.0, -1.0])
+def test_the_last_entry_does_not_come_beyond_the_first_a_turn_later(sense):
+    places = np.exp(1j * (2.5 + sense * np.array([0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 2.0 * np.pi + 0.03])))
+    inputs = ordered_inputs(lambda at: np.abs(np.exp(1j * at)[:, None] - places), 0.0, 2.0 * np.pi, True)
+    assert np.mod(sense * np.diff(inputs), 2.0 * np.pi).sum() <= 2.0 * np.pi + 1e-9
+    assert np.abs(np.exp(1j * inputs) - places).max() < 0.035
+
+
 def test_a_range_without_a_whole_turn_does_not_go_on_over_its_end():
     places = np.array([0.8, 0.1])
     inputs = ordered_inputs(lambda at: np.abs(at[:, None] - places), 0.0, 1.0, False)
