@@ -94,9 +94,9 @@ class TaskSearch:
         """Whether the time is up."""
         return self.end is not None and monotonic() > self.end
 
-    def best_error(self) -> float:
-        """The least error of a sound design."""
-        return min((each.error for each in self.sound), default=float("inf"))
+    def best_error(self, before: int = 0) -> float:
+        """The least error of a sound design, of those that came after so many."""
+        return min((each.error for each in self.sound[before:]), default=float("inf"))
 
     def add_start(self, mechanism: Mechanism, number: int) -> bool:
         """Search the designs of one start; whether that was finished."""
@@ -120,7 +120,7 @@ class TaskSearch:
                 self.size = search.size
                 self.starts[mechanism.name] = mechanism
                 self._search_round(search, turn, before)
-            bests.append(min((each.error for each in self.sound[before:]), default=float("inf")))
+            bests.append(self.best_error(before))
             if self._is_settled(before, bests):
                 break
         return True

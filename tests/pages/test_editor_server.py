@@ -6,7 +6,6 @@ import http.client
 import json
 import shutil
 import subprocess
-import time
 
 import pytest
 from click.testing import CliRunner
@@ -23,6 +22,7 @@ from planar.pages.editor.authors_file import carry_over
 from planar.pages.editor.edit_page import edit_page
 from tests.hostile import HARMFUL_LINE, harmful_mechanism
 from tests.pencil import served
+from tests.watchdog import watched
 
 FOUR_BAR = planar.to_dict("four-bar")
 
@@ -155,9 +155,9 @@ WISHED = {
 def test_a_search_tells_how_far_it_is_and_what_it_has_found_once_it_is_stopped(server):
     told = json.loads(asked(server, what="synthesise", body={"task": WISHED})[1])
     stopped = {"search": told["search"], "stops": True}
-    while not told["is_over"]:
-        time.sleep(0.05)
-        told = json.loads(asked(server, what="search", body=stopped)[1])
+    with watched():
+        while not told["is_over"]:
+            told = json.loads(asked(server, what="search", body=stopped)[1])
     assert "problem" not in told
     assert "the search was interrupted" in told["remarks"][0] or told["designs"]
     other = json.loads(asked(server, what="search", body={"search": told["search"] + 1})[1])
