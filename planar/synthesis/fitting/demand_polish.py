@@ -58,7 +58,7 @@ def polish_demands(state: MovingDesigns) -> None:
         )
         trial = state.tried(rows, lines, change)
         tried = trial.numbers, trial.unknowns, trial.zeros
-        after, left, before = state.misses(*tried), _shortage(trial.slack, state.inexactness(*tried)), short[rows]
+        after, left, before = trial.misses, _shortage(trial.slack, state.inexactness(*tried)), short[rows]
         is_better = trial.is_good & np.where(
             before > KEPT, (left <= KEPT) | (left < ENOUGH_DROP * before), (left <= KEPT) & (after < squares[rows])
         )

@@ -14,8 +14,11 @@ from planar.synthesis.fitting.moving_designs import FitProblem, MovingDesigns
 from planar.synthesis.fitting.wanted_equations import WantedEquations
 
 MAX_STEPS = 400
-HALVING_STEPS = (10, 20, 40)
+HALVING_STEPS = (5, 10, 20)
 """Steps after which only the better half goes on, where there are many."""
+VALLEY_STEPS, ENOUGH_FALL = 10, 0.01
+"""Steps, after the halvings, in which the sum of squares is to fall by so much of it: along a valley that is flatter
+nothing is won that would be worth its time."""
 LONG_STEPS, NEAR_BEST = 100, 4.0
 """Steps after which only designs go on whose sum of squares is at most so many times the least."""
 FEW = 4
@@ -63,16 +66,24 @@ class DesignFit:
         """The designs fitted from given ones (designs, ...), of which the best so many go on to the end; `guarded` are
         the guard's unknowns (designs, positions, unknowns) and its shares of the range (designs, positions)."""
         state = MovingDesigns(self.problem, numbers, list(unknowns), list(zeros), guarded)
+        before: float | Array = np.inf
 
-        def halve(step: int) -> None:
+        def rest(step: int) -> None:
+            """Let rest what leads to nothing better, and look anew where demands are kept least."""
+            nonlocal before
+            is_late = step >= 2 * HALVING_STEPS[-1]
+            if is_late and step % VALLEY_STEPS == 0:
+                state.is_moving &= state.squares <= (1.0 - ENOUGH_FALL) * before
             if state.demands is not None and step % WATCH_STEPS == 0 and state.demands.guard.rows:
                 state.relocate_demands()
+            if is_late and step % VALLEY_STEPS == 0:
+                before = state.squares.copy()
             if step >= LONG_STEPS:
                 state.is_moving &= state.squares <= NEAR_BEST * state.squares.min()
             if step in HALVING_STEPS:
                 state.keep_best(max(keep, FEW, (len(state.numbers) + 1) // 2))
 
-        state.run(MAX_STEPS, halve)
+        state.run(MAX_STEPS, rest)
         if state.demands is not None:
             state.keep_best(max(keep, FEW))
             for _ in range(PRESSINGS if state.demands.can_lack else 0):

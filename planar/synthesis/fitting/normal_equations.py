@@ -49,21 +49,43 @@ def normal_equations(
     equations: Sequence[WantedEquations], lines: Sequence[LinearRows], numbers: GlobalNumbers
 ) -> tuple[Array, Array]:
     """The matrices (designs, size, size) and the slopes (designs, size) of half the sum of squares."""
-    many, size = len(lines[0].residual), numbers.size
-    normal, slope = np.zeros((many, size, size)), np.zeros((many, size))
+    normal = np.zeros((len(lines[0].residual), numbers.size, numbers.size))
     for k, (each, line) in enumerate(zip(equations, lines, strict=True)):
         at = numbers.columns(k)
         own = np.einsum("cnpi,cnpj->cij", line.slopes, line.slopes, optimize=True)
-        towards = np.einsum("cnpi,cnp->ci", line.slopes, line.residual)
         if not each.is_timed:
             size_along = np.sum(line.along**2, axis=-1) + DAMPING_ALONG
             across = np.einsum("cnpi,cnp->cni", line.slopes, line.along)
-            off = np.einsum("cnp,cnp->cn", line.along, line.residual) / size_along
             own -= np.einsum("cni,cnj,cn->cij", across, across, 1.0 / size_along, optimize=True)
-            towards -= np.einsum("cni,cn->ci", across, off)
         normal[:, at[:, None], at] += own
-        slope[:, at] += towards
-    return normal, slope
+    return normal, half_slopes(equations, lines, [line.residual for line in lines], numbers)
+
+
+def half_slopes(
+    equations: Sequence[WantedEquations],
+    lines: Sequence[LinearRows],
+    residuals: Sequence[Array],
+    numbers: GlobalNumbers,
+) -> Array:
+    """The slopes (designs, size) of half the squares of residuals (designs, n, parts) that change as lines do."""
+    slope = np.zeros((len(residuals[0]), numbers.size))
+    for k, (each, line, residual) in enumerate(zip(equations, lines, residuals, strict=True)):
+        slope[:, numbers.columns(k)] += np.einsum("cnpi,cnp->ci", line.slopes, _across(each, line, residual))
+    return slope
+
+
+def _across(equations: WantedEquations, line: LinearRows, residual: Array) -> Array:
+    """Residuals (designs, n, parts) without their part along the path, where an entry may go along it."""
+    if equations.is_timed:
+        return residual
+    along = np.einsum("cnp,cnp->cn", line.along, residual) / (np.sum(line.along**2, axis=-1) + DAMPING_ALONG)
+    found: Array = residual - line.along * along[..., None]
+    return found
+
+
+def predicted_residuals(equations: WantedEquations, line: LinearRows, change: Array) -> Array:
+    """What a change of the globals of its rows (designs, own) leaves of the residuals, to the first order."""
+    return _across(equations, line, line.residual + np.einsum("cnpi,ci->cnp", line.slopes, change))
 
 
 def exact_rows(
