@@ -59,7 +59,7 @@ def step_choices(
         return
     if isinstance(item.wanted, WantedPoses):
         entries = _evenly(len(item.target), most)
-        yield StepChoices(entries, _turned_steps(values[..., 2], item.target[entries, 2]))
+        yield StepChoices(entries, _turned_steps(values[..., 2], item.target[entries, 2], stride))
     along = _lengths_along(values[..., 0] + 1j * values[..., 1])
     for order in _entry_orders(item):
         few = _evenly(len(order), most)
@@ -100,19 +100,25 @@ def _timed_steps(inputs: Array, given: Array, item: WantedItem, is_whole: BoolAr
     return steps
 
 
-def _turned_steps(angles: Array, wanted: Array) -> IntArray:
+def _turned_steps(angles: Array, wanted: Array, stride: int) -> IntArray:
     """Where a link is turned from every so many a step as it is to turn from pose to pose: that is alike however the
     linkage lies and however large it is."""
-    starts = np.arange(0, angles.shape[1], POSE_STRIDE)
-    steps = np.full((len(angles), len(starts), len(wanted)), -1)
-    for k, turn in enumerate(wanted - wanted[0]):
-        off = angles[:, None, :] - (angles[:, starts, None] + turn)
-        off = np.abs(off - TURN * np.round(off / TURN))
-        off = np.where(np.isfinite(off), off, np.inf)
-        nearest = np.argmin(off, axis=2)
-        is_near = np.take_along_axis(off, nearest[..., None], axis=2)[..., 0] < MAX_TURN_MISS
-        steps[..., k] = np.where(is_near, nearest, -1)
-    return steps
+    starts = np.arange(0, angles.shape[1], POSE_STRIDE * stride)
+    order = np.argsort(np.mod(angles, TURN), axis=1)  # what is not known comes last
+    rising = np.take_along_axis(np.mod(angles, TURN), order, axis=1)
+    last = np.maximum(np.isfinite(rising).sum(axis=1, keepdims=True) - 1, 0)
+    ends = [np.take_along_axis(rising, last, axis=1) - TURN, rising[:, :1] + TURN]
+    round_turn = np.concatenate([ends[0], np.where(np.isfinite(rising), rising, ends[1])], axis=1)
+    round_turn = np.concatenate([round_turn, ends[1]], axis=1)
+    first = angles[:, starts, None]
+    at = _steps_at(round_turn, np.mod(first + (wanted - wanted[0]), TURN))
+    at = np.where(at > last[:, :, None] + 1, 0, at - 1)  # beyond its last the first comes again
+    at = np.where(at < 0, last[:, :, None], at)
+    steps: IntArray = np.take_along_axis(order, at.reshape(len(at), -1), axis=1).reshape(at.shape)
+    every = np.arange(len(angles))[:, None, None]
+    off = angles[every, steps] - first - (wanted - wanted[0])
+    off = np.abs(off - TURN * np.round(off / TURN))
+    return np.where(off < MAX_TURN_MISS, steps, -1)
 
 
 def _lengths_along(curve: ComplexArray) -> Array:
@@ -183,13 +189,15 @@ def _arc_steps(along: Array, fractions: Array, is_whole: BoolArray, stride: int)
 
 
 def _steps_at(along: Array, wanted: Array) -> IntArray:
-    """The steps nearest to shares of each design's branch (designs, choices, n)."""
+    """The steps at which rising values along each design's branch (designs, steps), NaN beyond its ends, are nearest to
+    wanted ones (designs, choices, n)."""
     design, step = np.nonzero(np.isfinite(along))
-    row = 2.0 * np.arange(len(along))  # every design has a stretch of its own on one line, searched once
+    low, high = (float(function(along[design, step], initial=0.0)) for function in (np.min, np.max))
+    row = 2.0 * (high - low + 1.0) * np.arange(len(along))  # each design has a stretch of its own on one line
     line = along[design, step] + row[design]
     first = np.searchsorted(design, np.arange(len(along)))
     last = np.searchsorted(design, np.arange(len(along)), side="right") - 1
-    flat = wanted.reshape(len(wanted), -1) + row[:, None]
+    flat = np.nan_to_num(wanted.reshape(len(wanted), -1)) + row[:, None]
     at = np.searchsorted(line, flat)
     at = np.clip(at, first[:, None] + 1, last[:, None])
     nearer = np.abs(line[at - 1] - flat) < np.abs(line[at] - flat)
