@@ -193,6 +193,8 @@ KINDS: dict[str, Callable[[np.random.Generator], Made]] = {
     "five poses": poses,
     "four poses of slides": slide_poses,
     "four poses and two places": poses_and_places(4, 2),
+    "three poses and four places": poses_and_places(3, 4),
+    "two poses and six places": poses_and_places(2, 6),
     "three pairs": four_bar_function(3, True),
     "five pairs": four_bar_function(5, False),
     "five pairs of a slider-crank": slider_function,

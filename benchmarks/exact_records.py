@@ -19,7 +19,7 @@ from planar.synthesis.exact.tracking.generic_store import KNOWN, pack_record, wr
 from planar.synthesis.exact.tracking.member_homotopy import affine_solutions, homogeneous_solutions
 from planar.synthesis.exact.tracking.monodromy import GenericSolutions, find_generic_solutions
 from planar.synthesis.exact.tracking.symmetry import Images, exchange_images, name_family, representatives
-from planar.synthesis.exact.tracking.trace_test import trace_test
+from planar.synthesis.exact.tracking.trace_test import MAX_POINTS, trace_test
 from planar.synthesis.task.starts import start_mechanisms
 
 PLACE = 0.3 + 0.2j, -0.1 + 0.4j
@@ -66,6 +66,7 @@ def main() -> None:
     parser.add_argument("kind", choices=[*KINDS])
     parser.add_argument("--enough", type=int, default=None, help="the number that is known, where the search may end")
     parser.add_argument("--source", default="", help="where their number is published")
+    parser.add_argument("--points", type=int, default=MAX_POINTS, help="the most points of a slice of the trace test")
     wanted = parser.parse_args()
     value, entries, more = KINDS[wanted.kind](np.random.default_rng(0))
     task = planar.read_task({"planar": 1, "units": UNITS, "start": value, "wanted": entries} | more)
@@ -85,7 +86,7 @@ def main() -> None:
         V = np.concatenate([representatives(each, exchanged) for each in every]) if members > 1 else found.V
         classes = np.arange(len(V)).reshape(members, -1).T
         whole = GenericSolutions(found.member, V)
-        is_traced = members == 1 and trace_test(component.family, whole, name.exchanges)
+        is_traced = members == 1 and trace_test(component.family, whole, name.exchanges, most_points=wanted.points)
         content = write_record(pack_record(name, whole, classes, is_traced, wanted.source))
         save_file(KNOWN / f"{name.text[:16]}.npz", content)
         print(len(classes), "classes of", members, "traced" if is_traced else "not traced")

@@ -129,9 +129,10 @@ if TYPE_CHECKING:
     from planar.structures.symmetry import ChainSymmetry
     from planar.synthesis.cognates.cognate_inputs import CognateInput
     from planar.synthesis.cognates.cognates import Cognate, Cognates, cognates
+    from planar.synthesis.design_motion import DesignMotion
     from planar.synthesis.exact.complete_synthesis import CompleteSynthesis, DyadCurve, ExactDesign
     from planar.synthesis.search_progress import SearchProgress
-    from planar.synthesis.synthesis import DesignMotion, Synthesis, SynthesisedDesign
+    from planar.synthesis.synthesis import Synthesis, SynthesisedDesign
     from planar.synthesis.synthesise import synthesise
     from planar.synthesis.task.synthesis_task import Demands, SynthesisTask, WantedFunction, WantedPath, WantedPoses
     from planar.synthesis.task.task_reader import read_task

@@ -46,7 +46,7 @@ MODULES = {
     "Curvature": "analysis.centres.curvature",
     "CycloidalRise": "model.input_laws.cam_rises",
     "Demands": "synthesis.task.synthesis_task",
-    "DesignMotion": "synthesis.synthesis",
+    "DesignMotion": "synthesis.design_motion",
     "Distances": "model.mechanism",
     "Drive": "model.mechanism",
     "Dwell": "analysis.motion.dwells",

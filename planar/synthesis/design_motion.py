@@ -2,21 +2,44 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
 from planar.analysis.motion.output import Extreme
 from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput, NoAnswer
+from planar.foundation.short_repr import short_repr
 from planar.model.mechanism import Mechanism
 from planar.results.motion import Motion
 from planar.solving.cycle import cycle
 from planar.synthesis.demands.output_transmissions import output_transmissions
 from planar.synthesis.judgement.input_range import input_range, range_motion
-from planar.synthesis.synthesis import DesignMotion
 
 STEPS = 90
+
+
+class DesignMotion(NamedTuple):
+    """How a design moves: its input `pair` goes from `low` to `high` (rad or m), `is_whole_turn`: it turns fully.
+
+    `transmission` has the least transmission angle (rad) of every output that has one, by its pair, with the input
+    there: over the whole turn, else between the first and the last entry of what is wanted.
+    """
+
+    pair: str
+    low: float
+    high: float
+    is_whole_turn: bool
+    transmission: Mapping[str, Extreme]
+
+    @property
+    def least_transmission(self) -> Extreme | None:
+        """The least transmission angle of all outputs, None where there is none."""
+        return min(self.transmission.values(), key=lambda each: each.value, default=None)
+
+    def __repr__(self) -> str:
+        return short_repr(self)
 
 
 def design_motion(mechanism: Mechanism, inputs: Sequence[Array]) -> DesignMotion | None:

@@ -4,41 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple, overload
+from functools import cached_property
+from typing import Any, overload
 
 import numpy as np
 
-from planar.analysis.motion.output import Extreme
 from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput
-from planar.foundation.short_repr import short_repr
 from planar.model.mechanism import Mechanism
 from planar.model.wording import count_phrase
 from planar.synthesis.cognates.cognates import Cognate
+from planar.synthesis.design_motion import DesignMotion, design_motion
 from planar.synthesis.judgement.defects import Defect
 from planar.synthesis.task.synthesis_task import SynthesisTask
-
-
-class DesignMotion(NamedTuple):
-    """How a design moves: its input `pair` goes from `low` to `high` (rad or m), `is_whole_turn`: it turns fully.
-
-    `transmission` has the least transmission angle (rad) of every output that has one, by its pair, with the input
-    there: over the whole turn, else between the first and the last entry of what is wanted.
-    """
-
-    pair: str
-    low: float
-    high: float
-    is_whole_turn: bool
-    transmission: Mapping[str, Extreme]
-
-    @property
-    def least_transmission(self) -> Extreme | None:
-        """The least transmission angle of all outputs, None where there is none."""
-        return min(self.transmission.values(), key=lambda each: each.value, default=None)
-
-    def __repr__(self) -> str:
-        return short_repr(self)
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,8 +26,8 @@ class SynthesisedDesign:
     `error` is the root mean square of its misses and `greatest_miss` the greatest (m; rad where functions of angles
     alone are wanted); `misses` (n,) are those of each wanted item and `inputs` (n,) where the input is there.
     `shortages` tell what it is short of, none of an accepted design. `start` names the mechanism that it was made from;
-    `numbers` are those that were sought, by name (SI). `motion` says how it moves, None where it does not. `cognates`
-    are other linkages that come to the same places of a point: of a path whose timing is prescribed those that keep it.
+    `numbers` are those that were sought, by name (SI). `cognates` are other linkages that come to the same places of a
+    point: of a path whose timing is prescribed those that keep it.
     """
 
     mechanism: Mechanism
@@ -60,8 +38,12 @@ class SynthesisedDesign:
     shortages: tuple[Defect, ...] = field(repr=False)
     start: str
     numbers: Mapping[str, float] = field(repr=False)
-    motion: DesignMotion | None = field(default=None, repr=False)
     cognates: tuple[Cognate, ...] = field(default=(), repr=False)
+
+    @cached_property
+    def motion(self) -> DesignMotion | None:
+        """How it moves, run when it is asked for first; None where it does not."""
+        return design_motion(self.mechanism, self.inputs) if self.numbers else None
 
     @property
     def defects(self) -> tuple[str, ...]:

@@ -18,7 +18,6 @@ from planar.model.mechanism import Mechanism
 from planar.synthesis.catalogue.catalogue import Catalogue
 from planar.synthesis.catalogue.matches import Match
 from planar.synthesis.cognates.task_cognates import task_cognates
-from planar.synthesis.design_motion import design_motion
 from planar.synthesis.design_search import Candidate, DesignSearch
 from planar.synthesis.judgement.judgement import ONE_BRANCH, ORDER, REACH, WHOLE_TURN, DesignJudge
 from planar.synthesis.judgement.refusal import refusal
@@ -243,19 +242,15 @@ class TaskSearch:
         if not self.is_finished:
             remarks.append(self._unfinished())
         sound = tuple(map(self._complete, rank_designs(self.sound, self.many)))
-        rejected = tuple(
-            replace(each, motion=design_motion(each.mechanism, each.inputs))
-            for each in rank_designs(self.rejected, self.many)
-        )
+        rejected = rank_designs(self.rejected, self.many)
         remarks += [self._freedom(each.start) for each in (sound or rejected)[:1]]
         if not sound and (self.rejected or self.is_finished):
             remarks.append(refusal([each.shortages for each in self.rejected], self.task.units))
         return Synthesis(self.task, sound, rejected, self.size, tuple(remarks), self.seed, self.is_finished)
 
     def _complete(self, design: SynthesisedDesign) -> SynthesisedDesign:
-        """A sound design with how it moves, and its cognates."""
-        moving = design_motion(design.mechanism, design.inputs)
-        return replace(design, motion=moving, cognates=task_cognates(design.mechanism, self.task))
+        """A sound design with its cognates."""
+        return replace(design, cognates=task_cognates(design.mechanism, self.task))
 
     def _unfinished(self) -> str:
         """How far a search came that did not search every start."""

@@ -8,9 +8,11 @@ import pytest
 import planar
 from planar.foundation.jets import value_and_rates
 from planar.synthesis.exact.relations.exact_problem import ExactProblem
+from planar.synthesis.exact.tracking.bilinear_roots import bilinear_roots
 from planar.synthesis.exact.tracking.exact_certificates import certify_member
 from planar.synthesis.exact.tracking.generic_store import family_record
 from planar.synthesis.exact.tracking.member_homotopy import affine_solutions, homogeneous_solutions
+from planar.synthesis.exact.tracking.member_solutions import solve_member
 from planar.synthesis.exact.tracking.monodromy import first_of_same, follow
 from planar.synthesis.exact.tracking.other_ways import ClassedSolutions, with_members
 from planar.synthesis.exact.tracking.symmetry import exchange_images, name_family, representatives
@@ -80,6 +82,28 @@ def test_the_linkage_that_made_five_poses_is_among_the_six_that_do_them():
             own = [float(value_and_rates(getattr(state.frames["BC"], part))[0]) for part in ("x", "y", "angle")]
             np.testing.assert_allclose(own[:2], [x[k], y[k]], atol=1e-9)
             assert np.cos(own[2] - angle[k]) == pytest.approx(1.0, abs=1e-12)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_dyads_by_eigenvalues_are_those_that_paths_lead_to(seed):
+    fifth = {"at": [110, -30], "angle": 95}
+    component = family_of(task(with_points_on_coupler(), {"link": "BC", "poses": [*poses(4)["poses"], fifth]}))
+    member = component.family.random_member(np.random.default_rng(seed)) if seed else component.member
+    tracked = solve_member(component.family, family_record(component.family), member).x
+    direct = bilinear_roots(component.family, member, len(tracked))
+    assert direct is not None and len(direct) == 4
+    sizes = np.abs(tracked).max(axis=1)
+    assert all(
+        (np.abs(direct - each).max(axis=1) < 1e-8 * size).any() for each, size in zip(tracked, sizes, strict=True)
+    )
+    assert bilinear_roots(component.family, member, 3) is None
+
+
+def test_rows_of_another_kind_have_no_such_closed_form():
+    component = family_of(
+        task("four-bar", {"from": "A", "to": "D", "pairs": [[0, 0], [25, 14], [50, 33], [70, 51], [90, 75]]})
+    )
+    assert bilinear_roots(component.family, component.member, 1) is None
 
 
 def test_burmesters_curves_keep_their_distances_and_close():

@@ -14,8 +14,8 @@ from planar.synthesis.synthesis import Synthesis, SynthesisedDesign
 @dataclass(frozen=True, eq=False)
 class ExactDesign(SynthesisedDesign):
     """A linkage that meets a task exactly. `certified`: a box of its own is proved to hold it and no other; defective
-    ones are listed, too, and say so in `defects` and `shortages`. `numbers` are those that were sought, by name (SI),
-    and `motion` says how it moves."""
+    ones are listed, too, and say so in `defects` and `shortages`. `numbers` are those that were sought, by name
+    (SI)."""
 
     certified: bool = False
 

@@ -12,6 +12,7 @@ from planar.foundation.arrays import BoolArray, ComplexArray
 from planar.model.wording import count_phrase
 from planar.synthesis.exact.relations.exact_problem import Component
 from planar.synthesis.exact.relations.family import Member
+from planar.synthesis.exact.tracking.bilinear_roots import bilinear_roots
 from planar.synthesis.exact.tracking.exact_certificates import certify_member
 from planar.synthesis.exact.tracking.generic_store import FamilyRecord, family_record
 from planar.synthesis.exact.tracking.member_homotopy import homogeneous_solutions
@@ -54,8 +55,7 @@ def solve_components(components: Sequence[Component], say: Progress) -> list[Com
 
 
 def _solve(component: Component, record: FamilyRecord, say: Progress) -> ComponentSolutions:
-    say(f"{count_phrase(record.classes.size, 'path')}")
-    whole = solve_member(component.family, record, component.member)
+    whole = _member_solutions(component, record, say)
     if is_available() and len(whole.doubtful):
         whole = _with_doubtful(component, whole)
     proved = np.zeros(len(whole.x), dtype=bool)
@@ -69,6 +69,17 @@ def _solve(component: Component, record: FamilyRecord, say: Progress) -> Compone
     wanted = whole.members * len({*whole.classes[is_real].tolist()} - {UNKNOWN})
     missing = max(0, wanted - int(is_real.sum()))
     return ComponentSolutions(component, record, whole, x[is_real], proved[is_real], all_proved, missing)
+
+
+def _member_solutions(component: Component, record: FamilyRecord, say: Progress) -> MemberSolutions:
+    """All solutions, in closed form where there is one, else followed from those of a random member."""
+    count, members = record.classes.shape
+    x = bilinear_roots(component.family, component.member, count) if members == 1 else None
+    if x is not None:
+        none = np.zeros(0, dtype=int)
+        return MemberSolutions(x, np.arange(count), count, 1, 0, 0, 0, x[:0], none)
+    say(f"{count_phrase(record.classes.size, 'path')}")
+    return solve_member(component.family, record, component.member)
 
 
 def _with_doubtful(component: Component, whole: MemberSolutions) -> MemberSolutions:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 from itertools import combinations, permutations, product
 
 import numpy as np
@@ -12,7 +11,6 @@ from planar.foundation.arrays import Array, ComplexArray
 from planar.foundation.errors import BadInput
 from planar.model.mechanism import Mechanism
 from planar.model.wording import count_phrase
-from planar.synthesis.design_motion import design_motion
 from planar.synthesis.exact.complete_synthesis import CompleteSynthesis, DyadCurve, ExactDesign
 from planar.synthesis.exact.component_solutions import (
     ComponentSolutions,
@@ -147,8 +145,7 @@ def _best_design(
         found.append(_judged(problem, judge, linkage, certified))
         if not found[-1].defects:
             break
-    best = min(found, key=lambda each: len(each.defects))
-    return replace(best, motion=design_motion(best.mechanism, best.inputs) if best.numbers else None)
+    return min(found, key=lambda each: len(each.defects))
 
 
 def _unwritten(problem: ExactProblem, certified: bool, why: str) -> ExactDesign:

@@ -22,7 +22,7 @@ from planar.synthesis.exact.tracking.monodromy import GenericSolutions, first_of
 from planar.synthesis.exact.tracking.symmetry import exchange_images
 
 MAX_POINTS = 1500
-"""Of a slice; with more the test is not made."""
+"""Of a slice, where nothing else is said; with more the test is not made."""
 ROUNDS, IDLE_ROUNDS = 60, 15
 FINITE = 1e-6
 """Of solutions of length one: what is nearer to infinity is there."""
@@ -84,14 +84,20 @@ def _affine(V: ComplexArray, n: int) -> tuple[ComplexArray, ComplexArray, Comple
     return np.concatenate([y[:, :n], y[:, n + 1 : -1]], axis=1), y[:, n], y
 
 
-def trace_test(family: Family, known: GenericSolutions, exchanges: tuple[tuple[int, ...], ...], seed: int = 9) -> bool:
+def trace_test(
+    family: Family,
+    known: GenericSolutions,
+    exchanges: tuple[tuple[int, ...], ...],
+    seed: int = 9,
+    most_points: int = MAX_POINTS,
+) -> bool:
     """Whether the solutions of a random member, with what exchanges make of them, are all that it has.
 
-    False also where the slice has too many points for the test.
+    False also where the slice has more points than `most_points`.
     """
     V = np.concatenate(exchange_images(exchanges)(known.V))
     V = V[first_of_same(V) == np.arange(len(V))]
-    if len(V) * 4 > MAX_POINTS:
+    if len(V) * 4 > most_points:
         return False
     rng = np.random.default_rng(seed)
     line = tuple(rng.normal(size=each.shape) + 1j * rng.normal(size=each.shape) for each in known.member.parts)
@@ -124,7 +130,7 @@ def trace_test(family: Family, known: GenericSolutions, exchanges: tuple[tuple[i
         new = both[first_of_same(both) == np.arange(len(both))]
         idle = idle + 1 if len(new) == len(points) else 0
         points = new
-        if len(points) > MAX_POINTS:
+        if len(points) > most_points:
             return False
         if idle and _is_even(points, slice_, n, follow):
             break
