@@ -9,7 +9,9 @@ from planar.synthesis.catalogue.branch_tracking import follow_branches
 from planar.synthesis.catalogue.catalogue import build_catalogue
 from planar.synthesis.catalogue.design_samples import draw_designs
 from planar.synthesis.design_search import DesignSearch
+from planar.synthesis.fitting import moving_designs
 from planar.synthesis.fitting.design_fit import DesignFit
+from planar.synthesis.fitting.moving_designs import FitProblem, MovingDesigns
 from planar.synthesis.task.starts import start_mechanisms
 
 STARTS = [("four-bar", "E"), ("slider-crank", "E"), ("whitworth", "D"), ("klann-leg", "foot"), ("geared-five-bar", "P")]
@@ -94,6 +96,24 @@ def test_a_path_of_the_start_is_found_back_from_changed_numbers(model, point):
     assert np.sqrt(best.squares[0] / 24) < 1e-4
     off = np.linalg.norm(equations.values(best.numbers[:1], best.unknowns[0][:1])[0] * found.size - places, axis=1)
     assert off.max() < 1e-3 * found.size
+
+
+@pytest.mark.parametrize(("model", "point"), [("four-bar", "E"), ("slider-crank", "E"), ("geared-five-bar", "P")])
+def test_the_second_order_brings_designs_farther_in_as_many_steps(model, point, monkeypatch):
+    places = planar.cycle(planar.load(model), 48).point(point).position[3:43:4]
+    found = search(model, point, places.tolist())
+    catalogue = found.catalogue(600, 5)
+    starts = found._fit_starts(catalogue, found.matches(catalogue, 12))
+    x, y = np.array([each.numbers for each in starts]), np.array([each.unknowns[0] for each in starts])
+    scale = found.equations[0].scale
+    problem = FitProblem(found.equations, found.free.lower / scale, found.free.upper / scale)
+    squares = []
+    for curved in (moving_designs.CURVED, np.inf):
+        monkeypatch.setattr(moving_designs, "CURVED", curved)
+        state = MovingDesigns(problem, x, [y.copy()], [np.zeros((len(x), 0))], None)
+        state.run(25)
+        squares.append(np.log10(state.squares[np.argsort(state.order)] + 1e-24))
+    assert np.median(squares[0] - squares[1]) < -1e-3
 
 
 def test_bounds_are_kept():
