@@ -25,7 +25,19 @@ SAME = 1e-5
 """By how much a number of the linkage that made a task may differ from that of the one which is it."""
 NUMBERS = ("AD.A.x", "AD.A.y", "AD.D.x", "AD.D.y", "AB.length", "BC.length", "DC.length")
 NUMBERS = (*NUMBERS, "frame.O.x", "frame.O.y", "crank.length", "rod.length")
-NUMBERS = (*NUMBERS, "frame.D.x", "frame.D.y", "rod.A.x", "rod.A.y", "BC.B.x", "BC.B.y", "BC.C.x", "BC.C.y")
+NUMBERS = (
+    *NUMBERS,
+    "EF.length",
+    "GF.length",
+    "frame.D.x",
+    "frame.D.y",
+    "rod.A.x",
+    "rod.A.y",
+    "BC.B.x",
+    "BC.B.y",
+    "BC.C.x",
+    "BC.C.y",
+)
 EXCHANGED = {"AD.A.x": "AD.D.x", "AD.A.y": "AD.D.y", "AB.length": "DC.length"}
 EXCHANGED = EXCHANGED | {"BC.B.x": "BC.C.x", "BC.B.y": "BC.C.y"}
 
@@ -83,6 +95,27 @@ def slider_crank(rng: np.random.Generator) -> dict[str, Any]:
         ],
         "inputs": [{"pair": "O", "position": float(np.arctan2(*(a - o)[::-1]))}],
         "sketch": {"A": a.tolist(), "B": b.tolist()},
+    }
+
+
+def watt_two(rng: np.random.Generator) -> dict[str, Any]:
+    """A six-bar of Watt II: a four-bar whose rocker, a plate, drives another one."""
+    a, d, g = np.array([[0.0, 0.0], [1.0, 0.0], [2.0, 0.0]]) + rng.uniform(-0.3, 0.3, (3, 2))
+    b, c, e, f = rng.uniform(-0.5, 0.5, (4, 2)) + np.array([[0.0, 0.4], [1.0, 0.8], [1.2, 0.7], [2.2, 0.7]])
+    way, off = (c - d) / np.linalg.norm(c - d), e - d
+    at = [float(off @ way), float(way[0] * off[1] - way[1] * off[0])]
+    ends = {"AB": (a, b), "BC": (b, c), "EF": (e, f), "GF": (g, f)}
+    links = {name: {"ends": [*name], "length": float(np.linalg.norm(q - p))} for name, (p, q) in ends.items()}
+    links["plate"] = {"ends": ["D", "C"], "length": float(np.linalg.norm(c - d)), "points": {"E": at}}
+    pins = {"A": a.tolist(), "D": d.tolist(), "G": g.tolist()}
+    return {
+        "planar": 1,
+        "units": UNITS,
+        "frame": "frame",
+        "links": {"frame": {"points": pins}} | links,
+        "pairs": [{"turning": pin} for pin in "ABCDEFG"],
+        "inputs": [{"pair": "A", "position": float(np.arctan2(*(b - a)[::-1]))}],
+        "sketch": {"B": b.tolist(), "C": c.tolist(), "E": e.tolist(), "F": f.tolist()},
     }
 
 
@@ -181,6 +214,15 @@ def four_bar_function(count: int, absolute: bool) -> Callable[..., Made]:
     return made
 
 
+def watt_function(rng: np.random.Generator) -> Made:
+    """Four pairs of positions of crank and output of a six-bar, whose last two links are sought."""
+    value = watt_two(rng)
+    motion, rows = _run(value, 4, rng)
+    given, shown = motion.inputs["A"].position, motion.link("GF").angle
+    pairs = [[float(given[k]), float(shown[k])] for k in rows]
+    return value, [{"from": "A", "to": "G", "pairs": pairs}], {"free": ["EF.length", "GF.length"]}
+
+
 def slider_function(rng: np.random.Generator) -> Made:
     """Pairs of positions of a crank and a slide."""
     value = slider_crank(rng)
@@ -198,6 +240,7 @@ KINDS: dict[str, Callable[[np.random.Generator], Made]] = {
     "three pairs": four_bar_function(3, True),
     "five pairs": four_bar_function(5, False),
     "five pairs of a slider-crank": slider_function,
+    "four pairs of Watt II, its output links sought": watt_function,
     "five places, pivots given": path(four_bar, 5, free=["AB.length", "BC.length", "BC.E", "DC.length"]),
     "eight places of a slider-crank": path(slider_crank, 8),
     "nine places": path(four_bar, 9),

@@ -6,15 +6,20 @@ import numpy as np
 import pytest
 
 import planar
+from benchmarks.exact_makers import KINDS
 from planar.foundation.jets import value_and_rates
+from planar.synthesis.exact.exact_linkage import evaluate
 from planar.synthesis.exact.relations.exact_problem import ExactProblem
+from planar.synthesis.exact.relations.polynomials import Polynomial
+from planar.synthesis.exact.tracking import monodromy
 from planar.synthesis.exact.tracking.bilinear_roots import bilinear_roots
 from planar.synthesis.exact.tracking.exact_certificates import certify_member
 from planar.synthesis.exact.tracking.generic_store import family_record
 from planar.synthesis.exact.tracking.member_homotopy import affine_solutions, homogeneous_solutions
 from planar.synthesis.exact.tracking.member_solutions import solve_member
-from planar.synthesis.exact.tracking.monodromy import first_of_same, follow
+from planar.synthesis.exact.tracking.monodromy import find_generic_solutions, follow
 from planar.synthesis.exact.tracking.other_ways import ClassedSolutions, with_members
+from planar.synthesis.exact.tracking.same_solutions import first_of_same
 from planar.synthesis.exact.tracking.symmetry import exchange_images, name_family, representatives
 from planar.synthesis.task.starts import start_mechanisms
 from tests.command import run
@@ -43,6 +48,10 @@ def carried(place, number):
     angle = np.radians(POSES[number][2] - POSES[0][2])
     turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
     return other + (place - first) @ turn.T
+
+
+def five_poses():
+    return {"link": "BC", "poses": [*poses(4)["poses"], {"at": [110, -30], "angle": 95}]}
 
 
 def family_of(value):
@@ -86,8 +95,7 @@ def test_the_linkage_that_made_five_poses_is_among_the_six_that_do_them():
 
 @pytest.mark.parametrize("seed", range(4))
 def test_dyads_by_eigenvalues_are_those_that_paths_lead_to(seed):
-    fifth = {"at": [110, -30], "angle": 95}
-    component = family_of(task(with_points_on_coupler(), {"link": "BC", "poses": [*poses(4)["poses"], fifth]}))
+    component = family_of(task(with_points_on_coupler(), five_poses()))
     member = component.family.random_member(np.random.default_rng(seed)) if seed else component.member
     tracked = solve_member(component.family, family_record(component.family), member).x
     direct = bilinear_roots(component.family, member, len(tracked))
@@ -183,6 +191,53 @@ def test_a_family_is_known_whatever_its_links_are_called():
     other["pairs"] = other["pairs"][::-1]
     first, second = (family_of(task(start, {"point": "E", "through": places})) for start in ("four-bar", other))
     assert name_family(first.family).text == name_family(second.family).text
+
+
+def test_the_loops_of_a_six_bar_leave_one_turn_and_vanish_where_it_is():
+    """Of a Watt II six-bar the function is that of two four-bars one after the other, whichever loops are closed."""
+    rng = np.random.default_rng(2)
+    value, wanted, more = KINDS["four pairs of Watt II, its output links sought"](rng)
+    read = planar.read_task({"planar": 1, "units": value["units"], "start": value, "wanted": wanted} | more)
+    problem = ExactProblem(read, next(iter(start_mechanisms(read))))
+    (component,) = problem.components
+    assert component.freedom == 0
+    state = planar.solve(planar.from_dict(value), {"A": wanted[0]["pairs"][0][0]})
+    given, x = problem.first_values(), []
+    for each in component.unknowns:
+        key = next(key for key in problem.pose.places if each.own in problem.pose.place(*key).symbols)
+        parts = problem.pose.place(*key).by_powers(each.own)
+        at = (complex(*state.point(key[1]).position) - problem.origin) / problem.size
+        x.append((at - evaluate(parts.get(0, Polynomial({})), given)) / evaluate(parts[1], given))
+    x = np.array([*x, *np.conj(x)])
+    still = [np.zeros_like(each) for each in component.member.parts]
+    rows = component.family.rows_at(x[:, None], component.member, still, np.zeros(1))[0]
+    assert np.abs(rows).max() < 1e-9
+
+
+def test_a_search_for_all_solutions_goes_on_where_it_was(monkeypatch):
+    class Interrupted(Exception):
+        pass
+
+    class Kept:
+        content, many = None, 3
+
+        def read(self):
+            return self.content
+
+        def write(self, content):
+            self.content, self.many = content, self.many - 1
+            if self.many == 0:
+                raise Interrupted
+
+    monkeypatch.setattr(monodromy, "KEPT_FROM", 1)
+    family = family_of(task(with_points_on_coupler(), five_poses())).family
+    whole = find_generic_solutions(family, enough=3)
+    store = Kept()
+    with pytest.raises(Interrupted):
+        find_generic_solutions(family, enough=3, store=store)
+    again = find_generic_solutions(family, enough=3, store=store)
+    np.testing.assert_array_equal(again.V, whole.V)
+    np.testing.assert_array_equal(again.member.parts[1], whole.member.parts[1])
 
 
 def test_what_is_no_solution_is_not_certified():

@@ -17,8 +17,8 @@ from planar.synthesis.exact.tracking.exact_certificates import certify_member
 from planar.synthesis.exact.tracking.generic_store import FamilyRecord, family_record
 from planar.synthesis.exact.tracking.member_homotopy import homogeneous_solutions
 from planar.synthesis.exact.tracking.member_solutions import MemberSolutions, solve_member
-from planar.synthesis.exact.tracking.monodromy import first_of_same
 from planar.synthesis.exact.tracking.other_ways import UNKNOWN
+from planar.synthesis.exact.tracking.same_solutions import first_of_same
 from planar.synthesis.exact.tracking.symmetry import FamilyName
 
 REAL = 1e-7

@@ -11,6 +11,7 @@ Two such rows give e and e' by Cramer's rule, of which the product is one; any m
 
 from __future__ import annotations
 
+from itertools import permutations
 from typing import NamedTuple
 
 from planar.synthesis.exact.relations.polynomials import Polynomial, Symbol
@@ -55,7 +56,7 @@ def eliminate(
 ) -> EntryRows:
     """The rows of an entry without its own symbols. Raises BadInput where more than one turn is left."""
     steps: list[Quotient] = []
-    rows = _without_translations(rows, translations, steps)
+    rows = _shortest_loops(_without_translations(rows, translations, steps), turns)
     single: list[Polynomial] = []
     for slide in slides:
         rows, single = _without_slide(rows, single, slide, steps)
@@ -106,6 +107,22 @@ def _without_translations(
         else:
             raise refuse("a link is tied to nothing")
     return [row for row in rows if row.terms]
+
+
+def _shortest_loops(rows: list[Polynomial], turns: list[Symbol]) -> list[Polynomial]:
+    """Loops that close, as rows, made of others so that each has as few turns as can be, by adding one to another."""
+
+    def many(row: Polynomial) -> int:
+        return sum(bool({*turn} & row.symbols) for turn in turns)
+
+    rows, is_shorter = [*rows], True
+    while is_shorter:
+        is_shorter = False
+        for (i, one), (j, other) in permutations(enumerate(rows), 2):
+            shorter = min((other + one, other - one), key=many)
+            if rows[i] is one and rows[j] is other and many(shorter) < many(other):
+                rows[j], is_shorter = shorter, True
+    return rows
 
 
 def _without_slide(

@@ -13,7 +13,7 @@ import numpy as np
 from planar.foundation.arrays import Array, ComplexArray
 from planar.synthesis.exact.relations.family import Family, Member
 from planar.synthesis.exact.tracking.member_homotopy import homogeneous_solutions
-from planar.synthesis.exact.tracking.monodromy import first_of_same
+from planar.synthesis.exact.tracking.same_solutions import first_of_same
 
 POINTS, PLACES = 6, 2
 EXACT = 1e-9

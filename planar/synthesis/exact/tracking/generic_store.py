@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 from collections.abc import Callable
 from functools import lru_cache
+from hashlib import sha256
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -47,13 +48,32 @@ def family_record(family: Family, progress: Callable[[int], None] | None = None)
         kept = CACHE.read(name.text)
         content = _read(kept) if kept is not None else None
     if content is None:
-        found = find_generic_solutions(family, exchange_images(name.exchanges), progress=progress)
+        found = find_generic_solutions(
+            family, exchange_images(name.exchanges), progress=progress, store=_UnfinishedSearch(name)
+        )
         content = pack_record(
             name, found, np.arange(len(found.V))[:, None], trace_test(family, found, name.exchanges), ""
         )
         if CACHE.is_writable():
             CACHE.write(name.text, write_record(content))
     return _unpack(name, content)
+
+
+class _UnfinishedSearch:
+    """Where the search for the solutions of a family is kept as long as it is not at its end."""
+
+    def __init__(self, name: FamilyName):
+        self.key = sha256(f"unfinished {name.text} {name.unknowns} {name.given}".encode()).hexdigest()
+
+    def read(self) -> dict[str, Any] | None:
+        """What was kept."""
+        kept = CACHE.read(self.key)
+        return None if kept is None else _read(kept)
+
+    def write(self, content: dict[str, Any]) -> None:
+        """Keep it, where anything can be kept."""
+        if CACHE.is_writable():
+            CACHE.write(self.key, write_record(content))
 
 
 def pack_record(

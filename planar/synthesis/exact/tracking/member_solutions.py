@@ -14,8 +14,9 @@ from planar.foundation.arrays import Array, BoolArray, ComplexArray, IntArray
 from planar.synthesis.exact.relations.family import Family, Member
 from planar.synthesis.exact.tracking.generic_store import FamilyRecord
 from planar.synthesis.exact.tracking.member_homotopy import affine_solutions
-from planar.synthesis.exact.tracking.monodromy import first_of_same, follow
+from planar.synthesis.exact.tracking.monodromy import follow
 from planar.synthesis.exact.tracking.other_ways import UNKNOWN, ClassedSolutions, with_members, with_new_classes
+from planar.synthesis.exact.tracking.same_solutions import first_of_same
 from planar.synthesis.exact.tracking.symmetry import exchange_images, representatives
 
 PRECISION = 1e-4

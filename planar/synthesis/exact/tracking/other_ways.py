@@ -13,7 +13,8 @@ import numpy as np
 from planar.foundation.arrays import BoolArray, ComplexArray, IntArray
 from planar.synthesis.exact.relations.family import Family, Member
 from planar.synthesis.exact.tracking.generic_store import FamilyRecord
-from planar.synthesis.exact.tracking.monodromy import first_of_same, follow
+from planar.synthesis.exact.tracking.monodromy import follow
+from planar.synthesis.exact.tracking.same_solutions import first_of_same
 from planar.synthesis.exact.tracking.symmetry import exchange_images, representatives
 
 PRECISION = 1e-5

@@ -18,7 +18,8 @@ from planar.foundation.arrays import Array, ComplexArray
 from planar.synthesis.exact.relations.family import Family
 from planar.synthesis.exact.relations.unknowns import NumberKind
 from planar.synthesis.exact.tracking.member_homotopy import affine_solutions
-from planar.synthesis.exact.tracking.monodromy import GenericSolutions, first_of_same
+from planar.synthesis.exact.tracking.monodromy import GenericSolutions
+from planar.synthesis.exact.tracking.same_solutions import first_of_same
 from planar.synthesis.exact.tracking.symmetry import exchange_images
 
 MAX_POINTS = 1500
