@@ -16,7 +16,6 @@ import planar
 from planar.drawing.designs.design_picture import closeup_picture, design_picture
 from planar.drawing.designs.function_picture import function_picture
 from planar.drawing.paper.picture import Circle, Label, Pen, Polyline
-from planar.synthesis.design_motion import design_motion
 from planar.synthesis.judgement.defects import Defect
 from planar.synthesis.judgement.judgement import DesignJudge
 from planar.synthesis.synthesis import Synthesis, SynthesisedDesign
@@ -48,7 +47,6 @@ def designed(wanted, values, name, start="four-bar", **more):
         found.defects,
         f"{start} & <i>",
         numbers,
-        design_motion(mechanism, found.inputs),
         tuple(planar.cognates(mechanism, "E")[1:]),
     )
     refused = replace(design, shortages=(Defect("one branch", "branch defect: <b>entry</b> 1"),), cognates=())
