@@ -9,7 +9,7 @@ from hypothesis import settings
 SEARCH = os.environ.get("PLANAR_TESTS") == "search"
 TIMES = 10
 """As many more where one searches."""
-SHARE = 0.15
+SHARE = 0.1
 """Of the examples that a test names, so many are tried where nobody searches: the suite has five minutes."""
 
 settings.register_profile("repeatable", derandomize=True, deadline=None, max_examples=10)
