@@ -64,6 +64,57 @@ def test_a_picture_is_laid_by_two_places_whose_distance_is_typed_and_stays(drawi
     assert all(url.startswith(here) for url in asked)
 
 
+def test_a_picture_is_undone_step_by_step_with_what_is_drawn_and_comes_back(drawing):
+    hand = drawing()
+    hand.bars((0, 0), (30, 40))
+
+    def stands():
+        """What lies on the paper: the bars, the picture's corners, and the two places by which it is laid."""
+        settled(hand.window)
+        shown = hand.window.locator("#drawing .underlay image").count()
+        corners = hand.window.evaluate(ON_PICTURE, [[0, 0], [1, 1]]) if shown else None
+        opacity = hand.window.locator("#drawing .underlay image").get_attribute("opacity") if shown else None
+        marks = hand.window.get_by_label("Distance (mm)").is_visible()
+        return list(hand.file()["links"]), corners, opacity, marks
+
+    seen = [stands()]
+    hand.window.get_by_label("Picture", exact=True).set_input_files(files=[photograph()])
+    hand.window.wait_for_selector("#drawing .underlay image")
+    seen.append(stands())
+    for at in hand.window.evaluate(ON_PICTURE, [[0.25, 0.75], [0.75, 0.25]]):
+        hand.window.mouse.click(*at)
+    seen.append(stands())
+    for label, number in (("Distance (mm)", "150"), ("Direction (deg)", "90"), ("First at x (mm)", "-20")):
+        hand.type(label, number)
+        seen.append(stands())
+    opacity = hand.window.get_by_label("Opacity")
+    opacity.fill("0.25")
+    seen.append(stands())
+    hand.bars((30, 40), (90, 40))
+    seen.append(stands())
+    hand.button("Remove picture")
+    seen.append(stands())
+    assert len({str(each) for each in seen}) == len(seen)
+    asked = []
+    hand.window.on("request", lambda request: asked.append(request.url.rsplit("/", 1)[-1]))
+    back, forth = [], []
+    for _ in seen[1:]:
+        hand.button("Undo drawing")
+        back.append(stands())
+    for _ in seen[1:]:
+        hand.button("Redo drawing")
+        forth.append(stands())
+    assert back == seen[-2::-1]
+    assert forth == seen[1:]
+    assert asked.count("answer") == 2  # of the bar alone, there and back
+    hand.button("Undo drawing")
+    hand.window.on("dialog", lambda dialog: dialog.accept())
+    hand.window.reload()
+    hand.wait()
+    found = hand.window.locator("#drawing .underlay image")
+    assert found.get_attribute("opacity") == "0.25"  # what is undone is what the window keeps
+
+
 DROP = """([kind, content]) => {
   const carried = new DataTransfer();
   if (kind === "file") carried.items.add(new File([content], "drawn.svg", { type: "image/svg+xml" }));

@@ -151,9 +151,14 @@ class Editing {
     }
   }
 
-  commit(made) {
-    this.done.push(this.drawn);
+  /** What there was before a step: the drawing, or the picture under it, {underlay}. */
+  remember(before) {
+    this.done.push(before);
     this.undone = [];
+  }
+
+  commit(made) {
+    this.remember(this.drawn);
     this.take(made, this.changed || made.file !== this.file);
   }
 
@@ -163,9 +168,14 @@ class Editing {
   step(from, to, said) {
     const there = from.pop();
     if (there === undefined) { this.say(`Nothing is left to be ${said.toLowerCase()}.`); return; }
-    to.push(this.drawn);
     this.hand.pending = [];
-    this.take(there, there.changed);
+    if (there.underlay) {
+      to.push({ underlay: this.underlay.laid });
+      this.underlay.take(there.underlay);
+    } else {
+      to.push(this.drawn);
+      this.take(there, there.changed);
+    }
     this.say(`${said}.`);
   }
 
