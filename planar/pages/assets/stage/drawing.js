@@ -79,7 +79,7 @@ class Drawing {
     const { mm, width, height, poses } = this, low = [Infinity, Infinity], high = [-Infinity, -Infinity];
     this.strokes.measure(this.page, poses, 1, mm); // of the links: what depends on the scale is not seen
     const places = this.page.data.scheme.extent.map(({ link, at, radius }) => [link, this.strokes.place(at), this.strokes.values[radius]]);
-    places.push(...(this.page.data.added ?? []).map(({ link, at }) => [link, at, 0]));
+    places.push(...(this.page.data.added?.points ?? []).map(({ link, at }) => [link, at, 0]));
     for (const frames of poses) {
       for (const [link, place, r] of places) {
         const at = Plane.carry(frames[link], place);
