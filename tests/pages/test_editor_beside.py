@@ -233,6 +233,61 @@ def test_designs_that_the_server_finds_are_listed_and_taken_over_in_one_step(dra
     assert json.loads(coming.value.path().read_text())["start"] == before
 
 
+def test_a_search_is_found_again_by_a_page_that_is_loaded_again_and_so_is_its_answer(drawing):
+    hand = wished(drawing)
+    server = drawing.opened[0][1]
+    hand.window.on("dialog", lambda dialog: dialog.accept())
+    search, tell = hand.window.get_by_role("button", name="Synthesise"), server.tell_search
+
+    def load_again():
+        hand.window.reload()
+        hand.wait()
+
+    load_again()
+    assert search.is_enabled()  # nothing has been searched for
+    server.tell_search = lambda number, stops: {"search": number, "progress": f"search {number}", "is_over": False}
+    search.click()
+    hand.window.get_by_text("Searching: search").wait_for()
+    begun = server.search
+    load_again()
+    hand.window.get_by_text(f"Searching: search {begun.number}").wait_for()
+    assert search.is_disabled()
+    assert len(hand.window.evaluate("editing.wish.places")) == 24
+    server.tell_search = tell
+    hand.window.get_by_text("6 designs.").wait_for(timeout=60_000)
+    assert server.search is begun
+    found = begun.told
+    for _ in range(2):
+        listed = hand.window.locator("#pencil .designs li").all_inner_texts()
+        assert listed == [f"{each['words']} Take" for each in found["designs"]]
+        assert hand.window.locator("#pencil .remarks li").all_inner_texts() == found["remarks"]
+        load_again()
+        hand.window.get_by_text("6 designs.").wait_for()
+    hand.button("Take design 1")
+    assert hand.file() == found["designs"][0]["document"]
+    # another window has searched meanwhile
+    with server.work:
+        server.begin_search(hand.window.evaluate("editing.wishing.form.task()"))
+    load_again()
+    hand.window.get_by_text("Another search has taken the place of this one.").wait_for()
+    load_again()
+    settled(hand.window)
+    assert hand.window.get_by_text("Another search").count() == 0
+
+
+def test_a_path_that_is_wanted_stays_in_the_window_when_the_file_is_saved(drawing, tmp_path):
+    hand = wished(drawing)
+    hand.window.get_by_label("Name of the file").fill("four")
+    hand.button("Save as")
+    hand.window.get_by_text("four.json", exact=True).wait_for()
+    places = hand.window.evaluate("editing.wish.places")
+    hand.window.reload()
+    hand.wait()
+    assert hand.window.evaluate("editing.wish.places") == places
+    assert not hand.window.evaluate("editing.changed")
+    assert json.loads((tmp_path / "four.json").read_text()) == hand.file()
+
+
 # without a mouse, and for all eyes
 
 

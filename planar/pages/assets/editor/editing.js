@@ -28,6 +28,7 @@ class Editing {
     if (answer.conflicts) this.explain();
     if (kept?.file) this.take({ file: kept.file, at: new Map(kept.at), wish: Wish.valid(kept.wish) }, kept.changed);
     else if (!this.placed.pins.size) this.use("bar");
+    this.wishing.resume();
   }
 
   // what is kept in the window until it is saved; without a store it lasts as long as the page
