@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import planar
-from planar.document.texts.mechanism_link import write_link
+from planar.document.texts.mechanism_link import read_link, write_link
 from tests.known import MODELS
 from tests.page_scripts import downloaded, same, settled
 
@@ -181,6 +181,29 @@ def test_points_and_paths_that_are_added_are_steps_of_one_history(shown):
     assert forth == seen[1:]
     assert redo.is_disabled()
     assert "points=" in window.url
+
+
+@pytest.mark.parametrize("name", ["000-P1", "toggle-clamp"])
+def test_a_page_without_a_server_says_where_new_loads_are_drawn(name, shown, drawing):
+    window = shown(MODELS[name])
+    part = window.get_by_text("Loads, springs and masses", exact=True).locator("..")
+    if not part.evaluate("(part) => part.open"):
+        part.locator("summary").click()
+    (told,) = part.locator("p").all_inner_texts()
+    assert told.count(".") == 1
+    assert "planar edit LINK" in told
+    press(window, "Copy mechanism as a link")
+    link = window.get_by_label("Link of this mechanism").input_value()
+    # there they are drawn, and nothing is said of it
+    hand = drawing(json.loads(read_link(link)))
+    assert hand.window.get_by_text("planar edit LINK").count() == 0
+    many = len(hand.mechanism().loads)
+    moving = next(name for name, at in planar.solve(hand.mechanism()).points.items() if np.hypot(*at.velocity) > 0)
+    at = planar.solve(hand.mechanism()).point(moving).position * 1000
+    hand.tool("Force")
+    hand.drag(at, at + np.array([0.0, -0.2 * hand.window.evaluate("1000 * page.data.size")]))
+    assert len(hand.mechanism().loads) == many + 1
+    assert hand.window.get_by_label("Forces", exact=True).count() == 1
 
 
 def test_a_link_of_the_same_structure_is_opened_and_of_another_one_refused(shown):

@@ -4,7 +4,7 @@
 /** Begin in the document as it came: all parts of a page, in the order in which they hear of what happens; `undo` goes on from a page before. */
 function startPage(data, program, undo = new UndoHistory()) {
   document.documentElement.classList.toggle("compact", memory.read("compact") !== null);
-  const page = new Page(Figures.recall(data), program);
+  const page = new Page(Figures.recall(data), program), hasPencil = Boolean(data.edited || globalThis.editing);
   globalThis.page = page;
   Keeping.recall(page);
   page.wanted = Wanted.of(page);
@@ -13,10 +13,10 @@ function startPage(data, program, undo = new UndoHistory()) {
   new Courses(page);
   const lens = new Lens(page, svg, drawing, dragging);
   new InputRates(page, document.getElementById("acting"));
-  page.acting = new Acting(page, document.getElementById("acting"));
+  page.acting = new Acting(page, document.getElementById("acting"), hasPencil);
   new Dimensions(page, document.getElementById("dimensions"));
   new Assemblies(page, document.getElementById("assemblies"));
-  if (!data.edited && !globalThis.editing) new PinDragging(page, svg, lens, () => controls.pause());
+  if (!hasPencil) new PinDragging(page, svg, lens, () => controls.pause());
   undo.attach(page, controls.bar, () => controls.pause());
   const saving = new Saving(page, document.getElementById("saving"), svg);
   new Films(page, saving, svg, () => controls.pause());
