@@ -611,6 +611,19 @@ def test_a_rack_reaches_from_its_block_to_its_wheel():
                     assert min(xs) - 1e-9 <= x <= max(xs) + 1e-9
 
 
+def test_a_rack_reaches_beneath_its_wheel_over_the_whole_motion():
+    """The bar goes on for 1.2 radii (of 25 mm) beyond where the wheel comes, or to the pin of its slide."""
+    state = solved("rack-differential")
+    here = state.pair("lower mesh")["displacement"]
+    for far in (0.0, 0.02, 0.05):
+        picture = scheme(state, UNIT, travel={"lower mesh": (here - far, here + far)})
+        (bar,) = (each for each in about(picture, "link lower rack", Polyline) if each.closed)
+        xs = np.array([x for x, _ in bar.points]) / 1000
+        middle = state.point("C").position[0]
+        assert xs.min() == pytest.approx(middle - far - 1.2 * 0.025, abs=1e-9)
+        assert xs.max() == pytest.approx(max(middle + far + 1.2 * 0.025, state.point("L").position[0]), abs=1e-9)
+
+
 @every_model
 def test_hatching_leans_away_from_the_line_on_the_far_side_of_the_pin(name):
     picture = drawn(name)

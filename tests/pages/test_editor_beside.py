@@ -64,6 +64,57 @@ def test_a_picture_is_laid_by_two_places_whose_distance_is_typed_and_stays(drawi
     assert all(url.startswith(here) for url in asked)
 
 
+def test_a_picture_is_undone_step_by_step_with_what_is_drawn_and_comes_back(drawing):
+    hand = drawing()
+    hand.bars((0, 0), (30, 40))
+
+    def stands():
+        """What lies on the paper: the bars, the picture's corners, and the two places by which it is laid."""
+        settled(hand.window)
+        shown = hand.window.locator("#drawing .underlay image").count()
+        corners = hand.window.evaluate(ON_PICTURE, [[0, 0], [1, 1]]) if shown else None
+        opacity = hand.window.locator("#drawing .underlay image").get_attribute("opacity") if shown else None
+        marks = hand.window.get_by_label("Distance (mm)").is_visible()
+        return list(hand.file()["links"]), corners, opacity, marks
+
+    seen = [stands()]
+    hand.window.get_by_label("Picture", exact=True).set_input_files(files=[photograph()])
+    hand.window.wait_for_selector("#drawing .underlay image")
+    seen.append(stands())
+    for at in hand.window.evaluate(ON_PICTURE, [[0.25, 0.75], [0.75, 0.25]]):
+        hand.window.mouse.click(*at)
+    seen.append(stands())
+    for label, number in (("Distance (mm)", "150"), ("Direction (deg)", "90"), ("First at x (mm)", "-20")):
+        hand.type(label, number)
+        seen.append(stands())
+    opacity = hand.window.get_by_label("Opacity")
+    opacity.fill("0.25")
+    seen.append(stands())
+    hand.bars((30, 40), (90, 40))
+    seen.append(stands())
+    hand.button("Remove picture")
+    seen.append(stands())
+    assert len({str(each) for each in seen}) == len(seen)
+    asked = []
+    hand.window.on("request", lambda request: asked.append(request.url.rsplit("/", 1)[-1]))
+    back, forth = [], []
+    for _ in seen[1:]:
+        hand.button("Undo drawing")
+        back.append(stands())
+    for _ in seen[1:]:
+        hand.button("Redo drawing")
+        forth.append(stands())
+    assert back == seen[-2::-1]
+    assert forth == seen[1:]
+    assert asked.count("answer") == 2  # of the bar alone, there and back
+    hand.button("Undo drawing")
+    hand.window.on("dialog", lambda dialog: dialog.accept())
+    hand.window.reload()
+    hand.wait()
+    found = hand.window.locator("#drawing .underlay image")
+    assert found.get_attribute("opacity") == "0.25"  # what is undone is what the window keeps
+
+
 DROP = """([kind, content]) => {
   const carried = new DataTransfer();
   if (kind === "file") carried.items.add(new File([content], "drawn.svg", { type: "image/svg+xml" }));
@@ -180,6 +231,61 @@ def test_designs_that_the_server_finds_are_listed_and_taken_over_in_one_step(dra
     with hand.window.expect_download() as coming:
         hand.window.get_by_role("button", name="Synthesise").click()
     assert json.loads(coming.value.path().read_text())["start"] == before
+
+
+def test_a_search_is_found_again_by_a_page_that_is_loaded_again_and_so_is_its_answer(drawing):
+    hand = wished(drawing)
+    server = drawing.opened[0][1]
+    hand.window.on("dialog", lambda dialog: dialog.accept())
+    search, tell = hand.window.get_by_role("button", name="Synthesise"), server.tell_search
+
+    def load_again():
+        hand.window.reload()
+        hand.wait()
+
+    load_again()
+    assert search.is_enabled()  # nothing has been searched for
+    server.tell_search = lambda number, stops: {"search": number, "progress": f"search {number}", "is_over": False}
+    search.click()
+    hand.window.get_by_text("Searching: search").wait_for()
+    begun = server.search
+    load_again()
+    hand.window.get_by_text(f"Searching: search {begun.number}").wait_for()
+    assert search.is_disabled()
+    assert len(hand.window.evaluate("editing.wish.places")) == 24
+    server.tell_search = tell
+    hand.window.get_by_text("6 designs.").wait_for(timeout=60_000)
+    assert server.search is begun
+    found = begun.told
+    for _ in range(2):
+        listed = hand.window.locator("#pencil .designs li").all_inner_texts()
+        assert listed == [f"{each['words']} Take" for each in found["designs"]]
+        assert hand.window.locator("#pencil .remarks li").all_inner_texts() == found["remarks"]
+        load_again()
+        hand.window.get_by_text("6 designs.").wait_for()
+    hand.button("Take design 1")
+    assert hand.file() == found["designs"][0]["document"]
+    # another window has searched meanwhile
+    with server.work:
+        server.begin_search(hand.window.evaluate("editing.wishing.form.task()"))
+    load_again()
+    hand.window.get_by_text("Another search has taken the place of this one.").wait_for()
+    load_again()
+    settled(hand.window)
+    assert hand.window.get_by_text("Another search").count() == 0
+
+
+def test_a_path_that_is_wanted_stays_in_the_window_when_the_file_is_saved(drawing, tmp_path):
+    hand = wished(drawing)
+    hand.window.get_by_label("Name of the file").fill("four")
+    hand.button("Save as")
+    hand.window.get_by_text("four.json", exact=True).wait_for()
+    places = hand.window.evaluate("editing.wish.places")
+    hand.window.reload()
+    hand.wait()
+    assert hand.window.evaluate("editing.wish.places") == places
+    assert not hand.window.evaluate("editing.changed")
+    assert json.loads((tmp_path / "four.json").read_text()) == hand.file()
 
 
 # without a mouse, and for all eyes

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import planar
-from planar.document.texts.mechanism_link import write_link
+from planar.document.texts.mechanism_link import read_link, write_link
 from tests.known import MODELS
 from tests.page_scripts import downloaded, same, settled
 
@@ -100,6 +100,110 @@ def test_a_path_is_wanted_on_a_page_without_a_server_and_saved_as_a_task(shown, 
     assert window.evaluate("page.wanted.items[0].places.length") == 3
     press(window, "Erase wanted path")
     assert window.evaluate("page.wanted") is None
+
+
+STANDS = """() => JSON.stringify([
+  page.data.names, ...["d", "u", "z"].map((key) => Array.from(page.linkage[key])), page.inputRates(), page.running,
+  page.data.names.map((name) => page.point(name).position),
+  page.wanted?.items.map(({ of, places, is_closed }) => [of, places, is_closed]) ?? null,
+])"""
+"""What stands on a page, in exact numbers."""
+
+
+def test_points_and_paths_that_are_added_are_steps_of_one_history(shown):
+    window = shown(FOUR_BAR)
+    seen = [window.evaluate(STANDS)]
+
+    def see():
+        settled(window)
+        seen.append(window.evaluate(STANDS))
+
+    def type_length(number):
+        field = window.get_by_label("BC: length, number, mm")
+        field.fill(number)
+        field.press("Enter")
+        see()
+
+    def click(*places):
+        for place in places:
+            window.mouse.click(*on_screen(window, *place))
+            see()
+
+    def step_input():
+        window.locator("#drawing").press("Shift+ArrowRight")
+        see()
+
+    length = 1000 * planar.dimensions(FOUR_BAR)["BC.length"]
+    type_length(f"{1.05 * length:.6g}")
+    for _ in range(2):
+        middle = window.evaluate("[0, 1].map((k) => (page.point('B').position[k] + page.point('C').position[k]) / 2)")
+        press(window, "Add a point to a link")
+        window.mouse.click(*on_screen(window, *middle))
+        window.mouse.click(*on_screen(window, middle[0] + 0.01 * len(seen), middle[1] + 0.01))
+        press(window, "Add a point to a link")  # no longer
+        see()
+        step_input()
+    press(window, "Draw the wanted path")
+    click((0.0, 0.02), (0.03, 0.04), (0.06, 0.03))
+    press(window, "Draw the wanted path")
+    step_input()
+    window.mouse.move(*on_screen(window, 0.03, 0.04))
+    window.mouse.down()
+    window.mouse.move(*on_screen(window, 0.03, 0.044), steps=3)
+    window.mouse.up()
+    window.wait_for_function("() => page.wanted.fit.ready && !page.wanted.waits")  # the dimensions have followed
+    see()
+    window.get_by_label("Point that is to trace it").select_option("C")
+    see()
+    type_length(f"{0.97 * length:.6g}")
+    (name,) = json.loads(seen[-1])[0][-1:]
+    press(window, f"Remove {name}")
+    see()
+    step_input()
+    press(window, "Erase wanted path")
+    see()
+    assert len(set(seen)) == len(seen)
+    undo, redo = (window.get_by_role("button", name=each, exact=True) for each in ("Undo", "Redo"))
+    back, forth = [], []
+    undo.focus()
+    for _ in seen[1:]:
+        window.keyboard.press("Enter")
+        settled(window)
+        back.append(window.evaluate(STANDS))
+    assert back == seen[-2::-1]
+    assert undo.is_disabled()
+    assert "points=" not in window.url
+    assert "wish=" not in window.url
+    for _ in seen[1:]:
+        window.keyboard.press("Control+y")
+        settled(window)
+        forth.append(window.evaluate(STANDS))
+    assert forth == seen[1:]
+    assert redo.is_disabled()
+    assert "points=" in window.url
+
+
+@pytest.mark.parametrize("name", ["000-P1", "toggle-clamp"])
+def test_a_page_without_a_server_says_where_new_loads_are_drawn(name, shown, drawing):
+    window = shown(MODELS[name])
+    part = window.get_by_text("Loads, springs and masses", exact=True).locator("..")
+    if not part.evaluate("(part) => part.open"):
+        part.locator("summary").click()
+    (told,) = part.locator("p").all_inner_texts()
+    assert told.count(".") == 1
+    assert "planar edit LINK" in told
+    press(window, "Copy mechanism as a link")
+    link = window.get_by_label("Link of this mechanism").input_value()
+    # there they are drawn, and nothing is said of it
+    hand = drawing(json.loads(read_link(link)))
+    assert hand.window.get_by_text("planar edit LINK").count() == 0
+    many = len(hand.mechanism().loads)
+    moving = next(name for name, at in planar.solve(hand.mechanism()).points.items() if np.hypot(*at.velocity) > 0)
+    at = planar.solve(hand.mechanism()).point(moving).position * 1000
+    hand.tool("Force")
+    hand.drag(at, at + np.array([0.0, -0.2 * hand.window.evaluate("1000 * page.data.size")]))
+    assert len(hand.mechanism().loads) == many + 1
+    assert hand.window.get_by_label("Forces", exact=True).count() == 1
 
 
 def test_a_link_of_the_same_structure_is_opened_and_of_another_one_refused(shown):

@@ -28,6 +28,66 @@ def saved_bytes(window, button, path):
     return path.read_bytes()
 
 
+# what is drawn
+
+RACKS = [
+    ("pump-jack", {"horsehead": ("P", "S", 1)}),
+    ("rack-steering", {"mesh": ("S", "O", 0)}),
+    ("rack-differential", {"lower mesh": ("L", "C", 0), "upper mesh": ("U", "C", 0)}),
+]
+"""Of each rack a point on its pitch line, the pinion's centre, and the axis along which it lies."""
+BARS = """() => [...document.querySelectorAll("#drawing .wheels polygon")].map((each) => {
+  const { link } = each.closest("[data-link]").dataset, { left, right, top, bottom } = each.getBoundingClientRect();
+  return [link, [[left, right], [top, bottom]]];
+})"""
+
+
+@pytest.mark.parametrize(("name", "meshes"), RACKS)
+def test_a_rack_is_in_the_frame_and_beneath_its_wheel_at_every_end_of_the_motion(name, meshes, shown):
+    mechanism = MODELS[name]
+    window = shown(mechanism)
+    racks = {pair.name: pair.links[0] for pair in mechanism.pairs}
+    window.wait_for_function("() => page.course")
+    frame = window.locator("#drawing").bounding_box()
+    sides = [(frame["x"], frame["x"] + frame["width"]), (frame["y"], frame["y"] + frame["height"])]
+    for part in (0.5, 0.0, 1.0, 0.25):
+        window.evaluate(
+            "(part) => { const { low, high } = controls.ends(page.running); page.moveTo(low + part * (high - low)); }",
+            part,
+        )
+        settled(window)
+        bars = window.evaluate(BARS)
+        for mesh, (point, centre, axis) in meshes.items():
+            own = [box for link, box in bars if link == racks[mesh]]
+            assert own
+            for box in own:
+                for (low, high), (least, most) in zip(box, sides, strict=True):
+                    assert least <= low <= high <= most
+            low, high = own[0][axis]
+            for each in (point, centre):
+                assert low - 2.0 <= drawn_point(window, each)[axis] + sides[axis][0] <= high + 2.0
+
+
+def test_a_guide_is_drawn_wherever_its_block_goes_where_nothing_limits_it(shown):
+    window = shown(MODELS["rack-differential"])
+    frame = window.locator("#drawing").bounding_box()
+    for position in (0.12, 0.1, 0.07, 0.02, 0.17, 0.3):
+        window.evaluate("(position) => page.moveTo(position)", position)
+        settled(window)
+        x, y = drawn_point(window, "L")
+        assert 0.0 < x < frame["width"]
+        assert 0.0 < y < frame["height"]
+        # its guide is a line of the frame beside the block
+        lines = window.evaluate(
+            """() => [...document.querySelectorAll("#drawing .ground [data-link=frame] polyline")]
+              .map((each) => each.getBoundingClientRect()).filter(({ width }) => width > 60)
+              .map(({ left, right, top }) => [left, right, top])"""
+        )
+        near = [(left, right) for left, right, top in lines if abs(top - y - frame["y"]) < 15.0]
+        assert near
+        assert all(left <= x + frame["x"] <= right for left, right in near)
+
+
 # looked at
 
 

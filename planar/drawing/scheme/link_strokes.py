@@ -167,11 +167,11 @@ def _band_strokes(mark: BeltMark) -> Iterator[PlacedStroke]:
 
 
 def rack_strokes(scene: Scene) -> Iterator[PlacedSymbol]:
-    """Racks that move, from the link's body to beneath the wheel."""
+    """Racks that move, from the link's body to beneath the wheel, wherever it is known to come."""
     for mark in scene.marks:
         if isinstance(mark, PitchLineMark) and mark.link != scene.mechanism.frame:
             foot, way = next(each[1:] for each in scene.bodies[mark.link].guides if each.name == mark.name)
-            first, last = scene.shown_range(mark.name, mark.link, foot, way)
+            first, last = scene.drawn_range(mark.name, mark.link, mark.through, foot, way)
             half, side = rack_half_length(scene, mark), rack_side(scene, mark)
             low, high = least(first - half, 0.0), greatest(last + half, 0.0)
             yield PlacedSymbol(

@@ -56,6 +56,7 @@ class Small extends Drawing {
   drive() {}
   scaleBar() {}
   inside() { return true; }
+  covers() { return true; }
 }
 
 const items = document.querySelectorAll("#gallery li");

@@ -116,10 +116,10 @@ class Page {
   snapshot() {
     const { linkage: { d, u, z, last, stop }, running, assembly, given } = this;
     const wanted = this.wanted?.numbers() ?? [], acting = this.acting?.values ?? [];
-    return { d: Array.from(d), u: Array.from(u), z: Float64Array.from(z), last, stop, of: z, running, assembly, wanted, acting, given };
+    return { d: Array.from(d), u: Array.from(u), z: Float64Array.from(z), last, stop, of: z, running, assembly, wanted, acting, given, added: this.data.added };
   }
 
-  /** Take the mechanism back to a snapshot. */
+  /** Take the mechanism back to a snapshot, which has the same added. */
   restore({ d, u, z, last, stop, of, running, assembly, wanted, acting, given }) {
     const { linkage } = this;
     Object.assign(linkage, { d: Array.from(d), u: Array.from(u), z: Float64Array.from(z) });

@@ -1,10 +1,10 @@
 "use strict";
 /* A page made of its data and functions; a name of its own for each part that others ask for. */
 
-/** Begin in the document as it came: all parts of a page, in the order in which they hear of what happens. */
-function startPage(data, program) {
+/** Begin in the document as it came: all parts of a page, in the order in which they hear of what happens; `undo` goes on from a page before. */
+function startPage(data, program, undo = new UndoHistory()) {
   document.documentElement.classList.toggle("compact", memory.read("compact") !== null);
-  const page = new Page(Figures.recall(data), program);
+  const page = new Page(Figures.recall(data), program), hasPencil = Boolean(data.edited || globalThis.editing);
   globalThis.page = page;
   Keeping.recall(page);
   page.wanted = Wanted.of(page);
@@ -13,11 +13,11 @@ function startPage(data, program) {
   new Courses(page);
   const lens = new Lens(page, svg, drawing, dragging);
   new InputRates(page, document.getElementById("acting"));
-  page.acting = new Acting(page, document.getElementById("acting"));
+  page.acting = new Acting(page, document.getElementById("acting"), hasPencil);
   new Dimensions(page, document.getElementById("dimensions"));
   new Assemblies(page, document.getElementById("assemblies"));
-  if (!data.edited && !globalThis.editing) new PinDragging(page, svg, lens, () => controls.pause());
-  const undo = new UndoHistory(page, controls.bar, () => controls.pause());
+  if (!hasPencil) new PinDragging(page, svg, lens, () => controls.pause());
+  undo.attach(page, controls.bar, () => controls.pause());
   const saving = new Saving(page, document.getElementById("saving"), svg);
   new Films(page, saving, svg, () => controls.pause());
   page.tolerances = Tolerances.ofFile(page);

@@ -1,15 +1,20 @@
 "use strict";
 /* What a reader adds to a page: points of links, and a path that is wanted of one. The page is made anew with them where it
-   stands; they stay in its address, and go with the file that is saved or copied. */
+   stands; they stay in its address, and go with the file that is saved or copied. Each change is a step of the page's history. */
 
 const ADDED_NAME = /^[A-Z]\d*$/; // as they are given
 
 class Additions {
   constructor(data, program) {
-    Object.assign(this, { data, program, parts: null, points: this.recall(data), wish: Wish.valid(Additions.parse("wish")), tool: null });
+    Object.assign(this, { data, program, parts: null, tool: null, undo: new UndoHistory((there) => this.renew(there.added, there)) });
     globalThis.additions = this;
-    this.parts = startPage(this.whole(), program);
+    this.put({ points: this.recall(data), wish: Wish.valid(Additions.parse("wish")) });
+    this.parts = startPage(this.whole(), program, this.undo);
   }
+
+  /** What is added: {points, wish}, never changed but taken the place of; `wish` follows besides where its places are dragged. */
+  put(added) { Object.assign(this, { added, wish: added.wish }); }
+  get points() { return this.added.points; }
 
   static parse(key) { try { return JSON.parse(memory.read(key)); } catch { return null; } }
 
@@ -28,7 +33,7 @@ class Additions {
   /** The page's data with all that was added. */
   whole() {
     const { data, points } = this, names = [...data.names, ...points.map(({ name }) => name)], columns = Array.from(data.columns);
-    const made = { ...data, names, columns, added: points, points: { ...data.points }, polygons: structuredClone(data.polygons) };
+    const made = { ...data, names, columns, added: this.added, points: { ...data.points }, polygons: structuredClone(data.polygons) };
     points.forEach(({ link, name }, k) => {
       made.points[name] = { links: [link], at: [[0, 1].map((axis) => data.sizes + 2 * k + axis)] };
       made.polygons.vertices.push({ letter: name.toLowerCase(), point: name, fixed: false });
@@ -52,20 +57,18 @@ class Additions {
 
   addPoint(link, place) {
     const { page } = this.parts, name = Pins.fresh(this.file, page.data.names);
-    this.points = [...this.points, { link, name, at: Plane.local(page.frames[link], place) }];
+    const points = [...this.points, { link, name, at: Plane.local(page.frames[link], place) }];
     const chosen = [...page.chosen.list, { kind: "point", name }];
     memory.write("of", JSON.stringify(chosen.map((each) => [each.kind, each.name])));
-    this.renew(`Point ${name} of ${link} is added.`);
+    this.change({ points }, `Point ${name} of ${link} is added.`);
   }
 
   remove(name) {
-    this.points = this.points.filter((each) => each.name !== name);
-    this.renew(`Point ${name} is gone.`);
+    this.change({ points: this.points.filter((each) => each.name !== name) }, `Point ${name} is gone.`);
   }
 
   takeWish(wish) {
-    this.wish = wish;
-    this.renew(wish === null ? "Nothing is wanted any more." : `${wish.places.length} ${wish.places.length > 1 ? "places are" : "place is"} wanted.`);
+    this.change({ wish }, wish === null ? "Nothing is wanted any more." : `${wish.places.length} ${wish.places.length > 1 ? "places are" : "place is"} wanted.`);
   }
 
   keep() {
@@ -74,20 +77,25 @@ class Additions {
     memory.write("wish", rounded ? JSON.stringify(rounded) : "");
   }
 
-  /** The page anew, where it stands. */
-  renew(said) {
-    const { page, lens } = this.parts, { linkage, acting, given } = page, values = acting.values, look = lens.drawing.lens;
+  /** Other points, or another path: one step. */
+  change(other, said) {
+    this.undo.add(() => this.renew({ points: this.points, wish: this.wish, ...other }));
+    this.say(said);
+  }
+
+  /** The page anew with what is added, where it stands, or at a snapshot of one that had the same. */
+  renew(added, there = null) {
+    const { page, lens } = this.parts, stood = page.snapshot(), look = lens.drawing.lens;
     this.tool = this.tools.tool;
-    this.keep();
+    this.put(added);
     page.keeping.write();
     MainPart.renew(this.parts);
-    this.parts = startPage(this.whole(), this.program);
-    this.parts.page.adopt(linkage);
-    this.parts.page.give(given);
-    this.parts.page.acting.take(values);
+    this.parts = startPage(this.whole(), this.program, this.undo);
+    const { page: made } = this.parts;
+    made.restore(there ?? { ...stood, wanted: made.snapshot().wanted });
+    this.keep();
     if (look) this.parts.lens.look(look);
     if (this.tool) this.tools.use(this.tool);
-    this.say(said);
   }
 
   // on the page

@@ -1,9 +1,11 @@
 "use strict";
 /* A slider and a number field for each number of what acts: loads, springs, masses. Forces follow at once; the
-   motion that is shown stays, as the inputs drive it. */
+   motion that is shown stays, as the inputs drive it. New ones need equations, which Python makes: a page without a pencil
+   says where. */
 
 class Acting {
-  constructor(page, section) {
+  /** `hasPencil`: new ones are drawn on the page itself. */
+  constructor(page, section, hasPencil) {
     this.page = page;
     const list = page.data.forces?.parameters ?? [];
     this.values = list.map((each) => each.value);
@@ -11,18 +13,31 @@ class Acting {
       const k = list.findIndex((each) => each.name === name);
       if (k >= 0 && this.possible(value, k)) this.values[k] = value;
     }
-    if (!list.length) {
+    this.rows = list.map((each, k) => this.row(each, k));
+    if (!list.length && hasPencil) {
       if (!section.childElementCount) section.remove();
-      this.rows = [];
       return;
     }
-    this.rows = list.map((each, k) => this.row(each, k));
     const box = Forms.element("details", { class: "dimensions" }, Forms.element("summary", {}, "Loads, springs and masses"));
+    section.append(box);
+    if (list.length) this.fill(box);
+    if (!hasPencil) box.append(Acting.elsewhere());
+  }
+
+  /** Where new ones are drawn. */
+  static elsewhere() {
+    const { element } = Forms;
+    return element("p", { class: "hint" }, "A new load, spring or mass needs its equations from the server of ", element("code", {}, "planar edit"),
+      ": copy the mechanism as a link, under Save, and start ", element("code", {}, "planar edit LINK"), ".");
+  }
+
+  /** The numbers of those that there are. */
+  fill(box) {
+    const { list } = this;
     this.all = Forms.element("button", { type: "button" }, "Reset all of these");
     this.all.addEventListener("click", () => this.take(list.map((each) => each.value)));
     box.append(...this.rows.map((row) => row.box), this.all);
     box.open = list.length <= Dimensions.MANY;
-    section.append(box);
     this.show();
   }
 

@@ -9,7 +9,7 @@ class Panels {
     for (const [id, text] of PANELS) {
       const section = document.getElementById(id);
       if (!section?.firstElementChild) continue;
-      const told = id === "acting" && !page.acting.list.length ? "Speeds" : text;
+      const told = id === "acting" && !page.acting.list.length && section.querySelector(".rate") ? "Speeds" : text;
       const press = Forms.element("button", { type: "button" }, told);
       press.addEventListener("click", () => {
         section.scrollIntoView({ block: "start" });

@@ -50,7 +50,7 @@ const Files = (() => {
       const given = data.inputs[k], kind = InputRates.kind(given, order), { ratio, name } = units[kind];
       if (now !== (order ? given.acceleration : given.velocity)) file.inputs[k][RATE_KEYS[order]] = `${Number(((now * ratio[1]) / ratio[0]).toPrecision(15))} ${name}`;
     }));
-    for (const { link, name, at } of data.added ?? []) (file.links[link].points ??= {})[name] = at.map(length);
+    for (const { link, name, at } of data.added?.points ?? []) (file.links[link].points ??= {})[name] = at.map(length);
     if (!changed) return file;
     // `ids` and what was published are of the file's own position and dimensions
     delete file.ids;

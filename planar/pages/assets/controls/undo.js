@@ -1,13 +1,18 @@
 "use strict";
-/* Undo and redo of what was done to the mechanism: its dimensions, its inputs, its assembly, what acts on it. All that changes between
-   the beginning of one act of the reader (a press, a key, a number entered) and the next is one step. */
+/* Undo and redo of what was done to the mechanism: its dimensions, its inputs, its assembly, what acts on it, what a reader has
+   added to it. All that changes between the beginning of one act of the reader (a press, a key, a number entered) and the next is one step. */
 
 const MOST_STEPS = 200;
 
 class UndoHistory {
-  constructor(page, bar, before) {
-    Object.assign(this, { page, before, done: [], undone: [], open: false, changed: new WeakSet() });
-    this.stood = page.snapshot();
+  /** `renew(there)` makes the page anew where a snapshot has other additions than the page. */
+  constructor(renew = null) {
+    Object.assign(this, { renew, done: [], undone: [], open: false, changed: new WeakSet() });
+  }
+
+  /** On a page, which may take the place of one before; its buttons stand in `bar`; `before` is done before a step is. */
+  attach(page, bar, before) {
+    Object.assign(this, { page, before, stood: page.snapshot() });
     this.undoButton = this.button(bar, "Undo", "Control+Z", () => this.undo());
     this.redoButton = this.button(bar, "Redo", "Control+Shift+Z Control+Y", () => this.redo());
     // what plays on while a button of these is pressed belongs to the step that it takes back
@@ -24,7 +29,7 @@ class UndoHistory {
     // a number that is being typed is the browser's to undo, until it is entered
     document.addEventListener("input", ({ target }) => this.changed.add(target), capture);
     for (const event of ["change", "focusout"]) document.addEventListener(event, ({ target }) => this.changed.delete(target), capture);
-    for (const event of ["move", "size", "wanted", "acting"]) page.on(event, () => this.note());
+    for (const event of ["move", "size", "wanted", "acting"]) page.on(event, () => { if (page === this.page) this.note(); }); // not of one that was before
     this.show();
   }
 
@@ -43,13 +48,32 @@ class UndoHistory {
     if (this.restoring || this.page.recording) return;
     const now = this.page.snapshot();
     if (!this.open && !samePosition(this.stood, now)) {
-      this.done.push(this.stood);
-      if (this.done.length > MOST_STEPS) this.done.shift();
-      this.undone = [];
+      this.remember();
       this.open = true;
-      this.show();
     }
     this.stood = now;
+  }
+
+  remember() {
+    this.done.push(this.stood);
+    if (this.done.length > MOST_STEPS) this.done.shift();
+    this.undone = [];
+    this.show();
+  }
+
+  /** Make the page anew with other additions: one step. */
+  add(make) {
+    this.begin();
+    this.remember();
+    this.quietly(make);
+  }
+
+  /** What changes meanwhile is no step. */
+  quietly(act) {
+    this.restoring = true;
+    try { act(); } finally { this.restoring = false; }
+    this.stood = this.page.snapshot();
+    this.show();
   }
 
   undo() { this.go(this.done, this.undone, "Undone"); }
@@ -61,10 +85,9 @@ class UndoHistory {
     this.begin();
     if (there === undefined) { this.page.say(`Nothing is left to be ${said.toLowerCase()}.`); return; }
     to.push(this.stood);
-    this.restoring = true;
-    try { this.page.restore(there); } finally { this.restoring = false; }
-    this.stood = this.page.snapshot();
-    this.show();
+    const held = ["undoButton", "redoButton"].find((each) => this[each] === document.activeElement);
+    this.quietly(() => (there.added === this.page.data.added ? this.page.restore(there) : this.renew(there)));
+    if (held) this[held].focus({ preventScroll: true });
     const at = Forms.inputs(this.page);
     this.page.say(`${said}${at ? `: ${at}` : ""}.`);
   }
@@ -83,7 +106,7 @@ class UndoHistory {
   }
 }
 
-/** Whether two snapshots are of one position of one mechanism, of which the same is wanted. */
+/** Whether two snapshots are of one position of one mechanism, of which the same is wanted; what is added changes by steps of its own. */
 function samePosition(a, b) {
   const alike = (one, other) => one.every((each, k) => each === other[k]);
   return alike(a.d, b.d) && alike(a.u, b.u) && alike(a.z, b.z) && alike(a.wanted, b.wanted) && alike(a.acting, b.acting) && alike(a.given.flat(), b.given.flat());

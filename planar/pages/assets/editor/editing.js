@@ -28,6 +28,7 @@ class Editing {
     if (answer.conflicts) this.explain();
     if (kept?.file) this.take({ file: kept.file, at: new Map(kept.at), wish: Wish.valid(kept.wish) }, kept.changed);
     else if (!this.placed.pins.size) this.use("bar");
+    this.wishing.resume();
   }
 
   // what is kept in the window until it is saved; without a store it lasts as long as the page
@@ -151,9 +152,14 @@ class Editing {
     }
   }
 
-  commit(made) {
-    this.done.push(this.drawn);
+  /** What there was before a step: the drawing, or the picture under it, {underlay}. */
+  remember(before) {
+    this.done.push(before);
     this.undone = [];
+  }
+
+  commit(made) {
+    this.remember(this.drawn);
     this.take(made, this.changed || made.file !== this.file);
   }
 
@@ -163,9 +169,14 @@ class Editing {
   step(from, to, said) {
     const there = from.pop();
     if (there === undefined) { this.say(`Nothing is left to be ${said.toLowerCase()}.`); return; }
-    to.push(this.drawn);
     this.hand.pending = [];
-    this.take(there, there.changed);
+    if (there.underlay) {
+      to.push({ underlay: this.underlay.laid });
+      this.underlay.take(there.underlay);
+    } else {
+      to.push(this.drawn);
+      this.take(there, there.changed);
+    }
     this.say(`${said}.`);
   }
 

@@ -23,7 +23,7 @@ class Filing {
     }
     if (answer.problem) { editing.say(answer.problem); return; }
     Object.assign(editing, { fileName: answer.file, changed: false, file });
-    Editing.forget();
+    if (editing.wish) editing.keep(); else Editing.forget(); // the file has no place for a wanted path
     editing.panel.show();
     editing.say(`Saved to ${answer.file}.`);
   }

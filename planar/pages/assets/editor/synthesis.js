@@ -1,6 +1,7 @@
 "use strict";
 /* The wanted path of a drawing, and the linkages that the page's server finds for it: how far the search is, stopped on
-   demand, its designs with what they miss, each taken over into the drawing in one step. */
+   demand, its designs with what they miss, each taken over into the drawing in one step. The window keeps the search's number,
+   by which a page that is loaded again finds it, running or over. */
 
 const SEARCH_PAUSE = 300; // ms between two looks at how far a search is
 
@@ -74,8 +75,19 @@ class DrawnWish {
     await this.follow(answer);
   }
 
+  static recall() { try { return JSON.parse(sessionStorage.getItem("search")); } catch { return null; } }
+  static keep(search) { try { sessionStorage.setItem("search", JSON.stringify(search)); } catch { /* no store: it lasts as long as the page */ } }
+
+  /** The search that this window has begun before it was loaded again, or its answer. */
+  async resume() {
+    const search = DrawnWish.recall();
+    if (search !== null) await this.follow(await EditServer.post("search", { search }));
+  }
+
   async follow(answer) {
     this.running = answer.search ?? null;
+    if (!answer.gone) DrawnWish.keep(this.running);
+    this.form.box.open = true;
     for (this.told = answer; this.running !== null && !this.told.is_over;) {
       this.show();
       await new Promise((go) => setTimeout(go, SEARCH_PAUSE));

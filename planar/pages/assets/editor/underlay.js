@@ -1,7 +1,7 @@
 "use strict";
 /* A picture under the paper: a photograph, a scanned figure. It is laid by two of its places, whose distance and direction
-   are typed. The window keeps it over a reload; the file has no place for it. It comes from a file of the reader's own, made
-   into a text of the page: nothing is ever loaded from anywhere else. */
+   are typed. Whatever is done to it is a step of what is drawn. The window keeps it over a reload; the file has no place for
+   it. It comes from a file of the reader's own, made into a text of the page: nothing is ever loaded from anywhere else. */
 
 const MOST_SIDE = 1600;       // px: a larger picture is kept smaller
 const MOST_LETTERS = 2500000; // of a kept picture; a longer one is kept as JPEG
@@ -26,13 +26,24 @@ class Underlay {
 
   static recall() { try { return JSON.parse(sessionStorage.getItem("picture")); } catch { return null; } }
 
-  /** Kept for a reload, as far as the window has room for it. */
-  keep() {
+  /** What lies there, to come back to: {picture, marks}, of which nothing is ever changed. */
+  get laid() { return { picture: this.picture, marks: this.marks }; }
+
+  /** Another picture, or the same laid otherwise; kept for a reload, as far as the window has room for it. */
+  take(laid) {
+    Object.assign(this, laid);
     try {
       if (this.picture) sessionStorage.setItem("picture", JSON.stringify(this.picture)); else sessionStorage.removeItem("picture");
     } catch { this.editing.say("The picture is too large to be kept over a reload."); }
     this.draw();
-    this.form.show();
+    this.editing.panel.show();
+    this.editing.sketch.draw();
+  }
+
+  /** The same as a step of its own. */
+  change(laid) {
+    this.editing.remember({ underlay: this.laid });
+    this.take({ ...this.laid, ...laid });
   }
 
   /** Take a file: as large as most of the paper, in its middle. */
@@ -40,9 +51,8 @@ class Underlay {
     const { editing } = this, { view } = editing;
     try {
       const { url, size } = await Underlay.copy(file), scale = (FIRST_SHARE * view.width) / view.scale / size[0];
-      this.picture = { url, size, scale, angle: 0, opacity: FIRST_OPACITY, at: view.toWorld([view.width / 2, view.height / 2]) };
-      this.marks = null;
-      this.keep();
+      const at = view.toWorld([view.width / 2, view.height / 2]);
+      this.change({ picture: { url, size, scale, angle: 0, opacity: FIRST_OPACITY, at }, marks: null });
       editing.use("picture");
     } catch { editing.say(`${file.name} is no picture that this browser can read.`); }
   }
@@ -93,9 +103,7 @@ class Underlay {
   mark(marks) {
     if (this.picture === null) { this.editing.say("Choose a picture first, beside the drawing, or drop one on the paper."); return; }
     if (!(Plane.apart(...marks) > 0)) return;
-    this.marks = marks;
-    this.form.show();
-    this.editing.sketch.draw();
+    this.change({ marks });
     this.editing.say("Type how far these places are apart, beside the drawing.");
   }
 
@@ -109,16 +117,18 @@ class Underlay {
   lay(told) {
     const { picture, lie } = this, { at, distance, angle } = { ...lie, ...told }, by = distance / lie.distance, turn = angle - lie.angle;
     const carried = Plane.carry({ x: at[0], y: at[1], cos: by * Math.cos(turn), sin: by * Math.sin(turn) }, Plane.minus(picture.at, lie.at));
-    Object.assign(picture, { at: carried, scale: by * picture.scale, angle: picture.angle + turn });
-    this.marks = [at, Plane.on(at, [Math.cos(angle), Math.sin(angle)], distance)];
-    this.keep();
-    this.editing.sketch.draw();
+    this.change({
+      picture: { ...picture, at: carried, scale: by * picture.scale, angle: picture.angle + turn },
+      marks: [at, Plane.on(at, [Math.cos(angle), Math.sin(angle)], distance)],
+    });
   }
 
+  /** As it looks while its opacity is being chosen. */
+  show(opacity) { this.image.setAttribute("opacity", opacity); }
+  fade(opacity) { this.change({ picture: { ...this.picture, opacity } }); }
+
   remove() {
-    Object.assign(this, { picture: null, marks: null });
-    this.keep();
-    this.editing.sketch.draw();
+    this.change({ picture: null, marks: null });
     this.editing.say("The picture is gone.");
   }
 }
@@ -131,8 +141,8 @@ class UnderlayForm {
     this.file = element("input", { type: "file", accept: "image/*" });
     this.file.addEventListener("change", () => { if (this.file.files[0]) underlay.read(this.file.files[0]); this.file.value = ""; });
     this.opacity = element("input", { type: "range", min: 0.05, max: 1, step: 0.05 });
-    this.opacity.addEventListener("input", () => { underlay.picture.opacity = Number(this.opacity.value); underlay.place(); });
-    this.opacity.addEventListener("change", () => underlay.keep());
+    this.opacity.addEventListener("input", () => underlay.show(this.opacity.value));
+    this.opacity.addEventListener("change", () => underlay.fade(Number(this.opacity.value)));
     const remove = element("button", { type: "button" }, "Remove picture");
     remove.addEventListener("click", () => underlay.remove());
     this.laid = element("p", { class: "row" }, element("label", { class: "choice" }, "Opacity ", this.opacity), remove);

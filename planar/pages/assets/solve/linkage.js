@@ -78,7 +78,7 @@ class Linkage {
     this.found = new Float64Array(w);
     this.rates = new Float64Array((F + w) * 3 + F * (z + u));
     this.d = data.dimensions.map((each) => each.value);
-    this.sizes = new Float64Array(data.sizes + 2 * (data.added?.length ?? 0));
+    this.sizes = new Float64Array(data.sizes + 2 * (data.added?.points.length ?? 0));
     this.measure();
     this.scale = data.inputs.map((each) => (each.slides ? data.size : 1));
     this.u = data.inputs.map((each, k) => each.position / this.scale[k]);
@@ -103,7 +103,7 @@ class Linkage {
   /** Fill in the numbers of the pairs from the dimensions. */
   measure(d = this.d) {
     this.program.sizes(d, this.sizes);
-    this.data.added?.forEach(({ at }, k) => this.sizes.set(at, this.data.sizes + 2 * k)); // what the reader has added
+    this.data.added?.points.forEach(({ at }, k) => this.sizes.set(at, this.data.sizes + 2 * k)); // what the reader has added
     this.scales = null; // of the slope: made where they are wanted
     this.p = this.sizes.subarray(0, this.data.counts.p);
   }

@@ -4,6 +4,7 @@
 const POSES = 24; // over the range of an input
 const SLIDE_SEARCH = 3; // times its size: how far the limits of a slide are looked for
 const FREE = 0.3; // of the mechanism's size: how far a slide without limits is shown
+const AHEAD = { parts: 4, turn: Math.PI / 2 }; // of a way on from where it is
 
 /** Go through the motion of every input, the others where they are: {poses: the links' axes, spans: of every input from
     where to where it went, {low, high, whole, dead, names}}. */
@@ -32,4 +33,22 @@ function motions(page) {
     return span;
   });
   return { poses, spans };
+}
+
+/** The pose of a page, and those a little farther every way that its inputs go. */
+function motionsAhead(page) {
+  const { data, linkage } = page, poses = [page.frames];
+  data.inputs.forEach(({ slides }, k) => {
+    for (const way of [1, -1]) {
+      const made = linkage.copy();
+      for (let part = 1; part <= AHEAD.parts; part++) {
+        const u = Array.from(linkage.u);
+        u[k] += (way * part * (slides ? FREE : AHEAD.turn)) / AHEAD.parts;
+        const { reached } = made.moveTo(u);
+        poses.push(page.framesOf(made.state()));
+        if (reached < 1) break;
+      }
+    }
+  });
+  return poses;
 }

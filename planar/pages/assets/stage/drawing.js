@@ -5,6 +5,9 @@
 const HEIGHTS = ["ground", "plates", "wheels", "tubes", "bars", "springs", "sliders", "pins", "drives", "letters"];
 const LARGEST_MM = { page: 8, projected: 14 }; // px
 const MARGIN = 12;     // mm about everything that moves
+const EDGE = 1;        // mm about all strokes
+const REFITS = 5;      // times at the most that room is made for strokes, of which some keep their size on paper
+const OVERHANG = 2;    // mm: as far a block may go beyond what its guide is drawn for
 const FOOT = 6;        // mm below for the bar of the scale
 const FINGER = 24;     // px: as wide a link can be taken hold of
 
@@ -58,7 +61,17 @@ class Drawing {
     svg.style.setProperty("--mm", mm);
     svg.setAttribute("viewBox", `0 0 ${width} ${height}`);
     this.fit();
-    this.strokes.measure(page, this.poses, this.scale, mm);
+    this.compose();
+    for (let k = 0; k < REFITS && this.refit(); k++) this.compose();
+    this.scaleBar();
+    this.named();
+    page.emit("view");
+    this.place(true);
+  }
+
+  /** All strokes for the scale that there is. */
+  compose() {
+    this.strokes.measure(this.page, this.poses, this.scale, this.mm);
     this.root.replaceChildren();
     this.levels = Object.fromEntries(HEIGHTS.map((name) => [name, Symbols.element("g", { class: name })]));
     this.root.append(...HEIGHTS.map((name) => this.levels[name]));
@@ -68,10 +81,6 @@ class Drawing {
     this.draw();
     this.lasting = this.edges.length;
     this.drive();
-    this.scaleBar();
-    this.named();
-    page.emit("view");
-    this.place(true);
   }
 
   /** The scale (px/m) at which all positions fit, and where the world's origin lies. */
@@ -79,7 +88,7 @@ class Drawing {
     const { mm, width, height, poses } = this, low = [Infinity, Infinity], high = [-Infinity, -Infinity];
     this.strokes.measure(this.page, poses, 1, mm); // of the links: what depends on the scale is not seen
     const places = this.page.data.scheme.extent.map(({ link, at, radius }) => [link, this.strokes.place(at), this.strokes.values[radius]]);
-    places.push(...(this.page.data.added ?? []).map(({ link, at }) => [link, at, 0]));
+    places.push(...(this.page.data.added?.points ?? []).map(({ link, at }) => [link, at, 0]));
     for (const frames of poses) {
       for (const [link, place, r] of places) {
         const at = Plane.carry(frames[link], place);
@@ -97,7 +106,43 @@ class Drawing {
     if (this.lens) ({ scale: this.scale } = this.lens);
     if (this.held) ({ scale: this.scale } = this.held); // what is dragged is not drawn away from the pointer
     const whole = [(low[0] + high[0]) / 2, (low[1] + high[1]) / 2 - (0.5 * FOOT * mm) / this.scale];
-    const [x, y] = this.lens?.at ?? whole, origin = this.held?.origin ?? [width / 2 - x * this.scale, height / 2 + y * this.scale];
+    const [x, y] = this.lens?.at ?? whole;
+    this.corners = [low, high];
+    this.look(this.held?.origin ?? [width / 2 - x * this.scale, height / 2 + y * this.scale]);
+  }
+
+  /** Room for strokes that go farther than what they join, as racks do, in all positions; whether there was none. */
+  refit() {
+    if (this.lens || this.held) return false;
+    const { mm, width, height, scale, origin, corners: [[left, bottom], [right, top]] } = this, edge = EDGE * mm, margin = MARGIN * mm;
+    const room = [width, height - FOOT * mm], [low, high] = this.inked();
+    const from = [Math.min(low[0] - edge, left * scale - margin), Math.min(low[1] - edge, -top * scale - margin)];
+    const to = [Math.max(high[0] + edge, right * scale + margin), Math.max(high[1] + edge, -bottom * scale + margin)];
+    if ([0, 1].every((k) => from[k] + origin[k] >= -0.5 && to[k] + origin[k] <= room[k] + 0.5)) return false;
+    const by = Math.min(1, ...[0, 1].map((k) => room[k] / (to[k] - from[k])));
+    this.scale = this.fitted = by * scale;
+    this.look([0, 1].map((k) => room[k] / 2 - (by * (from[k] + to[k])) / 2));
+    return true;
+  }
+
+  /** The corners of all strokes in all positions, in px from the world's origin. */
+  inked() {
+    const { edges, poses, scale } = this, low = [Infinity, Infinity], high = [-Infinity, -Infinity];
+    for (const frames of poses) {
+      for (const [link, ...ends] of edges) {
+        const f = frames[link];
+        for (const [x, y] of ends) {
+          const at = [f.x * scale + f.cos * x + f.sin * y, -f.y * scale - f.sin * x + f.cos * y];
+          for (const k of [0, 1]) { low[k] = Math.min(low[k], at[k]); high[k] = Math.max(high[k], at[k]); }
+        }
+      }
+    }
+    return [low, high];
+  }
+
+  /** Take a place of the world's origin on the screen. */
+  look(origin) {
+    const { mm, width, height } = this;
     this.origin = origin;
     this.page.view = {
       scale: this.scale, mm, width, height,
@@ -194,7 +239,7 @@ class Drawing {
     for (const { group, link } of this.parts.values()) group.setAttribute("transform", matrices[link]);
     this.springs.place();
     this.avoid();
-    if (!this.lens && !this.inside() && !this.growing && !this.held) return this.grow();
+    if (!this.growing && !this.held && (!this.covers() || (!this.lens && !this.inside()))) return this.grow();
     const settled = this.letters.place(this.spots.map(([link, at]) => this.screen(link, at)), this.avoided, [this.width, this.height], jump);
     if (!settled && !this.settling) {
       this.settling = true;
@@ -227,10 +272,16 @@ class Drawing {
     return true;
   }
 
+  /** Whether guides and racks are long enough for where the mechanism is. */
+  covers() { return this.strokes.cover(this.page.frames, OVERHANG); }
+
+  /** Room for where the mechanism is, and a little more, so that it is not made at every step anew. */
   grow() {
     this.growing = true;
-    this.poses.push(this.page.frames);
-    this.slack += 0.05 * this.page.data.size; // not at every step anew
+    if (this.covers()) {
+      this.poses.push(this.page.frames);
+      this.slack += 0.05 * this.page.data.size;
+    } else this.poses.push(...motionsAhead(this.page));
     this.build();
     this.growing = false;
   }

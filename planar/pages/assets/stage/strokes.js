@@ -17,16 +17,30 @@ class Strokes {
     Object.assign(this, { scale, mm });
     const renew = () => page.drawn(this.travel, mm / scale, this.values);
     renew(); // of the lines that the travel is measured along
-    this.scheme.measures.forEach(({ link, foot, direction, rider, at }, k) => {
-      const [start, way, place] = [foot, direction, at].map((each) => this.place(each));
+    this.scheme.measures.forEach((measure, k) => {
       let low = Infinity, high = -Infinity;
       for (const frames of poses) {
-        const far = Plane.dot(Plane.minus(Plane.local(frames[link], Plane.carry(frames[rider], place)), start), way);
+        const far = this.displacement(measure, frames);
         [low, high] = [Math.min(low, far), Math.max(high, far)];
       }
       this.travel.set([low, high], 2 * k);
     });
     renew();
+  }
+
+  /** How far along a line of a link a point of another is in a pose (m). */
+  displacement({ link, foot, direction, rider, at }, frames) {
+    const [start, way, place] = [foot, direction, at].map((each) => this.place(each));
+    return Plane.dot(Plane.minus(Plane.local(frames[link], Plane.carry(frames[rider], place)), start), way);
+  }
+
+  /** Whether no displacement of a pose goes farther by `over` (mm) than those that the strokes are for. */
+  cover(frames, over) {
+    const off = (over * this.mm) / this.scale;
+    return this.scheme.measures.every((measure, k) => {
+      const far = this.displacement(measure, frames);
+      return far >= this.travel[2 * k] - off && far <= this.travel[2 * k + 1] + off;
+    });
   }
 
   /** A place or a direction in the axes of its link (m). */
