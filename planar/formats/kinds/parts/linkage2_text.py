@@ -36,6 +36,7 @@ class _Writer:
         self.linkage = linkage
         self.scale = MILLIMETRES[linkage.length] * PIXELS_PER_MILLIMETRE
         self.connectors: list[str] = []
+        self.at: list[Place] = []
         self.members: dict[str, list[int]] = {}
         self.gears: list[WheelJoint] = []
         places = [each.at for each in (*linkage.joints, *linkage.tracers) if not isinstance(each, WheelJoint)]
@@ -70,6 +71,7 @@ class _Writer:
 
     def _connector(self, name: str, at: Place, links: list[str], more: str = "", inside: tuple[int, ...] = ()) -> int:
         number = len(self.connectors)
+        self.at.append(at)
         x, y = at[0] * self.scale, at[1] * self.scale
         head = f'\t<connector id="{number}" name={quoteattr(name)} layer="16" x="{x!r}" y="{y!r}"'
         head += f" {more}" if more else ""
@@ -121,6 +123,8 @@ class _Writer:
         centres = [wheel_centre(self.linkage.joints, wheel, joint.carrier) for wheel in joint.wheels]
         if centres[0] is None or centres[1] is None or near(centres[0], centres[1]):
             raise cannot_say(TITLE, what, "its wheels have no two pins on a common link")
+        for wheel, centre in zip(joint.wheels, centres, strict=True):  # a wheel turns about its first connector
+            self.members[wheel].sort(key=lambda number: self.at[number] != centre)
         first, second = ids[joint.wheels[0]], ids[joint.wheels[1]]
         kind = "gears" if gears else "chain"
         return (
