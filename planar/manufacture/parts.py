@@ -36,6 +36,8 @@ PIN_SHARE = 0.1
 """Of the middle one of the distances between pins, of which the pins' diameter is to be about so much."""
 SCALES = (1.0, 2.0, 2.5, 5.0, 10.0, 20.0, 25.0, 50.0, 100.0, 200.0, 500.0, 1000.0)
 """By which a mechanism is made smaller, so that its largest plate fits the sheet."""
+TRAVEL_LEVEL = 4
+"""Of the run by which slots are as long as their travel: to 2e-6 of a crank."""
 
 
 @dataclass(frozen=True)
@@ -52,9 +54,9 @@ class PartPin:
 class Parts:
     """Plates of the links of a mechanism, in mm where they were drawn, and the same laid out on sheets.
 
-    `is_clear` tells whether no plate meets another in its layer and no pin runs through one, at any of `positions`
-    positions of the run; what meets, and what else is to know, is in `notes`. `thickness`, `sheet` and `scale` are as
-    they were asked for (m; a scale of 0.2 is 1:5).
+    `is_clear` tells whether no plate meets another in its layer and no pin runs through one, all over the run, between
+    positions too; `positions` are the most that this took. What meets, and what else is to know, is in `notes`.
+    `thickness`, `sheet` and `scale` are as they were asked for (m; a scale of 0.2 is 1:5).
     """
 
     mechanism: Mechanism
@@ -123,8 +125,9 @@ def parts(  # many: sizes of what is cut
     Lengths in m. A plate is what is within `pin` / 2 + `wall` of its pins and slots; holes and slots are wider than
     their pins by `play`; the pins of the file keep its radii. Left out, pins are about a tenth of the middle distance
     between pins, walls as wide as pins, and the scale is the largest that lets each plate fit a `sheet`, `gap` apart.
-    Layers are found by the distances of all plates and pins at steps + 1 positions of `planar.cycle`. Raises BadInput
-    for a pair that is none of plates, and where a plate cannot be; NoAnswer where the mechanism does not run.
+    Layers are found by the distances of all plates and pins over `planar.cycle` with so many steps, and with up to 64
+    times as many where those leave it open whether something is met between positions. Raises BadInput for a pair that
+    is none of plates, and where a plate cannot be; NoAnswer where the mechanism does not run.
 
     >>> import planar
     >>> planar.parts("four-bar", thickness=0.003)
@@ -141,8 +144,7 @@ def parts(  # many: sizes of what is cut
         raise BadInput(problem.place, told) from None
     held = {link for joint in linkage.joints for link in joined_links(joint)}
     linkage = replace(linkage, links=tuple(link for link in linkage.links if link in held))
-    motion = _whole_run(mechanism, steps)
-    run = _Run(motion, drawn, linkage)
+    run = _Run(mechanism, steps, drawn, linkage)
     sizes = _Request(thickness, pin, wall, play, sheet, gap, steps)
     for made in SCALES if scale is None else (1.0 / scale,):
         found = _parts_at(mechanism, run, sizes, 1.0 / made)
@@ -177,14 +179,27 @@ class _Request:
 
 
 class _Run:
-    """A run, and the linkage where it was drawn."""
+    """A run, the same with more steps, and the linkage where it was drawn."""
 
-    def __init__(self, motion: Motion, drawn: Mapping[str, Frame], linkage: DrawnLinkage) -> None:
-        self.motion, self.drawn, self.linkage = motion, drawn, linkage
+    def __init__(self, mechanism: Mechanism, steps: int, drawn: Mapping[str, Frame], linkage: DrawnLinkage) -> None:
+        self.mechanism, self.steps, self.drawn, self.linkage = mechanism, steps, drawn, linkage
+        self.motions = [_whole_run(mechanism, steps)]
 
-    def places(self, link: str, points: tuple[tuple[float, float], ...], scale: float) -> np.ndarray:
-        frame = self.motion.frames[link]
-        return places_over(points, self.drawn[link], frame, 1e-3 / scale, len(self.motion))
+    @property
+    def motion(self) -> Motion:
+        return self.motions[0]
+
+    @property
+    def most_positions(self) -> int:
+        """Of the run with the most steps that was looked at."""
+        return len(self.motions[-1])
+
+    def places(self, link: str, points: tuple[tuple[float, float], ...], scale: float, level: int = 0) -> np.ndarray:
+        """Points of a link over the run with 2^level times as many steps, as `places_over` gives them."""
+        while len(self.motions) <= level:
+            self.motions.append(_whole_run(self.mechanism, self.steps * 2 ** len(self.motions)))
+        motion = self.motions[level]
+        return places_over(points, self.drawn[link], motion.frames[link], 1e-3 / scale, len(motion))
 
     def travels(self, linkage: DrawnLinkage, scale: float) -> dict[str, Travel]:
         """How far each slide goes in its guide from where it was drawn."""
@@ -194,8 +209,8 @@ class _Run:
                 rider = joint.slider if isinstance(joint, SlideJoint) else joint.rider
                 way = cos(radians(joint.angle)), sin(radians(joint.angle))
                 ahead = (joint.at[0] + way[0], joint.at[1] + way[1])
-                own = self.places(rider, (joint.at,), scale)
-                guide = self.places(joint.guide, (joint.at, ahead), scale)
+                own = self.places(rider, (joint.at,), scale, TRAVEL_LEVEL)
+                guide = self.places(joint.guide, (joint.at, ahead), scale, TRAVEL_LEVEL)
                 ways = guide[:, 1] - guide[:, 0]
                 along = np.einsum("ij,ij->i", own[:, 0] - guide[:, 0], ways)
                 found[joint.name] = Travel(float(along.min()), float(along.max()))
@@ -215,8 +230,8 @@ def _parts_at(mechanism: Mechanism, run: _Run, request: _Request, scale: float) 
     except BadInput:
         return None
 
-    def places(link: str, points: tuple[tuple[float, float], ...]) -> np.ndarray:
-        return run.places(link, points, scale)
+    def places(link: str, points: tuple[tuple[float, float], ...], level: int) -> np.ndarray:
+        return run.places(link, points, scale, level)
 
     layers, meets = find_layers(layer_rules(places, plates, pins, meshing, sizes))
     placed = tuple(plate._replace(layer=layer) for plate, layer in zip(plates, layers, strict=True))
@@ -231,7 +246,7 @@ def _parts_at(mechanism: Mechanism, run: _Run, request: _Request, scale: float) 
         request.sheet,
         scale,
         not meets,
-        len(run.motion),
+        run.most_positions,
         notes,
     )
 

@@ -7,6 +7,8 @@ from math import atan2, cos, hypot, pi, radians, sin, tan
 from typing import NamedTuple
 
 Place = tuple[float, float]
+ROUND_OFF = 1e-12
+"""Of the square of a hull's extent: a turn that is none."""
 Vertex = tuple[float, float, float]
 """x, y, and the bulge of the way to the next vertex: the tangent of a quarter of its arc's angle, 0 if straight."""
 
@@ -54,15 +56,17 @@ class Plate(NamedTuple):
 
 
 def convex_hull(points: Iterable[Place]) -> list[Place]:
-    """The corners of the convex hull, anticlockwise (A. M. Andrew's monotone chain)."""
+    """The corners of the convex hull, anticlockwise (A. M. Andrew's monotone chain); on a line to round-off is none."""
     order = sorted(set(points))
     if len(order) < 3:
         return order
+    span = max(order[-1][0] - order[0][0], max(y for _, y in order) - min(y for _, y in order))
+    straight = ROUND_OFF * span**2
 
     def half(run: Sequence[Place]) -> list[Place]:
         found: list[Place] = []
         for point in run:
-            while len(found) > 1 and _turn(found[-2], found[-1], point) <= 0.0:
+            while len(found) > 1 and _turn(found[-2], found[-1], point) <= straight:
                 found.pop()
             found.append(point)
         return found[:-1]
