@@ -96,7 +96,7 @@ def ways_apart(one: Rows, other: Rows) -> Array:
     there, back = _ways_to_corners(one, other), -_ways_to_corners(other, one)
     nearer = np.linalg.norm(there, axis=1) <= np.linalg.norm(back, axis=1)
     ways = np.where(nearer[:, None], there, back)
-    return np.where(_edges_cross(one, other)[:, None], 0.0, ways)
+    return np.asarray(np.where(_edges_cross(one, other)[:, None], 0.0, ways))
 
 
 def _edges(rows: Rows) -> tuple[Array, Array]:
