@@ -115,11 +115,11 @@ def _ways_to_corners(corners: Rows, rows: Rows) -> Array:
     off = apart - along[..., None] * way[:, None]
     every = off.reshape(len(off), -1, 2)
     nearest = np.linalg.norm(every, axis=2).argmin(axis=1)
-    found = every[np.arange(len(every)), nearest]
+    found: Array = every[np.arange(len(every)), nearest]
     if rows.shape[1] > 2:
         left = way[:, None, :, 0] * apart[..., 1] - way[:, None, :, 1] * apart[..., 0]
         inside = np.all(left >= 0.0, axis=2).any(axis=1)
-        found = np.where(inside[:, None], 0.0, found)
+        return np.asarray(np.where(inside[:, None], 0.0, found))
     return found
 
 

@@ -13,6 +13,7 @@ from planar.formats.drawn.drawn_linkage import (
     Joint,
     PinJoint,
     Place,
+    RackJoint,
     SlideJoint,
     SlotJoint,
     Tracer,
@@ -26,6 +27,7 @@ from planar.model.mechanism import Mechanism, named_points, pair_entries, relati
 from planar.model.pairs.base import MeasureKind, Pair
 from planar.model.pairs.belt import BeltPair, ChainPair
 from planar.model.pairs.gear import GearPair
+from planar.model.pairs.rack import RackPair
 from planar.model.pairs.sliding import SlidingPair
 from planar.model.pairs.slot import SlotPair
 from planar.model.pairs.turning import TurningPair
@@ -100,7 +102,15 @@ class _Drawing:
                     sizes = tuple(float(self.unit.from_si(each)) for each in sizes)
                 crossed = bool(getattr(pair, "crossed", False))
                 return WheelJoint(pair.name, kind_name, pair.links, pair.carrier, pair.size_kind, sizes, crossed)
+        if isinstance(pair, RackPair):
+            return self._rack(pair)
         raise cannot_say(self.title, f"the {pair.keyword} {pair.name!r}")
+
+    def _rack(self, pair: RackPair) -> RackJoint:
+        rack, pinion = pair.links
+        angle = degrees(self.frames[rack].angle + pair.line.direction_angle(self.shapes[rack]))
+        radius, teeth = float(self.unit.from_si(pair.radius)), int(pair.pinion_teeth or 0)
+        return RackJoint(pair.name, rack, pinion, self._world(pinion, pair.point), _plain(angle), radius, teeth)
 
     def _tracers(self, joints: Sequence[Joint]) -> list[Tracer]:
         """Points of links where nothing is joined, by the names that results give them."""

@@ -13,6 +13,7 @@ from planar.formats.drawn.drawn_linkage import (
     Joint,
     PinJoint,
     Place,
+    RackJoint,
     SlideJoint,
     Tracer,
     WheelJoint,
@@ -130,6 +131,9 @@ class _Reader:
             if each.text == "FixedJoint":
                 welds.append((one.part, other.part))
                 continue
+            if each.text == "RackPinionJoint":
+                found.append(self._rack(each, one, other))
+                continue
             joint = self._gear(each, found) if each in gears else self._joint(each, one, other, size)
             found.append(joint)
             named[(each.value("Name") or "").rpartition("/")[2]] = joint, each
@@ -178,6 +182,19 @@ class _Reader:
                 raise BadInput(self._told(given), f"its markers are {off:.3g} m off its line; save the assembly closed")
             return SlideJoint(name, one.part, other.part, at, degrees(atan2(v, u)), start)
         raise BadInput(self._told(given), f"a {given.text!r:.40} as this stands is no pair of the plane that is read")
+
+    def _rack(self, given: Node, rack: Held, pinion: Held) -> RackJoint:
+        """x + r a stays as it is: of the pinion's marker along the x-axis of the rack's, and its turn about that z."""
+        radius, *_ = numbers(Node(given.value("pitchRadius") or "", given.line), 1, self.place)
+        way, axis = rack.pose.column(0), dot(rack.pose.column(2), self.normal)
+        if abs(abs(axis) - 1.0) > PARALLEL or abs(dot(way, self.normal)) > PARALLEL:
+            raise BadInput(self._told(given), "its pinion's axis is not parallel to the others: the parts move in space")
+        if radius == 0.0:
+            raise BadInput(self._told(given), "zero is no radius of a pinion")
+        u, v = self.flat(way)
+        name, at = self.book.fresh(given.value("Name") or "rack"), self.flat(pinion.pose.at)
+        sense = 1.0 if axis > 0.0 else -1.0
+        return RackJoint(name, rack.part, pinion.part, at, degrees(atan2(v, u)), sense * radius)
 
     def _gear(self, given: Node, found: list[Joint]) -> WheelJoint:
         """Gears by their radii: external ones where the centres are as far apart as both together."""

@@ -14,6 +14,7 @@ from planar.formats.drawn.drawn_linkage import (
     SlideJoint,
     SlotJoint,
     WheelJoint,
+    joint_phrase,
 )
 from planar.formats.drawn.file_format import WrittenText, cannot_say
 from planar.formats.drawn.wheels import wheel_centre, wheel_ratio
@@ -54,7 +55,7 @@ class _Writer:
             elif isinstance(joint, WheelJoint):
                 self.gears.append(joint)
             else:
-                raise cannot_say(TITLE, f"the rack {joint.name!r}")
+                raise cannot_say(TITLE, joint_phrase(joint))
         for tracer in linkage.tracers:
             self._connector(tracer.name, tracer.at, [tracer.link], 'draw="true"')
         ids = {link: number for number, link in enumerate(self.members)}
