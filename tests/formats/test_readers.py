@@ -174,3 +174,17 @@ def test_a_rack_of_ondsel_goes_as_far_as_its_pinion_turns(radius):
     assert state.point("S").velocity == pytest.approx([2 * pi * radius, 0.0], abs=1e-12)
     turned = planar.cycle(mechanism, steps=8)
     assert turned.point("S").position[-1, 0] - turned.point("S").position[0, 0] == pytest.approx(2 * pi * radius)
+
+
+def test_flags_of_pmks_may_be_words_and_its_texts_of_the_page_of_windows(tmp_path):
+    lines = ["ground, input,R,0,0", "input coupler,R,-2,0,0", "coupler rocker,R,5,6", "rocker ground,R,4,0"]
+    words = read_document("\n".join([*lines, "coupler,R,7,7,False,False,false"]))
+    assert (
+        words["links"]["coupler"]["points"]
+        == read_document("\n".join([*lines, "coupler,R,7,7"]))["links"]["coupler"]["points"]
+    )
+    told = read_document("\n".join(["rocker ground,R,4,0,0,true,false,false,true", *lines[:3]]))
+    assert told["inputs"][0]["pair"] == "A"
+    file = tmp_path / "link.txt"
+    file.write_bytes(b"A walker:\xa0http://x.org/?mech=" + "|".join(lines).replace(" ", ",").encode("ascii"))
+    assert len(planar.load(file).links) == 4

@@ -188,7 +188,9 @@ class _Reader:
         radius, *_ = numbers(Node(given.value("pitchRadius") or "", given.line), 1, self.place)
         way, axis = rack.pose.column(0), dot(rack.pose.column(2), self.normal)
         if abs(abs(axis) - 1.0) > PARALLEL or abs(dot(way, self.normal)) > PARALLEL:
-            raise BadInput(self._told(given), "its pinion's axis is not parallel to the others: the parts move in space")
+            raise BadInput(
+                self._told(given), "its pinion's axis is not parallel to the others: the parts move in space"
+            )
         if radius == 0.0:
             raise BadInput(self._told(given), "zero is no radius of a pinion")
         u, v = self.flat(way)
