@@ -33,7 +33,8 @@ class Slot(NamedTuple):
 class Plate(NamedTuple):
     """A plate of a link. `core` are points round which everything within `reach` is of the plate, for what clears it.
 
-    A plate with teeth is of kind "wheel" or "ring", a pulley is a "disc", any other a "bar".
+    A plate with teeth is of kind "wheel", "ring" or "rack", a pulley is a "disc"; a "cam" drives a "roller" or the flat
+    face of a "shoe"; any other is a "bar".
     """
 
     name: str
@@ -108,6 +109,19 @@ def sampled(loop: Sequence[Vertex], steps: int = 16) -> list[Place]:
                 c, s = cos(turn * step / many), sin(turn * step / many)
                 found.append((cx + c * (x - cx) - s * (y - cy), cy + s * (x - cx) + c * (y - cy)))
     return found
+
+
+def room_within(loop: Sequence[Place], at: Place) -> float:
+    """How far a place within a polygon is from it; below zero outside."""
+    least, crossings = float("inf"), 0
+    (x, y) = at
+    for (u, v), (p, q) in zip(loop, [*loop[1:], loop[0]], strict=True):
+        size = (p - u) ** 2 + (q - v) ** 2
+        along = min(1.0, max(0.0, ((x - u) * (p - u) + (y - v) * (q - v)) / size)) if size else 0.0
+        least = min(least, hypot(x - u - along * (p - u), y - v - along * (q - v)))
+        if (v > y) != (q > y) and x < u + (y - v) / (q - v) * (p - u):
+            crossings += 1
+    return least if crossings % 2 else -least
 
 
 def plate_area(plate: Plate) -> float:

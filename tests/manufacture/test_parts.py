@@ -220,7 +220,7 @@ def test_sheets_hold_plates_apart_and_refuse_what_is_larger():
 @pytest.mark.parametrize(
     ("words", "told"),
     [
-        (["valve-cam"], "the cam 'lift' cannot be cut as plates"),
+        (["geneva-wheel"], "the geneva 'cross' cannot be cut as plates"),
         (["four-bar", "-o", "x.iges"], "files that end in .dxf, .svg or .step"),
         (["four-bar", "--sheet", "big"], "not of the form WxH"),
         (["four-bar", "--made-at", "5"], "no scale such as 1:5"),
