@@ -6,6 +6,7 @@ from math import asin, degrees, hypot, pi
 import pytest
 
 import planar
+from planar.reports.files.converted import written_text
 from planar.solving.rest_position import rest_position
 from tests.foreign_samples import linkage2
 from tests.round_trips import read_document, read_text
@@ -99,3 +100,21 @@ def test_attributes_without_a_blank_between_them_are_read():
     text = linkage2(CRANK, "A B")
     assert read_document(text.replace('16" x', '16"x')) == read_document(text)
     assert degrees(read_text(text).inputs[0].velocity) == pytest.approx(-180.0)
+
+
+def test_two_inputs_about_one_place_are_two_connectors():
+    links = [{"name": "a", "length": 30}, {"name": "b", "length": 50}]
+    value = {
+        "planar": 1,
+        "units": {"length": "mm", "angle": "deg"},
+        "frame": "f",
+        "links": {"f": {"points": {"O": [0, 0]}}}
+        | {each["name"]: {"ends": ["O", each["name"].upper()], "length": each["length"]} for each in links},
+        "pairs": [{"turning": "O", "links": ["f", "a", "b"]}],
+        "inputs": [
+            {"pair": "O:f,a", "position": 20, "velocity": "2 rad/s"},
+            {"pair": "O:f,b", "position": 70, "velocity": "-3 rad/s"},
+        ],
+    }
+    back = read_text(written_text(planar.from_dict(value), "linkage2").text)
+    assert sorted(given.velocity for given in back.inputs) == pytest.approx([-3.0, 2.0])
