@@ -188,3 +188,9 @@ def test_flags_of_pmks_may_be_words_and_its_texts_of_the_page_of_windows(tmp_pat
     file = tmp_path / "link.txt"
     file.write_bytes(b"A walker:\xa0http://x.org/?mech=" + "|".join(lines).replace(" ", ",").encode("ascii"))
     assert len(planar.load(file).links) == 4
+
+
+def test_joints_of_ondsel_that_no_plane_has_are_refused_by_their_kind():
+    text = FOUR_BARS["ondsel"].replace("RevoluteJoint", "CurveCurveContact", 1).replace("/Asm/m1", "/Asm/curve", 1)
+    with pytest.raises(planar.BadInput, match="joint A: a 'CurveCurveContact' as this stands is no pair"):
+        read_text(text)
