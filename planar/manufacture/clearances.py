@@ -18,6 +18,8 @@ PlacesOf = Callable[[str, tuple[Place, ...], int], Rows]
 """Where points of a link (mm where it was drawn) are over the run with 2^level times as many steps."""
 LEVELS = 7
 """Runs that are tried, each with twice as many steps as the one before."""
+BLOCK = 512
+"""Positions at which distances are taken at a time."""
 SAFETY = 2.0
 """Of the sagitta of a way between positions, as found from those beside it."""
 
@@ -45,7 +47,8 @@ def keep_apart(one: Body, other: Body, room: float, places: PlacesOf) -> bool:
     still = np.array(other.corners, dtype=float)[None]
     for level in range(LEVELS):
         rows = _seen_from(one, other, places, level)
-        ways = ways_apart(rows, still)
+        blocks = np.array_split(rows, -(-len(rows) // BLOCK))
+        ways = np.concatenate([ways_apart(block, still) for block in blocks])
         if np.linalg.norm(ways, axis=1).min() < room:
             return False
         if len(rows) > 2 and _least_between(rows, still, ways) >= room:

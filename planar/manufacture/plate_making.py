@@ -179,7 +179,7 @@ class _Maker:
         ends = ((low, -depth), (high, -depth), (high, ADDENDUM * module), (low, ADDENDUM * module))
         core = tuple(place(x + (edge if x == low else -edge), y + (edge if y == -depth else -edge)) for x, y in ends)
         own = round_ if rack.side > 0.0 else round_[::-1]
-        return Plate(_rack_name(rack), rack.link, "rack", own, (), holes, (), core, 2.0**0.5 * edge, 0, teeth, module)
+        return Plate(_rack_name(rack), rack.link, "strip", own, (), holes, (), core, 2.0**0.5 * edge, 0, teeth, module)
 
     def _fasten(self, name: str, link: str, places: Sequence[Place]) -> tuple[Hole, ...]:
         """Pins that hold a plate on its link's bar, and the plate's holes for them."""
@@ -242,7 +242,7 @@ class _Maker:
         if not any(_apart(hole.at, drive.centre) < 1e-6 * wall for hole in held):
             raise BadInput(name, "the hole of its pin leaves no wall within the profile; take a smaller pin or wall")
         core, reach = hull_of_profile(drive.profile)
-        return Plate(name, drive.cam, "cam", outline_of(drive.profile), (), held, (), core, reach)
+        return Plate(name, drive.cam, "profile", outline_of(drive.profile), (), held, (), core, reach)
 
     def _gear(self, wheel: MeshedWheel, name: str) -> Plate:
         teeth = gear_outline(wheel.teeth, wheel.module, wheel.pressure_angle, wheel.phase, BACKLASH * wheel.module)

@@ -33,8 +33,8 @@ class Slot(NamedTuple):
 class Plate(NamedTuple):
     """A plate of a link. `core` are points round which everything within `reach` is of the plate, for what clears it.
 
-    A plate with teeth is of kind "wheel", "ring" or "rack", a pulley is a "disc"; a "cam" drives a "roller" or the flat
-    face of a "shoe"; any other is a "bar".
+    A plate with teeth is of kind "wheel", "ring" or, of a rack, "strip"; a pulley is a "disc"; a cam is a "profile"
+    that drives a "roller" or the flat face of a "shoe"; any other is a "bar".
     """
 
     name: str

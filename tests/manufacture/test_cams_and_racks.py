@@ -11,7 +11,7 @@ from planar.manufacture.plates import Plate, room_within, sampled
 from planar.manufacture.rack_teeth import rack_outline
 from planar.results.motion import Motion
 from tests.cams import cam_document
-from tests.manufacture.test_parts import drawn, meet
+from tests.cut_plates import drawn, meet
 
 CAMS = ("valve-cam", "tangent-cam", "measured-cam", "cam-with-spring")
 RUNS = {  # input that runs, from where to where, and what fits
@@ -42,7 +42,7 @@ def centre_of(plate: Plate, motion: Motion, row: int) -> np.ndarray:
 def test_a_roller_touches_its_cam_all_round(model):
     found = planar.parts(model, scale=1.0, pin=0.004)
     assert found.is_clear
-    cam, roller = plate_of(found, "cam"), plate_of(found, "roller")
+    cam, roller = plate_of(found, "profile"), plate_of(found, "roller")
     assert cam.layer == roller.layer
     motion = planar.cycle(model, steps=36)
     for row in range(0, 37, 4):
@@ -56,7 +56,7 @@ def test_the_shoe_of_a_flat_face_touches_its_cam_within_its_length(follower, clo
     mechanism = planar.from_dict(cam_document(follower, clockwise=clockwise))
     found = planar.parts(mechanism, pin=0.004)
     assert found.is_clear
-    cam, shoe = plate_of(found, "cam"), plate_of(found, "shoe")
+    cam, shoe = plate_of(found, "profile"), plate_of(found, "shoe")
     motion = planar.cycle(mechanism, steps=36)
     for row in range(0, 37, 3):
         profile, corners = drawn(cam, motion, row), drawn(shoe, motion, row)
@@ -74,7 +74,7 @@ def test_a_rack_and_its_pinion_mesh_without_cutting_into_each_other(model):
     found = planar.parts(model, pair=pair, start=start, stop=stop, **more)
     assert found.is_clear
     wheel = plate_of(found, "wheel")
-    racks = [plate for plate in found.plates if plate.kind == "rack"]
+    racks = [plate for plate in found.plates if plate.kind == "strip"]
     assert {plate.layer for plate in racks} == {wheel.layer}
     motion = planar.cycle(model, 24, start, stop, pair)
     scale = found.scale
@@ -97,7 +97,7 @@ def scaled(plate: Plate, motion: Motion, row: int, scale: float) -> np.ndarray:
 
 def test_a_rack_holds_as_much_pitch_as_its_teeth_and_two_pins_hold_it():
     found = planar.parts("rack-differential", pair="lower", start=-0.06, stop=0.12)
-    rack, bar = plate_of(found, "rack"), next(plate for plate in found.plates if plate.name == "lower rack")
+    rack, bar = plate_of(found, "strip"), next(plate for plate in found.plates if plate.name == "lower rack")
     assert [hole.pin for hole in rack.holes] == ["lower mesh 1", "lower mesh 2"]
     assert {hole.pin for hole in rack.holes} < {hole.pin for hole in bar.holes}
     assert {hole.at for hole in rack.holes} < {hole.at for hole in bar.holes}
