@@ -20,8 +20,9 @@ LEVELS = 7
 """Runs that are tried, each with twice as many steps as the one before."""
 BLOCK = 512
 """Positions at which distances are taken at a time."""
-SAFETY = 2.0
-"""Of the sagitta of a way between positions, as found from those beside it."""
+SAFETY = 4.0
+"""Of the sagitta of a way between positions, as found from those beside it: 3.4 is what it takes from a dead point on,
+where a way goes by the square root of the input's."""
 
 
 class Body(NamedTuple):
@@ -39,9 +40,9 @@ def body_of(link: str, points: tuple[Place, ...]) -> Body:
 def keep_apart(one: Body, other: Body, room: float, places: PlacesOf) -> bool:
     """Whether two bodies are at least so far apart (mm) all over a run, between its positions too.
 
-    Seen from the other body, a corner is between two positions taken to be no further from its chord than twice its
-    sagitta there, as the second differences of the positions beside tell it: so the distance is no less than what a
-    line between the bodies leaves at both positions, less that. Where this does not settle it the run is taken with
+    Seen from the other body, a corner is between two positions taken to be no further from its chord than four times
+    its sagitta there, as the second differences of the positions beside tell it: so the distance is no less than what
+    a line between the bodies leaves at both positions, less that. Where this does not settle it the run is taken with
     twice as many steps; bodies that are nearer than the last can tell count as meeting.
     """
     still = np.array(other.corners, dtype=float)[None]

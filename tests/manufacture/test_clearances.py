@@ -76,3 +76,17 @@ def test_few_positions_lead_to_the_layers_of_many(model):
     few, many = (planar.parts(model, scale=1.0, sheet=(9.0, 9.0), steps=steps) for steps in (30, 720))
     assert [(plate.name, plate.layer) for plate in few.plates] == [(plate.name, plate.layer) for plate in many.plates]
     assert few.is_clear == many.is_clear
+
+
+@pytest.mark.parametrize("gap", [9.97, 11.5])
+def test_a_way_from_a_dead_point_on_is_within_its_bound(gap):
+    """A point goes by the square root of the input's way, past a post beside where it is first."""
+
+    def places(link, points, level):
+        along = np.sqrt(np.linspace(0.0, 1.0, STEPS * 2**level + 1))[:, None]
+        bow = np.zeros_like(along) if link == "frame" else 40.0 * along * (0.1 - along)
+        u, v = np.array(points).T
+        return np.stack([u + (0.0 if link == "frame" else 100.0) * along, v + bow], axis=2)
+
+    post = Body("frame", ((5.0, 40.0 * 0.05 * 0.05 + gap),))
+    assert keep_apart(Body("rod", ((0.0, 0.0),)), post, ROOM, places) == (gap > ROOM)
