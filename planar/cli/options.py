@@ -258,6 +258,16 @@ def print_or_write(renderable: Any, output: Path | None) -> None:
     save_file(output, encode_tables(renderable, output.suffix))
 
 
+def read_ends(
+    mechanism: Mechanism, pair: str | None, start: str | None, stop: str | None
+) -> tuple[float | None, float | None]:
+    """Where the range of the options `--from` and `--to` starts and stops (rad or m), for the input that runs."""
+    names = [given.pair for given in mechanism.inputs]
+    of = pair if pair is not None or len(names) != 1 else names[0]
+    first, last = (_parse_position(mechanism, of, text, option) for option, text in (("--from", start), ("--to", stop)))
+    return first, last
+
+
 def run_motion(
     mechanism: Mechanism,
     steps: int,
@@ -271,9 +281,7 @@ def run_motion(
     from planar.document import read_time
     from planar.solving.cycle import cycle
 
-    names = [given.pair for given in mechanism.inputs]
-    of = pair if pair is not None or len(names) != 1 else names[0]
-    ends = [_parse_position(mechanism, of, text, option) for option, text in (("--from", start), ("--to", stop))]
+    ends = read_ends(mechanism, pair, start, stop)
     time = None if duration is None else read_time(duration, "--duration")
     return cycle(mechanism, steps, ends[0], ends[1], pair, duration=time, **more)
 

@@ -50,11 +50,11 @@ def foreign_text(content: bytes, place: str, value: Any) -> ForeignText:
 
 
 def _decoded(content: bytes, place: str) -> str:
-    """The characters of a file; Linkage saves names in the code page of its Windows."""
+    """The characters of a file; Linkage and PMKS save in the code page of their Windows."""
     try:
         return content.decode("utf-8-sig")
     except UnicodeDecodeError as problem:
-        if b"<linkage2" not in content[:4000]:
+        if b"<linkage2" not in content[:4000] and b"mech=" not in content[:4000]:
             raise BadInput(place, f"the file is not UTF-8 text (byte {problem.start})") from None
     return content.decode("latin-1")
 

@@ -1,6 +1,9 @@
-"""What comes near to what while the mechanism runs: plates and pins, at every position of a run."""
+"""What comes near to what while the mechanism runs: plates and pins, at positions of a run and between them."""
 
 from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 
@@ -11,6 +14,69 @@ from planar.manufacture.plates import Place, convex_hull
 
 Rows = Array
 """Places over the positions of a run, (positions, places, 2) in mm."""
+PlacesOf = Callable[[str, tuple[Place, ...], int], Rows]
+"""Where points of a link (mm where it was drawn) are over the run with 2^level times as many steps."""
+LEVELS = 7
+"""Runs that are tried, each with twice as many steps as the one before."""
+BLOCK = 512
+"""Positions at which distances are taken at a time."""
+SAFETY = 4.0
+"""Of the sagitta of a way between positions, as found from those beside it: 3.4 is what it takes from a dead point on,
+where a way goes by the square root of the input's."""
+
+
+class Body(NamedTuple):
+    """What moves with a link: the corners of a convex hull in order, or a point."""
+
+    link: str
+    corners: tuple[Place, ...]
+
+
+def body_of(link: str, points: tuple[Place, ...]) -> Body:
+    """The convex hull of points of a link."""
+    return Body(link, tuple(convex_hull(points)))
+
+
+def keep_apart(one: Body, other: Body, room: float, places: PlacesOf) -> bool:
+    """Whether two bodies are at least so far apart (mm) all over a run, between its positions too.
+
+    Seen from the other body, a corner is between two positions taken to be no further from its chord than four times
+    its sagitta there, as the second differences of the positions beside tell it: so the distance is no less than what
+    a line between the bodies leaves at both positions, less that. Where this does not settle it the run is taken with
+    twice as many steps; bodies that are nearer than the last can tell count as meeting.
+    """
+    still = np.array(other.corners, dtype=float)[None]
+    for level in range(LEVELS):
+        rows = _seen_from(one, other, places, level)
+        blocks = np.array_split(rows, -(-len(rows) // BLOCK))
+        ways = np.concatenate([ways_apart(block, still) for block in blocks])
+        if np.linalg.norm(ways, axis=1).min() < room:
+            return False
+        if len(rows) > 2 and _least_between(rows, still, ways) >= room:
+            return True
+    return False
+
+
+def _least_between(rows: Rows, still: Rows, ways: Array) -> float:
+    """A lower bound of the distance between positions: the widest strip across one of the ways from body to body."""
+    units = ways / np.linalg.norm(ways, axis=1, keepdims=True)
+    between = units[:-1] + units[1:]
+    between /= np.maximum(np.linalg.norm(between, axis=1, keepdims=True), 1e-300)
+    widths = []
+    for unit in (units[:-1], units[1:], between):
+        near = np.minimum(*((each * unit[:, None]).sum(axis=2).min(axis=1) for each in (rows[:-1], rows[1:])))
+        widths.append(near - (still * unit[:, None]).sum(axis=2).max(axis=1))
+    bends = np.linalg.norm(np.diff(rows, n=2, axis=0), axis=2).max(axis=1) / 8.0
+    padded = np.concatenate([bends[:1], bends, bends[-1:]])
+    return float((np.max(widths, axis=0) - SAFETY * np.maximum(padded[:-1], padded[1:])).min())
+
+
+def _seen_from(one: Body, other: Body, places: PlacesOf, level: int) -> Rows:
+    """The corners of a body in the axes of the other's link."""
+    rows = places(one.link, one.corners, level)
+    axes = places(other.link, ((0.0, 0.0), (1.0, 0.0)), level)
+    off, (c, s) = rows - axes[:, :1], np.moveaxis(axes[:, 1] - axes[:, 0], 1, 0)[:, :, None]
+    return np.stack([c * off[..., 0] + s * off[..., 1], c * off[..., 1] - s * off[..., 0]], axis=2)
 
 
 def places_over(points: tuple[Place, ...], drawn: Frame, frame: Frame, millimetre: float, positions: int) -> Rows:
@@ -26,15 +92,15 @@ def places_over(points: tuple[Place, ...], drawn: Frame, frame: Frame, millimetr
     return found
 
 
-def least_distance(one: Rows, other: Rows) -> float:
-    """The least distance of two convex hulls over the run; 0 where they meet. Points are corners in order."""
-    least = min(_corner_distance(one, other), _corner_distance(other, one))
-    return 0.0 if least == 0.0 or _edges_cross(one, other) else least
+def ways_apart(one: Rows, other: Rows) -> Array:
+    """The shortest way from the other of two convex hulls to the first at every position, (positions, 2).
 
-
-def hull_rows(core: tuple[Place, ...]) -> tuple[Place, ...]:
-    """The corners of a plate's core in order."""
-    return tuple(convex_hull(core))
+    It is zero where they meet. Points are corners in order.
+    """
+    there, back = _ways_to_corners(one, other), -_ways_to_corners(other, one)
+    nearer = np.linalg.norm(there, axis=1) <= np.linalg.norm(back, axis=1)
+    ways = np.where(nearer[:, None], there, back)
+    return np.asarray(np.where(_edges_cross(one, other)[:, None], 0.0, ways))
 
 
 def _edges(rows: Rows) -> tuple[Array, Array]:
@@ -44,22 +110,25 @@ def _edges(rows: Rows) -> tuple[Array, Array]:
     return rows[:, :many], (ends - rows)[:, :many]
 
 
-def _corner_distance(corners: Rows, rows: Rows) -> float:
-    """The least distance of corners from a hull; 0 where one lies in it."""
+def _ways_to_corners(corners: Rows, rows: Rows) -> Array:
+    """The way from a hull to the nearest corner at every position; zero where one lies in it."""
     start, way = _edges(rows)
     apart = corners[:, :, None] - start[:, None]
     size = np.maximum((way**2).sum(axis=2), 1e-300)[:, None]
     along = np.clip((apart * way[:, None]).sum(axis=3) / size, 0.0, 1.0)
-    least = np.linalg.norm(apart - along[..., None] * way[:, None], axis=3).min()
+    off = apart - along[..., None] * way[:, None]
+    every = off.reshape(len(off), -1, 2)
+    nearest = np.linalg.norm(every, axis=2).argmin(axis=1)
+    found: Array = every[np.arange(len(every)), nearest]
     if rows.shape[1] > 2:
         left = way[:, None, :, 0] * apart[..., 1] - way[:, None, :, 1] * apart[..., 0]
-        if np.any(np.all(left >= 0.0, axis=2)):
-            return 0.0
-    return float(least)
+        inside = np.all(left >= 0.0, axis=2).any(axis=1)
+        return np.asarray(np.where(inside[:, None], 0.0, found))
+    return found
 
 
-def _edges_cross(one: Rows, other: Rows) -> bool:
-    """Whether an edge of one crosses an edge of the other at any position."""
+def _edges_cross(one: Rows, other: Rows) -> Array:
+    """Whether an edge of one crosses an edge of the other, at every position."""
     (p, r), (q, s) = _edges(one), _edges(other)
     p, r, q, s = p[:, :, None], r[:, :, None], q[:, None], s[:, None]
 
@@ -69,4 +138,5 @@ def _edges_cross(one: Rows, other: Rows) -> bool:
     along, between = cross(r, s), q - p
     with np.errstate(divide="ignore", invalid="ignore"):
         t, u = cross(between, s) / along, cross(between, r) / along
-    return bool(np.any((along != 0.0) & (t >= 0.0) & (t <= 1.0) & (u >= 0.0) & (u <= 1.0)))
+    hits = (along != 0.0) & (t >= 0.0) & (t <= 1.0) & (u >= 0.0) & (u <= 1.0)
+    return np.asarray(hits.any(axis=(1, 2)))

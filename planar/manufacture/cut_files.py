@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 from xml.sax.saxutils import escape
 
 from planar.foundation.errors import BadInput, unknown_format_error
-from planar.manufacture.plates import Plate, Slot, Vertex
+from planar.manufacture.plates import Plate, Slot, Vertex, room_within, sampled
 
 SUFFIXES = (".dxf", ".svg", ".step")
 SHEET_GAP = 40.0
@@ -37,16 +37,17 @@ def encode_layout(layout: Layout, suffix: str) -> bytes:
 
 def _number_place(plate: Plate) -> tuple[float, float, float]:
     """Where a plate's number stands, and how high: between two of its points where most room is."""
+    outline = sampled(plate.outline)
     middles = [((a[0] + b[0]) / 2.0, (a[1] + b[1]) / 2.0) for a in plate.core for b in plate.core]
     middles += [(x, y + 0.55 * plate.reach) for x, y in plate.core]
 
     def room(at: tuple[float, float]) -> float:
         free = [hypot(hole.at[0] - at[0], hole.at[1] - at[1]) - hole.diameter / 2.0 for hole in plate.holes]
         free += [_off_slot(slot, at) for slot in plate.slots]
-        return min(free, default=plate.reach)
+        return min([*free, room_within(outline, at), LETTER_HEIGHT])
 
-    best = max(middles, key=lambda at: min(room(at), LETTER_HEIGHT))
-    return *best, max(1.0, min(LETTER_HEIGHT, room(best), 0.5 * plate.reach))
+    best = max(middles, key=room)
+    return *best, max(1.0, room(best))
 
 
 def _off_slot(slot: Slot, at: tuple[float, float]) -> float:

@@ -1,13 +1,13 @@
-"""Numbers of teeth, modules and phases of the gears of a linkage, so that all of them mesh where it was drawn."""
+"""Teeth, modules and phases of the gears and racks of a linkage, so that all of them mesh where it was drawn."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
-from math import atan2, hypot, pi
+from math import atan2, cos, hypot, pi, radians, sin
 from typing import NamedTuple
 
-from planar.formats.drawn.drawn_linkage import DrawnLinkage, WheelJoint
+from planar.formats.drawn.drawn_linkage import DrawnLinkage, Place, RackJoint, WheelJoint
 from planar.formats.drawn.wheels import wheel_centre, wheel_ratio
 from planar.foundation.errors import BadInput
 
@@ -31,11 +31,45 @@ class MeshedWheel(NamedTuple):
     pressure_angle: float
 
 
-def meshed_wheels(linkage: DrawnLinkage, pressure_angles: Mapping[str, float]) -> list[tuple[MeshedWheel, MeshedWheel]]:
-    """The two wheels of every pair of gears. Raises BadInput where a pair has no centres apart, or no whole teeth."""
+class MeshedRack(NamedTuple):
+    """A rack: its link, a place of its pitch line (mm) and the line's direction (unit) and how far on a tooth stands.
+
+    Teeth point to the left of the direction where `side` is 1, to the right where it is -1.
+    """
+
+    joint: str
+    link: str
+    foot: Place
+    way: Place
+    side: float
+    module: float
+    offset: float
+    pressure_angle: float
+
+
+class Meshes(NamedTuple):
+    """The two wheels of every pair of gears, and every rack with its pinion."""
+
+    gears: list[tuple[MeshedWheel, MeshedWheel]]
+    racks: list[tuple[MeshedRack, MeshedWheel]]
+
+    @property
+    def links(self) -> set[str]:
+        """Those that are wheels."""
+        return {wheel.link for two in self.gears for wheel in two} | {wheel.link for _, wheel in self.racks}
+
+
+def meshes(linkage: DrawnLinkage, pressure_angles: Mapping[str, float]) -> Meshes:
+    """All that has teeth. Raises BadInput where a pair has no centres apart, no whole teeth, or none that can mesh."""
     gears = [each for each in linkage.joints if isinstance(each, WheelJoint) and each.meshes]
+    racks = [each for each in linkage.joints if isinstance(each, RackJoint)]
     sizes = {each.name: _pitch_radii(each, linkage) for each in gears}
-    module = _common_module([radius for radii, _ in sizes.values() for radius in radii])
+    pitch_radii = [radius for both, _ in sizes.values() for radius in both]
+    module = _common_module([*pitch_radii, *(abs(each.radius) for each in racks)])
+    for name in [*(each.name for each in gears), *(each.name for each in racks)]:
+        if pressure_angles[name] <= 0.0:
+            told = "teeth of a pressure angle of 0 do not roll on each other: that is a strap, or a drive by friction"
+            raise BadInput(name, told)
     phases: dict[tuple[str, int], float] = {}
     found = []
     for joint in gears:
@@ -52,7 +86,23 @@ def meshed_wheels(linkage: DrawnLinkage, pressure_angles: Mapping[str, float]) -
             for i in (0, 1)
         )
         found.append((first, second))
-    return found
+    return Meshes(found, [_rack(each, module, phases, pressure_angles[each.name]) for each in racks])
+
+
+def _rack(
+    joint: RackJoint, module: float | None, phases: dict[tuple[str, int], float], pressure_angle: float
+) -> tuple[MeshedRack, MeshedWheel]:
+    """A rack whose spaces take the pinion's teeth: as these stand by another pair, or one on the way to the rack."""
+    size = abs(joint.radius)
+    teeth = joint.teeth or (LEAST_TEETH if module is None else round(2.0 * size / module))
+    own, (x, y), foot = 2.0 * size / teeth, joint.at, joint.contact
+    way = atan2(foot[1] - y, foot[0] - x)
+    phase = phases.setdefault((joint.pinion, teeth), way)
+    offset = joint.radius * (phase - way) + pi * own / 2.0
+    line = cos(radians(joint.angle)), sin(radians(joint.angle))
+    side = 1.0 if joint.radius > 0.0 else -1.0
+    rack = MeshedRack(joint.name, joint.rack, foot, line, side, own, offset, pressure_angle)
+    return rack, MeshedWheel(joint.name, joint.pinion, (x, y), teeth, own, phase, False, pressure_angle)
 
 
 def _pitch_radii(

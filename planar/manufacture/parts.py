@@ -8,17 +8,27 @@ from dataclasses import dataclass, replace
 from itertools import combinations
 from math import cos, radians, sin
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
 from planar.document.first_argument import takes_mechanism
 from planar.formats.drawn.blocks import slots_for_blocks
-from planar.formats.drawn.drawn_linkage import DrawnLinkage, Joint, SlideJoint, SlotJoint, WheelJoint, joined_links
+from planar.formats.drawn.drawn_linkage import (
+    DrawnLinkage,
+    Joint,
+    RackJoint,
+    SlideJoint,
+    SlotJoint,
+    WheelJoint,
+    joined_links,
+)
 from planar.formats.drawn.drawn_mechanism import drawn_mechanism
 from planar.foundation.errors import BadInput, NoAnswer, join_names
 from planar.foundation.geometry import Frame
 from planar.foundation.safe_files import save_file
 from planar.foundation.units import parse_unit
+from planar.manufacture.cam_plates import CamDrive, cam_drives, face_reach
 from planar.manufacture.clearances import places_over
 from planar.manufacture.layers import find_layers
 from planar.manufacture.nesting import nested
@@ -26,6 +36,7 @@ from planar.manufacture.plate_making import Pin, Sizes, Travel, make_plates
 from planar.manufacture.plates import Plate
 from planar.manufacture.stacking import joined_plates, layer_rules
 from planar.model.mechanism import Mechanism
+from planar.model.pairs.cams.profiled import ProfiledPair
 from planar.results.motion import Motion
 from planar.solving.cycle import cycle
 from planar.solving.rest_position import rest_position
@@ -36,6 +47,10 @@ PIN_SHARE = 0.1
 """Of the middle one of the distances between pins, of which the pins' diameter is to be about so much."""
 SCALES = (1.0, 2.0, 2.5, 5.0, 10.0, 20.0, 25.0, 50.0, 100.0, 200.0, 500.0, 1000.0)
 """By which a mechanism is made smaller, so that its largest plate fits the sheet."""
+FACE_LEVEL = 2
+"""Of the run by which the shoes of flat faces are as long as cams touch them."""
+TRAVEL_LEVEL = 4
+"""Of the run by which slots are as long as their travel: to 2e-6 of a crank."""
 
 
 @dataclass(frozen=True)
@@ -52,9 +67,9 @@ class PartPin:
 class Parts:
     """Plates of the links of a mechanism, in mm where they were drawn, and the same laid out on sheets.
 
-    `is_clear` tells whether no plate meets another in its layer and no pin runs through one, at any of `positions`
-    positions of the run; what meets, and what else is to know, is in `notes`. `thickness`, `sheet` and `scale` are as
-    they were asked for (m; a scale of 0.2 is 1:5).
+    `is_clear` tells whether no plate meets another in its layer and no pin runs through one, all over the run, between
+    positions too; `positions` are the most that this took. What meets, and what else is to know, is in `notes`.
+    `thickness`, `sheet` and `scale` are as they were asked for (m; a scale of 0.2 is 1:5).
     """
 
     mechanism: Mechanism
@@ -117,14 +132,19 @@ def parts(  # many: sizes of what is cut
     gap: float = 0.004,
     scale: float | None = None,
     steps: int = 90,
+    start: float | None = None,
+    stop: float | None = None,
+    pair: str | None = None,
 ) -> Parts:
     """The parts of a mechanism: a plate of this `thickness` for each link, gears with involute teeth, pins, sheets.
 
     Lengths in m. A plate is what is within `pin` / 2 + `wall` of its pins and slots; holes and slots are wider than
     their pins by `play`; the pins of the file keep its radii. Left out, pins are about a tenth of the middle distance
     between pins, walls as wide as pins, and the scale is the largest that lets each plate fit a `sheet`, `gap` apart.
-    Layers are found by the distances of all plates and pins at steps + 1 positions of `planar.cycle`. Raises BadInput
-    for a pair that is none of plates, and where a plate cannot be; NoAnswer where the mechanism does not run.
+    The run is that of `planar.cycle` from `start` to `stop` of the input at `pair`. Layers are found by the distances
+    of all plates and pins at so many steps of it, and at up to 64 times as many where those leave it open whether
+    something is met between positions. Raises BadInput for a pair that is none of plates, and where a plate cannot be;
+    NoAnswer where the mechanism does not run.
 
     >>> import planar
     >>> planar.parts("four-bar", thickness=0.003)
@@ -135,14 +155,15 @@ def parts(  # many: sizes of what is cut
             raise BadInput(name, f"a size above zero is wanted, not {value!r:.40}")
     drawn = rest_position(mechanism).frames
     try:
-        linkage = slots_for_blocks(drawn_mechanism(mechanism, drawn, "plates"))
+        linkage = slots_for_blocks(drawn_mechanism(mechanism, drawn, "plates", (ProfiledPair,)))
     except BadInput as problem:
         told = problem.sentence.replace("cannot be said in this format", "cannot be cut as plates that lie flat")
         raise BadInput(problem.place, told) from None
     held = {link for joint in linkage.joints for link in joined_links(joint)}
     linkage = replace(linkage, links=tuple(link for link in linkage.links if link in held))
-    motion = _whole_run(mechanism, steps)
-    run = _Run(motion, drawn, linkage)
+    if pair is None and len(mechanism.inputs) > 1:
+        pair = mechanism.inputs[0].pair
+    run = _Run(_Course(mechanism, steps, start, stop, pair), drawn, linkage)
     sizes = _Request(thickness, pin, wall, play, sheet, gap, steps)
     for made in SCALES if scale is None else (1.0 / scale,):
         found = _parts_at(mechanism, run, sizes, 1.0 / made)
@@ -156,13 +177,21 @@ def parts(  # many: sizes of what is cut
     )
 
 
-def _whole_run(mechanism: Mechanism, steps: int) -> Motion:
-    motion = (
-        cycle(mechanism, steps) if len(mechanism.inputs) < 2 else cycle(mechanism, steps, pair=mechanism.inputs[0].pair)
-    )
-    if len(motion) < 2:
-        raise NoAnswer(motion.outcome, motion.reason)
-    return motion
+class _Course(NamedTuple):
+    """What runs, from where to where."""
+
+    mechanism: Mechanism
+    steps: int
+    start: float | None
+    stop: float | None
+    pair: str | None
+
+    def run(self, times: int = 1) -> Motion:
+        """The motion, with so many times as many steps. Raises NoAnswer."""
+        motion = cycle(self.mechanism, self.steps * times, self.start, self.stop, self.pair)
+        if len(motion) < 2:
+            raise NoAnswer(motion.outcome, motion.reason)
+        return motion
 
 
 @dataclass(frozen=True)
@@ -177,28 +206,52 @@ class _Request:
 
 
 class _Run:
-    """A run, and the linkage where it was drawn."""
+    """A run, the same with more steps, and the linkage where it was drawn."""
 
-    def __init__(self, motion: Motion, drawn: Mapping[str, Frame], linkage: DrawnLinkage) -> None:
-        self.motion, self.drawn, self.linkage = motion, drawn, linkage
+    def __init__(self, course: _Course, drawn: Mapping[str, Frame], linkage: DrawnLinkage) -> None:
+        self.course, self.drawn, self.linkage = course, drawn, linkage
+        self.motions = [course.run()]
 
-    def places(self, link: str, points: tuple[tuple[float, float], ...], scale: float) -> np.ndarray:
-        frame = self.motion.frames[link]
-        return places_over(points, self.drawn[link], frame, 1e-3 / scale, len(self.motion))
+    @property
+    def motion(self) -> Motion:
+        return self.motions[0]
+
+    @property
+    def most_positions(self) -> int:
+        """Of the run with the most steps that was looked at."""
+        return len(self.motions[-1])
+
+    def places(self, link: str, points: tuple[tuple[float, float], ...], scale: float, level: int = 0) -> np.ndarray:
+        """Points of a link over the run with 2^level times as many steps, as `places_over` gives them."""
+        while len(self.motions) <= level:
+            self.motions.append(self.course.run(2 ** len(self.motions)))
+        motion = self.motions[level]
+        return places_over(points, self.drawn[link], motion.frames[link], 1e-3 / scale, len(motion))
 
     def travels(self, linkage: DrawnLinkage, scale: float) -> dict[str, Travel]:
-        """How far each slide goes in its guide from where it was drawn."""
+        """How far each slide goes in its guide, and each pinion along its rack, from where it was drawn."""
         found = {}
         for joint in linkage.joints:
-            if isinstance(joint, SlideJoint | SlotJoint):
-                rider = joint.slider if isinstance(joint, SlideJoint) else joint.rider
+            if isinstance(joint, SlideJoint | SlotJoint | RackJoint):
+                guide, rider = joined_links(joint)
                 way = cos(radians(joint.angle)), sin(radians(joint.angle))
                 ahead = (joint.at[0] + way[0], joint.at[1] + way[1])
-                own = self.places(rider, (joint.at,), scale)
-                guide = self.places(joint.guide, (joint.at, ahead), scale)
-                ways = guide[:, 1] - guide[:, 0]
-                along = np.einsum("ij,ij->i", own[:, 0] - guide[:, 0], ways)
+                own = self.places(rider, (joint.at,), scale, TRAVEL_LEVEL)
+                held = self.places(guide, (joint.at, ahead), scale, TRAVEL_LEVEL)
+                ways = held[:, 1] - held[:, 0]
+                along = np.einsum("ij,ij->i", own[:, 0] - held[:, 0], ways)
                 found[joint.name] = Travel(float(along.min()), float(along.max()))
+        return found
+
+    def faces(self, drives: Sequence[CamDrive], scale: float) -> dict[str, Travel]:
+        """How far along their flat faces cams touch followers."""
+        found = {}
+        for drive in drives:
+            if drive.normal is not None:
+                ahead = (drive.at[0] + drive.normal[0], drive.at[1] + drive.normal[1])
+                face = self.places(drive.follower, (drive.at, ahead), scale, FACE_LEVEL)
+                profiles = self.places(drive.cam, drive.profile, scale, FACE_LEVEL)
+                found[drive.name] = Travel(*face_reach(profiles, face[:, 0], face[:, 1] - face[:, 0]))
         return found
 
 
@@ -209,14 +262,16 @@ def _parts_at(mechanism: Mechanism, run: _Run, request: _Request, scale: float) 
     wall = pin if request.wall is None else 1e3 * request.wall
     sizes = Sizes(pin, _own_pins(mechanism, scale, pin) if request.pin is None else {}, 1e3 * request.play, wall)
     angles = {pair.name: float(getattr(pair, "pressure_angle", radians(20.0))) for pair in mechanism.pairs}
-    plates, pins, meshing = make_plates(linkage, sizes, run.travels(linkage, scale), angles)
+    drives = cam_drives(mechanism, run.drawn, scale)
+    travels = run.travels(linkage, scale) | run.faces(drives, scale)
+    plates, pins, meshing = make_plates(linkage, sizes, travels, angles, drives)
     try:
         sheets = nested(plates, (1e3 * request.sheet[0], 1e3 * request.sheet[1]), 1e3 * request.gap)
     except BadInput:
         return None
 
-    def places(link: str, points: tuple[tuple[float, float], ...]) -> np.ndarray:
-        return run.places(link, points, scale)
+    def places(link: str, points: tuple[tuple[float, float], ...], level: int) -> np.ndarray:
+        return run.places(link, points, scale, level)
 
     layers, meets = find_layers(layer_rules(places, plates, pins, meshing, sizes))
     placed = tuple(plate._replace(layer=layer) for plate, layer in zip(plates, layers, strict=True))
@@ -231,7 +286,7 @@ def _parts_at(mechanism: Mechanism, run: _Run, request: _Request, scale: float) 
         request.sheet,
         scale,
         not meets,
-        len(run.motion),
+        run.most_positions,
         notes,
     )
 
@@ -252,7 +307,9 @@ def _scaled(linkage: DrawnLinkage, scale: float) -> DrawnLinkage:
 
     joints: list[Joint] = []
     for joint in linkage.joints:
-        if not isinstance(joint, WheelJoint):
+        if isinstance(joint, RackJoint):
+            joints.append(joint._replace(at=place(joint.at), radius=joint.radius * factor))
+        elif not isinstance(joint, WheelJoint):
             joints.append(joint._replace(at=place(joint.at)))
         elif joint.size_kind == "radii":
             joints.append(joint._replace(sizes=tuple(each * factor for each in joint.sizes)))
@@ -266,7 +323,7 @@ def _pin_diameter(linkage: DrawnLinkage) -> float:
     """About a tenth of the middle distance between pins of a link, of those that rods are sold in."""
     places: dict[str, list[tuple[float, float]]] = {}
     for joint in linkage.joints:
-        if not isinstance(joint, WheelJoint):
+        if not isinstance(joint, WheelJoint | RackJoint):
             for link in joined_links(joint):
                 places.setdefault(link, []).append(joint.at)
     apart = sorted(

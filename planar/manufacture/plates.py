@@ -7,6 +7,8 @@ from math import atan2, cos, hypot, pi, radians, sin, tan
 from typing import NamedTuple
 
 Place = tuple[float, float]
+ROUND_OFF = 1e-12
+"""Of the square of a hull's extent: a turn that is none."""
 Vertex = tuple[float, float, float]
 """x, y, and the bulge of the way to the next vertex: the tangent of a quarter of its arc's angle, 0 if straight."""
 
@@ -31,7 +33,8 @@ class Slot(NamedTuple):
 class Plate(NamedTuple):
     """A plate of a link. `core` are points round which everything within `reach` is of the plate, for what clears it.
 
-    A plate with teeth is of kind "wheel" or "ring", a pulley is a "disc", any other a "bar".
+    A plate with teeth is of kind "wheel", "ring" or, of a rack, "strip"; a pulley is a "disc"; a cam is a "profile"
+    that drives a "roller" or the flat face of a "shoe"; any other is a "bar".
     """
 
     name: str
@@ -54,15 +57,17 @@ class Plate(NamedTuple):
 
 
 def convex_hull(points: Iterable[Place]) -> list[Place]:
-    """The corners of the convex hull, anticlockwise (A. M. Andrew's monotone chain)."""
+    """The corners of the convex hull, anticlockwise (A. M. Andrew's monotone chain); on a line to round-off is none."""
     order = sorted(set(points))
     if len(order) < 3:
         return order
+    span = max(order[-1][0] - order[0][0], max(y for _, y in order) - min(y for _, y in order))
+    straight = ROUND_OFF * span**2
 
     def half(run: Sequence[Place]) -> list[Place]:
         found: list[Place] = []
         for point in run:
-            while len(found) > 1 and _turn(found[-2], found[-1], point) <= 0.0:
+            while len(found) > 1 and _turn(found[-2], found[-1], point) <= straight:
                 found.pop()
             found.append(point)
         return found[:-1]
@@ -104,6 +109,19 @@ def sampled(loop: Sequence[Vertex], steps: int = 16) -> list[Place]:
                 c, s = cos(turn * step / many), sin(turn * step / many)
                 found.append((cx + c * (x - cx) - s * (y - cy), cy + s * (x - cx) + c * (y - cy)))
     return found
+
+
+def room_within(loop: Sequence[Place], at: Place) -> float:
+    """How far a place within a polygon is from it; below zero outside."""
+    least, crossings = float("inf"), 0
+    (x, y) = at
+    for (u, v), (p, q) in zip(loop, [*loop[1:], loop[0]], strict=True):
+        size = (p - u) ** 2 + (q - v) ** 2
+        along = min(1.0, max(0.0, ((x - u) * (p - u) + (y - v) * (q - v)) / size)) if size else 0.0
+        least = min(least, hypot(x - u - along * (p - u), y - v - along * (q - v)))
+        if (v > y) != (q > y) and x < u + (y - v) / (q - v) * (p - u):
+            crossings += 1
+    return least if crossings % 2 else -least
 
 
 def plate_area(plate: Plate) -> float:

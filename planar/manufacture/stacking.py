@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from itertools import combinations
 
-from planar.foundation.arrays import Array
-from planar.manufacture.clearances import hull_rows, least_distance
+from planar.manufacture.clearances import Body, PlacesOf, body_of, keep_apart
 from planar.manufacture.layers import LayerRules
 from planar.manufacture.plate_making import Pin, Sizes
-from planar.manufacture.plates import Place, Plate
-
-PlacesOf = Callable[[str, tuple[Place, ...]], Array]
-"""Where points of a link are at every position of a run: (positions, points, 2) in mm."""
+from planar.manufacture.plates import Plate
 
 
 def layer_rules(
@@ -25,7 +21,7 @@ def layer_rules(
     """What must not share a layer, and what no pin may run through, by the distances over the run."""
     number = {plate.name: index for index, plate in enumerate(plates)}
     together = tuple((number[one], number[other]) for one, other in meshing)
-    rows = [places(plate.link, hull_rows(plate.core)) for plate in plates]
+    bodies = [body_of(plate.link, plate.core) for plate in plates]
     apart, beside = set(), set()
     for one, other in combinations(range(1, len(plates)), 2):
         if plates[one].link == plates[other].link:
@@ -33,10 +29,10 @@ def layer_rules(
             beside.add((one, other))
         elif (one, other) not in together and (other, one) not in together:
             room = plates[one].reach + plates[other].reach + sizes.play
-            if least_distance(rows[one], rows[other]) < room:
+            if not keep_apart(bodies[one], bodies[other], room, places):
                 apart.add((one, other))
     joins = {each.name: joined_plates(each, plates) for each in pins}
-    spots = {each.name: places(each.on, (each.at,)) for each in pins}
+    spots = {each.name: Body(each.on, (each.at,)) for each in pins}
     obstacles = {}
     for each in pins:
         radius = sizes.diameter(each.name) / 2.0
@@ -46,14 +42,18 @@ def layer_rules(
             if index
             and index not in joins[each.name]
             and plate.link not in each.links
-            and least_distance(spots[each.name], rows[index]) < plate.reach + radius + sizes.play
+            and not keep_apart(spots[each.name], bodies[index], plate.reach + radius + sizes.play, places)
         ]
         obstacles[each.name] = frozenset(near)
     crowded = frozenset(
         (one.name, other.name)
         for one, other in combinations(pins, 2)
-        if least_distance(spots[one.name], spots[other.name])
-        < (sizes.diameter(one.name) + sizes.diameter(other.name)) / 2.0 + sizes.play
+        if not keep_apart(
+            spots[one.name],
+            spots[other.name],
+            (sizes.diameter(one.name) + sizes.diameter(other.name)) / 2.0 + sizes.play,
+            places,
+        )
     )
     return LayerRules(len(plates), frozenset(apart), together, tuple(sorted(beside)), joins, obstacles, crowded)
 

@@ -38,8 +38,8 @@ def changed(name, **more):
         ),
         (
             "a.linkage2",
-            linkage2('A 0 0 anchor="true"\nB 9 0 anchor="true"\nC 5 0 slider="true" slideradius="8" ~A ~B', "C A"),
-            ["curved"],
+            linkage2('A 9 0 anchor="true"\nB 9 0 anchor="true"\nC 5 0 slider="true" slideradius="8" ~A ~B', "C A"),
+            ["connector 2", "coincide"],
         ),
         ("a.txt", "ground,a,R,0,0\nground,a,Q,0,0\nx\n", ["no mechanism"]),
         ("a.txt", "mech=ground,a,R,0,0\nfoo bar\n", ["joint 2", "foo bar"]),

@@ -15,6 +15,7 @@ from tests.foreign_samples import (
     LINKAGE_SIM,
     PIXEL,
     SLIDER_CRANKS,
+    asmt,
     base64,
     coupler_point,
     linkage2,
@@ -154,3 +155,42 @@ def test_the_compact_form_of_a_pyslvs_project_is_read_alike():
     joints = "M[J[R, P[0, 0], L[ground, a]], J[R, P[1, 0], L[a]]]"
     text = f"{{input: [[0, 1]], algorithm: [{{input: [[2, 1]]}}], mechanism: '{joints}'}}"
     assert read_document(text)["inputs"][0]["pair"] == "P0"
+
+
+@pytest.mark.parametrize("radius", [0.03, -0.03])
+def test_a_rack_of_ondsel_goes_as_far_as_its_pinion_turns(radius):
+    """x + r a is constant, x of the pinion along the rack: the rack goes on by r a."""
+    parts = {"": {"m1": (0, 0), "x2": (0, -30)}, "wheel": {"a": (0, 0), "b": (0, 20)}}
+    text = asmt(
+        parts | {"rack": {"x": (0, -30), "c": (0, 0)}},
+        "RevoluteJoint A m1 wheel/a\nTranslationalJoint S x2 rack/x\nRackPinionJoint mesh rack/c wheel/a",
+        "A 2.0d*pi*time",
+    )
+    text = text.replace("/Asm/rack/c\n", f"/Asm/rack/c\n\t\t\t\tpitchRadius\n\t\t\t\t\t{radius}\n", 1)
+    mechanism = read_text(text)
+    state = planar.solve(mechanism)
+    assert state.residual < 1e-12 and state.mobility == 1
+    assert state.link("wheel").angular_velocity == pytest.approx(2 * pi)
+    assert state.point("S").velocity == pytest.approx([2 * pi * radius, 0.0], abs=1e-12)
+    turned = planar.cycle(mechanism, steps=8)
+    assert turned.point("S").position[-1, 0] - turned.point("S").position[0, 0] == pytest.approx(2 * pi * radius)
+
+
+def test_flags_of_pmks_may_be_words_and_its_texts_of_the_page_of_windows(tmp_path):
+    lines = ["ground, input,R,0,0", "input coupler,R,-2,0,0", "coupler rocker,R,5,6", "rocker ground,R,4,0"]
+    words = read_document("\n".join([*lines, "coupler,R,7,7,False,False,false"]))
+    assert (
+        words["links"]["coupler"]["points"]
+        == read_document("\n".join([*lines, "coupler,R,7,7"]))["links"]["coupler"]["points"]
+    )
+    told = read_document("\n".join(["rocker ground,R,4,0,0,true,false,false,true", *lines[:3]]))
+    assert told["inputs"][0]["pair"] == "A"
+    file = tmp_path / "link.txt"
+    file.write_bytes(b"A walker:\xa0http://x.org/?mech=" + "|".join(lines).replace(" ", ",").encode("ascii"))
+    assert len(planar.load(file).links) == 4
+
+
+def test_joints_of_ondsel_that_no_plane_has_are_refused_by_their_kind():
+    text = FOUR_BARS["ondsel"].replace("RevoluteJoint", "CurveCurveContact", 1).replace("/Asm/m1", "/Asm/curve", 1)
+    with pytest.raises(planar.BadInput, match="joint A: a 'CurveCurveContact' as this stands is no pair"):
+        read_text(text)

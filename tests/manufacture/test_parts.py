@@ -17,8 +17,8 @@ from planar.manufacture.involute import gear_outline, span_length
 from planar.manufacture.layers import LayerRules, broken_rules, find_layers
 from planar.manufacture.nesting import nested
 from planar.manufacture.plates import Hole, Plate, convex_hull, moved_plate, plate_area, rounded_hull, sampled
-from planar.results.motion import Motion
 from tests.command import run
+from tests.cut_plates import drawn, meet
 from tests.draws import part
 
 CLEAR = ("four-bar", "klann-leg", "jansen-leg", "v-twin-engine", "gear-reducer", "planetary-gear-set", "slider-crank")
@@ -26,27 +26,6 @@ CLEAR = ("four-bar", "klann-leg", "jansen-leg", "v-twin-engine", "gear-reducer",
 
 def dxf(found):
     return ezdxf.read(io.StringIO(found.encode(".dxf").decode())).modelspace()
-
-
-def drawn(plate: Plate, motion: Motion, row: int) -> list[np.ndarray]:
-    """A plate's outline where its link is in a row of a run, by the places of two of the link's points (mm)."""
-    frame = motion.frames[plate.link]
-    x, y, angle = (
-        np.broadcast_to(getattr(each, "parts", (each,))[0], (len(motion),))[row]
-        for each in (frame.x, frame.y, frame.angle)
-    )
-    start = planar.solve(motion.mechanism).frames[plate.link]
-    u, v, first = (float(getattr(each, "parts", (each,))[0]) for each in (start.x, start.y, start.angle))
-    points = np.array(sampled(plate.outline)) / 1e3
-    c, s = cos(angle - first), sin(angle - first)
-    return np.column_stack(
-        [x + c * (points[:, 0] - u) - s * (points[:, 1] - v), y + s * (points[:, 0] - u) + c * (points[:, 1] - v)]
-    )
-
-
-def meet(one, other):
-    """Whether two polygons meet: a corner of one in the other, or edges that cross."""
-    return bool(Polygon(one, closed=False).intersects_path(Polygon(other, closed=False), filled=True))
 
 
 @pytest.mark.parametrize("model", part(CLEAR[:5], 2))
@@ -220,7 +199,7 @@ def test_sheets_hold_plates_apart_and_refuse_what_is_larger():
 @pytest.mark.parametrize(
     ("words", "told"),
     [
-        (["valve-cam"], "the cam 'lift' cannot be cut as plates"),
+        (["geneva-wheel"], "the geneva 'cross' cannot be cut as plates"),
         (["four-bar", "-o", "x.iges"], "files that end in .dxf, .svg or .step"),
         (["four-bar", "--sheet", "big"], "not of the form WxH"),
         (["four-bar", "--made-at", "5"], "no scale such as 1:5"),

@@ -8,7 +8,7 @@ import pytest
 import planar
 from planar.manufacture.plates import plate_area
 
-MODELS = ("klann-leg", "slider-crank", "gear-reducer")
+MODELS = ("klann-leg", "slider-crank", "gear-reducer", "valve-cam")
 
 
 def entities(content: bytes) -> dict[int, tuple[str, str]]:

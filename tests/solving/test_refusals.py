@@ -3,6 +3,7 @@
 import copy
 import json
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -591,3 +592,11 @@ def test_a_range_whose_start_is_out_of_contact_is_refused_as_the_position_is(mon
     )
     with pytest.raises(planar.NoAnswer, match="from touching"):
         planar.cycle(wheel, 24)
+
+
+@pytest.mark.parametrize("model", ["three-parallel-cranks", "coupled-wheels"])
+def test_what_is_held_twice_wants_an_input_where_it_has_none(model):
+    with pytest.raises(planar.NoAnswer) as refused:
+        planar.solve(replace(planar.load(model), inputs=()))
+    assert refused.value.outcome is planar.Outcome.TOO_FEW_INPUTS
+    assert "give an input at" in refused.value.reason

@@ -13,6 +13,7 @@ from planar.formats.drawn.drawn_linkage import (
     Joint,
     PinJoint,
     Place,
+    RackJoint,
     SlideJoint,
     SlotJoint,
     Tracer,
@@ -98,12 +99,21 @@ class _Writer:
             return entry | {"turn": self.angle(joint.slider) - joint.angle}
         if isinstance(joint, SlotJoint):
             return {"slot": joint.name, "links": [joint.guide, joint.rider], **self._line(joint)}
+        if isinstance(joint, RackJoint):
+            return self._rack(joint)
         return self._wheels(joint)
 
     def _line(self, joint: SlideJoint | SlotJoint) -> dict[str, Any]:
         through = joint.at if joint.through is None else joint.through
         line = {"through": list(through), "angle": joint.angle - self.angle(joint.guide)}
         return {"line": line, "point": joint.name}
+
+    def _rack(self, joint: RackJoint) -> dict[str, Any]:
+        line = {"through": list(joint.contact), "angle": joint.angle - self.angle(joint.rack)}
+        entry: dict[str, Any] = {"rack": joint.name, "links": [joint.rack, joint.pinion], "line": line}
+        entry |= {"point": joint.name, "radius": joint.radius}
+        turned = self.angle(joint.pinion) - self.angle(joint.rack)
+        return entry | ({"mesh": {"displacement": 0, "angle": turned}} if turned else {})
 
     def _wheels(self, joint: WheelJoint) -> dict[str, Any]:
         sizes = joint.sizes[0] if joint.size_kind == "ratio" else list(joint.sizes)
@@ -204,6 +214,8 @@ def _points_of_links(linkage: DrawnLinkage) -> dict[str, dict[str, Place]]:
                 points[link][joint.name] = joint.at
         elif isinstance(joint, SlideJoint | SlotJoint):
             points[joint.slider if isinstance(joint, SlideJoint) else joint.rider][joint.name] = joint.at
+        elif isinstance(joint, RackJoint):
+            points[joint.pinion][joint.name] = joint.at
     for tracer in linkage.tracers:
         if tracer.link in points:
             points[tracer.link][tracer.name] = tracer.at

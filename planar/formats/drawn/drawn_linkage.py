@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from math import cos, radians, sin
 from typing import NamedTuple
 
 from planar.foundation.errors import join_names
@@ -66,7 +67,29 @@ class WheelJoint(NamedTuple):
         return self.kind == "gear"
 
 
-Joint = PinJoint | SlideJoint | SlotJoint | WheelJoint
+class RackJoint(NamedTuple):
+    """A pinion that rolls on the pitch line of a rack; as drawn they are in mesh.
+
+    `at` is the pinion's centre, `angle` the line's direction in the drawing (degrees), `radius` the pitch radius,
+    positive where the centre lies to the left of the line. `teeth` are the pinion's, 0 where they are not said.
+    """
+
+    name: str
+    rack: str
+    pinion: str
+    at: Place
+    angle: float
+    radius: float
+    teeth: int = 0
+
+    @property
+    def contact(self) -> Place:
+        """Where the pitch circle touches the pitch line."""
+        way = radians(self.angle)
+        return self.at[0] + self.radius * sin(way), self.at[1] - self.radius * cos(way)
+
+
+Joint = PinJoint | SlideJoint | SlotJoint | WheelJoint | RackJoint
 
 
 class Tracer(NamedTuple):
@@ -155,6 +178,8 @@ def joined_links(joint: Joint) -> tuple[str, ...]:
         return joint.guide, joint.slider
     if isinstance(joint, SlotJoint):
         return joint.guide, joint.rider
+    if isinstance(joint, RackJoint):
+        return joint.rack, joint.pinion
     return (*joint.wheels, joint.carrier)
 
 
@@ -162,7 +187,7 @@ def joint_phrase(joint: Joint) -> str:
     """The joint in a sentence: "the gear 'mesh'"."""
     if isinstance(joint, WheelJoint):
         return f"the {joint.kind} {joint.name!r}"
-    kinds = {PinJoint: "pin", SlideJoint: "slide", SlotJoint: "slot"}
+    kinds = {PinJoint: "pin", SlideJoint: "slide", SlotJoint: "slot", RackJoint: "rack"}
     return f"the {kinds[type(joint)]} {joint.name!r}"
 
 
@@ -178,5 +203,7 @@ def renamed_links(joint: Joint, names: dict[str, str]) -> Joint:
         return joint._replace(guide=name(joint.guide), slider=name(joint.slider))
     if isinstance(joint, SlotJoint):
         return joint._replace(guide=name(joint.guide), rider=name(joint.rider))
+    if isinstance(joint, RackJoint):
+        return joint._replace(rack=name(joint.rack), pinion=name(joint.pinion))
     first, second = joint.wheels
     return joint._replace(wheels=(name(first), name(second)), carrier=name(joint.carrier))

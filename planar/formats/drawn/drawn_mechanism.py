@@ -13,6 +13,7 @@ from planar.formats.drawn.drawn_linkage import (
     Joint,
     PinJoint,
     Place,
+    RackJoint,
     SlideJoint,
     SlotJoint,
     Tracer,
@@ -26,6 +27,7 @@ from planar.model.mechanism import Mechanism, named_points, pair_entries, relati
 from planar.model.pairs.base import MeasureKind, Pair
 from planar.model.pairs.belt import BeltPair, ChainPair
 from planar.model.pairs.gear import GearPair
+from planar.model.pairs.rack import RackPair
 from planar.model.pairs.sliding import SlidingPair
 from planar.model.pairs.slot import SlotPair
 from planar.model.pairs.turning import TurningPair
@@ -35,21 +37,26 @@ LENGTHS = ("mm", "cm", "m", "in")
 """Units of length that drawn linkages have; any other is written as mm."""
 
 
-def drawn_mechanism(mechanism: Mechanism, frames: Mapping[str, Frame], title: str) -> DrawnLinkage:
+def drawn_mechanism(
+    mechanism: Mechanism, frames: Mapping[str, Frame], title: str, without: tuple[type[Pair], ...] = ()
+) -> DrawnLinkage:
     """The mechanism as a linkage where its links have these frames, in its own unit of length.
 
-    `title` is the format's, for BadInput where a pair is of a type that no drawn linkage has. What a drawn linkage
-    cannot say beside the motion stands in its notes.
+    `title` is the format's, for BadInput where a pair is of a type that no drawn linkage has; pairs of the types
+    `without` are left out. What a drawn linkage cannot say beside the motion stands in its notes.
     """
-    return _Drawing(mechanism, frames, title).linkage()
+    return _Drawing(mechanism, frames, title, without).linkage()
 
 
 class _Drawing:
     """One mechanism on its way to a linkage."""
 
-    def __init__(self, mechanism: Mechanism, frames: Mapping[str, Frame], title: str) -> None:
+    def __init__(
+        self, mechanism: Mechanism, frames: Mapping[str, Frame], title: str, without: tuple[type[Pair], ...]
+    ) -> None:
         from planar.model.link_shapes import link_shape
 
+        self.without = without
         self.mechanism, self.frames, self.title = mechanism, frames, title
         self.shapes: dict[str, LinkShape] = {link.name: link_shape(link) for link in mechanism.links}
         self.length = mechanism.units.length if mechanism.units.length in LENGTHS else "mm"
@@ -59,7 +66,8 @@ class _Drawing:
         mechanism = self.mechanism
         if mechanism.closes_within is not None:
             raise cannot_say(self.title, "the misfit that 'closes_within' allows", "its pairs close exactly")
-        joints = tuple(self._joint(group) for group in pair_entries(mechanism))
+        groups = [group for group in pair_entries(mechanism) if not isinstance(group[0], self.without)]
+        joints = tuple(self._joint(group) for group in groups)
         return DrawnLinkage(
             mechanism.name,
             mechanism.frame,
@@ -100,7 +108,15 @@ class _Drawing:
                     sizes = tuple(float(self.unit.from_si(each)) for each in sizes)
                 crossed = bool(getattr(pair, "crossed", False))
                 return WheelJoint(pair.name, kind_name, pair.links, pair.carrier, pair.size_kind, sizes, crossed)
+        if isinstance(pair, RackPair):
+            return self._rack(pair)
         raise cannot_say(self.title, f"the {pair.keyword} {pair.name!r}")
+
+    def _rack(self, pair: RackPair) -> RackJoint:
+        rack, pinion = pair.links
+        angle = degrees(self.frames[rack].angle + pair.line.direction_angle(self.shapes[rack]))
+        radius, teeth = float(self.unit.from_si(pair.radius)), int(pair.pinion_teeth or 0)
+        return RackJoint(pair.name, rack, pinion, self._world(pinion, pair.point), _plain(angle), radius, teeth)
 
     def _tracers(self, joints: Sequence[Joint]) -> list[Tracer]:
         """Points of links where nothing is joined, by the names that results give them."""

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from math import atan2, degrees, hypot
+from string import ascii_lowercase, ascii_uppercase
 from xml.etree.ElementTree import Element
 
 from planar.formats.drawn.drawn_document import drawn_document
@@ -18,16 +20,20 @@ from planar.formats.drawn.drawn_linkage import (
 )
 from planar.formats.drawn.file_format import FileFormat, ForeignText, ReadDocument
 from planar.formats.drawn.rigid_links import merge_links, merge_links_of_two_pins, without_loose_links
+from planar.formats.kinds.parts.linkage2_motion import arc_centre, swing_phase, turned_links
 from planar.formats.kinds.parts.linkage2_text import PIXELS_PER_MILLIMETRE, write
 from planar.formats.texts.names import NameBook
 from planar.formats.texts.xml_text import number_attribute, parse_xml
-from planar.foundation.errors import BadInput
+from planar.foundation.errors import BadInput, join_names
 
-MECHANISM_LAYER = 16
-"""The bit of `layer` that is set on what moves; other layers are drawings."""
+MECHANISM_LAYERS = 0xFFFFFFF0
+"""The bits of `layer` of which one is set on what moves; other layers are drawings."""
 DEFAULT_RATE = 15.0
 """rpm, or strokes to and fro in a minute, where none is written."""
 FRAME = "frame"
+LETTERS = ascii_uppercase + ascii_lowercase
+JOINED = re.compile(r'(=\s*"[^"<]*")(?=\w)')
+"""An attribute that the next follows without a blank, as in some of the program's own samples."""
 
 
 def recognise(source: ForeignText) -> bool:
@@ -37,7 +43,7 @@ def recognise(source: ForeignText) -> bool:
 
 def read(source: ForeignText) -> ReadDocument:
     """The mechanism of a file of Linkage. Raises BadInput."""
-    root = parse_xml(source.text, source.place)
+    root = parse_xml(JOINED.sub(r"\1 ", source.text), source.place)
     if root.tag != "linkage2":
         raise BadInput(source.place, f"the outermost element is {root.tag!r:.40}, and not 'linkage2'")
     linkage, welds = _Reader(root, source).read()
@@ -55,19 +61,22 @@ class _Reader:
         self.joints: list[Joint] = []
         self.inputs: list[DrawnInput] = []
         self.tracers: list[Tracer] = []
-        self.welds: list[tuple[str, str]] = []
+        self.welds: list[tuple[str, ...]] = []
         self.connectors = {self._id(each): each for each in root.iter() if each in [*root] and each.tag == "connector"}
-        self.elements = [each for each in root if each.tag in ("Link", "element") and self._moves(each, "a link")]
+        elements = [each for each in root if each.tag in ("Link", "element") and self._moves(each, "a link")]
         if not self.connectors:
             raise BadInput(source.place, "there is no connector in this file")
+        self.anchors = {key for key, each in self.connectors.items() if each.get("anchor") == "true"}
+        self.elements = self._with_extent(elements)
         self.names = {key: self._connector_name(key) for key in self.connectors}
         self.places = {key: self._place(key) for key in self.connectors}
         self.links: dict[str, list[str]] = {}
         self.named: dict[str, str] = {}
+        self.still: set[str] = set()
         for each in self.elements:
             self._add_link(each)
 
-    def read(self) -> tuple[DrawnLinkage, list[tuple[str, str]]]:
+    def read(self) -> tuple[DrawnLinkage, list[tuple[str, ...]]]:
         for key, element in self.connectors.items():
             if not self._moves(element, ""):
                 continue
@@ -96,7 +105,7 @@ class _Reader:
     def _moves(self, element: Element, what: str) -> bool:
         """Whether an element is of the mechanism, and no drawing and no measurement."""
         layer = element.get("layer", "").strip()
-        drawn = layer.isdecimal() and int(layer) not in (0,) and not int(layer) & MECHANISM_LAYER
+        drawn = layer.isdecimal() and int(layer) not in (0,) and not int(layer) & MECHANISM_LAYERS
         if (drawn or element.get("measurementelement") == "true") and what:
             self.notes.append("drawings and measurements of the file are left out")
         return not drawn and element.get("measurementelement") != "true"
@@ -110,6 +119,18 @@ class _Reader:
         x, y = (number_attribute(self.connectors[key], name, told) for name in ("x", "y"))
         return x / PIXELS_PER_MILLIMETRE, y / PIXELS_PER_MILLIMETRE
 
+    def _with_extent(self, elements: list[Element]) -> list[Element]:
+        """Without the Links that stand for a connector alone: one that is on other Links as well, or an anchor."""
+        held = [{self._id(each) for each in element if each.tag == "connector"} for element in elements]
+
+        def is_alone(number: int) -> bool:
+            own = held[number]
+            if len(own) != 1 or elements[number].get("gear") == "true":
+                return False
+            return own <= self.anchors or any(own & other for index, other in enumerate(held) if index != number)
+
+        return [element for number, element in enumerate(elements) if not is_alone(number)]
+
     def _add_link(self, element: Element) -> None:
         key = self._id(element)
         name = self.book.fresh(element.get("name", "").strip() or f"L{key}", "link")
@@ -120,6 +141,8 @@ class _Reader:
         keys = list(dict.fromkeys(keys))
         if key not in self.named:
             self.named[key] = name
+        if element.get("fastenconnector") in self.anchors:
+            self.still.add(name)
         if element.get("actuator") == "true" and len(keys) >= 2:
             self._actuator(element, name, keys)
             return
@@ -138,25 +161,29 @@ class _Reader:
         told = f"{self.source.place}, Link {element.get('id')}"
         throw = number_attribute(element, "throw", told, 0.0) / PIXELS_PER_MILLIMETRE
         cpm = number_attribute(element, "cpm", told, DEFAULT_RATE)
-        self.inputs.append(DrawnInput(joint, (name, rod), 2.0 * throw * cpm / 60.0))
+        offset = number_attribute(element, "startoffset", told, 0.0) / PIXELS_PER_MILLIMETRE
+        begun, way = swing_phase(throw, offset) if throw > 0.0 else (0.0, 1)
+        self.inputs.append(DrawnInput(joint, (name, rod), way * 2.0 * throw * cpm / 60.0))
+        after = f", {begun:.6g} mm of it done as drawn" if begun else ""
         self.notes.append(
-            f"the actuator {name!r} goes to and fro by {throw:.6g} mm, "
-            f"{cpm:g} times a minute; here it runs at that mean speed"
+            f"the actuator {name!r} goes to and fro by {throw:.6g} mm{after}, "
+            f"{abs(cpm):g} times a minute; here it runs on at that mean speed"
         )
+        self._by_hand(element, f"actuator {name!r}")
+
+    def _by_hand(self, element: Element, what: str) -> None:
+        if element.get("alwaysmanual") == "true":
+            self.notes.append(f"the {what} is moved by hand in that program; here it runs at the speed of the file")
 
     def _join(self, key: str, element: Element) -> None:
         """The joint at a connector: a pin of its Links, and where it slides a pin in a slot."""
         holders = [name for name, keys in self.links.items() if key in keys]
-        anchored = element.get("anchor") == "true"
+        anchored = key in self.anchors
         at, name = self.places[key], self.names[key]
         limits = [self._id(each) for each in element if each.tag == "slidelimit"]
-        if element.get("slider") == "true" and len(limits) >= 2:
-            if number_attribute(element, "slideradius", f"{self.source.place}, connector {key}", 0.0) > 0.0:
-                raise BadInput(
-                    f"{self.source.place}, connector {key}", "its slot is curved, for which planar has no pair"
-                )
-            if self._slide(key, holders, anchored, limits[0], limits[1]):
-                return
+        slides = element.get("slider") == "true" and len(limits) >= 2
+        if slides and self._slide(key, holders, anchored, limits[0], limits[1]):
+            return
         members = ([FRAME] if anchored else []) + holders
         fastened = element.get("fastenlink") or element.get("fasten")
         if fastened and not members:
@@ -177,7 +204,7 @@ class _Reader:
                     f"{self.source.place}, connector {key}", f"there is no connector {each!r} that limits its slide"
                 )
         carriers = [n for n, keys in self.links.items() if start in keys and end in keys and key not in keys]
-        fixed = all(self.connectors[each].get("anchor") == "true" for each in (start, end))
+        fixed = all(each in self.anchors for each in (start, end))
         guide = FRAME if fixed else next(iter(carriers), None)
         riders = [FRAME, *holders] if anchored else holders
         riders = [each for each in riders if each != guide]
@@ -191,35 +218,64 @@ class _Reader:
                 f"{self.source.place}, connector {key}", "the ends of its slot coincide, so it has no direction"
             )
         at, name = self.places[key], self.names[key]
+        self.notes.append("where slots end is not kept: what slides in them goes on")
+        radius = number_attribute(self.connectors[key], "slideradius", f"{self.source.place}, connector {key}", 0.0)
+        if radius:
+            self._arc(key, guide, riders, arc_centre((x, y), (u, v), radius / PIXELS_PER_MILLIMETRE))
+            return True
         along = self.book.fresh(f"{name}_slot") if len(riders) > 1 else name
         if len(riders) > 1:
             self.joints.append(PinJoint(name, tuple(riders), at))
         self.joints.append(SlotJoint(along, guide, riders[0], at, degrees(atan2(v - y, u - x)), through=(x, y)))
         return True
 
+    def _arc(self, key: str, guide: str, riders: list[str], centre: tuple[float, float]) -> None:
+        """A pin in a curved slot: a link from the slot's centre holds it there."""
+        name, at = self.names[key], self.places[key]
+        arc = self.book.fresh(f"{name}_arc")
+        self.links[arc] = []
+        self.joints.append(PinJoint(self.book.fresh(f"{name}_centre"), (guide, arc), centre))
+        self.joints.append(PinJoint(name, (*riders, arc), at))
+        radius = hypot(at[0] - centre[0], at[1] - centre[1])
+        told = f"the curved slot of {name!r} is here the link {arc!r} about its centre, {radius:.6g} mm long"
+        self.notes.append(told)
+
     def _drive(self, key: str, element: Element, members: list[str]) -> None:
         """The input of a connector: it turns the Link there that is not held elsewhere against the frame."""
-        anchors = {each for each, c in self.connectors.items() if c.get("anchor") == "true"}
-        turning = [name for name in members if not set(self.links[name]) - {key} & anchors]
-        if element.get("anchor") != "true":
-            self.notes.append(f"the input at {self.names[key]!r} is on no anchor and is left out")
+        name = self.names[key]
+        if key not in self.anchors:
+            self.notes.append(f"the input at {name!r} is on no anchor and is left out")
             return
+        free = [link for link in members if link not in self.still]
+        turning = turned_links(key, free, self.links, self.anchors - {key})
         if not turning:
-            self.notes.append(f"the input at {self.names[key]!r} turns no link and is left out")
+            self.notes.append(f"the input at {name!r} turns no link and is left out")
             return
         if len(turning) > 1:
-            told = f"the input at {self.names[key]!r} drives {turning[0]!r} alone of its links"
+            self.notes.append(f"the links that the input at {name!r} turns are one here: {join_names(turning)}")
+            self.welds.append(tuple(turning))
+        told = f"{self.source.place}, connector {key}"
+        rate = -number_attribute(element, "rpm", told, DEFAULT_RATE)
+        limit = number_attribute(element, "limitangle", told, 0.0)
+        if limit > 0.0:
+            begun, way = swing_phase(limit, number_attribute(element, "startoffset", told, 0.0))
+            after = f", {begun:g} of them done as drawn" if begun else ""
+            told = f"the input at {name!r} goes to and fro by {limit:g} degrees{after}; here it turns on at its speed"
             self.notes.append(told)
-        rate = number_attribute(element, "rpm", f"{self.source.place}, connector {key}", DEFAULT_RATE)
-        self.inputs.append(DrawnInput(self.names[key], (FRAME, turning[0]), -rate, "rpm"))
+            rate *= way
+        self._by_hand(element, f"input at {name!r}")
+        self.inputs.append(DrawnInput(name, (FRAME, turning[0]), rate, "rpm"))
 
     def _fasten(self, element: Element) -> None:
+        """What a Link is fastened to: another, which it goes with, or an anchor, on which a gear stands still."""
         own = self.named[self._id(element)]
-        others = [element.get("fastenlink")] if element.get("fastenlink") else []
-        for each in others:
-            if each in self.named and self.named[each] != own:
-                self.welds.append((own, self.named[each]))
-        held = [element.get("fastenconnector"), *(each.get("id") for each in element if each.tag == "fastenconnector")]
+        other = self.named.get(element.get("fastenlink") or "", own)
+        if other != own:
+            self.welds.append((own, other))
+        if own in self.still:
+            self.welds.append((FRAME, own))
+        to = element.get("fastenconnector")
+        held = [None if to in self.anchors else to, *(e.get("id") for e in element if e.tag == "fastenconnector")]
         for key in filter(None, held):
             if key in self.places and not any(key in keys for keys in self.links.values()):
                 self.tracers.append(Tracer(self.book.fresh(f"{self.names[key]}_on_{own}"), own, self.places[key]))
@@ -245,7 +301,7 @@ class _Reader:
         (x, y), (u, v) = (self.places[each] for each in centres)
         apart = hypot(u - x, v - y)
         carriers = [n for n, keys in self.links.items() if set(centres) <= set(keys)]
-        fixed = all(self.connectors[each].get("anchor") == "true" for each in centres)
+        fixed = all(each in self.anchors for each in centres)
         if not fixed and not carriers:
             raise BadInput(
                 f"{self.source.place}, ratios", f"the wheels {wheels[0]!r} and {wheels[1]!r} have no common carrier"
@@ -264,22 +320,19 @@ class _Reader:
             self.joints.append(WheelJoint(name, "chain", wheels, carrier, "ratio", (sizes[0] / sizes[1],)))
 
     def _centre(self, wheel: str) -> str:
-        """The connector about which a wheel turns: an anchor of it, or its first."""
+        """The connector about which a wheel turns: its first."""
         keys = self.links[wheel]
         if not keys:
             raise BadInput(f"{self.source.place}, ratios", f"the wheel {wheel!r} has no connector to turn about")
-        return next((each for each in keys if self.connectors[each].get("anchor") == "true"), keys[0])
+        return keys[0]
 
 
 def _letters(key: str) -> str:
-    """The letters by which Linkage shows a connector's number: 0 is A, 25 Z, 26 AA."""
+    """The letter by which Linkage shows a connector's number: 0 is A, 25 Z, 26 a, and 52 A1."""
     if not key.isdecimal() or int(key) > 10**6:
         return key
-    number, found = int(key) + 1, ""
-    while number:
-        number, rest = divmod(number - 1, 26)
-        found = chr(65 + rest) + found
-    return found
+    times, letter = divmod(int(key), len(LETTERS))
+    return LETTERS[letter] + (str(times) if times else "")
 
 
 FORMAT = FileFormat(

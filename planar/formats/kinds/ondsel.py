@@ -13,6 +13,7 @@ from planar.formats.drawn.drawn_linkage import (
     Joint,
     PinJoint,
     Place,
+    RackJoint,
     SlideJoint,
     Tracer,
     WheelJoint,
@@ -38,6 +39,11 @@ from planar.foundation.errors import BadInput
 FRAME = "ground"
 PARALLEL, CLOSED, EXACT = 1e-6, 1e-4, 1e-8
 """Of unit vectors that are parallel; of the assembly's size, gaps of joints that are closed, and that are told."""
+KNOWN = (
+    *("RevoluteJoint", "CylindricalJoint", "TranslationalJoint", "FixedJoint"),
+    *("GearJoint", "RackPinionJoint"),
+)
+"""Joints of which some are pairs of a plane."""
 TABLE_STEPS = 200
 """Of the table that stands for a motion of any other course than an even one."""
 
@@ -126,9 +132,14 @@ class _Reader:
         size = max((hypot(*self.flat(each.pose.at)) for each in self.markers.values()), default=0.0) or 1.0
         gears = [each for each in self.given if each.text == "GearJoint"]
         for each in (*(joint for joint in self.given if joint not in gears), *gears):
+            if each.text not in KNOWN:
+                raise self._no_pair(each)
             one, other = self._ends(each)
             if each.text == "FixedJoint":
                 welds.append((one.part, other.part))
+                continue
+            if each.text == "RackPinionJoint":
+                found.append(self._rack(each, one, other))
                 continue
             joint = self._gear(each, found) if each in gears else self._joint(each, one, other, size)
             found.append(joint)
@@ -177,7 +188,25 @@ class _Reader:
             if off > CLOSED * size:
                 raise BadInput(self._told(given), f"its markers are {off:.3g} m off its line; save the assembly closed")
             return SlideJoint(name, one.part, other.part, at, degrees(atan2(v, u)), start)
-        raise BadInput(self._told(given), f"a {given.text!r:.40} as this stands is no pair of the plane that is read")
+        raise self._no_pair(given)
+
+    def _no_pair(self, given: Node) -> BadInput:
+        return BadInput(self._told(given), f"a {given.text!r:.40} as this stands is no pair of the plane that is read")
+
+    def _rack(self, given: Node, rack: Held, pinion: Held) -> RackJoint:
+        """x + r a stays as it is: of the pinion's marker along the x-axis of the rack's, and its turn about that z."""
+        radius, *_ = numbers(Node(given.value("pitchRadius") or "", given.line), 1, self.place)
+        way, axis = rack.pose.column(0), dot(rack.pose.column(2), self.normal)
+        if abs(abs(axis) - 1.0) > PARALLEL or abs(dot(way, self.normal)) > PARALLEL:
+            raise BadInput(
+                self._told(given), "its pinion's axis is not parallel to the others: the parts move in space"
+            )
+        if radius == 0.0:
+            raise BadInput(self._told(given), "zero is no radius of a pinion")
+        u, v = self.flat(way)
+        name, at = self.book.fresh(given.value("Name") or "rack"), self.flat(pinion.pose.at)
+        sense = 1.0 if axis > 0.0 else -1.0
+        return RackJoint(name, rack.part, pinion.part, at, degrees(atan2(v, u)), sense * radius)
 
     def _gear(self, given: Node, found: list[Joint]) -> WheelJoint:
         """Gears by their radii: external ones where the centres are as far apart as both together."""

@@ -76,7 +76,10 @@ def _parsed(line: str) -> PmksJoint | None:
     else:
         return None
     rest = words[index + 1 :]
-    flags = rest.pop() if len(rest) > 2 and FLAGS.fullmatch(rest[-1]) else ""
+    told: list[str] = []
+    while len(rest) > 2 and rest[-1].lower() in ("true", "false"):
+        told.insert(0, rest.pop()[0])
+    flags = rest.pop() if len(rest) > 2 and FLAGS.fullmatch(rest[-1]) else "".join(told)
     if not 2 <= len(rest) <= 3 or not all(NUMBER.fullmatch(word) for word in rest):
         return None
     x, y, angle = (*map(float, rest), 0.0)[:3]

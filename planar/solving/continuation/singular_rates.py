@@ -46,6 +46,8 @@ class _FirstOrderSolution(NamedTuple):
 def singular_rates(setup: PreparedMechanism, z: Array) -> SingularRates | None:
     """The one motion through a singular position near z, one freedom more than inputs; None if it is not one."""
     u1, u2 = setup.inputs.u1, setup.inputs.u2
+    if not u1.size:
+        return None  # no input says which way
     speed, gain = float(np.linalg.norm(u1)), float(np.linalg.norm(u2))
     if speed > 0.0:
         # in units of time in which the inputs run at speed one, so that no tolerance depends on the speed

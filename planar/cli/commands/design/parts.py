@@ -12,6 +12,8 @@ from planar.cli.options import (
     model_argument,
     output_option,
     print_or_write,
+    range_options,
+    read_ends,
     read_model,
     refuse_overwriting,
     show_status,
@@ -29,6 +31,7 @@ from planar.foundation.errors import BadInput
 @click.option("--play", default="0.1mm", show_default=True, metavar="LENGTH", help="What holes are wider than pins.")
 @click.option("--sheet", default="600x400", show_default=True, metavar="WxH", help="Its width and height in mm.")
 @click.option("--made-at", metavar="SCALE", help="The scale, as 1:5; left out, the largest that fits the sheet.")
+@range_options
 @json_option
 # many: sizes of what is cut
 def parts(
@@ -40,6 +43,9 @@ def parts(
     play: str,
     sheet: str,
     made_at: str | None,
+    pair: str | None,
+    start: str | None,
+    stop: str | None,
     as_json: bool,
 ) -> None:
     """Plates to be cut: a layer for each, so that they clear one another; pins, gears, a sheet."""
@@ -59,6 +65,7 @@ def parts(
         None if text is None else read_length(mechanism, text, option) for option, text in lengths.items()
     )
     assert thick is not None and loose is not None
+    first, last = read_ends(mechanism, pair, start, stop)
     with show_status(f"{mechanism.name}: plates and layers"):
         found = made(
             mechanism,
@@ -68,6 +75,9 @@ def parts(
             play=loose,
             sheet=_sheet(sheet),
             scale=None if made_at is None else _scale(made_at),
+            start=first,
+            stop=last,
+            pair=pair,
         )
     if output is not None:
         found.save(output)

@@ -14,6 +14,7 @@ from planar.formats.drawn.drawn_linkage import (
     SlideJoint,
     SlotJoint,
     WheelJoint,
+    joint_phrase,
 )
 from planar.formats.drawn.file_format import WrittenText, cannot_say
 from planar.formats.drawn.wheels import wheel_centre, wheel_ratio
@@ -36,16 +37,18 @@ class _Writer:
         self.linkage = linkage
         self.scale = MILLIMETRES[linkage.length] * PIXELS_PER_MILLIMETRE
         self.connectors: list[str] = []
+        self.at: list[Place] = []
         self.members: dict[str, list[int]] = {}
         self.gears: list[WheelJoint] = []
         places = [each.at for each in (*linkage.joints, *linkage.tracers) if not isinstance(each, WheelJoint)]
         self.reach = max((hypot(x - places[0][0], y - places[0][1]) for x, y in places), default=1.0) or 1.0
 
     def write(self) -> WrittenText:
-        linkage, driven = self.linkage, {each.joint: each for each in self.linkage.inputs}
+        linkage = self.linkage
+        driven = {each.joint for each in linkage.inputs}
         for joint in linkage.joints:
             if isinstance(joint, PinJoint):
-                self._pin(joint, driven.get(joint.name))
+                self._pin(joint, [each for each in linkage.inputs if each.joint == joint.name])
             elif isinstance(joint, SlideJoint | SlotJoint):
                 if joint.name in driven:
                     raise cannot_say(TITLE, f"the input at {joint.name!r}", "its inputs turn a link on the frame")
@@ -53,7 +56,7 @@ class _Writer:
             elif isinstance(joint, WheelJoint):
                 self.gears.append(joint)
             else:
-                raise cannot_say(TITLE, f"the rack {joint.name!r}")
+                raise cannot_say(TITLE, joint_phrase(joint))
         for tracer in linkage.tracers:
             self._connector(tracer.name, tracer.at, [tracer.link], 'draw="true"')
         ids = {link: number for number, link in enumerate(self.members)}
@@ -70,6 +73,7 @@ class _Writer:
 
     def _connector(self, name: str, at: Place, links: list[str], more: str = "", inside: tuple[int, ...] = ()) -> int:
         number = len(self.connectors)
+        self.at.append(at)
         x, y = at[0] * self.scale, at[1] * self.scale
         head = f'\t<connector id="{number}" name={quoteattr(name)} layer="16" x="{x!r}" y="{y!r}"'
         head += f" {more}" if more else ""
@@ -80,21 +84,23 @@ class _Writer:
                 self.members.setdefault(link, []).append(number)
         return number
 
-    def _pin(self, joint: PinJoint, driven: DrawnInput | None) -> None:
-        frame = self.linkage.frame
+    def _pin(self, joint: PinJoint, driven: list[DrawnInput]) -> None:
+        """A connector, or at an input one for each link that is driven and one for the rest: inputs turn all of one."""
+        frame, rest = self.linkage.frame, list(joint.links)
         anchor = 'anchor="true"' if frame in joint.links else ""
-        if driven is None:
-            self._connector(joint.name, joint.at, list(joint.links), anchor)
-            return
-        if frame not in driven.links:
-            told = f"the input of {driven.links[1]!r} against {driven.links[0]!r}"
-            raise cannot_say(TITLE, told, "its inputs turn a link on the frame")
-        other = next(each for each in driven.links if each != frame)
-        rate = driven.velocity * 30.0 / pi * (-1.0 if driven.links[1] == other else 1.0)
-        self._connector(joint.name, joint.at, [other], f'anchor="true" input="true" rpm="{rate!r}"')
-        rest = [each for each in joint.links if each not in (frame, other)]
-        if rest:
-            self._connector(f"{joint.name}_fixed", joint.at, rest, 'anchor="true"')
+        for number, given in enumerate(driven):
+            if frame not in given.links:
+                told = f"the input of {given.links[1]!r} against {given.links[0]!r}"
+                raise cannot_say(TITLE, told, "its inputs turn a link on the frame")
+            other = next(each for each in given.links if each != frame)
+            rate = given.velocity * 30.0 / pi * (-1.0 if given.links[1] == other else 1.0)
+            name = f"{joint.name}_{number}" if number else joint.name
+            self._connector(name, joint.at, [other], f'anchor="true" input="true" rpm="{rate!r}"')
+            rest.remove(other)
+        if not driven:
+            self._connector(joint.name, joint.at, rest, anchor)
+        elif set(rest) - {frame}:
+            self._connector(f"{joint.name}_fixed", joint.at, rest, anchor)
 
     def _slide(self, joint: SlideJoint | SlotJoint) -> None:
         """A connector in the slot between two of its guide; two of them, where the link must not turn."""
@@ -121,6 +127,11 @@ class _Writer:
         centres = [wheel_centre(self.linkage.joints, wheel, joint.carrier) for wheel in joint.wheels]
         if centres[0] is None or centres[1] is None or near(centres[0], centres[1]):
             raise cannot_say(TITLE, what, "its wheels have no two pins on a common link")
+        for wheel, centre in zip(joint.wheels, centres, strict=True):  # a wheel turns about its first connector
+            self.members[wheel].sort(key=lambda number: self.at[number] != centre)
+        turning = {self.members[wheel][0] for wheel in joint.wheels}
+        if joint.carrier != self.linkage.frame and not turning <= set(self.members.get(joint.carrier, [])):
+            raise cannot_say(TITLE, what, "an input turns its carrier about a connector of its own")
         first, second = ids[joint.wheels[0]], ids[joint.wheels[1]]
         kind = "gears" if gears else "chain"
         return (

@@ -25,7 +25,7 @@ def parts_tables(found: Parts) -> RenderableType:
         low, high = pin.layers
         pins.add_row(pin.name, f"{1e3 * pin.diameter:g}", f"{1e3 * pin.length:g}", f"{low} to {high}")
     clear = "every plate and pin is clear" if found.is_clear else "not everything is clear"
-    told = [f"{clear} at {found.positions} positions of the run", *found.notes]
+    told = [f"{clear} over the run, at {found.positions} positions and between them", *found.notes]
     return Group(plates, pins, Text("\n".join(told)))
 
 
