@@ -14,7 +14,7 @@ from planar.synthesis.fitting.moving_designs import FitProblem, MovingDesigns
 from planar.synthesis.fitting.wanted_equations import WantedEquations
 
 MAX_STEPS = 400
-HALVING_STEPS = (5, 10, 20)
+HALVING_STEPS = (10, 20, 40)
 """Steps after which only the better half goes on, where there are many."""
 VALLEY_STEPS, ENOUGH_FALL = 10, 0.01
 """Steps, after the halvings, in which the sum of squares is to fall by so much of it: along a valley that is flatter
@@ -71,7 +71,7 @@ class DesignFit:
         def rest(step: int) -> None:
             """Let rest what leads to nothing better, and look anew where demands are kept least."""
             nonlocal before
-            is_late = step >= 2 * HALVING_STEPS[-1]
+            is_late = step > HALVING_STEPS[-1]
             if is_late and step % VALLEY_STEPS == 0:
                 state.is_moving &= state.squares <= (1.0 - ENOUGH_FALL) * before
             if state.demands is not None and step % WATCH_STEPS == 0 and state.demands.guard.rows:
