@@ -12,6 +12,7 @@ from PIL import Image
 
 import planar
 from planar.foundation.units import parse_unit
+from tests.drawn_linkages import LINKAGES
 from tests.known import MODELS
 from tests.page_scripts import downloaded, same, settled
 
@@ -89,6 +90,36 @@ def test_a_guide_is_drawn_wherever_its_block_goes_where_nothing_limits_it(shown)
 
 
 # looked at
+
+
+HIDDEN = """() => {
+  const boxes = [...document.querySelectorAll(".lens")].filter((each) => each.offsetHeight).map((each) => each.getBoundingClientRect());
+  const { left, top } = svg.getBoundingClientRect(), { avoided } = drawing, spots = [];
+  for (let k = 0; k < avoided.length; k += 2) spots.push([left + avoided[k], top + avoided[k + 1], left + avoided[k], top + avoided[k + 1]]);
+  for (const each of document.querySelectorAll("#drawing .layers :is(circle, text, .head)")) {
+    const box = each.getBoundingClientRect();
+    spots.push([box.left, box.top, box.right, box.bottom]);
+  }
+  return [boxes.length, spots.filter(([x0, y0, x1, y1]) => boxes.some((box) => x0 < box.right && x1 > box.left && y0 < box.bottom && y1 > box.top))];
+}"""
+"""How many groups of buttons lie over the drawing, and the boxes of what they hide: strokes' ends, centres and letters."""
+
+
+@pytest.mark.parametrize("name", ["quick return", "offset slider-crank", "toggle", "cam"])
+@pytest.mark.parametrize("screen", ["desk", "phone"])
+def test_no_button_hides_what_is_drawn_while_it_moves(name, screen, shown):
+    window = shown(planar.from_dict(LINKAGES[name][1]), screen)
+    window.wait_for_function("() => page.course")
+    window.get_by_label("Instantaneous centres").check()
+    for part in (0.5, 0.0, 1.0, 0.3, 0.7):
+        window.evaluate(
+            "(part) => { const { low, high } = controls.ends(page.running); page.moveTo(low + part * (high - low)); }",
+            part,
+        )
+        settled(window)
+        count, hidden = window.evaluate(HIDDEN)
+        assert count == 2
+        assert hidden == []
 
 
 def test_the_drawing_stays_in_sight_while_the_panels_scroll(shown):

@@ -160,7 +160,10 @@ class Layers {
   }
 
   /** What can be seen, in px: [x, y, x, y]. */
-  bounds() { return [0, 0, this.page.view.width, this.page.view.height]; }
+  bounds() {
+    const { width, height, head, foot } = this.page.view;
+    return [0, head, width, height - foot];
+  }
 
   at(position) { return this.page.view.toScreen(position); }
 
