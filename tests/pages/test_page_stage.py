@@ -92,6 +92,12 @@ def test_a_guide_is_drawn_wherever_its_block_goes_where_nothing_limits_it(shown)
 # looked at
 
 
+def test_numbers_below_nothing_have_a_minus_as_in_print(shown):
+    window = shown(planar.from_dict(LINKAGES["offset slider-crank"][1]))
+    window.wait_for_function("() => page.course")
+    assert window.locator(".ends span").first.inner_text() == "dead point −171.5 deg"
+
+
 HIDDEN = """() => {
   const boxes = [...document.querySelectorAll(".lens")].filter((each) => each.offsetHeight).map((each) => each.getBoundingClientRect());
   const { left, top } = svg.getBoundingClientRect(), { avoided } = drawing, spots = [];
