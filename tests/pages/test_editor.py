@@ -10,7 +10,7 @@ import pytest
 
 import planar
 from planar.document.texts.mechanism_link import read_link
-from tests.drawn_linkages import LINKAGES, SLIDER_CRANK, draw_quick_return, draw_slider_crank
+from tests.drawn_linkages import CAM, LINKAGES, SLIDER_CRANK, draw_cam, draw_quick_return, draw_slider_crank
 from tests.guide_screens import draw_six_bar, guide_steps
 from tests.hostile import harmful_mechanism
 from tests.page_scripts import settled
@@ -44,6 +44,34 @@ def test_a_linkage_drawn_from_nothing_is_the_written_one(name, drawing):
     many = len(written["inputs"])
     assert hand.told() == f"mobility {many}, {many} input{'s' * (many > 1)}"
     equal(hand.mechanism(), written)
+
+
+@pytest.mark.parametrize(
+    ("law", "pieces"),
+    [
+        (
+            {"motion": "3-4-5", "rise": 90, "dwell": 30, "back": 150},
+            [("3-4-5", 8, 90), ("dwell", 0, 30), ("3-4-5", -8, 150), ("dwell", 0, 90)],
+        ),
+        (
+            {"motion": "modified trapezoidal", "rise": 200, "dwell": 0, "back": 160},
+            [("modified trapezoidal", 8, 200), ("modified trapezoidal", -8, 160)],
+        ),
+    ],
+)
+def test_a_cam_is_drawn_with_the_law_that_stands_beside(law, pieces, drawing):
+    hand = drawing()
+    draw_cam(hand, lift=8, **law)
+    *others, cam = CAM["pairs"]
+    wanted = [{"motion": motion, "in": angle} | ({"by": by} if by else {}) for motion, by, angle in pieces]
+    equal(hand.mechanism(), CAM | {"pairs": [*others, cam | {"law": wanted}]})
+
+
+def test_a_cam_of_more_than_a_turn_is_not_drawn(drawing):
+    hand = drawing()
+    draw_cam(hand, rise=200, dwell=61, back=100)
+    assert "360 deg at the most" in hand.said()
+    assert not any("cam" in pair for pair in hand.file()["pairs"])
 
 
 def test_what_was_drawn_is_undone_to_nothing_and_done_again(drawing):

@@ -14,6 +14,7 @@ from planar.foundation.errors import BadInput, NoAnswer, Outcome
 from planar.foundation.units import parse_unit
 from planar.model.file_units import display_unit
 from planar.model.mechanism import Mechanism
+from planar.model.pairs.cams.lift_law import rise_motions
 from planar.model.wording import count_phrase, join_all_names, quote_names
 from planar.pages.data.page_data import page_data
 from planar.solving.checks.singular_values import null_space
@@ -45,9 +46,11 @@ def edit_answer(value: Any) -> dict[str, Any]:
     `problem` is a sentence, empty where it moves, `place` its JSON path; `mobility` says in words how it can move,
     `loose` are the links that inputs leave free; `conflicts`: whether `conflict_answer` has more to say. `data` and
     `functions` are those of a page, where there is a position; `units` the metres and radians of the file's units,
-    `usual` what is drawn of a force, a mass, a stiffness at first: a number and its unit.
+    `usual` what is drawn of a force, a mass, a stiffness at first: a number and its unit; `rises` the motions of which a
+    cam's lift is drawn.
     """
     found: dict[str, Any] = {"problem": "", "place": "", "mobility": "", "loose": [], "remedies": []}
+    found["rises"] = rise_motions()
     try:
         mechanism = from_dict(value)
         found |= {"units": _units(mechanism), "usual": _usual_amounts(mechanism)}

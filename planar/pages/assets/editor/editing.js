@@ -9,7 +9,7 @@ const BLANK_WIDTH = 0.3;    // m that are seen of empty paper
 class Editing {
   constructor(data, program) {
     const { value, name, answer } = data.edited;
-    Object.assign(this, { file: value, fileName: name, answer, units: answer.units ?? { length: 1e-3, angle: Math.PI / 180 }, usual: answer.usual, wish: null });
+    Object.assign(this, { file: value, fileName: name, answer, units: answer.units ?? { length: 1e-3, angle: Math.PI / 180 }, usual: answer.usual, rises: answer.rises, wish: null });
     Object.assign(this, { at: new Map(), done: [], undone: [], tool: "hand", chosen: null, linkBefore: null, changed: false, asked: 0, settled: true });
     this.sketch = new Sketch(this);
     this.leading = new PinLeading(this);

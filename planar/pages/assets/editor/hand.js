@@ -21,7 +21,7 @@ const TOOLS = {
   gear: { name: "Wheels", told: "A click on each of two links that turn as wheels do, on empty paper for the frame; their ratio stands beside." },
   rack: { name: "Rack", told: "From a link that rolls, near the pin about which it turns, to the bar on which it rolls." },
   belt: { name: "Belt", told: "A click on each of two pulleys; their radii stand beside, left empty they are chosen." },
-  cam: { name: "Cam", told: "From a link that is the cam to the pin of its follower, which slides or swings; lift and roller stand beside, left empty they are chosen." },
+  cam: { name: "Cam", told: "From a link that is the cam to the pin of its follower, which slides or swings; lift, roller and law stand beside; lift and roller left empty are chosen." },
   spring: { name: "Spring", told: "From one pin to another." },
   load: { name: "Force", told: "From a pin in the force's direction." },
   mass: { name: "Mass", told: "A click on a link." },
@@ -166,7 +166,7 @@ class Hand {
       gear: (draft) => Couplings.gear(draft, wheels, numbers.read("ratio")),
       belt: (draft) => Couplings.belt(draft, wheels, ["first", "second"].map((key) => numbers.length(key)), numbers.read("crossed")),
       rack: (draft) => Couplings.rack(draft, first.link, spot.link, first.at),
-      cam: (draft) => Couplings.cam(draft, first.link, spot.pin, { lift: numbers.lift(), roller: numbers.length("roller") }),
+      cam: (draft) => Couplings.cam(draft, first.link, spot.pin, { lift: numbers.lift(), roller: numbers.length("roller"), law: numbers.law() }),
     };
     this.pending = [];
     if (editing.tool === "picture") editing.underlay.mark([first, spot].map((each) => each.free ?? each.at));
