@@ -98,6 +98,25 @@ def test_numbers_below_nothing_have_a_minus_as_in_print(shown):
     assert window.locator(".ends span").first.inner_text() == "dead point −171.5 deg"
 
 
+CROSSED = """() => {
+  const boxes = (parts) => [...document.querySelectorAll(parts)].map((each) => each.getBoundingClientRect());
+  const rings = boxes("#drawing .layers circle"), letters = boxes("#drawing .letters text");
+  const apart = (a, b) => a.right <= b.left || b.right <= a.left || a.bottom - 4 <= b.top || b.bottom - 4 <= a.top;
+  return [rings.length, letters.filter((letter) => rings.some((ring) => !apart(ring, letter))).map(({ left, top }) => [left, top])];
+}"""
+"""How many centres are marked, and the places of letters that one of them crosses."""
+
+
+@pytest.mark.parametrize("name", ["toggle", "Stephenson", "Watt"])
+def test_letters_of_points_make_room_for_centres(name, shown):
+    window = shown(planar.from_dict(LINKAGES[name][1]))
+    window.get_by_label("Instantaneous centres").check()
+    settled(window)
+    count, crossed = window.evaluate(CROSSED)
+    assert count > 5
+    assert crossed == []
+
+
 HIDDEN = """() => {
   const boxes = [...document.querySelectorAll(".lens")].filter((each) => each.offsetHeight).map((each) => each.getBoundingClientRect());
   const { left, top } = svg.getBoundingClientRect(), { avoided } = drawing, spots = [];

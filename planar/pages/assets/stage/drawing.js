@@ -9,6 +9,7 @@ const EDGE = 1;        // mm about all strokes
 const REFITS = 5;      // times at the most that room is made for strokes, of which some keep their size on paper
 const OVERHANG = 2;    // mm: as far a block may go beyond what its guide is drawn for
 const FOOT = 6;        // mm below for the bar of the scale
+const MARK = 4;        // px: half of what a layer marks a place by
 const FINGER = 24;     // px: as wide a link can be taken hold of
 
 class Drawing {
@@ -24,6 +25,7 @@ class Drawing {
     this.measure();
     page.on("size", () => this.renew());
     page.on("move", () => { if (!this.stale) this.place(); });
+    page.on("shown", () => this.place(true));
     new ResizeObserver(() => {
       if (svg.clientWidth !== this.width || svg.clientHeight !== this.height) this.build();
     }).observe(svg);
@@ -261,10 +263,10 @@ class Drawing {
     }
   }
 
-  /** Where all strokes are on the screen, [x, y, x, y, ...]; sixty times a second, so nothing is made anew. */
+  /** Where all strokes and what layers mark are on the screen, [x, y, x, y, ...]; sixty times a second, so nothing is made anew. */
   avoid() {
-    const { page, scale, origin, edges } = this;
-    const many = 4 * edges.length + this.springs.room;
+    const { page, scale, origin, edges } = this, { marks } = page, strokes = 4 * edges.length + this.springs.room;
+    const many = strokes + 4 * marks.length;
     if (this.avoided?.length !== many) this.avoided = new Float64Array(many);
     for (let k = 0; k < edges.length; k++) {
       const f = page.frames[edges[k][0]], x = origin[0] + f.x * scale, y = origin[1] - f.y * scale;
@@ -275,12 +277,13 @@ class Drawing {
       }
     }
     this.springs.avoided(this.avoided, 4 * edges.length);
+    marks.forEach(([x, y], k) => this.avoided.set([x - MARK, y, x + MARK, y], strokes + 4 * k));
   }
 
   /** Whether everything is on the picture; several inputs together may leave what each alone covers. */
   inside() {
-    const { avoided, width, height } = this;
-    for (let k = 0; k < avoided.length; k += 2) {
+    const { avoided, width, height, page: { marks } } = this, strokes = avoided.length - 4 * marks.length;
+    for (let k = 0; k < strokes; k += 2) {
       if (avoided[k] < 0 || avoided[k] > width || avoided[k + 1] < 0 || avoided[k + 1] > height) return false;
     }
     return true;
