@@ -328,7 +328,12 @@ def draw_cam(hand, lift=20, **law):
     hand.drag((10, 0), (0, 60))
 
 
-CAM_LABELS = {"motion": "Motion of the rise", "rise": "Rise (deg)", "dwell": "Dwell above (deg)", "back": "Return (deg)"}
+CAM_LABELS = {
+    "motion": "Motion of the rise",
+    "rise": "Rise (deg)",
+    "dwell": "Dwell above (deg)",
+    "back": "Return (deg)",
+}
 CAM = HEAD | {
     "links": {
         "frame": {"points": {"A": [0, 0]}},

@@ -319,6 +319,52 @@ def test_two_windows_draw_each_their_own_and_a_reload_keeps_it(drawing, chromium
     equal(hand.mechanism(), SLIDER_CRANK)
 
 
+def test_what_another_window_or_program_has_saved_is_replaced_only_when_that_is_wanted(drawing, tmp_path):
+    path = tmp_path / "two.json"
+    path.write_text(json.dumps(planar.to_dict("four-bar")))
+    first = drawing(json.loads(path.read_text()), path)
+    second = Pencil(first.window.context, drawing.opened[0][1])
+    asked, answers = [], []
+
+    def answer(dialog):
+        if dialog.type == "beforeunload":
+            dialog.accept()
+            return
+        asked.append(dialog.message)
+        dialog.accept() if answers.pop(0) else dialog.dismiss()
+
+    def save(hand):
+        hand.window.bring_to_front()
+        hand.window.evaluate("editing.say('')")
+        hand.window.locator("#pencil").get_by_role("button", name="Save", exact=True).click()
+        hand.window.wait_for_function("() => document.getElementById('said').textContent.includes('ave')")
+        return hand.said(), path.read_text()
+
+    for hand, place in ((first, (40, 30)), (second, (60, 10))):
+        hand.window.bring_to_front()
+        hand.window.on("dialog", answer)
+        hand.bars((20, 20), place)
+        hand.wait()
+    assert save(first)[0] == "Saved to two.json."
+    kept = path.read_text()
+    assert json.loads(kept) == first.file() != second.file()
+    answers += [False]
+    told, text = save(second)
+    assert "two.json was written by another window or program meanwhile: nothing is saved" in told
+    assert text == kept
+    answers += [True]  # also after a reload, which does not forget from what it was drawn on
+    second.window.reload()
+    second.wait()
+    assert save(second)[0] == "Saved to two.json."
+    assert json.loads(path.read_text()) == second.file()
+    assert save(second)[0] == "Saved to two.json."  # its own, by now
+    path.write_text(kept)
+    answers += [False]
+    assert "nothing is saved" in save(second)[0]
+    why = "two.json was written by another window or program meanwhile"
+    assert asked == [f"{why}. Replace it?"] * 3
+
+
 def test_without_its_server_what_is_drawn_stays_and_leaves_as_a_link(drawing):
     hand = drawing()
     draw_slider_crank(hand)

@@ -117,12 +117,13 @@ def test_it_writes_only_what_is_saved_and_only_beside(tmp_path):
             answer = json.loads(asked(server, what="save", body={"document": written, "name": name})[1])
             assert "name" in answer["problem"]
         (tmp_path / "taken.json").write_text("{}")
-        save = {"document": written, "name": "taken"}
-        assert json.loads(asked(server, what="save", body=save)[1]) == {"taken": "taken.json"}
+        save = {"document": written, "name": "taken", "mark": server.mark}
+        assert json.loads(asked(server, what="save", body=save)[1]) == {"taken": "taken.json", "own": False}
         assert (tmp_path / "taken.json").read_text() == "{}"
         assert json.loads(asked(server, what="save", body={"document": {"links": 1}})[1])["problem"]
         assert path.read_bytes() == before
-        assert json.loads(asked(server, what="save", body={"document": written})[1]) == {"file": "own.json"}
+        saved = json.loads(asked(server, what="save", body={"document": written, "mark": server.mark})[1])
+        assert saved == {"file": "own.json", "mark": server.mark}
     assert sorted(each.name for each in tmp_path.iterdir()) == ["own.json", "taken.json"]
     assert next(iter(json.loads(path.read_text()))) == "name"
     assert planar.load(path).links == planar.load("four-bar").links

@@ -102,7 +102,8 @@ CROSSED = """() => {
   const boxes = (parts) => [...document.querySelectorAll(parts)].map((each) => each.getBoundingClientRect());
   const rings = boxes("#drawing .layers circle"), letters = boxes("#drawing .letters text");
   const apart = (a, b) => a.right <= b.left || b.right <= a.left || a.bottom - 4 <= b.top || b.bottom - 4 <= a.top;
-  return [rings.length, letters.filter((letter) => rings.some((ring) => !apart(ring, letter))).map(({ left, top }) => [left, top])];
+  const crossed = letters.filter((letter) => rings.some((ring) => !apart(ring, letter)));
+  return [rings.length, crossed.map(({ left, top }) => [left, top])];
 }"""
 """How many centres are marked, and the places of letters that one of them crosses."""
 
@@ -118,16 +119,21 @@ def test_letters_of_points_make_room_for_centres(name, shown):
 
 
 HIDDEN = """() => {
-  const boxes = [...document.querySelectorAll(".lens")].filter((each) => each.offsetHeight).map((each) => each.getBoundingClientRect());
+  const shown = [...document.querySelectorAll(".lens")].filter((each) => each.offsetHeight);
+  const boxes = shown.map((each) => each.getBoundingClientRect());
   const { left, top } = svg.getBoundingClientRect(), { avoided } = drawing, spots = [];
-  for (let k = 0; k < avoided.length; k += 2) spots.push([left + avoided[k], top + avoided[k + 1], left + avoided[k], top + avoided[k + 1]]);
+  for (let k = 0; k < avoided.length; k += 2) {
+    const x = left + avoided[k], y = top + avoided[k + 1];
+    spots.push([x, y, x, y]);
+  }
   for (const each of document.querySelectorAll("#drawing .layers :is(circle, text, .head)")) {
     const box = each.getBoundingClientRect();
     spots.push([box.left, box.top, box.right, box.bottom]);
   }
-  return [boxes.length, spots.filter(([x0, y0, x1, y1]) => boxes.some((box) => x0 < box.right && x1 > box.left && y0 < box.bottom && y1 > box.top))];
+  const meets = ([x0, y0, x1, y1]) => (box) => x0 < box.right && x1 > box.left && y0 < box.bottom && y1 > box.top;
+  return [boxes.length, spots.filter((each) => boxes.some(meets(each)))];
 }"""
-"""How many groups of buttons lie over the drawing, and the boxes of what they hide: strokes' ends, centres and letters."""
+"""How many groups of buttons lie over the drawing, and boxes of what they hide: strokes' ends, centres, letters."""
 
 
 @pytest.mark.parametrize("name", ["quick return", "offset slider-crank", "toggle", "cam"])

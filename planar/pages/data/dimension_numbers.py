@@ -113,9 +113,7 @@ class DimensionNumbers:
     def with_values(self, tree: Any) -> Any:
         """Tuples, lists and dictionaries of numbers with each number as one that knows its value."""
         flat = list(_numbers_of(tree))
-        known = ca.Function("values", [self.d], [_column(flat)])(
-            [each.value for each in self.dimensions]
-        )
+        known = ca.Function("values", [self.d], [_column(flat)])([each.value for each in self.dimensions])
         return _replace_numbers(tree, iter(known.full().ravel().tolist()))
 
 

@@ -46,8 +46,8 @@ def edit_answer(value: Any) -> dict[str, Any]:
     `problem` is a sentence, empty where it moves, `place` its JSON path; `mobility` says in words how it can move,
     `loose` are the links that inputs leave free; `conflicts`: whether `conflict_answer` has more to say. `data` and
     `functions` are those of a page, where there is a position; `units` the metres and radians of the file's units,
-    `usual` what is drawn of a force, a mass, a stiffness at first: a number and its unit; `rises` the motions of which a
-    cam's lift is drawn.
+    `usual` what is drawn of a force, a mass, a stiffness at first: a number and its unit; `rises` the motions of a
+    cam's lift.
     """
     found: dict[str, Any] = {"problem": "", "place": "", "mobility": "", "loose": [], "remedies": []}
     found["rises"] = rise_motions()

@@ -8,8 +8,8 @@ const BLANK_WIDTH = 0.3;    // m that are seen of empty paper
 
 class Editing {
   constructor(data, program) {
-    const { value, name, answer } = data.edited;
-    Object.assign(this, { file: value, fileName: name, answer, units: answer.units ?? { length: 1e-3, angle: Math.PI / 180 }, usual: answer.usual, rises: answer.rises, wish: null });
+    const { value, name, answer, mark } = data.edited;
+    Object.assign(this, { file: value, fileName: name, answer, units: answer.units ?? { length: 1e-3, angle: Math.PI / 180 }, usual: answer.usual, rises: answer.rises, wish: null, mark });
     Object.assign(this, { at: new Map(), done: [], undone: [], tool: "hand", chosen: null, linkBefore: null, changed: false, asked: 0, settled: true });
     this.sketch = new Sketch(this);
     this.leading = new PinLeading(this);
@@ -26,6 +26,7 @@ class Editing {
     this.begin(data, program, !answer.problem);
     if (!this.solved) this.guess();
     if (answer.conflicts) this.explain();
+    if (kept?.file) this.mark = kept.mark ?? mark; // of the file from which it was drawn on
     if (kept?.file) this.take({ file: kept.file, at: new Map(kept.at), wish: Wish.valid(kept.wish) }, kept.changed);
     else if (!this.placed.pins.size) this.use("bar");
     this.wishing.resume();
@@ -34,7 +35,7 @@ class Editing {
   // what is kept in the window until it is saved; without a store it lasts as long as the page
 
   static recall() { try { return JSON.parse(sessionStorage.getItem("drawing")); } catch { return null; } }
-  keep() { try { sessionStorage.setItem("drawing", JSON.stringify({ ...this.drawn, at: [...this.at] })); } catch { /* no store */ } }
+  keep() { try { sessionStorage.setItem("drawing", JSON.stringify({ ...this.drawn, at: [...this.at], mark: this.mark })); } catch { /* no store */ } }
   static forget() { try { sessionStorage.removeItem("drawing"); } catch { /* no store */ } }
 
   // the page
