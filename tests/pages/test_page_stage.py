@@ -98,6 +98,17 @@ def test_numbers_below_nothing_have_a_minus_as_in_print(shown):
     assert window.locator(".ends span").first.inner_text() == "dead point −171.5 deg"
 
 
+def test_the_heading_of_a_wide_table_is_read_whole(shown):
+    window = shown(planar.from_dict(LINKAGES["five-bar"][1]))
+    assert window.evaluate(
+        """() => [...document.querySelectorAll("#numbers .scroll")].every((each) => {
+          each.scrollLeft = 100;
+          const frame = each.getBoundingClientRect(), head = each.querySelector("caption").getBoundingClientRect();
+          return each.scrollWidth > each.clientWidth && head.left >= frame.left - 1 && head.right <= frame.right + 1;
+        })"""
+    )
+
+
 CROSSED = """() => {
   const boxes = (parts) => [...document.querySelectorAll(parts)].map((each) => each.getBoundingClientRect());
   const rings = boxes("#drawing .layers circle"), letters = boxes("#drawing .letters text");
