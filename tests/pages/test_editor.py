@@ -74,6 +74,25 @@ def test_a_cam_of_more_than_a_turn_is_not_drawn(drawing):
     assert not any("cam" in pair for pair in hand.file()["pairs"])
 
 
+def test_a_place_on_the_side_of_a_link_lies_in_its_line_unless_alt_is_held(drawing):
+    hand = drawing()
+    hand.bars((0, 0), (100, 40))
+    way, step = np.array([100, 40]) / hypot(100, 40), hand.window.evaluate("editing.sketch.step * 1000")
+    off = 2 / hand.window.evaluate("page.view.scale / 1000")  # of 2 px, in mm
+    place = 36.7 * way + off * np.array([-way[1], way[0]])
+    hand.use("Point", 20 * way, place)
+    hand.tool("Point")
+    hand.click(20 * way)
+    hand.window.keyboard.down("Alt")
+    hand.click(place + 30 * way)
+    hand.window.keyboard.up("Alt")
+    first, second = hand.file()["links"]["AB"]["points"].values()
+    assert first[1] == 0
+    assert first[0] == pytest.approx(36.7, abs=step / 10)
+    assert first[0] / step * 10 == pytest.approx(round(first[0] / step * 10), abs=1e-9)
+    assert second == pytest.approx([66.7, off], abs=off / 2)
+
+
 def test_what_was_drawn_is_undone_to_nothing_and_done_again(drawing):
     hand = drawing()
     draw_quick_return(hand)
