@@ -14,7 +14,7 @@ from tests.drawn_linkages import CAM, LINKAGES, SLIDER_CRANK, draw_cam, draw_qui
 from tests.guide_screens import draw_six_bar, guide_steps
 from tests.hostile import harmful_mechanism
 from tests.page_scripts import settled
-from tests.pencil import Pencil
+from tests.pencil import KeyPencil, Pencil
 
 CLOSE = 1e-10
 """m: numbers of a drawn file have twelve figures."""
@@ -120,44 +120,19 @@ def test_the_guides_steps_lead_from_empty_paper_to_a_moving_six_bar(drawing):
     assert hand.window.locator("#drawing circle.centre").count() >= 10
 
 
-def test_a_slider_crank_is_drawn_by_keys_alone(drawing):
-    hand = drawing()
-    press = hand.window.keyboard.press
-
-    def lead(x, y, at):
-        """The cross, from a place to another, in steps of the grid."""
-        step = hand.window.evaluate("editing.sketch.step * 1000")
-        for way, keys in ((x - at[0], ("ArrowRight", "ArrowLeft")), (y - at[1], ("ArrowUp", "ArrowDown"))):
-            count = round(abs(way) / step)
-            for _ in range(count // 10):
-                press(f"Shift+{keys[way < 0]}")
-            for _ in range(count % 10):
-                press(keys[way < 0])
-
-    def place():
-        return [round(1000 * each, 6) for each in hand.window.evaluate("editing.hand.cursor")]
-
-    def use(name, *places):
-        hand.window.get_by_role("toolbar", name="Pencil").get_by_role("button", name=name, exact=True).focus()
-        press("Enter")
-        hand.window.locator("#drawing").focus()
-        press("ArrowRight")
-        for at in places:
-            lead(*at, place())
-            assert place() == pytest.approx(at)
-            press("Enter")
-            hand.wait()
-            hand.window.locator("#drawing").focus()
-
-    use("Bar", (0, 0), (30, 40), (30, 40), (150, 0))
-    assert "mm" in hand.said() or "Bar" in hand.said()
-    use("Ground", (0, 0))
-    use("Slide", (150, 0), (180, 0))
-    use("Input", (0, 0))
-    equal(hand.mechanism(), SLIDER_CRANK)
-    press("Control+z")
-    hand.wait()
-    assert "inputs" not in hand.file()
+@pytest.mark.parametrize("name", ["slider-crank", "Stephenson", "epicyclic", "cam", "slot"])
+def test_a_linkage_is_drawn_by_keys_alone(name, drawing):
+    draw, written = LINKAGES[name]
+    hand = drawing(hand=KeyPencil)
+    draw(hand)
+    equal(hand.mechanism(), written)
+    drawn = hand.file()
+    hand.lead(30, 40)
+    assert hand.said().startswith(("30, 40 mm", "Pin "))  # for those who do not see the cross
+    hand.press("Control+z")
+    assert hand.file() != drawn
+    hand.press("Control+y")
+    assert hand.file() == drawn
 
 
 def test_a_four_bar_is_drawn_by_a_finger_on_a_phone(drawing):
