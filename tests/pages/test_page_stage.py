@@ -260,8 +260,10 @@ def test_compact_shows_the_drawing_and_what_moves_it_alone(shown):
     window.reload()
     assert window.get_by_role("button", name="Play").is_visible()
     assert window.locator("#drawing").is_visible()
-    for hidden in ("h1", "#layers", "#numbers", "#dimensions"):
+    for hidden in ("#layers", "#numbers", "#dimensions"):
         assert not window.locator(hidden).is_visible()
+    heading = window.get_by_role("heading", level=1)  # heard, and not seen
+    assert heading.inner_text() == MODELS["four-bar"].name
     assert window.evaluate("document.documentElement.scrollHeight <= innerHeight")
 
 
