@@ -265,7 +265,20 @@ def test_what_does_not_go_together_is_shown_with_what_mends_it(drawing):
     hand = drawing(value)
     assert "cannot be assembled" in hand.told()
     hand.window.wait_for_function("() => editing.answer.remedies.length", timeout=30_000)
-    assert "pair 'B' stays open by" in hand.told()
+    told = hand.told()
+    assert "pair 'B' stays open by" in told
+    # drawn where it is nearest to going together: all lengths as they are, and the gap between
+    hand.button("Fit everything (0)")
+    scale = hand.window.evaluate("page.view.scale")
+
+    def lengths(parts):
+        drawn = [each.get_attribute("points").split() for each in hand.window.locator(parts).all()]
+        ends = np.array([[[float(part) for part in at.split(",")] for at in each] for each in drawn])
+        return sorted(np.hypot(*(ends[:, 1] - ends[:, 0]).T) / scale * 1000)
+
+    assert f"{lengths('.gap')[0]:.3f} mm" in told
+    wanted = [each["length"] for each in value["links"].values() if "length" in each]
+    assert lengths(".pencil .link") == pytest.approx(sorted(wanted), rel=1e-6)
     assert "it goes together with coupler.length" in hand.told()
     hand.window.get_by_text("Text of the file").click()
     hand.window.wait_for_function("() => editing.panel.area.value")

@@ -10,7 +10,7 @@ class Editing {
   constructor(data, program) {
     const { value, name, answer, mark } = data.edited;
     Object.assign(this, { file: value, fileName: name, answer, units: answer.units ?? { length: 1e-3, angle: Math.PI / 180 }, usual: answer.usual, rises: answer.rises, wish: null, mark });
-    Object.assign(this, { at: new Map(), done: [], undone: [], tool: "hand", chosen: null, linkBefore: null, changed: false, asked: 0, settled: true });
+    Object.assign(this, { at: new Map(), done: [], undone: [], tool: "hand", chosen: null, linkBefore: null, changed: false, asked: 0, settled: true, nearest: {} });
     this.sketch = new Sketch(this);
     this.leading = new PinLeading(this);
     this.hand = new Hand(this);
@@ -90,6 +90,16 @@ class Editing {
     const { file, units } = this, local = (spot) => spot.map((each) => Written.read(each, "length", units) ?? 0);
     for (const [point, where] of Object.entries(file.links?.[file.frame]?.points ?? {})) if (Array.isArray(where)) this.at.set(Pins.of(Pins.all(file), file.frame, point), local(where));
     for (const [pin, where] of Object.entries(file.sketch ?? {})) if (Array.isArray(where)) this.at.set(pin, local(where));
+    this.sketch.draw();
+  }
+
+  /** Draw links where they are nearest to going together: {link: {point: place}}. */
+  approach(nearest) {
+    this.nearest = nearest;
+    for (const [pin, members] of this.placed.pins) {
+      const [own] = members.flatMap(([link, point]) => nearest[link]?.[point] ? [nearest[link][point]] : []);
+      if (own) this.at.set(pin, own);
+    }
     this.sketch.draw();
   }
 
@@ -183,7 +193,7 @@ class Editing {
 
   /** Another file: drawn at once, told of once Python has answered. */
   take({ file, at, wish = this.wish }, changed) {
-    Object.assign(this, { file, at: new Map(at), wish, changed });
+    Object.assign(this, { file, at: new Map(at), wish, changed, nearest: {} });
     if (this.chosen && !(this.chosen.kind === "pin" ? this.at.has(this.chosen.name) : file.links[this.chosen.name])) this.chosen = null;
     this.keep();
     this.solved = false;
@@ -262,6 +272,7 @@ class Editing {
     const answer = await EditServer.post("conflict", { document: this.file });
     if (number !== this.asked) return;
     Object.assign(this.answer, { problem: answer.problem || this.answer.problem, remedies: answer.remedies ?? [] });
+    if (this.hand.dragged === null) this.approach(answer.nearest ?? {});
     this.panel.show();
   }
 }
