@@ -11,7 +11,6 @@ import json
 import threading
 import time
 from collections.abc import Callable
-from hashlib import sha256
 from hmac import compare_digest
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
@@ -22,7 +21,7 @@ from typing import Any
 from planar.document.files import MAX_FILE_BYTES, from_dict, parse_json
 from planar.document.texts.json_layout import format_json
 from planar.foundation.errors import BadInput, PlanarError
-from planar.foundation.safe_files import save_file
+from planar.foundation.safe_files import file_sha256, save_file
 from planar.pages.editor.answer import conflict_answer, edit_answer
 from planar.pages.editor.edit_page import edit_page
 from planar.pages.editor.search import BackgroundSearch
@@ -140,7 +139,7 @@ class EditServer(ThreadingHTTPServer):
 def file_mark(path: Path | None) -> str:
     """What tells the content of a file from any other; empty where there is none."""
     try:
-        return sha256(path.read_bytes()).hexdigest() if path else ""
+        return file_sha256(path) if path else ""
     except OSError:
         return ""
 
