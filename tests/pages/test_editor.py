@@ -372,6 +372,25 @@ def test_what_another_window_or_program_has_saved_is_replaced_only_when_that_is_
     assert asked == [f"{why}. Replace it?"] * 3
 
 
+def test_without_its_server_pins_are_led_on_and_the_mechanism_moves(drawing):
+    hand = drawing(planar.to_dict("four-bar"))
+    _, server, _ = drawing.opened[0]
+    server.shutdown()
+    server.server_close()
+    hand.tool("Pins")
+    for by in (4, -2):
+        place = 1000 * np.array(hand.window.evaluate("editing.at.get('C')"))
+        hand.click(place)
+        hand.type("x (mm)", str(place[0] + by))
+        assert "does not answer" in hand.told()
+        assert hand.window.evaluate("page.point('C').position[0]") == pytest.approx((place[0] + by) / 1000, abs=CLOSE)
+        assert planar.solve(hand.mechanism()).point("C").position[0] == pytest.approx((place[0] + by) / 1000, abs=CLOSE)
+    hand.tool("Move")
+    start = hand.window.evaluate("page.input(0)")
+    hand.button("Play")
+    hand.window.wait_for_function("([start]) => Math.abs(page.input(0) - start) > 0.05", arg=[start])
+
+
 def test_without_its_server_what_is_drawn_stays_and_leaves_as_a_link(drawing):
     hand = drawing()
     draw_slider_crank(hand)

@@ -10,7 +10,7 @@ class Editing {
   constructor(data, program) {
     const { value, name, answer, mark } = data.edited;
     Object.assign(this, { file: value, fileName: name, answer, units: answer.units ?? { length: 1e-3, angle: Math.PI / 180 }, usual: answer.usual, rises: answer.rises, wish: null, mark });
-    Object.assign(this, { at: new Map(), done: [], undone: [], tool: "hand", chosen: null, linkBefore: null, changed: false, asked: 0, settled: true, nearest: {} });
+    Object.assign(this, { at: new Map(), done: [], undone: [], tool: "hand", chosen: null, linkBefore: null, changed: false, asked: 0, settled: true, nearest: {}, led: null });
     this.sketch = new Sketch(this);
     this.leading = new PinLeading(this);
     this.hand = new Hand(this);
@@ -220,6 +220,7 @@ class Editing {
 
   hear(answer) {
     this.answer = answer;
+    if (answer.gone) this.solved = this.led === this.file; // the page itself has come there
     if (answer.units) Object.assign(this, { units: answer.units, usual: answer.usual });
     if (answer.data) {
       const script = document.createElement("script"); // functions are run as those of any page are

@@ -52,11 +52,13 @@ class PinLeading {
     const { editing } = this;
     held.to = to;
     editing.parts.drawing.hold(false);
-    if (held.along) this.pullAlong(held);
+    if (held.along) this.pullAlong(held); else this.pull(held);
     if (held.along && !held.reached) return;
+    const { solved } = editing;
     const at = new Map(editing.at), made = held.along ? { file: new Placed(held.reached, at, editing.units).sketched(), at } : held.placed.moved(held.pin, to, held.inputs);
     editing.at = held.placed.at; // to come back to
     editing.commit(made);
+    editing.led = solved ? editing.file : null;
     editing.say(`${held.pin} moved${held.along ? ", and what hangs on it" : ""}.`);
   }
 
