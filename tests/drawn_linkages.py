@@ -308,7 +308,8 @@ RACK = HEAD | {
 }
 
 
-def draw_cam(hand):
+def draw_cam(hand, lift=20, **law):
+    """A cam and its follower, with what stands beside the tool typed where it differs."""
     hand.bars((0, 0), (20, 0))
     hand.bars((0, 60), (0, 120))
     hand.tool("Slide")
@@ -316,11 +317,23 @@ def draw_cam(hand):
     hand.drag((0, 120), (0, 150))
     hand.drive((0, 0))
     hand.tool("Cam")
-    hand.window.get_by_label("Lift, a length or an angle").fill("20")
+    hand.window.get_by_label("Lift, a length or an angle").fill(str(lift))
     hand.window.get_by_label("Radius of the roller").fill("10")
+    for name, value in law.items():
+        field = hand.window.get_by_label(CAM_LABELS[name])
+        if name == "motion":
+            field.select_option(value)
+        else:
+            field.fill(str(value))
     hand.drag((10, 0), (0, 60))
 
 
+CAM_LABELS = {
+    "motion": "Motion of the rise",
+    "rise": "Rise (deg)",
+    "dwell": "Dwell above (deg)",
+    "back": "Return (deg)",
+}
 CAM = HEAD | {
     "links": {
         "frame": {"points": {"A": [0, 0]}},

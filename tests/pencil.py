@@ -119,3 +119,46 @@ class Pencil:
     def mechanism(self) -> planar.Mechanism:
         """The mechanism that is drawn."""
         return planar.from_dict(self.file())
+
+
+class KeyPencil(Pencil):
+    """The same by keys alone: Tab's stops are taken as reached, arrows lead the cross by the grid, Enter presses."""
+
+    def press(self, *keys: str) -> None:
+        """One key after the other."""
+        for key in keys:
+            self.actions += 1
+            self.window.keyboard.press(key)
+
+    def tool(self, name: str) -> None:
+        """From the tool in hand by arrows to another."""
+        bar = self.window.get_by_role("toolbar", name="Pencil")
+        bar.locator("button[aria-pressed=true]").focus()
+        for _ in bar.get_by_role("button").all():
+            if self.window.evaluate("document.activeElement.textContent") == name:
+                break
+            self.press("ArrowRight")
+        self.press("Enter")
+
+    def drag(self, *places: tuple[float, float]) -> None:
+        """From the first place to the last."""
+        self.click(places[0], places[-1])
+
+    def click(self, *places: tuple[float, float]) -> None:
+        """Lead the cross to one place after the other, and press there."""
+        for place in places:
+            self.window.locator("#drawing").focus()
+            self.lead(*place)
+            self.press("Enter")
+            self.wait()
+
+    def lead(self, x: float, y: float) -> None:
+        """Lead the cross to a place of the grid, or near it."""
+        if self.window.evaluate("editing.hand.cursor") is None:
+            self.press("ArrowRight")
+        at, step = (self.window.evaluate(f"editing.{each}") for each in ("hand.cursor", "sketch.step"))
+        ways = (("ArrowRight", "ArrowLeft"), ("ArrowUp", "ArrowDown"))
+        for far, start, (on, back) in zip((x, y), at, ways, strict=True):
+            count = round((far / 1000 - start) / step)
+            key = back if count < 0 else on
+            self.press(*[f"Shift+{key}"] * (abs(count) // 10), *[key] * (abs(count) % 10))

@@ -26,11 +26,15 @@ class PageLink(NamedTuple):
 
 
 class EditedFile(NamedTuple):
-    """A file that is drawn on: its JSON value, its name if it has one, and what is told of it (`edit_answer`)."""
+    """A file that is drawn on: its JSON value, its name if it has one, and what is told of it (`edit_answer`).
+
+    `mark` is what tells its content from any other.
+    """
 
     value: Any
     name: str | None
     answer: dict[str, Any]
+    mark: str = ""
 
 
 class PageRange(NamedTuple):

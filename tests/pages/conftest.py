@@ -46,11 +46,11 @@ def drawing(chromium, tmp_path):
     """Opens the page of a file, or of empty paper, in which nothing must go wrong."""
     opened, contexts = [], []
 
-    def begin(value=None, path=None, **context):
+    def begin(value=None, path=None, hand=Pencil, **context):
         serving = served(value, path, tmp_path)
         server = serving.__enter__()
         contexts.append(chromium.new_context(**{"viewport": {"width": 1280, "height": 900}} | context))
-        pencil = Pencil(contexts[-1], server)
+        pencil = hand(contexts[-1], server)
         opened.append((serving, server, pencil))
         return pencil
 

@@ -10,11 +10,11 @@ import pytest
 
 import planar
 from planar.document.texts.mechanism_link import read_link
-from tests.drawn_linkages import LINKAGES, SLIDER_CRANK, draw_quick_return, draw_slider_crank
+from tests.drawn_linkages import CAM, LINKAGES, SLIDER_CRANK, draw_cam, draw_quick_return, draw_slider_crank
 from tests.guide_screens import draw_six_bar, guide_steps
 from tests.hostile import harmful_mechanism
 from tests.page_scripts import settled
-from tests.pencil import Pencil
+from tests.pencil import KeyPencil, Pencil
 
 CLOSE = 1e-10
 """m: numbers of a drawn file have twelve figures."""
@@ -46,6 +46,53 @@ def test_a_linkage_drawn_from_nothing_is_the_written_one(name, drawing):
     equal(hand.mechanism(), written)
 
 
+@pytest.mark.parametrize(
+    ("law", "pieces"),
+    [
+        (
+            {"motion": "3-4-5", "rise": 90, "dwell": 30, "back": 150},
+            [("3-4-5", 8, 90), ("dwell", 0, 30), ("3-4-5", -8, 150), ("dwell", 0, 90)],
+        ),
+        (
+            {"motion": "modified trapezoidal", "rise": 200, "dwell": 0, "back": 160},
+            [("modified trapezoidal", 8, 200), ("modified trapezoidal", -8, 160)],
+        ),
+    ],
+)
+def test_a_cam_is_drawn_with_the_law_that_stands_beside(law, pieces, drawing):
+    hand = drawing()
+    draw_cam(hand, lift=8, **law)
+    *others, cam = CAM["pairs"]
+    wanted = [{"motion": motion, "in": angle} | ({"by": by} if by else {}) for motion, by, angle in pieces]
+    equal(hand.mechanism(), CAM | {"pairs": [*others, cam | {"law": wanted}]})
+
+
+def test_a_cam_of_more_than_a_turn_is_not_drawn(drawing):
+    hand = drawing()
+    draw_cam(hand, rise=200, dwell=61, back=100)
+    assert "360 deg at the most" in hand.said()
+    assert not any("cam" in pair for pair in hand.file()["pairs"])
+
+
+def test_a_place_on_the_side_of_a_link_lies_in_its_line_unless_alt_is_held(drawing):
+    hand = drawing()
+    hand.bars((0, 0), (100, 40))
+    way, step = np.array([100, 40]) / hypot(100, 40), hand.window.evaluate("editing.sketch.step * 1000")
+    off = 2 / hand.window.evaluate("page.view.scale / 1000")  # of 2 px, in mm
+    place = 36.7 * way + off * np.array([-way[1], way[0]])
+    hand.use("Point", 20 * way, place)
+    hand.tool("Point")
+    hand.click(20 * way)
+    hand.window.keyboard.down("Alt")
+    hand.click(place + 30 * way)
+    hand.window.keyboard.up("Alt")
+    first, second = hand.file()["links"]["AB"]["points"].values()
+    assert first[1] == 0
+    assert first[0] == pytest.approx(36.7, abs=step / 10)
+    assert first[0] / step * 10 == pytest.approx(round(first[0] / step * 10), abs=1e-9)
+    assert second == pytest.approx([66.7, off], abs=off / 2)
+
+
 def test_what_was_drawn_is_undone_to_nothing_and_done_again(drawing):
     hand = drawing()
     draw_quick_return(hand)
@@ -73,44 +120,19 @@ def test_the_guides_steps_lead_from_empty_paper_to_a_moving_six_bar(drawing):
     assert hand.window.locator("#drawing circle.centre").count() >= 10
 
 
-def test_a_slider_crank_is_drawn_by_keys_alone(drawing):
-    hand = drawing()
-    press = hand.window.keyboard.press
-
-    def lead(x, y, at):
-        """The cross, from a place to another, in steps of the grid."""
-        step = hand.window.evaluate("editing.sketch.step * 1000")
-        for way, keys in ((x - at[0], ("ArrowRight", "ArrowLeft")), (y - at[1], ("ArrowUp", "ArrowDown"))):
-            count = round(abs(way) / step)
-            for _ in range(count // 10):
-                press(f"Shift+{keys[way < 0]}")
-            for _ in range(count % 10):
-                press(keys[way < 0])
-
-    def place():
-        return [round(1000 * each, 6) for each in hand.window.evaluate("editing.hand.cursor")]
-
-    def use(name, *places):
-        hand.window.get_by_role("toolbar", name="Pencil").get_by_role("button", name=name, exact=True).focus()
-        press("Enter")
-        hand.window.locator("#drawing").focus()
-        press("ArrowRight")
-        for at in places:
-            lead(*at, place())
-            assert place() == pytest.approx(at)
-            press("Enter")
-            hand.wait()
-            hand.window.locator("#drawing").focus()
-
-    use("Bar", (0, 0), (30, 40), (30, 40), (150, 0))
-    assert "mm" in hand.said() or "Bar" in hand.said()
-    use("Ground", (0, 0))
-    use("Slide", (150, 0), (180, 0))
-    use("Input", (0, 0))
-    equal(hand.mechanism(), SLIDER_CRANK)
-    press("Control+z")
-    hand.wait()
-    assert "inputs" not in hand.file()
+@pytest.mark.parametrize("name", ["slider-crank", "Stephenson", "epicyclic", "cam", "slot"])
+def test_a_linkage_is_drawn_by_keys_alone(name, drawing):
+    draw, written = LINKAGES[name]
+    hand = drawing(hand=KeyPencil)
+    draw(hand)
+    equal(hand.mechanism(), written)
+    drawn = hand.file()
+    hand.lead(30, 40)
+    assert hand.said().startswith(("30, 40 mm", "Pin "))  # for those who do not see the cross
+    hand.press("Control+z")
+    assert hand.file() != drawn
+    hand.press("Control+y")
+    assert hand.file() == drawn
 
 
 def test_a_four_bar_is_drawn_by_a_finger_on_a_phone(drawing):
@@ -243,7 +265,20 @@ def test_what_does_not_go_together_is_shown_with_what_mends_it(drawing):
     hand = drawing(value)
     assert "cannot be assembled" in hand.told()
     hand.window.wait_for_function("() => editing.answer.remedies.length", timeout=30_000)
-    assert "pair 'B' stays open by" in hand.told()
+    told = hand.told()
+    assert "pair 'B' stays open by" in told
+    # drawn where it is nearest to going together: all lengths as they are, and the gap between
+    hand.button("Fit everything (0)")
+    scale = hand.window.evaluate("page.view.scale")
+
+    def lengths(parts):
+        drawn = [each.get_attribute("points").split() for each in hand.window.locator(parts).all()]
+        ends = np.array([[[float(part) for part in at.split(",")] for at in each] for each in drawn])
+        return sorted(np.hypot(*(ends[:, 1] - ends[:, 0]).T) / scale * 1000)
+
+    assert f"{lengths('.gap')[0]:.3f} mm" in told
+    wanted = [each["length"] for each in value["links"].values() if "length" in each]
+    assert lengths(".pencil .link") == pytest.approx(sorted(wanted), rel=1e-6)
     assert "it goes together with coupler.length" in hand.told()
     hand.window.get_by_text("Text of the file").click()
     hand.window.wait_for_function("() => editing.panel.area.value")
@@ -289,6 +324,71 @@ def test_two_windows_draw_each_their_own_and_a_reload_keeps_it(drawing, chromium
     hand.window.reload()
     hand.wait()
     equal(hand.mechanism(), SLIDER_CRANK)
+
+
+def test_what_another_window_or_program_has_saved_is_replaced_only_when_that_is_wanted(drawing, tmp_path):
+    path = tmp_path / "two.json"
+    path.write_text(json.dumps(planar.to_dict("four-bar")))
+    first = drawing(json.loads(path.read_text()), path)
+    second = Pencil(first.window.context, drawing.opened[0][1])
+    asked, answers = [], []
+
+    def answer(dialog):
+        if dialog.type == "beforeunload":
+            dialog.accept()
+            return
+        asked.append(dialog.message)
+        dialog.accept() if answers.pop(0) else dialog.dismiss()
+
+    def save(hand):
+        hand.window.bring_to_front()
+        hand.window.evaluate("editing.say('')")
+        hand.window.locator("#pencil").get_by_role("button", name="Save", exact=True).click()
+        hand.window.wait_for_function("() => document.getElementById('said').textContent.includes('ave')")
+        return hand.said(), path.read_text()
+
+    for hand, place in ((first, (40, 30)), (second, (60, 10))):
+        hand.window.bring_to_front()
+        hand.window.on("dialog", answer)
+        hand.bars((20, 20), place)
+        hand.wait()
+    assert save(first)[0] == "Saved to two.json."
+    kept = path.read_text()
+    assert json.loads(kept) == first.file() != second.file()
+    answers += [False]
+    told, text = save(second)
+    assert "two.json was written by another window or program meanwhile: nothing is saved" in told
+    assert text == kept
+    answers += [True]  # also after a reload, which does not forget from what it was drawn on
+    second.window.reload()
+    second.wait()
+    assert save(second)[0] == "Saved to two.json."
+    assert json.loads(path.read_text()) == second.file()
+    assert save(second)[0] == "Saved to two.json."  # its own, by now
+    path.write_text(kept)
+    answers += [False]
+    assert "nothing is saved" in save(second)[0]
+    why = "two.json was written by another window or program meanwhile"
+    assert asked == [f"{why}. Replace it?"] * 3
+
+
+def test_without_its_server_pins_are_led_on_and_the_mechanism_moves(drawing):
+    hand = drawing(planar.to_dict("four-bar"))
+    _, server, _ = drawing.opened[0]
+    server.shutdown()
+    server.server_close()
+    hand.tool("Pins")
+    for by in (4, -2):
+        place = 1000 * np.array(hand.window.evaluate("editing.at.get('C')"))
+        hand.click(place)
+        hand.type("x (mm)", str(place[0] + by))
+        assert "does not answer" in hand.told()
+        assert hand.window.evaluate("page.point('C').position[0]") == pytest.approx((place[0] + by) / 1000, abs=CLOSE)
+        assert planar.solve(hand.mechanism()).point("C").position[0] == pytest.approx((place[0] + by) / 1000, abs=CLOSE)
+    hand.tool("Move")
+    start = hand.window.evaluate("page.input(0)")
+    hand.button("Play")
+    hand.window.wait_for_function("([start]) => Math.abs(page.input(0) - start) > 0.05", arg=[start])
 
 
 def test_without_its_server_what_is_drawn_stays_and_leaves_as_a_link(drawing):

@@ -17,7 +17,7 @@ from planar.document.texts.json_layout import format_json
 from planar.document.texts.mechanism_link import read_link, write_link
 from planar.foundation.errors import BadInput, NoAnswer
 from planar.pages.editor import server as serving
-from planar.pages.editor.answer import BLANK, conflict_answer, edit_answer
+from planar.pages.editor.answer import BLANK, conflict_answer, edit_answer, nearest_places
 from planar.pages.editor.authors_file import carry_over
 from planar.pages.editor.edit_page import edit_page
 from tests.hostile import HARMFUL_LINE, harmful_mechanism
@@ -117,12 +117,13 @@ def test_it_writes_only_what_is_saved_and_only_beside(tmp_path):
             answer = json.loads(asked(server, what="save", body={"document": written, "name": name})[1])
             assert "name" in answer["problem"]
         (tmp_path / "taken.json").write_text("{}")
-        save = {"document": written, "name": "taken"}
-        assert json.loads(asked(server, what="save", body=save)[1]) == {"taken": "taken.json"}
+        save = {"document": written, "name": "taken", "mark": server.mark}
+        assert json.loads(asked(server, what="save", body=save)[1]) == {"taken": "taken.json", "own": False}
         assert (tmp_path / "taken.json").read_text() == "{}"
         assert json.loads(asked(server, what="save", body={"document": {"links": 1}})[1])["problem"]
         assert path.read_bytes() == before
-        assert json.loads(asked(server, what="save", body={"document": written})[1]) == {"file": "own.json"}
+        saved = json.loads(asked(server, what="save", body={"document": written, "mark": server.mark})[1])
+        assert saved == {"file": "own.json", "mark": server.mark}
     assert sorted(each.name for each in tmp_path.iterdir()) == ["own.json", "taken.json"]
     assert next(iter(json.loads(path.read_text()))) == "name"
     assert planar.load(path).links == planar.load("four-bar").links
@@ -195,6 +196,8 @@ def test_what_is_loose_held_twice_and_in_conflict_is_told():
     assert edit_answer(value)["conflicts"]
     found = conflict_answer(value)
     assert "stays open by" in found["problem"]
+    assert found["nearest"]["crank"]["A"] == pytest.approx(found["nearest"]["coupler"]["A"], abs=1e-12)
+    assert nearest_places(planar.from_dict(FOUR_BAR)) == nearest_places(planar.from_dict(loose)) == {}
     assert any("it goes together with coupler.length" in each for each in found["remedies"])
     assert edit_answer(BLANK)["place"] == "$.links.frame"
     twice = edit_answer(planar.to_dict("three-parallel-cranks"))

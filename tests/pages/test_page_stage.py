@@ -12,6 +12,7 @@ from PIL import Image
 
 import planar
 from planar.foundation.units import parse_unit
+from tests.drawn_linkages import LINKAGES
 from tests.known import MODELS
 from tests.page_scripts import downloaded, same, settled
 
@@ -89,6 +90,78 @@ def test_a_guide_is_drawn_wherever_its_block_goes_where_nothing_limits_it(shown)
 
 
 # looked at
+
+
+def test_numbers_below_nothing_have_a_minus_as_in_print(shown):
+    window = shown(planar.from_dict(LINKAGES["offset slider-crank"][1]))
+    window.wait_for_function("() => page.course")
+    assert window.locator(".ends span").first.inner_text() == "dead point −171.5 deg"
+
+
+def test_the_heading_of_a_wide_table_is_read_whole(shown):
+    window = shown(planar.from_dict(LINKAGES["five-bar"][1]))
+    assert window.evaluate(
+        """() => [...document.querySelectorAll("#numbers .scroll")].every((each) => {
+          each.scrollLeft = 100;
+          const frame = each.getBoundingClientRect(), head = each.querySelector("caption").getBoundingClientRect();
+          return each.scrollWidth > each.clientWidth && head.left >= frame.left - 1 && head.right <= frame.right + 1;
+        })"""
+    )
+
+
+CROSSED = """() => {
+  const boxes = (parts) => [...document.querySelectorAll(parts)].map((each) => each.getBoundingClientRect());
+  const rings = boxes("#drawing .layers circle"), letters = boxes("#drawing .letters text");
+  const apart = (a, b) => a.right <= b.left || b.right <= a.left || a.bottom - 4 <= b.top || b.bottom - 4 <= a.top;
+  const crossed = letters.filter((letter) => rings.some((ring) => !apart(ring, letter)));
+  return [rings.length, crossed.map(({ left, top }) => [left, top])];
+}"""
+"""How many centres are marked, and the places of letters that one of them crosses."""
+
+
+@pytest.mark.parametrize("name", ["toggle", "Stephenson", "Watt"])
+def test_letters_of_points_make_room_for_centres(name, shown):
+    window = shown(planar.from_dict(LINKAGES[name][1]))
+    window.get_by_label("Instantaneous centres").check()
+    settled(window)
+    count, crossed = window.evaluate(CROSSED)
+    assert count > 5
+    assert crossed == []
+
+
+HIDDEN = """() => {
+  const shown = [...document.querySelectorAll(".lens")].filter((each) => each.offsetHeight);
+  const boxes = shown.map((each) => each.getBoundingClientRect());
+  const { left, top } = svg.getBoundingClientRect(), { avoided } = drawing, spots = [];
+  for (let k = 0; k < avoided.length; k += 2) {
+    const x = left + avoided[k], y = top + avoided[k + 1];
+    spots.push([x, y, x, y]);
+  }
+  for (const each of document.querySelectorAll("#drawing .layers :is(circle, text, .head)")) {
+    const box = each.getBoundingClientRect();
+    spots.push([box.left, box.top, box.right, box.bottom]);
+  }
+  const meets = ([x0, y0, x1, y1]) => (box) => x0 < box.right && x1 > box.left && y0 < box.bottom && y1 > box.top;
+  return [boxes.length, spots.filter((each) => boxes.some(meets(each)))];
+}"""
+"""How many groups of buttons lie over the drawing, and boxes of what they hide: strokes' ends, centres, letters."""
+
+
+@pytest.mark.parametrize("name", ["quick return", "offset slider-crank", "toggle", "cam"])
+@pytest.mark.parametrize("screen", ["desk", "phone"])
+def test_no_button_hides_what_is_drawn_while_it_moves(name, screen, shown):
+    window = shown(planar.from_dict(LINKAGES[name][1]), screen)
+    window.wait_for_function("() => page.course")
+    window.get_by_label("Instantaneous centres").check()
+    for part in (0.5, 0.0, 1.0, 0.3, 0.7):
+        window.evaluate(
+            "(part) => { const { low, high } = controls.ends(page.running); page.moveTo(low + part * (high - low)); }",
+            part,
+        )
+        settled(window)
+        count, hidden = window.evaluate(HIDDEN)
+        assert count == 2
+        assert hidden == []
 
 
 def test_the_drawing_stays_in_sight_while_the_panels_scroll(shown):
@@ -187,8 +260,10 @@ def test_compact_shows_the_drawing_and_what_moves_it_alone(shown):
     window.reload()
     assert window.get_by_role("button", name="Play").is_visible()
     assert window.locator("#drawing").is_visible()
-    for hidden in ("h1", "#layers", "#numbers", "#dimensions"):
+    for hidden in ("#layers", "#numbers", "#dimensions"):
         assert not window.locator(hidden).is_visible()
+    heading = window.get_by_role("heading", level=1)  # heard, and not seen
+    assert heading.inner_text() == MODELS["four-bar"].name
     assert window.evaluate("document.documentElement.scrollHeight <= innerHeight")
 
 

@@ -92,6 +92,8 @@ REFUSED = {
     'Couplings.slot(draft, { pin: "B" }, "AB", [0, 0])': "a link is wanted at B",
     'Couplings.cam(draft, "AB", "A", { lift: {}, roller: null })': "the pin of its follower",
     'Couplings.cam(draft, "AB", "D", { lift: {}, roller: 1 })': "larger than what is between",
+    'Couplings.camLaw({ motion: "cycloidal", angles: [0, 60, 120] })': "above 0 deg",
+    'Couplings.camLaw({ motion: "cycloidal", angles: [200, null, 170] })': "360 deg at the most",
     'Draw.slide(draft, { pin: "B" }, "AB", [0, 0])': "it cannot slide on it",
 }
 """What cannot be drawn of two bars on the frame, one in line with the other's pin, and why."""

@@ -13,6 +13,7 @@ class Recording {
     this.steps = first.length / 3 - 1;
     this.poses = Array.from({ length: this.steps + 1 }, (_, k) => this.at(k));
     [this.frames] = this.poses;
+    this.marks = []; // no layer marks anything
   }
 
   on() {}

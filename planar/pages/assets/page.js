@@ -17,6 +17,7 @@ class Page {
     this.acting = null; // the numbers of what acts
     this.recording = false; // whether the motion is gone through for a film: nobody is to remember that
     this.besides = () => []; // places that the drawing is to show, too
+    this.marks = []; // places (px) that layers mark, of which the drawing's letters keep clear
     this.wanted = null; // what is wanted of the mechanism, if anything is
     this.assembly = null; // the number of the assembly that it was moved from, if it is one of those listed
     this.update();

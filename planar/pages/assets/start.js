@@ -29,6 +29,7 @@ function startPage(data, program, undo = new UndoHistory()) {
   }
   page.keeping = new Keeping(page);
   globalThis.additions?.attach({ page, svg, lens });
+  drawing.settle();
   new Panels(page, document.querySelector(".right"));
   document.getElementById("still")?.remove(); // what moves stands in its place
   Object.assign(globalThis, { svg, drawing, dragging, controls, lens });

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property, total_ordering
 from typing import Any
@@ -11,6 +11,7 @@ import casadi as ca
 
 from planar.codegen.javascript import write_javascript
 from planar.document.dimensions import change_dimension, link_lengths
+from planar.equations.elimination import stack_expressions
 from planar.equations.mechanism_numbers import shapes_of_links
 from planar.foundation.geometry import Vector
 from planar.model.mechanism import Mechanism
@@ -107,14 +108,12 @@ class DimensionNumbers:
 
     def to_javascript(self) -> str:
         """sizes(d): all numbers."""
-        return write_javascript("sizes", ca.Function("sizes", [self.d], [ca.vertcat(*map(ca.SX, self.values))]))
+        return write_javascript("sizes", ca.Function("sizes", [self.d], [_column(self.values)]))
 
     def with_values(self, tree: Any) -> Any:
         """Tuples, lists and dictionaries of numbers with each number as one that knows its value."""
         flat = list(_numbers_of(tree))
-        known = ca.Function("values", [self.d], [ca.vertcat(*map(ca.SX, flat))])(
-            [each.value for each in self.dimensions]
-        )
+        known = ca.Function("values", [self.d], [_column(flat)])([each.value for each in self.dimensions])
         return _replace_numbers(tree, iter(known.full().ravel().tolist()))
 
 
@@ -154,11 +153,16 @@ class DrawingNumbers:
     def to_javascript(self) -> str:
         """drawn(d, travel, per_mm): all numbers."""
         given = [self.dimensions.d, ca.vertcat(*self.travel), self._scale]
-        return write_javascript("drawn", ca.Function("drawn", given, [ca.vertcat(*map(ca.SX, self.values))]))
+        return write_javascript("drawn", ca.Function("drawn", given, [_column(self.values)]))
 
     def _rounded(self, value: Any) -> Any:
         constant = self.digits is not None and ca.SX(value).is_constant()
         return float(f"{float(value):.{self.digits}g}") if constant else value
+
+
+def _column(values: Sequence[Any]) -> ca.SX:
+    """Numbers and expressions one below the other; to copy an expression takes longer than to stack it."""
+    return stack_expressions(each if isinstance(each, ca.SX) else ca.SX(each) for each in values)
 
 
 def _numbers_of(tree: Any) -> Iterator[Any]:

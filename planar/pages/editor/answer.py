@@ -10,12 +10,15 @@ import numpy as np
 from planar.analysis.identity.mobility import closed_position, mobility
 from planar.assemblies.conflict import conflict
 from planar.document.files import from_dict
+from planar.equations.coordinates import frames_from_coordinates
 from planar.foundation.errors import BadInput, NoAnswer, Outcome
 from planar.foundation.units import parse_unit
 from planar.model.file_units import display_unit
 from planar.model.mechanism import Mechanism
+from planar.model.pairs.cams.lift_law import rise_motions
 from planar.model.wording import count_phrase, join_all_names, quote_names
 from planar.pages.data.page_data import page_data
+from planar.solving.assembly.nearest_assembly import AssemblySearchFailure
 from planar.solving.checks.singular_values import null_space
 from planar.solving.full_constraints import FullConstraints
 from planar.solving.position import PositionSolver, solved_mechanism
@@ -45,9 +48,11 @@ def edit_answer(value: Any) -> dict[str, Any]:
     `problem` is a sentence, empty where it moves, `place` its JSON path; `mobility` says in words how it can move,
     `loose` are the links that inputs leave free; `conflicts`: whether `conflict_answer` has more to say. `data` and
     `functions` are those of a page, where there is a position; `units` the metres and radians of the file's units,
-    `usual` what is drawn of a force, a mass, a stiffness at first: a number and its unit.
+    `usual` what is drawn of a force, a mass, a stiffness at first: a number and its unit; `rises` the motions of a
+    cam's lift.
     """
     found: dict[str, Any] = {"problem": "", "place": "", "mobility": "", "loose": [], "remedies": []}
+    found["rises"] = rise_motions()
     try:
         mechanism = from_dict(value)
         found |= {"units": _units(mechanism), "usual": _usual_amounts(mechanism)}
@@ -104,8 +109,8 @@ def _mobility_words(mechanism: Mechanism) -> str:
 def conflict_answer(value: Any) -> dict[str, Any]:
     """What is in conflict in a file that does not go together, and the least changes of one number that mend it.
 
-    `problem` is how far it stays open, `remedies` are in sentences, none where nothing in conflict was found. It takes
-    a search. Raises BadInput, NoAnswer.
+    `problem` is how far it stays open, `remedies` are in sentences, none where nothing in conflict was found, `nearest`
+    tells where it is nearest to going together (`nearest_places`). It takes a search. Raises BadInput, NoAnswer.
     """
     mechanism = from_dict(value)
     why = ""
@@ -114,13 +119,37 @@ def conflict_answer(value: Any) -> dict[str, Any]:
     except NoAnswer as problem:
         known, why = None, str(problem)
     if known is not None:
-        return {"problem": "", "remedies": []}
+        return {"problem": "", "remedies": [], "nearest": {}}
+    told = {"problem": why, "remedies": [], "nearest": nearest_places(mechanism)}
     found = conflict(mechanism)
     if found is None:
-        return {"problem": why, "remedies": []}
+        return told
     changes = islice((*found.dimensions, *found.positions), MAX_REMEDIES)
-    told = (f"it goes together with {each.name} = {each.shown}" for each in changes)
-    return {"problem": why, "remedies": [found.remarks[0], *told]}
+    mended = (f"it goes together with {each.name} = {each.shown}" for each in changes)
+    return told | {"remedies": [found.remarks[0], *mended]}
+
+
+def nearest_places(mechanism: Mechanism) -> dict[str, dict[str, list[float]]]:
+    """Where the points of links lie (m) where a mechanism that does not go together is nearest to it.
+
+    {link: {point: [x, y]}}: a pin that stays open has a place of its own in each of its links. Links that hang on what
+    stays open are left out; all are where it goes together, or is loose.
+    """
+    solver = PositionSolver(mechanism)
+    try:
+        found = solver.nearest()
+    except NoAnswer:
+        return {}
+    if not isinstance(found, AssemblySearchFailure):
+        return {}
+    w = solver.functions.coordinates(found.z, solver.inputs.u, solver.inputs.p) * solver.scale
+    frames, _ = frames_from_coordinates(w.tolist(), solver.column, solver.shapes, {})
+    later = {link for block in solver.equations.blocks[found.stage.block_index + 1 :] for link in block.links}
+    return {
+        link: {name: list(frames[link].to_world(at)) for name, at in shape.points.items()}
+        for link, shape in solver.shapes.items()
+        if link not in later
+    }
 
 
 def _usual_amounts(mechanism: Mechanism) -> dict[str, tuple[float, str]]:

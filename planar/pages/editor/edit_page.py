@@ -10,8 +10,8 @@ from planar.pages.editor.answer import BACKDROP, edit_answer
 from planar.pages.page import EditedFile, page
 
 
-def edit_page(value: Any, file: str | None) -> str:
-    """The page for a file's JSON value; `file` is the name under which it is saved, if it has one.
+def edit_page(value: Any, file: str | None, mark: str = "") -> str:
+    """The page for a file's JSON value; `file` is the name under which it is saved, if it has one, with its `mark`.
 
     A file that is no mechanism yet, or does not go together, is drawn on all the same, over an empty page.
     """
@@ -20,6 +20,6 @@ def edit_page(value: Any, file: str | None) -> str:
     answer.pop("functions", None)
     answer.pop("data", None)
     try:
-        return page(mechanism, edited=EditedFile(value, file, answer))
+        return page(mechanism, edited=EditedFile(value, file, answer, mark))
     except (BadInput, NoAnswer):  # a page lets less be shown than an answer
-        return page(from_dict(BACKDROP), edited=EditedFile(value, file, answer))
+        return page(from_dict(BACKDROP), edited=EditedFile(value, file, answer, mark))

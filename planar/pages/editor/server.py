@@ -21,7 +21,7 @@ from typing import Any
 from planar.document.files import MAX_FILE_BYTES, from_dict, parse_json
 from planar.document.texts.json_layout import format_json
 from planar.foundation.errors import BadInput, PlanarError
-from planar.foundation.safe_files import save_file
+from planar.foundation.safe_files import file_sha256, save_file
 from planar.pages.editor.answer import conflict_answer, edit_answer
 from planar.pages.editor.edit_page import edit_page
 from planar.pages.editor.search import BackgroundSearch
@@ -51,6 +51,7 @@ class EditServer(ThreadingHTTPServer):
     def __init__(self, value: Any, path: Path | None, folder: Path):
         super().__init__((LOCAL, 0), _Handler)
         self.value, self.path, self.folder = value, path, folder
+        self.mark = file_mark(path)
         self.token = token_urlsafe(24)
         self.work = threading.Lock()
         "one answer at a time: equations are built by a library that many threads must not enter"
@@ -117,17 +118,30 @@ class EditServer(ThreadingHTTPServer):
             self.search.stop()
         return self.search.tell()
 
-    def save(self, value: Any, name: str | None, replaces: bool) -> dict[str, Any]:
-        """Write a file's JSON value: {file}, or {taken} where another file has that name and nothing is written."""
+    def save(self, value: Any, name: str | None, mark: Any = "", replaces: bool = False) -> dict[str, Any]:
+        """Write a file's JSON value: {file, mark}.
+
+        {taken, own} where nothing is written: another file has that name, or the own one has changed since the page
+        knew it by its `mark`, saved by another window or program.
+        """
         from_dict(value)
         path = self.path if name is None else self.folder / _file_name(name)
         if path is None:
             raise BadInput("name", "the mechanism has no file yet; give a name")
-        if path != self.path and path.exists() and not replaces:
-            return {"taken": path.name}
+        own = path == self.path
+        if path.exists() and not replaces and not (own and file_mark(path) == mark):
+            return {"taken": path.name, "own": own}
         save_file(path, format_json(value) + "\n")
-        self.path, self.value = path, value
-        return {"file": path.name}
+        self.path, self.value, self.mark = path, value, file_mark(path)
+        return {"file": path.name, "mark": self.mark}
+
+
+def file_mark(path: Path | None) -> str:
+    """What tells the content of a file from any other; empty where there is none."""
+    try:
+        return file_sha256(path) if path else ""
+    except OSError:
+        return ""
 
 
 def _file_name(name: str) -> str:
@@ -156,7 +170,7 @@ class _Handler(BaseHTTPRequestHandler):
         with self.server.work:
             path = self.server.path
             self.server.hold()
-            text = edit_page(self.server.value, path.name if path else None)
+            text = edit_page(self.server.value, path.name if path else None, self.server.mark)
         self._send(HTTPStatus.OK, text, "text/html; charset=utf-8")
         self.server.hold()
 
@@ -167,7 +181,9 @@ class _Handler(BaseHTTPRequestHandler):
             "conflict": lambda asked: conflict_answer(asked["document"]),
             "synthesise": lambda asked: self.server.begin_search(asked["task"]),
             "search": lambda asked: self.server.tell_search(asked["search"], bool(asked.get("stops"))),
-            "save": lambda asked: self.server.save(asked["document"], asked.get("name"), bool(asked.get("replaces"))),
+            "save": lambda asked: self.server.save(
+                asked["document"], asked.get("name"), asked.get("mark"), bool(asked.get("replaces"))
+            ),
             "open": lambda asked: self.server.hear(str(asked["page"]), True),
             "gone": lambda asked: self.server.hear(str(asked["page"]), False),
         }

@@ -35,6 +35,13 @@ def lift_motions() -> dict[str, type[LawSegment]]:
     return {motion: kind for motion, kind in SEGMENT_TYPES.items() if kind.is_lift}
 
 
+def rise_motions() -> tuple[str, ...]:
+    """Those that lead from rest to rest, of which a lift and an angle say all."""
+    from planar.model.input_laws.cam_rises import CamRise  # which few files have
+
+    return tuple(motion for motion, kind in lift_motions().items() if issubclass(kind, CamRise))
+
+
 def lift_schema() -> Schema:
     """What JSON Schema says of a piece of lift."""
     return {"oneOf": [_piece_schema(motion, kind) for motion, kind in lift_motions().items()]}

@@ -272,11 +272,11 @@ class ProfiledPair(Pair):
         outline = touching.point.rotate(direction(-(self.start + self.sense * angles)))
         if self.profile_by_points is not None:
             outline = Vector(*self.profile_by_points.outline(DRAWN_POINTS).T)
-        profile = [at_centre + each for each in _vectors(outline)]
+        profile = _vectors(at_centre + outline)
         face: list[Vector] = []
         if along_face is not None:
             reach = turn_left(touching.normal).dot(touching.point - touching.middle)
-            face = [middle, *(middle + each for each in _vectors(along_face * (DRAWN_FACE_RATIO * reach)))]
+            face = [middle, *_vectors(middle + along_face * (DRAWN_FACE_RATIO * reach))]
         radius = self.shape.roller_radius
         return (CamMark(self.name, cam, at_centre, tuple(profile), follower, middle, radius, tuple(face)),)
 

@@ -138,7 +138,7 @@ function deadPoint(page, k) {
 /** An input's position as it is printed, in the file's unit. */
 function amount(page, k, value = page.input(k)) {
   const { name, si } = inputUnit(page, k);
-  return `${readable(value / si)} ${name}`;
+  return `${readable(value / si).replace("-", "−")} ${name}`;
 }
 
 const inputUnit = (page, k) => page.data.units[page.data.inputs[k].slides ? "length" : "angle"];

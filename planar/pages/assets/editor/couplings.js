@@ -2,7 +2,6 @@
 /* Pairs that tie one link's turning to another's motion, as the pencil draws them: wheels, belts, racks, cams, and pins in
    slots. They are drawn as links stand: what they roll on, and about which pins, follows from the drawing. */
 
-const CAM_LAW = [["cycloidal", 1, 120], ["dwell", 0, 60], ["cycloidal", -1, 120], ["dwell", 0, 60]]; // motion, sense of its lift, deg
 const USUAL_SHARES = { pulleys: [6, 3], roller: 6, lift: 4, swing: 12 }; // of a distance, or a turn, so many parts where nothing is typed
 const ROUND_FIGURES = 2;
 
@@ -85,8 +84,15 @@ const Couplings = {
     return `${pin} runs in a slot of ${guide}`;
   },
 
+  /** The pieces of a lift that rises, dwells, returns, and dwells for what is left of a turn: [motion, sense, deg], none of 0 deg. */
+  camLaw({ motion, angles: [rise, dwell, back] }) {
+    const rest = 360 - rise - dwell - back;
+    if (!(rise > 0 && back > 0 && dwell >= 0 && rest >= 0)) throw new Error("rise and return are above 0 deg, and with the dwell a turn of 360 deg at the most");
+    return [[motion, 1, rise], ["dwell", 0, dwell], [motion, -1, back], ["dwell", 0, rest]].filter(([, , angle]) => angle > 0);
+  },
+
   /** A follower with a roller at its pin on a cam, which stands where its lift begins; `lift` {length, angle} of which it has one; null: chosen. */
-  cam(draft, cam, pin, { lift, roller }) {
+  cam(draft, cam, pin, { lift, roller, law }) {
     const { file, at, units } = draft, links = pin === null ? [] : Pins.carriers(file, pin).filter((link) => link !== cam && link !== file.frame), [follower] = links;
     if (follower === undefined) throw new Error("a cam ends at the pin of its follower that touches it");
     const carrier = Couplings.carrier(file, [cam, cam]), centre = Couplings.centre(file, cam, carrier);
@@ -104,7 +110,7 @@ const Couplings = {
       Object.assign(pair, { pivot, side: way[0] * arm[1] - way[1] * arm[0] > 0 ? "left" : "right" });
     } else pair.line = Couplings.camLine(draft, placed.line(slide), axes, centre, O, P);
     Object.assign(pair, { base_radius: Draw.length(draft, base), roller_radius: Draw.length(draft, size), start: Object.values(Couplings.mesh(draft, [cam, cam], carrier))[0] });
-    pair.law = CAM_LAW.map(([motion, sense, angle]) => (sense ? { motion, by: by(sense), in: turn(angle) } : { motion, in: turn(angle) }));
+    pair.law = Couplings.camLaw(law).map(([motion, sense, angle]) => (sense ? { motion, by: by(sense), in: turn(angle) } : { motion, in: turn(angle) }));
     file.pairs.push(pair);
     return `${follower} follows the cam ${cam}`;
   },

@@ -8,9 +8,9 @@ const BLANK_WIDTH = 0.3;    // m that are seen of empty paper
 
 class Editing {
   constructor(data, program) {
-    const { value, name, answer } = data.edited;
-    Object.assign(this, { file: value, fileName: name, answer, units: answer.units ?? { length: 1e-3, angle: Math.PI / 180 }, usual: answer.usual, wish: null });
-    Object.assign(this, { at: new Map(), done: [], undone: [], tool: "hand", chosen: null, linkBefore: null, changed: false, asked: 0, settled: true });
+    const { value, name, answer, mark } = data.edited;
+    Object.assign(this, { file: value, fileName: name, answer, units: answer.units ?? { length: 1e-3, angle: Math.PI / 180 }, usual: answer.usual, rises: answer.rises, wish: null, mark });
+    Object.assign(this, { at: new Map(), done: [], undone: [], tool: "hand", chosen: null, linkBefore: null, changed: false, asked: 0, settled: true, nearest: {}, led: null });
     this.sketch = new Sketch(this);
     this.leading = new PinLeading(this);
     this.hand = new Hand(this);
@@ -26,6 +26,7 @@ class Editing {
     this.begin(data, program, !answer.problem);
     if (!this.solved) this.guess();
     if (answer.conflicts) this.explain();
+    if (kept?.file) this.mark = kept.mark ?? mark; // of the file from which it was drawn on
     if (kept?.file) this.take({ file: kept.file, at: new Map(kept.at), wish: Wish.valid(kept.wish) }, kept.changed);
     else if (!this.placed.pins.size) this.use("bar");
     this.wishing.resume();
@@ -34,7 +35,7 @@ class Editing {
   // what is kept in the window until it is saved; without a store it lasts as long as the page
 
   static recall() { try { return JSON.parse(sessionStorage.getItem("drawing")); } catch { return null; } }
-  keep() { try { sessionStorage.setItem("drawing", JSON.stringify({ ...this.drawn, at: [...this.at] })); } catch { /* no store */ } }
+  keep() { try { sessionStorage.setItem("drawing", JSON.stringify({ ...this.drawn, at: [...this.at], mark: this.mark })); } catch { /* no store */ } }
   static forget() { try { sessionStorage.removeItem("drawing"); } catch { /* no store */ } }
 
   // the page
@@ -89,6 +90,16 @@ class Editing {
     const { file, units } = this, local = (spot) => spot.map((each) => Written.read(each, "length", units) ?? 0);
     for (const [point, where] of Object.entries(file.links?.[file.frame]?.points ?? {})) if (Array.isArray(where)) this.at.set(Pins.of(Pins.all(file), file.frame, point), local(where));
     for (const [pin, where] of Object.entries(file.sketch ?? {})) if (Array.isArray(where)) this.at.set(pin, local(where));
+    this.sketch.draw();
+  }
+
+  /** Draw links where they are nearest to going together: {link: {point: place}}. */
+  approach(nearest) {
+    this.nearest = nearest;
+    for (const [pin, members] of this.placed.pins) {
+      const [own] = members.flatMap(([link, point]) => nearest[link]?.[point] ? [nearest[link][point]] : []);
+      if (own) this.at.set(pin, own);
+    }
     this.sketch.draw();
   }
 
@@ -182,7 +193,7 @@ class Editing {
 
   /** Another file: drawn at once, told of once Python has answered. */
   take({ file, at, wish = this.wish }, changed) {
-    Object.assign(this, { file, at: new Map(at), wish, changed });
+    Object.assign(this, { file, at: new Map(at), wish, changed, nearest: {} });
     if (this.chosen && !(this.chosen.kind === "pin" ? this.at.has(this.chosen.name) : file.links[this.chosen.name])) this.chosen = null;
     this.keep();
     this.solved = false;
@@ -209,6 +220,7 @@ class Editing {
 
   hear(answer) {
     this.answer = answer;
+    if (answer.gone) this.solved = this.led === this.file; // the page itself has come there
     if (answer.units) Object.assign(this, { units: answer.units, usual: answer.usual });
     if (answer.data) {
       const script = document.createElement("script"); // functions are run as those of any page are
@@ -261,6 +273,7 @@ class Editing {
     const answer = await EditServer.post("conflict", { document: this.file });
     if (number !== this.asked) return;
     Object.assign(this.answer, { problem: answer.problem || this.answer.problem, remedies: answer.remedies ?? [] });
+    if (this.hand.dragged === null) this.approach(answer.nearest ?? {});
     this.panel.show();
   }
 }

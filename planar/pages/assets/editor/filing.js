@@ -16,13 +16,15 @@ class Filing {
   }
 
   async save(name, replaces = false) {
-    const { editing } = this, { file } = editing.draft(), answer = await EditServer.post("save", { document: file, name, replaces });
+    const { editing } = this, { file } = editing.draft(), answer = await EditServer.post("save", { document: file, name, replaces, mark: editing.mark });
     if (answer.taken) {
-      if (confirm(`There is a ${answer.taken} already. Replace it?`)) await this.save(name, true);
+      const why = answer.own ? `${answer.taken} was written by another window or program meanwhile` : `There is a ${answer.taken} already`;
+      if (confirm(`${why}. Replace it?`)) await this.save(name, true);
+      else editing.say(`${why}: nothing is saved. Save as another file keeps both.`);
       return;
     }
     if (answer.problem) { editing.say(answer.problem); return; }
-    Object.assign(editing, { fileName: answer.file, changed: false, file });
+    Object.assign(editing, { fileName: answer.file, changed: false, file, mark: answer.mark });
     if (editing.wish) editing.keep(); else Editing.forget(); // the file has no place for a wanted path
     editing.panel.show();
     editing.say(`Saved to ${answer.file}.`);

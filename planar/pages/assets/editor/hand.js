@@ -1,9 +1,10 @@
 "use strict";
 /* The hand that holds the pencil: mouse, finger and keys as presses at places, which snap to pins, to what lies in line
-   with them, and to the grid. A press begins; a release somewhere else, or a second press, ends. */
+   with them, to the sides of links, and to the grid. A press begins; a release somewhere else, or a second press, ends. */
 
 const REACH = 13;        // px about a pin, or a link
 const ALIGNED = 5;       // px: as near to the height or the breadth of a pin a place is taken there
+const SIDE_PARTS = 10;   // of the grid's step, at which a place comes to lie along the side of a link
 const APART = 8;         // px: a release that is farther from its press ends what was begun
 const TURN_STEP = Math.PI / 12; // with Shift
 
@@ -21,7 +22,7 @@ const TOOLS = {
   gear: { name: "Wheels", told: "A click on each of two links that turn as wheels do, on empty paper for the frame; their ratio stands beside." },
   rack: { name: "Rack", told: "From a link that rolls, near the pin about which it turns, to the bar on which it rolls." },
   belt: { name: "Belt", told: "A click on each of two pulleys; their radii stand beside, left empty they are chosen." },
-  cam: { name: "Cam", told: "From a link that is the cam to the pin of its follower, which slides or swings; lift and roller stand beside, left empty they are chosen." },
+  cam: { name: "Cam", told: "From a link that is the cam to the pin of its follower, which slides or swings; lift, roller and law stand beside; lift and roller left empty are chosen." },
   spring: { name: "Spring", told: "From one pin to another." },
   load: { name: "Force", told: "From a pin in the force's direction." },
   mass: { name: "Mass", told: "A click on a link." },
@@ -87,6 +88,8 @@ class Hand {
       const { step } = editing.sketch;
       const line = (axis) => cheapest(pins.filter(([, each]) => Math.abs(to(each)[axis] - px[axis]) <= ALIGNED), ([, each]) => Math.abs(to(each)[axis] - px[axis]))?.[1][axis];
       at = at.map((each, axis) => line(axis) ?? Math.round(each / step) * step);
+      const side = this.sidePlace(px, held);
+      if (side && Plane.apart(to(side), px) < Plane.apart(to(at), px)) at = side;
     }
     const start = this.pending[this.pending.length - 1]?.at;
     if (shiftKey && start) {
@@ -100,11 +103,28 @@ class Hand {
   linkAt(px) {
     const { editing } = this, { file, view } = editing;
     const far = (link) => {
-      const spots = editing.sketch.spots(link).map(view.toScreen), closed = spots.length > 2 ? [...spots, spots[0]] : spots;
-      return closed.slice(1).reduce((least, b, k) => Math.min(least, Hand.toPiece(px, closed[k], b)), spots.length === 1 ? Plane.apart(px, spots[0]) : Infinity);
+      const spots = editing.sketch.spots(link).map(view.toScreen);
+      return this.sides(link).reduce((least, side) => Math.min(least, Hand.toPiece(px, ...side.map(view.toScreen))), spots.length === 1 ? Plane.apart(px, spots[0]) : Infinity);
     };
     const links = Object.keys(file.links).filter((each) => each !== file.frame), best = cheapest(links, far);
     return best !== undefined && far(best) <= REACH ? best : null;
+  }
+
+  /** The sides of a link: [[place, place], ...]. */
+  sides(link) {
+    const spots = this.editing.sketch.spots(link), closed = spots.length > 2 ? [...spots, spots[0]] : spots;
+    return closed.slice(1).map((b, k) => [closed[k], b]);
+  }
+
+  /** The place upon the side of a link at which the pointer is, to a tenth of the grid's step from where the side begins;
+      null where it is at none. Links that go with the pin held are none to come to. */
+  sidePlace(px, held) {
+    const { editing } = this, { file, view, sketch } = editing, step = sketch.step / SIDE_PARTS;
+    const own = held === null ? [] : Pins.carriers(file, held), links = Object.keys(file.links).filter((each) => each !== file.frame && !own.includes(each));
+    const [start, stop] = cheapest(links.flatMap((link) => this.sides(link)), (side) => Hand.toPiece(px, ...side.map(view.toScreen))) ?? [];
+    if (!start || Hand.toPiece(px, ...[start, stop].map(view.toScreen)) > ALIGNED) return null;
+    const way = Plane.unit(Plane.minus(stop, start)), far = Plane.dot(Plane.minus(view.toWorld(px), start), way);
+    return Plane.on(start, way, Math.max(0, Math.min(Plane.apart(start, stop), Math.round(far / step) * step)));
   }
 
   /** How far a place is from a piece of a line. */
@@ -166,7 +186,7 @@ class Hand {
       gear: (draft) => Couplings.gear(draft, wheels, numbers.read("ratio")),
       belt: (draft) => Couplings.belt(draft, wheels, ["first", "second"].map((key) => numbers.length(key)), numbers.read("crossed")),
       rack: (draft) => Couplings.rack(draft, first.link, spot.link, first.at),
-      cam: (draft) => Couplings.cam(draft, first.link, spot.pin, { lift: numbers.lift(), roller: numbers.length("roller") }),
+      cam: (draft) => Couplings.cam(draft, first.link, spot.pin, { lift: numbers.lift(), roller: numbers.length("roller"), law: numbers.law() }),
     };
     this.pending = [];
     if (editing.tool === "picture") editing.underlay.mark([first, spot].map((each) => each.free ?? each.at));

@@ -9,6 +9,7 @@ class PinLeading {
   take(pin) {
     const { editing } = this, { parts: { page, drawing, controls }, solved, panel, linkBefore } = editing;
     controls.pause();
+    editing.nearest = {}; // what is led is drawn from pin to pin
     const { file, at, units } = editing.draft(), inputs = solved ? page.data.inputs.map((_, k) => page.input(k)) : null;
     drawing.hold(true);
     return { pin, placed: new Placed(file, at, units), inputs, made: null, solved, along: solved && panel.numbers.read("along"), link: linkBefore };
@@ -51,11 +52,13 @@ class PinLeading {
     const { editing } = this;
     held.to = to;
     editing.parts.drawing.hold(false);
-    if (held.along) this.pullAlong(held);
+    if (held.along) this.pullAlong(held); else this.pull(held);
     if (held.along && !held.reached) return;
+    const { solved } = editing;
     const at = new Map(editing.at), made = held.along ? { file: new Placed(held.reached, at, editing.units).sketched(), at } : held.placed.moved(held.pin, to, held.inputs);
     editing.at = held.placed.at; // to come back to
     editing.commit(made);
+    editing.led = solved ? editing.file : null;
     editing.say(`${held.pin} moved${held.along ? ", and what hangs on it" : ""}.`);
   }
 

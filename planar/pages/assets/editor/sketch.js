@@ -45,8 +45,8 @@ class Sketch {
 
   /** The places of a link's pins. */
   spots(link) {
-    const { editing } = this, { pins, file } = editing.placed;
-    return Pins.ofLink(file.links[link]).map((point) => editing.at.get(Pins.of(pins, link, point))).filter(Boolean);
+    const { editing } = this, { pins, file } = editing.placed, own = editing.nearest[link] ?? {};
+    return Pins.ofLink(file.links[link]).map((point) => own[point] ?? editing.at.get(Pins.of(pins, link, point))).filter(Boolean);
   }
 
   outline(link, kind, px) {
@@ -63,6 +63,11 @@ class Sketch {
       const ends = [-40, 40].map((far) => { const [x, y] = px(at); return `${x + far * line.way[0]},${y - far * line.way[1]}`; });
       svgPart("polyline", { points: ends.join(" "), class: "guide" }, this.group);
     }
+    for (const [a, b] of this.gaps()) {
+      const [cx, cy] = px(b);
+      svgPart("polyline", { points: [a, b].map((each) => px(each).join(",")).join(" "), class: "gap" }, this.group);
+      svgPart("circle", { cx, cy, r: 4, class: "pin" }, this.group);
+    }
     for (const point of Pins.ofLink(file.links[file.frame])) {
       const at = editing.at.get(Pins.of(editing.placed.pins, file.frame, point));
       if (!at) continue;
@@ -74,6 +79,15 @@ class Sketch {
       svgPart("circle", { cx: x, cy: y, r: 4, class: "pin" }, this.group);
       svgPart("text", { x: x + 9, y: y - 9, class: "name" }, this.group, Letters.told(pin));
     }
+  }
+
+  /** From where to where pins stay open: [[place, place], ...]. */
+  gaps() {
+    const { editing: { nearest, placed } } = this;
+    return [...placed.pins.values()].flatMap((members) => {
+      const [first, ...others] = members.flatMap(([link, point]) => (nearest[link]?.[point] ? [nearest[link][point]] : []));
+      return others.filter((each) => Plane.apart(first, each) > ON_LINE * Math.max(Plane.length(first), 1e-3)).map((each) => [first, each]);
+    });
   }
 
   /** The path that is wanted, as it is drawn, or where the page has no mechanism to show it of. */

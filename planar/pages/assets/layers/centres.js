@@ -111,7 +111,7 @@ function standardFrames(page) {
 function drawCentre(ink, layers, room, { name, at, shown }, drawn, picked) {
   const [x, y, w] = at, middle = [(room[0] + room[2]) / 2, (room[1] + room[3]) / 2], edge = CENTRE_ARROW.margin * ink.mm;
   const there = w === 0 ? null : layers.at([x / w, y / w]);
-  const inside = there !== null && there[0] > room[0] && there[0] < room[2] && there[1] > room[1] && there[1] < room[3];
+  const radius = CENTRE_RADII[shown ? "shown" : "found"], inside = there !== null && [0, 1].every((k) => there[k] - radius * ink.mm > room[k] && there[k] + radius * ink.mm < room[k + 2]);
   const add = (key, place, outside, away) => {
     if (drawn.has(key)) { drawn.get(key).names.push(name); return false; }
     drawn.set(key, { place, names: [name], outside, away });
@@ -120,7 +120,7 @@ function drawCentre(ink, layers, room, { name, at, shown }, drawn, picked) {
   if (inside) {
     const key = there.map((each) => Math.round(each / 2)).join();
     if (add(key, there, "", null)) {
-      ink.dot(there, CENTRE_RADII[shown ? "shown" : "found"], `centre ${shown ? "shown" : "found"}${picked ? " picked" : ""}`);
+      ink.dot(there, radius, `centre ${shown ? "shown" : "found"}${picked ? " picked" : ""}`);
       ink.keepClear(there, 5);
     }
     return there;

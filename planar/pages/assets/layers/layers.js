@@ -92,6 +92,7 @@ class Layers {
         memory.write("layers", this.all.map((each) => each.key).filter((key) => this.on.has(key)).join(",") || "none");
         this.draw();
         page.emit("shown");
+        this.draw(); // beside letters that make room
       });
       const part = htmlPart(layer.beside ? "figure" : "p", { hidden: "" }, layer.beside ? this.places : this.notes);
       const beside = layer.beside?.(this, part) ?? null, told = layer.beside ? htmlPart("figcaption", {}, part) : part;
@@ -128,6 +129,8 @@ class Layers {
       if (beside !== null) text = [beside.draw(), text].filter(Boolean).join("; ");
       if (told.textContent !== text) told.textContent = text;
     }
+    // what the drawing's own letters keep clear of
+    this.page.marks = this.below.flatMap((layer) => (layer.places && this.ready && this.on.has(layer.key) ? layer.places().map(([, place]) => place) : []));
     const lettered = shapes.filter(([, ink]) => ink.letters.length);
     if (!lettered.length) return;
     const zoom = parseFloat(getComputedStyle(document.body).fontSize) / 16;
@@ -160,7 +163,10 @@ class Layers {
   }
 
   /** What can be seen, in px: [x, y, x, y]. */
-  bounds() { return [0, 0, this.page.view.width, this.page.view.height]; }
+  bounds() {
+    const { width, height, head, foot } = this.page.view;
+    return [0, head, width, height - foot];
+  }
 
   at(position) { return this.page.view.toScreen(position); }
 

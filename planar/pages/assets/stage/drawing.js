@@ -9,6 +9,7 @@ const EDGE = 1;        // mm about all strokes
 const REFITS = 5;      // times at the most that room is made for strokes, of which some keep their size on paper
 const OVERHANG = 2;    // mm: as far a block may go beyond what its guide is drawn for
 const FOOT = 6;        // mm below for the bar of the scale
+const MARK = 4;        // px: half of what a layer marks a place by
 const FINGER = 24;     // px: as wide a link can be taken hold of
 
 class Drawing {
@@ -20,9 +21,11 @@ class Drawing {
     svg.setAttribute("aria-label", page.data.name);
     this.sense = 1; // of the input that runs, for its arrow
     this.lens = null; // {scale (px/m), at}: how near, and the place in the middle (m); null where everything is to be seen
+    this.buttons = { head: () => 0, foot: () => 0 }; // px at the upper and the lower edge that buttons hide
     this.measure();
     page.on("size", () => this.renew());
     page.on("move", () => { if (!this.stale) this.place(); });
+    page.on("shown", () => this.place(true));
     new ResizeObserver(() => {
       if (svg.clientWidth !== this.width || svg.clientHeight !== this.height) this.build();
     }).observe(svg);
@@ -99,13 +102,14 @@ class Drawing {
       for (const k of [0, 1]) { low[k] = Math.min(low[k], at[k]); high[k] = Math.max(high[k], at[k]); }
     }
     for (const k of [0, 1]) { low[k] -= this.slack; high[k] += this.slack; }
-    const span = [high[0] - low[0], high[1] - low[1]], room = [width - 2 * MARGIN * mm, height - (2 * MARGIN + FOOT) * mm];
+    const span = [high[0] - low[0], high[1] - low[1]], { head, foot, margin } = this.margins();
+    const top = Math.max(margin, head + EDGE * mm), bottom = foot + margin, room = [width - 2 * margin, height - top - bottom];
     const scale = Math.min(room[0] / Math.max(span[0], 1e-9), room[1] / Math.max(span[1], 1e-9));
     this.scale = Math.min(scale, (0.6 * Math.min(...room)) / (0.02 * this.page.data.size)); // a single spot is not blown up
     this.fitted = this.scale;
     if (this.lens) ({ scale: this.scale } = this.lens);
     if (this.held) ({ scale: this.scale } = this.held); // what is dragged is not drawn away from the pointer
-    const whole = [(low[0] + high[0]) / 2, (low[1] + high[1]) / 2 - (0.5 * FOOT * mm) / this.scale];
+    const whole = [(low[0] + high[0]) / 2, (low[1] + high[1]) / 2 + (0.5 * (top - bottom)) / this.scale];
     const [x, y] = this.lens?.at ?? whole;
     this.corners = [low, high];
     this.look(this.held?.origin ?? [width / 2 - x * this.scale, height / 2 + y * this.scale]);
@@ -114,15 +118,27 @@ class Drawing {
   /** Room for strokes that go farther than what they join, as racks do, in all positions; whether there was none. */
   refit() {
     if (this.lens || this.held) return false;
-    const { mm, width, height, scale, origin, corners: [[left, bottom], [right, top]] } = this, edge = EDGE * mm, margin = MARGIN * mm;
-    const room = [width, height - FOOT * mm], [low, high] = this.inked();
-    const from = [Math.min(low[0] - edge, left * scale - margin), Math.min(low[1] - edge, -top * scale - margin)];
+    const { mm, width, height, scale, origin, corners: [[left, bottom], [right, top]] } = this, edge = EDGE * mm, { head, foot, margin } = this.margins();
+    const room = [width, height - foot], [low, high] = this.inked();
+    const from = [Math.min(low[0] - edge, left * scale - margin), Math.min(Math.min(low[1], -top * scale) - edge - head, -top * scale - margin)];
     const to = [Math.max(high[0] + edge, right * scale + margin), Math.max(high[1] + edge, -bottom * scale + margin)];
     if ([0, 1].every((k) => from[k] + origin[k] >= -0.5 && to[k] + origin[k] <= room[k] + 0.5)) return false;
     const by = Math.min(1, ...[0, 1].map((k) => room[k] / (to[k] - from[k])));
     this.scale = this.fitted = by * scale;
     this.look([0, 1].map((k) => room[k] / 2 - (by * (from[k] + to[k])) / 2));
     return true;
+  }
+
+  /** px: what buttons and the bar of the scale take above and below, and what is left free about all places. */
+  margins() {
+    const { mm, height, buttons } = this, most = 0.2 * height;
+    return { head: Math.min(buttons.head(), most), foot: Math.min(Math.max(FOOT * mm, buttons.foot()), most), margin: MARGIN * mm };
+  }
+
+  /** Make room beside buttons that have come. */
+  settle() {
+    const { head, foot } = this.margins(), { view } = this.page;
+    if (view && (view.head !== head || view.foot !== foot)) this.build();
   }
 
   /** The corners of all strokes in all positions, in px from the world's origin. */
@@ -142,10 +158,10 @@ class Drawing {
 
   /** Take a place of the world's origin on the screen. */
   look(origin) {
-    const { mm, width, height } = this;
+    const { mm, width, height } = this, { head, foot } = this.margins();
     this.origin = origin;
     this.page.view = {
-      scale: this.scale, mm, width, height,
+      scale: this.scale, mm, width, height, head, foot, // head, foot: px that are not free above and below
       toScreen: ([x, y]) => [origin[0] + x * this.scale, origin[1] - y * this.scale],
       toWorld: ([x, y]) => [(x - origin[0]) / this.scale, (origin[1] - y) / this.scale],
     };
@@ -247,10 +263,10 @@ class Drawing {
     }
   }
 
-  /** Where all strokes are on the screen, [x, y, x, y, ...]; sixty times a second, so nothing is made anew. */
+  /** Where all strokes and what layers mark are on the screen, [x, y, x, y, ...]; sixty times a second, so nothing is made anew. */
   avoid() {
-    const { page, scale, origin, edges } = this;
-    const many = 4 * edges.length + this.springs.room;
+    const { page, scale, origin, edges } = this, { marks } = page, strokes = 4 * edges.length + this.springs.room;
+    const many = strokes + 4 * marks.length;
     if (this.avoided?.length !== many) this.avoided = new Float64Array(many);
     for (let k = 0; k < edges.length; k++) {
       const f = page.frames[edges[k][0]], x = origin[0] + f.x * scale, y = origin[1] - f.y * scale;
@@ -261,12 +277,13 @@ class Drawing {
       }
     }
     this.springs.avoided(this.avoided, 4 * edges.length);
+    marks.forEach(([x, y], k) => this.avoided.set([x - MARK, y, x + MARK, y], strokes + 4 * k));
   }
 
   /** Whether everything is on the picture; several inputs together may leave what each alone covers. */
   inside() {
-    const { avoided, width, height } = this;
-    for (let k = 0; k < avoided.length; k += 2) {
+    const { avoided, width, height, page: { marks } } = this, strokes = avoided.length - 4 * marks.length;
+    for (let k = 0; k < strokes; k += 2) {
       if (avoided[k] < 0 || avoided[k] > width || avoided[k + 1] < 0 || avoided[k + 1] > height) return false;
     }
     return true;

@@ -36,6 +36,8 @@ class Lens {
     this.whole = this.button("Fit", "Fit everything (0)", () => this.fit());
     this.screen = this.button("Full screen", "Full screen (F)", () => this.fill(!this.isFull));
     this.svg.parentNode.append(box, this.tools);
+    const { drawing, tools } = this;
+    drawing.buttons = { head: () => box.offsetTop + box.offsetHeight, foot: () => (tools.offsetHeight ? drawing.height - tools.offsetTop : 0) };
     this.show();
   }
 
