@@ -15,7 +15,7 @@ from planar.synthesis.exact.relations.family import Family, Member
 from planar.synthesis.exact.tracking.member_homotopy import homogeneous_solutions
 from planar.synthesis.exact.tracking.same_solutions import first_of_same
 
-POINTS, PLACES = 6, 2
+PLACES = 2
 EXACT = 1e-9
 """Of the size of rows: what they may leave at a solution."""
 FINITE = 1e-8
@@ -80,14 +80,13 @@ def _finite_roots(rows: ComplexArray) -> ComplexArray:
         values, vectors = np.linalg.eig(np.linalg.solve(still + middle * moved, moved))
     except np.linalg.LinAlgError:
         return np.zeros((0, 2, 3), dtype=complex)
-    order = np.argsort(-np.abs(values))[: 2 * POINTS]
     found = []
-    for k in order.tolist():
-        if abs(values[k]) < EXACT:
+    for value, vector in zip(values.tolist(), vectors.T, strict=True):
+        if abs(value) < EXACT:
             continue
-        powers = vectors[:, k].reshape(4, 3)
+        powers = vector.reshape(4, 3)
         s = np.vdot(powers[:-1], powers[1:]) / np.vdot(powers[:-1], powers[:-1])
-        p = turn @ np.array([1.0, s, middle - 1.0 / values[k]])
+        p = turn @ np.array([1.0, s, middle - 1.0 / value])
         p /= np.linalg.norm(p)
         left = np.linalg.svd(np.einsum("i,rij->rj", p, rows))
         q = left[2][-1].conj()
