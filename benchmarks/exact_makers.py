@@ -254,7 +254,7 @@ def distance_to_maker(found: planar.CompleteSynthesis, maker: planar.Mechanism) 
         numbers = planar.dimensions(each.mechanism)
         other = dict(numbers)
         for one, two in EXCHANGED.items():
-            if one in numbers:
+            if one in numbers and two in numbers:
                 other[one], other[two] = numbers[two], numbers[one]
         for told in (numbers, other):
             off = max(abs(told[name] - wanted[name]) for name in NUMBERS if name in wanted)

@@ -50,11 +50,11 @@ def ball(value: complex) -> Any:
     return acb(value.real, value.imag)
 
 
-def direction_ball(angle: float) -> Any:
-    """exp(i angle), enclosed."""
-    from flint import acb, arb
+def direction_ball(angle: Any) -> Any:
+    """exp(i angle) of a ball, enclosed."""
+    from flint import acb
 
-    return acb(arb(angle).cos(), arb(angle).sin())
+    return (acb(0.0, 1.0) * angle).exp()
 
 
 def _inverse(slope: list[list[Any]]) -> Any | None:
@@ -67,24 +67,32 @@ def _inverse(slope: list[list[Any]]) -> Any | None:
         return None
 
 
-def polished_balls(equations: BallEquations, w: ComplexArray) -> list[Any] | None:
-    """A solution near w to the precision of balls, by Newton's method."""
+def newton_step(equations: BallEquations, at: Sequence[Any]) -> list[Any] | None:
+    """What Newton's method takes from w, None where the Jacobian has no inverse."""
     from flint import acb_mat
 
+    left, slope = equations(at)
+    near = _inverse(slope)
+    return None if near is None else (near * acb_mat([[each] for each in left])).entries()
+
+
+def polished_balls(equations: BallEquations, w: ComplexArray) -> list[Any] | None:
+    """A solution near w to the precision of balls, by Newton's method."""
     at = [ball(complex(each)) for each in w]
     for _ in range(POLISHING_STEPS):
-        left, slope = equations(at)
-        near = _inverse(slope)
-        if near is None:
+        step = newton_step(equations, at)
+        if step is None:
             return None
-        step = (near * acb_mat([[each] for each in left])).entries()
         at = [(one - other).mid() for one, other in zip(at, step, strict=True)]
-        if all(
-            abs(complex(each.mid())) < POLISHED * max(1.0, abs(complex(one)))
-            for each, one in zip(step, at, strict=True)
-        ):
+        if relative_size(step, at) < POLISHED:
             break
     return at
+
+
+def relative_size(step: Sequence[Any], at: Sequence[Any]) -> float:
+    """The greatest entry of a step, of those it is taken from where they are greater than one."""
+    sizes = (abs(complex(each.mid())) / max(1.0, abs(complex(one))) for each, one in zip(step, at, strict=True))
+    return max(sizes, default=0.0)
 
 
 def prove_box(equations: BallEquations, middle: list[Any]) -> ProvedBox | None:

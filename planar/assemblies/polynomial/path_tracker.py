@@ -138,6 +138,7 @@ def track_paths(
     V: ComplexArray,
     near: float = PREDICTION_TOLERANCE,
     correction: float = CORRECTION_TOLERANCE,
+    most_steps: int = MAX_STEPS,
 ) -> PathEnds:
     """The solutions at the end of the way from those at its beginning; in as many digits as V has, where the homotopy
     keeps them, though linear systems are solved in double precision.
@@ -145,9 +146,10 @@ def track_paths(
     `near` is how far a prediction may be off, `correction` what Newton's second step may still move a solution by.
     """
     V = normalize(V)
-    way, step = np.zeros(len(V)), np.full(len(V), FIRST_STEP)
+    way, step = np.zeros(len(V), V.real.dtype), np.full(len(V), FIRST_STEP, V.real.dtype)
+    least_step = MIN_STEP * min(1.0, float(np.finfo(V.real.dtype).eps / np.finfo(float).eps))
     busy = np.arange(len(V))
-    for _ in range(MAX_STEPS):
+    for _ in range(most_steps):
         if busy.size == 0:
             break
         here, t = V[busy], way[busy]
@@ -159,7 +161,7 @@ def track_paths(
         taken = busy[good]
         V[taken], way[taken] = tried[good], ahead[good]
         step[busy] = h * _step_factors(first / near, second / correction, good)
-        busy = busy[(way[busy] < 1.0) & (step[busy] > MIN_STEP * np.maximum(1.0 - way[busy], 1e-3))]
+        busy = busy[(way[busy] < 1.0) & (step[busy] > least_step * np.maximum(1.0 - way[busy], 1e-3))]
     return refine_ends(homotopy, V, way >= 1.0)._replace(is_near_end=way > 1.0 - END_VISIBLE_DISTANCE)
 
 
@@ -177,15 +179,15 @@ def _step_factors(first: Array, second: Array, good: BoolArray) -> Array:
 def refine_ends(homotopy: Homotopy, V: ComplexArray, arrived: BoolArray) -> PathEnds:
     """Solutions carried to round-off at the end of the way."""
     arrived = arrived.copy()
+    if not len(V):
+        return PathEnds(V, np.zeros(0), arrived, arrived)
     one = np.ones(len(V))
     for _ in range(3):
         with np.errstate(all="ignore"):
             step, slope = _newton_step(homotopy, V, V, one)
             moved = np.linalg.norm(step, axis=1)
             good = moved < 1e-3
-        V = np.where(good[:, None], normalize(V + step), V) if len(V) else V
-    if not len(V):
-        return PathEnds(V, np.zeros(0), arrived, arrived)
+        V = np.where(good[:, None], normalize(V + step), V)
     values = np.linalg.svd(slope, compute_uv=False)
     regular = values[:, -1] / values[:, 0]
     arrived |= good & (moved < CORRECTION_TOLERANCE) & (regular > SINGULAR_TOLERANCE)

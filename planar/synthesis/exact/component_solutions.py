@@ -8,21 +8,26 @@ from typing import NamedTuple
 import numpy as np
 
 from planar.assemblies.polynomial.certification import is_available
-from planar.foundation.arrays import BoolArray, ComplexArray
+from planar.assemblies.polynomial.path_tracker import SAME_SOLUTION_DISTANCE
+from planar.foundation.arrays import BoolArray, ComplexArray, IntArray
 from planar.model.wording import count_phrase
 from planar.synthesis.exact.relations.exact_problem import Component
 from planar.synthesis.exact.relations.family import Member
+from planar.synthesis.exact.tracking.ball_paths import follow_in_balls
 from planar.synthesis.exact.tracking.bilinear_roots import bilinear_roots
 from planar.synthesis.exact.tracking.exact_certificates import certify_member
 from planar.synthesis.exact.tracking.generic_store import FamilyRecord, family_record
-from planar.synthesis.exact.tracking.member_homotopy import homogeneous_solutions
+from planar.synthesis.exact.tracking.member_homotopy import affine_solutions
 from planar.synthesis.exact.tracking.member_solutions import MemberSolutions, solve_member
 from planar.synthesis.exact.tracking.other_ways import UNKNOWN
-from planar.synthesis.exact.tracking.same_solutions import first_of_same
 from planar.synthesis.exact.tracking.symmetry import FamilyName
 
 REAL = 1e-7
 """Of a solution's size: one that differs from its own conjugate by less is real."""
+FARTHEST = 1e11
+"""What is farther out than this is at infinity."""
+MOST_BALL_PATHS = 30
+"""They take seconds each."""
 Progress = Callable[[str], None]
 
 
@@ -58,6 +63,8 @@ def _solve(component: Component, record: FamilyRecord, say: Progress) -> Compone
     whole = _member_solutions(component, record, say)
     if is_available() and len(whole.doubtful):
         whole = _with_doubtful(component, whole)
+    if is_available() and whole.found < whole.class_count:
+        whole = _with_ball_paths(component, record, whole, say)
     proved = np.zeros(len(whole.x), dtype=bool)
     x, is_real = whole.x, _is_real(whole.x)
     all_proved = 0
@@ -77,19 +84,45 @@ def _member_solutions(component: Component, record: FamilyRecord, say: Progress)
     x = bilinear_roots(component.family, component.member, count) if members == 1 else None
     if x is not None:
         none = np.zeros(0, dtype=int)
-        return MemberSolutions(x, np.arange(count), count, 1, 0, 0, 0, x[:0], none)
+        return MemberSolutions(x, np.arange(count), count, 1, x[:0], none, none.astype(bool))
     say(f"{count_phrase(record.classes.size, 'path')}")
     return solve_member(component.family, record, component.member)
 
 
 def _with_doubtful(component: Component, whole: MemberSolutions) -> MemberSolutions:
-    """Ends that only look as if several met there, which balls of more digits tell from such, beside the others."""
-    proof = certify_member(component.family, component.member, whole.doubtful)
-    both = np.concatenate([whole.x, proof.x[proof.proved]])
-    classes = np.concatenate([whole.classes, whole.doubtful_classes[proof.proved]])
-    kept = first_of_same(homogeneous_solutions(both)) == np.arange(len(both))
-    told = whole._replace(x=both[kept], classes=classes[kept])
-    return told._replace(singular=max(0, whole.singular - (told.found - whole.found)))
+    """With ends that only look as if several met there, or as if they were at infinity, which balls of more digits tell
+    from such."""
+    near = np.flatnonzero(np.abs(whole.doubtful).max(axis=1, initial=0.0) < FARTHEST)
+    return _with_proved(component, whole, whole.doubtful[near], whole.doubtful_classes[near])
+
+
+def _with_ball_paths(
+    component: Component, record: FamilyRecord, whole: MemberSolutions, say: Progress
+) -> MemberSolutions:
+    """With the solutions of classes whose paths were lost, followed once more in balls, where they are few."""
+    open_classes = sorted({*range(len(record.classes))} - {*whole.classes.tolist()})
+    rows = record.classes[open_classes].ravel()
+    if len(rows) > MOST_BALL_PATHS:
+        return whole
+    say(f"{count_phrase(len(rows), 'path')} in balls")
+    x = follow_in_balls(
+        component.family, record.solutions.member, affine_solutions(record.solutions.V[rows]), component.member
+    )
+    came = np.isfinite(x).all(axis=1)
+    return _with_proved(component, whole, x[came], np.repeat(open_classes, record.classes.shape[1])[came])
+
+
+def _with_proved(
+    component: Component, whole: MemberSolutions, more: ComplexArray, of_class: IntArray
+) -> MemberSolutions:
+    """With those solutions more (solutions, unknowns) that are proved, and new."""
+    proof = certify_member(component.family, component.member, more)
+    x, classes = whole.x, whole.classes
+    for k in np.flatnonzero(proof.proved).tolist():
+        off = np.abs(x - proof.x[k]) / np.maximum(1.0, np.abs(proof.x[k]))
+        if off.max(axis=1).min(initial=np.inf) > SAME_SOLUTION_DISTANCE:
+            x, classes = np.concatenate([x, proof.x[k : k + 1]]), np.append(classes, of_class[k])
+    return whole._replace(x=x, classes=classes)
 
 
 def _is_real(x: ComplexArray) -> BoolArray:

@@ -42,11 +42,14 @@ def completeness(solved: Sequence[ComponentSolutions]) -> str:
     gap = _gap(solved)
     if gap:
         return f"incomplete: {gap}"
+    is_traced = all(each.record.is_traced for each in solved)
+    told = "numerically complete" if is_traced else "all of a number that is a lower bound"
+    infinite = sum(each.whole.at_infinity for each in solved)
     if any(each.whole.singular for each in solved):
-        return "numerically complete but for singular solutions, where several meet or a curve of them passes"
-    if not all(each.record.is_traced for each in solved):
-        return "all of a number that is a lower bound: it was found by monodromy without a trace test"
-    return "numerically complete"
+        told += " but for singular solutions, where several meet or a curve of them passes"
+    elif infinite:
+        told += f" but for {infinite} at infinity"
+    return told if is_traced else f"{told}: it was found by monodromy without a trace test"
 
 
 def _gap(solved: Sequence[ComponentSolutions]) -> str:

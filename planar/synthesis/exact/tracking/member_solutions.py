@@ -31,27 +31,52 @@ INFINITY = 1e-6
 
 class MemberSolutions(NamedTuple):
     """`x` (solutions, unknowns): those at finite places that count once, and the class of each (solutions,), UNKNOWN
-    where paths of several came to it.
+    where paths of several came to it; there are `class_count` classes with so many `members` each.
 
-    Of `class_count` classes with so many `members` each: how many have no solution that was found, their paths ending
-    where several meet, or at infinity, or nowhere (`lost`). `doubtful` are solutions where several seem to meet, with
-    their classes.
+    `doubtful` are ends of paths where several solutions seem to meet, or that seem to be at infinity
+    (`is_doubtful_infinite`), with their classes.
     """
 
     x: ComplexArray
     classes: IntArray
     class_count: int
     members: int
-    singular: int
-    at_infinity: int
-    lost: int
     doubtful: ComplexArray
     doubtful_classes: IntArray
+    is_doubtful_infinite: BoolArray
 
     @property
     def found(self) -> int:
         """How many classes have a solution."""
-        return len({*self.classes.tolist()} - {UNKNOWN})
+        return len(self._known) if self.members > 1 else len(self.x)
+
+    @property
+    def singular(self) -> int:
+        """How many classes without one have paths that end where several meet."""
+        return min(len(self._singular), self._without_solution)
+
+    @property
+    def at_infinity(self) -> int:
+        """How many of the rest have paths that end at infinity."""
+        infinite = {*self.doubtful_classes.tolist()} - self._known - self._singular
+        return min(len(infinite), self._without_solution - self.singular)
+
+    @property
+    def lost(self) -> int:
+        """How many are left."""
+        return self._without_solution - self.singular - self.at_infinity
+
+    @property
+    def _without_solution(self) -> int:
+        return max(0, self.class_count - self.found)
+
+    @property
+    def _known(self) -> set[int]:
+        return {*self.classes.tolist()} - {UNKNOWN}
+
+    @property
+    def _singular(self) -> set[int]:
+        return {*self.doubtful_classes[~self.is_doubtful_infinite].tolist()} - self._known
 
 
 class _Ends(NamedTuple):
@@ -75,29 +100,26 @@ def solve_member(family: Family, record: FamilyRecord, member: Member, seed: int
     ends = _follow_all(family, record, member)
     kept = np.flatnonzero(ends.is_single)
     kept = kept[first_of_same(ends.V[kept]) == np.arange(len(kept))]
-    found = ClassedSolutions(ends.V[kept], np.where(ends.is_shared, UNKNOWN, class_of)[kept])
-    settled = class_of[ends.is_singular | ends.is_infinite]
+    # a solution that several paths came to is one of their classes, and the only one of it where each has one
+    is_unknown = ends.is_shared & (members > 1)
+    found = ClassedSolutions(ends.V[kept], np.where(is_unknown, UNKNOWN, class_of)[kept])
+    doubtful = np.flatnonzero(ends.is_singular | ends.is_infinite)
+    settled = class_of[doubtful]
     for _ in range(OTHER_WAYS):
         count = np.bincount(np.concatenate([found.known_classes, settled]), minlength=many)
-        if not (count < members).any():
+        if not (count < members).any() or (members == 1 and len(found.V) + len({*settled.tolist()}) >= many):
             break
         if not count.all():
             found = with_new_classes(family, record, member, found, rng)
         found = with_members(family, record, member, found, count < members, rng)
-    known = {*found.known_classes.tolist()}
-    singular = {*class_of[ends.is_singular].tolist()} - known
-    infinite = {*class_of[ends.is_infinite].tolist()} - known - singular
-    lost = max(0, many - len(known) - len(singular) - len(infinite))
     return MemberSolutions(
         affine_solutions(found.V),
         found.classes,
         many,
         members,
-        len(singular),
-        len(infinite),
-        lost,
-        affine_solutions(ends.V[ends.is_singular]),
-        class_of[ends.is_singular],
+        affine_solutions(ends.V[doubtful]),
+        settled,
+        ends.is_infinite[doubtful],
     )
 
 

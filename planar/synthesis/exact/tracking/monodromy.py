@@ -11,7 +11,7 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from planar.assemblies.polynomial.path_tracker import PathEnds, track_paths
+from planar.assemblies.polynomial.path_tracker import MAX_STEPS, PathEnds, track_paths
 from planar.foundation.arrays import ComplexArray
 from planar.synthesis.exact.relations.family import Family, Member
 from planar.synthesis.exact.tracking.first_solution import first_solution
@@ -23,6 +23,8 @@ FIRST_NODES, IDLE_NODES = 4, 2
 """Members at first, and how many more must bring nothing new."""
 KEPT_FROM = 64
 """Solutions from which on every edge that was followed is kept, so that a search may go on from there."""
+CLOSER_STEPS = 20 * MAX_STEPS
+"""Of a path that is followed with the digits of long doubles: near members with solutions that meet it takes many."""
 CORRECTION = 1e-7
 """What Newton's second step may still move a solution by: paths that leap for it are seen, as two come to one."""
 
@@ -92,7 +94,9 @@ def follow(
 ) -> PathEnds:
     """Solutions of one member followed to another, many at a time; with the digits of long doubles where asked for."""
     between = MemberHomotopy(family, begin, end)
-    start = V.astype(np.clongdouble) if has_more_digits else V
-    blocks = [track_paths(between, start[k : k + BLOCK], near, CORRECTION) for k in range(0, max(len(V), 1), BLOCK)]
+    start, steps = (V.astype(np.clongdouble), CLOSER_STEPS) if has_more_digits else (V, MAX_STEPS)
+    blocks = [
+        track_paths(between, start[k : k + BLOCK], near, CORRECTION, steps) for k in range(0, max(len(V), 1), BLOCK)
+    ]
     ends = PathEnds(*(np.concatenate(each) for each in zip(*blocks, strict=True)))
     return ends._replace(V=ends.V.astype(complex))

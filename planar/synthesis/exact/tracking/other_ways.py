@@ -83,11 +83,8 @@ def with_new_classes(
     V = representatives(V, exchange_images(record.name.exchanges))
     first = first_of_same(np.concatenate([found.V, V]))[len(found.V) :]
     new = V[first == len(found.V) + np.arange(len(V))]
-    # classes have other numbers there; what is new of a class of which others are known goes to one without any
-    free = sorted({*range(len(record.classes))} - {*found.classes.tolist()})
-    if record.classes.shape[1] > 1 or len(new) > len(free):
-        return found if not free else found.merge(ClassedSolutions(new, np.full(len(new), UNKNOWN)))
-    return found.merge(ClassedSolutions(new, np.array(free[: len(new)], dtype=int)))
+    # classes have other numbers there
+    return found.merge(ClassedSolutions(new, np.full(len(new), UNKNOWN)))
 
 
 def _by_way(
