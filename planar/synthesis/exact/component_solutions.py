@@ -17,10 +17,10 @@ from planar.synthesis.exact.tracking.ball_paths import follow_in_balls
 from planar.synthesis.exact.tracking.bilinear_roots import bilinear_roots
 from planar.synthesis.exact.tracking.exact_certificates import certify_member
 from planar.synthesis.exact.tracking.generic_store import FamilyRecord, family_record
-from planar.synthesis.exact.tracking.member_homotopy import affine_solutions
+from planar.synthesis.exact.tracking.member_homotopy import affine_solutions, homogeneous_solutions
 from planar.synthesis.exact.tracking.member_solutions import MemberSolutions, solve_member
 from planar.synthesis.exact.tracking.other_ways import UNKNOWN
-from planar.synthesis.exact.tracking.symmetry import FamilyName
+from planar.synthesis.exact.tracking.symmetry import FamilyName, exchange_images
 
 REAL = 1e-7
 """Of a solution's size: one that differs from its own conjugate by less is real."""
@@ -62,8 +62,8 @@ def solve_components(components: Sequence[Component], say: Progress) -> list[Com
 def _solve(component: Component, record: FamilyRecord, say: Progress) -> ComponentSolutions:
     whole = _member_solutions(component, record, say)
     if is_available() and len(whole.doubtful):
-        whole = _with_doubtful(component, whole)
-    if is_available() and whole.found < whole.class_count:
+        whole = _with_doubtful(component, record, whole)
+    if is_available():
         whole = _with_ball_paths(component, record, whole, say)
     proved = np.zeros(len(whole.x), dtype=bool)
     x, is_real = whole.x, _is_real(whole.x)
@@ -89,38 +89,42 @@ def _member_solutions(component: Component, record: FamilyRecord, say: Progress)
     return solve_member(component.family, record, component.member)
 
 
-def _with_doubtful(component: Component, whole: MemberSolutions) -> MemberSolutions:
+def _with_doubtful(component: Component, record: FamilyRecord, whole: MemberSolutions) -> MemberSolutions:
     """With ends that only look as if several met there, or as if they were at infinity, which balls of more digits tell
     from such."""
     near = np.flatnonzero(np.abs(whole.doubtful).max(axis=1, initial=0.0) < FARTHEST)
-    return _with_proved(component, whole, whole.doubtful[near], whole.doubtful_classes[near])
+    return _with_proved(component, record, whole, whole.doubtful[near], whole.doubtful_classes[near])
 
 
 def _with_ball_paths(
     component: Component, record: FamilyRecord, whole: MemberSolutions, say: Progress
 ) -> MemberSolutions:
-    """With the solutions of classes whose paths were lost, followed once more in balls, where they are few."""
-    open_classes = sorted({*range(len(record.classes))} - {*whole.classes.tolist()})
+    """With what the paths of classes that have no solution, or only some of real ones, come to in balls, where they are
+    few."""
+    many, members = record.classes.shape
+    count = np.bincount(whole.classes[whole.classes != UNKNOWN], minlength=many)
+    open_classes = count < np.where(np.isin(np.arange(many), whole.classes[_is_real(whole.x)]), members, 1)
     rows = record.classes[open_classes].ravel()
-    if len(rows) > MOST_BALL_PATHS:
+    if (whole.members == 1 and whole.found >= many) or not 0 < len(rows) <= MOST_BALL_PATHS:
         return whole
     say(f"{count_phrase(len(rows), 'path')} in balls")
-    x = follow_in_balls(
-        component.family, record.solutions.member, affine_solutions(record.solutions.V[rows]), component.member
-    )
+    begin = affine_solutions(record.solutions.V[rows])
+    x = follow_in_balls(component.family, record.solutions.member, begin, component.member)
     came = np.isfinite(x).all(axis=1)
-    return _with_proved(component, whole, x[came], np.repeat(open_classes, record.classes.shape[1])[came])
+    return _with_proved(component, record, whole, x[came], np.repeat(np.flatnonzero(open_classes), members)[came])
 
 
 def _with_proved(
-    component: Component, whole: MemberSolutions, more: ComplexArray, of_class: IntArray
+    component: Component, record: FamilyRecord, whole: MemberSolutions, more: ComplexArray, of_class: IntArray
 ) -> MemberSolutions:
-    """With those solutions more (solutions, unknowns) that are proved, and new."""
+    """With those solutions more (solutions, unknowns) that are proved, and new whatever the names of links."""
     proof = certify_member(component.family, component.member, more)
+    images = exchange_images(record.name.exchanges)(homogeneous_solutions(proof.x))
+    alike = np.stack([affine_solutions(each) for each in images], axis=1)
     x, classes = whole.x, whole.classes
     for k in np.flatnonzero(proof.proved).tolist():
-        off = np.abs(x - proof.x[k]) / np.maximum(1.0, np.abs(proof.x[k]))
-        if off.max(axis=1).min(initial=np.inf) > SAME_SOLUTION_DISTANCE:
+        off = np.abs(x[:, None] - alike[k]) / np.maximum(1.0, np.abs(alike[k]))
+        if off.max(axis=2).min(initial=np.inf) > SAME_SOLUTION_DISTANCE:
             x, classes = np.concatenate([x, proof.x[k : k + 1]]), np.append(classes, of_class[k])
     return whole._replace(x=x, classes=classes)
 
