@@ -13,10 +13,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from planar.assemblies.polynomial.certification import is_available
 from planar.assemblies.polynomial.path_tracker import HomotopyValues, is_finite_solution, normalize, track_paths
 from planar.foundation.arrays import Array, ComplexArray
-from planar.synthesis.exact.relations.family import Family
+from planar.synthesis.exact.relations.family import Family, Member
 from planar.synthesis.exact.relations.unknowns import NumberKind
+from planar.synthesis.exact.tracking.exact_certificates import certify_member
 from planar.synthesis.exact.tracking.member_homotopy import affine_solutions
 from planar.synthesis.exact.tracking.monodromy import GenericSolutions
 from planar.synthesis.exact.tracking.same_solutions import first_of_same
@@ -24,10 +26,14 @@ from planar.synthesis.exact.tracking.symmetry import exchange_images
 
 MAX_POINTS = 1500
 """Of a slice, where nothing else is said; with more the test is not made."""
-ROUNDS, IDLE_ROUNDS = 60, 15
+ROUNDS, IDLE_ROUNDS = 200, 15
 FINITE = 1e-6
 """Of solutions of length one: what is nearer to infinity is there."""
-EVEN = 1e-7
+NEARER = 1e4
+"""No solution of a random member is at infinity that is nearer than this."""
+MOVES = 0.0, 1.0, -1.0
+"""Of a plane: levels at which the sums of its points are compared."""
+EVEN = 1e-8
 """Of the size of the sums: by how much a trace may be off."""
 
 
@@ -140,9 +146,19 @@ def trace_test(
     else:
         return False
     back, _ = follow(points, slice_, start)
-    told = _affine(back[is_finite_solution(back, FINITE)], n)[0]
-    every = np.concatenate([V, _homogeneous(told)])
-    return int(np.sum(first_of_same(every) == np.arange(len(every)))) == len(V)
+    x = _affine(back[is_finite_solution(back, FINITE)], n)[0]
+    others = x[first_of_same(np.concatenate([V, _homogeneous(x)]))[len(V) :] >= len(V)]
+    return not len(others) or _are_at_infinity(family, known.member, V, others)
+
+
+def _are_at_infinity(family: Family, member: Member, V: ComplexArray, x: ComplexArray) -> bool:
+    """Whether ends beside those that are known only look as if they were at finite places: where several meet at
+    infinity doubles come there by and by."""
+    if not is_available() or (np.abs(x).max(axis=1) < NEARER).any():
+        return False
+    proof = certify_member(family, member, x)
+    told = first_of_same(np.concatenate([V, _homogeneous(proof.x[proof.proved])]))
+    return bool((told < len(V)).all())
 
 
 def _homogeneous(x: ComplexArray) -> ComplexArray:
@@ -156,7 +172,7 @@ _Follow = Callable[[ComplexArray, _Plane, _Plane], tuple[ComplexArray, bool]]
 def _is_even(points: ComplexArray, plane: _Plane, n: int, follow: _Follow) -> bool:
     """Whether the sum of the points moves evenly with the plane's level."""
     sums = []
-    for step in (0.0, 1.0, -1.0):
+    for step in MOVES:
         moved, is_whole = (
             (points, True) if not step else follow(points, plane, plane._replace(level=plane.level + step))
         )
