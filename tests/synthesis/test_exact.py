@@ -8,10 +8,12 @@ import pytest
 import planar
 from benchmarks.exact_makers import KINDS
 from planar.foundation.jets import value_and_rates
+from planar.synthesis.exact.component_solutions import with_ball_paths, with_doubtful
 from planar.synthesis.exact.exact_linkage import evaluate
 from planar.synthesis.exact.relations.exact_problem import ExactProblem
 from planar.synthesis.exact.relations.polynomials import Polynomial
 from planar.synthesis.exact.tracking import monodromy
+from planar.synthesis.exact.tracking.ball_paths import follow_in_balls
 from planar.synthesis.exact.tracking.bilinear_roots import bilinear_roots
 from planar.synthesis.exact.tracking.exact_certificates import certify_member
 from planar.synthesis.exact.tracking.generic_store import family_record
@@ -325,6 +327,49 @@ def test_paths_end_at_the_same_places_in_more_digits():
     plain, more = (follow(component.family, known.member, known.V, component.member, 1e-4, each) for each in (0, 1))
     assert plain.is_single.all() and more.is_single.all()
     np.testing.assert_allclose(affine_solutions(plain.V), affine_solutions(more.V), rtol=1e-12)
+
+
+def test_paths_in_balls_end_at_the_same_places():
+    component = family_of(task(with_points_on_coupler(), five_poses()))
+    known = family_record(component.family).solutions
+    plain = follow(component.family, known.member, known.V, component.member, 1e-4)
+    x = follow_in_balls(component.family, known.member, affine_solutions(known.V), component.member)
+    np.testing.assert_allclose(affine_solutions(plain.V), x, rtol=1e-10)
+    none = follow(component.family, known.member, known.V[:0], component.member, 1e-4)
+    assert none.V.shape == (0, known.V.shape[1])
+
+
+def test_a_path_in_balls_to_where_several_meet_ends_nowhere():
+    """Two poses that are one leave a curve of dyads."""
+    poses_ = five_poses()
+    component = family_of(
+        task(with_points_on_coupler(), poses_ | {"poses": [*poses_["poses"][:4], poses_["poses"][3]]})
+    )
+    known = family_record(component.family).solutions
+    x = follow_in_balls(component.family, known.member, affine_solutions(known.V), component.member)
+    assert np.isnan(x).all()
+
+
+@pytest.mark.parametrize("gone", range(4))
+def test_what_paths_lose_is_found_in_balls_and_nothing_twice(gone):
+    component = family_of(task(with_points_on_coupler(), five_poses()))
+    record = family_record(component.family)
+    whole = solve_member(component.family, record, component.member)
+    kept = np.arange(4) != gone
+    rest = whole._replace(x=whole.x[kept], classes=whole.classes[kept])
+    assert (rest.found, rest.lost) == (3, 1)
+    found = with_ball_paths(component, record, rest, print)
+    assert sorted(found.classes.tolist()) == [0, 1, 2, 3]
+    np.testing.assert_allclose(found.x[3], whole.x[gone], rtol=1e-10)
+    # far out, where it stands beside one that is known
+    doubtful = rest._replace(
+        doubtful=whole.x[[gone, gone - 1]],
+        doubtful_classes=whole.classes[[gone, gone - 1]],
+        is_doubtful_infinite=np.ones(2, dtype=bool),
+    )
+    assert (doubtful.at_infinity, doubtful.singular, doubtful.lost) == (1, 0, 0)
+    found = with_doubtful(component, record, doubtful)
+    assert len(found.x) == found.found == 4 and not found.at_infinity
 
 
 def test_solutions_that_are_nearly_real_are_told_from_their_images():

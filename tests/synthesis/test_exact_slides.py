@@ -163,8 +163,11 @@ def test_a_dyad_that_slides_twice_and_more_poses_than_a_slide_takes_are_refused_
         "inputs": [{"pair": "one", "position": 60}],
         "sketch": {"Q": [50, 20]},
     }
-    with pytest.raises(planar.BadInput, match="how 'plate' turns is given twice"):
+    with pytest.raises(planar.BadInput, match="'plate' slides on what does not turn, so that it takes parallel poses"):
         planar.synthesise(task(plate, poses(3, "plate")), complete=True)
+    parallel = {"link": "plate", "poses": [{"at": [k, k * k], "angle": 7} for k in range(3)]}
+    with pytest.raises(planar.BadInput, match="takes parallel poses whatever two directions"):
+        planar.synthesise(task(plate, parallel), complete=True)
     five = poses(4, "rod")
     five["poses"].append({"at": [99, -30], "angle": 99})
     with pytest.raises(planar.BadInput, match="1 condition more"):

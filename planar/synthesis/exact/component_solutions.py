@@ -62,9 +62,9 @@ def solve_components(components: Sequence[Component], say: Progress) -> list[Com
 def _solve(component: Component, record: FamilyRecord, say: Progress) -> ComponentSolutions:
     whole = _member_solutions(component, record, say)
     if is_available() and len(whole.doubtful):
-        whole = _with_doubtful(component, record, whole)
+        whole = with_doubtful(component, record, whole)
     if is_available():
-        whole = _with_ball_paths(component, record, whole, say)
+        whole = with_ball_paths(component, record, whole, say)
     proved = np.zeros(len(whole.x), dtype=bool)
     x, is_real = whole.x, _is_real(whole.x)
     all_proved = 0
@@ -89,14 +89,14 @@ def _member_solutions(component: Component, record: FamilyRecord, say: Progress)
     return solve_member(component.family, record, component.member)
 
 
-def _with_doubtful(component: Component, record: FamilyRecord, whole: MemberSolutions) -> MemberSolutions:
+def with_doubtful(component: Component, record: FamilyRecord, whole: MemberSolutions) -> MemberSolutions:
     """With ends that only look as if several met there, or as if they were at infinity, which balls of more digits tell
     from such."""
     near = np.flatnonzero(np.abs(whole.doubtful).max(axis=1, initial=0.0) < FARTHEST)
     return _with_proved(component, record, whole, whole.doubtful[near], whole.doubtful_classes[near])
 
 
-def _with_ball_paths(
+def with_ball_paths(
     component: Component, record: FamilyRecord, whole: MemberSolutions, say: Progress
 ) -> MemberSolutions:
     """With what the paths of classes that have no solution, or only some of real ones, come to in balls, where they are

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+import numpy as np
+
 from planar.foundation.geometry import Frame
 from planar.model.mechanism import relative_motions
 from planar.model.pairs import MeasureKind
@@ -11,7 +13,10 @@ from planar.synthesis.exact.relations.elimination import EntryRows, eliminate
 from planar.synthesis.exact.relations.polynomials import AngleSum, Polynomial, Symbol, as_polynomial, point
 from planar.synthesis.exact.relations.reference_pose import WORLD, ReferencePose
 from planar.synthesis.exact.relations.unknowns import NumberKind, refuse
-from planar.synthesis.task.synthesis_task import Wanted, WantedFunction, WantedPath
+from planar.synthesis.task.synthesis_task import Wanted, WantedFunction, WantedPath, WantedPoses
+
+PARALLEL = 1e-9
+"""rad: by how much the angles of poses may differ that are parallel."""
 
 
 class EntryNumber(NamedTuple):
@@ -88,7 +93,7 @@ class _EntryBuilder:
             at = self._number(NumberKind.PLACE)
         else:
             at = self._number(NumberKind.PLACE)
-            self._know_turn(wanted.link)
+            self._know_pose_turn(wanted)
         if not isinstance(wanted, WantedFunction) and wanted.inputs is not None:
             self._know(self.pose.mechanism.inputs[0].pair)
         translations: list[Symbol] = []
@@ -129,6 +134,16 @@ class _EntryBuilder:
         if of in self.turns:
             raise refuse(f"how {link!r} turns is given twice")
         self.turns[of] = self._number(NumberKind.TURN)
+
+    def _know_pose_turn(self, wanted: WantedPoses) -> None:
+        """The turn of a link that takes poses, which it must have."""
+        name = wanted.link
+        if self.turn_of[name] != self.pose.mechanism.frame:
+            self._know_turn(name)
+        elif np.ptp(wanted.angles) > PARALLEL:
+            raise refuse(f"{name!r} slides on what does not turn, so that it takes parallel poses alone")
+        else:
+            raise refuse(f"{name!r} does not turn, and takes parallel poses whatever two directions it slides along")
 
     def _know(self, name: str) -> None:
         """The position of a pair is given, from that at the first entry."""
