@@ -42,6 +42,8 @@ class ComponentSolutions(NamedTuple):
     all_proved: int
     missing: int
     "of classes of real ones, linkages that were not reached"
+    in_balls: int
+    "how many solutions doubles could not tell"
 
 
 def solve_components(components: Sequence[Component], say: Progress) -> list[ComponentSolutions]:
@@ -61,10 +63,9 @@ def solve_components(components: Sequence[Component], say: Progress) -> list[Com
 
 def _solve(component: Component, record: FamilyRecord, say: Progress) -> ComponentSolutions:
     whole = _member_solutions(component, record, say)
-    if is_available() and len(whole.doubtful):
-        whole = with_doubtful(component, record, whole)
+    followed = len(whole.x)
     if is_available():
-        whole = with_ball_paths(component, record, whole, say)
+        whole = with_ball_paths(component, record, with_doubtful(component, record, whole), say)
     proved = np.zeros(len(whole.x), dtype=bool)
     x, is_real = whole.x, _is_real(whole.x)
     all_proved = 0
@@ -75,7 +76,9 @@ def _solve(component: Component, record: FamilyRecord, say: Progress) -> Compone
         is_real = np.where(proof.proved, proof.is_real, is_real)
     wanted = whole.members * len({*whole.classes[is_real].tolist()} - {UNKNOWN})
     missing = max(0, wanted - int(is_real.sum()))
-    return ComponentSolutions(component, record, whole, x[is_real], proved[is_real], all_proved, missing)
+    return ComponentSolutions(
+        component, record, whole, x[is_real], proved[is_real], all_proved, missing, len(x) - followed
+    )
 
 
 def _member_solutions(component: Component, record: FamilyRecord, say: Progress) -> MemberSolutions:
