@@ -12,6 +12,7 @@ from planar.document.dimensions import file_dimensions
 from planar.document.files import read_asset
 from planar.drawing.designs.design_picture import closeup_picture, design_picture
 from planar.drawing.designs.function_picture import function_picture
+from planar.drawing.diagrams.dyad_drawing import drawn_curves, dyad_pictures
 from planar.drawing.output.svg import pen_variable, svg
 from planar.drawing.paper.pens import PEN_STYLES
 from planar.drawing.paper.picture import Pen
@@ -27,11 +28,14 @@ from planar.synthesis.task.synthesis_task import WantedFunction
 from planar.synthesis.task.task_numbers import miss_kind
 
 STYLES = ("page.css", "designs/designs.css", "print.css")
+LEGEND = '<span><i class="wanted"></i>wanted</span><span><i class="path"></i>made by the design</span>'
 DARK_PENS = {
     Pen.PATH: LAYER_COLOURS["centrode"][1],
     Pen.WANTED: LAYER_COLOURS["wanted"][1],
     Pen.ACCELERATION: LAYER_COLOURS["acceleration"][1],
     Pen.INPUT: "#ffa45c",
+    Pen.FIXED_CENTRODE: LAYER_COLOURS["centrode"][1],
+    Pen.MOVING_CENTRODE: LAYER_COLOURS["velocity"][1],
     Pen.PITCH: "#a3a9b0",
     Pen.BAND: "#c9ced4",
 }
@@ -52,10 +56,16 @@ def gallery_page(found: Synthesis, cards: Sequence[GalleryCard], columns: Sequen
     """The page of all designs: those that do the task, those rejected with their defects, and the table of all."""
     sound = [each for each in cards if not each.design.defects]
     rejected = [each for each in cards if each.design.defects]
-    sections = [_cards_section("designs", "Designs", found, sound)] if sound else []
+    curves = _curves_section(found)
+    sections = [curves] if curves else []
+    sections += [_cards_section("designs", "Designs", found, sound)] if sound else []
     sections += [_cards_section("rejected", "Rejected", found, rejected)] if rejected else []
     sections += [_table_section(columns, table)] if cards else []
-    links = [("designs", "Designs")] * bool(sound) + [("rejected", "Rejected")] * bool(rejected)
+    links = (
+        [("dyads", "Dyads")] * bool(curves)
+        + [("designs", "Designs")] * bool(sound)
+        + [("rejected", "Rejected")] * bool(rejected)
+    )
     links += [("table", "Table")] * bool(cards)
     styles = [*map(read_asset, STYLES), _dark_pens()]
     entries = count_phrase(found.task.entry_count, "entry is wanted", "entries are wanted")
@@ -67,7 +77,7 @@ def gallery_page(found: Synthesis, cards: Sequence[GalleryCard], columns: Sequen
         "title": escape(found.task.name),
         "styles": "\n".join(styles),
         "summary": escape(counts),
-        "legend": '<span><i class="wanted"></i>wanted</span><span><i class="path"></i>made by the design</span>',
+        "legend": LEGEND if cards else "",
         "links": "".join(f'<a href="#{name}">{told}</a>' for name, told in links) + '<a href="task.json">Task</a>',
         "sections": (f'<ul class="remarks">{remarks}</ul>' if remarks else "") + "\n".join(sections),
     }
@@ -78,6 +88,18 @@ def _dark_pens() -> str:
     """The colours of pens where the page is dark."""
     told = " ".join(f"{pen_variable(PEN_STYLES[pen].colour)}: {dark};" for pen, dark in DARK_PENS.items())
     return f"@media screen and (prefers-color-scheme: dark) {{ :root {{ {told} }} }}"
+
+
+def _curves_section(found: Synthesis) -> str:
+    """The curves of dyads that poses leave."""
+    if not isinstance(found, CompleteSynthesis) or not drawn_curves(found):
+        return ""
+    pictures, heading = dyad_pictures(found)
+    figures = "".join(  # without the last note, the scale, which is that of paper
+        f"<figure>{svg(each, heading)}<figcaption>{'<br>'.join(map(escape, each.notes[:-1]))}</figcaption></figure>"
+        for each in pictures
+    )
+    return f'<section id="dyads"><h2>Dyads</h2>{figures}</section>'
 
 
 def _cards_section(name: str, heading: str, found: Synthesis, cards: Sequence[GalleryCard]) -> str:

@@ -291,6 +291,20 @@ def test_a_picture_shows_each_curve_once():
         planar.plot.dyad_curves(planar.synthesise(task(with_points_on_coupler(), poses(3)), complete=True))
 
 
+def test_the_command_draws_curves_of_dyads_on_sheets_and_in_the_gallery(tmp_path):
+    file = tmp_path / "hatch.json"
+    file.write_text(json.dumps(task(with_points_on_coupler(), poses(4))))
+    run(tmp_path, "synthesise", "hatch.json", "--complete", "-o", "curves.svg").done()
+    assert "Dyads B about A and C about D" in (tmp_path / "curves.svg").read_text()
+    run(tmp_path, "synthesise", "hatch.json", "--complete", "-o", "all").done()
+    page = (tmp_path / "all" / "index.html").read_text()
+    assert "Dyads B about A and C about D" in page and page.count("<svg") == 1
+    file.write_text(json.dumps(task(with_points_on_coupler(), poses(3))))
+    ended = run(tmp_path, "synthesise", "hatch.json", "--complete", "-o", "none.svg")
+    assert ended.status == 0 and "nothing was found that could be drawn" in ended.err
+    assert not (tmp_path / "none.svg").exists()
+
+
 def test_what_moves_alike_comes_round_together_and_is_roberts_cognates():
     """S. Roberts, Three-bar motion in plane space, 1875: the three fixed pivots are a triangle like the coupler's."""
     places = [[k * k % 17, 3 * k * k % 19] for k in range(9)]

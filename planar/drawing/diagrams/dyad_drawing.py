@@ -28,13 +28,19 @@ def dyad_pictures(found: CompleteSynthesis, scale: ScaleTexts = None) -> tuple[l
     if not isinstance(found, CompleteSynthesis):
         raise BadInput("found", f"a complete list, as of synthesise(..., complete=True), is wanted, not {found!r:.60}")
     known = parse_scales(scale, ["length"], found.task.units).get("length")
+    curves = drawn_curves(found)
+    if not curves:
+        raise BadInput("found", "there is no curve of dyads; four poses of a link leave one, three where it slides")
+    return [_picture(found, each, known) for each in curves], f"{found.task.name}: dyads for the poses"
+
+
+def drawn_curves(found: CompleteSynthesis) -> list[DyadCurve]:
+    """The curves that can be drawn, those that are the same once."""
     curves: list[DyadCurve] = []
     for each in found.curves:
         if each.dimension == 1 and not any(_is_same(each, other) for other in curves):
             curves.append(each)
-    if not curves:
-        raise BadInput("found", "there is no curve of dyads; four poses of a link leave one, three where it slides")
-    return [_picture(found, each, known) for each in curves], f"{found.task.name}: dyads for the poses"
+    return curves
 
 
 def _is_same(one: DyadCurve, other: DyadCurve) -> bool:

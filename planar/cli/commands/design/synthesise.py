@@ -39,7 +39,8 @@ SHEET_SUFFIXES = (".png", ".svg", ".pdf")
     type=click.Path(path_type=Path),
     metavar="FOLDER",
     help="The folder for the designs, a mechanism file and a page each, with a gallery; the same command goes on there "
-    "where it was interrupted. Or a .pdf, .png or .svg file for drawings of the designs alone.",
+    "where it was interrupted. Or a .pdf, .png or .svg file for drawings of the designs alone, or of the curves "
+    "of their dyads.",
 )
 @click.option(
     "--complete", is_flag=True, help="All linkages that meet exactly as much as the start can, each certified."
@@ -79,7 +80,7 @@ def synthesise(
         with show_progress(f"{len(found)} pages") as progress:
             write_designs(found, folder, progress=progress)
         files = design_files(found, folder)
-    elif output is not None and len(found):
+    elif output is not None:
         _write_sheets(found, output)
     if as_json:
         print_json(record(found, files))
@@ -120,6 +121,14 @@ def _ended_by_signal() -> Iterator[None]:
 
 
 def _write_sheets(found: Synthesis, output: Path) -> None:
+    """Drawings of the designs, else of the curves of dyads that poses leave."""
     from planar import plot
+    from planar.drawing.diagrams.dyad_drawing import drawn_curves
+    from planar.synthesis.exact.complete_synthesis import CompleteSynthesis
 
-    plot.save(plot.designs(found), output)
+    if len(found):
+        plot.save(plot.designs(found), output)
+    elif isinstance(found, CompleteSynthesis) and drawn_curves(found):
+        plot.save(plot.dyad_curves(found), output)
+    else:
+        click.echo(f"planar: nothing was found that could be drawn; {output} is not written", err=True)
