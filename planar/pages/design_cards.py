@@ -59,17 +59,20 @@ def gallery_page(found: Synthesis, cards: Sequence[GalleryCard], columns: Sequen
     curves = _curves_section(found)
     sections = [curves] if curves else []
     sections += [_cards_section("designs", "Designs", found, sound)] if sound else []
-    sections += [_cards_section("rejected", "Rejected", found, rejected)] if rejected else []
+    others = "With a defect" if isinstance(found, CompleteSynthesis) else "Rejected"
+    sections += [_cards_section("rejected", others, found, rejected)] if rejected else []
     sections += [_table_section(columns, table)] if cards else []
     links = (
         [("dyads", "Dyads")] * bool(curves)
         + [("designs", "Designs")] * bool(sound)
-        + [("rejected", "Rejected")] * bool(rejected)
+        + [("rejected", others)] * bool(rejected)
     )
     links += [("table", "Table")] * bool(cards)
     styles = [*map(read_asset, STYLES), _dark_pens()]
     entries = count_phrase(found.task.entry_count, "entry is wanted", "entries are wanted")
     refused = f", the best {len(rejected)} of those rejected" if rejected else ""
+    if rejected and isinstance(found, CompleteSynthesis):
+        refused = f" and {len(rejected)} with a defect"
     counts = f"{entries}; {count_phrase(len(sound), 'design')}{refused}"
     summary = found.summary if isinstance(found, CompleteSynthesis) else ()
     remarks = "".join(f"<li>{escape(each)}</li>" for each in (*summary, *found.remarks))
