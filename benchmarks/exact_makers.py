@@ -214,13 +214,17 @@ def four_bar_function(count: int, absolute: bool) -> Callable[..., Made]:
     return made
 
 
-def watt_function(rng: np.random.Generator) -> Made:
-    """Four pairs of positions of crank and output of a six-bar, whose last two links are sought."""
-    value = watt_two(rng)
-    motion, rows = _run(value, 4, rng)
-    given, shown = motion.inputs["A"].position, motion.link("GF").angle
-    pairs = [[float(given[k]), float(shown[k])] for k in rows]
-    return value, [{"from": "A", "to": "G", "pairs": pairs}], {"free": ["EF.length", "GF.length"]}
+def watt_function(count: int, *links: str) -> Callable[..., Made]:
+    """Pairs of positions of crank and output of a six-bar, of which the lengths of these links are sought."""
+
+    def made(rng: np.random.Generator) -> Made:
+        value = watt_two(rng)
+        motion, rows = _run(value, count, rng)
+        given, shown = motion.inputs["A"].position, motion.link("GF").angle
+        pairs = [[float(given[k]), float(shown[k])] for k in rows]
+        return value, [{"from": "A", "to": "G", "pairs": pairs}], {"free": [f"{each}.length" for each in links]}
+
+    return made
 
 
 def slider_function(rng: np.random.Generator) -> Made:
@@ -240,7 +244,9 @@ KINDS: dict[str, Callable[[np.random.Generator], Made]] = {
     "three pairs": four_bar_function(3, True),
     "five pairs": four_bar_function(5, False),
     "five pairs of a slider-crank": slider_function,
-    "four pairs of Watt II, its output links sought": watt_function,
+    "four pairs of Watt II, two links sought": watt_function(4, "EF", "GF"),
+    "five pairs of Watt II, three links sought": watt_function(5, "BC", "EF", "GF"),
+    "six pairs of Watt II, four links sought": watt_function(6, "AB", "BC", "EF", "GF"),
     "five places, pivots given": path(four_bar, 5, free=["AB.length", "BC.length", "BC.E", "DC.length"]),
     "eight places of a slider-crank": path(slider_crank, 8),
     "nine places": path(four_bar, 9),

@@ -198,7 +198,7 @@ def test_a_family_is_known_whatever_its_links_are_called():
 def test_the_loops_of_a_six_bar_leave_one_turn_and_vanish_where_it_is():
     """Of a Watt II six-bar the function is that of two four-bars one after the other, whichever loops are closed."""
     rng = np.random.default_rng(2)
-    value, wanted, more = KINDS["four pairs of Watt II, its output links sought"](rng)
+    value, wanted, more = KINDS["four pairs of Watt II, two links sought"](rng)
     read = planar.read_task({"planar": 1, "units": value["units"], "start": value, "wanted": wanted} | more)
     problem = ExactProblem(read, next(iter(start_mechanisms(read))))
     (component,) = problem.components

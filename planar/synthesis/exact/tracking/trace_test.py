@@ -14,19 +14,27 @@ from typing import NamedTuple
 import numpy as np
 
 from planar.assemblies.polynomial.certification import is_available
-from planar.assemblies.polynomial.path_tracker import HomotopyValues, is_finite_solution, normalize, track_paths
+from planar.assemblies.polynomial.path_tracker import (
+    CORRECTION_TOLERANCE,
+    HomotopyValues,
+    is_finite_solution,
+    normalize,
+    track_paths,
+)
 from planar.foundation.arrays import Array, ComplexArray
 from planar.synthesis.exact.relations.family import Family, Member
 from planar.synthesis.exact.relations.unknowns import NumberKind
 from planar.synthesis.exact.tracking.exact_certificates import certify_member
 from planar.synthesis.exact.tracking.member_homotopy import affine_solutions
-from planar.synthesis.exact.tracking.monodromy import GenericSolutions
+from planar.synthesis.exact.tracking.monodromy import CLOSER_STEPS, GenericSolutions
 from planar.synthesis.exact.tracking.same_solutions import first_of_same
 from planar.synthesis.exact.tracking.symmetry import exchange_images
 
 MAX_POINTS = 1500
 """Of a slice, where nothing else is said; with more the test is not made."""
 ROUNDS, IDLE_ROUNDS = 200, 15
+FEW, CLOSER = 0.02, 1e-6
+"""Of paths: where no more are lost they are followed again, and how far predictions may be off then."""
 FINITE = 1e-6
 """Of solutions of length one: what is nearer to infinity is there."""
 NEARER = 1e4
@@ -119,7 +127,13 @@ def trace_test(
         return _Plane(c[0] + 1j * c[1], complex(*level))
 
     def follow(points: ComplexArray, one: _Plane, other: _Plane) -> tuple[ComplexArray, bool]:
-        ends = track_paths(_SliceHomotopy(family, known, line, (one, other)), points)
+        between = _SliceHomotopy(family, known, line, (one, other))
+        ends = track_paths(between, points)
+        again = np.flatnonzero(~ends.is_near_end)
+        if 0 < len(again) <= FEW * len(points):
+            closer = track_paths(between, points[again], CLOSER, CORRECTION_TOLERANCE, CLOSER_STEPS)
+            for whole, part in zip(ends, closer, strict=True):
+                whole[again] = part
         return ends.V[ends.is_single], bool(ends.is_single.all())
 
     x = affine_solutions(V)
