@@ -23,6 +23,7 @@ from planar.synthesis.exact.tracking.monodromy import find_generic_solutions, fo
 from planar.synthesis.exact.tracking.other_ways import ClassedSolutions, with_members
 from planar.synthesis.exact.tracking.same_solutions import first_of_same
 from planar.synthesis.exact.tracking.symmetry import exchange_images, name_family, representatives
+from planar.synthesis.exact.tracking.trace_test import trace_test
 from planar.synthesis.task.starts import start_mechanisms
 from tests.command import run
 
@@ -341,6 +342,15 @@ def test_paths_end_at_the_same_places_in_more_digits():
     plain, more = (follow(component.family, known.member, known.V, component.member, 1e-4, each) for each in (0, 1))
     assert plain.is_single.all() and more.is_single.all()
     np.testing.assert_allclose(affine_solutions(plain.V), affine_solutions(more.V), rtol=1e-12)
+
+
+def test_a_trace_is_even_of_all_solutions_and_tells_where_one_is_left_out():
+    component = family_of(task(with_points_on_coupler(), five_poses()))
+    record = family_record(component.family)
+    exchanges, known = record.name.exchanges, record.solutions
+    assert trace_test(component.family, known, exchanges)
+    assert not trace_test(component.family, known._replace(V=known.V[1:]), exchanges)
+    assert not trace_test(component.family, known, exchanges, most_points=len(known.V))
 
 
 def test_paths_in_balls_end_at_the_same_places():
