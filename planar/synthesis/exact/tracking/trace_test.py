@@ -15,7 +15,6 @@ import numpy as np
 
 from planar.assemblies.polynomial.certification import is_available
 from planar.assemblies.polynomial.path_tracker import (
-    CORRECTION_TOLERANCE,
     HomotopyValues,
     is_finite_solution,
     normalize,
@@ -26,7 +25,7 @@ from planar.synthesis.exact.relations.family import Family, Member
 from planar.synthesis.exact.relations.unknowns import NumberKind
 from planar.synthesis.exact.tracking.exact_certificates import certify_member
 from planar.synthesis.exact.tracking.member_homotopy import affine_solutions
-from planar.synthesis.exact.tracking.monodromy import CLOSER_STEPS, GenericSolutions
+from planar.synthesis.exact.tracking.monodromy import CLOSER_STEPS, CORRECTION, GenericSolutions
 from planar.synthesis.exact.tracking.same_solutions import first_of_same
 from planar.synthesis.exact.tracking.symmetry import exchange_images
 
@@ -73,17 +72,17 @@ class _SliceHomotopy:
         rows, paths = f.shape
         c = self.begin.c + way[:, None] * (self.end.c - self.begin.c)
         level = self.begin.level + way * (self.end.level - self.begin.level)
-        whole: ComplexArray = np.zeros((paths, rows + 2, 2 * n + 2), dtype=complex)
+        whole: ComplexArray = np.zeros((paths, rows + 2, 2 * n + 2), dtype=V.dtype)
         whole[:, :rows, :n], whole[:, :rows, n] = slope[:, :n].transpose(2, 0, 1), by_s.T
         whole[:, :rows, n + 1 : 2 * n + 1] = slope[:, n:].transpose(2, 0, 1)
         whole[:, rows, : 2 * n + 1] = c
         whole[:, rows + 1, n], whole[:, rows + 1, 2 * n + 1] = 1.0, -1.0
-        left: ComplexArray = np.zeros((paths, rows + 2), dtype=complex)
+        left: ComplexArray = np.zeros((paths, rows + 2), dtype=V.dtype)
         left[:, :rows], left[:, rows] = f.T, np.sum(c * y[:, :-1], axis=1) - level
         left[:, rows + 1] = y[:, n] - y[:, 2 * n + 1]
         along: ComplexArray = np.zeros_like(left)
         along[:, rows] = y[:, :-1] @ (self.end.c - self.begin.c) - (self.end.level - self.begin.level)
-        found: ComplexArray = np.empty((paths, rows + 2, 2 * n + 4), dtype=complex)
+        found: ComplexArray = np.empty((paths, rows + 2, 2 * n + 4), dtype=V.dtype)
         for first, at in ((0, 0), (n + 1, n + 2)):
             part, over = whole[:, :, first : first + n + 1], V[:, at][:, None]
             found[:, :, at] = -np.einsum("pru,pu->pr", part, y[:, first : first + n + 1]) / over
@@ -131,7 +130,8 @@ def trace_test(
         ends = track_paths(between, points)
         again = np.flatnonzero(~ends.is_near_end)
         if 0 < len(again) <= FEW * len(points):
-            closer = track_paths(between, points[again], CLOSER, CORRECTION_TOLERANCE, CLOSER_STEPS)
+            more = points[again].astype(np.clongdouble)
+            closer = track_paths(between, more, CLOSER, CORRECTION, CLOSER_STEPS)
             for whole, part in zip(ends, closer, strict=True):
                 whole[again] = part
         return ends.V[ends.is_single], bool(ends.is_single.all())
