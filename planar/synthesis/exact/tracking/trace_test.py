@@ -72,7 +72,7 @@ class _SliceHomotopy:
         rows, paths = f.shape
         c = self.begin.c + way[:, None] * (self.end.c - self.begin.c)
         level = self.begin.level + way * (self.end.level - self.begin.level)
-        whole: ComplexArray = np.zeros((paths, rows + 2, 2 * n + 2), dtype=V.dtype)
+        whole: ComplexArray = np.zeros((paths, rows + 2, 2 * n + 2), dtype=complex)
         whole[:, :rows, :n], whole[:, :rows, n] = slope[:, :n].transpose(2, 0, 1), by_s.T
         whole[:, :rows, n + 1 : 2 * n + 1] = slope[:, n:].transpose(2, 0, 1)
         whole[:, rows, : 2 * n + 1] = c
@@ -82,7 +82,7 @@ class _SliceHomotopy:
         left[:, rows + 1] = y[:, n] - y[:, 2 * n + 1]
         along: ComplexArray = np.zeros_like(left)
         along[:, rows] = y[:, :-1] @ (self.end.c - self.begin.c) - (self.end.level - self.begin.level)
-        found: ComplexArray = np.empty((paths, rows + 2, 2 * n + 4), dtype=V.dtype)
+        found: ComplexArray = np.empty((paths, rows + 2, 2 * n + 4), dtype=complex)
         for first, at in ((0, 0), (n + 1, n + 2)):
             part, over = whole[:, :, first : first + n + 1], V[:, at][:, None]
             found[:, :, at] = -np.einsum("pru,pu->pr", part, y[:, first : first + n + 1]) / over
