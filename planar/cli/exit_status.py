@@ -146,8 +146,8 @@ def _exit_with_status() -> Iterator[None]:
         _exit_refused(str(problem), "bad input", str(problem), BAD_INPUT)
     except NoAnswer as problem:
         _exit_refused(str(problem), problem.outcome.value, problem.reason, NO_ANSWER, problem.more)
-    except KeyboardInterrupt:
-        told = "stopped by the user before it was done"
+    except KeyboardInterrupt as stopped:
+        told = "; ".join(["stopped by the user before it was done", *map(str, stopped.args)])
         _exit_refused(f"interrupted: {told}", "interrupted", told, INTERRUPTED)
     except click.UsageError as problem:
         told = " ".join(problem.format_message().split()).rstrip(".").replace(". Did", "; did").replace(". (", " (")

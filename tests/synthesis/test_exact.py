@@ -284,6 +284,16 @@ def test_the_command_tells_what_is_expected_found_and_proved(tmp_path):
     assert all(isinstance(each["certified"], bool) for each in told["designs"])
 
 
+def test_an_interrupted_list_says_that_its_search_is_kept(tmp_path, monkeypatch):
+    def interrupted(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("planar.synthesis.exact.component_solutions.family_record", interrupted)
+    (tmp_path / "five.json").write_text(json.dumps(task(with_points_on_coupler(), five_poses())))
+    told = run(tmp_path, "synthesise", "five.json", "--complete").refused(130)
+    assert told.startswith("interrupted: ") and told.endswith("the same command goes on from there")
+
+
 def test_a_picture_shows_each_curve_once():
     found = planar.synthesise(task(with_points_on_coupler(), poses(4)), complete=True)
     texts = [each.get_text() for each in planar.plot.dyad_curves(found).findobj(lambda one: hasattr(one, "get_text"))]

@@ -23,6 +23,9 @@ if TYPE_CHECKING:
 SHEET_SUFFIXES = (".png", ".svg", ".pdf")
 """What `-o` names where it is no folder: sheets of drawings."""
 
+KEPT = "what was found of a random task is kept, and the same command goes on from there"
+"""Of a search for all linkages that is interrupted."""
+
 
 @main.command()
 @click.argument("task", type=click.Path(path_type=Path))
@@ -68,7 +71,10 @@ def synthesise(
         ended_by: int | None = None
         found: Synthesis
         if complete:
-            found = find_all(wanted, complete=True, progress=show)
+            try:
+                found = find_all(wanted, complete=True, progress=show)
+            except KeyboardInterrupt:
+                raise KeyboardInterrupt(KEPT) from None
         else:
             search = TaskSearch(wanted, many, seed, seconds, folder, show)
             ended_by = _run(search)
