@@ -8,7 +8,6 @@ s = 0 has no more than they lead to. A. Leykin, J. I. Rodriguez, F. Sottile, Tra
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -98,6 +97,69 @@ def _affine(V: ComplexArray, n: int) -> tuple[ComplexArray, ComplexArray, Comple
     return np.concatenate([y[:, :n], y[:, n + 1 : -1]], axis=1), y[:, n], y
 
 
+class _Slices:
+    """Planes that cut the solutions along one line of members."""
+
+    def __init__(self, family: Family, known: GenericSolutions, rng: np.random.Generator):
+        self.family, self.known, self.rng = family, known, rng
+        self.line = tuple(rng.normal(size=each.shape) + 1j * rng.normal(size=each.shape) for each in known.member.parts)
+        for part, each in zip(family.parts, self.line, strict=True):
+            real = [k for k, kind in enumerate(part.kinds) if kind is NumberKind.LENGTH]
+            each[:, real, 1] = each[:, real, 0]
+        self.start = _Plane(np.eye(1, 2 * family.size + 1, family.size)[0].astype(complex), 0.0)
+
+    def random_plane(self) -> _Plane:
+        """A plane."""
+        c, level = self.rng.normal(size=(2, 2 * self.family.size + 1)), self.rng.normal(size=2)
+        return _Plane(c[0] + 1j * c[1], complex(*level))
+
+    def follow(self, points: ComplexArray, one: _Plane, other: _Plane) -> tuple[ComplexArray, bool]:
+        """The points of one plane on another, and whether all came there."""
+        between = _SliceHomotopy(self.family, self.known, self.line, (one, other))
+        ends = track_paths(between, points)
+        again = np.flatnonzero(~ends.is_near_end)
+        if 0 < len(again) <= FEW * len(points):
+            more = points[again].astype(np.clongdouble)
+            closer = track_paths(between, more, CLOSER, CORRECTION, CLOSER_STEPS)
+            for whole, part in zip(ends, closer, strict=True):
+                whole[again] = part
+        return ends.V[ends.is_single], bool(ends.is_single.all())
+
+    def points_on(self, plane: _Plane, points: ComplexArray, most: int) -> ComplexArray | None:
+        """All points of a plane, found from some of them by going round; None where their trace is not even, or where
+        they are more than so many."""
+        idle = 0
+        for _ in range(ROUNDS):
+            a, b = self.random_plane(), self.random_plane()
+            gone = points
+            for first, last in ((plane, a), (a, b), (b, plane)):
+                gone, _ = self.follow(gone, first, last)
+            both = np.concatenate([points, gone])
+            new = both[first_of_same(both) == np.arange(len(both))]
+            idle = idle + 1 if len(new) == len(points) else 0
+            points = new
+            if idle and self.is_even(points, plane):
+                return points
+            if len(points) > most or idle >= IDLE_ROUNDS:
+                return None
+        return None
+
+    def is_even(self, points: ComplexArray, plane: _Plane) -> bool:
+        """Whether the sum of the points moves evenly with the plane's level."""
+        sums = []
+        for step in MOVES:
+            moved, is_whole = (
+                (points, True) if not step else self.follow(points, plane, plane._replace(level=plane.level + step))
+            )
+            if not is_whole:
+                return False
+            x, s, _ = _affine(moved, self.family.size)
+            sums.append(np.append(x.sum(axis=0), s.sum()))
+        off = np.abs(sums[1] + sums[2] - 2.0 * sums[0]).max()
+        size = max(float(np.abs(each).max()) for each in sums)
+        return bool(off <= EVEN * max(size, 1.0))
+
+
 def trace_test(
     family: Family,
     known: GenericSolutions,
@@ -113,53 +175,15 @@ def trace_test(
     V = V[first_of_same(V) == np.arange(len(V))]
     if len(V) * 4 > most_points:
         return False
-    rng = np.random.default_rng(seed)
-    line = tuple(rng.normal(size=each.shape) + 1j * rng.normal(size=each.shape) for each in known.member.parts)
-    for part, each in zip(family.parts, line, strict=True):
-        real = [k for k, kind in enumerate(part.kinds) if kind is NumberKind.LENGTH]
-        each[:, real, 1] = each[:, real, 0]
-    n = family.size
-    start = _Plane(np.eye(1, 2 * n + 1, n)[0].astype(complex), 0.0)
-
-    def plane() -> _Plane:
-        c, level = rng.normal(size=(2, 2 * n + 1)), rng.normal(size=2)
-        return _Plane(c[0] + 1j * c[1], complex(*level))
-
-    def follow(points: ComplexArray, one: _Plane, other: _Plane) -> tuple[ComplexArray, bool]:
-        between = _SliceHomotopy(family, known, line, (one, other))
-        ends = track_paths(between, points)
-        again = np.flatnonzero(~ends.is_near_end)
-        if 0 < len(again) <= FEW * len(points):
-            more = points[again].astype(np.clongdouble)
-            closer = track_paths(between, more, CLOSER, CORRECTION, CLOSER_STEPS)
-            for whole, part in zip(ends, closer, strict=True):
-                whole[again] = part
-        return ends.V[ends.is_single], bool(ends.is_single.all())
-
-    x = affine_solutions(V)
+    n, x = family.size, affine_solutions(V)
+    slices = _Slices(family, known, np.random.default_rng(seed))
     one = np.ones((len(x), 1))
     W = normalize(np.concatenate([one, x[:, :n], 0.0 * one, one, x[:, n:], 0.0 * one], axis=1))
-    slice_ = plane()
-    points, _ = follow(W, start, slice_)
-    idle = 0
-    for _ in range(ROUNDS):
-        a, b = plane(), plane()
-        gone = points
-        for first, last in ((slice_, a), (a, b), (b, slice_)):
-            gone, _ = follow(gone, first, last)
-        both = np.concatenate([points, gone])
-        new = both[first_of_same(both) == np.arange(len(both))]
-        idle = idle + 1 if len(new) == len(points) else 0
-        points = new
-        if len(points) > most_points:
-            return False
-        if idle and _is_even(points, slice_, n, follow):
-            break
-        if idle >= IDLE_ROUNDS:
-            return False
-    else:
+    plane = slices.random_plane()
+    points = slices.points_on(plane, slices.follow(W, slices.start, plane)[0], most_points)
+    if points is None:
         return False
-    back, _ = follow(points, slice_, start)
+    back, _ = slices.follow(points, plane, slices.start)
     x = _affine(back[is_finite_solution(back, FINITE)], n)[0]
     others = x[first_of_same(np.concatenate([V, _homogeneous(x)]))[len(V) :] >= len(V)]
     return not len(others) or _are_at_infinity(family, known.member, V, others)
@@ -178,22 +202,3 @@ def _are_at_infinity(family: Family, member: Member, V: ComplexArray, x: Complex
 def _homogeneous(x: ComplexArray) -> ComplexArray:
     half, one = x.shape[1] // 2, np.ones((len(x), 1))
     return normalize(np.concatenate([one, x[:, :half], one, x[:, half:]], axis=1))
-
-
-_Follow = Callable[[ComplexArray, _Plane, _Plane], tuple[ComplexArray, bool]]
-
-
-def _is_even(points: ComplexArray, plane: _Plane, n: int, follow: _Follow) -> bool:
-    """Whether the sum of the points moves evenly with the plane's level."""
-    sums = []
-    for step in MOVES:
-        moved, is_whole = (
-            (points, True) if not step else follow(points, plane, plane._replace(level=plane.level + step))
-        )
-        if not is_whole:
-            return False
-        x, s, _ = _affine(moved, n)
-        sums.append(np.append(x.sum(axis=0), s.sum()))
-    off = np.abs(sums[1] + sums[2] - 2.0 * sums[0]).max()
-    size = max(float(np.abs(each).max()) for each in sums)
-    return bool(off <= EVEN * max(size, 1.0))
