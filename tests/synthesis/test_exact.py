@@ -12,13 +12,13 @@ from planar.synthesis.exact.component_solutions import with_ball_paths, with_dou
 from planar.synthesis.exact.exact_linkage import evaluate
 from planar.synthesis.exact.relations.exact_problem import ExactProblem
 from planar.synthesis.exact.relations.polynomials import Polynomial
-from planar.synthesis.exact.tracking import monodromy
+from planar.synthesis.exact.tracking import member_solutions, monodromy
 from planar.synthesis.exact.tracking.ball_paths import follow_in_balls
 from planar.synthesis.exact.tracking.bilinear_roots import bilinear_roots
 from planar.synthesis.exact.tracking.exact_certificates import certify_member
 from planar.synthesis.exact.tracking.generic_store import family_record
 from planar.synthesis.exact.tracking.member_homotopy import affine_solutions, homogeneous_solutions
-from planar.synthesis.exact.tracking.member_solutions import solve_member
+from planar.synthesis.exact.tracking.member_solutions import is_nearly_singular, solve_member
 from planar.synthesis.exact.tracking.monodromy import find_generic_solutions, follow
 from planar.synthesis.exact.tracking.other_ways import ClassedSolutions, with_members
 from planar.synthesis.exact.tracking.same_solutions import first_of_same
@@ -349,7 +349,9 @@ def test_paths_end_at_the_same_places_in_more_digits():
     wanted = {"link": "BC", "poses": [*poses(4)["poses"], {"at": [99, -30], "angle": 99}]}
     component = family_of(task(with_points_on_coupler(), wanted))
     known = family_record(component.family).solutions
-    plain, more = (follow(component.family, known.member, known.V, component.member, 1e-4, each) for each in (0, 1))
+    plain, more = (
+        follow(component.family, known.member, known.V, component.member, 1e-4, each) for each in (None, 2000)
+    )
     assert plain.is_single.all() and more.is_single.all()
     np.testing.assert_allclose(affine_solutions(plain.V), affine_solutions(more.V), rtol=1e-12)
 
@@ -404,6 +406,46 @@ def test_what_paths_lose_is_found_in_balls_and_nothing_twice(gone):
     assert (doubtful.at_infinity, doubtful.singular, doubtful.lost) == (1, 0, 0)
     found = with_doubtful(component, record, doubtful)
     assert len(found.x) == found.found == 4 and not found.at_infinity
+
+
+def lose_paths(monkeypatch, lost, leap):
+    """Those paths are lost, or leap to the end of the first, and long doubles are of no help."""
+    plain = member_solutions.follow
+
+    def follow_less(family, begin, V, end, near, long_steps=None):
+        ends = plain(family, begin, V, end, near, long_steps)
+        if long_steps is None:
+            assert len(V) == 4, "another way was tried"
+            if leap:
+                ends.V[lost] = ends.V[0]
+            else:
+                ends.has_converged[lost], ends.is_near_end[lost] = False, False
+            return ends
+        return ends._replace(has_converged=np.zeros(len(V), dtype=bool), is_near_end=np.zeros(len(V), dtype=bool))
+
+    monkeypatch.setattr(member_solutions, "follow", follow_less)
+
+
+@pytest.mark.parametrize("lost", [[2], [1, 3], [1, 2, 3]])
+@pytest.mark.parametrize("leap", [False, True])
+def test_paths_that_are_lost_or_leap_are_followed_in_balls_before_other_ways(monkeypatch, lost, leap):
+    component = family_of(task(with_points_on_coupler(), five_poses()))
+    record = family_record(component.family)
+    known = solve_member(component.family, record, component.member)
+    lose_paths(monkeypatch, lost, leap)
+    said = []
+    found = solve_member(component.family, record, component.member, said.append)
+    np.testing.assert_allclose(found.x, known.x, rtol=1e-10)
+    assert found.found == 4 and sorted(found.classes.tolist()) == [0, 1, 2, 3]
+    assert said == [f"{len(lost) + leap} path{'s' * (len(lost) + leap > 1)} in balls"]
+    assert found.ball_rows.tolist() == ([0, *lost] if leap else lost)
+
+
+def test_solutions_that_nearly_meet_or_are_far_out_are_told_from_others():
+    component = family_of(task(with_points_on_coupler(), five_poses()))
+    known = solve_member(component.family, family_record(component.family), component.member)
+    assert not is_nearly_singular(component.family, component.member, known.x).any()
+    assert is_nearly_singular(component.family, component.member, known.x * 1e9).all()
 
 
 def test_solutions_that_are_nearly_real_are_told_from_their_images():

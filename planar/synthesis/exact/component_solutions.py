@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -13,12 +13,18 @@ from planar.foundation.arrays import BoolArray, ComplexArray, IntArray
 from planar.model.wording import count_phrase
 from planar.synthesis.exact.relations.exact_problem import Component
 from planar.synthesis.exact.relations.family import Member
-from planar.synthesis.exact.tracking.ball_paths import follow_in_balls
+from planar.synthesis.exact.tracking.ball_paths import MOST_PATHS
 from planar.synthesis.exact.tracking.bilinear_roots import bilinear_roots
 from planar.synthesis.exact.tracking.exact_certificates import certify_member
 from planar.synthesis.exact.tracking.generic_store import FamilyRecord, family_record
 from planar.synthesis.exact.tracking.member_homotopy import affine_solutions, homogeneous_solutions
-from planar.synthesis.exact.tracking.member_solutions import MemberSolutions, solve_member
+from planar.synthesis.exact.tracking.member_solutions import (
+    MemberSolutions,
+    Progress,
+    is_nearly_singular,
+    proved_in_balls,
+    solve_member,
+)
 from planar.synthesis.exact.tracking.other_ways import UNKNOWN
 from planar.synthesis.exact.tracking.symmetry import FamilyName, exchange_images
 
@@ -26,9 +32,6 @@ REAL = 1e-7
 """Of a solution's size: one that differs from its own conjugate by less is real."""
 FARTHEST = 1e11
 """What is farther out than this is at infinity."""
-MOST_BALL_PATHS = 30
-"""They take seconds each."""
-Progress = Callable[[str], None]
 
 
 class ComponentSolutions(NamedTuple):
@@ -42,8 +45,8 @@ class ComponentSolutions(NamedTuple):
     all_proved: int
     missing: int
     "of classes of real ones, linkages that were not reached"
-    in_balls: int
-    "how many solutions doubles could not tell"
+    nearly_singular: int
+    "how many solutions lie so near to others, or so far out, that doubles do not tell them"
 
 
 def solve_components(components: Sequence[Component], say: Progress) -> list[ComponentSolutions]:
@@ -63,7 +66,6 @@ def solve_components(components: Sequence[Component], say: Progress) -> list[Com
 
 def _solve(component: Component, record: FamilyRecord, say: Progress) -> ComponentSolutions:
     whole = _member_solutions(component, record, say)
-    followed = len(whole.x)
     if is_available():
         whole = with_ball_paths(component, record, with_doubtful(component, record, whole), say)
     proved = np.zeros(len(whole.x), dtype=bool)
@@ -76,9 +78,8 @@ def _solve(component: Component, record: FamilyRecord, say: Progress) -> Compone
         is_real = np.where(proof.proved, proof.is_real, is_real)
     wanted = whole.members * len({*whole.classes[is_real].tolist()} - {UNKNOWN})
     missing = max(0, wanted - int(is_real.sum()))
-    return ComponentSolutions(
-        component, record, whole, x[is_real], proved[is_real], all_proved, missing, len(x) - followed
-    )
+    near = int(is_nearly_singular(component.family, component.member, x).sum())
+    return ComponentSolutions(component, record, whole, x[is_real], proved[is_real], all_proved, missing, near)
 
 
 def _member_solutions(component: Component, record: FamilyRecord, say: Progress) -> MemberSolutions:
@@ -87,48 +88,44 @@ def _member_solutions(component: Component, record: FamilyRecord, say: Progress)
     x = bilinear_roots(component.family, component.member, count) if members == 1 else None
     if x is not None:
         none = np.zeros(0, dtype=int)
-        return MemberSolutions(x, np.arange(count), count, 1, x[:0], none, none.astype(bool))
+        return MemberSolutions(x, np.arange(count), count, 1, x[:0], none, none.astype(bool), none)
     say(f"{count_phrase(record.classes.size, 'path')}")
-    return solve_member(component.family, record, component.member)
+    return solve_member(component.family, record, component.member, say)
 
 
 def with_doubtful(component: Component, record: FamilyRecord, whole: MemberSolutions) -> MemberSolutions:
     """With ends that only look as if several met there, or as if they were at infinity, which balls of more digits tell
     from such."""
     near = np.flatnonzero(np.abs(whole.doubtful).max(axis=1, initial=0.0) < FARTHEST)
-    return _with_proved(component, record, whole, whole.doubtful[near], whole.doubtful_classes[near])
+    proof = certify_member(component.family, component.member, whole.doubtful[near])
+    return _with_new(record, whole, proof.x[proof.proved], whole.doubtful_classes[near[proof.proved]])
 
 
 def with_ball_paths(
     component: Component, record: FamilyRecord, whole: MemberSolutions, say: Progress
 ) -> MemberSolutions:
     """With what the paths of classes that have no solution, or only some of real ones, come to in balls, where they are
-    few."""
+    few and were not followed so before."""
     many, members = record.classes.shape
     count = np.bincount(whole.classes[whole.classes != UNKNOWN], minlength=many)
     open_classes = count < np.where(np.isin(np.arange(many), whole.classes[_is_real(whole.x)]), members, 1)
-    rows = record.classes[open_classes].ravel()
-    if (whole.members == 1 and whole.found >= many) or not 0 < len(rows) <= MOST_BALL_PATHS:
+    class_of = {row: k for k in np.flatnonzero(open_classes).tolist() for row in record.classes[k].tolist()}
+    rows = np.setdiff1d(record.classes[open_classes], whole.ball_rows)
+    if (whole.members == 1 and whole.found >= many) or not 0 < len(rows) <= MOST_PATHS:
         return whole
-    say(f"{count_phrase(len(rows), 'path')} in balls")
-    begin = affine_solutions(record.solutions.V[rows])
-    x = follow_in_balls(component.family, record.solutions.member, begin, component.member)
-    came = np.isfinite(x).all(axis=1)
-    return _with_proved(component, record, whole, x[came], np.repeat(np.flatnonzero(open_classes), members)[came])
+    own, x = proved_in_balls(component.family, record, rows, component.member, say)
+    return _with_new(record, whole, x, np.array([class_of[k] for k in own.tolist()], dtype=int))
 
 
-def _with_proved(
-    component: Component, record: FamilyRecord, whole: MemberSolutions, more: ComplexArray, of_class: IntArray
-) -> MemberSolutions:
-    """With those solutions more (solutions, unknowns) that are proved, and new whatever the names of links."""
-    proof = certify_member(component.family, component.member, more)
-    images = exchange_images(record.name.exchanges)(homogeneous_solutions(proof.x))
+def _with_new(record: FamilyRecord, whole: MemberSolutions, more: ComplexArray, of_class: IntArray) -> MemberSolutions:
+    """With those solutions more (solutions, unknowns) that are new whatever the names of links."""
+    images = exchange_images(record.name.exchanges)(homogeneous_solutions(more))
     alike = np.stack([affine_solutions(each) for each in images], axis=1)
     x, classes = whole.x, whole.classes
-    for k in np.flatnonzero(proof.proved).tolist():
+    for k in range(len(more)):
         off = np.abs(x[:, None] - alike[k]) / np.maximum(1.0, np.abs(alike[k]))
         if off.max(axis=2).min(initial=np.inf) > SAME_SOLUTION_DISTANCE:
-            x, classes = np.concatenate([x, proof.x[k : k + 1]]), np.append(classes, of_class[k])
+            x, classes = np.concatenate([x, more[k : k + 1]]), np.append(classes, of_class[k])
     return whole._replace(x=x, classes=classes)
 
 

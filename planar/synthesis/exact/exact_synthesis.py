@@ -12,17 +12,13 @@ from planar.foundation.errors import BadInput
 from planar.model.mechanism import Mechanism
 from planar.model.wording import count_phrase
 from planar.synthesis.exact.complete_synthesis import CompleteSynthesis, DyadCurve, ExactDesign
-from planar.synthesis.exact.component_solutions import (
-    ComponentSolutions,
-    Progress,
-    alike_components,
-    solve_components,
-)
+from planar.synthesis.exact.component_solutions import ComponentSolutions, alike_components, solve_components
 from planar.synthesis.exact.dyad_curves import dyad_curve, is_dyad
 from planar.synthesis.exact.exact_linkage import ExactLinkage, exact_linkage
 from planar.synthesis.exact.list_words import completeness, counted_class, list_remarks, solution_count
 from planar.synthesis.exact.relations.exact_problem import Component, ExactProblem
 from planar.synthesis.exact.tracking.member_homotopy import affine_solutions, homogeneous_solutions
+from planar.synthesis.exact.tracking.member_solutions import Progress
 from planar.synthesis.exact.tracking.symmetry import reordered
 from planar.synthesis.judgement.defects import Defect
 from planar.synthesis.judgement.judgement import DesignJudge

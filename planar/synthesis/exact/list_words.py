@@ -79,8 +79,8 @@ def list_remarks(solved: Sequence[ComponentSolutions], designs: Sequence[ExactDe
         else:
             told += "; python-flint is not there to certify them"
         found.append(told)
-        if each.in_balls:
-            many = count_phrase(each.in_balls, "solution")
+        if each.nearly_singular:
+            many = count_phrase(each.nearly_singular, "solution")
             found.append(
                 f"{many} told by balls of many digits alone: near others or far out, the task is nearly singular"
             )

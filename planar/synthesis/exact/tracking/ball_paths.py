@@ -15,11 +15,13 @@ from planar.foundation.arrays import ComplexArray
 from planar.synthesis.exact.relations.family import Family, Member
 from planar.synthesis.exact.tracking.member_in_balls import MemberInBalls
 
+MOST_PATHS = 30
+"""That are worth following: they take seconds each."""
 FIRST_STEP, LEAST_STEP = 1e-4, 1e-9
 """Of what is left of the way."""
 SINGULAR_END = 1e-18
 """What is left of the way where a path is said to end where several solutions meet."""
-MOST_STEPS = 3000
+MOST_STEPS = 10_000
 POINTS = 6
 """Through so many the predictor goes at most."""
 NEAR, CORRECTION = 1e-4, 1e-9

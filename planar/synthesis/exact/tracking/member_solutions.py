@@ -5,28 +5,42 @@ Every linkage of every class is followed, so that a path that leaps to another's
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 
-from planar.assemblies.polynomial.path_tracker import SINGULAR_TOLERANCE, PathEnds, is_finite_solution
+from planar.assemblies.polynomial.certification import is_available
+from planar.assemblies.polynomial.path_tracker import (
+    MAX_STEPS,
+    SINGULAR_TOLERANCE,
+    PathEnds,
+    is_finite_solution,
+    normalize,
+    refine_ends,
+)
 from planar.foundation.arrays import Array, BoolArray, ComplexArray, IntArray
+from planar.model.wording import count_phrase
 from planar.synthesis.exact.relations.family import Family, Member
+from planar.synthesis.exact.tracking.ball_paths import MOST_PATHS, follow_in_balls
+from planar.synthesis.exact.tracking.exact_certificates import certify_member
 from planar.synthesis.exact.tracking.generic_store import FamilyRecord
-from planar.synthesis.exact.tracking.member_homotopy import affine_solutions
-from planar.synthesis.exact.tracking.monodromy import follow
+from planar.synthesis.exact.tracking.member_homotopy import MemberHomotopy, affine_solutions, homogeneous_solutions
+from planar.synthesis.exact.tracking.monodromy import CLOSER_STEPS, follow
 from planar.synthesis.exact.tracking.other_ways import UNKNOWN, ClassedSolutions, with_members, with_new_classes
 from planar.synthesis.exact.tracking.same_solutions import first_of_same
 from planar.synthesis.exact.tracking.symmetry import exchange_images, representatives
 
 PRECISION = 1e-4
 """How far predictions may be off."""
-CLOSER_PRECISIONS = (1e-5, 1e-7)
-"""The same for paths that are lost or come to one solution: they are followed again with more digits."""
+CLOSER_PASSES = ((1e-5, MAX_STEPS), (1e-7, CLOSER_STEPS))
+"""The same, and how many steps, for paths that are lost or come to one solution: they are followed again with more
+digits; by the second where there are too many for balls."""
 OTHER_WAYS = 3
 """By way of how many random members linkages that are missing are sought."""
 INFINITY = 1e-6
 """Of homogeneous coordinates of length one."""
+Progress = Callable[[str], None]
 
 
 class MemberSolutions(NamedTuple):
@@ -34,7 +48,8 @@ class MemberSolutions(NamedTuple):
     where paths of several came to it; there are `class_count` classes with so many `members` each.
 
     `doubtful` are ends of paths where several solutions seem to meet, or that seem to be at infinity
-    (`is_doubtful_infinite`), with their classes.
+    (`is_doubtful_infinite`), with their classes. `ball_rows`: solutions of the random member whose paths were followed
+    in balls.
     """
 
     x: ComplexArray
@@ -44,6 +59,7 @@ class MemberSolutions(NamedTuple):
     doubtful: ComplexArray
     doubtful_classes: IntArray
     is_doubtful_infinite: BoolArray
+    ball_rows: IntArray
 
     @property
     def found(self) -> int:
@@ -81,23 +97,26 @@ class MemberSolutions(NamedTuple):
 
 class _Ends(NamedTuple):
     """Where paths ended (each (paths,)): at single solutions, those to which several came among them; where several
-    meet; at infinity; or nowhere."""
+    meet; at infinity; or nowhere. `in_balls`: which were followed in balls."""
 
     V: ComplexArray
     is_single: BoolArray
     is_shared: BoolArray
     is_singular: BoolArray
     is_infinite: BoolArray
+    in_balls: BoolArray
 
 
-def solve_member(family: Family, record: FamilyRecord, member: Member, seed: int = 3) -> MemberSolutions:
-    """The solutions of a member. Paths that are lost, or come to one solution, are followed more closely; what is
-    missing then is sought by other ways."""
+def solve_member(
+    family: Family, record: FamilyRecord, member: Member, say: Progress = lambda _: None, seed: int = 3
+) -> MemberSolutions:
+    """The solutions of a member. Paths that are lost, or come to one solution, are followed more closely, and where
+    they are few in balls; what is missing then is sought by other ways."""
     rng = np.random.default_rng(seed)
     many, members = record.classes.shape
     class_of = np.empty(record.classes.size, dtype=int)
     class_of[record.classes] = np.arange(many)[:, None]
-    ends = _follow_all(family, record, member)
+    ends = _follow_all(family, record, member, say)
     kept = np.flatnonzero(ends.is_single)
     kept = kept[first_of_same(ends.V[kept]) == np.arange(len(kept))]
     # a solution that several paths came to is one of their classes, and the only one of it where each has one
@@ -120,10 +139,11 @@ def solve_member(family: Family, record: FamilyRecord, member: Member, seed: int
         affine_solutions(ends.V[doubtful]),
         settled,
         ends.is_infinite[doubtful],
+        np.flatnonzero(ends.in_balls),
     )
 
 
-def _follow_all(family: Family, record: FamilyRecord, member: Member) -> _Ends:
+def _follow_all(family: Family, record: FamilyRecord, member: Member, say: Progress) -> _Ends:
     """All solutions of the random member followed to another."""
     images, begin = exchange_images(record.name.exchanges), record.solutions
 
@@ -131,21 +151,53 @@ def _follow_all(family: Family, record: FamilyRecord, member: Member) -> _Ends:
         return representatives(ends.V, images), ends.is_single, ends.is_near_end, ends.regularity
 
     V, is_single, is_near, regularity = parts(follow(family, begin.member, begin.V, member, PRECISION))
-    for near in CLOSER_PRECISIONS:
+    for near, steps in CLOSER_PASSES:
         again = ~is_single | _is_shared(V, is_single)
-        if near != CLOSER_PRECISIONS[0]:
-            again &= ~(is_near & ~is_single)  # it came to the end twice, where several meet
+        if steps == CLOSER_STEPS:
+            again &= is_single | ~is_near  # else it came to the end twice, where several meet
+            if is_available() and again.sum() <= MOST_PATHS:
+                break
         if not again.any():
             break
-        closer = parts(follow(family, begin.member, begin.V[again], member, near, has_more_digits=True))
+        closer = parts(follow(family, begin.member, begin.V[again], member, near, steps))
         take = closer[1] | ~is_single[again]
         better = np.flatnonzero(again)[take]
         for whole, part in zip((V, is_single, is_near, regularity), closer, strict=True):
             whole[better] = part[take]
+    in_balls = np.zeros(len(V), dtype=bool)
+    while is_available():
+        # one that leapt may be seen only where the path that belongs to its solution comes there, too
+        again = (_is_shared(V, is_single) | ~(is_single | is_near)) & ~in_balls
+        if not 0 < again.sum() <= MOST_PATHS:
+            break
+        in_balls |= again
+        rows, x = proved_in_balls(family, record, np.flatnonzero(again), member, say)
+        # what is proved is at a finite place, however far out
+        V[rows], is_single[rows], is_near[rows] = representatives(homogeneous_solutions(x), images), True, True
     finite = is_finite_solution(V, INFINITY)
     is_singular = is_near & finite & ~is_single & (regularity < 1e3 * SINGULAR_TOLERANCE)
     single = is_single & finite
-    return _Ends(V, single, _is_shared(V, single), is_singular, is_near & ~finite)
+    return _Ends(V, single, _is_shared(V, single), is_singular, is_near & ~finite, in_balls)
+
+
+def proved_in_balls(
+    family: Family, record: FamilyRecord, rows: IntArray, member: Member, say: Progress
+) -> tuple[IntArray, ComplexArray]:
+    """What the paths from those solutions of the random member come to in balls, where that is proved: the number of
+    each that does, and its solution of the member (solutions, unknowns)."""
+    say(f"{count_phrase(len(rows), 'path')} in balls")
+    begin = affine_solutions(record.solutions.V[rows])
+    x = follow_in_balls(family, record.solutions.member, begin, member)
+    came = np.flatnonzero(np.isfinite(x).all(axis=1))
+    proof = certify_member(family, member, x[came])
+    return rows[came[proof.proved]], proof.x[proof.proved]
+
+
+def is_nearly_singular(family: Family, member: Member, x: ComplexArray) -> BoolArray:
+    """Which solutions (solutions, unknowns) lie so near to others, or so far out, that doubles do not tell them."""
+    V = normalize(homogeneous_solutions(x))
+    ends = refine_ends(MemberHomotopy(family, member, member), V, np.ones(len(x), dtype=bool))
+    return (ends.regularity <= SINGULAR_TOLERANCE) | ~is_finite_solution(V, INFINITY)
 
 
 def _is_shared(V: ComplexArray, among: BoolArray) -> BoolArray:

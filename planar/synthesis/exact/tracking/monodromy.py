@@ -90,13 +90,15 @@ def _add_random_node(graph: MemberGraph, seed: int) -> None:
 
 
 def follow(
-    family: Family, begin: Member, V: ComplexArray, end: Member, near: float, has_more_digits: bool = False
+    family: Family, begin: Member, V: ComplexArray, end: Member, near: float, long_steps: int | None = None
 ) -> PathEnds:
-    """Solutions of one member followed to another, many at a time; with the digits of long doubles where asked for."""
+    """Solutions of one member followed to another, many at a time; in at most so many `long_steps` with the digits of
+    long doubles, where any are given."""
     between = MemberHomotopy(family, begin, end)
-    start, steps = (V.astype(np.clongdouble), CLOSER_STEPS) if has_more_digits else (V, MAX_STEPS)
+    start = V if long_steps is None else V.astype(np.clongdouble)
     blocks = [
-        track_paths(between, start[k : k + BLOCK], near, CORRECTION, steps) for k in range(0, max(len(V), 1), BLOCK)
+        track_paths(between, start[k : k + BLOCK], near, CORRECTION, long_steps or MAX_STEPS)
+        for k in range(0, max(len(V), 1), BLOCK)
     ]
     ends = PathEnds(*(np.concatenate(each) for each in zip(*blocks, strict=True)))
     return ends._replace(V=ends.V.astype(complex))

@@ -13,7 +13,7 @@ import numpy as np
 from planar.foundation.arrays import BoolArray, ComplexArray, IntArray
 from planar.synthesis.exact.relations.family import Family, Member
 from planar.synthesis.exact.tracking.generic_store import FamilyRecord
-from planar.synthesis.exact.tracking.monodromy import follow
+from planar.synthesis.exact.tracking.monodromy import CLOSER_STEPS, follow
 from planar.synthesis.exact.tracking.same_solutions import first_of_same
 from planar.synthesis.exact.tracking.symmetry import exchange_images, representatives
 
@@ -96,7 +96,7 @@ def _by_way(
     gone = follow(family, between, there.V[first], end, PRECISION)
     lost = ~gone.is_single
     if lost.any():
-        again = follow(family, between, there.V[first[lost]], end, PRECISION, has_more_digits=True)
+        again = follow(family, between, there.V[first[lost]], end, PRECISION, CLOSER_STEPS)
         for whole, part in zip(gone, again, strict=True):
             whole[lost] = part
     return gone.V[gone.is_single], first[gone.is_single]
