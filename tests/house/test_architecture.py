@@ -3,7 +3,6 @@
 import ast
 import subprocess
 import sys
-from collections import Counter
 from collections.abc import Iterable
 from functools import cache
 from pathlib import Path
@@ -77,7 +76,7 @@ LIBRARIES = {
     "xarray": {"reports"},
     "xlsxwriter": {"reports"},
 }
-MOST_FILES, MOST_LINES, LONGEST_FUNCTION, MOST_PARAMETERS = 16, 400, 60, 8
+MOST_LINES, LONGEST_FUNCTION, MOST_PARAMETERS = 800, 60, 8
 MOST_MODULES_TO_SOLVE, MOST_OTHERS_TO_SOLVE = 106, 40
 """Modules of planar, and others beside the libraries that are needed, which `planar solve` loads."""
 BESIDE_OTHER_JOINTS = {ROOT / "formats" / "drawn" / f"drawn_{what}.py" for what in ("document", "mechanism")}
@@ -163,13 +162,6 @@ def test_inside_a_room_no_arrow_goes_up(name):
 
     within = [(one, other) for one, other in arrows() if room(NAMES[one]) == room(NAMES[other]) == name]
     assert circles((part(one), part(other)) for one, other in within) == []
-
-
-def test_no_folder_has_too_many_files():
-    many = Counter(
-        path.parent.relative_to(ROOT) for path in ROOT.rglob("*") if path.is_file() and path.suffix != ".pyc"
-    )
-    assert {str(folder): count for folder, count in many.items() if count > MOST_FILES} == {}
 
 
 def test_libraries_stay_in_their_rooms():
