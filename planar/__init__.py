@@ -93,7 +93,7 @@ if TYPE_CHECKING:
     from planar.model.input_laws.constant_rates import ConstantAccelerationSegment, ConstantSpeedSegment, DwellSegment
     from planar.model.input_laws.input_law import InputLaw
     from planar.model.input_laws.spline_table import TableSegment
-    from planar.model.link_shapes import Along, At, Distances, Link, Point
+    from planar.model.link_shapes import Along, At, Distances, Link, Offset, Point
     from planar.model.loads import Course, Load, Mass, Spring
     from planar.model.mechanism import Drive, Input, Mechanism
     from planar.model.motors import Motor
@@ -238,6 +238,7 @@ __all__ = [
     "Motor",
     "MotorDuty",
     "NoAnswer",
+    "Offset",
     "Outcome",
     "Outlier",
     "Pair",

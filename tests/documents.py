@@ -218,6 +218,8 @@ def mistake(path: str, new: Any, place: str, *words: str, of: str = "four-bar") 
 
 ALONG = "links/BC/points/E"
 
+E_PLACE = "$.links.BC.points.E"
+
 TRIANGLE = "links/BC/points/F"
 
 SLIDE = {"sliding": "s", "on": "AD", "block": "E", "line": {"through": "A"}}
@@ -317,6 +319,10 @@ MISTAKES = [
     mistake(ALONG, {"along": ["B", "E"], "distance": 4}, "$.links.BC.points.E", "rests on itself"),
     mistake(f"{ALONG}/distance", "40 deg", "$.links.BC.points.E.distance", "length is wanted"),
     mistake(f"{ALONG}/angle", "40 mm", "$.links.BC.points.E.angle", "angle is wanted"),
+    mistake(
+        ALONG, {"along": ["B", "C"], "distance": 4, "angle": 5, "offset": 3}, "$.links.BC.points.E.offset", "not both"
+    ),
+    mistake(ALONG, {"along": ["B", "C"], "distance": 4, "offset": "3 deg"}, f"{E_PLACE}.offset", "length is wanted"),
     mistake(f"{ALONG}/left_of", ["B", "C"], "$.links.BC.points.E.left_of", "'left_of'"),
     mistake(f"{ALONG}/distances", {"B": 1, "C": 1}, "$.links.BC.points.E.distances", "'distances'"),
     mistake(f"{TRIANGLE}/distances", {"B": 5, "C": 5}, "$.links.BC.points.F", "does not close", "B-C-F"),
@@ -380,7 +386,15 @@ MISTAKES = [
     mistake("pairs/3", RIDE | {"on": "AD"}, "$.pairs[3].on", "'block'"),
     mistake("pairs/3", SLIDE | {"block": 5}, "$.pairs[3].block", "text", "number 5"),
     mistake("pairs/3", SLIDE | {"block": ""}, "$.pairs[3].block", "empty"),
-    mistake("pairs/3", SLIDE | {"block": "BC.E"}, "$.pairs[3].block", "'BC.E'", "'.'"),
+    mistake(
+        "pairs/3",
+        SLIDE | {"block": "BC.E"},
+        "$.pairs[3].block",
+        "a block is a new link",
+        '["AD", "BC"]',
+        '"point": "E"',
+    ),
+    mistake("pairs/3", SLIDE | {"block": "Z.E"}, "$.pairs[3].block", "'Z.E'", "'.'"),
     mistake("pairs/3", SLIDE | {"block": "Z"}, "$.pairs[3].block", "no link", "'Z'"),
     mistake("pairs/3", SLIDE | {"on": "Ad"}, "$.pairs[3].on", "no link 'Ad'", "'AD'"),
     mistake("pairs/3", SLIDE | {"on": ["AD"]}, "$.pairs[3].on", "text", "a list"),

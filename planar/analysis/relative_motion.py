@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from planar.foundation.arrays import Array
-from planar.foundation.errors import Unknown
+from planar.foundation.errors import Unknown, suggest_name
 from planar.foundation.geometry import Frame, Vector
 from planar.foundation.jets import value_and_rates
 from planar.foundation.short_repr import short_repr
@@ -65,7 +65,7 @@ def relative_motion(frames: Mapping[str, Frame], link: str, other: str) -> Relat
     """The motion of a link against another, from frames that are jets. Raises Unknown."""
     for name in (link, other):
         if name not in frames:
-            raise Unknown(f"there is no link {name!r}; links are {', '.join(frames)}")
+            raise Unknown(f"there is no link {name!r}{suggest_name(name, frames, 'links')}")
     if link == other:
         raise Unknown(f"a motion is of one link against another, and both are {link!r}")
     moved, base = frames[link], frames[other]

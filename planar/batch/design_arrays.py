@@ -7,13 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from planar.document.cursor import suggest_spelling
 from planar.document.dimensions import (
     Dimension,
     change_dimension,
     file_dimensions,
 )
-from planar.foundation.errors import BadInput
+from planar.foundation.errors import BadInput, suggest_name
 from planar.model.mechanism import LARGEST_COUNTED_ANGLE, Mechanism
 
 Array = np.ndarray
@@ -48,8 +47,8 @@ def read_designs(mechanism: Mechanism, designs: Mapping[str, Any]) -> dict[str, 
 
 def _read_values(name: str, given: Any, known: Mapping[str, Dimension]) -> Array:
     if name not in known:
-        meant = suggest_spelling(str(name), known, cutoff=0.5) or f"; there are {', '.join(list(known)[:12])}"
-        raise BadInput(str(name), f"the mechanism has no such dimension or input{meant}")
+        hint = suggest_name(str(name), known, "its numbers")
+        raise BadInput(str(name), f"the mechanism has no such dimension or input{hint}")
     try:
         array = np.asarray(given, dtype=float)
     except (TypeError, ValueError):

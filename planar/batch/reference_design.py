@@ -12,10 +12,9 @@ import numpy as np
 
 from planar.batch.design_arrays import design_variables, values_of_design, with_design_values
 from planar.batch.march.backend import DesignBatch
-from planar.document.cursor import suggest_spelling
 from planar.equations.coordinates import frames_from_coordinates
 from planar.equations.mechanism_numbers import scaled_pair_numbers, shapes_of_links
-from planar.foundation.errors import BadInput
+from planar.foundation.errors import BadInput, suggest_name
 from planar.foundation.geometry import Vector
 from planar.foundation.jets import Scalar
 from planar.model.link_shapes import LinkPlace, LinkShape, PointMember, PointName, link_shape, place_in_link
@@ -87,8 +86,8 @@ class ReferenceDesign:
         known = members | {name: name for name in self.points}
         for each in given:
             if each not in known:
-                meant = suggest_spelling(str(each), known, cutoff=0.5) or f"; points are {', '.join(self.points)}"
-                raise BadInput("points", f"there is no point {each!r:.60}{meant}")
+                hint = suggest_name(str(each), known, "points")
+                raise BadInput("points", f"there is no point {each!r:.60}{hint}")
         return tuple(dict.fromkeys(known[each] for each in given))
 
     def result_name(self, point: str) -> PointName:

@@ -10,7 +10,7 @@ import casadi as ca
 from planar.derivatives.design_equations import DesignEquations
 from planar.derivatives.force_equations import ForceEquations
 from planar.equations.elimination import stack_expressions
-from planar.foundation.errors import Unknown, join_names
+from planar.foundation.errors import Unknown, suggest_name
 from planar.model.pairs import MeasureKind
 from planar.results.kinematic_result import KinematicResult
 
@@ -71,4 +71,4 @@ def force_expressions(equations: ForceEquations, name: str) -> Iterator[ResultEx
 def refuse_name(design: DesignEquations, moving: KinematicResult, name: str) -> Unknown:
     """That nothing bears a name."""
     known = dict.fromkeys((*moving.point_names, *moving.frames, *design.work.relative_motions))
-    return Unknown(f"there is no point, link or pair {name!r}; there are {join_names(known)}")
+    return Unknown(f"there is no point, link or pair {name!r}{suggest_name(name, known, 'names')}")

@@ -7,10 +7,9 @@ import re
 from pathlib import Path
 from typing import NamedTuple
 
-from planar.document.cursor import suggest_spelling
 from planar.document.files import read_limited
 from planar.document.tables.spreadsheet_text import SEPARATOR_LINE, choose_separator, decode_text, read_number
-from planar.foundation.errors import BadInput, join_names
+from planar.foundation.errors import BadInput, join_names, suggest_spelling
 
 COLUMNS = ("student", "variant", "quantity", "value", "unit")
 SEED_LINE = re.compile(r"#?\s*seed[\s:=,;]*(\d{1,18})", re.IGNORECASE)

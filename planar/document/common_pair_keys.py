@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from planar.document.cursor import Cursor, suggest_name
+from planar.document.cursor import Cursor
+from planar.foundation.errors import suggest_name
 from planar.model.mechanism import LARGEST_COUNTED_ANGLE
 from planar.model.pairs import MeasureKind, Pair, QuantityWriter
 from planar.model.stops import Stops
@@ -21,6 +22,8 @@ def read_stops(entry: Cursor, group: Sequence[Pair]) -> tuple[Stops, ...]:
     restitution = entry["restitution"].as_number() if entry.has("restitution") else 0.0
     cursor = entry["stops"]
     if isinstance(cursor.value, dict):
+        if not cursor.value:
+            raise cursor.error_at(None, "no relative motion is named here; write the two stops, as [10, 95]")
         for name, place in cursor.members():
             if name not in motions:
                 raise place.error_at(

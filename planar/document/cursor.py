@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import isnan
 from typing import Any
 
 from planar.document.schema import FORBIDDEN_IN_NAMES
-from planar.foundation.errors import BadInput, first_unprintable, join_names
+from planar.foundation.errors import BadInput, first_unprintable, suggest_name, suggest_spelling
 from planar.foundation.units import UnitError, example_quantity, parse_quantity
 from planar.model.file_units import FileUnits, takes_bare_number, unit_of_kind
 from planar.model.link_shapes import Link, link_shape
@@ -45,6 +45,8 @@ class Cursor:
     value: Any
     path: str = "$"
     context: FileContext = field(default_factory=FileContext)
+    other_keys: tuple[str, ...] = ()
+    """Keys that the object may have besides those that `check_keys` names, where they are read elsewhere."""
 
     # refusing
 
@@ -54,7 +56,8 @@ class Cursor:
     def check_keys(self, *keys: str) -> None:
         for key in self.fields():
             if key not in keys:
-                raise self.error_at(key, f"unknown key {key!r}{suggest_spelling(key, keys)}")
+                hint = suggest_name(key, (*keys, *self.other_keys), "allowed keys", None)
+                raise self.error_at(key, f"unknown key {key!r}{hint}")
 
     # walking
 
@@ -100,7 +103,7 @@ class Cursor:
         if key not in self.fields():
             near = suggest_spelling(key, self.value, "is written {!r} the key meant?", 0.75)
             raise self.error_at(None, f"the key {key!r} is missing{near}")
-        return replace(self, value=self.value[key], path=self.place_of(key))
+        return replace(self, value=self.value[key], path=self.place_of(key), other_keys=())
 
     def object_at(self, key: str) -> Cursor:
         found = self[key]
@@ -352,17 +355,3 @@ def describe_value(value: Any) -> str:
     text = repr(value) if isinstance(value, str | int | float) else ""
     name = next(name for kind, name in kinds.items() if isinstance(value, kind))
     return f"the {name.split()[1]} {text}" if 0 < len(text) < 40 else name
-
-
-def suggest_name(word: str, known: Iterable[str], what: str) -> str:
-    """A clause that offers the nearest known name, or the names that there are."""
-    names = list(known)
-    return suggest_spelling(word, names) or (f"; {what} are {join_names(names)}" if names else "; there is none")
-
-
-def suggest_spelling(word: str, known: Any, sentence: str = "did you mean {!r}?", cutoff: float = 0.6) -> str:
-    """A clause that offers the nearest known word, or nothing."""
-    from difflib import get_close_matches
-
-    near = get_close_matches(word, list(known), 1, cutoff) or [each for each in known if each.lower() == word.lower()]
-    return "; " + sentence.format(near[0]) if near else ""

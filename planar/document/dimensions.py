@@ -20,10 +20,9 @@ from numbers import Real
 from typing import Any, NamedTuple
 
 from planar.document.common_pair_keys import write_stops
-from planar.document.cursor import suggest_spelling
 from planar.document.loads import write_load, write_mass, write_spring
 from planar.document.writer import write_input, write_link
-from planar.foundation.errors import BadInput, join_names
+from planar.foundation.errors import BadInput, join_names, suggest_name
 from planar.model.input_laws import SEGMENT_TYPES
 from planar.model.mechanism import Mechanism, pair_entries, relative_motions
 from planar.model.pairs import Pair
@@ -135,8 +134,9 @@ def find_dimension(known: Mapping[str, Dimension], name: str) -> Dimension:
         raise BadInput(
             str(name), f"two numbers of the mechanism could be meant; write {join_names(meant, last_joiner=' or ')}"
         )
-    near = suggest_spelling(str(name), known, cutoff=0.5) or f"; there are {', '.join(list(known)[:12])}"
-    raise BadInput(str(name), f"the mechanism has no number of that name{near}")
+    raise BadInput(
+        str(name), f"the mechanism has no number of that name{suggest_name(str(name), known, 'its numbers')}"
+    )
 
 
 def _every_dimension(mechanism: Mechanism) -> Iterator[Dimension]:

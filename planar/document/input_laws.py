@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
-from planar.document.cursor import Cursor, suggest_spelling
+from planar.document.cursor import Cursor
+from planar.foundation.errors import suggest_name
 from planar.foundation.units import SI_UNITS
 from planar.model.file_units import FileUnits, display_unit
 from planar.model.input_laws import SEGMENT_TYPES, InputLaw, LawSegment, SegmentKey, TableSegment
@@ -68,8 +69,8 @@ def _read_segment(cursor: Cursor, kinds: InputKinds) -> LawSegment:
     kind = SEGMENT_TYPES[motion]
     for key in cursor.fields():
         if key not in ("motion", *kind.keys):
-            told = f"{motion!r} has no {key!r}, only {', '.join(map(repr, kind.keys))}"
-            raise cursor.error_at(key, f"{told}{suggest_spelling(key, kind.keys)}")
+            hint = suggest_name(key, ("motion", *kind.keys), "its keys", None)
+            raise cursor.error_at(key, f"{motion!r} has no {key!r}{hint}")
     for key, each in kind.keys.items():
         if each.is_list and len(tuple(cursor[key].items())) > MAX_LAW_ITEMS:
             raise cursor.error_at(key, f"a table has at most {MAX_LAW_ITEMS} points")

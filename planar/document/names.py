@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
-from planar.document.cursor import Cursor, suggest_name, suggest_spelling
-from planar.foundation.errors import join_names
+from planar.document.cursor import Cursor
+from planar.foundation.errors import join_names, suggest_name, suggest_spelling
 from planar.model.mechanism import Mechanism, named_points
 from planar.model.pairs import Pair, joining_entry_text
 
@@ -56,5 +56,7 @@ def find_point(cursor: Cursor, name: str, points: Mapping[str, str]) -> str:
                 f"{_links_phrase(cursor.links_with_point(name))}"
             )
         raise cursor.error_at(None, told)
-    near = suggest_spelling(name, points) or suggest_name(name, dict.fromkeys(points.values()), "points")
-    raise cursor.error_at(None, f"there is no point {name!r}{near}")
+    written = dict.fromkeys(points.values())
+    is_alias_near = suggest_spelling(name, points) and not suggest_spelling(name, written)
+    hint = suggest_name(name, points if is_alias_near else written, "points")
+    raise cursor.error_at(None, f"there is no point {name!r}{hint}")

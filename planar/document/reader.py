@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-from planar.document.cursor import Cursor, FileContext, describe_value, suggest_name, suggest_spelling
+from planar.document.cursor import Cursor, FileContext, describe_value
 from planar.document.loads import read_loads
 from planar.document.names import find_motion, find_point, point_aliases
 from planar.document.schema import (
@@ -22,15 +22,30 @@ from planar.document.schema import (
     UNITS_SCHEMA,
 )
 from planar.document.sections.published import read_published
+from planar.foundation.errors import suggest_name, suggest_spelling
+from planar.foundation.geometry import GROUND
 from planar.foundation.units import UnitError, example_quantity
 from planar.model.file_units import FileUnits, OtherKind, parse_declared_unit
-from planar.model.link_shapes import Along, At, Distances, Link, Point, PointDefinition, PointPlacementError, link_shape
+from planar.model.link_shapes import (
+    Along,
+    At,
+    Distances,
+    Link,
+    LinkShape,
+    Offset,
+    Point,
+    PointDefinition,
+    PointPlacementError,
+    fitted_frame,
+    link_shape,
+)
 from planar.model.mechanism import (
     Input,
     Mechanism,
     pair_entries,
     pair_misfits,
     relative_motions,
+    sketched_places,
 )
 from planar.model.pairs import MeasureKind, Pair, pair_types
 
@@ -80,17 +95,43 @@ def read_mechanism(value: Any) -> Mechanism:
         jumps = speed_jump_remarks(inputs, relative_motions(bare), units)
         driven = replace(driven, remarks=(*driven.remarks, *jumps))
     points = point_aliases(driven)
-    whole = replace(
-        driven,
-        **read_loads(full, driven, points),
-        sketch=_read_sketch(full, points),
-        published=tuple(read_published(item, driven, points) for item in full.list_items("published")),
+    complete = _completed_by_sketch(
+        replace(
+            driven,
+            **read_loads(full, driven, points),
+            sketch=_read_sketch(full, points),
+            published=tuple(read_published(item, driven, points) for item in full.list_items("published")),
+        ),
+        entries,
+        shapes,
     )
     if not full.has("tolerances"):
-        return whole
+        return complete
     from planar.document.sections.tolerances import read_tolerances  # few files have any
 
-    return replace(whole, tolerances=read_tolerances(full["tolerances"], whole))
+    return replace(complete, tolerances=read_tolerances(full["tolerances"], complete))
+
+
+def _completed_by_sketch(
+    mechanism: Mechanism, entries: Sequence[tuple[Cursor, Sequence[Pair]]], shapes: Mapping[str, LinkShape]
+) -> Mechanism:
+    """The mechanism with what the entries of its pairs leave out and its sketch decides, and remarks that say so."""
+    if not mechanism.sketch:
+        return mechanism
+    places = sketched_places(mechanism)
+    frames = {mechanism.frame: GROUND}
+    for link in places:
+        frame = None if link == mechanism.frame else fitted_frame(shapes[link], places[link])
+        if frame is not None:
+            frames[link] = frame
+    pairs, remarks = list(mechanism.pairs), list(mechanism.remarks)
+    for entry, group in entries:
+        for pair in group:
+            completed = pair.completed_by_sketch(entry, shapes, frames, places.get(pair.links[1], {}))
+            if completed is not None:
+                pairs[pairs.index(pair)] = completed[0]
+                remarks.append(completed[1])
+    return replace(mechanism, pairs=tuple(pairs), remarks=tuple(remarks))
 
 
 def read_units(top: Cursor) -> FileUnits:
@@ -216,7 +257,12 @@ def _read_point_definition(cursor: Cursor) -> PointDefinition:
         start, towards = cursor.names("along", 2)
         if start == towards:
             raise cursor.error_at("along", "a direction needs two different points")
-        return Along(start, towards, cursor.quantity("distance", "length"), cursor.quantity("angle", "angle", 0.0))
+        distance = cursor.quantity("distance", "length")
+        if not cursor.has("offset"):
+            return Along(start, towards, distance, cursor.quantity("angle", "angle", 0.0))
+        if cursor.has("angle"):
+            raise cursor.error_at("offset", "a point has an 'angle' or an 'offset', not both; leave one out")
+        return Offset(start, towards, distance, cursor.quantity("offset", "length"))
     cursor.check_keys(*DISTANCES_SCHEMA)
     if not cursor.has("distances"):
         raise cursor.error_at(None, "a point is [x, y], or has 'along' and 'distance', or 'distances' and a side")
@@ -236,7 +282,8 @@ def _read_point_definition(cursor: Cursor) -> PointDefinition:
 def _own_keys(entry: Cursor) -> Cursor:
     """A pair's entry with the keys of its type alone."""
     common = STOP_SCHEMA | PAIR_SCHEMA
-    return replace(entry, value={key: value for key, value in entry.fields().items() if key not in common})
+    keys_of_type = {key: value for key, value in entry.fields().items() if key not in common}
+    return replace(entry, value=keys_of_type, other_keys=tuple(common))
 
 
 def _read_common_keys(entries: Sequence[tuple[Cursor, Sequence[Pair]]]) -> dict[str, Any]:

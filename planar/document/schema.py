@@ -87,6 +87,11 @@ ALONG_SCHEMA: Schema = {
         schema_reference("angle"),
         "by how much the way is turned about the first point, anticlockwise, as on a bell crank",
     ),
+    "offset": described(
+        schema_reference("length"),
+        "how far it lies to the left of the line from the first point to the second, negative to the right; "
+        "in place of an 'angle'",
+    ),
 }
 DISTANCES_SCHEMA: Schema = {
     "distances": described(
@@ -352,7 +357,7 @@ def schema() -> dict[str, Any]:
             "place": {
                 "anyOf": [
                     vector_schema("length"),
-                    object_schema(ALONG_SCHEMA, "along", "distance"),
+                    object_schema(ALONG_SCHEMA, "along", "distance", **{"not": {"required": ["angle", "offset"]}}),
                     object_schema(
                         DISTANCES_SCHEMA, "distances", oneOf=[{"required": ["left_of"]}, {"required": ["right_of"]}]
                     ),

@@ -11,7 +11,7 @@ from planar.document.loads import write_loads
 from planar.document.schema import DRIVE_SCHEMA, FORMAT_VERSION
 from planar.foundation.units import SI_UNITS, Unit, UnitError, parse_unit, shortest_number
 from planar.model.file_units import FileUnits, is_metric, takes_bare_number, unit_of_kind
-from planar.model.link_shapes import Along, At, Link, PointDefinition
+from planar.model.link_shapes import Along, At, Link, Offset, PointDefinition
 from planar.model.mechanism import (
     PUBLISHED_QUANTITIES,
     Drive,
@@ -114,6 +114,12 @@ def _write_point_definition(place: PointDefinition, quantity: QuantityWriter) ->
             "along": [place.start, place.towards],
             "distance": quantity(place.distance, "length"),
             "angle": quantity(place.angle, "angle"),
+        }
+    if isinstance(place, Offset):
+        return {
+            "along": [place.start, place.towards],
+            "distance": quantity(place.distance, "length"),
+            "offset": quantity(place.offset, "length"),
         }
     return {
         "distances": {

@@ -1,6 +1,6 @@
 """What can go wrong, and the sentence in which it is said."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from enum import StrEnum
 from typing import Any
 
@@ -8,7 +8,7 @@ MAX_NAMES_LISTED = 12
 """Names that a sentence lists; of more it tells how many."""
 INVISIBLE_JOINERS = "\u200c\u200d"
 """Invisible, but letters of some scripts need them."""
-MAX_LOCATION_LENGTH, MAX_SENTENCE_LENGTH, MAX_REASON_LENGTH = 200, 300, 1200
+MAX_LOCATION_LENGTH, MAX_SENTENCE_LENGTH, MAX_REASON_LENGTH = 200, 400, 1200
 """Characters of a place, of a sentence about it, and of a reason why there is no answer."""
 
 
@@ -44,6 +44,43 @@ def join_names(names: Iterable[str], max_names: int | None = MAX_NAMES_LISTED, l
     if max_names is not None and len(every) > max_names + 1:
         every = [*every[:max_names], f"{len(every) - max_names} more"]
     return last_joiner.join(filter(None, (", ".join(every[:-1]), every[-1]))) if every else "none"
+
+
+def suggest_spelling(word: str, known: Iterable[str], sentence: str = "did you mean {!r}?", cutoff: float = 0.6) -> str:
+    """A clause that offers the name nearest to a misspelt word; empty where none is near."""
+    near = _nearest_names(word, list(known), cutoff)
+    return "; " + sentence.format(near[0]) if near else ""
+
+
+def suggest_name(word: str, known: Iterable[str], kind: str, max_names: int | None = MAX_NAMES_LISTED) -> str:
+    """A clause that offers the nearest name and lists the names of this kind, the nearest first."""
+    return suggest_name_of_kinds(word, {kind: known}, max_names)
+
+
+def suggest_name_of_kinds(
+    word: str, names_by_kind: Mapping[str, Iterable[str]], max_names: int | None = MAX_NAMES_LISTED
+) -> str:
+    """A clause that offers the nearest name, and lists the names of each kind ("links", "pairs"), nearest first."""
+    names = {kind: list(known) for kind, known in names_by_kind.items()}
+    near = _nearest_names(word, list(dict.fromkeys(name for known in names.values() for name in known)), 0.6)
+    rank = {name: index for index, name in enumerate(near)}
+    lists = [
+        f"{kind} are {join_names(sorted(known, key=lambda name: rank.get(name, len(rank))), max_names)}"
+        for kind, known in names.items()
+        if known
+    ]
+    question = f"; did you mean {near[0]!r}? " if near else "; "
+    return question + "; ".join(lists) if lists else "; there is none"
+
+
+def _nearest_names(word: str, names: list[str], cutoff: float) -> list[str]:
+    """The names that are spelt like the word, the nearest first."""
+    from difflib import get_close_matches
+
+    same_letters = [name for name in names if name.lower() == word.lower()]
+    return [
+        *dict.fromkeys(same_letters + get_close_matches(word[:MAX_LOCATION_LENGTH], names, MAX_NAMES_LISTED, cutoff))
+    ]
 
 
 def first_unprintable(text: str) -> str:

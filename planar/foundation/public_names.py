@@ -97,6 +97,7 @@ MODULES = {
     "Motor": "model.motors",
     "MotorDuty": "analysis.efforts.motor_duty",
     "NoAnswer": "foundation.errors",
+    "Offset": "model.mechanism",
     "Outcome": "foundation.errors",
     "Outlier": "analysis.calibration.outliers",
     "Pair": "model.pairs.base",

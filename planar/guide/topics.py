@@ -6,9 +6,8 @@ import re
 from functools import cache
 from typing import NamedTuple
 
-from planar.document.cursor import suggest_spelling
 from planar.document.files import read_packaged_text
-from planar.foundation.errors import BadInput
+from planar.foundation.errors import BadInput, suggest_name
 
 FIRST_PAGE = "index"
 LIST_ENTRY = re.compile(r"^- \[(?P<title>[^\]]+)\]\((?P<path>[\w/-]+)\.md\)(?:: (?P<summary>.*))?$", re.MULTILINE)
@@ -58,6 +57,6 @@ def find_topic(name: str) -> Topic:
     wanted = name.strip().lower()
     found = known.get(wanted) or titles.get(wanted)
     if found is None:
-        meant = suggest_spelling(wanted, known, cutoff=0.5) or f"; topics are {', '.join(known)}"
+        meant = suggest_name(wanted, known, "topics", None)
         raise BadInput("TOPIC", f"the guide has no page {name!r:.60}{meant}")
     return found

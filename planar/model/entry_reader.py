@@ -90,6 +90,9 @@ class EntryReader(Protocol):
     def list_items(self, key: str) -> Sequence[EntryReader]:
         """The items of the list under this key; none where it is left out."""
 
+    def text(self, key: str, default: str | None = None) -> str | None:
+        """A text; `default` where the key is left out."""
+
     def choice(self, key: str, words: tuple[str, ...]) -> str | None:
         """One of some words; None where the key is left out."""
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from math import hypot
+from math import atan2, hypot
 from typing import NamedTuple
 
-from planar.foundation.geometry import Vector, direction
+from planar.foundation.geometry import Frame, Vector, direction
 from planar.foundation.jets import Scalar, sqrt
 
 
@@ -27,6 +27,15 @@ class Along(NamedTuple):
     angle: Scalar = 0.0
 
 
+class Offset(NamedTuple):
+    """A point at a signed distance (m) from `start` on the line to `towards`, and a signed offset (m) to its left."""
+
+    start: str
+    towards: str
+    distance: Scalar
+    offset: Scalar
+
+
 class Distances(NamedTuple):
     """A point by its distances (m) from two points, to the left of the way from the first to the second, or right."""
 
@@ -37,7 +46,7 @@ class Distances(NamedTuple):
     left: bool = True
 
 
-PointDefinition = At | Along | Distances
+PointDefinition = At | Along | Offset | Distances
 PointReference = str | tuple[Scalar, Scalar]
 """A point of a link by name, or by coordinates in the axes in which the link was drawn."""
 
@@ -82,7 +91,7 @@ class Link:
         >>> Link.from_points("frame", {"A": (0, 0), "D": (0.1, 0)}).points[1].place
         At(x=0.1, y=0)
         """
-        known = (At, Along, Distances)
+        known = (At, Along, Offset, Distances)
         return cls(name, tuple(Point(p, at if isinstance(at, known) else At(*at)) for p, at in points.items()))
 
     @property
@@ -180,7 +189,7 @@ def _place_point(name: str, places: Mapping[str, PointDefinition], drawn: dict[s
 def _reference_points(place: PointDefinition) -> tuple[str, ...]:
     if isinstance(place, At):
         return ()
-    return (place.start, place.towards) if isinstance(place, Along) else (place.first, place.second)
+    return (place.first, place.second) if isinstance(place, Distances) else (place.start, place.towards)
 
 
 def _point_position(name: str, place: PointDefinition, drawn: Mapping[str, Vector]) -> Vector:
@@ -196,6 +205,8 @@ def _point_position(name: str, place: PointDefinition, drawn: Mapping[str, Vecto
     if isinstance(place, Along):
         away: Vector = unit.rotate(direction(place.angle)) * place.distance
         return p + away
+    if isinstance(place, Offset):
+        return p + Vector(place.distance, place.offset).rotate(unit)
     return p + _triangle_apex(name, place, length).rotate(unit)
 
 
@@ -216,6 +227,27 @@ def _triangle_apex(name: str, place: Distances, base: Scalar) -> Vector:
         height = max(height, 0.0)  # a flat triangle, but for rounding
     root = sqrt(height)
     return Vector(along, root if place.left else -root)
+
+
+def fitted_frame(shape: LinkShape, places: Mapping[str, Vector]) -> Frame | None:
+    """Where a link stands whose points lie nearest to these places (m); None where they give it no direction.
+
+    The rotation of least squares about both centroids is the direction of the sum of products of complex numbers.
+    """
+    points = [shape.points[name] for name in places]
+    if len(points) < 2:
+        return None
+    share = 1.0 / len(points)
+    own_centroid = Vector(sum(p.x for p in points) * share, sum(p.y for p in points) * share)
+    centroid = Vector(sum(p.x for p in places.values()) * share, sum(p.y for p in places.values()) * share)
+    arms = [(p - own_centroid, place - centroid) for p, place in zip(points, places.values(), strict=True)]
+    cosine, sine = sum(own.dot(arm) for own, arm in arms), sum(own.cross(arm) for own, arm in arms)
+    length = hypot(cosine, sine)
+    if length <= 1e-9 * sum(own.dot(own) for own, _ in arms):
+        return None
+    axis = Vector(cosine / length, sine / length)
+    origin = centroid - own_centroid.rotate(axis)
+    return Frame(origin.x, origin.y, axis.x, axis.y, atan2(axis.y, axis.x))
 
 
 def shape_extent(shape: LinkShape) -> float:

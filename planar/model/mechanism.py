@@ -10,10 +10,11 @@ from numbers import Real
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from planar.foundation.errors import BadInput, first_unprintable, join_names
+from planar.foundation.geometry import Vector
 from planar.foundation.notebook_display import Displayable
 from planar.foundation.units import parse_unit
 from planar.model.file_units import FileUnits
-from planar.model.link_shapes import Along, At, Distances, Link, LinkShape, Point, PointDefinition
+from planar.model.link_shapes import Along, At, Distances, Link, LinkShape, Offset, Point, PointDefinition
 from planar.model.loads import Course, Load, Mass, Spring
 from planar.model.pairs.base import Pair
 from planar.model.revision import Revisable
@@ -37,6 +38,7 @@ __all__ = [
     "Mass",
     "Mechanism",
     "NamedPoint",
+    "Offset",
     "Point",
     "PointDefinition",
     "PublishedValue",
@@ -334,6 +336,16 @@ def named_points(mechanism: Mechanism) -> tuple[NamedPoint, ...]:
         own = point if alone[point] == 1 and point not in names else f"{link}.{point}"
         grouped.setdefault(together.get((link, point), own), []).append((link, point))
     return tuple(NamedPoint(name, tuple(members)) for name, members in grouped.items())
+
+
+def sketched_places(mechanism: Mechanism) -> dict[str, dict[str, Vector]]:
+    """The places (m, in the frame's axes) that the sketch gives to points, by link and point."""
+    members = {point.name: point.members for point in named_points(mechanism)}
+    places: dict[str, dict[str, Vector]] = {}
+    for name, x, y in mechanism.sketch:
+        for link, point in members[name]:
+            places.setdefault(link, {})[point] = Vector(x, y)
+    return places
 
 
 def unjoined_points(mechanism: Mechanism) -> dict[str, tuple[str, ...]]:

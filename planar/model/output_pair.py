@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from planar.foundation.errors import BadInput, Unknown
+from planar.foundation.errors import BadInput, Unknown, suggest_name_of_kinds
 from planar.model.mechanism import Mechanism, relative_motions
 from planar.model.pairs import MeasureKind, Pair
 
@@ -16,8 +16,8 @@ def find_output_pair(mechanism: Mechanism, output: str) -> tuple[str, Pair]:
     elif output in links:
         candidates = [pair for pair in named.values() if output in pair.links]
     else:
-        told = f"pairs are {', '.join(named)}, links {', '.join(links)}"
-        raise Unknown(f"there is no pair and no link {output!r}; {told}")
+        hint = suggest_name_of_kinds(output, {"pairs": named, "links": links})
+        raise Unknown(f"there is no pair and no link {output!r}{hint}")
     for pair in candidates:
         others = [link for link in pair.links if link != frame]
         pinned = pair.input_kind is MeasureKind.ANGLE and bool(pair.coincident_points())

@@ -10,7 +10,7 @@ import numpy as np
 
 from planar.foundation.angles import wrap_angle
 from planar.foundation.arrays import Array
-from planar.foundation.errors import Unknown, join_names
+from planar.foundation.errors import Unknown, suggest_name
 from planar.foundation.geometry import Frame, Vector
 from planar.foundation.jets import Jet, value_and_rates
 from planar.foundation.notebook_display import Displayable
@@ -120,13 +120,13 @@ class KinematicResult(Displayable):
 
     def _frame(self, link: str) -> Frame:
         if link not in self.frames:
-            raise Unknown(f"there is no link {link!r}; links are {join_names(self.frames)}")
+            raise Unknown(f"there is no link {link!r}{suggest_name(link, self.frames, 'links')}")
         return self.frames[link]
 
     def _find_relative_motion(self, name: str) -> tuple[Pair, ValueAndRates]:
         """A pair, and the relative motion that its results are of."""
         if name not in self._relative_motions:
-            raise Unknown(f"there is no pair {name!r}; pairs are {join_names(self._relative_motions)}")
+            raise Unknown(f"there is no pair {name!r}{suggest_name(name, self._relative_motions, 'pairs')}")
         pair = self._relative_motions[name]
         return pair, value_and_rates(pair.input_position_at(self.shapes, self.frames, self.own))
 
@@ -188,7 +188,7 @@ class KinematicResult(Displayable):
     def _find_point(self, name: str) -> NamedPoint:
         if name in self._point_names:
             return self._point_names[name]
-        raise Unknown(f"there is no point {name!r}; points are {join_names(self.point_names)}")
+        raise Unknown(f"there is no point {name!r}{suggest_name(name, self.point_names, 'points')}")
 
     def _point_position(self, named: NamedPoint) -> Vector:
         link, point = named.members[0]

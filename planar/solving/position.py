@@ -20,7 +20,12 @@ from planar.foundation.jets import Jet
 from planar.model.mechanism import Drive, Mechanism, replace_inputs
 from planar.results.motion import State
 from planar.solving.assembly.block_assemblies import BlockAssemblies
-from planar.solving.assembly.nearest_assembly import Assembly, AssemblySearchFailure, find_nearest_assembly
+from planar.solving.assembly.nearest_assembly import (
+    Assembly,
+    AssemblySearchFailure,
+    find_nearest_assembly,
+    sketch_distance_remarks,
+)
 from planar.solving.checks.singular_values import MIN_REGULARITY
 from planar.solving.continuation.fast_path import StraightPathCache, fast_position, is_surely_regular
 from planar.solving.lazy_frames import lazy_frames
@@ -109,11 +114,14 @@ class PositionSolver(PreparedMechanism):
 
     def remarks(self, found: Assembly) -> tuple[str, ...]:
         """What there is to say of an assembly."""
+        remarks = self.mechanism.remarks
+        if self.mechanism.sketch:
+            remarks += sketch_distance_remarks(self, found.z)
         if not (found.ties or found.is_cut_off or self.is_deflated):
-            return self.mechanism.remarks
+            return remarks
         from planar.solving.assembly.sketch_remarks import sketch_remarks  # only where there is something to say
 
-        return (*self.mechanism.remarks, *sketch_remarks(self, BlockAssemblies(self), found))
+        return (*remarks, *sketch_remarks(self, BlockAssemblies(self), found))
 
     def _is_regular(self, z: Array) -> bool:
         """Whether every block of an assembly is determined there."""

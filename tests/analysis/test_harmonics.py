@@ -540,7 +540,7 @@ def test_what_cannot_be_told_is_refused_in_one_sentence(tmp_path, words, status,
     [
         ("002-E3.6a", {}, "stroke: after a turn of 'O' it is not where it was"),
         ("000-P5", {"pairs": ("O",)}, "O: nothing slides at this pair"),
-        ("000-P5", {"points": ("Z",)}, "there is no point 'Z'; points are O, A, B"),
+        ("000-P5", {"points": ("Z",)}, "there is no point 'Z'; points are O, A and B"),
         ("000-P5", {"pairs": ("Z",)}, "there is no pair and no link 'Z'"),
     ],
 )

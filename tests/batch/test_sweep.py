@@ -285,7 +285,7 @@ def test_points_left_out_are_all_that_move():
 
 WRONG = [
     ({"BC.lenght": [1.0]}, {}, "did you mean 'BC.length'"),
-    ({"nothing": [1.0]}, {}, "no such dimension or input; there are"),
+    ({"nothing": [1.0]}, {}, "no such dimension or input; its numbers are"),
     ({"BC.length": [1.0, 2.0], "AB.length": [1.0, 2.0, 3.0]}, {}, "3 numbers, but 2 of 'BC.length'"),
     ({"BC.length": [[1.0]]}, {}, "one row of numbers"),
     ({"BC.length": [1.0, np.nan]}, {}, "not finite"),

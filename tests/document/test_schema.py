@@ -4,6 +4,9 @@ import json
 import subprocess
 import sys
 from copy import deepcopy
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, given, settings
@@ -12,15 +15,18 @@ from jsonschema import Draft202012Validator
 from jsonschema.exceptions import best_match
 
 import planar
+from planar.document.cursor import Cursor
 from planar.document.files import model_files
-from planar.document.schema import schema
+from planar.document.schema import PAIR_SCHEMA, STOP_SCHEMA, schema
 from planar.foundation.errors import BadInput
 from planar.model.pairs import pair_types
 from tests import documents as document
 from tests import random_documents
 from tests import wheel_documents as wheels
+from tests.cams import cam_document
 from tests.draws import draws
 
+EXAMPLE_FILES = Path(planar.__file__).parent / "guide" / "examples"
 VALIDATOR = Draft202012Validator(schema())
 MODELS = {file.stem: json.loads(file.read_text(encoding="utf-8")) for file in model_files()}
 SAMPLES = [pytest.param(sample, id=key) for key, kind in pair_types().items() for sample in kind.samples()]
@@ -190,3 +196,183 @@ def test_a_quantity_that_the_reader_reads_is_one_of_the_schema(text, path):
         assert wrong(value) is None
     elif "has no unit" in refusal(value):
         assert wrong(value)
+
+
+# one wrong file for each rule of the schema
+
+
+WRONG_VALUES = {"object": [], "array": {}, "string": [], "number": [], "integer": [], "boolean": 5, "null": []}
+"""In place of a value of a type: one of no type that any key takes there."""
+
+
+def resolved(part):
+    """A part of the schema, its reference followed, and where it is."""
+    name = part.get("$ref", "").rpartition("/")[2]
+    return (schema_parts()[name], name) if name else (part, "")
+
+
+@cache
+def schema_parts():
+    return schema()["$defs"]
+
+
+def key_place(where, key):
+    """The place of a key in the schema; the keys that pairs of all types share have one."""
+    return f"pair.{key}" if where.startswith("pair.") and key in STOP_SCHEMA | PAIR_SCHEMA else f"{where}.{key}"
+
+
+def broken_rules(part, value, where="file", path=()):
+    """Every rule of a part of the schema that a value follows: where the rule is, the path of the value, a wrong one.
+
+    Where a part offers several forms, those that the value has.
+    """
+    part, name = resolved(part)
+    where = name or where
+    for keyword in ("anyOf", "oneOf"):
+        for index, form in enumerate(part.get(keyword, ())):
+            if VALIDATOR.evolve(schema=form).is_valid(value):
+                yield from broken_rules(form, value, f"{where}.{keyword}[{index}]", path)
+    if "type" in part:
+        yield f"{where}.type", path, WRONG_VALUES[part["type"]]
+    if "const" in part or "enum" in part:
+        yield f"{where}.const", path, "no such word"
+    if "pattern" in part and isinstance(value, str):
+        yield f"{where}.pattern", path, ".:,"
+    for keyword, wrong_value in (("minimum", -1), ("exclusiveMinimum", -1e300), ("exclusiveMaximum", 1e300)):
+        if keyword in part and isinstance(value, int | float):
+            yield f"{where}.{keyword}", path, wrong_value
+    if isinstance(value, list) and value and "items" in part:
+        for index, item in enumerate(value):
+            yield from broken_rules(part["items"], item, f"{where}.items", (*path, index))
+        if part.get("minItems"):
+            yield f"{where}.minItems", path, value[: part["minItems"] - 1]
+        if part.get("maxItems", 99) < 99:
+            yield f"{where}.maxItems", path, [*value, *value]
+        if part.get("uniqueItems"):
+            yield f"{where}.uniqueItems", path, [value[0], value[0]]
+    if not isinstance(value, dict):
+        return
+    properties, others = part.get("properties", {}), part.get("additionalProperties")
+    for key in part.get("required", ()) if properties else ():
+        yield f"{where}.required.{key}", path, {name: item for name, item in value.items() if name != key}
+    if others is False:
+        yield f"{where}.additionalProperties", path, {**value, "no_such_key": 1}
+    if "propertyNames" in part and value:
+        yield f"{where}.propertyNames", path, {**value, "no.name": next(iter(value.values()))}
+    for key, item in value.items():
+        if key in properties or isinstance(others, dict):
+            part_place = key_place(where, key if key in properties else "*")
+            yield from broken_rules(properties.get(key, others), item, part_place, (*path, key))
+
+
+def rule_names(part, where="file", seen=frozenset()):
+    """The name of every rule of a part of the schema, as `broken_rules` names it."""
+    part, name = resolved(part)
+    where = name or where
+    if name in seen:
+        return
+    seen = seen | {name} - {""}
+    for keyword in ("anyOf", "oneOf"):
+        for index, form in enumerate(part.get(keyword, ())):
+            if set(form) != {"required"}:
+                yield from rule_names(form, f"{where}.{keyword}[{index}]", seen)
+    if "type" in part:
+        yield f"{where}.type"
+    if "const" in part or "enum" in part:
+        yield f"{where}.const"
+    yield from (f"{where}.required.{key}" for key in (part.get("required", ()) if "properties" in part else ()))
+    if part.get("additionalProperties") is False:
+        yield f"{where}.additionalProperties"
+    if isinstance(part.get("additionalProperties"), dict):
+        yield from rule_names(part["additionalProperties"], f"{where}.*", seen)
+    if "items" in part:
+        yield from rule_names(part["items"], f"{where}.items", seen)
+    for key, item in part.get("properties", {}).items():
+        if not set(item) & {"minProperties"}:
+            yield from rule_names(item, key_place(where, key), seen)
+
+
+def with_value(value, path, new):
+    if not path:
+        return new
+    copied = deepcopy(value)
+    document.put(copied, list(path), new)
+    return copied
+
+
+def json_path(path):
+    """A path as the reader writes places."""
+    place = Cursor(None)
+    for key in path:
+        place = replace(place, path=f"{place.path}[{key}]" if isinstance(key, int) else place.place_of(key))
+    return place.path
+
+
+RARE_UNITS = {
+    "acceleration": "mm/s^2",
+    "jerk": "mm/s^3",
+    "angular_acceleration": "deg/s^2",
+    "angular_jerk": "rad/s^3",
+    "moment_of_inertia": "g mm^2",
+    "torsional_stiffness": "N mm/rad",
+    "damping": "N s/mm",
+    "torsional_damping": "N mm s/rad",
+    "stress": "MPa",
+    "energy": "J",
+}
+
+
+def rare_keys():
+    """Files with the keys that no example and no model has."""
+    four_bar = document.base()
+    yield four_bar | {"units": four_bar["units"] | RARE_UNITS}
+    for piece in schema()["$defs"]["lift"]["oneOf"]:
+        motion = {"motion": piece["properties"]["motion"]["const"]}
+        law = [{**motion, "by": 20, "in": 120}, {**motion, "by": -20, "in": 120}, {"motion": "dwell", "in": 120}]
+        if "by" in piece["required"]:
+            yield cam_document("roller", law=law)
+    contact = {"modulus": "210 GPa", "poisson_ratio": 0.3, "follower_poisson_ratio": 0.3, "width": 10}
+    yield cam_document("roller", contact=contact, grooved=True, clockwise=True)
+    yield cam_document("swinging flat", side="right")
+    pins = document.base("two dyads")
+    pins["pairs"][1] |= {"links": ["crank", "rod"], "points": ["A", "A"], "stops": [None, 100]}
+    pins["pairs"][2] |= {"stops": {"C:rod,rocker": [None, 300]}, "restitution": 0.5}
+    yield pins
+    wheels_by_teeth = document.base("wheels")
+    wheels_by_teeth["pairs"][6] = {"belt": "loop", "links": ["planet", "pulley"], "teeth": [20, 40]}
+    wheels_by_teeth["pairs"][7] = {
+        "chain": "drive",
+        "links": ["pulley", "sprocket"],
+        "radii": [15, 45],
+        "crossed": True,
+    }
+    rack = wheels_by_teeth["pairs"][10]
+    wheels_by_teeth["pairs"][10] = {**rack, "teeth": 20}
+    yield wheels_by_teeth
+
+
+def test_every_rule_of_the_schema_has_its_refusal():
+    """A wrong file for each rule is refused where the rule is broken; an unknown key with those that are allowed."""
+    documents = [
+        *(document.base(name) for name in document.EXAMPLES),
+        *(json.loads(file.read_text(encoding="utf-8")) for file in sorted(EXAMPLE_FILES.glob("*.json"))),
+        *MODELS.values(),
+        *rare_keys(),
+    ]
+    tried = {}
+    for value in documents:
+        for rule, path, wrong_value in broken_rules(schema(), value):
+            if rule in tried:
+                continue
+            mistaken = with_value(value, path, wrong_value)
+            try:
+                planar.from_dict(mistaken)
+            except BadInput as problem:
+                place, holder = json_path(path), json_path(path[:-1])
+                assert problem.place.startswith(holder) or place.startswith(problem.place), (rule, place, str(problem))
+                if rule.endswith("additionalProperties"):
+                    assert " keys are " in problem.sentence, (rule, str(problem))
+                tried[rule] = problem
+            else:
+                assert VALIDATOR.is_valid(mistaken), (rule, path, wrong_value)
+    assert sorted(set(rule_names(schema())) - set(tried)) == []

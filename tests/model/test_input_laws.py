@@ -483,7 +483,7 @@ MISTAKES = [
     pytest.param([RISE | {"by": "3 mm"}], "[0].by", "an angle is wanted", id="a length for an angle"),
     pytest.param([RISE | {"by": 1e9}], "[0]", "moves to 10000 rad", id="too far"),
     pytest.param([RISE | {"ramp": 0.1}], "[0].ramp", "'cycloidal' has no 'ramp'", id="no such key"),
-    pytest.param([RISE | {"speed": "1 rad/s"}], "[0].speed", "only 'by', 'in'", id="a rise at a speed"),
+    pytest.param([RISE | {"speed": "1 rad/s"}], "[0].speed", "its keys are motion, by and in", id="a rise at a speed"),
     *(
         pytest.param([RISE | {"motion": each, "ramp": ramp}], "[0].ramp", "0.25", id=f"{each} {ramp}")
         for each in ("trapezoidal", "modified trapezoidal")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import cos, hypot, pi, sin
+from math import atan2, cos, hypot, pi, sin
 
 import numpy as np
 import pytest
@@ -10,7 +10,17 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from planar.foundation.geometry import Vector
-from planar.model.link_shapes import Along, At, Distances, Link, Point, PointDefinition, PointPlacementError, link_shape
+from planar.model.link_shapes import (
+    Along,
+    At,
+    Distances,
+    Link,
+    Offset,
+    Point,
+    PointDefinition,
+    PointPlacementError,
+    link_shape,
+)
 
 STEADY = settings(deadline=None)
 """No example is timed: the first one may load a library."""
@@ -84,6 +94,25 @@ def test_coordinates_beside_ends_are_in_the_axes_of_the_ends() -> None:
 )
 def test_along_goes_a_signed_distance_on_the_way_turned_anticlockwise(place: Along, x: float, y: float) -> None:
     assert link_shape(bar(("P", place))).points["P"] == near(x, y)
+
+
+@STEADY
+@given(PLACE, PLACE, st.floats(-10.0, 10.0), st.floats(-10.0, 10.0))
+def test_an_offset_lies_to_the_left_of_the_line(
+    p: tuple[float, float], q: tuple[float, float], distance: float, offset: float
+) -> None:
+    """By the polar form of the same place, and by the products of the line with the way to it."""
+    assume(hypot(q[0] - p[0], q[1] - p[1]) > 1e-3)
+    polar = Along("P", "Q", hypot(distance, offset), atan2(offset, distance))
+    points = link_shape(
+        drawn(("P", At(*p)), ("Q", At(*q)), ("R", Offset("P", "Q", distance, offset)), ("S", polar))
+    ).points
+    line, arm = points["Q"] - points["P"], points["R"] - points["P"]
+    length = hypot(*line)
+    rounding = 1e-11 * (1.0 + hypot(*arm))
+    assert points["R"] == pytest.approx(points["S"], abs=rounding)
+    assert line.dot(arm) / length == pytest.approx(distance, abs=rounding)
+    assert line.cross(arm) / length == pytest.approx(offset, abs=rounding)
 
 
 @STEADY

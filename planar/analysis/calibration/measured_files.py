@@ -8,10 +8,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from planar.derivatives.predicted_results import position_results
-from planar.document.cursor import suggest_spelling
 from planar.document.tables.measured_table import MeasuredColumn, MeasuredTable
 from planar.foundation.arrays import Array
-from planar.foundation.errors import BadInput, join_names
+from planar.foundation.errors import BadInput, join_names, suggest_spelling
 from planar.foundation.units import UnitError, parse_unit
 from planar.model.mechanism import Mechanism, relative_motions
 from planar.results.motion import State

@@ -7,8 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from planar.analysis.worked.published import Comparison, compare_value
-from planar.document.cursor import suggest_spelling
-from planar.foundation.errors import BadInput, Unknown, join_names
+from planar.foundation.errors import BadInput, Unknown, suggest_name
 from planar.model.mechanism import PUBLISHED_QUANTITIES, PublishedValue, relative_motions
 from planar.model.pairs import MeasureKind
 from planar.results.motion import State
@@ -70,8 +69,7 @@ def read_question(text: str, questions: tuple[PublishedValue, ...]) -> Published
     if len(alike) == 1:
         return alike.pop()
     asked = [question_text(item) for item in questions]
-    meant = suggest_spelling(text, asked) or f"; asked are {join_names(asked, 4)}"
-    raise BadInput("quantity", f"{text[:60]!r} is not asked{meant}")
+    raise BadInput("quantity", f"{text[:60]!r} is not asked{suggest_name(text, asked, 'questions', 4)}")
 
 
 def solve_question(state: State, item: PublishedValue) -> Comparison:

@@ -80,7 +80,7 @@ def _varied_numbers(mechanism: Mechanism) -> Iterator[Dimension]:
     """Lengths of links, and the inputs' numbers; nothing that is zero but for an input's angle."""
     for each in file_dimensions(mechanism).values():
         of_link = each.path[0] == "links" and each.kind == "length" and each.link != mechanism.frame
-        is_length = of_link and each.path[-1] in ("length", "distance")
+        is_length = of_link and each.path[-1] in ("length", "distance", "offset")
         of_input = each.path[0] == "inputs" and each.path[-1] in ("position", "velocity", "acceleration")
         if (is_length and each.value) or (of_input and (each.value or each.kind == "angle")):
             yield each

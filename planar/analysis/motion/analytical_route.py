@@ -12,7 +12,7 @@ from planar.analysis.motion.harmonics import Harmonics, full_turn, harmonics
 from planar.analysis.motion.output import Extreme
 from planar.analysis.motion.piston import Deviation, Piston, RodPointMotion, find_piston
 from planar.foundation.arrays import Array
-from planar.foundation.errors import BadInput
+from planar.foundation.errors import BadInput, suggest_name
 from planar.foundation.short_repr import short_repr
 from planar.model.mechanism import Mechanism, named_points, relative_motions
 from planar.model.pairs import MeasureKind
@@ -111,8 +111,8 @@ def _unambiguous_point(mechanism: Mechanism, name: str) -> tuple[str, str]:
         for link, point in each.members:
             if name in (each.name, f"{link}.{point}"):
                 return link, point
-    known = ", ".join(each.name for each in named_points(mechanism))
-    raise BadInput(name, f"there is no point {name!r}; points are {known}")
+    hint = suggest_name(name, (each.name for each in named_points(mechanism)), "points")
+    raise BadInput(name, f"there is no point {name!r}{hint}")
 
 
 def _analytical_route(

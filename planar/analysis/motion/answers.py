@@ -13,7 +13,7 @@ from planar.analysis.motion.output import Axis, Extreme, Output
 from planar.analysis.motion.time_ratio import TimeRatio, find_time_ratio
 from planar.analysis.motion.transmission_angle import Transmission, transmission
 from planar.document.first_argument import takes_result
-from planar.foundation.errors import BadInput, Unknown
+from planar.foundation.errors import BadInput, Unknown, suggest_name_of_kinds
 from planar.foundation.short_repr import short_repr
 from planar.model.mechanism import relative_motions
 from planar.results.motion import Motion
@@ -69,10 +69,8 @@ def answers(motion: Motion, name: str) -> tuple[Answers, ...]:
     if name in motion._point_names:
         found.append(_point_answers(motion, steady, name))
     if not found:
-        raise Unknown(
-            f"there is no pair, link or point {name!r}; pairs are {', '.join(relative_motions(motion.mechanism))}, "
-            f"links {', '.join(motion.frames)}, points {', '.join(motion.point_names)}"
-        )
+        known = {"pairs": relative_motions(motion.mechanism), "links": motion.frames, "points": motion.point_names}
+        raise Unknown(f"there is no pair, link or point {name!r}{suggest_name_of_kinds(name, known)}")
     return tuple(found)
 
 

@@ -13,7 +13,7 @@ from planar.analysis.motion.output import Extreme
 from planar.document.first_argument import takes_mechanism
 from planar.equations.mechanism_numbers import mechanism_size, shapes_of_links
 from planar.foundation.arrays import Array
-from planar.foundation.errors import BadInput, NoAnswer, Outcome, Unknown
+from planar.foundation.errors import BadInput, NoAnswer, Outcome, Unknown, suggest_name_of_kinds
 from planar.foundation.short_repr import short_repr
 from planar.model.mechanism import Drive, Mechanism, relative_motions, replace_inputs
 from planar.model.pairs import MeasureKind
@@ -217,8 +217,8 @@ def _quantity_kind(motion: Motion, of: str, axis: str | None) -> str:
         return "angle"
     if of in motion.point_names:
         raise BadInput(of, "of a point the harmonics of one coordinate are found; name the axis, 'x' or 'y'")
-    told = f"pairs are {', '.join(named)}; links are {', '.join(motion.frames)}"
-    raise BadInput(of, f"there is no pair and no link {of!r}; {told}")
+    hint = suggest_name_of_kinds(of, {"pairs": named, "links": motion.frames})
+    raise BadInput(of, f"there is no pair and no link {of!r}{hint}")
 
 
 def _value_and_rates(motion: Motion, of: str, axis: str | None) -> list[Array]:

@@ -15,7 +15,7 @@ from planar.analysis.rate_equations import Rate, RateEquations, rate_equations
 from planar.document.first_argument import takes_result
 from planar.dynamics.virtual_velocities import has_length_motion, unit_rate_state
 from planar.foundation.arrays import Array
-from planar.foundation.errors import BadInput, NoAnswer, Unknown
+from planar.foundation.errors import BadInput, NoAnswer, Unknown, suggest_name_of_kinds
 from planar.model.mechanism import Input, relative_motions
 from planar.model.wording import REST_TOLERANCE, join_all_names
 from planar.results.motion import State
@@ -136,10 +136,8 @@ class _AdvantagesOverInput:
                 links,
                 lambda motion: _pair_rate(found, slopes, motion),
             )
-        raise Unknown(
-            f"there is no point, link or pair {name!r}; points are {', '.join(state.point_names)}, "
-            f"links {', '.join(state.frames)}, pairs {', '.join(named)}"
-        )
+        hint = suggest_name_of_kinds(name, {"points": state.point_names, "links": state.frames, "pairs": named})
+        raise Unknown(f"there is no point, link or pair {name!r}{hint}")
 
     def _rate_by_centres(
         self, links: tuple[str, ...], read: Callable[[PoleOfLink], float]

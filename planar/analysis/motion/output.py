@@ -13,7 +13,7 @@ import numpy as np
 from planar.analysis.interpolated_run import CLOSED_TOLERANCE, InterpolatedRun
 from planar.analysis.motion.zeros import bracket_near_zeros, bracket_zeros
 from planar.foundation.arrays import Array
-from planar.foundation.errors import BadInput, NoAnswer, Unknown
+from planar.foundation.errors import BadInput, NoAnswer, Unknown, suggest_name_of_kinds
 from planar.foundation.jets import value_and_rates
 from planar.foundation.root_finding import find_root
 from planar.model.mechanism import relative_motions
@@ -52,9 +52,8 @@ class Output:
         elif not self._is_pair and name not in moving.frames:
             if name in moving.point_names:
                 raise BadInput(name, "of a point one coordinate is meant; name the axis, 'x' or 'y', or a direction")
-            raise Unknown(
-                f"there is no pair and no link {name!r}; pairs are {', '.join(named)}, links {', '.join(moving.frames)}"
-            )
+            hint = suggest_name_of_kinds(name, {"pairs": named, "links": moving.frames})
+            raise Unknown(f"there is no pair and no link {name!r}{hint}")
         length = self._direction is not None or (self._is_pair and named[name].input_kind is MeasureKind.LENGTH)
         self.kind = "length" if length else "angle"
         self.tolerance = CLOSED_TOLERANCE * run.solver.unit if length else CLOSED_TOLERANCE

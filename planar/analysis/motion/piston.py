@@ -17,7 +17,7 @@ from planar.analysis.identity.kinematic_scheme import (
     pin_distance,
 )
 from planar.foundation.arrays import Array
-from planar.foundation.errors import BadInput
+from planar.foundation.errors import BadInput, suggest_name
 from planar.foundation.geometry import Vector
 from planar.foundation.jets import Jet
 from planar.foundation.root_finding import find_root
@@ -241,7 +241,7 @@ def find_piston(mechanism: Mechanism, pair: str) -> Piston | None:
     frame that is driven. Raises BadInput where there is no such pair, NoAnswer where the mechanism cannot be solved.
     """
     if pair not in relative_motions(mechanism):
-        raise BadInput(pair, f"there is no pair {pair!r}; pairs are {', '.join(relative_motions(mechanism))}")
+        raise BadInput(pair, f"there is no pair {pair!r}{suggest_name(pair, relative_motions(mechanism), 'pairs')}")
     chain = kinematic_scheme(mechanism)
     slide = next((joint for joint in chain.joints if joint.slides and joint.name == pair), None)
     if slide is None or mechanism.frame not in slide.locations:

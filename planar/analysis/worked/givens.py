@@ -11,7 +11,7 @@ from planar.analysis.rate_equations import SlideJoint, rate_equations
 from planar.analysis.rich_text import MeasuredValue, Phrase, list_phrases
 from planar.foundation.units import SI_UNITS, parse_unit
 from planar.model.file_units import FileUnits, unit_of_kind
-from planar.model.link_shapes import Along, At, Distances, Link
+from planar.model.link_shapes import Along, At, Distances, Link, Offset
 from planar.model.mechanism import Mechanism, pair_entries, relative_motions
 from planar.model.pairs import MeasureKind, Pair
 from planar.model.wording import amount, turning_sense
@@ -97,6 +97,14 @@ def _link_phrases(mechanism: Mechanism, link: Link) -> Iterator[Phrase]:
             where = f", at {turned} from {way}{back}" if turned else f" on {way}{back}"
             away = _format_amount(abs(float(place.distance)), "length", units)
             told.append(f"{point.name}{where}, {_line_name(place.start, point.name)} = {away}")
+        elif isinstance(place, Offset):
+            line = _line_name(place.start, place.towards)
+            along, across = (
+                _format_amount(abs(float(size)), "length", units) for size in (place.distance, place.offset)
+            )
+            back = " produced back" if float(place.distance) < 0.0 else ""
+            side = "right" if float(place.offset) < 0.0 else "left"
+            told.append(f"{point.name}: {along} from {place.start} along {line}{back}, {across} to the {side} of it")
         elif isinstance(place, Distances):
             lengths = [
                 f"{_line_name(end, point.name)} = {_format_amount(float(each), 'length', units)}"

@@ -7,9 +7,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from planar.document.cursor import suggest_spelling
 from planar.foundation.arrays import Array, IntArray
-from planar.foundation.errors import BadInput, join_names
+from planar.foundation.errors import BadInput, join_names, suggest_name
 from planar.foundation.short_repr import short_repr
 
 ORDERS = ("position", "velocity", "acceleration")
@@ -54,8 +53,8 @@ def read_weights(weights: RunWeights, index: Mapping[str, int], rates: bool, cou
         first = wide * ORDERS.index(order)
         for point, given in points.items():
             if point not in index:
-                meant = suggest_spelling(str(point), index, cutoff=0.5) or f"; there are {join_names(index)}"
-                raise BadInput(f"weights[{order!r}]", f"the run was not prepared with the point {point!r:.60}{meant}")
+                hint = suggest_name(str(point), index, "its points")
+                raise BadInput(f"weights[{order!r}]", f"the run was not prepared with the point {point!r:.60}{hint}")
             row = first + index[point]
             rows += (row, row + 1)
             is_read = type(given) is np.ndarray and given.dtype is DOUBLE and given.shape == shape
@@ -96,6 +95,6 @@ def read_names(of: Sequence[str] | str | None, known: Iterable[str]) -> tuple[st
     names = tuple(dict.fromkeys([of] if isinstance(of, str) else of))
     for name in names:
         if name not in known:
-            meant = suggest_spelling(str(name), known, cutoff=0.5) or f"; there are {', '.join(known[:12])}"
-            raise BadInput("of", f"there is no derivative in a number {str(name)!r:.60}{meant}")
+            hint = suggest_name(str(name), known, "numbers")
+            raise BadInput("of", f"there is no derivative in a number {str(name)!r:.60}{hint}")
     return names

@@ -22,12 +22,11 @@ from planar.batch.reference_design import ReferenceDesign
 from planar.derivatives.design_equations import DesignEquations, design_equations
 from planar.derivatives.implicit_system import ImplicitSystem
 from planar.derivatives.result_slopes import OPENING, pair_gaps, tied_dimensions
-from planar.document.cursor import suggest_spelling
 from planar.document.dimensions import value_at
 from planar.equations.casadi_call import BufferedFunction
 from planar.equations.elimination import stack_expressions
 from planar.foundation.arrays import Array, BoolArray
-from planar.foundation.errors import BadInput
+from planar.foundation.errors import BadInput, suggest_name
 
 Expression = tuple[str, ca.SX]
 """What is derived, as `position of E`, and its parts (parts,)."""
@@ -45,8 +44,8 @@ class DesignSlopes:
         names = list(self.design.names)
         for each in results.derivatives:
             if each not in names:
-                meant = suggest_spelling(each, names, cutoff=0.5) or "; see planar.dimensions"
-                raise BadInput("derivatives", f"nothing is derived in {each!r:.60}{meant}")
+                hint = suggest_name(each, names, "numbers")
+                raise BadInput("derivatives", f"nothing is derived in {each!r:.60}{hint}")
         self.columns = [names.index(each) for each in results.derivatives]
         self.rest = [k for k in range(len(names)) if k not in self.columns]
         self.scale = self.design.scale[self.columns]

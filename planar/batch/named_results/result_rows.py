@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
-from planar.document.cursor import suggest_spelling
-from planar.foundation.errors import BadInput
+from planar.foundation.errors import BadInput, suggest_name
 from planar.model.mechanism import Mechanism, relative_motions
 from planar.model.pairs import MeasureKind
 
@@ -87,6 +86,6 @@ def select_names(place: str, given: Sequence[str] | str, known: Sequence[str]) -
     asked = [given] if isinstance(given, str) else list(given)
     for each in asked:
         if each not in known:
-            meant = suggest_spelling(str(each), known, cutoff=0.5) or f"; there are {', '.join(list(known)[:12])}"
-            raise BadInput(place, f"there is nothing of the name {each!r:.60} here{meant}")
+            hint = suggest_name(str(each), known, "names here")
+            raise BadInput(place, f"there is nothing of the name {each!r:.60} here{hint}")
     return tuple(dict.fromkeys(asked))

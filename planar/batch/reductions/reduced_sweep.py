@@ -22,8 +22,7 @@ from planar.batch.reductions.point_reductions import (
 )
 from planar.batch.results import Sweep, SweepNotes
 from planar.batch.stores.store import BlockStore, MemoryStore, SweepPlan
-from planar.document.cursor import suggest_spelling
-from planar.foundation.errors import BadInput, Outcome
+from planar.foundation.errors import BadInput, Outcome, suggest_name
 from planar.foundation.short_repr import short_repr
 
 Array = np.ndarray
@@ -135,8 +134,8 @@ def _read_reduction(name: str, given: Any, result_name: Callable[[str], Any], st
             return told
         if measure not in MEASURES:
             known = [*MEASURES, *(f"{result}{EXTREMES_ENDING}" for result in RESULTS)]
-            meant = suggest_spelling(measure, known, cutoff=0.5) or f"; there are {', '.join(known)}"
-            raise BadInput(f"reduce.{name}", f"there is no measure {given!r:.60}{meant}")
+            hint = suggest_name(measure, known, "measures", None)
+            raise BadInput(f"reduce.{name}", f"there is no measure {given!r:.60}{hint}")
         if measure == "fourier_descriptors" and steps <= 2 * HARMONICS:
             raise BadInput(f"reduce.{name}", f"{HARMONICS} harmonics want more than {2 * HARMONICS} steps")
         measured: Reduction[Any] = PointReduction(result_name(point), measure)

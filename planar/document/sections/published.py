@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from planar.document.cursor import Cursor, suggest_name, suggest_spelling
+from planar.document.cursor import Cursor
 from planar.document.names import find_motion, find_point
 from planar.document.schema import DRIVE_SCHEMA, PUBLISHED_SCHEMA, SENSE_WORDS
+from planar.foundation.errors import suggest_name
 from planar.model.mechanism import PUBLISHED_QUANTITIES, Drive, Mechanism, PublishedValue, relative_motions
 
 
@@ -15,9 +16,8 @@ def read_published(cursor: Cursor, mechanism: Mechanism, points: Mapping[str, st
     cursor.check_keys(*PUBLISHED_SCHEMA)
     quantity = cursor["quantity"].as_text()
     if quantity not in PUBLISHED_QUANTITIES:
-        raise cursor.error_at(
-            "quantity", f"{quantity!r} is no quantity{suggest_spelling(quantity, PUBLISHED_QUANTITIES)}"
-        )
+        hint = suggest_name(quantity, PUBLISHED_QUANTITIES, "quantities", None)
+        raise cursor.error_at("quantity", f"{quantity!r} is no quantity{hint}")
     kind = PUBLISHED_QUANTITIES[quantity]
     of, relative_to = cursor["of"].as_text(), cursor.text("relative_to")
     if quantity.startswith("angular"):

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from planar.document.cursor import Cursor, suggest_name, suggest_spelling
+from planar.document.cursor import Cursor
 from planar.document.dimensions import Dimension, file_dimensions, find_dimension
 from planar.document.schema import TOLERANCE_SCHEMA
-from planar.foundation.errors import BadInput
+from planar.foundation.errors import BadInput, suggest_name, suggest_spelling
 from planar.model.mechanism import Mechanism, pair_entries
 from planar.model.pairs import Pair
 from planar.model.tolerances.iso_286 import FitError, greatest_clearance, parse_fit

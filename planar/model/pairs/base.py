@@ -185,6 +185,20 @@ class Pair(ABC):
         """What is to be said of it to who reads its mechanism's results."""
         return ()
 
+    def completed_by_sketch(
+        self,
+        entry: EntryReader,
+        shapes: Mapping[str, LinkShape],
+        sketched_frames: Mapping[str, Frame],
+        places: Mapping[str, Vector],
+    ) -> tuple[Self, str] | None:
+        """The pair with what its entry leaves out as the sketch decides it, and a sentence; None where nothing is.
+
+        `sketched_frames`: where the links stand whose place the sketch gives; `places` (m): where it has the points of
+        the second link.
+        """
+        return None
+
     @property
     def measures_symbols(self) -> bool:
         """Whether `measure` takes symbols too, and not numbers and arrays alone."""

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from math import pi
+from math import pi, sqrt
 from typing import Any, ClassVar, Self
 
+from planar.foundation.errors import join_names
 from planar.foundation.geometry import Frame, Vector, direction, frame_at
 from planar.foundation.jets import Scalar
 from planar.model.entry_reader import EntryReader, QuantityWriter
@@ -142,6 +143,45 @@ class SlidingPair(GuidedPair):
             SliderMark(self.name, block, shapes[block].position(self.point), along_block, guide),
         )
 
+    def completed_by_sketch(
+        self,
+        entry: EntryReader,
+        shapes: Mapping[str, LinkShape],
+        sketched_frames: Mapping[str, Frame],
+        places: Mapping[str, Vector],
+    ) -> tuple[Self, str] | None:
+        """With a `turn` of a quarter or half turn where it is left out and the sketched points fit no turn of 0.
+
+        Across the line the second link cannot move, so that the misfit of a turn is known without the displacement.
+        """
+        first, second = self.links
+        if entry.has("turn") or not places or first not in sketched_frames:
+            return None
+        through, line_direction = self._line_in_link(shapes)
+        guide, point = sketched_frames[first], shapes[second].position(self.point)
+        x_axis = guide.rotate_to_world(line_direction)
+        arms = {name: shapes[second].points[name] - point for name in places}
+        sketched = {
+            name: (place - guide.to_world(through)).rotate(Vector(x_axis.x, -x_axis.y))
+            for name, place in places.items()
+        }
+        misfits = {}
+        for turn in (0.0, pi / 2, -pi / 2, pi):
+            gaps = [sketched[name] - arm.rotate(direction(turn)) for name, arm in arms.items()]
+            displacement = sum(gap.x for gap in gaps) / len(gaps)
+            misfits[turn] = sqrt(sum((gap.x - displacement) ** 2 + gap.y**2 for gap in gaps) / len(gaps))
+        best, second_best = sorted(misfits, key=misfits.__getitem__)[:2]
+        extent = max(sqrt(arm.dot(arm)) for arm in arms.values())
+        is_decided = misfits[0.0] > 0.5 * extent and misfits[second_best] > 2.0 * misfits[best] + 1e-6 * extent
+        if best == 0.0 or not is_decided:
+            return None
+        degrees = f"{best * 180 / pi:.0f}"
+        remark = (
+            f"'turn' of {self.name!r} is left out; {degrees} deg is assumed, as the sketch of {join_names(places)} has "
+            f'link {second!r} at that angle to the line; write "turn": "{degrees} deg" to confirm it, or "turn": 0'
+        )
+        return replace(self, block_angle=best), remark
+
     @classmethod
     def expand_short_form(cls, entry: EntryReader) -> ExpandedEntry | None:
         """`"on": link, "block": point`: a block of its own, pinned at the point to the links that carry it."""
@@ -150,9 +190,21 @@ class SlidingPair(GuidedPair):
                 raise entry.error_at("on", "'on' goes with a 'block'; without one name two 'links' and a 'point'")
             return None
         entry.check_keys(*(key for key in (cls.keyword, *cls.entry_schemas) if key not in ("links", "point")))
-        on, point = entry.link("on"), entry.name("block")
+        on, written = entry.link("on"), entry.text("block") or ""
+        link, _, link_point = written.partition(".")
+        if link_point and link in entry.links_with_point(link_point):
+            raise entry.error_at(
+                "block",
+                f"a block is a new link, pinned at a point of other links, and 'block' names that point; for link "
+                f'{link!r} itself to slide write "links": ["{on}", "{link}"], "point": "{link_point}"',
+            )
+        point = entry.name("block")
         if not entry.links_with_point(point):
-            raise entry.error_at("block", f"no link carries a point {point!r}, at which the block would be pinned")
+            raise entry.error_at(
+                "block",
+                f"a block is a new link, pinned at a point of other links, and no link carries a point {point!r}; "
+                "for a link that exists to slide write 'links' and 'point'",
+            )
         block = f"block {point}"
         full = {key: value for key, value in entry.fields().items() if key not in ("on", "block")}
         full |= {"links": [on, block], "point": point}

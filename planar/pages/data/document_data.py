@@ -7,7 +7,7 @@ from typing import Any
 
 from planar.document.dimensions import Dimension
 from planar.document.files import to_dict
-from planar.model.link_shapes import Along, At, Distances, PointDefinition
+from planar.model.link_shapes import At, Distances, Offset, PointDefinition
 from planar.model.mechanism import Input, Mechanism
 
 LENGTH_DEPTH = 3
@@ -38,7 +38,9 @@ def dimension_words(mechanism: Mechanism, dimension: Dimension) -> str:
     point, place = dimension.path[3], _place(mechanism, dimension)
     if isinstance(place, At):
         return f"{part} of {point}"
-    return f"{place.start if isinstance(place, Along) else part} to {point}"
+    if isinstance(place, Offset) and part == "offset":
+        return f"offset of {point} from {place.start}{place.towards}"
+    return f"{part if isinstance(place, Distances) else place.start} to {point}"
 
 
 def is_positive_length(mechanism: Mechanism, dimension: Dimension) -> bool:

@@ -12,7 +12,7 @@ from rich.text import Text
 
 from planar.assemblies.circuits.circuits import Circuits
 from planar.assemblies.modes import Mode, Modes, ModesBlock
-from planar.foundation.errors import BadInput, Outcome
+from planar.foundation.errors import BadInput, Outcome, suggest_name
 from planar.foundation.units import parse_unit
 from planar.model.mechanism import relative_motions
 from planar.model.wording import amount, count_phrase, join_all_names
@@ -179,7 +179,7 @@ def _check_points(modes: Modes, points: Sequence[str]) -> list[str]:
     known = modes.places
     for name in points:
         if name not in known:
-            raise BadInput("--point", f"there is no point {name!r}; points are {', '.join(known)}")
+            raise BadInput("--point", f"there is no point {name!r}{suggest_name(name, known, 'points')}")
     return list(points)
 
 

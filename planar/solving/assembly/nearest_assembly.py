@@ -1,17 +1,24 @@
-"""The assembly nearest to the sketch, found block after block."""
+"""The assembly nearest to the sketch, found block after block, and how far from the sketch it lies."""
 
 from __future__ import annotations
 
 import heapq
 from collections.abc import Callable
 from itertools import count
+from math import hypot, pi, remainder, tau
 from typing import NamedTuple
 
 import numpy as np
 
+from planar.equations.coordinates import frames_from_coordinates
 from planar.equations.symbolic_equations import Block
 from planar.foundation.arrays import Array
+from planar.foundation.geometry import GROUND
+from planar.foundation.units import parse_unit
+from planar.model.link_shapes import fitted_frame
+from planar.model.mechanism import named_points, sketched_places
 from planar.solving.assembly.block_assemblies import BlockAssemblies, BlockAssembly, block_dependencies
+from planar.solving.prepared_mechanism import PreparedMechanism
 
 EQUAL_DISTANCE_TOLERANCE = 1e-9
 """Assemblies whose sums of squared distances to the sketch (sizes squared) agree to this fit alike."""
@@ -19,6 +26,10 @@ MAX_TIED = 64
 """Assemblies that fit alike among which one is looked for whose rates are determined."""
 MAX_EXPANSIONS = 1000
 """Blocks solved before the search stops looking for a nearer assembly and takes the best way to an end."""
+FAR_FROM_SKETCH = 0.1
+"""The part of the mechanism's size by which a point may be off its sketch without a remark."""
+TURNED_FROM_SKETCH = pi / 4
+"""The angle (rad) by which a link may be turned against its sketched points without a remark."""
 
 
 class Assembly(NamedTuple):
@@ -139,3 +150,41 @@ def find_nearest_assembly(
         assert groups.last_failure is not None
         return groups.last_failure._replace(solved_blocks=expansions)
     return Assembly((taken or chosen).z, (taken or chosen).ties if tied else (), expansions >= MAX_EXPANSIONS)
+
+
+def sketch_distance_remarks(setup: PreparedMechanism, z: Array) -> tuple[str, ...]:
+    """A sentence on an assembly that lies far from the sketch: the farthest point, and the link that is turned most."""
+    mechanism, places = setup.mechanism, sketched_places(setup.mechanism)
+    w = setup.functions.coordinates(z, setup.inputs.u, setup.inputs.p) * setup.scale
+    frames, _ = frames_from_coordinates(w, setup.column, [*places], {})
+    frames[mechanism.frame] = GROUND
+    distances = {
+        (link, point): hypot(*(frames[link].to_world(setup.shapes[link].position(point)) - place))
+        for link, points in places.items()
+        for point, place in points.items()
+    }
+    turns = {
+        link: remainder(float(frames[link].angle) - sketched.angle, tau)
+        for link, points in places.items()
+        if link != mechanism.frame and (sketched := fitted_frame(setup.shapes[link], points)) is not None
+    }
+    clauses = []
+    farthest = max(distances, key=lambda member: distances[member])
+    if distances[farthest] > FAR_FROM_SKETCH * _diagonal(setup, w):
+        name = next(point.name for point in named_points(mechanism) if farthest in point.members)
+        distance = parse_unit(mechanism.units.length).from_si(float(distances[farthest]))
+        clauses.append(f"{name} is {distance:.4g} {mechanism.units.length} from where it is sketched")
+    link = max(turns, key=lambda name: abs(turns[name]), default="")
+    if link and abs(turns[link]) > TURNED_FROM_SKETCH:
+        clauses.append(f"link {link!r} is turned by {turns[link] * 180 / pi:.4g} deg against its sketched points")
+    if not clauses:
+        return ()
+    return (f"at the file's inputs {' and '.join(clauses)}, far from the sketch; check lengths, angles and sketch",)
+
+
+def _diagonal(setup: PreparedMechanism, w: Array) -> float:
+    """The diagonal (m) of the box round all points of links."""
+    frames, _ = frames_from_coordinates(w, setup.column, [*setup.shapes], {})
+    points = [frames[link].to_world(point) for link, shape in setup.shapes.items() for point in shape.points.values()]
+    x, y = [float(point.x) for point in points], [float(point.y) for point in points]
+    return hypot(max(x) - min(x), max(y) - min(y))

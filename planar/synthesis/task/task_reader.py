@@ -9,12 +9,12 @@ from math import inf
 from pathlib import Path
 from typing import Any
 
-from planar.document.cursor import Cursor, FileContext, describe_value, suggest_name
+from planar.document.cursor import Cursor, FileContext, describe_value
 from planar.document.files import find_model_file, load, load_value
 from planar.document.reader import read_mechanism, read_units
 from planar.document.schema import FORMAT_VERSION
 from planar.document.writer import write_mechanism
-from planar.foundation.errors import BadInput
+from planar.foundation.errors import BadInput, suggest_name
 from planar.model.mechanism import Mechanism
 from planar.synthesis.task.demands_reader import read_demands
 from planar.synthesis.task.synthesis_task import ChainStart, SynthesisTask, Wanted

@@ -7,9 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from planar.document.cursor import Cursor, suggest_name
+from planar.document.cursor import Cursor
 from planar.document.names import find_motion, find_point, point_aliases
 from planar.foundation.arrays import Array
+from planar.foundation.errors import suggest_name
 from planar.model.mechanism import Mechanism, named_points, relative_motions
 from planar.synthesis.task.synthesis_task import Wanted, WantedFunction, WantedPath, WantedPoses
 from planar.synthesis.task.task_numbers import motion_kind
