@@ -29,6 +29,7 @@ PLATE = {
             "points": {
                 "E": {"along": ["B", "C"], "distance": 40},
                 "H": {"along": ["B", "C"], "distance": 30, "angle": 90},
+                "J": {"along": ["B", "C"], "distance": 45, "offset": 20},
                 "F": {"distances": {"B": 45, "C": 30}, "right_of": ["B", "C"]},
                 "G": [20, -10],
             },

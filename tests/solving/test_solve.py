@@ -26,6 +26,76 @@ def mechanism(links, pairs, inputs, sketch=None, frame="frame"):
 lengths = st.floats(0.2, 2.0)
 
 
+def governor(turn, sketch, guide_angle=90.0):
+    """Half a Porter governor: arms of 12 on a spindle, a sleeve with its pin 1.5 beside the axis."""
+    slide = {
+        "sliding": "lift",
+        "links": ["spindle", "sleeve"],
+        "line": {"through": "A", "angle": guide_angle},
+        "point": "S",
+    }
+    links = {
+        "spindle": {"points": {"A": [0, 0]}},
+        "arm": {"ends": ["A", "B"], "length": 12},
+        "rod": {"ends": ["B", "C"], "length": 12},
+        "sleeve": {"points": {"S": [0, 0], "C": [1.5, 0]}},
+    }
+    pairs = [{"turning": "A"}, {"turning": "B"}, {"turning": "C"}, slide | ({} if turn is None else {"turn": turn})]
+    return mechanism(links, pairs, [{"pair": "A", "position": -48.19}], sketch, "spindle")
+
+
+@pytest.mark.parametrize("turn", [90, -90])
+def test_a_turn_that_is_left_out_is_that_of_the_sketch(turn):
+    """The pin lies on the side of the axis where it is sketched, at the height of a triangle with the arms."""
+    x = -1.5 if turn == 90 else 1.5
+    state = planar.solve(governor(None, {"C": [x * 1.1, -19.0]}))
+    arm = 12.0 * np.array([np.cos(48.19 * DEG), -np.sin(48.19 * DEG)])
+    y = arm[1] - np.sqrt(12.0**2 - (arm[0] - x) ** 2)
+    assert state.point("C").position == pytest.approx([x, y], abs=1e-12)
+    assert any(f"{turn} deg is assumed" in remark for remark in state.remarks)
+    written = planar.to_dict(state.mechanism)
+    assert written["pairs"][3]["turn"] == pytest.approx(turn)
+    assert not any("assumed" in remark for remark in planar.from_dict(written).remarks)
+
+
+@pytest.mark.parametrize(
+    ("turn", "sketch"),
+    [
+        (None, {}),
+        (None, {"B": [8, -9]}),  # no point of the sleeve
+        (None, {"C": [0.0, -19.0]}),  # on the line, as a turn of 0 has it
+        (None, {"C": [0.6, -19.0]}),  # between two turns
+        (0, {"C": [1.5, -19.0]}),  # the file decides
+        (180, {"C": [1.5, -19.0]}),
+    ],
+)
+def test_a_turn_is_kept_that_the_file_gives_or_the_sketch_leaves_open(turn, sketch):
+    made = governor(turn, sketch)
+    assert planar.to_dict(made)["pairs"][3].get("turn", 0) == pytest.approx(turn or 0)
+    assert not any("assumed" in remark for remark in made.remarks)
+
+
+@given(st.sampled_from([0, 90, -90, 180]), st.floats(-180.0, 180.0), st.floats(-0.4, 0.4), st.floats(-0.4, 0.4))
+def test_any_turn_is_read_from_a_rough_sketch_of_two_points(turn, guide_angle, dx, dy):
+    """Both points of the sleeve sketched within a third of its length, along any line."""
+    way = np.exp(1j * guide_angle * DEG)
+    s, c = 5.0 * way, 5.0 * way + 1.5 * way * np.exp(1j * turn * DEG)
+    made = governor(None, {"S": [s.real, s.imag], "C": [c.real + dx, c.imag + dy]}, guide_angle)
+    assert planar.to_dict(made)["pairs"][3].get("turn", 0) == pytest.approx(turn, abs=1e-9)
+
+
+def test_a_position_far_from_the_sketch_names_the_point_and_the_link():
+    """The sleeve of a turn of 0 has its pin on the axis, 1.5 from the sketch; its two points are turned by 90 deg."""
+    state = planar.solve(governor(0, {"C": [1.5, -17.9], "S": [0.0, -17.9]}))
+    (remark,) = (text for text in state.remarks if "far from the sketch" in text)
+    assert "link 'sleeve' is turned by 90 deg" in remark
+    far = planar.solve(governor(0, {"C": [0.0, -25.0]}))
+    gap = abs(far.point("C").position[1] + 25.0)
+    assert any(f"C is {gap:.4g} m from where it is sketched" in remark for remark in far.remarks)
+    near = planar.solve(governor(0, {"C": [0.0, -18.0]}))
+    assert not any("sketched" in remark for remark in near.remarks)
+
+
 @given(lengths, lengths, lengths, lengths, st.floats(-3.1, 3.1), st.booleans())
 def test_four_bar_satisfies_freudenstein_and_its_derivatives(a, b, c, d, theta, up):
     """K1 cos(phi) - K2 cos(theta) + K3 = cos(theta - phi) (F. Freudenstein, Trans. ASME 77, 1955), both assemblies."""

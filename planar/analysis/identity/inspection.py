@@ -131,7 +131,7 @@ def inspect(mechanism: Mechanism) -> Inspection:
         is_linkage=is_mechanism and not higher,
         linkage_reason=_linkage_reason(is_mechanism, higher),
         actions=describe_actions(mechanism),
-        remarks=attachment_remarks(mechanism),
+        remarks=(*mechanism.remarks, *attachment_remarks(mechanism)),
         structure=structure,
         structure_reason=no_structure,
         dimensions={name: _describe_number(mechanism, each) for name, each in file_dimensions(mechanism).items()},
