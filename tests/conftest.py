@@ -3,7 +3,9 @@
 import atexit
 import gc
 import os
+import re
 import sys
+from collections import Counter
 from tempfile import TemporaryDirectory
 
 import pytest
@@ -22,6 +24,18 @@ os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 sys.dont_write_bytecode = False
 
 load_profile()
+
+
+MISSING_PROGRAM = re.compile(r"could not import '([\w.]+)'|needs ([\w.]+)")
+"""How a test says which program or folder it is skipped for: by `pytest.importorskip`, or in its own words."""
+
+
+def pytest_terminal_summary(terminalreporter):
+    """Count the tests that are skipped for want of a program, by its name."""
+    reasons = (str(report.longrepr[2]) for report in terminalreporter.stats.get("skipped", ()))
+    missing = Counter(match[1] or match[2] for reason in reasons if (match := MISSING_PROGRAM.search(reason)))
+    names = ", ".join(f"{name} {count}" for name, count in sorted(missing.items())) or "none"
+    terminalreporter.write_line(f"tests skipped for want of a program: {sum(missing.values())} ({names})")
 
 
 @pytest.hookimpl(wrapper=True)

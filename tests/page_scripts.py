@@ -71,7 +71,7 @@ CLOSE = 1e-12
 """Of the greatest of its kind: as nearly a page's numbers are Python's."""
 
 _carried = cache(page_data)
-needs_node = pytest.mark.skipif(NODE is None, reason="there is no Node to run the page's scripts in")
+needs_node = pytest.mark.skipif(NODE is None, reason="needs Node.js")
 
 
 def in_node(mechanisms: dict[str, Any], act: str, *more: str) -> dict[str, Any]:
@@ -98,12 +98,12 @@ def in_node(mechanisms: dict[str, Any], act: str, *more: str) -> dict[str, Any]:
 @cache
 def chromium() -> str:
     """The browser's program; the test is skipped where there is none, or no Playwright to drive it."""
-    pytest.importorskip("playwright.sync_api", reason="there is no Playwright to drive a browser")
+    pytest.importorskip("playwright.sync_api", reason="needs Playwright")
     for name in BROWSERS:
         found = shutil.which(name)
         if found:
             return found
-    return pytest.skip("there is no Chromium: apt-get install chromium")
+    return pytest.skip("needs Chromium: apt-get install chromium")
 
 
 @contextmanager

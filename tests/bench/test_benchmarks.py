@@ -173,7 +173,7 @@ def test_random_linkages_go_round_but_for_those_whose_last_dyad_stops():
 
 
 @pytest.mark.filterwarnings("ignore")
-@pytest.mark.skipif("pylinkage" not in peers.installed(), reason="pylinkage is not there")
+@pytest.mark.skipif("pylinkage" not in peers.installed(), reason="needs pylinkage")
 def test_pylinkage_finds_random_linkages_of_dyads():
     mixed = Mixed(6, False, 90)
     entries = [entry for entry in mixed.entries() if entry.system.startswith("pylinkage")]

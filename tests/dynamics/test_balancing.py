@@ -24,7 +24,7 @@ from tests.command import run
 from tests.draws import draws
 from tests.linkages import random_linkage
 
-needs_solver = pytest.mark.skipif(find_spec("clarabel") is None, reason="clarabel is not installed")
+needs_solver = pytest.mark.skipif(find_spec("clarabel") is None, reason="needs clarabel")
 STEPS = 60
 
 

@@ -22,7 +22,7 @@ STUCK = (
     planar.Outcome.INPUT_JAMMED,
 )
 """How files end that hold no input, or were drawn where the input alone does not tell how they go on."""
-pytestmark = pytest.mark.skipif(not FILES, reason="PLANAR_PEER_FILES names no folder of other programs' files")
+pytestmark = pytest.mark.skipif(not FILES, reason="needs PLANAR_PEER_FILES, a folder of other programs' files")
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda each: each.name)

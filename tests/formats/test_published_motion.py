@@ -39,7 +39,7 @@ def pmks_text(case: dict) -> str:
     return "mech=\n" + "\n".join(lines) + "\n"
 
 
-@pytest.mark.skipif(not CASES, reason="PLANAR_PEER_FILES names no folder with cases of PMKS_Verification")
+@pytest.mark.skipif(not CASES, reason="needs PLANAR_PEER_FILES, a folder with cases of PMKS_Verification")
 @pytest.mark.parametrize("path", CASES, ids=lambda each: each.parent.name)
 def test_joints_go_where_pmks_found_them(path):
     case = json.loads(path.read_text())
@@ -65,7 +65,7 @@ def test_joints_go_where_pmks_found_them(path):
                 assert 1e3 * state.points[name].position == pytest.approx(wanted, abs=1e-11)
 
 
-@pytest.mark.skipif(not CURVES, reason="PLANAR_PEER_FILES names no folder with curves of MotionGen")
+@pytest.mark.skipif(not CURVES, reason="needs PLANAR_PEER_FILES, a folder with curves of MotionGen")
 @pytest.mark.parametrize("path", CURVES, ids=lambda each: each.parent.name)
 def test_joints_of_a_gripper_go_where_motiongen_found_them(path):
     """Its curves hold six digits after the point, and its slots are met to about a thousandth of an inch."""

@@ -7,13 +7,16 @@ import shlex
 import shutil
 import subprocess
 import sys
+import tomllib
+from importlib import metadata
 from pathlib import Path
 
 import pytest
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
 from PIL import Image, ImageChops, ImageStat
 
 from tests import command
-from tests.draws import SEARCH
 
 ROOT = Path(__file__).parents[2]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -38,16 +41,78 @@ COMMANDS = [
 ] + [shlex.split(text) for text in re.findall(r"\) `(planar [^`]*)` \|", README)]
 
 
-@pytest.mark.parametrize("words", COMMANDS, ids=" ".join)
-def test_commands_of_the_tour_run(words, folder):
-    # the start of a process takes longer than most commands: each one's first form has it only where one searches
-    first = SEARCH and next(each for each in COMMANDS if each[1] == words[1]) == words
-    done = (command.process if first else command.run)(folder, *words[1:])
-    done.done()
-    if "-o" in words:
-        assert (folder / words[words.index("-o") + 1]).stat().st_size > 1000
-    else:
-        assert len(done.out) > 100
+def installed_by_the_first_command() -> set[str]:
+    """The distributions that README's first command installs: what planar and the extras named there need."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    extras = re.search(r"pip install -q '\.\[([\w,]+)\]'", README).group(1).split(",")
+    waiting = [
+        *project["dependencies"],
+        *(line for extra in extras for line in project["optional-dependencies"][extra]),
+    ]
+    names = set()
+    while waiting:
+        requirement = Requirement(waiting.pop())
+        name = canonicalize_name(requirement.name)
+        if name in names or (requirement.marker and not requirement.marker.evaluate({"extra": ""})):
+            continue
+        names.add(name)
+        waiting += metadata.requires(name) or ()
+    return names
+
+
+TOUR = """
+import json, sys
+from importlib import metadata
+
+allowed = set(json.loads(sys.argv[1]))
+owners = metadata.packages_distributions()
+foreign = {
+    package
+    for package, names in owners.items()
+    if package != "planar" and not any(name.lower().replace("_", "-").replace(".", "-") in allowed for name in names)
+}
+
+
+class Refusing:
+    def find_spec(self, name, path=None, target=None):
+        if name.partition(".")[0] in foreign:
+            raise ModuleNotFoundError(f"No module named {name!r}", name=name.partition(".")[0])
+
+
+sys.meta_path.insert(0, Refusing())
+from planar.cli import main
+
+for words in json.loads(sys.argv[2]):
+    print("==", *words, flush=True)
+    try:
+        main(words[1:], prog_name="planar")
+    except SystemExit as ending:
+        if ending.code:
+            sys.exit(f"{words}: exit status {ending.code}")
+exec(sys.argv[3], {"__name__": "__main__"})
+"""
+
+
+def test_commands_and_snippet_of_the_tour_run_with_what_the_first_command_installs(folder):
+    """In one process that imports no other package than those."""
+    (snippet,) = blocks("python")
+    allowed = json.dumps(sorted(installed_by_the_first_command()))
+    environment = os.environ | {"PYTHONPATH": str(ROOT), "PYTHONWARNINGS": "error", "PYTHONIOENCODING": "utf-8"}
+    done = subprocess.run(
+        [sys.executable, "-c", TOUR, allowed, json.dumps(COMMANDS), snippet],
+        cwd=folder,
+        capture_output=True,
+        encoding="utf-8",
+        env=environment,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    _, *printed = re.split(r"^== planar .*$", done.stdout, flags=re.MULTILINE)
+    for words, text in zip(COMMANDS, printed, strict=True):
+        if "-o" in words:
+            assert (folder / words[words.index("-o") + 1]).stat().st_size > 1000
+        else:
+            assert len(text) > 100
 
 
 def test_the_tour_has_twelve_pictures_which_are_there_as_all_that_it_leads_to():
@@ -77,15 +142,6 @@ def test_the_tour_runs_as_it_stands_once_the_environment_is_activated(folder):
     )
     assert done.returncode == 0, done.stderr
     assert "Press" in done.stdout
-
-
-def test_the_python_snippet_runs(folder):
-    (snippet,) = blocks("python")
-    environment = os.environ | {"PYTHONPATH": str(ROOT), "PYTHONWARNINGS": "error"}
-    done = subprocess.run(
-        [sys.executable, "-c", snippet], cwd=folder, capture_output=True, text=True, env=environment, check=False
-    )
-    assert done.returncode == 0, done.stderr
 
 
 def test_the_first_screen_has_a_sentence_a_picture_and_two_commands():
