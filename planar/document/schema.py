@@ -202,6 +202,15 @@ EFFORT_SCHEMA: Schema = {
     "torque": described(schema_reference("quantity"), "the torque at a pin or wheel, positive the way its angle grows"),
     "varies": _VARIES,
 }
+POINT_PAIR_SCHEMA: Schema = {
+    "points": list_schema("text", 2, 2) | {"uniqueItems": True} | PIN_POINT_NOTE,
+    "force": described(
+        schema_reference("quantity"),
+        "the force on each of the two points along the line that joins them: positive pushes them apart, negative "
+        "pulls them together",
+    ),
+    "varies": _VARIES,
+}
 SPRING_SCHEMA: Schema = {
     "points": list_schema("text", 2, 2) | {"uniqueItems": True} | PIN_POINT_NOTE,
     "stiffness": described(schema_reference("amount"), "force by length, in the declared unit or N/m"),
@@ -258,6 +267,7 @@ _LOADS: Schema = {
         "anyOf": [
             object_schema(FORCE_SCHEMA, "point", "force"),
             object_schema(TORQUE_SCHEMA, "link", "torque"),
+            object_schema(POINT_PAIR_SCHEMA, "points", "force"),
             object_schema(EFFORT_SCHEMA, "pair", oneOf=[{"required": ["force"]}, {"required": ["torque"]}]),
         ]
     },

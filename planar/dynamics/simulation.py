@@ -347,7 +347,7 @@ class _SimulationRun:
             driven = f"a dead point of what is driven at {join_all_names(self.driven)}, or " if self.driven else ""
             return f", near {driven}a change point, where branches of the motion cross"
         if not np.all(np.isfinite(pushed.q2)):
-            return ", where the ends of a spring or damper meet, so that it has no direction"
+            return ", where two points between which a spring, damper or load acts coincide, so that it has no direction"
         return ", where accelerations grow without end"
 
     def _extrapolate_beyond(
