@@ -75,7 +75,7 @@ if TYPE_CHECKING:
     from planar.dynamics.friction.holding import Holding, holding
     from planar.dynamics.in_time.friction_record import FrictionEvent, RubbingPair
     from planar.dynamics.in_time.stop_contacts import Impact
-    from planar.dynamics.reactions import Reaction
+    from planar.dynamics.reactions import FixedWheel, Reaction
     from planar.dynamics.simulation import Simulation, simulate
     from planar.foundation.errors import BadInput, NoAnswer, Outcome, PlanarError, Unknown
     from planar.manufacture.parts import PartPin, Parts, parts
@@ -198,6 +198,7 @@ __all__ = [
     "Extreme",
     "Extremes",
     "FileUnits",
+    "FixedWheel",
     "Flywheel",
     "ForceBalance",
     "ForceMap",

@@ -57,6 +57,7 @@ MODULES = {
     "Extreme": "analysis.motion.output",
     "Extremes": "analysis.motion.extremes",
     "FileUnits": "model.file_units",
+    "FixedWheel": "dynamics.reactions",
     "Flywheel": "dynamics.flywheel",
     "ForceBalance": "dynamics.balancing.force_balance",
     "ForceMap": "analysis.force_maps.force_map",

@@ -129,6 +129,10 @@ class Pair(ABC):
         """Where its teeth touch, beside all pairs of its mechanism; None without teeth, or where that is not known."""
         return None
 
+    def wheel_centres(self, all_pairs: Sequence[Pair]) -> Mapping[str, str | None]:
+        """Its wheels by their links, each with the point of the link at its centre; None where that is not known."""
+        return {}
+
     def rubbing_contacts(
         self, frames: Mapping[str, Frame], shapes: Mapping[str, LinkShape], all_pairs: Sequence[Pair], at_rest: bool
     ) -> tuple[RubbingContact, ...]:
