@@ -33,12 +33,14 @@ def check_loads(mechanism: Mechanism) -> None:
 
 def require_loads(mechanism: Mechanism) -> None:
     """Raise BadInput where a mechanism has no loads, springs or masses, so that there are no forces to be shown."""
-    if not (mechanism.loads or mechanism.springs or mechanism.masses):
-        raise BadInput("$.loads", _explain_loads(mechanism))
+    if message := missing_loads(mechanism):
+        raise BadInput("$.loads", message)
 
 
-def _explain_loads(mechanism: Mechanism) -> str:
-    """That nothing acts on a mechanism, and how what acts is written, with names of its own."""
+def missing_loads(mechanism: Mechanism) -> str:
+    """If nothing acts on a mechanism, the sentence that says so and how loads are written in its file; else nothing."""
+    if mechanism.loads or mechanism.springs or mechanism.masses:
+        return ""
     frame = mechanism.frame
     moving = [each.name for each in named_points(mechanism) if frame not in (link for link, _ in each.members)]
     links = [link.name for link in mechanism.links if link.name != frame]
