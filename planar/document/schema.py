@@ -256,6 +256,11 @@ TOLERANCE_SCHEMA: Schema = {
         {"enum": [f"ISO 2768-1 {grade}" for grade in "fmcv"]},
         "the general tolerances of lengths and angles of links and pairs that have none of their own",
     ),
+    "lengths": described(
+        {"anyOf": [schema_reference("quantity"), list_schema("quantity", 2, 2)]},
+        "how far every length of links and pairs that has no tolerance of its own, and is not 0, may be off: 0.1, plus "
+        "and minus, or the lower and upper deviation",
+    ),
     "clearance": described(
         _named_values_schema({"anyOf": [schema_reference("amount"), TEXT]}),
         "by pins how far the centres of pin and hole may stand apart, as 0.03 mm, or their fit, as H7/g6",

@@ -28,20 +28,21 @@ class Clearance(NamedTuple):
 
 class Tolerances(NamedTuple):
     """The tolerances of numbers, the class of general tolerances ("f", "m", "c" or "v" of ISO 2768-1) for the lengths
-    and angles that have none of their own, and the clearances of pins."""
+    and angles that have none of their own, the clearances of pins, and the lower and upper deviation (m) of all
+    `lengths` of links and pairs that have none of their own."""
 
     numbers: tuple[Deviations, ...] = ()
     general: str | None = None
     clearances: tuple[Clearance, ...] = ()
+    lengths: tuple[float, float] | None = None
 
     def write(self, quantity: Callable[[float, str], float | str]) -> dict[str, Any]:
         """What a file has of them."""
         found: dict[str, Any] = {}
         for each in self.numbers:
-            if each.lower == -each.upper:
-                found[each.number] = quantity(each.upper, each.kind)
-            else:
-                found[each.number] = [quantity(each.lower, each.kind), quantity(each.upper, each.kind)]
+            found[each.number] = _write_deviations(each.lower, each.upper, each.kind, quantity)
+        if self.lengths is not None:
+            found["lengths"] = _write_deviations(*self.lengths, "length", quantity)
         if self.general is not None:
             found["general"] = f"{GENERAL}{self.general}"
         if self.clearances:
@@ -50,3 +51,8 @@ class Tolerances(NamedTuple):
                 for each in self.clearances
             }
         return found
+
+
+def _write_deviations(lower: float, upper: float, kind: str, quantity: Callable[[float, str], float | str]) -> Any:
+    """One value for plus and minus, else the lower and the upper deviation."""
+    return quantity(upper, kind) if lower == -upper else [quantity(lower, kind), quantity(upper, kind)]
