@@ -74,6 +74,7 @@ if TYPE_CHECKING:
     from planar.dynamics.forces import Forces, PairFriction, forces
     from planar.dynamics.friction.holding import Holding, holding
     from planar.dynamics.in_time.friction_record import FrictionEvent, RubbingPair
+    from planar.dynamics.in_time.oscillations import Oscillation
     from planar.dynamics.in_time.stop_contacts import Impact
     from planar.dynamics.reactions import FixedWheel, Reaction
     from planar.dynamics.simulation import Simulation, simulate
@@ -239,6 +240,7 @@ __all__ = [
     "Motor",
     "MotorDuty",
     "NoAnswer",
+    "Oscillation",
     "Outcome",
     "Outlier",
     "Pair",

@@ -98,6 +98,7 @@ MODULES = {
     "Motor": "model.motors",
     "MotorDuty": "analysis.efforts.motor_duty",
     "NoAnswer": "foundation.errors",
+    "Oscillation": "dynamics.in_time.oscillations",
     "Outcome": "foundation.errors",
     "Outlier": "analysis.calibration.outliers",
     "Pair": "model.pairs.base",

@@ -110,9 +110,7 @@ def _links_table(state: State) -> FittedTable:
                 name,
                 _report_cell(link.angle, "angle", units, scales["angle"]),
                 _report_cell(link.angular_velocity, "angular velocity", units, scales["angular velocity"]),
-                _report_cell(
-                    link.angular_acceleration, "angular acceleration", units, scales["angular acceleration"]
-                ),
+                _report_cell(link.angular_acceleration, "angular acceleration", units, scales["angular acceleration"]),
                 link.sense,
             )
     return table
@@ -134,7 +132,8 @@ def _points_table(state: State) -> FittedTable:
     scales = kind_scales(state)
     for name, point in points.items():
         placed = (
-            format_number(length.from_si(float(each) if abs(each) > 1e-13 * scales["length"] else 0.0)) for each in point.position
+            format_number(length.from_si(float(each) if abs(each) > 1e-13 * scales["length"] else 0.0))
+            for each in point.position
         )
         table.add_row(
             name,

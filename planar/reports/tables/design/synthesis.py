@@ -74,7 +74,9 @@ def _file_cells(files: Sequence[Path], number: int) -> tuple[str, ...]:
 def _dimensions_text(found: Synthesis, design: SynthesisedDesign) -> str:
     """The numbers of a design that were sought, with their units."""
     known = file_dimensions(design.mechanism)
-    return ", ".join(f"{name} {amount(value, known[name].kind, found.task.units)}" for name, value in design.numbers.items())
+    return ", ".join(
+        f"{name} {amount(value, known[name].kind, found.task.units)}" for name, value in design.numbers.items()
+    )
 
 
 def _complete_parts(found: CompleteSynthesis, files: Sequence[Path]) -> Iterator[RenderableType]:

@@ -17,7 +17,9 @@ def fixed_wheels_table(forces: Forces, moment: float) -> FittedTable:
     """The holding torque about each centre at a position, beside the greatest moment (N m), and by pairs."""
     units = forces.mechanism.units
     headings = ("about", "pair", column_heading("holding torque", "torque", units))
-    table = plain_table(f"Holding torque on wheels of {forces.mechanism.frame}, anticlockwise", *headings, left=(0, 1), keys=2)
+    table = plain_table(
+        f"Holding torque on wheels of {forces.mechanism.frame}, anticlockwise", *headings, left=(0, 1), keys=2
+    )
     for name, wheel in forces.fixed_wheels.items():
         about = "-" if wheel.centre is None else name
         for pair, share in wheel.shares.items():
