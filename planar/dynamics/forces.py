@@ -212,8 +212,8 @@ def forces(moving: State | Motion, inertia: bool = True, friction: bool = True) 
     if state is not None and not np.isfinite(reactions.balance.loads).all():
         raise NoAnswer(
             Outcome.DEAD_POINT,
-            "two points between which a spring, a damper or a load acts coincide here, so that its force has no direction; "
-            "move the input",
+            "two points between which a spring, a damper or a load acts coincide here, so that its force has no "
+            "direction; move the input",
         )
     if not solved.is_balanced.all():
         if state is not None:

@@ -45,8 +45,8 @@ class FixedWheel(NamedTuple):
     """The torque that holds a wheel of the frame: what the foundation exerts on it, anticlockwise, N m.
 
     About its `centre` (2,), m, which is None where the file does not place it (the torque is a couple then). `shares`
-    are the parts of the `torque` by the gear, belt and rack pairs of the wheel. Over a motion torques are (n,); a torque
-    that equilibrium does not determine is NaN.
+    are the parts of the `torque` by the gear, belt and rack pairs of the wheel. Over a motion torques are (n,); a
+    torque that equilibrium does not determine is NaN.
     """
 
     centre: Array | None

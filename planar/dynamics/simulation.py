@@ -59,8 +59,8 @@ class Simulation:
     `work` is what loads, dampers and driven inputs have put in since the start, and `lost` what impacts on stops have
     taken, and `heat` what friction has, so that kinetic + potential - work + lost + heat stays what it was: `balance`
     is how far it does not, of the greatest of these. `impacts` are those on stops, in their order. `rubbing` has by
-    pair what sticks and slips at every row, with its own heat, and `friction_events` when that changed. `oscillations` has the
-    released inputs that turn back, with the times of it and the period.
+    pair what sticks and slips at every row, with its own heat, and `friction_events` when that changed. `oscillations`
+    has the released inputs that turn back, with the times of it and the period.
     """
 
     motion: Motion

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from planar.foundation.argument_types import checked_arguments
 from planar.model.link_shapes import PointReference
 
 MAX_LAW_ITEMS = 10_000
@@ -12,6 +13,7 @@ COINCIDENCE_TOLERANCE = 1e-12
 """Of a mechanism's size: two points of a spring or load that are nearer to each other than this have no direction."""
 
 
+@checked_arguments
 class Course(NamedTuple):
     """How a load varies: `factors` times what it says, over the positions `at` of an input, or over the time.
 
@@ -24,6 +26,7 @@ class Course(NamedTuple):
     factors: tuple[float, ...]
 
 
+@checked_arguments
 class Load(NamedTuple):
     """A force (N) at a point, a torque (N m, anticlockwise) on a link, or an effort at a pair or between two points.
 
@@ -59,6 +62,7 @@ class Load(NamedTuple):
         )
 
 
+@checked_arguments
 class Spring(NamedTuple):
     """A spring with a damper between two points, or a torsional one between two links.
 
@@ -84,6 +88,7 @@ class Spring(NamedTuple):
         return self.links or self.points or ("", "")
 
 
+@checked_arguments
 class Mass(NamedTuple):
     """The mass of a link (kg), where it is centred, and its moment of inertia about that (kg m^2).
 

@@ -33,12 +33,13 @@ PoleOfLink = Callable[[str], Array]
 class Advantage(NamedTuple):
     """Output force (or torque) for each unit of an input's torque (or force), without friction, inertia and weight.
 
-    It is the input's rate by the output's. Of a point the force is the one along its path, in the sense in which it moves
-    as the input moves in its positive sense; of a load it is the force in the load's direction, negative where what it
-    acts on moves against it; of a link and a pair it has the sign of the output's motion in its positive sense. `along`
-    says which: "path" of a point, else the name of the load, empty of a link and a pair; `target` is what the output
-    acts on, which of a load is not its name. `by_power` is from the rates that the constraints give, `by_centres` from the instantaneous centres. Both are None
-    where the output is at rest, the second also where centres do not tell; `why` then says so.
+    It is the input's rate by the output's. Of a point the force is the one along its path, in the sense in which it
+    moves as the input moves in its positive sense; of a load it is the force in the load's direction, negative where
+    what it acts on moves against it; of a link and a pair it has the sign of the output's motion in its positive
+    sense. `along` says which: "path" of a point, "line" of two points, else the name of the load, empty of a link and a
+    pair; `target` is what the output acts on, which of a load is not its name. `by_power` is from the rates that the
+    constraints give, `by_centres` from the instantaneous centres. Both are None where the output does not move, the
+    second also where centres do not determine it; `why` then says so.
     """
 
     output: str
@@ -58,9 +59,9 @@ class Advantage(NamedTuple):
 def advantage(state: State, output: str, input: str | None = None) -> Advantage:  # noqa: A002
     """The mechanical advantage of a point, a link, a pair or a load (in this order, by name) over an input.
 
-    A load is named as in `planar.dimensions`, `loads.0`; `P,Q` is a force between two points, along the line that joins
-    them. With the input alone moving at unit rate; `input` may be left out where there is one. Raises Unknown where there
-    is no such output or input, BadInput where an input has to be named, NoAnswer where none can move alone.
+    A load is named as in `planar.dimensions`, `loads.0`; `P,Q` is a force between two points, along the line that
+    joins them. With the input alone moving at unit rate; `input` may be left out where there is one. Raises Unknown
+    where there is no such output or input, BadInput where an input has to be named, NoAnswer where none can move alone.
 
     >>> import planar
     >>> state = planar.solve(planar.load("slider-crank"))

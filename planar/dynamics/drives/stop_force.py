@@ -18,8 +18,8 @@ def stop_forces(state: State, efforts: Mapping[str, float]) -> dict[str, dict[st
     """What each stop that is met carries if one input is released, by the pair at its stop and by the input.
 
     A force (N) or couple (N m) in the positive sense of the pair's motion; 0 where the mechanism leaves the stop. The
-    inputs would supply `efforts`. By virtual work, with the other inputs held: effort times motion of the input is force
-    times motion at the stop. An input at its own stop is the one that is released; else each that moves the pair is.
+    inputs would supply `efforts`. By virtual work, with the other inputs held: effort times motion of the input is
+    force times motion at the stop. An input at its own stop is the one that is released; else each that moves the pair.
     """
     mechanism = state.mechanism
     if not mechanism.stops:

@@ -23,8 +23,8 @@ is at rest, since that is round-off."""
 class Oscillation(NamedTuple):
     """The times (n,), s, at which a released input turns back, and its positions (n,), rad or m, there.
 
-    A start from rest is the first of them. Each time is a zero of the input's rate on the integrator's own polynomial of
-    its step, or an impact; where friction holds the input it is the time at which it comes to rest.
+    A start from rest is the first of them. Each time is a zero of the input's rate on the polynomial of the
+    integrator's step, or an impact; where friction holds the input it is the time at which it comes to rest.
     """
 
     times: Array

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import Any, ClassVar, NamedTuple, Self
 
+from planar.foundation.argument_types import check_field_types
 from planar.foundation.geometry import Frame, Vector
 from planar.foundation.jets import Scalar
 from planar.model.entry_reader import EntryReader, QuantityWriter
@@ -77,6 +78,9 @@ class Pair(ABC):
     """Whether a profile follows from it, which is drawn under its keyword."""
     ties_angles: ClassVar[bool] = False
     """Whether it ties angles alone: what holds it are couples, whatever forces they come from (see `tooth_contact`)."""
+
+    def __post_init__(self) -> None:
+        check_field_types(self)
 
     @property
     def bodies(self) -> tuple[str, ...]:

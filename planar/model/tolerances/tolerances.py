@@ -1,14 +1,19 @@
-"""Tolerances of a mechanism's numbers and clearances of its pins, as immutable data in SI units."""
+"""Tolerances of a mechanism's
+from planar.foundation.argument_types import checked_arguments
+ numbers and clearances of its pins, as immutable data in SI units."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
+from planar.foundation.argument_types import checked_arguments
+
 GENERAL = "ISO 2768-1 "
 """How a file begins to name a class of general tolerances."""
 
 
+@checked_arguments
 class Deviations(NamedTuple):
     """How far one number of the file may be from its value: between `lower` and `upper` (SI, signed)."""
 
@@ -18,6 +23,7 @@ class Deviations(NamedTuple):
     upper: float
 
 
+@checked_arguments
 class Clearance(NamedTuple):
     """How far the centres of a pin and its hole may stand apart (m), or the fit that says so, as H7/g6."""
 
@@ -26,6 +32,7 @@ class Clearance(NamedTuple):
     fit: str | None = None
 
 
+@checked_arguments
 class Tolerances(NamedTuple):
     """The tolerances of numbers, the class of general tolerances ("f", "m", "c" or "v" of ISO 2768-1) for the lengths
     and angles that have none of their own, the clearances of pins, and the lower and upper deviation (m) of all

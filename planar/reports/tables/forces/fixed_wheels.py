@@ -13,8 +13,11 @@ from planar.reports.fitted_table import FittedTable, plain_table
 from planar.reports.number_format import column_heading, format_quantity
 
 
-def fixed_wheels_table(forces: Forces, moment: float) -> FittedTable:
-    """The holding torque about each centre at a position, beside the greatest moment (N m), and by pairs."""
+def fixed_wheels_tables(forces: Forces, moment: float) -> list[FittedTable]:
+    """The holding torque about each centre at a position, beside the greatest moment (N m), and by pairs; no table
+    where the frame has no wheel."""
+    if not forces.fixed_wheels:
+        return []
     units = forces.mechanism.units
     headings = ("about", "pair", column_heading("holding torque", "torque", units))
     table = plain_table(
@@ -26,7 +29,7 @@ def fixed_wheels_table(forces: Forces, moment: float) -> FittedTable:
             table.add_row(about, pair, format_quantity(float(share), "torque", units, moment))
         if len(wheel.shares) > 1:
             table.add_row(about, "all of them", format_quantity(float(wheel.torque), "torque", units, moment))
-    return table
+    return [table]
 
 
 def fixed_wheel_series(forces: Forces) -> Iterator[ReportedSeries]:

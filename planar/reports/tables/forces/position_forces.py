@@ -60,8 +60,7 @@ def tables(
         parts.append(loads.actions_table("Inertia", inertia, units, greatest_moment_and_force(forces)[0]))
     most = sum(each.max_power for each in (*acting, *inertia))
     parts.append(_reactions_table(forces))
-    if forces.fixed_wheels:
-        parts.append(fixed_wheels.fixed_wheels_table(forces, greatest_moment_and_force(forces)[0]))
+    parts += fixed_wheels.fixed_wheels_tables(forces, greatest_moment_and_force(forces)[0])
     contacts = cam_contacts.contacts_table(forces)
     if contacts is not None:
         parts.append(contacts)
@@ -239,9 +238,9 @@ def _balanced_links_text(forces: Forces) -> str:
 def stop_remarks(forces: Forces) -> Iterator[str]:
     """What stops carry in place of the input."""
     motions = relative_motions(forces.mechanism)
-    for name, loads in forces.stop_loads.items():
+    for name, by_input in forces.stop_loads.items():
         kind = "force" if motions[name].input_kind is MeasureKind.LENGTH else "torque"
-        for released, force in loads.items():
+        for released, force in by_input.items():
             carried = f"the stop carries {quantity_text(force, kind, forces.mechanism.units)} in place of the input"
             result = carried if force else "the mechanism leaves the stop"
             yield f"pair {name!r} stands at its stop: if the input at {released!r} is released, {result}"
