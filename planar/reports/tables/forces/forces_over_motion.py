@@ -82,10 +82,11 @@ def _efforts_table(forces: Forces, motion: Motion) -> FittedTable:
     for name, effort in forces.inputs.items():
         _, unit, of = at_one.effort_name_and_unit(forces, name)
         values = np.asarray(effort)
-        least, greatest = (_greatest_with_place(motion, sense * values) for sense in (-1.0, 1.0))
+        scale = most[forces.is_force_input(name)]
+        least, greatest = _extremes_with_places(motion, values, scale)
         mean, low, high = (
-            format_or_zero(of.from_si(each), of.from_si(most[forces.is_force_input(name)]))
-            for each in (_mean(motion, values), -least[0], greatest[0])
+            format_or_zero(of.from_si(each), of.from_si(scale))
+            for each in (_mean(motion, values), least[0], greatest[0])
         )
         table.add_row(name, mean, unit, low, least[1], high, greatest[1])
     return table
@@ -99,12 +100,10 @@ def _holding_torques_table(forces: Forces, motion: Motion) -> FittedTable:
     table = plain_table(title, "about", "pair", (heading[0], at), (heading[1], at), left=(0, 1), keys=2)
     for name, wheel in forces.fixed_wheels.items():
         values = np.asarray(wheel.torque)
-        least, greatest = (_greatest_with_place(motion, sense * values) for sense in (-1.0, 1.0))
-        low, high = (format_quantity(value, "torque", units, moment) for value in (-least[0], greatest[0]))
-        is_constant = greatest[0] + least[0] <= ROUNDING_RATIO * moment
-        places = ("", "") if is_constant else (least[1], greatest[1])
+        least, greatest = _extremes_with_places(motion, values, moment)
+        low, high = (format_quantity(value, "torque", units, moment) for value in (least[0], greatest[0]))
         about = "-" if wheel.centre is None else name
-        table.add_row(about, join_all_names([*wheel.shares]), low, places[0], high, places[1])
+        table.add_row(about, join_all_names([*wheel.shares]), low, least[1], high, greatest[1])
     return table
 
 
@@ -116,6 +115,14 @@ def _mean(motion: Motion, values: Array) -> float:
     if not steps.any():
         return float(values[0])
     return float(np.sum(0.5 * (values[1:] + values[:-1]) * steps) / np.sum(steps))
+
+
+def _extremes_with_places(motion: Motion, values: Array, scale: float) -> tuple[tuple[float, str], tuple[float, str]]:
+    """The least and the greatest of values, each with its place; without one where they differ by round-off of a scale
+    alone."""
+    least, greatest = (_greatest_with_place(motion, sense * values) for sense in (-1.0, 1.0))
+    is_constant = greatest[0] + least[0] <= ROUNDING_RATIO * scale
+    return (-least[0], "" if is_constant else least[1]), (greatest[0], "" if is_constant else greatest[1])
 
 
 def _greatest_with_place(motion: Motion, values: Array) -> tuple[float, str]:
