@@ -74,8 +74,9 @@ if TYPE_CHECKING:
     from planar.dynamics.forces import Forces, PairFriction, forces
     from planar.dynamics.friction.holding import Holding, holding
     from planar.dynamics.in_time.friction_record import FrictionEvent, RubbingPair
+    from planar.dynamics.in_time.oscillations import Oscillation
     from planar.dynamics.in_time.stop_contacts import Impact
-    from planar.dynamics.reactions import Reaction
+    from planar.dynamics.reactions import FixedWheel, Reaction
     from planar.dynamics.simulation import Simulation, simulate
     from planar.foundation.errors import BadInput, NoAnswer, Outcome, PlanarError, Unknown
     from planar.manufacture.parts import PartPin, Parts, parts
@@ -198,6 +199,7 @@ __all__ = [
     "Extreme",
     "Extremes",
     "FileUnits",
+    "FixedWheel",
     "Flywheel",
     "ForceBalance",
     "ForceMap",
@@ -239,6 +241,7 @@ __all__ = [
     "MotorDuty",
     "NoAnswer",
     "Offset",
+    "Oscillation",
     "Outcome",
     "Outlier",
     "Pair",

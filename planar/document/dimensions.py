@@ -12,6 +12,7 @@ of a law, has its numbers named by being written.
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import fields, is_dataclass, replace
@@ -134,9 +135,18 @@ def find_dimension(known: Mapping[str, Dimension], name: str) -> Dimension:
         raise BadInput(
             str(name), f"two numbers of the mechanism could be meant; write {join_names(meant, last_joiner=' or ')}"
         )
-    raise BadInput(
-        str(name), f"the mechanism has no number of that name{suggest_name(str(name), known, 'its numbers')}"
-    )
+    alike = [number for number in known if _spelling(number) == _spelling(str(name))]
+    if len(alike) == 1:
+        raise BadInput(str(name), f"the mechanism has no number of that name; did you mean {alike[0]!r}?")
+    hint = suggest_name(str(name), known, "its numbers")
+    raise BadInput(str(name), f"the mechanism has no number of that name{hint}")
+
+
+def _spelling(name: str) -> tuple[str, ...]:
+    """A name's parts without the words of lists that names leave out, and with 0 and 1 for x and y."""
+    left_out = {"", "$", *NAMED_LISTS, *(key for (_, _, key), spelt in SPELLINGS.items() if not spelt)}
+    parts = re.split(r"[.\[\]]+", name)
+    return tuple({"x": "0", "y": "1"}.get(part, part) for part in parts if part not in left_out)
 
 
 def _every_dimension(mechanism: Mechanism) -> Iterator[Dimension]:

@@ -12,6 +12,7 @@ from planar.document.schema import (
     EFFORT_SCHEMA,
     FORCE_SCHEMA,
     MASS_SCHEMA,
+    POINT_PAIR_SCHEMA,
     SPRING_SCHEMA,
     TORQUE_SCHEMA,
     TORSION_SPRING_SCHEMA,
@@ -37,17 +38,23 @@ def read_loads(top: Cursor, mechanism: Mechanism, points: Mapping[str, str]) -> 
 
 
 def _read_load(cursor: Cursor, mechanism: Mechanism, named: Mapping[str, Pair], points: Mapping[str, str]) -> Load:
-    kinds = {"point": FORCE_SCHEMA, "link": TORQUE_SCHEMA, "pair": EFFORT_SCHEMA}
-    given = [key for key in kinds if cursor.has(key)]
-    if len(given) != 1:
-        told = "a load is a 'force' at a 'point', a 'torque' on a 'link', or a 'force' or 'torque' at a 'pair'"
-        raise cursor.error_at(None, told)
-    cursor.check_keys(*kinds[given[0]])
+    kinds = {"point": FORCE_SCHEMA, "points": POINT_PAIR_SCHEMA, "link": TORQUE_SCHEMA, "pair": EFFORT_SCHEMA}
+    targets = [key for key in kinds if cursor.has(key)]
+    if len(targets) != 1:
+        message = (
+            "a load is a 'force' at a 'point' or between two 'points', a 'torque' on a 'link', or a 'force' or "
+            "'torque' at a 'pair'"
+        )
+        raise cursor.error_at(None, message)
+    cursor.check_keys(*kinds[targets[0]])
     varies = _read_variation(cursor["varies"], mechanism, named) if cursor.has("varies") else None
     if cursor.has("point"):
         point = _read_point(cursor["point"], points)
         axes = cursor.link("axes") if cursor.has("axes") else None
         return Load(point=point, force=cursor["force"].as_vector("force"), axes=axes, varies=varies)
+    if cursor.has("points"):
+        ends = _read_two_points(cursor, points, "a force acts between two different points")
+        return Load(points=ends, effort=cursor.quantity("force", "force"), varies=varies)
     if cursor.has("link"):
         return Load(link=cursor["link"].as_link(), torque=cursor.quantity("torque", "torque"), varies=varies)
     pair = find_motion(cursor["pair"], named)
@@ -101,10 +108,16 @@ def _read_spring(cursor: Cursor, points: Mapping[str, str]) -> Spring:
     if turns:
         links = cursor.two_links("links")
         return Spring(None, links, found[0], cursor.quantity("free_angle", "angle", 0.0), found[1])
+    ends = _read_two_points(cursor, points, "a spring stands between two different points")
+    return Spring(ends, None, found[0], _read_nonnegative(cursor, "free_length", "length", 0.0), found[1])
+
+
+def _read_two_points(cursor: Cursor, points: Mapping[str, str], requirement: str) -> tuple[str, str]:
+    """The two different points of the key `points`. Raises BadInput with the requirement."""
     ends = tuple(_read_point(item, points) for item in cursor["points"].items())
     if len(ends) != 2 or ends[0] == ends[1]:
-        raise cursor.error_at("points", "a spring stands between two different points")
-    return Spring((ends[0], ends[1]), None, found[0], _read_nonnegative(cursor, "free_length", "length", 0.0), found[1])
+        raise cursor.error_at("points", requirement)
+    return ends[0], ends[1]
 
 
 def _read_mass(cursor: Cursor) -> Mass:
@@ -141,6 +154,8 @@ def write_load(load: Load, named: Mapping[str, Pair], quantity: QuantityWriter) 
     found: dict[str, Any] = {}
     if load.point is not None and load.force is not None:
         found |= {"point": load.point, "force": [quantity(each, "force") for each in load.force]}
+    if load.points is not None and load.effort is not None:
+        found |= {"points": list(load.points), "force": quantity(load.effort, "force")}
     if load.axes is not None:
         found["axes"] = load.axes
     if load.link is not None and load.torque is not None:

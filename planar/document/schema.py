@@ -207,6 +207,15 @@ EFFORT_SCHEMA: Schema = {
     "torque": described(schema_reference("quantity"), "the torque at a pin or wheel, positive the way its angle grows"),
     "varies": _VARIES,
 }
+POINT_PAIR_SCHEMA: Schema = {
+    "points": list_schema("text", 2, 2) | {"uniqueItems": True} | PIN_POINT_NOTE,
+    "force": described(
+        schema_reference("quantity"),
+        "the force on each of the two points along the line that joins them: positive pushes them apart, negative "
+        "pulls them together",
+    ),
+    "varies": _VARIES,
+}
 SPRING_SCHEMA: Schema = {
     "points": list_schema("text", 2, 2) | {"uniqueItems": True} | PIN_POINT_NOTE,
     "stiffness": described(schema_reference("amount"), "force by length, in the declared unit or N/m"),
@@ -252,6 +261,11 @@ TOLERANCE_SCHEMA: Schema = {
         {"enum": [f"ISO 2768-1 {grade}" for grade in "fmcv"]},
         "the general tolerances of lengths and angles of links and pairs that have none of their own",
     ),
+    "lengths": described(
+        {"anyOf": [schema_reference("quantity"), list_schema("quantity", 2, 2)]},
+        "how far every length of links and pairs that has no tolerance of its own, and is not 0, may be off: 0.1, plus "
+        "and minus, or the lower and upper deviation",
+    ),
     "clearance": described(
         _named_values_schema({"anyOf": [schema_reference("amount"), TEXT]}),
         "by pins how far the centres of pin and hole may stand apart, as 0.03 mm, or their fit, as H7/g6",
@@ -263,6 +277,7 @@ _LOADS: Schema = {
         "anyOf": [
             object_schema(FORCE_SCHEMA, "point", "force"),
             object_schema(TORQUE_SCHEMA, "link", "torque"),
+            object_schema(POINT_PAIR_SCHEMA, "points", "force"),
             object_schema(EFFORT_SCHEMA, "pair", oneOf=[{"required": ["force"]}, {"required": ["torque"]}]),
         ]
     },

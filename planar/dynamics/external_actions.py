@@ -132,10 +132,11 @@ def _load_actions(field: KinematicArrays, time: Array | None) -> Iterator[Extern
     inputs = {given.pair: _input_positions(field, given.pair) for given in field.mechanism.inputs}
     by = load_factors(field.mechanism, inputs, time, field.position_count)
     for load, factor in zip(field.mechanism.loads, by.T, strict=True):
-        yield from _actions_of_load(field, load, factor)
+        yield from actions_of_load(field, load, factor)
 
 
-def _actions_of_load(field: KinematicArrays, load: Load, factor: Array) -> Iterator[ExternalAction]:
+def actions_of_load(field: KinematicArrays, load: Load, factor: Array) -> Iterator[ExternalAction]:
+    """What one load does to each link on which it acts, multiplied by a factor (n,)."""
     none = np.zeros((field.position_count, 2))
     if load.point is not None and load.force is not None:
         link, point = field.attachments[load.point][:2]
@@ -148,6 +149,9 @@ def _actions_of_load(field: KinematicArrays, load: Load, factor: Array) -> Itera
         yield ExternalAction(
             "load", load.link, load.link, field.point_rates(load.link, Vector(0.0, 0.0)), none, load.torque * factor
         )
+    if load.points is not None and load.effort is not None:
+        line = _point_line(field, load.points)
+        yield from line.actions("load", load.target, load.effort * factor[:, None] * line.unit)
     if load.pair is not None and load.effort is not None:
         yield from _effort_actions(field, "load", load.pair, load.pair, load.effort * factor)
 
@@ -217,19 +221,38 @@ def _spring_actions(field: KinematicArrays, spring: Spring, name: str) -> list[E
             ExternalAction("spring", name, link, field.point_rates(link, Vector(0.0, 0.0)), none, sense * couple)
             for link, sense in ((first, 1.0), (second, -1.0))
         ]
-    carried = [field.attachments[end] for end in spring.ends]
-    ends = [(each.link, field.shapes[each.link].position(each.point)) for each in carried]
-    at, rate = ([field.point_rates(*end, order) for end in ends] for order in (0, 1))
-    way = at[1] - at[0]
-    length = np.hypot(*way.T)
-    pull = spring.stiffness * way
-    met = length <= COINCIDENCE_TOLERANCE * mechanism_size(field.mechanism, field.shapes)
-    unit = way / np.where(met, np.nan, length)[:, None]
+    line = _point_line(field, spring.ends)
+    pull = spring.stiffness * (line.places[1] - line.places[0])
     if spring.free:
-        pull = pull - spring.stiffness * spring.free * unit
+        pull = pull - spring.stiffness * spring.free * line.unit
     if spring.damping:
-        pull = pull + spring.damping * ((rate[1] - rate[0]) * unit).sum(axis=1)[:, None] * unit
-    return [
-        ExternalAction("spring", name, link, place, sense * pull, 0.0 * length)
-        for (link, _), place, sense in zip(ends, at, (1.0, -1.0), strict=True)
-    ]
+        rate = [field.point_rates(*end, 1) for end in line.ends]
+        pull = pull + spring.damping * ((rate[1] - rate[0]) * line.unit).sum(axis=1)[:, None] * line.unit
+    return line.actions("spring", name, -pull)
+
+
+class _PointLine(NamedTuple):
+    """The line from one point to another: their links with the places there, where they are (2, n, 2), and its
+    direction (n, 2), NaN where the points coincide."""
+
+    ends: list[tuple[str, Vector]]
+    places: list[Array]
+    unit: Array
+
+    def actions(self, kind: str, name: str, push: Array) -> list[ExternalAction]:
+        """A force (n, 2) on the second point, and its opposite on the first."""
+        none = np.zeros(len(push))
+        return [
+            ExternalAction(kind, name, link, place, sense * push, none)
+            for (link, _), place, sense in zip(self.ends, self.places, (-1.0, 1.0), strict=True)
+        ]
+
+
+def _point_line(field: KinematicArrays, points: tuple[str, str]) -> _PointLine:
+    attached = [field.attachments[point] for point in points]
+    ends = [(each.link, field.shapes[each.link].position(each.point)) for each in attached]
+    places = [field.point_rates(*end, 0) for end in ends]
+    apart = places[1] - places[0]
+    distance = np.hypot(*apart.T)
+    coincide = distance <= COINCIDENCE_TOLERANCE * mechanism_size(field.mechanism, field.shapes)
+    return _PointLine(ends, places, apart / np.where(coincide, np.nan, distance)[:, None])

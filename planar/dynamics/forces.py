@@ -25,7 +25,14 @@ from planar.dynamics.friction.frictional_forces import pair_heat, solve_friction
 from planar.dynamics.imbalance import explain_imbalance, imbalance_refusal
 from planar.dynamics.load_validation import check_loads
 from planar.dynamics.reaction_solver import ForceSolution, fill_balance
-from planar.dynamics.reactions import ZERO_COUPLE_TOLERANCE, Reaction, input_efforts, pair_reaction
+from planar.dynamics.reactions import (
+    ZERO_COUPLE_TOLERANCE,
+    FixedWheel,
+    Reaction,
+    fixed_wheels,
+    input_efforts,
+    pair_reaction,
+)
 from planar.dynamics.sharing.least_work import Wrench, yielding_power
 from planar.dynamics.virtual_velocities import has_length_motion, refuse_surplus_inputs, unit_rate_state
 from planar.dynamics.virtual_work import balance_function
@@ -154,11 +161,22 @@ class Forces(Displayable):
         return sum((each.force for each in of), np.stack([none, none], axis=-1)), sum(at, none)
 
     @cached_property
-    def stops(self) -> Mapping[str, float]:
-        """What stops carry at which pairs stand, where the input is let go; see `drives.stop_force`. At a position."""
+    def fixed_wheels(self) -> Mapping[str, FixedWheel]:
+        """The torques that hold the wheels of the frame, as the annulus of an epicyclic train; see `FixedWheel`."""
+        return fixed_wheels(self.mechanism, self.moving.shapes, self.reactions)
+
+    @cached_property
+    def stop_loads(self) -> Mapping[str, Mapping[str, float]]:
+        """By the pair at its stop and the input that is released: what the stop then carries (N, N m); see
+        `drives.stop_force`. Only at a position."""
         if not isinstance(self.moving, State):
             return {}
-        return stop_forces(self.moving, {name: float(each) for name, each in self.inputs.items()})
+        return stop_forces(self.moving, {name: float(effort) for name, effort in self.inputs.items()})
+
+    @property
+    def stops(self) -> Mapping[str, float]:
+        """`stop_loads` of the stops on which only one input can press."""
+        return {name: next(iter(loads.values())) for name, loads in self.stop_loads.items() if len(loads) == 1}
 
     def is_force_input(self, name: str) -> bool:
         """Whether an input's effort is a force (N), not a torque (N m)."""
@@ -194,7 +212,8 @@ def forces(moving: State | Motion, inertia: bool = True, friction: bool = True) 
     if state is not None and not np.isfinite(reactions.balance.loads).all():
         raise NoAnswer(
             Outcome.DEAD_POINT,
-            "the ends of a spring or damper meet here, so that its force has no direction; move the input",
+            "two points between which a spring, a damper or a load acts coincide here, so that its force has no "
+            "direction; move the input",
         )
     if not solved.is_balanced.all():
         if state is not None:

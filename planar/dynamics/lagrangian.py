@@ -200,19 +200,26 @@ class LagrangianFunctions:
         if spring.is_torsional:
             way = self.frames[second].angle - self.frames[first].angle - spring.free - self.spring_turns[number]
             return 0.5 * spring.stiffness * way**2, 0.5 * spring.damping * self._time_derivative(way) ** 2
-        ends = self.attachments
-        apart = stack_expressions(self.attachment_position(ends[second]) - self.attachment_position(ends[first]))
+        apart, distance, known = self._distance(spring.ends)
         square = ca.dot(apart, apart)
-        away = ca.sqrt(square)
-        met = square <= (COINCIDENCE_TOLERANCE * self.size) ** 2
-        known = ca.if_else(met, np.nan, 1.0)  # as a factor, so that Jacobians have it too
         stored = (
-            0.5 * spring.stiffness * ((away - spring.free) ** 2 * known if _may_be_nonzero(spring.free) else square)
+            0.5 * spring.stiffness * ((distance - spring.free) ** 2 * known if _may_be_nonzero(spring.free) else square)
         )
         taken = ca.SX(0.0)
         if _may_be_nonzero(spring.damping):
-            taken = 0.5 * spring.damping * (ca.dot(apart, self._time_derivative(apart)) / away) ** 2 * known
+            taken = 0.5 * spring.damping * (ca.dot(apart, self._time_derivative(apart)) / distance) ** 2 * known
         return stored, taken
+
+    def _distance(self, points: tuple[str, str]) -> tuple[ca.SX, ca.SX, ca.SX]:
+        """From one point to another: the vector (2,) and its length, m, and a factor: NaN where the points coincide.
+
+        As a factor of a force along the line it makes Jacobians NaN too.
+        """
+        first, second = (self.attachment_position(self.attachments[point]) for point in points)
+        apart = stack_expressions(second - first)
+        square = ca.dot(apart, apart)
+        coincide = square <= (COINCIDENCE_TOLERANCE * self.size) ** 2
+        return apart, ca.sqrt(square), ca.if_else(coincide, np.nan, 1.0)
 
     def _load_forces(self, load: Load) -> tuple[ca.SX, ca.SX]:
         """A load on the coordinates, and an effort between the links of a pair."""
@@ -225,6 +232,9 @@ class LagrangianFunctions:
             found += ca.jtimes(at, q, ca.vertcat(*turned), True)
         if load.link is not None and load.torque is not None and load.link in self.link_columns:
             found[self.link_columns[load.link] + 2] += load.torque
+        if load.points is not None and load.effort is not None:
+            _, distance, known = self._distance(load.points)
+            found += load.effort * ca.gradient(distance, q) * known
         if load.pair is not None and load.effort is not None:
             (position,) = self.relative_positions([load.pair])
             effort += load.effort * ca.gradient(position, q)

@@ -46,6 +46,7 @@ def attachment_remarks(mechanism: Mechanism) -> tuple[str, ...]:
     """A sentence for every load and every end of a spring of which another link might have been meant."""
     where = attachments(mechanism)
     named = [("the load", load.point) for load in mechanism.loads if load.point is not None]
+    named += [("the load", end) for load in mechanism.loads for end in load.points or ()]
     named += [("the spring's end", end) for spring in mechanism.springs for end in spring.points or ()]
     return tuple(
         _attachment_remark(what, name, where[name]) for what, name in dict.fromkeys(named) if where[name].others

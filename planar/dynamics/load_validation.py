@@ -33,12 +33,14 @@ def check_loads(mechanism: Mechanism) -> None:
 
 def require_loads(mechanism: Mechanism) -> None:
     """Raise BadInput where a mechanism has no loads, springs or masses, so that there are no forces to be shown."""
-    if not (mechanism.loads or mechanism.springs or mechanism.masses):
-        raise BadInput("$.loads", _explain_loads(mechanism))
+    if message := missing_loads(mechanism):
+        raise BadInput("$.loads", message)
 
 
-def _explain_loads(mechanism: Mechanism) -> str:
-    """That nothing acts on a mechanism, and how what acts is written, with names of its own."""
+def missing_loads(mechanism: Mechanism) -> str:
+    """If nothing acts on a mechanism, the sentence that says so and how loads are written in its file; else nothing."""
+    if mechanism.loads or mechanism.springs or mechanism.masses:
+        return ""
     frame = mechanism.frame
     moving = [each.name for each in named_points(mechanism) if frame not in (link for link, _ in each.members)]
     links = [link.name for link in mechanism.links if link.name != frame]
@@ -68,12 +70,22 @@ class _LoadChecker:
 
     def load_problems(self, load: Load) -> Problems:
         """What is wrong with a load."""
-        parts = ((load.point, load.force), (load.link, load.torque), (load.pair, load.effort))
-        if any((on is None) != (what is None) for on, what in parts):
-            yield "a force acts at a point, a torque on a link, an effort at a pair; one of the two is left out"
-        if all(on is None for on, _ in parts):
-            yield "a load is a force at a point, or a torque on a link, or an effort at a pair"
+        if load.pair is not None and load.points is not None:
+            yield "an effort acts at a pair or between two points, not both; make two loads of it"
+        between = load.pair if load.points is None else load.points
+        parts = ((load.point, load.force), (load.link, load.torque), (between, load.effort))
+        if any((target is None) != (size is None) for target, size in parts):
+            yield (
+                "a force acts at a point, a torque on a link, an effort at a pair or between two points; one of the "
+                "two is left out"
+            )
+        if all(target is None for target, _ in parts):
+            yield "a load is a force at a point, a torque on a link, or an effort at a pair or between two points"
         yield from self._unknown_name_problems(point=load.point, link=load.link, pair=load.pair)
+        for point in load.points or ():
+            yield from self._unknown_name_problems(point=point)
+        if load.points is not None and (len(load.points) != 2 or load.points[0] == load.points[1]):
+            yield "a force acts between two different points"
         yield from self._unknown_name_problems(link=load.axes)
         yield from _nonfinite_problems((*(load.force or ()), load.torque or 0.0, load.effort or 0.0))
         if load.varies is not None:

@@ -11,6 +11,8 @@ from planar.dynamics.external_actions import KinematicArrays
 from planar.dynamics.reaction_solver import ForceSolution, ReactionSolver
 from planar.foundation.arrays import Array, BoolArray
 from planar.foundation.short_repr import short_repr
+from planar.model.link_shapes import LinkShape
+from planar.model.mechanism import Mechanism
 from planar.model.pairs import Pair
 from planar.model.wording import join_all_names
 
@@ -37,6 +39,54 @@ class Reaction(NamedTuple):
 
     def __repr__(self) -> str:
         return short_repr(self)
+
+
+class FixedWheel(NamedTuple):
+    """The torque that holds a wheel of the frame: what the foundation exerts on it, anticlockwise, N m.
+
+    About its `centre` (2,), m, which is None where the file does not place it (the torque is a couple then). `shares`
+    are the parts of the `torque` by the gear, belt and rack pairs of the wheel. Over a motion torques are (n,); a
+    torque that equilibrium does not determine is NaN.
+    """
+
+    centre: Array | None
+    torque: Array | float
+    shares: Mapping[str, Array | float]
+
+    def __repr__(self) -> str:
+        return short_repr(self)
+
+
+def fixed_wheels(
+    mechanism: Mechanism, shapes: Mapping[str, LinkShape], reactions: Mapping[str, Reaction]
+) -> dict[str, FixedWheel]:
+    """The holding torques of the wheels that belong to the frame, as the annulus of an epicyclic train.
+
+    By the frame's point at the centre; of a wheel without a known centre by the name of its pair. Wheels about one
+    centre are held together.
+    """
+    frame, shape = mechanism.frame, shapes[mechanism.frame]
+    wheels: dict[str, FixedWheel] = {}
+    for pair in mechanism.pairs:
+        centres = pair.wheel_centres(mechanism.pairs)
+        if frame not in centres:
+            continue
+        point, reaction = centres[frame], reactions[pair.name]
+        # the axes of the frame are those of the world
+        centre = None if point is None else np.array([*shape.position(point)], dtype=float)
+        if reaction.at is None:
+            moment = reaction.couples[frame]
+        elif centre is None:
+            continue
+        else:
+            arm = reaction.at - centre
+            force = reaction.force
+            on_second = arm[..., 0] * force[..., 1] - arm[..., 1] * force[..., 0] + reaction.couple
+            moment = on_second if reaction.links[1] == frame else -on_second
+        key = pair.name if point is None else point
+        previous = wheels.get(key, FixedWheel(centre, 0.0, {}))
+        wheels[key] = FixedWheel(centre, previous.torque - moment, {**previous.shares, pair.name: -moment})
+    return wheels
 
 
 def input_efforts(solved: ForceSolution) -> tuple[Array, list[str]]:

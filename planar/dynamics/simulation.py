@@ -16,6 +16,7 @@ from planar.dynamics.imbalance import explain_loose_links
 from planar.dynamics.in_time.contact_phases import ContactEvent, make_phases
 from planar.dynamics.in_time.freedom_remark import freedom_remarks
 from planar.dynamics.in_time.friction_record import FrictionEvent, RubbingPair
+from planar.dynamics.in_time.oscillations import Oscillation, OscillationRecorder
 from planar.dynamics.in_time.simulated_motion import simulated_motion
 from planar.dynamics.in_time.stop_contacts import Impact
 from planar.dynamics.lagrangian import lagrangian_functions
@@ -58,7 +59,8 @@ class Simulation:
     `work` is what loads, dampers and driven inputs have put in since the start, and `lost` what impacts on stops have
     taken, and `heat` what friction has, so that kinetic + potential - work + lost + heat stays what it was: `balance`
     is how far it does not, of the greatest of these. `impacts` are those on stops, in their order. `rubbing` has by
-    pair what sticks and slips at every row, with its own heat, and `friction_events` when that changed.
+    pair what sticks and slips at every row, with its own heat, and `friction_events` when that changed. `oscillations`
+    has the released inputs that turn back, with the times of it and the period.
     """
 
     motion: Motion
@@ -70,6 +72,7 @@ class Simulation:
     impacts: tuple[Impact, ...] = ()
     rubbing: Mapping[str, RubbingPair] = field(default_factory=dict)
     friction_events: tuple[FrictionEvent, ...] = ()
+    oscillations: Mapping[str, Oscillation] = field(default_factory=dict)
 
     __repr__ = short_repr
 
@@ -175,6 +178,8 @@ class _SimulationRun:
         self.is_firm = False
         "whether constraints are far from a change point"
         self.time = np.linspace(0.0, duration, steps + 1)
+        released = [given.pair for given in self.mechanism.inputs if given.pair not in self.driven]
+        self.oscillations = OscillationRecorder(self.work, released, duration)
 
     @property
     def equations(self) -> EquationsOfMotion:
@@ -194,7 +199,8 @@ class _SimulationRun:
         motion, lost = replace(made, outcome=outcome, reason=reason), self.phases.lost_at(time)
         work, heats = rows[:, 2 * self.coordinate_count], rows[:, 2 * self.coordinate_count + 1 :]
         told = motion, energies[:, 0], energies[:, 1], work, lost, self.driven, tuple(self.phases.impacts)
-        return Simulation(*told, self.phases.record.rubbing(time, heats), tuple(self.phases.record.events))
+        rubbing, events = self.phases.record.rubbing(time, heats), tuple(self.phases.record.events)
+        return Simulation(*told, rubbing, events, self.oscillations.oscillations())
 
     def _accelerations(self, time: float, q: Array, q1: Array) -> Array:
         """Those of a row; not a number where nothing tells them."""
@@ -229,6 +235,7 @@ class _SimulationRun:
     def _add_rows(self, rows: list[Array], tick: ProgressCallback | None) -> str:
         """Add the rows after the first, as far as they can be told; why not all of them."""
         last = float(self.time[-1])
+        self.oscillations.jump(0.0, self.initial_state)
         self._hold_pieces(0.0, self.initial_state)
         solver, tiny = self._integrator(0.0, self.initial_state), 0
         good: list[tuple[float, Array]] = []
@@ -254,16 +261,19 @@ class _SimulationRun:
                 self._add_rows_until(rows, at, inner)
                 y = self._project(at, inner(at))
                 self._hold_pieces(at, y)
+                self.oscillations.follow(before, (at, y), lambda inner=inner: inner)
                 solver, good, tiny = self._integrator(at, y), [], 0
                 continue
             at = solver.t if kink is None else kink[0]
             if len(rows) < len(self.time) and self.time[len(rows)] <= at:
                 self._add_rows_until(rows, at, solver.dense_output())
+            self.oscillations.follow(before, (at, y if kink is None else kink[1]), solver.dense_output)
             if kink is not None:
                 ahead = solver.y if at == before[0] and kink[2] is None else None
                 y = self.phases.respond(at, self._project(*kink[:2]), kink[2])
                 y, good = self._project(at, y), [] if kink[2] is not None else good
                 self._hold_pieces(at, y, ahead)
+                self.oscillations.jump(at, y)
                 solver = self._integrator(at, y, length)
             else:
                 solver.y, solver.f = y, self._state_rate(solver.t, y)
@@ -347,7 +357,9 @@ class _SimulationRun:
             driven = f"a dead point of what is driven at {join_all_names(self.driven)}, or " if self.driven else ""
             return f", near {driven}a change point, where branches of the motion cross"
         if not np.all(np.isfinite(pushed.q2)):
-            return ", where the ends of a spring or damper meet, so that it has no direction"
+            return (
+                ", where two points between which a spring, damper or load acts coincide, so that it has no direction"
+            )
         return ", where accelerations grow without end"
 
     def _extrapolate_beyond(

@@ -7,10 +7,12 @@ from dataclasses import dataclass
 from math import atan2, hypot
 from typing import NamedTuple
 
+from planar.foundation.argument_types import check_field_types, checked_arguments
 from planar.foundation.geometry import Frame, Vector, direction
 from planar.foundation.jets import Scalar, sqrt
 
 
+@checked_arguments
 class At(NamedTuple):
     """A point by its coordinates (m) in the axes in which the link was drawn."""
 
@@ -18,6 +20,7 @@ class At(NamedTuple):
     y: Scalar
 
 
+@checked_arguments
 class Along(NamedTuple):
     """A point at a signed distance (m) from `start` on the way to `towards`, that way turned by `angle` (rad)."""
 
@@ -27,6 +30,7 @@ class Along(NamedTuple):
     angle: Scalar = 0.0
 
 
+@checked_arguments
 class Offset(NamedTuple):
     """A point at a signed distance (m) from `start` on the line to `towards`, and a signed offset (m) to its left."""
 
@@ -36,6 +40,7 @@ class Offset(NamedTuple):
     offset: Scalar
 
 
+@checked_arguments
 class Distances(NamedTuple):
     """A point by its distances (m) from two points, to the left of the way from the first to the second, or right."""
 
@@ -51,6 +56,7 @@ PointReference = str | tuple[Scalar, Scalar]
 """A point of a link by name, or by coordinates in the axes in which the link was drawn."""
 
 
+@checked_arguments
 class Point(NamedTuple):
     """A named point of a link."""
 
@@ -71,6 +77,9 @@ class Link:
     ends: tuple[str, str] | None = None
     length: Scalar | None = None
     axis: tuple[str, str] | None = None
+
+    def __post_init__(self) -> None:
+        check_field_types(self)
 
     @classmethod
     def from_ends(

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from planar.foundation.argument_types import checked_arguments
 from planar.model.link_shapes import PointReference
 
 MAX_LAW_ITEMS = 10_000
 """Pieces of one law of an input, points of one table, places of the course of a load."""
 COINCIDENCE_TOLERANCE = 1e-12
-"""Of a mechanism's size: ends of a spring that are nearer to each other have met, and nothing tells its direction."""
+"""Of a mechanism's size: two points of a spring or load that are nearer to each other than this have no direction."""
 
 
+@checked_arguments
 class Course(NamedTuple):
     """How a load varies: `factors` times what it says, over the positions `at` of an input, or over the time.
 
@@ -24,13 +26,16 @@ class Course(NamedTuple):
     factors: tuple[float, ...]
 
 
+@checked_arguments
 class Load(NamedTuple):
-    """A force (N) at a point, a torque (N m, anticlockwise) on a link, or an effort between the links of a pair.
+    """A force (N) at a point, a torque (N m, anticlockwise) on a link, or an effort at a pair or between two points.
 
     At a pin a `point` without its link is of the link that slides there, else of the first (see
     `planar.dynamics.load_attachment`). The force is given in the frame's axes, or in those of the link `axes`, with
     which it turns. An `effort` (N where the pair's motion is a length, N m where it is an angle) acts on the second
-    link, and its opposite on the first: in the positive sense of the pair's motion.
+    link, and its opposite on the first: in the positive sense of the pair's motion. Between `points` the effort (N) is
+    a pair of equal and opposite forces along the line that joins them: positive pushes the points apart, as the force
+    at a slide is positive in the sense in which its displacement grows; negative pulls them together.
     """
 
     point: str | None = None
@@ -41,8 +46,23 @@ class Load(NamedTuple):
     effort: float | None = None
     axes: str | None = None
     varies: Course | None = None
+    points: tuple[str, str] | None = None
+
+    @property
+    def target(self) -> str:
+        """What the load acts on: the name of a point, link or pair; of two points both, as `P,Q`."""
+        return self.point or self.link or self.pair or ",".join(self.points or ())
+
+    def scaled(self, factor: float) -> Load:
+        """The load multiplied by a factor."""
+        return self._replace(
+            force=None if self.force is None else (factor * self.force[0], factor * self.force[1]),
+            torque=None if self.torque is None else factor * self.torque,
+            effort=None if self.effort is None else factor * self.effort,
+        )
 
 
+@checked_arguments
 class Spring(NamedTuple):
     """A spring with a damper between two points, or a torsional one between two links.
 
@@ -68,6 +88,7 @@ class Spring(NamedTuple):
         return self.links or self.points or ("", "")
 
 
+@checked_arguments
 class Mass(NamedTuple):
     """The mass of a link (kg), where it is centred, and its moment of inertia about that (kg m^2).
 

@@ -9,6 +9,7 @@ from math import isfinite
 from numbers import Real
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from planar.foundation.argument_types import checked_arguments
 from planar.foundation.errors import BadInput, first_unprintable, join_names
 from planar.foundation.geometry import Vector
 from planar.foundation.notebook_display import Displayable
@@ -88,6 +89,7 @@ LARGEST_COUNTED_ANGLE = 1e12
 """rad: how far an angle may count; beyond it rounding leaves less than three digits of where it points."""
 
 
+@checked_arguments
 class Input(NamedTuple):
     """A relative motion that is given: at a turning pair an angle, at a sliding pair a distance (rad or m, per s).
 
@@ -103,6 +105,7 @@ class Input(NamedTuple):
     motor: Motor | None = None
 
 
+@checked_arguments
 class Drive(NamedTuple):
     """What an input is changed to for one published quantity; None leaves it as it is."""
 
@@ -112,6 +115,7 @@ class Drive(NamedTuple):
     acceleration: float | None = None
 
 
+@checked_arguments
 class PublishedValue(NamedTuple):
     """A value that a book prints for a quantity of this mechanism (SI), or None where it prints none.
 

@@ -7,9 +7,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from planar.foundation.argument_types import checked_arguments
 from planar.foundation.arrays import Array
 
 
+@checked_arguments
 class Motor(NamedTuple):
     """What drives an input: a torque (N m) against angular speed (rad/s), at a slide a force (N) against speed (m/s).
 

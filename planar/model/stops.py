@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from planar.foundation.argument_types import checked_arguments
 
+
+@checked_arguments
 class Stops(NamedTuple):
     """Between which positions the relative motion at a pair can go: from `low` to `high` (rad or m); None where open.
 

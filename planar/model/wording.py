@@ -11,21 +11,26 @@ from planar.model.file_units import FileUnits, display_unit
 
 REST_TOLERANCE = 1e-12
 """A rate below this part of the greatest of its kind is at rest: what rounding leaves of none."""
+AT_REST, NOT_TURNING = "at rest", "does not turn"
+"""The senses of a point and of a link without a velocity; a link that does not turn may move along a line."""
 STEADY_TOLERANCE = 1e-9
 """A speed that changes by less than this part of what it could is steady."""
 
 
-def amount(value: float, kind: str, units: FileUnits) -> str:
-    """A quantity (SI) in the unit in which its kind is shown beside those of a mechanism's file, with that unit."""
+def amount(value: float, kind: str, units: FileUnits, beside: float = 0.0) -> str:
+    """A quantity (SI) in the unit in which its kind is shown beside those of a mechanism's file, with that unit.
+
+    It is 0 where it is round-off of another of its kind `beside` it.
+    """
     name, of = display_unit(kind, units)
-    shown = f"{of.from_si(value):.6g}"
+    shown = f"{of.from_si(value if abs(value) > REST_TOLERANCE * abs(beside) else 0.0):.6g}"
     return shown if name == "1" else f"{shown} {name}"
 
 
 def turning_sense(rate: float, scale: float = 0.0) -> str:
     """The sense of an angular rate, beside the greatest of its kind."""
     if abs(rate) <= REST_TOLERANCE * scale:
-        return "at rest"
+        return NOT_TURNING
     return "anticlockwise" if rate > 0.0 else "clockwise"
 
 
@@ -33,7 +38,7 @@ def direction_sense(vector: Sequence[float] | Array, scale: float = 0.0) -> str:
     """The sense of a vector, beside the greatest of its kind: one of four ways along an axis, else two together."""
     x, y = float(vector[0]), float(vector[1])
     if hypot(x, y) <= REST_TOLERANCE * scale:
-        return "at rest"
+        return AT_REST
     sector = round(atan2(y, x) / (pi / 4)) % 8
     across = "to the right" if x > 0 else "to the left"
     along = "upwards" if y > 0 else "downwards"

@@ -19,6 +19,9 @@ ROUND_OFF_THRESHOLD = 1e-10
 ROUNDING_RATIO = 1e-12
 """What is less than this part of what it is told beside is printed as 0."""
 
+ZERO_THRESHOLD = 1e-14
+"""A number of which it is not known what it is told beside is printed as 0 below this."""
+
 
 def paragraphs(rows: Iterable[tuple[str, str]]) -> Table:
     """Paragraphs with what they are about before them."""
@@ -35,15 +38,19 @@ def column_heading(name: str, kind: str, units: FileUnits) -> str:
     return f"{name}, {display_unit(kind, units)[0]}"
 
 
-def _polar_cells(vector: np.ndarray, of: Unit, units: FileUnits) -> tuple[str, str]:
-    """A vector's magnitude and direction; without a direction where it is nothing."""
+def _polar_cells(vector: np.ndarray, of: Unit, units: FileUnits, beside: float) -> tuple[str, str]:
+    """A vector's magnitude and direction; without a direction where it is round-off of the size beside it."""
     size = float(np.hypot(*vector))
-    way = format_number(parse_unit(units.angle).from_si(vector_direction(vector))) if size > 1e-14 else ""
-    return format_number(of.from_si(size)), way
+    if size <= max(ROUNDING_RATIO * beside, ZERO_THRESHOLD):
+        return "0", ""
+    return format_number(of.from_si(size)), format_number(parse_unit(units.angle).from_si(vector_direction(vector)))
 
 
-def _report_cell(value: float | None, kind: str, units: FileUnits) -> str:
-    return "-" if value is None else format_number(display_unit(kind, units)[1].from_si(value))
+def _report_cell(value: float | None, kind: str, units: FileUnits, beside: float) -> str:
+    """A quantity (SI), 0 where it is round-off of the size beside it; a dash where there is none."""
+    if value is None:
+        return "-"
+    return format_number(display_unit(kind, units)[1].from_si(value if abs(value) > ROUNDING_RATIO * beside else 0.0))
 
 
 def vector_direction(vector: np.ndarray) -> float:
@@ -66,7 +73,7 @@ def precision_text(value: float, reference: str = "") -> str:
 
 
 def format_number(value: float) -> str:
-    return "0" if abs(value) < 1e-14 else f"{value:#.{DIGITS}g}".rstrip(".")
+    return "0" if abs(value) < ZERO_THRESHOLD else f"{value:#.{DIGITS}g}".rstrip(".")
 
 
 def format_quantity(value: float | None, kind: str, units: FileUnits, beside: float = 0.0) -> str:

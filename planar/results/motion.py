@@ -16,7 +16,7 @@ from planar.foundation.jets import Jet, value_and_rates
 from planar.model.link_shapes import LinkShape
 from planar.model.mechanism import Mechanism, NamedPoint
 from planar.model.pairs import MeasureKind
-from planar.model.wording import direction_sense, speed_trend, turning_sense
+from planar.model.wording import AT_REST, NOT_TURNING, direction_sense, speed_trend, turning_sense
 from planar.results.kinematic_result import KinematicResult
 from planar.results.records import (
     InputMotion,
@@ -308,4 +308,4 @@ class Motion(KinematicResult):
 
 
 def _describe_sense(way: str, power: float, scale: float) -> str:
-    return way if way == "at rest" else f"{way}, {speed_trend(power, scale)}"
+    return way if way in (AT_REST, NOT_TURNING) else f"{way}, {speed_trend(power, scale)}"

@@ -21,7 +21,7 @@ from planar.synthesis.cognates.task_cognates import task_cognates
 from planar.synthesis.design_search import Candidate, DesignSearch
 from planar.synthesis.judgement.judgement import ONE_BRANCH, ORDER, REACH, WHOLE_TURN, DesignJudge
 from planar.synthesis.judgement.refusal import refusal
-from planar.synthesis.judgement.written_design import DIGITS, EXACT_DIGITS, write_design
+from planar.synthesis.judgement.written_design import write_design
 from planar.synthesis.search_folder import SearchFolder
 from planar.synthesis.search_progress import SearchProgress
 from planar.synthesis.synthesis import Synthesis, SynthesisedDesign, rank_designs
@@ -217,8 +217,8 @@ class TaskSearch:
         inputs = [y[:, -1] * each.input_scale for each, y in zip(search.equations, candidate.unknowns, strict=True)]
         y = search.most_regular(candidate)
         try:
-            at, digits = float(y[-1] * search.equations[0].input_scale), EXACT_DIGITS if self.task.exact else DIGITS
-            mechanism = write_design(design, candidate.numbers, y, at, name, digits)
+            input_position = float(y[-1] * search.equations[0].input_scale)
+            mechanism = write_design(design, candidate.numbers, y, input_position, name)
         except BadInput:
             return None
         found = judge.judge(mechanism, inputs, values)

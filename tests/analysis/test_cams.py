@@ -235,6 +235,14 @@ def test_the_commands_file_and_record_say_the_same(tmp_path):
     assert at + 10.0 * normal == pytest.approx(middle, abs=1e-9)
 
 
+def test_what_is_round_off_of_the_lift_is_zero_in_the_table(tmp_path):
+    """The nose of a tangent cam begins and ends at the same lift."""
+    from tests import command
+
+    (nose,) = (line for line in command.run(tmp_path, "cams", "tangent-cam").done().splitlines() if "nose" in line)
+    assert nose.split()[:4] == ["nose", "310.647", "409.353", "0"]
+
+
 @pytest.mark.parametrize(
     ("face", "radius"),
     [({"roller_radius": 10}, lambda rho: 1.0 / (1.0 / rho + 1.0 / 0.010)), ({"flat": 0}, lambda rho: rho)],

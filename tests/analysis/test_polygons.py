@@ -240,7 +240,7 @@ def turns_are_those_of_the_links(polygon, tolerance):
         link = state.link(turn.link)
         rate = link.angular_velocity if polygon.kind == "velocity" else link.angular_acceleration
         assert turn.value == pytest.approx(rate)
-        if turn.sense != "at rest":
+        if turn.sense != "does not turn":
             assert turn.sense == ("anticlockwise" if rate > 0.0 else "clockwise")
         if turn.by:
             assert turn.by in polygon.state.pairs

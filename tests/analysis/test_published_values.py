@@ -97,7 +97,11 @@ def test_headings(vector, words):
 
 
 def test_senses_and_lists():
-    assert (turning_sense(2.0), turning_sense(-2.0), turning_sense(0.0)) == ("anticlockwise", "clockwise", "at rest")
+    assert (turning_sense(2.0), turning_sense(-2.0), turning_sense(0.0)) == (
+        "anticlockwise",
+        "clockwise",
+        "does not turn",
+    )
     assert (speed_trend(2.0), speed_trend(-2.0), speed_trend(0.0)) == ("speeding up", "slowing down", "steady")
     assert (join_all_names([]), join_all_names(["a"]), join_all_names(["a", "b"]), join_all_names(["a", "b", "c"])) == (
         "none",

@@ -49,6 +49,16 @@ def test_a_slider_cranks_worst_case_spread_and_contributions_are_those_of_its_cl
     assert uniform.std == pytest.approx(band.std * sqrt(3.0))
 
 
+def test_one_tolerance_of_all_lengths_is_that_of_each_beside_those_that_have_their_own():
+    state, pair, crank, rod = crank_of()
+    both = planar.tolerance(state, pair, {crank: 1e-4, rod: 1e-4})
+    assert planar.tolerance(state, pair, {"lengths": "0.1 mm"}).worst == pytest.approx(both.worst, rel=1e-12)
+    finer = planar.tolerance(state, pair, {crank: 1e-4, rod: 1e-6})
+    assert planar.tolerance(state, pair, {"lengths": 1e-4, rod: 1e-6}).worst == pytest.approx(finer.worst, rel=1e-12)
+    with_angles = planar.tolerance(state, pair, {"general": "ISO 2768-1 m", "lengths": 1e-4})
+    assert with_angles.worst == pytest.approx(both.worst, rel=1e-12)
+
+
 def test_a_four_bars_worst_case_is_that_of_the_law_of_cosines():
     """The rocker's angle at the crank on the line of centres: cos = (d'^2 + c^2 - b^2) / (2 c d')."""
     mechanism = planar.from_dict(read_example("tolerances") | {"tolerances": {"BC.length": 0.05, "DC.length": 0.02}})

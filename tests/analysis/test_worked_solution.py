@@ -182,6 +182,8 @@ def test_a_magnitude_has_its_formula_and_its_numbers() -> None:
     coriolis = rows(solved("004-OABQ").acceleration.sections[1])["f_dd′^cr"]
     assert coriolis[1] == "2 × ω_AB × (d′d) = 2 × 0.529 × 9.31 = 9.85"
     assert coriolis[2] == "⊥ line on AB"
+    steps = [plain_text(step) for step in solved("004-OABQ").acceleration.sections[1].steps]
+    assert sum(", the Coriolis component, square to the line on AB" in step for step in steps) == 1
 
 
 def test_the_vector_equation_of_example_3_1_is_the_chapters() -> None:
@@ -379,6 +381,14 @@ def test_the_command_moves_an_input_and_prints_data(tmp_path: Path) -> None:
     section = told["velocity"]["sections"][0]
     assert section["vectors"][0]["symbol"] == {"letter": "v", "subscript": "ba", "superscript": ""}
     assert section["vectors"][1]["known"] is False
+
+
+def test_where_nothing_acts_the_centres_are_written_and_what_is_missing_is_said(tmp_path: Path) -> None:
+    told = run(tmp_path, "explain", "four-bar", "--with", "centres,forces").done()
+    assert "Instantaneous centres" in told
+    assert "no forces are shown: the mechanism has no loads, springs or masses" in told
+    assert "Reactions" not in told
+    assert run(tmp_path, "explain", "four-bar", "--with", "forces", "-o", "four-bar.pdf").status == 0
 
 
 @pytest.mark.parametrize(

@@ -119,6 +119,12 @@ def test_a_pin_of_many_links_has_one_radius():
     ("values", "told"),
     [
         ({"BC.lenght": 1.0}, "BC.lenght: the mechanism has no number of that name; did you mean 'BC.length'"),
+        ({"AD.D[0]": 1.0}, "AD.D[0]: the mechanism has no number of that name; did you mean 'AD.D.x'?"),
+        ({"sketch.C[1]": 1.0}, "sketch.C[1]: the mechanism has no number of that name; did you mean 'sketch.C.y'?"),
+        (
+            {"links.AD.points.D[1]": 1},
+            "links.AD.points.D[1]: the mechanism has no number of that name; did you mean 'AD.D.y'",
+        ),
         ({"BC.length": -1.0}, "BC.length: a length above zero"),
         ({"BC.length": "3 deg"}, "BC.length: '3 deg' is an angle"),
         ({"BC.length": "3"}, "BC.length: '3' has no unit"),

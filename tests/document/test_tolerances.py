@@ -43,6 +43,8 @@ def test_tolerances_are_read_in_the_units_of_the_file_written_back_and_kept():
         ({"AB.length": -1}, "['AB.length']", "no number below 0"),
         ({"AB.length": [2, 1]}, "['AB.length']", "the lower first"),
         ({"AB.length": "3 deg"}, "['AB.length']", "a length is wanted"),
+        ({"lengths": -1}, ".lengths", "no number below 0"),
+        ({"lengths": "3 deg"}, ".lengths", "a length is wanted"),
         ({"sketch.C.x": 1}, "['sketch.C.x']", "has no tolerance"),
         ({"general": "ISO 2768 m"}, ".general", "'ISO 2768-1 m' \\(medium\\)"),
         ({"clearance": {"X": 1}}, ".clearance.X", "pairs are A, B, C and D"),
@@ -114,3 +116,10 @@ def test_general_tolerances_are_those_printed():
     assert 1e3 * length_deviation("m", 0.0301) == pytest.approx(0.3)
     assert angle_deviation("m", 0.03) == pytest.approx(0.5 * pi / 180.0)
     assert angle_deviation("v", 1.0) == pytest.approx(pi / 540.0)
+
+
+def test_one_tolerance_of_all_lengths_is_read_and_written():
+    mechanism = planar.from_dict(EXAMPLE | {"tolerances": {"AB.length": 0.01, "lengths": [-0.1, "0.2 mm"]}})
+    assert mechanism.tolerances.lengths == pytest.approx((-1e-4, 2e-4))
+    assert write_mechanism(mechanism)["tolerances"]["lengths"] == [-0.1, 0.2]
+    assert planar.from_dict(write_mechanism(mechanism)) == mechanism

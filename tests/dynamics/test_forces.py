@@ -57,6 +57,9 @@ def loaded(mechanism: Mechanism, seed: int) -> Mechanism:
         for _ in range(2)
     ]
     loads.append(Load(link=links[int(rng.integers(len(links)))], torque=float(rng.uniform(-1e3, 1e3))))
+    first, second = rng.permutation(len(points))[:2]
+    ends = points[int(first)].name, points[int(second)].name
+    loads.append(Load(points=ends, effort=float(rng.uniform(-1e3, 1e3))))
     return replace(mechanism, loads=tuple(loads))
 
 
@@ -68,6 +71,9 @@ def potential(mechanism: Mechanism, state: State) -> float:
             found += float(np.dot(load.force, state.point(load.point).position))
         if load.link is not None:
             found += load.torque * state.link(load.link).angle
+        if load.points is not None:
+            first, second = (state.point(end).position for end in load.points)
+            found += load.effort * float(np.hypot(*(second - first)))
     return found
 
 
@@ -199,6 +205,170 @@ def test_the_toggle_of_the_chapter_takes_217_newton_metres_and_its_337_is_named_
     assert ratio.through == ("I16", "I14", "I46")
 
 
+def levers(hand: float, bolt: float, **changes: Any) -> Value:
+    """A compound cutter with handles of 420 and 60, and jaws of 100 and 35: two forces, each between two points."""
+    links = {
+        "lower handle": {"points": {"A": [0, 0], "D": [0.06, -0.025], "L": [-0.42, -0.06]}},
+        "upper handle": {"points": {"A": [0, 0], "B": [0.06, 0.025], "H": [-0.42, 0.06]}},
+        "upper jaw": {"points": {"C": [0, 0], "B": [-0.1, 0.025], "P": [0.035, 0.004]}},
+        "lower jaw": {"points": {"C": [0, 0], "D": [-0.1, -0.025], "Q": [0.035, -0.004]}},
+    }
+    loads = [{"points": ["H", "L"], "force": -hand}, {"points": ["P", "Q"], "force": bolt}]
+    return {
+        "planar": 1,
+        "frame": "lower handle",
+        "links": links,
+        "pairs": [{"turning": pin} for pin in "ABCD"],
+        "inputs": [{"pair": "A", "position": 0.0, "velocity": 0.3}],
+        "loads": loads,
+        "sketch": {"C": [0.16, 0]},
+        **changes,
+    }
+
+
+def test_hands_on_both_handles_hold_a_bolt_by_the_ratio_of_the_levers():
+    """Moments about the pins: 420 of the handle on 60, 100 of the jaw on 35; every pin's force by equilibrium."""
+    state = solved(levers(100.0, 2000.0))
+    found = planar.forces(state)
+    assert found.inputs["A"] == pytest.approx(0.0, abs=1e-9)
+    proved(found, EXACT)
+    for pin, force in (("A", 800.0), ("B", 700.0), ("C", 2700.0), ("D", -700.0)):
+        assert found.reactions[pin].force == pytest.approx([0.0, force], abs=1e-8)
+    for load, size in (("loads.0", -100.0), ("loads.1", 2000.0)):
+        unknown = planar.unknown_load(state, load)
+        assert (unknown.what, unknown.value, unknown.factor) == ("force", size, pytest.approx(1.0, rel=1e-12))
+    pressed = planar.unknown_load(solved(levers(45.0, 1.0)), "loads.1")
+    assert pressed.factor == pytest.approx(45.0 * 20.0, rel=1e-12)
+
+
+def test_a_force_between_two_points_is_read_written_and_varies_as_other_loads():
+    varies = {"with": "A", "at": [-0.1, 0.1], "factors": [0.0, 1.0]}
+    value = levers(100.0, 0.0, loads=[{"points": ["H", "L"], "force": -100.0, "varies": varies}])
+    mechanism = planar.from_dict(value)
+    assert mechanism.loads[0].points == ("H", "L")
+    assert planar.loads(planar.dumps(mechanism)) == mechanism
+    assert planar.dimensions(mechanism)["loads.0.force"] == -100.0
+    turned = planar.forces(planar.solve(mechanism, {"A": 0.05}))
+    constant = planar.forces(planar.solve(planar.from_dict(levers(75.0, 0.0)), {"A": 0.05}))
+    assert turned.inputs["A"] == pytest.approx(constant.inputs["A"], rel=1e-12)
+    slope = planar.sensitivity(turned, "A").effort["loads.0.force"]
+    assert slope == pytest.approx(turned.inputs["A"] / -100.0, rel=1e-9)
+    with pytest.raises(BadInput, match="a force acts between two different points") as refused:
+        planar.from_dict(levers(1.0, 1.0, loads=[{"points": ["H", "H"], "force": 1.0}]))
+    assert refused.value.place == "$.loads[0].points"
+    with pytest.raises(BadInput, match="a 'force' at a 'point' or between two 'points'"):
+        planar.from_dict(levers(1.0, 1.0, loads=[{"points": ["H", "L"], "point": "H", "force": 1.0}]))
+
+
+def test_a_force_between_points_that_coincide_has_no_direction():
+    value = levers(1.0, 1.0, loads=[{"points": ["upper jaw.C", "lower jaw.C"], "force": 1.0}])
+    with pytest.raises(NoAnswer, match="a spring, a damper or a load acts coincide here"):
+        planar.forces(solved(value))
+
+
+def test_a_force_between_two_points_drives_a_simulation_with_its_work():
+    """Two masses pressed apart on a line: each moves by F t^2 / 2 m."""
+    links = {name: {"points": {point: [0, 0]}} for name, point in (("a", "P"), ("b", "Q"))}
+    value = {
+        "planar": 1,
+        "frame": "f",
+        "links": {"f": {"points": {"O": [0, 0]}}, **links},
+        "pairs": [
+            {"sliding": name, "links": ["f", name], "line": {"through": "O"}, "point": point}
+            for name, point in (("a", "P"), ("b", "Q"))
+        ],
+        "inputs": [{"pair": "a", "position": 0.0}, {"pair": "b", "position": 1.0}],
+        "loads": [{"points": ["P", "Q"], "force": 6.0}],
+        "masses": [{"link": "a", "mass": 2.0, "at": "P"}, {"link": "b", "mass": 3.0, "at": "Q"}],
+    }
+    found = planar.simulate(planar.from_dict(value), 0.5, 4)
+    time = found.motion.time
+    np.testing.assert_allclose(found.motion.inputs["a"].position, -1.5 * time**2, atol=1e-12)
+    np.testing.assert_allclose(found.motion.inputs["b"].position, 1.0 + time**2, atol=1e-12)
+    assert found.balance < 1e-12
+
+
+def epicyclic(teeth: bool, **changes: Any) -> Value:
+    """A sun of 40 inside an annulus of 80, which is the frame; the arm is loaded with 300 N m."""
+    sizes = (
+        ({"teeth": [40, 20]}, {"teeth": [-80, 20]}) if teeth else ({"radii": [0.04, 0.02]}, {"radii": [-0.08, 0.02]})
+    )
+    return {
+        "planar": 1,
+        "frame": "annulus",
+        "links": {
+            "annulus": {"points": {"O": [0.1, 0.2]}},
+            "sun": {"points": {"O": [0, 0]}},
+            "arm": {"ends": ["O", "P"], "length": 0.06},
+            "planet": {"points": {"P": [0, 0]}},
+        },
+        "pairs": [
+            {"turning": "O", "links": ["annulus", "sun", "arm"]},
+            {"turning": "P"},
+            {"gear": "inner", "links": ["sun", "planet"], "carrier": "arm", **sizes[0]},
+            {"gear": "outer", "links": ["annulus", "planet"], "carrier": "arm", **sizes[1]},
+        ],
+        "inputs": [{"pair": "O:annulus,sun", "position": 0.3, "velocity": 10.0}],
+        "loads": [{"link": "arm", "torque": -300.0}],
+        **changes,
+    }
+
+
+@pytest.mark.parametrize("sizes", ["teeth", "radii", "ratio"])
+def test_the_annulus_of_an_epicyclic_train_is_held_with_what_arm_and_sun_differ_by(sizes):
+    """Torques of sun, arm and annulus add up to nothing: 100 drives, 300 is taken off, 200 holds."""
+    value = epicyclic(sizes == "teeth")
+    if sizes == "ratio":  # only couples are known then
+        for pair, ratio in zip(value["pairs"][2:], (-2.0, 4.0), strict=True):
+            pair |= {"ratio": ratio}
+            del pair["radii"]
+    found = planar.forces(solved(value))
+    assert found.inputs["O:annulus,sun"] == pytest.approx(100.0, rel=1e-12)
+    assert {*found.fixed_wheels} == {"O"}
+    wheel = found.fixed_wheels["O"]
+    assert wheel.torque == pytest.approx(200.0, rel=1e-12)
+    assert {*wheel.shares} == {"outer"}
+    assert wheel.centre == pytest.approx([0.1, 0.2])
+    over = planar.forces(planar.cycle(planar.from_dict(value), 4))
+    np.testing.assert_allclose(over.fixed_wheels["O"].torque, 200.0, rtol=1e-12)
+
+
+def test_the_holding_torque_is_the_effort_of_the_wheel_as_a_second_input_at_rest():
+    """With a loss in both meshes as well, and with three planets, which share it."""
+    value = epicyclic(False)
+    for pair in value["pairs"][2:]:
+        pair["efficiency"] = 0.95
+    held = planar.forces(solved(value)).fixed_wheels["O"].torque
+    value["links"] |= {"base": {"points": {"O": [0.1, 0.2]}}, "annulus": {"points": {"O": [0, 0]}}}
+    value |= {"frame": "base"}
+    value["pairs"][0]["links"] = ["base", "annulus", "sun", "arm"]
+    value["inputs"] = [
+        {"pair": "O:base,sun", "position": 0.3, "velocity": 10.0},
+        {"pair": "O:base,annulus", "position": 0.0},
+    ]
+    assert planar.forces(solved(value)).inputs["O:base,annulus"] == pytest.approx(held, rel=1e-9)
+
+
+def test_a_stop_carries_the_effort_of_the_input_that_is_released():
+    """Of two inputs each is released in turn, but one at its stop is the one that is released."""
+    links = {"f": {"points": {"O": [0, 0]}}, "a": {"ends": ["O", "A"], "length": 1.0}}
+    links["b"] = {"ends": ["A", "B"], "length": 0.5}
+    value = {
+        "planar": 1,
+        "frame": "f",
+        "links": links,
+        "pairs": [{"turning": "O", "stops": [-0.5, 0.0]}, {"turning": "A"}],
+        "inputs": [{"pair": "O", "position": 0.0}, {"pair": "A", "position": 0.0}],
+        "loads": [{"point": "B", "force": [0, 10]}],
+    }
+    found = planar.forces(solved(value))
+    assert found.inputs["O"] == pytest.approx(-15.0)
+    assert {name: dict(of) for name, of in found.stop_loads.items()} == {"O": {"O": pytest.approx(-15.0)}}
+    assert found.stops == {"O": pytest.approx(-15.0)}
+    value["loads"][0]["force"] = [0, -10]
+    assert planar.forces(solved(value)).stops == {"O": 0.0}
+
+
 # other routes
 
 
@@ -312,12 +482,30 @@ def test_the_advantage_of_everything_is_the_same_by_power_and_by_centres(stem):
         (found,) = over.values()
         if found.by_power is None:
             assert found.by_centres is None
-            assert "at rest" in found.why
+            assert " here however " in found.why
             continue
         told += 1
         assert found.why == ""
         assert found.by_centres == pytest.approx(found.by_power, rel=1e-9)
     assert told
+
+
+def test_the_advantage_of_a_load_is_along_the_load_and_that_of_its_point_along_the_path():
+    """The handle turns about A: H goes square to AH, and the load is square to the handles."""
+    value = levers(1.0, 1.0, loads=[{"point": "H", "force": [0, -45]}, {"points": ["P", "Q"], "force": 3.0}])
+    found = advantages(solved(value))
+    assert list(found) == ["H", "loads.0", "P,Q"]
+    path, load, line = (over["A"] for over in found.values())
+    assert (path.along, load.along, line.along) == ("path", "loads.0", "line")
+    assert (path.target, load.target, line.target) == ("H", "H", "P,Q")
+    assert path.by_power == pytest.approx(1.0 / hypot(0.42, 0.06), rel=1e-12)
+    assert load.by_power == pytest.approx(1.0 / 0.42, rel=1e-12)
+    assert line.by_power == pytest.approx(-20.0 / 0.42, rel=1e-12)
+    for each in (path, load, line):
+        assert each.by_centres == pytest.approx(each.by_power, rel=1e-12)
+    assert advantage(solved(value), "loads.1").by_power == pytest.approx(line.by_power, rel=1e-12)
+    value["loads"] = [{"point": "H", "force": [0.42, -0.06]}]
+    assert advantage(solved(value), "loads.0").why.startswith("H does not move along loads.0 here however A moves")
 
 
 @pytest.mark.parametrize(
@@ -353,7 +541,7 @@ def test_with_several_inputs_each_has_its_own_advantage():
     mechanism = replace(MODELS["excavator-arm"], loads=(Load("tip", (-5e4, 3e4)), Load(link="bucket", torque=1.0)))
     state = solve(mechanism)
     found = advantages(state)
-    assert list(found) == ["tip", "bucket"]
+    assert list(found) == ["tip", "loads.0", "bucket"]
     for name in state.inputs:
         unit = unit_rate_state(state, name)
         assert has_length_motion(mechanism, name)
@@ -370,11 +558,11 @@ def test_towards_its_dead_point_a_toggle_grows_without_bound_and_there_it_is_sai
     assert grown == pytest.approx([1 / speed_ratio(angle) for angle in (1e-1, 1e-2, 1e-3, 1e-4, 1e-6)], rel=1e-8)
     assert grown[-1] > 1e6
     state = solved(pushed_crank(0.0, [{"point": "B", "force": [1e3, 0]}]))
-    for output in ("B", "stroke"):
+    for output, rest in (("B", "B is at rest"), ("stroke", "pair 'stroke' does not move")):
         there = advantage(state, output)
         assert there.by_power is None
         assert there.by_centres is None
-        assert there.why == f"{output} is at rest here however O moves, so that no force at it is too great"
+        assert there.why == f"{rest} here however O moves, so that no force at it is too great"
     assert abs(planar.forces(state).inputs["O"]) < 1e-9
 
 
@@ -402,7 +590,12 @@ def test_more_inputs_than_freedoms_are_refused_with_the_remedy():
         (Load(link="X", torque=1.0), "there is no link 'X'"),
         (Load(point="B"), "one of the two is left out"),
         (Load(torque=1.0), "one of the two is left out"),
-        (Load(), "a load is a force at a point, or a torque on a link"),
+        (Load(), "a load is a force at a point, a torque on a link, or an effort at a pair or between two points"),
+        (Load(points=("A", "X"), effort=1.0), "there is no point 'X'"),
+        (Load(points=("A", "A"), effort=1.0), "two different points"),
+        (Load(points=("A", "B")), "one of the two is left out"),
+        (Load(points=("A", "B"), pair="A", effort=1.0), "at a pair or between two points, not both"),
+        (Load(points=("A", "B"), effort=inf), "finite"),
         (Load(point="B", force=(nan, 0.0)), "finite"),
         (Load(link="crank", torque=inf), "finite"),
     ],
@@ -416,7 +609,7 @@ def test_loads_made_in_python_are_checked(load, sentence):
 
 def test_unknown_outputs_and_inputs_are_named():
     state = state_of("four-bar")
-    with pytest.raises(Unknown, match="there is no point, link or pair 'nothing'"):
+    with pytest.raises(Unknown, match="there is no point, link, pair or load 'nothing'"):
         advantage(state, "nothing")
     with pytest.raises(Unknown, match="there is no input at 'nothing'"):
         advantage(state, next(iter(state.points)), "nothing")
@@ -435,7 +628,8 @@ def test_the_program_prints_torque_loads_power_advantage_and_the_slip(tmp_path):
         "stroke   block D  frame  489.986  -90.0000         0  -489.986       0",
         "the load at 'D' acts on link 'block D', not on 'BD'; to have it there write 'BD.D'",
         "in: 4082.98 W from the inputs; out: 4082.98 W against the loads",
-        "D       O               9.23324     9.23324  N per N·m  I16 I14 I46",
+        "D       its path  O               9.23324     9.23324  N per N·m  I16 I14 I46",
+        "D       loads.0   O              -9.23324    -9.23324  N per N·m",
         "links 1 OA, 2 AB, 3 CB, 4 BD, 5 block D and 6 frame",
         "slip in the book",
         "without inertia, weight and friction",

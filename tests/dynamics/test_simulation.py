@@ -48,6 +48,42 @@ def test_a_physical_pendulum_has_the_period_of_the_elliptic_integral(swing):
     assert found.balance < 1e-10
 
 
+@pytest.mark.parametrize("steps", [1, 7])
+def test_the_period_of_a_swing_is_solved_for_and_does_not_depend_on_the_rows(steps):
+    """T = 4 K(sin(swing / 2)) sqrt(J / m g l); it turns back at both ends, the start from rest among them."""
+    swing = 1.0
+    period = 4.0 * ellipk(sin(swing / 2) ** 2) * sqrt(ABOUT_PIN / (2.0 * G * LENGTH))
+    found = run(lever_document({"G": [LENGTH, 0]}, swing - pi / 2, **PENDULUM), 2.2 * period, steps)
+    oscillation = found.oscillations["O"]
+    assert oscillation.period == pytest.approx(period, rel=1e-10)
+    np.testing.assert_allclose(oscillation.times, np.arange(5) * period / 2.0, rtol=1e-10, atol=1e-15)
+    np.testing.assert_allclose(
+        oscillation.positions, [swing - pi / 2, -swing - pi / 2] * 2 + [swing - pi / 2], rtol=1e-9
+    )
+
+
+def test_a_damped_swing_has_its_closed_form_period_and_a_wheel_that_spins_or_rests_none():
+    """m x'' + c x' + k x = 0: 2 pi / sqrt(k / m - (c / 2 m)^2)."""
+    value: Value = {
+        "planar": 1,
+        "frame": "f",
+        "links": {"f": {"points": {"O": [0, 0]}}, "b": {"points": {"P": [0, 0]}}},
+        "pairs": [{"sliding": "s", "links": ["f", "b"], "line": {"through": "O"}, "point": "P"}],
+        "inputs": [{"pair": "s", "position": 0.1, "velocity": 0.3}],
+        "masses": [{"link": "b", "mass": 2.0, "at": "P"}],
+    }
+    period = 2.0 * pi / sqrt(50.0 / 2.0 - (1.5 / 4.0) ** 2)
+    # a spring without a length has no direction for its damper where its ends meet, so that the anchor is aside
+    value["links"]["f"]["points"]["W"] = [-10.0, 0]
+    value["springs"] = [{"points": ["W", "P"], "stiffness": 50.0, "free_length": 10.0, "damping": 1.5}]
+    found = run(value, 3.0, 3, moving=True).oscillations["s"]
+    assert found.period == pytest.approx(period, rel=1e-9)
+    np.testing.assert_allclose(found.periods, period, rtol=1e-9)
+    value["springs"] = []
+    assert run(value, 1.0, moving=True).oscillations == {}
+    assert run(value, 1.0).oscillations == {}
+
+
 def test_the_pin_of_a_pendulum_carries_its_weight_and_its_swing():
     """Along it m (g cos + l w^2), by energy w^2 = 2 m g l (cos - cos swing) / J; across m g sin (1 - m l^2 / J)."""
     found = run(lever_document({"G": [LENGTH, 0]}, 1.2 - pi / 2, **PENDULUM), 1.5, 30)
@@ -439,7 +475,9 @@ def test_a_spring_whose_ends_meet_at_the_start_is_said_to_have_no_direction():
     value["masses"] = [{"link": "lever", "mass": 1, "at": "A"}]
     found = planar.simulate(planar.from_dict(value), 1.0)
     assert found.motion.outcome is Outcome.BRANCH_LOST
-    assert "told only to 0 s, where the ends of a spring or damper meet" in found.motion.reason
+    assert (
+        "told only to 0 s, where two points between which a spring, damper or load acts coincide" in found.motion.reason
+    )
     assert len(found.motion) == 1
 
 

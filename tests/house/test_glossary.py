@@ -13,10 +13,10 @@ from planar.model.mechanism import PUBLISHED_QUANTITIES
 TABLES = Path(__file__).parents[2] / "planar" / "reports" / "tables"
 ENTRY = re.compile(r"^- \*\*(.+?)\*\*(.*(?:\n  .*)*)", re.MULTILINE)
 EVERYDAY = (
-    "a after along also among an and another answer are as at by cannot change changed few from go goes handed here "
-    "how in instead is it its kg line list m many mark missing mm model much n name no not number of off on one or "
-    "other read right set sn step student than that the these this to together turn two value w what where which whose "
-    "why with within would x xy y"
+    "a about after along also among an and another answer are as at by cannot change changed few from go goes handed "
+    "here how in instead is it its kg line list m many mark missing mm model much n name no not number of off on one "
+    "or other read right set sn step student than that the these this to together turn two value w what where which "
+    "whose why with within would x xy y"
 )
 """Words that need no explanation, units, and what options are called."""
 

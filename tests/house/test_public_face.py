@@ -9,6 +9,7 @@ import pickle
 import sys
 import tomllib
 from concurrent.futures import ProcessPoolExecutor
+from dataclasses import replace
 from importlib import import_module
 from importlib.util import find_spec
 from multiprocessing import get_context
@@ -98,6 +99,9 @@ def results():
         planar.sweep(bars, {"BC.length": [0.066]}, steps=6, reduce={"path": "C.path_length"}),
     )
     yield planar.simulate("tipper", 0.3, steps=4).impacts[0]
+    yield planar.simulate("physical-pendulum", 1.0, steps=1).oscillations["O"]
+    train = replace(planar.load("planetary-gear-set"), loads=(planar.Load(link="arm", torque=-300.0),))
+    yield planar.forces(planar.solve(train)).fixed_wheels["O"]
     yield from ((rubbed := planar.simulate("stick-slip", 0.1, steps=1)).friction_events[0], rubbed.rubbing["block"])
     yield planar.unknown_load(planar.solve("balanced-lamp"), "springs.0")
     yield planar.motor_duty(planar.forces(planar.solve("motor-press")))

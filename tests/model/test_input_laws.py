@@ -550,8 +550,6 @@ def test_times_that_lie_too_unevenly_are_refused_and_nothing_else():
         ((), "A.law"),
         ((DwellSegment(1.0), CycloidalRise(0.0, 1.0)), "A.law[1].in"),
         ((DwellSegment(float("nan")),), "A.law[0].in"),
-        ((CycloidalRise(1.0, None),), "A.law[0].by"),
-        ((TrapezoidalRise(1.0, 1.0, None),), "A.law[0].ramp"),
         ((TableSegment((0.0, 1.0), (0.0, float("inf"))),), "A.law[0].positions[1]"),
         ((TableSegment((), ()),), "A.law[0].times"),
     ],
@@ -562,6 +560,34 @@ def test_a_law_made_in_python_is_held_to_the_same_rules(pieces, place):
     with pytest.raises(BadInput) as caught:
         planar.solve(replace(mechanism, inputs=(Input("A", 1.0, law=InputLaw(pieces)),)))
     assert caught.value.place == place
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: CycloidalRise(1.0, None), "CycloidalRise.by: a number is wanted here, not None"),
+        (lambda: TrapezoidalRise(1.0, 1.0, None), "TrapezoidalRise.ramp: a number is wanted here, not None"),
+        (
+            lambda: Input("A", 1.0, law=abs),
+            "Input.law: an InputLaw or None is wanted here, not <built-in function abs>",
+        ),
+        (lambda: InputLaw(CycloidalRise(1.0, 1.0)), "InputLaw.segments: a tuple of LawSegment objects is wanted here"),
+        (lambda: Input("A", "60 deg"), "Input.position: a number is wanted here, not '60 deg'"),
+        (lambda: planar.Load(point="D", force=3), "Load.force: a tuple of 2 numbers or None is wanted here, not 3"),
+        (lambda: planar.Spring(points="PQ"), "Spring.points: a tuple of 2 texts or None is wanted here, not 'PQ'"),
+        (lambda: planar.Stops("A", low="1"), "Stops.low: a number or None is wanted here, not '1'"),
+        (lambda: planar.Link.from_ends("A", "B", "5 mm"), "Link.length: a number or None is wanted here"),
+        (
+            lambda: planar.TurningPair("A", "ab", ("A", "A"), "A"),
+            "TurningPair.links: a tuple of 2 texts is wanted here",
+        ),
+    ],
+    ids=str,
+)
+def test_what_a_mechanism_is_built_of_refuses_arguments_of_other_types_by_name(make, message):
+    with pytest.raises(BadInput) as caught:
+        make()
+    assert str(caught.value).startswith(message)
 
 
 @settings(STEADY, max_examples=draws(150))

@@ -61,6 +61,7 @@ def acted_on(mechanism: Mechanism, seed: int = 3) -> Mechanism:
         Load(point=points[-1], force=(30.0, -20.0), varies=course),
         Load(point=points[0], force=(5.0, 2.0), axes=links[0]),
         Load(link=links[-1], torque=3.0),
+        Load(points=(points[0], points[-1]), effort=7.0, varies=course),
         *(Load(pair=pairs[k], effort=4.0) for k in rng.integers(len(pairs), size=2)),
     )
     springs = (

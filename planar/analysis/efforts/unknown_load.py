@@ -149,11 +149,7 @@ def scale_load(mechanism: Mechanism, load: str, factor: float) -> Mechanism:
     kind, index = _find_load(mechanism, load)
     if kind == "loads":
         each = mechanism.loads[index]
-        changed = each._replace(
-            force=None if each.force is None else (factor * each.force[0], factor * each.force[1]),
-            torque=None if each.torque is None else factor * each.torque,
-            effort=None if each.effort is None else factor * each.effort,
-        )
+        changed = each.scaled(factor)
         return replace(mechanism, loads=(*mechanism.loads[:index], changed, *mechanism.loads[index + 1 :]))
     if kind == "springs":
         spring = mechanism.springs[index]
@@ -194,8 +190,10 @@ def _describe_size(mechanism: Mechanism, load: str) -> tuple[str, float]:
     each = mechanism.loads[index]
     if each.force is not None:
         return "force", float(np.hypot(*each.force))
-    if each.torque is not None or each.pair is None:
-        return "torque", each.torque or 0.0
+    if each.torque is not None:
+        return "torque", each.torque
+    if each.pair is None:
+        return "force", each.effort or 0.0
     return "force" if has_length_motion(mechanism, each.pair) else "torque", each.effort or 0.0
 
 

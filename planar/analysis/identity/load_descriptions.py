@@ -46,6 +46,14 @@ def _describe_load(mechanism: Mechanism, load: Load) -> ActionDescription:
             (link,),
             f"{_describe_vector(mechanism, load.force, 'force')}{turns}",
         )
+    elif load.points is not None and load.effort is not None:
+        where = attachments(mechanism)
+        kind, at, links = (
+            "force between two points",
+            " and ".join(load.points),
+            tuple(where[end].link for end in load.points),
+        )
+        told = amount(load.effort, "force", mechanism.units)
     elif load.link is not None and load.torque is not None:
         kind, at, links, told = "torque", load.link, (load.link,), amount(load.torque, "torque", mechanism.units)
     else:

@@ -13,15 +13,19 @@ from planar.analysis.centres.centres import Centres, centres, extent
 from planar.analysis.centres.velocities import LinkByCentres, links_by_centres
 from planar.analysis.rate_equations import Rate, RateEquations, rate_equations
 from planar.document.first_argument import takes_result
+from planar.dynamics.external_actions import KinematicArrays, action_powers, action_velocities, actions_of_load
+from planar.dynamics.load_attachment import attachments
 from planar.dynamics.virtual_velocities import has_length_motion, unit_rate_state
 from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput, NoAnswer, Unknown, suggest_name_of_kinds
+from planar.model.loads import Load
 from planar.model.mechanism import Input, relative_motions
 from planar.model.wording import REST_TOLERANCE, join_all_names
 from planar.results.motion import State
 
 LEAST_SEPARATION = 1e-3
 """Centres that lie closer together than this, homogeneous and of length one, tell the line through them badly."""
+LOAD_PREFIX = "loads."
 PoleOfLink = Callable[[str], Array]
 """Of a link by name: w times its pole (x, y, 1) against the frame, (3,), rad/s and m."""
 
@@ -29,10 +33,13 @@ PoleOfLink = Callable[[str], Array]
 class Advantage(NamedTuple):
     """Output force (or torque) for each unit of an input's torque (or force), without friction, inertia and weight.
 
-    It is the input's rate by the output's. Of a point the force is the one along its motion as the input moves in its
-    positive sense; of a link and a pair it has a sign, that of the output's motion in its own positive sense.
-    `by_power` is from the rates that the constraints give, `by_centres` from the instantaneous centres. Both are None
-    where the output is at rest, the second also where centres do not tell; `why` then says so.
+    It is the input's rate by the output's. Of a point the force is the one along its path, in the sense in which it
+    moves as the input moves in its positive sense; of a load it is the force in the load's direction, negative where
+    what it acts on moves against it; of a link and a pair it has the sign of the output's motion in its positive
+    sense. `along` says which: "path" of a point, "line" of two points, else the name of the load, empty of a link and a
+    pair; `target` is what the output acts on, which of a load is not its name. `by_power` is from the rates that the
+    constraints give, `by_centres` from the instantaneous centres. Both are None where the output does not move, the
+    second also where centres do not determine it; `why` then says so.
     """
 
     output: str
@@ -44,14 +51,17 @@ class Advantage(NamedTuple):
     through: tuple[str, ...]
     "the names of the centres that the second was read from"
     why: str
+    target: str = ""
+    along: str = ""
 
 
 @takes_result("State")
 def advantage(state: State, output: str, input: str | None = None) -> Advantage:  # noqa: A002
-    """The mechanical advantage of a point, a link or a pair (in this order, by name) over an input.
+    """The mechanical advantage of a point, a link, a pair or a load (in this order, by name) over an input.
 
-    With the input alone moving at unit rate; `input` may be left out where there is one. Raises Unknown where there
-    is no such output or input, BadInput where an input has to be named, NoAnswer where none can move alone.
+    A load is named as in `planar.dimensions`, `loads.0`; `P,Q` is a force between two points, along the line that
+    joins them. With the input alone moving at unit rate; `input` may be left out where there is one. Raises Unknown
+    where there is no such output or input, BadInput where an input has to be named, NoAnswer where none can move alone.
 
     >>> import planar
     >>> state = planar.solve(planar.load("slider-crank"))
@@ -64,13 +74,30 @@ def advantage(state: State, output: str, input: str | None = None) -> Advantage:
 def advantages(state: State, outputs: Sequence[str] | None = None) -> dict[str, dict[str, Advantage]]:
     """The advantages of outputs over every input, by output and input; left out, of all that is loaded.
 
-    Raises as `advantage` does.
+    Of a force at a point there are both: the point's, along its path, and the load's, in its direction. Raises as
+    `advantage` does.
     """
     if outputs is None:
-        named = (name for load in state.mechanism.loads for name in (load.point, load.link))
-        outputs = [name for name in named if name is not None]
+        outputs = []
+        for index, load in enumerate(state.mechanism.loads):
+            outputs += [load.target, *([] if load.force is None or not any(load.force) else [f"{LOAD_PREFIX}{index}"])]
     ways = [_AdvantagesOverInput(state, given.pair) for given in state.mechanism.inputs] if outputs else []
     return {output: {each.input: each.advantage_of(output) for each in ways} for output in dict.fromkeys(outputs)}
+
+
+class _OutputRate(NamedTuple):
+    """An output's rate at unit rate of the input (m or rad), the links it is read from, and how from their motions.
+
+    `rest` is the clause that says that it is zero; `target` and `along` as in `Advantage`.
+    """
+
+    value: float
+    is_length: bool
+    links: tuple[str, ...]
+    from_motions: Callable[[PoleOfLink], float]
+    rest: str
+    target: str = ""
+    along: str = ""
 
 
 class _AdvantagesOverInput:
@@ -94,34 +121,62 @@ class _AdvantagesOverInput:
 
     def advantage_of(self, output: str) -> Advantage:
         """The advantage of an output."""
-        rate, length, links, read = self._output_rate(output)
-        measure = {(True, False): "1/m", (False, True): "m"}.get((length, self.is_sliding), "1")
-        if abs(rate) <= REST_TOLERANCE * self.greatest * (self.size if length else 1.0):
-            what = "force" if length else "torque"
-            told = f"{output} is at rest here however {self.input} moves, so that no {what} at it is too great"
-            return Advantage(output, self.input, None, None, measure, (), told)
-        by_power = 1.0 / rate
+        rate = self._output_rate(output)
+        measure = {(True, False): "1/m", (False, True): "m"}.get((rate.is_length, self.is_sliding), "1")
+        result = Advantage(output, self.input, None, None, measure, (), "", rate.target or output, rate.along)
+        if abs(rate.value) <= REST_TOLERANCE * self.greatest * (self.size if rate.is_length else 1.0):
+            effort = "force" if rate.is_length else "torque"
+            why = f"{rate.rest} here however {self.input} moves, so that no {effort} at it is too great"
+            return result._replace(why=why)
+        result = result._replace(by_power=1.0 / rate.value)
         try:
-            other, through = self._rate_by_centres(links, read)
+            by_centres, through = self._rate_by_centres(rate.links, rate.from_motions)
         except NoAnswer as problem:
-            return Advantage(output, self.input, by_power, None, measure, (), f"not by centres: {problem.reason}")
-        if other == 0.0:
-            told = f"not by centres: by them {output} is at rest here"
-            return Advantage(output, self.input, by_power, None, measure, through, told)
-        return Advantage(output, self.input, by_power, 1.0 / other, measure, through, "")
+            return result._replace(why=f"not by centres: {problem.reason}")
+        if by_centres == 0.0:
+            return result._replace(through=through, why=f"not by centres: by them {rate.rest} here")
+        return result._replace(by_centres=1.0 / by_centres, through=through)
 
-    def _output_rate(self, name: str) -> tuple[float, bool, tuple[str, ...], Callable[[PoleOfLink], float]]:
-        """An output's rate, whether it is of a length, the links it is read from, and how from their motions."""
+    def _load_rate(self, load: Load, along: str) -> _OutputRate:
+        """The power of a load of one (N, N m) in its direction, at unit rate of the input."""
+        size = np.hypot(*load.force) if load.force is not None else load.torque or load.effort
+        if not size:
+            raise BadInput(along, "the load is zero, so that it has no direction; give it a size")
+        field = KinematicArrays(self.state, self.state.shapes)
+        unit_load = load.scaled(1.0 / abs(float(size)))
+        actions = list(actions_of_load(field, unit_load, np.ones(1)))
+        value = float(action_powers(field, actions, action_velocities(field, actions)).sum())
+
+        def from_motions(motion: PoleOfLink) -> float:
+            return float(
+                sum(
+                    action.force[0] @ _point_velocity(motion(action.link), action.at[0])
+                    + float(np.ravel(action.couple)[0]) * motion(action.link)[2]
+                    for action in actions
+                )
+            )
+
+        is_length = any(action.force.any() for action in actions)
+        links = tuple(dict.fromkeys(action.link for action in actions))
+        rest = f"{load.target} does not move along {along}"
+        return _OutputRate(value, is_length, links, from_motions, rest, load.target, along)
+
+    def _output_rate(self, name: str) -> _OutputRate:
+        """An output's rate by its name. Raises Unknown."""
         state, frame = self.state, self.state.mechanism.frame
         if name in state._point_names:
             place, velocity, *_ = state.point(name)
             speed = float(np.hypot(*velocity))
             carrying = [link for link, _ in state._find_point(name).members]
             link = frame if frame in carrying else carrying[0]
-            return speed, True, (link,), lambda motion: float(np.hypot(*_point_velocity(motion(link), place)))
+
+            def path_speed(motion: PoleOfLink) -> float:
+                return float(np.hypot(*_point_velocity(motion(link), place)))
+
+            return _OutputRate(speed, True, (link,), path_speed, f"{name} is at rest", along="path")
         if name in state.frames:
             turns = state.link(name).angular_velocity
-            return turns, False, (name,), lambda motion: float(motion(name)[2])
+            return _OutputRate(turns, False, (name,), lambda motion: float(motion(name)[2]), f"{name} does not turn")
         named = relative_motions(state.mechanism)
         if name in named:
             pair = named[name]
@@ -130,14 +185,27 @@ class _AdvantagesOverInput:
             slopes = next(tie for tie in found.equations if tie.is_input).coefficients
             rate = sum(slope * found.value(each) for each, slope in slopes.items())
             links = tuple(dict.fromkeys((*pair.links, *(each.owner for each in slopes if each.is_angular))))
-            return (
-                rate,
-                has_length_motion(state.mechanism, name),
-                links,
-                lambda motion: _pair_rate(found, slopes, motion),
-            )
-        hint = suggest_name_of_kinds(name, {"points": state.point_names, "links": state.frames, "pairs": named})
-        raise Unknown(f"there is no point, link or pair {name!r}{hint}")
+            is_length = has_length_motion(state.mechanism, name)
+            rest = f"pair {name!r} does not move"
+            return _OutputRate(rate, is_length, links, lambda motion: _pair_rate(found, slopes, motion), rest)
+        return self._named_load_rate(name)
+
+    def _named_load_rate(self, name: str) -> _OutputRate:
+        """The rate of a load by its name, or of the distance between two points, `P,Q`. Raises Unknown."""
+        state = self.state
+        loads = {f"{LOAD_PREFIX}{index}": load for index, load in enumerate(state.mechanism.loads)}
+        if name in loads:
+            return self._load_rate(loads[name], name)
+        first, _, second = name.partition(",")
+        if first != second and {first, second} <= attachments(state.mechanism).keys():
+            return self._load_rate(Load(points=(first, second), effort=1.0), "line")
+        known = {
+            "points": state.point_names,
+            "links": state.frames,
+            "pairs": relative_motions(state.mechanism),
+            "loads": loads,
+        }
+        raise Unknown(f"there is no point, link, pair or load {name!r}{suggest_name_of_kinds(name, known)}")
 
     def _rate_by_centres(
         self, links: tuple[str, ...], read: Callable[[PoleOfLink], float]

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from planar.analysis.polygons.notation import Notation
-from planar.analysis.polygons.polygon import Meeting, MeetingSide, PointImage, PolygonVector
+from planar.analysis.polygons.polygon import Meeting, MeetingSide, PointImage, PolygonVector, VectorPart
 from planar.analysis.rate_equations import rate_equations
 from planar.analysis.rich_text import Fraction, Name, Phrase, PolygonLetter, format_ratio, join_phrases, list_phrases
 from planar.foundation.units import parse_unit
@@ -78,7 +78,8 @@ class ConstructionSteps:
         chord = notation.chord(vector.tail, vector.head)
         if not notation.vector_length(vector.value):
             return (chord, " = 0: ", chord.head, " falls in ", chord.tail, ".")
-        drawn = (chord, " = ", notation.drawn_magnitude(vector), " ", *notation.direction_and_sense(vector), ".")
+        name = ", the Coriolis component, " if vector.part is VectorPart.CORIOLIS else " "
+        drawn = (chord, " = ", notation.drawn_magnitude(vector), name, *notation.direction_and_sense(vector), ".")
         return ("From ", chord.tail, " draw ", *drawn) if first else ("To it add ", *drawn)
 
     def _unknown_vector(self, vector: PolygonVector, first: bool) -> Phrase:

@@ -10,7 +10,7 @@ from planar.analysis.polygons.polygon import Meeting, PolygonVector, Simultaneou
 from planar.analysis.rich_text import Fraction, MeasuredValue, Name, Phrase, Symbol
 from planar.foundation.arrays import Array
 from planar.model.mechanism import relative_motions
-from planar.model.wording import direction_sense
+from planar.model.wording import AT_REST, NOT_TURNING, direction_sense
 
 LINE_OF_MOTION = "line of motion"
 
@@ -25,7 +25,7 @@ class Readings:
         """ω_BC = bc/BC = 0.340/0.066 = 5.15 rad/s, clockwise."""
         order = self.notation.order
         symbol = Symbol("ω" if order == 1 else "α", turn.link)
-        still = turn.sense == "at rest"
+        still = turn.sense == NOT_TURNING
         value = MeasuredValue(0.0 if still else abs(turn.value), ("rad/s", "rad/s^2")[order - 1])
         sense = "" if still else f", {turn.sense}"
         if not turn.vector[0]:
@@ -56,7 +56,7 @@ class Readings:
         )
 
     def _is_turning(self, link: str) -> bool:
-        return self.notation.polygon.state.link(link).sense != "at rest"
+        return self.notation.polygon.state.link(link).sense != NOT_TURNING
 
     def meeting_readings(self, meeting: Meeting) -> Iterator[Phrase]:
         """v_C = dc = 0.400 m/s, with the sense, of every point on the way; of sliders also whether they speed up."""
@@ -95,7 +95,7 @@ class Readings:
             return ()
         velocity = self.notation.polygon.state.point(point).velocity
         sense = self.notation.polygon.state.point(point).sense
-        if sense == "at rest":
+        if sense == AT_REST:
             moving = any(given.velocity for given in self.notation.polygon.state.inputs.values())
             return ("; at rest for an instant only: it turns back here" if moving else "; it starts from rest",)
         if float(velocity @ value) > 0.0:

@@ -57,6 +57,7 @@ def find_variations(mechanism: Mechanism, tolerances: Tolerances | Mapping[str, 
     remarks = []
     dimensions = {each.name: each for each in (*design_dimensions(mechanism), *input_numbers(mechanism))}
     numbers = {each.number: each for each in told.numbers}
+    given = frozenset(numbers)
     strange = [name for name in numbers if name not in dimensions]
     if strange:
         remarks.append(f"{join_names(strange)}: nothing that is told follows smoothly from it, and it is left out")
@@ -65,9 +66,22 @@ def find_variations(mechanism: Mechanism, tolerances: Tolerances | Mapping[str, 
         numbers = {**{each.number: each for each in general}, **numbers}
         if without:
             remarks.append(f"ISO 2768-1 has no general tolerance of {without} lengths below 0.5 mm or too great")
+    if told.lengths is not None:
+        lengths = (
+            Deviations(each.name, each.kind, *told.lengths)
+            for each in dimensions.values()
+            if each.kind == "length" and _has_general_tolerance(each) and each.name not in given
+        )
+        numbers |= {each.number: each for each in lengths}
     kept = tuple(each for name, each in numbers.items() if name in dimensions)
     found = Variations(kept, tuple(_pin_offsets(mechanism, told.clearances)), tuple(remarks))
     return leave_out_tied(found, tied_dimensions(mechanism))
+
+
+def _has_general_tolerance(each: Dimension) -> bool:
+    """Whether a number is a length or an angle of a link or a pair, not 0 and not the size of a pin."""
+    moves = each.path[0] in ("links", "pairs") and each.path[-1] not in PIN_SIZES
+    return moves and each.kind in ("length", "angle") and bool(each.value)
 
 
 def _general_deviations(
@@ -78,8 +92,7 @@ def _general_deviations(
     extents = {link.name: shape_extent(link_shape(link)) for link in mechanism.links}
     found, without = [], 0
     for each in dimensions.values():
-        moves = each.path[0] in ("links", "pairs") and each.path[-1] not in PIN_SIZES
-        if not moves or each.kind not in ("length", "angle") or not each.value:
+        if not _has_general_tolerance(each):
             continue
         if each.kind == "length":
             most = length_deviation(grade, each.value)

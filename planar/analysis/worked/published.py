@@ -86,14 +86,17 @@ def _compare(item: PublishedValue, state: State, start: State) -> Comparison:
 
 
 def _turning_sense(item: PublishedValue, value: float) -> str:
-    return turning_sense(value) if item.quantity.startswith("angular") else ""
+    if not item.quantity.startswith("angular"):
+        return ""
+    return "none" if item.quantity == "angular acceleration" and not value else turning_sense(value)
 
 
 def _size_and_sense(item: PublishedValue, value: Array) -> tuple[float, str]:
     """The magnitude of a vector, or its component where one is asked for, with its sense."""
+    sense = "none" if item.quantity != "velocity" and not value.any() else direction_sense(value)
     if item.component is not None:
-        return float(value["xy".index(item.component)]), direction_sense(value)
-    return float(np.hypot(*value)), direction_sense(value)
+        return float(value["xy".index(item.component)]), sense
+    return float(np.hypot(*value)), sense
 
 
 def _solved_value(item: PublishedValue, state: State, start: State) -> float | Array:

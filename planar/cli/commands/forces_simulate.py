@@ -91,7 +91,11 @@ def forces(
     output: Path | None,
     **course: Any,
 ) -> None:
-    """What the inputs supply and the pairs carry against loads, weights, springs, friction and inertia."""
+    """What the inputs supply and the pairs carry against loads, weights, springs, friction and inertia.
+
+    Also the torques that hold wheels of the frame (an annulus, for example), what stops carry if an input is released,
+    and the mechanical advantage along the path of each loaded point and along each load.
+    """
     if as_json and output is not None:
         raise BadInput("-o", ONE_DESTINATION)
     if whole and at:

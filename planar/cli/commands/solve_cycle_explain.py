@@ -116,7 +116,8 @@ def explain(  # many: one for each option
         from planar.foundation.safe_files import save_file
 
         with show_status(state.mechanism.name):
-            pages = solution_pages(state, comparisons, given) + _added_pages(state, parts)
+            notes = _missing_parts(state, parts)
+            pages = solution_pages(state, comparisons, given, notes=notes) + _added_pages(state, parts)
             save_file(output, encode_sheets(pages, output.suffix))
         return
     from planar.analysis.worked.solution import worked_solution
@@ -138,12 +139,22 @@ def _read_parts(also: str | None) -> tuple[str, ...]:
     return parts
 
 
+def _missing_parts(state: State, parts: tuple[str, ...]) -> list[str]:
+    """A sentence for each part of `--with` that the file gives nothing for."""
+    from planar.dynamics.load_validation import missing_loads
+
+    message = missing_loads(state.mechanism) if "forces" in parts else ""
+    return [f"no forces are shown: {message}"] if message else []
+
+
 def _added_pages(state: State, parts: tuple[str, ...]) -> list[Any]:
     """The pages of what `--with` adds."""
     from planar import plot
 
-    made = {"centres": lambda: [plot.centres(state)], "forces": lambda: plot.forces(state)}
-    return [page for part in parts for page in made[part]()]
+    makers = {"centres": lambda: [plot.centres(state)]}
+    if not _missing_parts(state, parts):
+        makers["forces"] = lambda: plot.forces(state)
+    return [page for part in parts if part in makers for page in makers[part]()]
 
 
 def _with_parts(text: RenderableType, state: State, parts: tuple[str, ...]) -> RenderableType:
@@ -159,7 +170,9 @@ def _with_parts(text: RenderableType, state: State, parts: tuple[str, ...]) -> R
         from planar.reports.tables.centres import table
 
         found += [Text(), table(centres(state))]
-    if "forces" in parts:
+    missing = _missing_parts(state, parts)
+    found += [Text(), *(Text(f"- {sentence}") for sentence in missing)] if missing else []
+    if "forces" in parts and not missing:
         from planar.analysis.motion.mechanical_advantage import advantages
         from planar.dynamics.forces import forces
         from planar.reports.tables.forces.position_forces import tables

@@ -28,9 +28,11 @@ def read_tolerances(cursor: Cursor, mechanism: Mechanism) -> Tolerances:
         if not text.startswith(GENERAL) or general not in CLASSES:
             told = ", ".join(f"'{GENERAL}{grade}' ({word})" for grade, word in CLASSES.items())
             raise cursor.error_at("general", f"{text!r:.40} is no class of general tolerances; there are {told}")
+    lengths = _read_bounds(cursor["lengths"], "length") if cursor.has("lengths") else None
     pins = {group[0].entry_name(): group[0] for group in pair_entries(mechanism)}
     clearances = cursor["clearance"].members() if cursor.has("clearance") else ()
-    return Tolerances(numbers, general, tuple(_read_clearance(place, name, pins) for name, place in clearances))
+    by_pins = tuple(_read_clearance(place, name, pins) for name, place in clearances)
+    return Tolerances(numbers, general, by_pins, lengths)
 
 
 def _read_deviations(cursor: Cursor, name: str, known: Mapping[str, Dimension]) -> Deviations:
@@ -41,15 +43,20 @@ def _read_deviations(cursor: Cursor, name: str, known: Mapping[str, Dimension]) 
         raise cursor.error_at(None, f"{problem.sentence}{near}") from None
     if dimension.kind == "count" or dimension.path[0] == "sketch" or dimension.address[0] == "stops":
         raise cursor.error_at(None, f"{name!r} has no tolerance: nothing that is told follows smoothly from it")
+    return Deviations(name, dimension.kind, *_read_bounds(cursor, dimension.kind))
+
+
+def _read_bounds(cursor: Cursor, kind: str) -> tuple[float, float]:
+    """The lower and the upper deviation: two values, or one that is plus and minus. Raises BadInput."""
     if not isinstance(cursor.value, list):
-        upper = _read_value(cursor, dimension.kind)
+        upper = _read_value(cursor, kind)
         if upper < 0.0:
             raise cursor.error_at(None, "plus and minus this, so it is no number below 0; or give [lower, upper]")
-        return Deviations(name, dimension.kind, -upper, upper)
-    both = tuple(_read_value(item, dimension.kind) for item in cursor.items())
-    if len(both) != 2 or both[0] > both[1]:
+        return -upper, upper
+    bounds = tuple(_read_value(item, kind) for item in cursor.items())
+    if len(bounds) != 2 or bounds[0] > bounds[1]:
         raise cursor.error_at(None, "a lower and an upper deviation are wanted here, as [-0.02, 0.05], the lower first")
-    return Deviations(name, dimension.kind, *both)
+    return bounds[0], bounds[1]
 
 
 def _read_value(cursor: Cursor, kind: str) -> float:

@@ -73,10 +73,11 @@ def solution_pages(
     comparisons: Sequence[Comparison] = (),
     scales: Mapping[str, Scale] | None = None,
     title: str | None = None,
+    notes: Sequence[str] = (),
 ) -> list[Figure]:
     """The worked solution of a position on upright A4 pages, drawings to round scales unless they are given.
 
-    `title` stands on top in place of the mechanism's name.
+    `title` stands on top in place of the mechanism's name; `notes` follow the notes of the solution.
 
     Raises BadInput where a given scale would make a drawing larger than a page, or matplotlib is missing.
     """
@@ -86,7 +87,7 @@ def solution_pages(
     solution = worked_solution(state, comparisons)
     used = {**_fitting_scales(solution), **(scales or {})}
     with rc_context(MATPLOTLIB_SETTINGS):
-        return lay_out_pages(_solution_strips(solution, used, title or state.mechanism.name))
+        return lay_out_pages(_solution_strips(solution, used, title or state.mechanism.name, notes))
 
 
 def encode_sheets(figures: Sequence[Figure], suffix: str) -> bytes:
@@ -161,7 +162,9 @@ def space_diagram_scale(state: State, size: tuple[float, float] = DRAWING_SIZES[
     return scale
 
 
-def _solution_strips(solution: WorkedSolution, scales: Mapping[str, Scale], title: str) -> Iterator[Strip]:
+def _solution_strips(
+    solution: WorkedSolution, scales: Mapping[str, Scale], title: str, more_notes: Sequence[str]
+) -> Iterator[Strip]:
     mechanism = solution.state.mechanism
     yield from paragraph((title,), TITLE_STYLE)
     if mechanism.source:
@@ -187,7 +190,7 @@ def _solution_strips(solution: WorkedSolution, scales: Mapping[str, Scale], titl
     yield from paragraph(("3. Results",), SECTION_STYLE, space_before=5.0, keep_with_next=True)
     yield from _result_strips(solution)
     yield from _comparison_strips(solution)
-    notes = [*attachment_remarks(mechanism), *solution.state.remarks, *mechanism.notes]
+    notes = [*attachment_remarks(mechanism), *solution.state.remarks, *mechanism.notes, *more_notes]
     if notes:
         yield from paragraph(("Notes",), TOPIC_STYLE, space_before=4.0, keep_with_next=True)
     for note in notes:

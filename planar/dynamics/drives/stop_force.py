@@ -14,27 +14,29 @@ LEAST_RATIO = 1e-9
 """A motion at a stop that is smaller for one of the input is none: the stop cannot hold the input there."""
 
 
-def stop_forces(state: State, efforts: Mapping[str, float]) -> dict[str, float]:
-    """By the pair: the force (N) or couple (N m) of each stop that is met, in the positive sense of the pair's motion,
-    where the input is let go that would supply these efforts; 0 where the mechanism leaves the stop by itself.
+def stop_forces(state: State, efforts: Mapping[str, float]) -> dict[str, dict[str, float]]:
+    """What each stop that is met carries if one input is released, by the pair at its stop and by the input.
 
-    By virtual work: effort times motion of the input is force times motion at the stop. Of several inputs it is not
-    told which is let go: nothing then.
+    A force (N) or couple (N m) in the positive sense of the pair's motion; 0 where the mechanism leaves the stop. The
+    inputs would supply `efforts`. By virtual work, with the other inputs held: effort times motion of the input is
+    force times motion at the stop. An input at its own stop is the one that is released; else each that moves the pair.
     """
     mechanism = state.mechanism
-    if not mechanism.stops or len(mechanism.inputs) != 1:
+    if not mechanism.stops:
         return {}
     stops = PairStops(mechanism, mechanism_size(mechanism, state.shapes))
     met = stops.met_at(stops.positions(state.shapes, state.frames, state.own))
-    if not met:
-        return {}
-    ((name, effort),) = efforts.items()
-    unit = unit_rate_state(state, name)
-    found = {}
-    for each in met:
-        motion = stops.motions[each.pair].input_position_at(unit.shapes, unit.frames, unit.own)
-        ratio = float(value_and_rates(motion)[1])
-        force = effort / ratio if abs(ratio) > LEAST_RATIO else 0.0
-        pushes = force < 0.0 if each.is_upper else force > 0.0
-        found[each.pair] = force if pushes else 0.0
-    return found
+    loads: dict[str, dict[str, float]] = {}
+    for name, effort in efforts.items() if met else ():
+        unit = unit_rate_state(state, name)
+        for stop in met:
+            if stop.pair in efforts and stop.pair != name:
+                continue
+            motion = stops.motions[stop.pair].input_position_at(unit.shapes, unit.frames, unit.own)
+            ratio = float(value_and_rates(motion)[1])
+            if abs(ratio) <= LEAST_RATIO and len(efforts) > 1:
+                continue
+            force = effort / ratio if abs(ratio) > LEAST_RATIO else 0.0
+            pushes = force < 0.0 if stop.is_upper else force > 0.0
+            loads.setdefault(stop.pair, {})[name] = force if pushes else 0.0
+    return loads

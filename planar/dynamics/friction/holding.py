@@ -102,7 +102,7 @@ def holding(moving: State | Motion, load: str | None = None, effort: float = 0.0
 
 def load_names(mechanism: Mechanism) -> tuple[str, ...]:
     """What each load of a mechanism acts on."""
-    return tuple(load.point or load.link or load.pair or "" for load in mechanism.loads)
+    return tuple(load.target for load in mechanism.loads)
 
 
 def _load_index(mechanism: Mechanism, name: str) -> int:

@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from planar.foundation.argument_types import check_field_types
 from planar.foundation.arrays import Array, IntArray
 from planar.model.input_laws.segment import LawSegment
 from planar.model.input_laws.spline_table import TableSegment
@@ -31,6 +32,9 @@ class InputLaw:
     """Pieces of motion from t = 0 on, as in a cam's timing diagram (s, m, rad)."""
 
     segments: tuple[LawSegment, ...]
+
+    def __post_init__(self) -> None:
+        check_field_types(self)
 
     @cached_property
     def joint_times(self) -> tuple[float, ...]:

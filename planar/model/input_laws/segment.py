@@ -8,6 +8,7 @@ from math import isfinite
 from numbers import Real
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
+from planar.foundation.argument_types import check_field_types
 from planar.foundation.arrays import Array
 
 SHORTEST_DURATION, LONGEST_DURATION = 1e-9, 1e9
@@ -47,6 +48,9 @@ class LawSegment(ABC):
         @property
         def duration(self) -> float:
             """How long it takes (s)."""
+
+    def __post_init__(self) -> None:
+        check_field_types(self)
 
     @abstractmethod
     def evaluate(self, t: Array, velocity: float) -> Array:

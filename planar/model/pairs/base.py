@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import Any, ClassVar, NamedTuple, Self
 
+from planar.foundation.argument_types import check_field_types
 from planar.foundation.geometry import Frame, Vector
 from planar.foundation.jets import Scalar
 from planar.model.entry_reader import EntryReader, QuantityWriter
@@ -78,6 +79,9 @@ class Pair(ABC):
     ties_angles: ClassVar[bool] = False
     """Whether it ties angles alone: what holds it are couples, whatever forces they come from (see `tooth_contact`)."""
 
+    def __post_init__(self) -> None:
+        check_field_types(self)
+
     @property
     def bodies(self) -> tuple[str, ...]:
         """The links whose frames its formulas need: the two that it joins, and those that they are seen from."""
@@ -128,6 +132,10 @@ class Pair(ABC):
     ) -> ToothContact | None:
         """Where its teeth touch, beside all pairs of its mechanism; None without teeth, or where that is not known."""
         return None
+
+    def wheel_centres(self, all_pairs: Sequence[Pair]) -> Mapping[str, str | None]:
+        """Its wheels by their links, each with the point of the link at its centre; None where that is not known."""
+        return {}
 
     def rubbing_contacts(
         self, frames: Mapping[str, Frame], shapes: Mapping[str, LinkShape], all_pairs: Sequence[Pair], at_rest: bool

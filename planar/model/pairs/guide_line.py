@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, NamedTuple
 
+from planar.foundation.argument_types import checked_arguments
 from planar.foundation.geometry import Frame, Vector, direction
 from planar.foundation.jets import Scalar, atan2, hypot
 from planar.model.entry_reader import EntryReader, QuantityWriter
@@ -32,6 +33,7 @@ LINE_NUMBER_KINDS = (MeasureKind.LENGTH, MeasureKind.LENGTH, MeasureKind.PURE, M
 """What `measure_line` gives: a point of the line, and the line's direction."""
 
 
+@checked_arguments
 class LinkLine(NamedTuple):
     """A line `through` a point (a name, or x and y in m) at `angle` (rad) to the link's x-axis, or `to` a second."""
 

@@ -111,6 +111,9 @@ class RackPair(GuidedPair):
     def has_friction(self) -> bool:
         return super().has_friction or has_loss(self.efficiency)
 
+    def wheel_centres(self, all_pairs: Sequence[Pair]) -> Mapping[str, str | None]:
+        return {self.links[1]: self.point}
+
     def measure(self, shapes: Sequence[LinkShape]) -> Sequence[Scalar]:
         rack, pinion = shapes
         return (*self.line.measure_line(rack), *pinion.position(self.point), self.radius, *self.mesh_reference)

@@ -5,11 +5,13 @@ from __future__ import annotations
 from enum import Enum
 from typing import NamedTuple
 
+from planar.foundation.argument_types import checked_arguments
 from planar.foundation.geometry import Vector
 from planar.foundation.jets import Scalar, sqrt
 from planar.foundation.short_repr import short_repr
 
 
+@checked_arguments
 class Friction(NamedTuple):
     """Coulomb's friction at a pair: its coefficient in motion, and at rest where that is another."""
 

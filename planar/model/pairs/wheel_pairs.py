@@ -162,6 +162,9 @@ class WheelPair(Pair):
             if not (isinstance(radius, float) and radius == 0.0)
         )
 
+    def wheel_centres(self, all_pairs: Sequence[Pair]) -> Mapping[str, str | None]:
+        return {wheel: (self._centre_pin(wheel, all_pairs) or {}).get(wheel) for wheel in self.links}
+
     def _carrier_centres(self, shapes: Mapping[str, LinkShape], all_pairs: Sequence[Pair]) -> list[Vector]:
         """Where both wheels are pinned to the carrier, in its axes; fewer where one is not."""
         pins = [self._centre_pin(wheel, all_pairs) for wheel in self.links]

@@ -57,10 +57,10 @@ def _label(each: Dimension, mechanism: Mechanism) -> str:
     what, index = str(each.path[2]).replace("_", " "), int(each.path[1])
     if each.path[0] == "loads":
         load = mechanism.loads[index]
-        on = next(name for name in (load.point, load.link, load.pair) if name is not None)
         along = f" along {'xy'[int(each.path[3])]}" if len(each.path) > 3 else ""
         axes = f" of {load.axes}" if load.axes is not None and along else ""
-        return f"{what} on {on}{along}{axes}"
+        target = f"between {' and '.join(load.points)}" if load.points is not None else f"on {load.target}"
+        return f"{what} {target}{along}{axes}"
     if each.path[0] == "springs":
         ends = " and ".join(mechanism.springs[index].ends)
         return f"{what}, spring between {ends}"

@@ -147,10 +147,9 @@ def _action_data(rows: BalanceRows) -> Iterator[dict[str, Any]]:
     row, _ = rows.add(work.actions_on_links.T)
     for load in mechanism.loads:
         on = _loaded_links(load, rows)
-        name = next(each for each in (load.point, load.link, load.pair) if each is not None)
         yield {
             "kind": "load",
-            "name": name,
+            "name": load.target,
             "row": row,
             "on": list(on.items()),
             "course": _load_law_data(load.varies, mechanism),
@@ -177,9 +176,10 @@ def _action_data(rows: BalanceRows) -> Iterator[dict[str, Any]]:
 def _loaded_links(load: Load, rows: BalanceRows) -> Mapping[str, int]:
     """The links on which a load acts, each with the place."""
     on: dict[str, int] = {}
-    if load.point is not None:
-        at = rows.work.attachments[load.point]
-        on[at.link] = rows.add_place(rows.work.attachment_position(at))
+    for point in (load.point, *(load.points or ())):
+        if point is not None:
+            at = rows.work.attachments[point]
+            on[at.link] = rows.add_place(rows.work.attachment_position(at))
     if load.link is not None:
         on.setdefault(load.link, rows.add_origin(load.link))
     if load.pair is not None:

@@ -14,7 +14,7 @@ from planar.analysis.motion.answers import Answers
 from planar.analysis.motion.output import Axis, Extreme
 from planar.foundation.units import parse_unit
 from planar.model.file_units import FileUnits, display_unit, unit_by_input
-from planar.model.wording import amount
+from planar.model.wording import REST_TOLERANCE, amount
 from planar.reports.fitted_table import plain_table
 from planar.reports.number_format import DIGITS
 from planar.reports.tables.forces.mechanical_advantage import advantage_unit
@@ -47,10 +47,12 @@ class _PositionFormatter:
 
     def __init__(self, slides: bool, units: FileUnits):
         self.kind, self.units = "length" if slides else "angle", units
+        # an angle is told beside a radian; nothing tells how large a slide's positions are
+        self.least = 0.0 if slides else REST_TOLERANCE
 
     def __call__(self, *positions: float) -> str:
         name = self.units.length if self.kind == "length" else self.units.angle
-        told = [f"{parse_unit(name).from_si(each) + 0.0:.6g}" for each in positions]
+        told = [f"{parse_unit(name).from_si(each if abs(each) > self.least else 0.0) + 0.0:.6g}" for each in positions]
         return f"{' to '.join(told)} {name}"
 
 
@@ -60,15 +62,16 @@ def _range_rows(each: Answers, units: FileUnits, position: _PositionFormatter) -
     if each.stroke is not None:
         yield "stroke", amount(each.stroke.length, "length", units), "", ""
         for word, end in (("TDC", each.stroke.top), ("BDC", each.stroke.bottom)):
-            yield f"  {word}", amount(end.value, "length", units), position(end.input), ""
+            yield f"  {word}", amount(end.value, "length", units, each.stroke.length), position(end.input), ""
     if each.swing is not None:
         yield "swing", amount(each.swing.angle, "angle", units), "", ""
         for word, end in (("least", each.swing.least), ("greatest", each.swing.greatest)):
-            yield f"  {word} angle", amount(end.value, "angle", units), position(end.input), ""
+            yield f"  {word} angle", amount(end.value, "angle", units, 1.0), position(end.input), ""
     for one in each.extremes:
         for word, end, turns in (("least", one.least, one.turning[0]), ("greatest", one.greatest, one.turning[1])):
             told = "" if turns or not one.length else "an end of the range"
-            yield f"{word} {one.axis}", amount(end.value, "length", units), position(end.input), told
+            size = max(abs(one.least.value), abs(one.greatest.value))
+            yield f"{word} {one.axis}", amount(end.value, "length", units, size), position(end.input), told
     if each.time_ratio is not None:
         ratio = each.time_ratio
         yield "time ratio", f"{ratio.ratio:.{DIGITS}g}", "", ""
@@ -76,7 +79,7 @@ def _range_rows(each: Answers, units: FileUnits, position: _PositionFormatter) -
             took = "" if each.per_unit else f"{way.time:.{DIGITS}g} s"
             yield f"  {word}", position(way.travel), position(way.start.input, way.stop.input), took
     for axis, dwell in each.dwells:
-        near = f"within {amount(dwell.within, kind, units)} of {amount(dwell.at.value, kind, units)}"
+        near = f"within {amount(dwell.within, kind, units)} of {amount(dwell.at.value, kind, units, dwell.within)}"
         yield f"dwell{_axis_suffix(axis)}", position(dwell.travel), position(dwell.start, dwell.stop), near
 
 

@@ -16,7 +16,7 @@ from planar.foundation.units import parse_unit
 from planar.model.file_units import FileUnits
 from planar.model.mechanism import Mechanism
 from planar.reports.fitted_table import FittedTable, plain_table
-from planar.reports.number_format import format_number, paragraphs
+from planar.reports.number_format import format_number, format_or_zero, paragraphs
 
 
 def cam_tables(mechanism: Mechanism, found: CamProfile, least: BaseCircle) -> RenderableType:
@@ -74,9 +74,13 @@ def _law_table(found: CamProfile, units: FileUnits) -> FittedTable:
     heads = ("motion", ("from, deg", "to, deg"), (f"by, {unit}", "s'", "s''", "s'''"))
     table = plain_table(title, *heads, left=(0,), keys=1)
     pieces = found.cam.lift_pieces(found.shapes)
+    greatest = np.abs(found.lift).max(axis=1) * per
     for piece, lift in zip(pieces, np.split(found.lift, len(pieces), axis=1), strict=True):
-        rates = [format_number(float(np.abs(rate).max()) * per) for rate in lift[1:]]
-        way = format_number(float(lift[0, -1] - lift[0, 0]) * per)
+        rates = [
+            format_or_zero(float(np.abs(rate).max()) * per, scale)
+            for rate, scale in zip(lift[1:], greatest[1:], strict=True)
+        ]
+        way = format_or_zero(float(lift[0, -1] - lift[0, 0]) * per, greatest[0])
         table.add_row(piece.name, format_number(degrees(piece.start)), format_number(degrees(piece.stop)), way, *rates)
     return table
 

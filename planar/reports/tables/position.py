@@ -85,6 +85,15 @@ def _state_heading(state: State) -> RenderableType:
     return Group(*lines)
 
 
+def kind_scales(state: State) -> dict[str, float]:
+    """By kinds of quantity the greatest size (SI) of a position: what is round-off of it is printed as 0."""
+    points, links = state.scales_of_points, state.scales_of_links
+    size = max((float(np.hypot(*point.position)) for point in state.points.values()), default=1.0) or 1.0
+    rates = {"velocity": points[0], "acceleration": points[1]}
+    turning = {"angular velocity": links[0], "angular acceleration": links[1]}
+    return {"length": size, "angle": 1.0, **rates, **turning}
+
+
 def _links_table(state: State) -> FittedTable:
     units = state.mechanism.units
     table = plain_table(
@@ -94,13 +103,14 @@ def _links_table(state: State) -> FittedTable:
         column_heading("ang. velocity", "angular velocity", units),
         (column_heading("ang. acceleration", "angular acceleration", units), "sense"),
     )
+    scales = kind_scales(state)
     for name, link in state.links.items():
         if name != state.mechanism.frame:
             table.add_row(
                 name,
-                _report_cell(link.angle, "angle", units),
-                _report_cell(link.angular_velocity, "angular velocity", units),
-                _report_cell(link.angular_acceleration, "angular acceleration", units),
+                _report_cell(link.angle, "angle", units, scales["angle"]),
+                _report_cell(link.angular_velocity, "angular velocity", units, scales["angular velocity"]),
+                _report_cell(link.angular_acceleration, "angular acceleration", units, scales["angular acceleration"]),
                 link.sense,
             )
     return table
@@ -119,16 +129,17 @@ def _points_table(state: State) -> FittedTable:
     )
     length, velocity, acceleration = (display_unit(kind, units)[1] for kind in ("length", "velocity", "acceleration"))
     points = state.points
-    scale = max((float(np.hypot(*point.position)) for point in points.values()), default=1.0) or 1.0
+    scales = kind_scales(state)
     for name, point in points.items():
         placed = (
-            format_number(length.from_si(float(each) if abs(each) > 1e-13 * scale else 0.0)) for each in point.position
+            format_number(length.from_si(float(each) if abs(each) > 1e-13 * scales["length"] else 0.0))
+            for each in point.position
         )
         table.add_row(
             name,
             *placed,
-            *_polar_cells(point.velocity, velocity, units),
-            *_polar_cells(point.acceleration, acceleration, units),
+            *_polar_cells(point.velocity, velocity, units, scales["velocity"]),
+            *_polar_cells(point.acceleration, acceleration, units, scales["acceleration"]),
             point.sense,
         )
     return table
@@ -138,7 +149,7 @@ def _pair_tables(state: State) -> RenderableType:
     kinds: dict[type[Pair], list[Pair]] = {}
     for pair in relative_motions(state.mechanism).values():
         kinds.setdefault(type(pair), []).append(pair)
-    tables, units = [], state.mechanism.units
+    tables, units, scales = [], state.mechanism.units, kind_scales(state)
     for kind, pairs in kinds.items():
         titles = [
             column_heading(name.replace("_", " ").replace("angular", "ang."), of, units)
@@ -147,7 +158,9 @@ def _pair_tables(state: State) -> RenderableType:
         table = plain_table(f"{kind.keyword.capitalize()} pairs", "pair", "links", *titles, left=(0, 1), keys=2)
         for pair in pairs:
             report = state.pair(pair.name)
-            values = [_report_cell(report[name], of, units) for name, of in kind.result_kinds.items()]
+            values = [
+                _report_cell(report[name], of, units, scales.get(of, 0.0)) for name, of in kind.result_kinds.items()
+            ]
             table.add_row(pair.name, " - ".join(pair.links), *values)
         tables.append(table)
     return Group(*tables)
@@ -160,7 +173,7 @@ def misfit_table(moving: State | Motion) -> FittedTable:
     table = plain_table(title, "pair", "links", column_heading("misfit", "length", units), left=(0, 1))
     for pair in moving.mechanism.pairs:
         most = float(np.max(moving.misfits[pair.name]))
-        table.add_row(pair.name, " - ".join(pair.links), _report_cell(most, "length", units))
+        table.add_row(pair.name, " - ".join(pair.links), _report_cell(most, "length", units, 0.0))
     return table
 
 
@@ -181,8 +194,10 @@ def _relative_table(text: str, relative: RelativeState, state: State) -> Rendera
         "  Coriolis": ("acceleration", relative.coriolis),
         "  by sliding ": ("acceleration", relative.sliding_acceleration),
     }
+    scales = kind_scales(state)
     for name, (kind, part) in parts.items():
         measure, of = display_unit(kind, units)
-        size, way = _polar_cells(part, of, units)
-        table.add_row(name, size, measure, way, *(format_number(of.from_si(float(each))) for each in part))
+        size, direction = _polar_cells(part, of, units, scales[kind])
+        cells = (_report_cell(float(component), kind, units, scales[kind]) for component in part)
+        table.add_row(name, size, measure, direction, *cells)
     return table

@@ -13,7 +13,14 @@ from planar.foundation.units import parse_unit
 from planar.model.file_units import display_unit
 from planar.reports.columns import ReportedSeries
 from planar.reports.fitted_table import FittedTable, plain_table
-from planar.reports.number_format import column_heading, format_number, format_quantity, paragraphs, quantity_text
+from planar.reports.number_format import (
+    column_heading,
+    format_number,
+    format_or_zero,
+    format_quantity,
+    paragraphs,
+    quantity_text,
+)
 from planar.reports.tables.motion import motion_tables
 from planar.reports.tables.rubbing import (
     friction_events_table,
@@ -48,6 +55,7 @@ def tables(simulation: Simulation) -> RenderableType:
         _inputs_table(simulation),
         *hits,
         *rubs,
+        *([_oscillations_table(simulation)] if simulation.oscillations else []),
         _energies_table(simulation),
         paragraphs([("energy", kept)]),
     )
@@ -73,6 +81,26 @@ def _impacts_table(simulation: Simulation) -> FittedTable:
             *(quantity_text(speed, SPEED_KINDS[length], units) for speed in (each.approach, each.rebound)),
             format_quantity(each.lost, "energy", units, float(np.abs(simulation.lost).max(initial=0.0))),
             "rests there" if each.rests else "",
+        )
+    return table
+
+
+def _oscillations_table(simulation: Simulation) -> FittedTable:
+    """How often released inputs turn back, the period of their swings, and where the last ends."""
+    motion, units = simulation.motion, simulation.motion.mechanism.units
+    periods = ("period, s", "least", "greatest")
+    headings = ("input", "turnings", periods, ("last oscillation from", "to", "unit"))
+    table = plain_table("Oscillations, solved for", *headings, left=(0, 7), keys=1)
+    for name, oscillation in simulation.oscillations.items():
+        own = units.length if motion.has_length_motion(name) else units.angle
+        values = [
+            oscillation.period,
+            *((oscillation.periods.min(), oscillation.periods.max()) if len(oscillation.periods) else (np.nan,) * 2),
+        ]
+        last = [float(place) for place in oscillation.positions[-2:]]
+        places = [np.nan] * (2 - len(last)) + [parse_unit(own).from_si(place) for place in last]
+        table.add_row(
+            name, str(len(oscillation.times)), *map(format_or_zero, values), *map(format_or_zero, places), own
         )
     return table
 
@@ -132,4 +160,14 @@ def simulation_facts(simulation: Simulation) -> dict[str, Any]:
     found: dict[str, Any] = {"driven": list(simulation.driven), "energy_balance": simulation.balance}
     if simulation.motion.mechanism.stops:
         found["impacts"] = [each._asdict() for each in simulation.impacts]
+    if simulation.oscillations:
+        found["oscillations"] = {
+            name: {
+                "period": oscillation.period if np.isfinite(oscillation.period) else None,
+                "periods": oscillation.periods.tolist(),
+                "times": oscillation.times.tolist(),
+                "positions": oscillation.positions.tolist(),
+            }
+            for name, oscillation in simulation.oscillations.items()
+        }
     return found | friction_facts(simulation)

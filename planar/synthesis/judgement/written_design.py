@@ -16,8 +16,9 @@ from planar.foundation.arrays import Array
 from planar.model.file_units import FileUnits, unit_of_kind
 from planar.model.mechanism import Mechanism, NamedPoint, named_points
 
-DIGITS, EXACT_DIGITS = 7, 13
-"""Of the size of a mechanism, or of a rad, that its file is written with; where something is to be met exactly."""
+DIGITS, SKETCH_DIGITS = 13, 7
+"""Of the size of a mechanism, or of a rad, to which its numbers are written, so that what is met exactly still is; and
+those of its sketch, which only chooses the assembly."""
 
 
 def write_design(
@@ -26,21 +27,20 @@ def write_design(
     y: Array,
     input_position: float,
     name: str,
-    digits: int = DIGITS,
 ) -> Mechanism:
-    """The mechanism with these numbers (SI, rounded to what a file needs), whose sketch is where it stands with
+    """The mechanism with these numbers (SI, rounded to `DIGITS`), whose sketch is where it stands with
     unknowns y (unknowns,). Raises BadInput where a file with these numbers is refused."""
     start = design.mechanism
     units, size = start.units, design.solver.unit
     known = file_dimensions(start)
-    told = {key: _rounded(value, known[key].kind, units, size, digits) for key, value in numbers.items()}
+    told = {key: _rounded(value, known[key].kind, units, size, DIGITS) for key, value in numbers.items()}
     running = f"{start.inputs[0].pair}.position"
-    told[running] = _rounded(input_position, known[running].kind, units, size, digits)
+    told[running] = _rounded(input_position, known[running].kind, units, size, DIGITS)
     joints = [each for each in named_points(start) if len(each.members) > 1 and _moves(start, each)]
     places = _places(design, joints, told, y)
     sketch = []
     for each, at in zip(joints, places, strict=True):
-        x, y_own = (_rounded(part, "length", units, size, DIGITS) for part in at)
+        x, y_own = (_rounded(part, "length", units, size, SKETCH_DIGITS) for part in at)
         sketch.append((each.name, x, y_own))
     made = replace(start, sketch=tuple(sketch), name=name, about=None, source=None, published=(), ids=())
     return with_values(made, told)

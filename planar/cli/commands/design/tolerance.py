@@ -39,6 +39,11 @@ LIMIT_RESULTS = {"stroke": "travel", "swing": "travel", "travel": "travel", "tim
 @click.option("--result", metavar="NAME", help="Which of its results, or travel, 'time ratio', dead_points.")
 @click.option("--cycle", "whole", is_flag=True, help="Over the whole motion, as `planar cycle` has it.")
 @click.option("--general", type=click.Choice(list("fmcv")), help="ISO 2768-1 of this class, in place of the file's.")
+@click.option(
+    "--lengths",
+    metavar="VALUE",
+    help="Every length of links and pairs that is not 0 within this, as 0.1mm, in place of the file's tolerances.",
+)
 @click.option("--limit", metavar="VALUE", help="A deviation, as 0.1mm: how many mechanisms keep it.")
 @click.option("--allow", metavar="NAME=VALUE", help="The loosest tolerances that suffice, as E=0.05mm.")
 @click.option("--statistical", is_flag=True, help="With --allow: by three standard deviations, not the worst case.")
@@ -56,6 +61,7 @@ def tolerance(  # many: options of the command
     result: str | None,
     whole: bool,
     general: str | None,
+    lengths: str | None,
     limit: str | None,
     allow: str | None,
     statistical: bool,
@@ -80,11 +86,13 @@ def tolerance(  # many: options of the command
     from planar.solving.position import solve
 
     mechanism = load_model(model, mode)
-    others = None if general is None else {"general": f"ISO 2768-1 {general}"}
+    others: dict[str, Any] = {} if general is None else {"general": f"ISO 2768-1 {general}"}
+    if lengths is not None:
+        others["lengths"] = _read_deviation(lengths, "--lengths", "length", mechanism.units)
     refuse_overwriting(model, output)
     with show_status(f"{mechanism.name}: tolerances"):
         moving = run_motion(mechanism, **course) if whole else solve(mechanism, parse_drives(mechanism, at))
-        band = band_of(moving, of, others, result=named, samples=samples or 0, seed=seed, guaranteed=guaranteed)
+        band = band_of(moving, of, others or None, result=named, samples=samples or 0, seed=seed, guaranteed=guaranteed)
         if limit is not None:
             band = band.with_limit(_read_deviation(limit, "--limit", band.kind, mechanism.units))
         allowed = None

@@ -12,6 +12,7 @@ from math import pi
 from typing import Any, NamedTuple
 
 from planar.foundation.angles import wrap_angle
+from planar.foundation.argument_types import checked_arguments
 from planar.foundation.geometry import Vector, direction
 from planar.foundation.jets import Jet, Scalar, TermSizes, atan2, hypot, sqrt, value_between, within_turn
 from planar.model.entry_reader import EntryReader, QuantityWriter
@@ -31,6 +32,7 @@ STEEPEST = 4.0
 """By how much, about, the terms of a lift grow with the cam's angle, beside the sizes of the cam."""
 
 
+@checked_arguments
 class CamCircle(NamedTuple):
     """A circle of a cam: its centre in the cam's axes from the cam's centre, and its radius (m)."""
 

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+from planar.foundation.argument_types import checked_arguments
 from planar.model.entry_reader import EntryReader, QuantityWriter
 from planar.model.pairs.base import Schema, described, schema_reference
 
 KEYS = ("width", "modulus", "poisson_ratio", "follower_modulus", "follower_poisson_ratio")
 
 
+@checked_arguments
 class ContactMaterial(NamedTuple):
     """How wide cam and follower touch (m), and of both Young's modulus (Pa) and Poisson's ratio."""
 

@@ -9,6 +9,7 @@ from itertools import pairwise
 from math import pi
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from planar.foundation.argument_types import check_field_types
 from planar.foundation.jets import Jet, Scalar, part_of_piece, value_between, within_turn
 from planar.model.entry_reader import EntryReader, QuantityWriter
 from planar.model.pairs.base import MeasureKind, Schema, described, list_schema, schema_reference
@@ -101,6 +102,9 @@ class LiftLaw:
     """Pieces of lift over a turn of the cam, whose durations are angles (rad); the lift starts, and ends, at zero."""
 
     pieces: tuple[LawSegment, ...]
+
+    def __post_init__(self) -> None:
+        check_field_types(self)
 
     def ways(self) -> tuple[Scalar, ...]:
         """By how much each piece lifts (m or rad)."""

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import numpy as np
 
+from planar.foundation.argument_types import checked_arguments
 from planar.foundation.geometry import Frame, Vector, direction, frame_at
 from planar.foundation.jets import Scalar
 from planar.model.entry_reader import EntryReader, QuantityWriter
@@ -41,6 +42,7 @@ SIDES = ("left", "right")
 SHAPE_KEYS = ("centre", "base_radius", "roller_radius", "flat", "pivot", "side", "grooved", "contact")
 
 
+@checked_arguments
 class CamShape(NamedTuple):
     """What makes a profile of a law: the cam's `centre` (a point of cam and carrier), its base circle (m; 0 where that
     follows from the points of a profile), and the follower's face: a roller's radius (m; 0: a point), or, where it is

@@ -233,7 +233,7 @@ const Draw = {
     const pins = Pins.all(file), names = new Set(file.pairs.map(Pins.pairName));
     const keep = (key, holds) => { if (file[key]) { file[key] = file[key].filter(holds); if (!file[key].length) delete file[key]; } };
     keep("inputs", (each) => { const [entry, two] = each.pair.split(":"); return names.has(entry) && (two?.split(",") ?? []).every((link) => carries(link, entry)); });
-    keep("loads", (each) => (each.point === undefined || pins.has(each.point)) && (each.link === undefined || has(each.link)) && (each.pair === undefined || names.has(each.pair)));
+    keep("loads", (each) => [each.point, ...(each.points ?? [])].every((point) => point === undefined || pins.has(point)) && (each.link === undefined || has(each.link)) && (each.pair === undefined || names.has(each.pair)));
     keep("springs", (each) => (each.points ?? []).every((point) => pins.has(point)) && (each.links ?? []).every(has));
     keep("masses", (each) => has(each.link) && (Array.isArray(each.at) || carries(each.link, each.at)));
     for (const pin of Object.keys(file.sketch ?? {})) if (!pins.has(pin) || carries(file.frame, pin)) delete file.sketch[pin];
@@ -268,7 +268,7 @@ const Draw = {
     }
     for (const each of file.inputs ?? []) { const [entry, two] = each.pair.split(":"); if (entry === from) each.pair = two === undefined ? name : `${name}:${two}`; }
     for (const each of file.loads ?? []) each.point === from && (each.point = name);
-    for (const each of file.springs ?? []) if (each.points) each.points = each.points.map((point) => swap(point, from));
+    for (const each of [...(file.loads ?? []), ...(file.springs ?? [])]) if (each.points) each.points = each.points.map((point) => swap(point, from));
     if (file.sketch) file.sketch = keyed(file.sketch, from);
     at.set(name, at.get(from));
     at.delete(from);

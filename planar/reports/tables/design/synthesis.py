@@ -10,6 +10,7 @@ import numpy as np
 from rich.console import Group, RenderableType
 from rich.text import Text
 
+from planar.document.dimensions import file_dimensions
 from planar.foundation.arrays import Array
 from planar.model.wording import amount, count_phrase
 from planar.reports.fitted_table import FittedTable, plain_table
@@ -48,7 +49,7 @@ def _designs_table(found: Synthesis, files: Sequence[Path]) -> FittedTable:
         "input",
         "transmission",
         "cognates",
-        "file",
+        *(("file",) if files else ()),
         left=(1, 5, 8),
         keys=1,
     )
@@ -60,9 +61,22 @@ def _designs_table(found: Synthesis, files: Sequence[Path]) -> FittedTable:
             input_text(found, each),
             transmission_text(found, each),
             str(len(each.cognates)),
-            str(files[number - 1]) if files else "",
+            *_file_cells(files, number),
         )
     return rows
+
+
+def _file_cells(files: Sequence[Path], number: int) -> tuple[str, ...]:
+    """The cell of the file of a design; none where no files are written."""
+    return (str(files[number - 1]),) if files else ()
+
+
+def _dimensions_text(found: Synthesis, design: SynthesisedDesign) -> str:
+    """The numbers of a design that were sought, with their units."""
+    known = file_dimensions(design.mechanism)
+    return ", ".join(
+        f"{name} {amount(value, known[name].kind, found.task.units)}" for name, value in design.numbers.items()
+    )
 
 
 def _complete_parts(found: CompleteSynthesis, files: Sequence[Path]) -> Iterator[RenderableType]:
@@ -70,12 +84,15 @@ def _complete_parts(found: CompleteSynthesis, files: Sequence[Path]) -> Iterator
     yield from map(Text, found.summary)
     if len(found):
         yield Text()
-        rows = plain_table("Designs", "no.", "proved", "greatest miss", "defects", "file", left=(3, 4), keys=1)
-        for number, each in enumerate(found, start=1):
-            sure = "yes" if isinstance(each, ExactDesign) and each.certified else "no"
-            told = "; ".join(each.defects) or "none"
-            rows.add_row(str(number), sure, _misses(found, each)[0], told, str(files[number - 1]) if files else "")
+        file_heading = ("file",) if files else ()
+        rows = plain_table("Designs", "no.", "proved", "greatest miss", "defects", *file_heading, left=(3, 4), keys=1)
+        for number, design in enumerate(found, start=1):
+            proved = "yes" if isinstance(design, ExactDesign) and design.certified else "no"
+            defects = "; ".join(design.defects) or "none"
+            rows.add_row(str(number), proved, _misses(found, design)[0], defects, *_file_cells(files, number))
         yield rows
+        yield Text("Dimensions")
+        yield paragraphs((str(number), _dimensions_text(found, design)) for number, design in enumerate(found, start=1))
     if found.curves:
         yield Text()
         rows = plain_table("Dyads", "pivot", "joint", "dimension", "points", left=(0, 1), keys=2)

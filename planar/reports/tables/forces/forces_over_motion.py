@@ -19,8 +19,8 @@ from planar.model.file_units import display_unit
 from planar.model.wording import count_phrase, join_all_names
 from planar.reports.columns import ReportedSeries
 from planar.reports.fitted_table import FittedTable, plain_table
-from planar.reports.number_format import column_heading, format_or_zero, format_quantity, paragraphs
-from planar.reports.tables.forces import cam_contacts, flywheels, friction, loads, motors, unknown_loads
+from planar.reports.number_format import ROUNDING_RATIO, column_heading, format_or_zero, format_quantity, paragraphs
+from planar.reports.tables.forces import cam_contacts, fixed_wheels, flywheels, friction, loads, motors, unknown_loads
 from planar.reports.tables.forces import position_forces as at_one
 from planar.reports.tables.motion import motion_heading, position_cell, position_heading, running_pair
 from planar.results.motion import Motion
@@ -48,6 +48,7 @@ def tables(
     if unknown is not None:
         facts = [*unknown_loads.unknown_load_facts(forces, unknown), *facts]
     parts.append(_reactions_table(forces, motion))
+    parts += [_holding_torques_table(forces, motion)] if forces.fixed_wheels else []
     contacts = cam_contacts.contacts_table(forces)
     if contacts is not None:
         parts.append(contacts)
@@ -81,12 +82,28 @@ def _efforts_table(forces: Forces, motion: Motion) -> FittedTable:
     for name, effort in forces.inputs.items():
         _, unit, of = at_one.effort_name_and_unit(forces, name)
         values = np.asarray(effort)
-        least, greatest = (_greatest_with_place(motion, sense * values) for sense in (-1.0, 1.0))
+        scale = most[forces.is_force_input(name)]
+        least, greatest = _extremes_with_places(motion, values, scale)
         mean, low, high = (
-            format_or_zero(of.from_si(each), of.from_si(most[forces.is_force_input(name)]))
-            for each in (_mean(motion, values), -least[0], greatest[0])
+            format_or_zero(of.from_si(each), of.from_si(scale))
+            for each in (_mean(motion, values), least[0], greatest[0])
         )
         table.add_row(name, mean, unit, low, least[1], high, greatest[1])
+    return table
+
+
+def _holding_torques_table(forces: Forces, motion: Motion) -> FittedTable:
+    """The least and the greatest torque that holds wheels of the frame, about each centre."""
+    at, moment, units = position_heading(motion), at_one.greatest_moment_and_force(forces)[0], forces.mechanism.units
+    title = f"Holding torque on wheels of {forces.mechanism.frame}, anticlockwise, among these positions"
+    heading = column_heading("least", "torque", units), column_heading("greatest", "torque", units)
+    table = plain_table(title, "about", "pair", (heading[0], at), (heading[1], at), left=(0, 1), keys=2)
+    for name, wheel in forces.fixed_wheels.items():
+        values = np.asarray(wheel.torque)
+        least, greatest = _extremes_with_places(motion, values, moment)
+        low, high = (format_quantity(value, "torque", units, moment) for value in (least[0], greatest[0]))
+        about = "-" if wheel.centre is None else name
+        table.add_row(about, join_all_names([*wheel.shares]), low, least[1], high, greatest[1])
     return table
 
 
@@ -98,6 +115,14 @@ def _mean(motion: Motion, values: Array) -> float:
     if not steps.any():
         return float(values[0])
     return float(np.sum(0.5 * (values[1:] + values[:-1]) * steps) / np.sum(steps))
+
+
+def _extremes_with_places(motion: Motion, values: Array, scale: float) -> tuple[tuple[float, str], tuple[float, str]]:
+    """The least and the greatest of values, each with its place; without one where they differ by round-off of a scale
+    alone."""
+    least, greatest = (_greatest_with_place(motion, sense * values) for sense in (-1.0, 1.0))
+    is_constant = greatest[0] + least[0] <= ROUNDING_RATIO * scale
+    return (-least[0], "" if is_constant else least[1]), (greatest[0], "" if is_constant else greatest[1])
 
 
 def _greatest_with_place(motion: Motion, values: Array) -> tuple[float, str]:
@@ -184,6 +209,7 @@ def force_series(forces: Forces) -> Iterable[ReportedSeries]:
     for name, each in forces.reactions.items():
         values = _reaction_values(each)
         yield ReportedSeries("reactions", name, {what: _REACTION_KINDS.get(what, "torque") for what in values}, values)
+    yield from fixed_wheels.fixed_wheel_series(forces)
     yield from friction.friction_series(forces)
     yield from cam_contacts.contact_series(forces)
     if at_one.has_inertia(forces):

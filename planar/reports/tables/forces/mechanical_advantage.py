@@ -31,12 +31,13 @@ def all_advantages(advantages: Advantages) -> list[Advantage]:
 
 def advantages_table(ratios: Iterable[Advantage], units: FileUnits) -> FittedTable:
     """What an ideal mechanism exerts at each output for what an input supplies, by both routes."""
-    headings = ("output", "for the input", ("by power", "by centres", "unit"), "through")
-    table = plain_table("Mechanical advantage", *headings, left=(0, 1, 4, 5), keys=2)
+    headings = ("output", "along", "for the input", ("by power", "by centres", "unit"), "through")
+    table = plain_table("Mechanical advantage", *headings, left=(0, 1, 2, 5, 6), keys=3)
     for each in ratios:
         unit, by = advantage_unit(each.measure, units)
         values = (format_or_zero(None if one is None else one * by) for one in (each.by_power, each.by_centres))
-        table.add_row(each.output, each.input, *values, unit, " ".join(each.through))
+        along = {"path": "its path", "line": "their line"}.get(each.along, each.along)
+        table.add_row(each.target, along, each.input, *values, unit, " ".join(each.through))
     return table
 
 
@@ -48,6 +49,8 @@ def record(advantages: Advantages) -> dict[str, Any]:
                 "by_power": each.by_power,
                 "by_centres": each.by_centres,
                 "unit": each.measure,
+                "target": each.target,
+                "along": each.along,
                 "through": list(each.through),
                 "why": each.why,
             }

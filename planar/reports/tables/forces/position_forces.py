@@ -31,7 +31,7 @@ from planar.reports.number_format import (
     precision_text,
     quantity_text,
 )
-from planar.reports.tables.forces import cam_contacts, friction, loads, motors, unknown_loads
+from planar.reports.tables.forces import cam_contacts, fixed_wheels, friction, loads, motors, unknown_loads
 from planar.reports.tables.forces import mechanical_advantage as ratios
 from planar.reports.tables.position import published_table
 
@@ -60,6 +60,7 @@ def tables(
         parts.append(loads.actions_table("Inertia", inertia, units, greatest_moment_and_force(forces)[0]))
     most = sum(each.max_power for each in (*acting, *inertia))
     parts.append(_reactions_table(forces))
+    parts += fixed_wheels.fixed_wheels_tables(forces, greatest_moment_and_force(forces)[0])
     contacts = cam_contacts.contacts_table(forces)
     if contacts is not None:
         parts.append(contacts)
@@ -237,10 +238,12 @@ def _balanced_links_text(forces: Forces) -> str:
 def stop_remarks(forces: Forces) -> Iterator[str]:
     """What stops carry in place of the input."""
     motions = relative_motions(forces.mechanism)
-    for name, force in forces.stops.items():
+    for name, by_input in forces.stop_loads.items():
         kind = "force" if motions[name].input_kind is MeasureKind.LENGTH else "torque"
-        carried = f"let go, the input is held by it with {quantity_text(force, kind, forces.mechanism.units)}"
-        yield f"pair {name!r} stands at its stop: {carried if force else 'let go, the mechanism leaves it'}"
+        for released, force in by_input.items():
+            carried = f"the stop carries {quantity_text(force, kind, forces.mechanism.units)} in place of the input"
+            result = carried if force else "the mechanism leaves the stop"
+            yield f"pair {name!r} stands at its stop: if the input at {released!r} is released, {result}"
 
 
 def undetermined_sentences(forces: Forces) -> tuple[str, ...]:
@@ -280,6 +283,8 @@ def record(
         "reactions": {name: _reaction_record(each) for name, each in forces.reactions.items()},
         **({"motors": motors.record(duties)} if (duties := motors.motor_duties(forces)) else {}),
         **({"stops": dict(forces.stops)} if forces.stops else {}),
+        **({"stop_loads": {name: dict(of) for name, of in forces.stop_loads.items()}} if forces.stop_loads else {}),
+        **fixed_wheels.record(forces),
         **({"solved_for": unknown_loads.record(unknown)} if unknown is not None else {}),
         **({"shaking": {"force": force.tolist(), "moment": float(moment)}} if has_inertia(forces) else {}),
         "power": {"in": _finite_or_none(float(forces.power_in)), "out": forces.power_out},
