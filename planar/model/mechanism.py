@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from planar.foundation.errors import BadInput, first_unprintable, join_names
 from planar.foundation.notebook_display import Displayable
 from planar.foundation.units import parse_unit
-from planar.model.file_units import FileUnits
+from planar.model.file_units import FileUnits, rate_length
 from planar.model.link_shapes import Along, At, Distances, Link, LinkShape, Point, PointDefinition
 from planar.model.loads import Course, Load, Mass, Spring
-from planar.model.pairs.base import Pair
+from planar.model.pairs.base import MeasureKind, Pair
 from planar.model.revision import Revisable
 
 if TYPE_CHECKING:
@@ -44,6 +44,7 @@ __all__ = [
     "Stops",
     "check_mechanism",
     "find_law_problem",
+    "has_input_rates",
     "links_counting_turns",
     "named_points",
     "pair_entries",
@@ -51,6 +52,9 @@ __all__ = [
     "relative_motions",
     "replace_inputs",
     "running_input_index",
+    "unit_input_rate",
+    "unit_rate_note",
+    "with_unit_rate",
 ]
 
 
@@ -214,6 +218,37 @@ def replace_inputs(mechanism: Mechanism, drives: tuple[Drive, ...]) -> Mechanism
         return found._replace(law=given.law and given.law.start_at(found.position, found.velocity))
 
     return replace(mechanism, inputs=tuple(changed(given) for given in mechanism.inputs))
+
+
+def has_input_rates(mechanism: Mechanism) -> bool:
+    """Whether an input has a velocity, an acceleration or a law."""
+    return any(given.velocity or given.acceleration or given.law is not None for given in mechanism.inputs)
+
+
+def unit_input_rate(mechanism: Mechanism, pair: str) -> float:
+    """The unit rate of the input at a pair: 1 rad/s, or the length of the file's rates (`rate_length`) per second."""
+    slides = relative_motions(mechanism)[pair].input_kind is MeasureKind.LENGTH
+    return rate_length(mechanism.units)[1].to_si(1.0) if slides else 1.0
+
+
+def unit_rate_note(mechanism: Mechanism, pair: str) -> str:
+    """The sentence which says that velocities and accelerations are those at the unit rate of an input."""
+    slides = relative_motions(mechanism)[pair].input_kind is MeasureKind.LENGTH
+    rate = f"1 {rate_length(mechanism.units)[0]}/s" if slides else "1 rad/s"
+    return f"the file gives no velocity: velocities and accelerations are for {rate} at the input {pair}"
+
+
+def with_unit_rate(mechanism: Mechanism, pair: str | None = None) -> Mechanism:
+    """The same mechanism with one input at its unit rate where no input has a rate, else the mechanism itself.
+
+    `pair` names the input, by default the first. The remarks of the result say so. Raises BadInput for an input that
+    the mechanism does not have.
+    """
+    if not mechanism.inputs or has_input_rates(mechanism):
+        return mechanism
+    driven = pair if pair is not None else mechanism.inputs[0].pair
+    moving = replace_inputs(mechanism, (Drive(driven, velocity=unit_input_rate(mechanism, driven)),))
+    return replace(moving, remarks=(*moving.remarks, unit_rate_note(mechanism, driven)))
 
 
 def running_input_index(mechanism: Mechanism, pair: str | None, place: str | None = None) -> int:

@@ -208,10 +208,17 @@ def cycle(
     steps: int,
     **course: Any,
 ) -> None:
-    """The whole motion: position to position through the range of an input, or in time by the inputs' laws."""
+    """The whole motion: position to position through the range of an input, or in time by the inputs' laws.
+
+    Where the file gives no velocity, rates are those at the unit rate of the input that runs, and a remark says so.
+    """
+    from planar.model.mechanism import with_unit_rate
+
     if as_json and output is not None:
         raise BadInput("-o", "a run goes to a file or is printed with --json; give one of the two")
     mechanism = load_model(model, mode)
+    if course["duration"] is None:  # in time, an input without a rate stands still
+        mechanism = with_unit_rate(mechanism, course["pair"])
     refuse_overwriting(model, output)
     if output is not None:
         from planar.reports.files.run_formats import check_writable
