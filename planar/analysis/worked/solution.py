@@ -17,7 +17,7 @@ from planar.analysis.worked.sections import Section, sections
 from planar.model.file_units import rate_unit
 from planar.model.mechanism import PUBLISHED_QUANTITIES, PublishedValue, relative_motions, unit_rate_note
 from planar.model.pairs import MeasureKind
-from planar.model.wording import REST_TOLERANCE, direction_sense, turning_sense
+from planar.model.wording import REST_TOLERANCE, direction_sense, sentence, turning_sense
 from planar.model.wording import join_all_names as words_listed
 from planar.results.motion import State
 from planar.solving.position import state_at_unit_rate
@@ -94,8 +94,7 @@ def worked_solution(state: State, comparisons: Sequence[Comparison] = ()) -> Wor
     filed, state = state, state_at_unit_rate(state)
     given = list(given_data(state))
     if state is not filed:
-        note = unit_rate_note(state.mechanism, state.mechanism.inputs[0].pair)
-        given.append((f"{note[0].upper()}{note[1:]}.",))
+        given.append((sentence(unit_rate_note(state.mechanism, state.mechanism.inputs[0].pair)),))
     velocity, acceleration = (
         WorkedPolygon(each.kind, each, sections(each))
         for each in (velocity_polygon(state), acceleration_polygon(state))

@@ -46,7 +46,7 @@ const Files = (() => {
       const { ratio, name } = units[kind];
       put(path, kind === "length" ? length(now) : `${Number(((now * ratio[1]) / ratio[0]).toPrecision(15))} ${name}`);
     });
-    page.inputRates().forEach((rates, k) => rates.forEach((now, order) => {
+    page.given.forEach((rates, k) => rates.forEach((now, order) => {
       const given = data.inputs[k], kind = InputRates.kind(given, order), { ratio, name } = units[kind];
       if (now !== (order ? given.acceleration : given.velocity)) file.inputs[k][RATE_KEYS[order]] = `${Number(((now * ratio[1]) / ratio[0]).toPrecision(15))} ${name}`;
     }));

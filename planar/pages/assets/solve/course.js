@@ -7,12 +7,16 @@ const PARTS = 360;           // of the range
 const CHUNK = Math.PI / 36;  // rad, sizes: how far the march to a limit goes at a time
 const FREE_SLIDE = 2;        // sizes: as far is gone each way where a slide has no limit
 const SLICE = 8;             // ms of work at a time
+const CHORD = 2e-4;          // sizes: how far a path may be from the chord between two of its positions
+const MAX_HALVINGS = 8;      // of the range between two rows
+const DEAD_POINT_PART = 0.25; // of the range beside a dead point: there paths go as the root of the input
 const OUTGROWN = 2;          // times the middle rate: beside a dead point rates outgrow every scale
 
 /** The motion over a range of the input: rows of positions and rates, in SI. */
 class Course {
-  constructor(page, k, rows, whole, dead) {
+  constructor(page, k, rows, whole, dead, between = new Map()) {
     this.page = page;
+    this.between = between;                 // frames of positions after a row, by its number, where paths bend
     this.input = k;
     this.rows = rows;
     this.inputs = Float64Array.from(rows, (row) => row.at);
@@ -35,6 +39,12 @@ class Course {
 
   /** A point over the motion: x, y, vx, vy, ax, ay. */
   point(name) { return this.keep(`point ${name}`, () => this.columns((frames) => pointNumbers(this.page, name, frames))); }
+
+  /** The path of a point, [[x, y], ...]: the rows, and more positions between them where it bends. */
+  path(name) {
+    return this.keep(`path ${name}`, () => this.rows.flatMap(({ frames }, i) => (
+      [frames, ...(this.between.get(i) ?? [])].map((each) => this.page.point(name, each).position))));
+  }
 
   /** The place of an input's position in the range, brought there by whole turns where that changes nothing. */
   within(position) {
@@ -172,7 +182,8 @@ class Courses {
         yield;
       }
     }
-    const made = new Course(page, k, rows, turns, [ends[0].stopped, ends[1].stopped]);
+    const dead = [ends[0].stopped, ends[1].stopped], between = yield* this.refine(start, k, rows, dead);
+    const made = new Course(page, k, rows, turns, dead, between);
     made.names = ends.map((each) => (each.met ? "stop" : "dead point"));
     return made;
   }
@@ -188,13 +199,51 @@ class Courses {
     return { at: made.u[k], made, stopped, met: stopped && made.met.length > 0 };
   }
 
+  /** Positions between rows, so that no chord of a path is far from it: frames by the number of the row before them. */
+  *refine(start, k, rows, dead) {
+    const { page } = this, names = Object.keys(page.data.points), last = rows.length - 1, between = new Map();
+    const places = (frames) => names.map((name) => page.point(name, frames).position);
+    const ends = rows.map(({ at, z, frames }) => ({ at, z, frames, places: places(frames) }));
+    const bend = (a, b, c) => Math.max(0, ...names.map((_, j) => chordDistance(a.places[j], b.places[j], c.places[j])));
+    const isDead = ({ at }) => (dead[0] && at === rows[0].at) || (dead[1] && at === rows[last].at);
+    /** The positions between two, the first of which is no dead point. */
+    const inner = function* (from, to, halvings) {
+      const made = start.copy(), part = isDead(to) ? 1 - DEAD_POINT_PART : 0.5, at = from.at + part * (to.at - from.at);
+      Object.assign(made, { z: Float64Array.from(from.z), last: null, stop: null });
+      made.u[k] = from.at / made.scale[k];
+      yield;
+      if (made.moveTo(made.u.map((each, j) => (j === k ? at / made.scale[k] : each))).reached < 1) return [];
+      const frames = page.framesOf(made.state()), middle = { at, z: made.z, frames, places: places(frames) };
+      if (bend(from, middle, to) <= CHORD * page.data.size) return [];
+      if (halvings === MAX_HALVINGS) return [frames];
+      return [...yield* inner(from, middle, halvings + 1), frames, ...yield* inner(middle, to, halvings + 1)];
+    };
+    for (let i = 0; i < last; i++) {
+      // a chord of two parts bends four times as far as one of its parts
+      const near = [i, i + 1].filter((row) => row > 0 && row < last);
+      const isFlat = near.length === 2 && near.every((row) => bend(ends[row - 1], ends[row], ends[row + 1]) <= CHORD * page.data.size);
+      if (isFlat) continue;
+      const frames = isDead(ends[i]) ? (yield* inner(ends[i + 1], ends[i], 1)).reverse() : yield* inner(ends[i], ends[i + 1], 1);
+      if (frames.length) between.set(i, frames);
+    }
+    return between;
+  }
+
   /** A position with the rates of the file, and with those of the running input alone, at unit speed. */
   row(made, at) {
     const { page, running } = this, { inputs } = page.data;
     const rates = page.inputRates(), still = inputs.map(() => 0);
-    const state = made.state(rates.map((each) => each[0]), rates.map((each) => each[1])), frames = page.framesOf(state);
+    const state = page.stateOf(made, rates), frames = page.framesOf(state);
     const same = inputs.length === 1 && rates[0][0] !== 0;
     const alone = same ? frames : page.framesOf(made.state(still.map((_, k) => (k === running ? 1 : 0)), still));
-    return { at, z: Float64Array.from(made.z), state, frames, alone };
+    const loaded = page.forces ? page.loadedState(made, state) : state;
+    return { at, z: Float64Array.from(made.z), state, loaded, frames, alone };
   }
+}
+
+/** How far a place is from the chord between two others. */
+function chordDistance([ax, ay], [x, y], [bx, by]) {
+  const [dx, dy] = [bx - ax, by - ay], square = dx * dx + dy * dy;
+  const part = square > 0 ? Math.max(0, Math.min(1, ((x - ax) * dx + (y - ay) * dy) / square)) : 0;
+  return Math.hypot(x - ax - part * dx, y - ay - part * dy);
 }
