@@ -67,6 +67,21 @@ class Course {
     });
   }
 
+  /** The greatest size of each kind of quantity over the motion (SI), as the size of the mechanism and its speeds let it be. */
+  get scales() {
+    return this.keep("scales", () => {
+      const { page } = this, { size } = page.data;
+      const greatest = (list, key) => list.reduce((most, columns) => columns[key].reduce((a, b) => Math.max(a, Math.abs(b) || 0), most), 0);
+      const links = page.data.links.map((name) => this.link(name)), points = Object.keys(page.data.points).map((name) => this.point(name));
+      const turning = greatest(links, "w"), turningUp = Math.max(greatest(links, "e"), turning ** 2);
+      return {
+        length: size, angle: Math.PI, "angular velocity": turning, "angular acceleration": turningUp,
+        velocity: Math.max(turning * size, greatest(points, "vx"), greatest(points, "vy")),
+        acceleration: Math.max(turningUp * size, greatest(points, "ax"), greatest(points, "ay")),
+      };
+    });
+  }
+
   keep(key, make) {
     if (!this.kept.has(key)) this.kept.set(key, make());
     return this.kept.get(key);
