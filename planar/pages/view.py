@@ -74,9 +74,7 @@ class PageSubject(NamedTuple):
     window: PageRange | None = None
 
 
-def page_of(
-    shown: Mechanism | State | Motion, task: SynthesisTask | None = None, pair: str | None = None
-) -> str:
+def page_of(shown: Mechanism | State | Motion, task: SynthesisTask | None = None, pair: str | None = None) -> str:
     """The text of the page of a mechanism, a position or a motion, with what a task wants of it.
 
     `pair` names the input that runs first.

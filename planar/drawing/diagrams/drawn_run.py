@@ -17,7 +17,6 @@ from planar.model.mechanism import (
     Drive,
     Input,
     Mechanism,
-    relative_motions,
     replace_inputs,
     running_input_index,
     unit_input_rate,

@@ -12,6 +12,7 @@ from planar.assemblies.circuits.circuits import Circuits, circuits
 from planar.assemblies.modes import Mode, modes
 from planar.codegen.javascript import write_javascript
 from planar.document.dimensions import Dimension, change_dimension
+from planar.drawing.scheme.link_bodies import outline_point_names
 from planar.equations.mechanism_numbers import scale_lengths, shapes_of_links
 from planar.equations.symbolic_equations import slice_length
 from planar.model.link_graph import link_numbers
@@ -148,11 +149,13 @@ def page_data(mechanism: Mechanism, z: np.ndarray | None = None) -> tuple[dict[s
 
 
 def _point_data(mechanism: Mechanism, numbers: DimensionNumbers) -> dict[str, Any]:
-    """The links and the points of a mechanism, their numbers as places."""
+    """The links and the points of a mechanism, their numbers as places; points of outlines are marked as such."""
+    outlines = outline_point_names(mechanism, shapes_of_links(mechanism))
     points = {
         name: {
             "links": [member[0] for member in members],
             "at": [numbers.add_point(numbers.shapes[link].position(point)) for link, point in members],
+            **({"is_outline": True} if name in outlines else {}),
         }
         for name, members in named_points(mechanism)
     }
