@@ -97,13 +97,13 @@ def test_what_was_drawn_is_undone_to_nothing_and_done_again(drawing):
     hand = drawing()
     draw_quick_return(hand)
     drawn, steps = hand.file(), 0
-    undo = hand.window.get_by_role("button", name="Undo drawing")
+    undo = hand.window.get_by_role("button", name="Undo")
     while undo.is_enabled():
         undo.click()
         steps += 1
     assert hand.file()["links"] == {"frame": {"points": {}}}
     for _ in range(steps):
-        hand.window.get_by_role("button", name="Redo drawing").click()
+        hand.window.get_by_role("button", name="Redo").click()
     assert hand.file() == drawn
     assert hand.told() == "mobility 1, 1 input"
 
@@ -232,7 +232,7 @@ def test_names_are_changed_and_pins_and_links_go(drawing):
     assert "no . : or ," in hand.said()
     hand.button("Erase Zapfen 1")
     assert "Zapfen 1" not in json.dumps(hand.file())
-    hand.button("Undo drawing")
+    hand.button("Undo")
     assert "Zapfen 1" in planar.solve(hand.mechanism()).points
 
 
@@ -400,7 +400,7 @@ def test_without_its_server_what_is_drawn_stays_and_leaves_as_a_link(drawing):
     hand.tool("Bar")
     hand.drag((30, 40), (60, 90))
     assert "does not answer" in hand.told()
-    hand.button("Undo drawing")
+    hand.button("Undo")
     hand.button("Copy link")
     hand.window.wait_for_function("() => !editing.panel.link.hidden")
     link = hand.window.get_by_label("Link of the mechanism").input_value()
@@ -466,6 +466,6 @@ def test_the_rest_goes_along_with_a_pin_and_keeps_its_lengths(drawing):
     assert found.point(pin).position * 1000 == pytest.approx(start + np.array([6, 4]), abs=1e-6)
     for name, at in hand.window.evaluate("[...editing.at]"):
         assert found.point(name).position == pytest.approx(at, abs=CLOSE)
-    hand.button("Undo drawing")
-    hand.button("Undo drawing")
+    hand.button("Undo")
+    hand.button("Undo")
     assert planar.dimensions(hand.mechanism()) == before

@@ -99,15 +99,15 @@ def test_a_picture_is_undone_step_by_step_with_what_is_drawn_and_comes_back(draw
     hand.window.on("request", lambda request: asked.append(request.url.rsplit("/", 1)[-1]))
     back, forth = [], []
     for _ in seen[1:]:
-        hand.button("Undo drawing")
+        hand.button("Undo")
         back.append(stands())
     for _ in seen[1:]:
-        hand.button("Redo drawing")
+        hand.button("Redo")
         forth.append(stands())
     assert back == seen[-2::-1]
     assert forth == seen[1:]
     assert asked.count("answer") == 2  # of the bar alone, there and back
-    hand.button("Undo drawing")
+    hand.button("Undo")
     hand.window.on("dialog", lambda dialog: dialog.accept())
     hand.window.reload()
     hand.wait()
@@ -176,8 +176,8 @@ def test_a_path_drawn_freehand_is_the_wanted_curve_of_a_point_and_a_task(drawing
     hand.drag((x, y), (x, y + 4), (x, y + 8))
     moved = np.array(hand.window.evaluate("editing.wish.places[6]")) * 1000
     assert moved == pytest.approx([x, y + 8], abs=0.5)
-    hand.button("Undo drawing")
-    hand.button("Undo drawing")
+    hand.button("Undo")
+    hand.button("Undo")
     assert hand.window.evaluate("page.wanted") is None
     assert not hand.window.evaluate("editing.changed")
 
@@ -224,7 +224,7 @@ def test_designs_that_the_server_finds_are_listed_and_taken_over_in_one_step(dra
     hand.button("Take design 1")
     assert hand.file() == design
     assert hand.window.evaluate("page.wanted.items.length") == 1
-    hand.button("Undo drawing")
+    hand.button("Undo")
     assert hand.file() == before
     server.shutdown()
     server.server_close()
@@ -319,5 +319,5 @@ def test_whatever_the_pencil_shows_has_a_name_is_legible_and_reached_by_keys(dra
                 "document.activeElement.id || document.activeElement.ariaLabel || document.activeElement.textContent"
             )
         )
-    stops = [each for each in reached if each in ("Plate", "Undo drawing", "Full screen (F)", "drawing", "Play")]
-    assert stops == ["Undo drawing", "drawing", "Full screen (F)", "Play"]
+    stops = [each for each in reached if each in ("Plate", "Undo", "Full screen (F)", "drawing", "Play")]
+    assert stops == ["Undo", "drawing", "Full screen (F)", "Play"]
