@@ -246,7 +246,7 @@ def with_unit_rate(mechanism: Mechanism, pair: str | None = None) -> Mechanism:
     """
     if not mechanism.inputs or has_input_rates(mechanism):
         return mechanism
-    driven = pair if pair is not None else mechanism.inputs[0].pair
+    driven = mechanism.inputs[0 if pair is None else running_input_index(mechanism, pair)].pair
     moving = replace_inputs(mechanism, (Drive(driven, velocity=unit_input_rate(mechanism, driven)),))
     return replace(moving, remarks=(*moving.remarks, unit_rate_note(mechanism, driven)))
 

@@ -170,12 +170,15 @@ def test_a_path_drawn_freehand_is_the_wanted_curve_of_a_point_and_a_task(drawing
     hand.window.get_by_label("Point that is to trace it").select_option("B")
     hand.wait()
     assert hand.window.evaluate("page.wanted.items[0].of") == "B"
-    # a place is dragged as on any page, and undone by the pencil with the rest
+    # a place is dragged as on any page, and one button undoes that, the choice of the point, and the path
     hand.tool("Move")
     x, y = (1000 * each for each in hand.window.evaluate("editing.wish.places[6]"))
     hand.drag((x, y), (x, y + 4), (x, y + 8))
     moved = np.array(hand.window.evaluate("editing.wish.places[6]")) * 1000
     assert moved == pytest.approx([x, y + 8], abs=0.5)
+    hand.button("Undo")
+    back = np.array(hand.window.evaluate("editing.wish.places[6]")) * 1000
+    assert back == pytest.approx([x, y], abs=1e-9)
     hand.button("Undo")
     hand.button("Undo")
     assert hand.window.evaluate("page.wanted") is None

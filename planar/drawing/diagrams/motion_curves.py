@@ -17,8 +17,8 @@ from planar.model.mechanism import Mechanism, named_points, relative_motions
 from planar.model.pairs import MeasureKind
 
 ZERO_TOLERANCE = FLAT_TOLERANCE
-"""A curve below this part of the mechanism's size, or of that times the input's rate, is round-off: beside a change point
-accelerations have errors a thousand times those of other positions."""
+"""A curve below this part of the mechanism's size, or of that times the input's rate, is round-off: beside a change
+point accelerations have errors a thousand times those of other positions."""
 
 
 class MotionCurve(NamedTuple):

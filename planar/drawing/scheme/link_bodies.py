@@ -1,4 +1,4 @@
-"""What each link looks like in its own axes: the lines between its joints, its plate, its further points, its outline."""
+"""What each link looks like in its own axes: lines between its joints, its plate, its further points, its outline."""
 
 from __future__ import annotations
 

@@ -262,6 +262,7 @@ class Editing {
   /** Another file in place of this one: one step. `fits`: all of it is to be seen. */
   replace(file, fits = false) {
     this.fits = fits;
+    this.absorb();
     this.commit({ file, at: new Map() });
     this.guess();
   }
