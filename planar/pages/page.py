@@ -154,9 +154,9 @@ def page(  # many: what is shown, and how
     `z` are the unknowns of the assembly, left out that nearest to the sketch; `window` is the input that runs and its
     range, by default the first input with a rate, and a turn or from limit to limit. `back` leads to an index, `layers`
     are shown at first. `library` is of notebooks: the page carries the scripts for others beside it (True), or takes
-    them from one of those (False). `wanted` is what the page shows under the mechanism, to be dragged; `edited` the file
-    that its server draws on. Raises NoAnswer where it has no position to start from, BadInput for something wanted of
-    what it does not have.
+    them from one of those (False). `wanted` is what the page shows under the mechanism, to be dragged; `edited` the
+    file that its server draws on. Raises NoAnswer where it has no position to start from, BadInput for something wanted
+    of what it does not have.
     """
     data, functions = page_data(mechanism, z)
     data["window"] = window._asdict() if window is not None and window.low is not None else None

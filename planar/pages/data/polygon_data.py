@@ -33,7 +33,8 @@ def polygon_data(mechanism: Mechanism, points: Mapping[str, Mapping[str, Any]]) 
     mechanism (`point`), whose velocity it has, fixed or not, or one of a guide (`link`) below a point that slides
     (`over`). A stroke goes `from` a point `to` another; it is an `image`, or a vector from the pole (`absolute`) or
     between two points (`relative`). That of two points of one `link` has a part along their line and one across, of
-    which the first ends in what is lettered `end`. `legends` say what letters stand for, without such ends and with them.
+    which the first ends in what is lettered `end`. `legends` say what letters stand for, without such ends and with
+    them.
     """
     frame, letters = mechanism.frame, small_letters(points)
     rests = any(frame in each["links"] for each in points.values())

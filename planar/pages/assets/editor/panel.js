@@ -78,8 +78,9 @@ class PencilPanel {
     this.hint.hidden = tool === "hand";
     editing.parts.undo.show();
     this.mobility.textContent = answer?.mobility ?? "";
-    const isUnfixed = answer?.place === `$.links.${file.frame}` && !Pins.ofLink(file.links[file.frame]).length;
-    const nextStep = !isUnfixed ? "" : Object.keys(file.links).length > 1 ? NEXT_STEPS.drawn : NEXT_STEPS.empty;
+    // an answer is of the file that it was asked of, which may have changed since
+    if (answer) answer.isUnfixed ??= answer.place === `$.links.${file.frame}` && !Pins.ofLink(file.links[file.frame]).length;
+    const nextStep = !answer?.isUnfixed ? "" : Object.keys(file.links).length > 1 ? NEXT_STEPS.drawn : NEXT_STEPS.empty;
     this.problem.textContent = nextStep || (answer?.problem ? `${answer.place ? `${answer.place}: ` : ""}${answer.problem}` : "");
     this.problem.hidden = !answer?.problem;
     this.problem.className = nextStep ? "hint" : "why";
