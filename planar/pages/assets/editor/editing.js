@@ -128,7 +128,7 @@ class Editing {
     this.parts.lens.show();
     this.show();
     // the hint above the drawing says what a tool does, where there is room for it
-    this.say(tool === "hand" || this.panel.hint.checkVisibility() ? "" : TOOLS[tool].told);
+    this.say(tool === "hand" || this.panel.hint.offsetParent !== null ? "" : TOOLS[tool].told);
   }
 
   choose(one) {

@@ -70,6 +70,7 @@ function greatest(page, names, parts) {
       most = Math.max(most, Math.hypot(...(parts[0] === "vx" ? velocity : acceleration) ?? [0, 0]));
     }
   }
-  // what is below rounding beside the mechanism's size is none
-  return most > 1e-12 * page.data.size ? most : 0;
+  // what is zero to round-off is none
+  const scale = (course?.scales ?? greatestNumbers(page))[parts[0] === "vx" ? "velocity" : "acceleration"];
+  return most > AXIS.flat * scale ? most : 0;
 }
