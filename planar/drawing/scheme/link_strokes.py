@@ -106,8 +106,9 @@ def bar_strokes(scene: Scene, pen: Pen = Pen.LINK) -> Iterator[PlacedLine]:
                 yield PlacedLine(about, link, pen, side)
         for side in body.tracers:
             yield PlacedLine(about, link, thin, side)
-        if (side := _outline_support(scene, body)) is not None:
-            yield PlacedLine(about, link, thin if body.sides else pen, side)
+        support = _outline_support(scene, body)
+        if support is not None:
+            yield PlacedLine(about, link, thin if body.sides else pen, support)
         yield from _guide_strokes(scene, link, body, pen)
 
 
