@@ -78,7 +78,8 @@ def draw_over_a_figure(hand: Pencil) -> None:
 
 
 def take(hand: Pencil, name: str) -> None:
-    """A picture of the window, in few colours."""
+    """A picture of the window, in few colours, once the server has answered."""
+    hand.wait()
     settled(hand.window)
     image = Image.open(io.BytesIO(hand.window.screenshot())).convert("RGB").quantize(COLOURS)
     path = FOLDER / f"{name}.png"

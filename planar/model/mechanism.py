@@ -14,10 +14,10 @@ from planar.foundation.errors import BadInput, first_unprintable, join_names
 from planar.foundation.geometry import Vector
 from planar.foundation.notebook_display import Displayable
 from planar.foundation.units import parse_unit
-from planar.model.file_units import FileUnits
+from planar.model.file_units import FileUnits, rate_length
 from planar.model.link_shapes import Along, At, Distances, Link, LinkShape, Offset, Point, PointDefinition
 from planar.model.loads import Course, Load, Mass, Spring
-from planar.model.pairs.base import Pair
+from planar.model.pairs.base import MeasureKind, Pair
 from planar.model.revision import Revisable
 
 if TYPE_CHECKING:
@@ -47,6 +47,7 @@ __all__ = [
     "Stops",
     "check_mechanism",
     "find_law_problem",
+    "has_input_rates",
     "links_counting_turns",
     "named_points",
     "pair_entries",
@@ -54,6 +55,9 @@ __all__ = [
     "relative_motions",
     "replace_inputs",
     "running_input_index",
+    "unit_input_rate",
+    "unit_rate_note",
+    "with_unit_rate",
 ]
 
 
@@ -220,6 +224,37 @@ def replace_inputs(mechanism: Mechanism, drives: tuple[Drive, ...]) -> Mechanism
         return found._replace(law=given.law and given.law.start_at(found.position, found.velocity))
 
     return replace(mechanism, inputs=tuple(changed(given) for given in mechanism.inputs))
+
+
+def has_input_rates(mechanism: Mechanism) -> bool:
+    """Whether an input has a velocity, an acceleration or a law."""
+    return any(driven.velocity or driven.acceleration or driven.law is not None for driven in mechanism.inputs)
+
+
+def unit_input_rate(mechanism: Mechanism, pair: str) -> float:
+    """The unit rate of the input at a pair: 1 rad/s, or the length of the file's rates (`rate_length`) per second."""
+    slides = relative_motions(mechanism)[pair].input_kind is MeasureKind.LENGTH
+    return rate_length(mechanism.units)[1].to_si(1.0) if slides else 1.0
+
+
+def unit_rate_note(mechanism: Mechanism, pair: str) -> str:
+    """The sentence which says that velocities and accelerations are those at the unit rate of an input."""
+    slides = relative_motions(mechanism)[pair].input_kind is MeasureKind.LENGTH
+    rate = f"1 {rate_length(mechanism.units)[0]}/s" if slides else "1 rad/s"
+    return f"the file gives no velocity: velocities and accelerations are for {rate} at the input {pair}"
+
+
+def with_unit_rate(mechanism: Mechanism, pair: str | None = None) -> Mechanism:
+    """The same mechanism with one input at its unit rate where no input has a rate, else the mechanism itself.
+
+    `pair` names the input, by default the first. The remarks of the result say so. Raises BadInput for an input that
+    the mechanism does not have.
+    """
+    if not mechanism.inputs or has_input_rates(mechanism):
+        return mechanism
+    name = mechanism.inputs[0 if pair is None else running_input_index(mechanism, pair)].pair
+    moving = replace_inputs(mechanism, (Drive(name, velocity=unit_input_rate(mechanism, name)),))
+    return replace(moving, remarks=(*moving.remarks, unit_rate_note(mechanism, name)))
 
 
 def running_input_index(mechanism: Mechanism, pair: str | None, place: str | None = None) -> int:

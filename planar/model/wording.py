@@ -27,6 +27,11 @@ def amount(value: float, kind: str, units: FileUnits, beside: float = 0.0) -> st
     return shown if name == "1" else f"{shown} {name}"
 
 
+def sentence(phrase: str) -> str:
+    """A phrase as a sentence: its first letter capital, and a full stop at its end."""
+    return f"{phrase[:1].upper()}{phrase[1:]}."
+
+
 def turning_sense(rate: float, scale: float = 0.0) -> str:
     """The sense of an angular rate, beside the greatest of its kind."""
     if abs(rate) <= REST_TOLERANCE * scale:

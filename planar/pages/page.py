@@ -38,11 +38,14 @@ class EditedFile(NamedTuple):
 
 
 class PageRange(NamedTuple):
-    """The part of an input's range that a page runs through: the number of the input, and both ends (rad or m)."""
+    """The input that runs on a page: its number, and both ends of its range (rad or m).
+
+    Without ends its range is a turn, or from limit to limit.
+    """
 
     running: int
-    low: float
-    high: float
+    low: float | None = None
+    high: float | None = None
 
 
 STYLES = (
@@ -148,15 +151,17 @@ def page(  # many: what is shown, and how
 ) -> str:
     """The page of a mechanism at its inputs.
 
-    `z` are the unknowns of the assembly, left out that nearest to the sketch; `window` is the range that is run
-    through, left out a turn or from limit to limit. `back` leads to an index, `layers` are
-    shown at first. `library` is of notebooks: the page carries the scripts for others beside it (True), or takes them
-    from one of those (False). `wanted` is what the page shows under the mechanism, to be dragged; `edited` the file
-    that its server draws on. Raises NoAnswer where it has no position to start from, BadInput for something wanted of
-    what it does not have.
+    `z` are the unknowns of the assembly, left out that nearest to the sketch; `window` is the input that runs and its
+    range, by default the first input with a rate, and a turn or from limit to limit. `back` leads to an index, `layers`
+    are shown at first. `library` is of notebooks: the page carries the scripts for others beside it (True), or takes
+    them from one of those (False). `wanted` is what the page shows under the mechanism, to be dragged; `edited` the
+    file that its server draws on. Raises NoAnswer where it has no position to start from, BadInput for something wanted
+    of what it does not have.
     """
     data, functions = page_data(mechanism, z)
-    data["window"], data["layers"] = window and window._asdict(), layers
+    data["window"] = window._asdict() if window is not None and window.low is not None else None
+    data["layers"] = layers
+    data["running"] = data["running"] if window is None else window.running
     data["wanted"] = wanted_data(mechanism, data, wanted)
     data["edited"] = edited and edited._asdict()
     own = (EDITOR_SCRIPTS, EDITOR_STYLES) if edited else ((), ())

@@ -14,7 +14,7 @@ from planar.foundation.geometry import frame_at
 from planar.foundation.jets import Jet, Scalar
 from planar.foundation.notebook_display import Displayable
 from planar.foundation.safe_files import save_file
-from planar.model.mechanism import Drive, Mechanism, replace_inputs
+from planar.model.mechanism import Drive, Mechanism, replace_inputs, running_input_index
 from planar.pages.data.wanted_data import apply_task
 from planar.pages.notebook import must_carry_scripts, output_html
 from planar.pages.page import PageRange, page
@@ -30,13 +30,22 @@ MAX_LISTED_ASSEMBLIES = 12
 
 
 @takes_result("Mechanism", "State", "Motion")
-def view(shown: Mechanism | State | Motion, path: str | Path | None = None, *, task: TaskSource | None = None) -> Path:
+def view(
+    shown: Mechanism | State | Motion,
+    path: str | Path | None = None,
+    *,
+    task: TaskSource | None = None,
+    pair: str | None = None,
+) -> Path:
     """Write the page of a mechanism, of a position, or of a motion, which keeps its range.
 
     Without a path it is written to a folder of its own and opened in the browser. A `task`, as `planar.synthesise`
-    takes it, is shown under the mechanism: what is wanted can be dragged, and the free dimensions follow. Gives the
-    file's path. Raises NoAnswer where the mechanism has no position to start from, BadInput where the file cannot be
-    written, or the task is none of this mechanism.
+    takes it, is shown under the mechanism: what is wanted can be dragged, and the free dimensions follow. `pair` names
+    the input that runs first, by default the first that has a velocity. While no input has a velocity, rates are those
+    at the unit rate of the input that runs, and the page says so. Returns the file's path.
+
+    Raises NoAnswer where the mechanism has no position to start from, BadInput where the file cannot be
+    written, the task is none of this mechanism, or there is no input at `pair`.
 
     >>> import planar
     >>> from tempfile import mkdtemp
@@ -45,7 +54,7 @@ def view(shown: Mechanism | State | Motion, path: str | Path | None = None, *, t
     """
     if not isinstance(shown, Mechanism | State | Motion):
         raise BadInput("view", f"a Mechanism, a State or a Motion is wanted, not {type(shown).__name__}")
-    text = page_of(shown, None if task is None else read_task(task))
+    text = page_of(shown, None if task is None else read_task(task), pair)
     if path is not None:
         save_file(Path(path), text)
         return Path(path)
@@ -65,9 +74,16 @@ class PageSubject(NamedTuple):
     window: PageRange | None = None
 
 
-def page_of(shown: Mechanism | State | Motion, task: SynthesisTask | None = None) -> str:
-    """The text of the page of a mechanism, a position or a motion, with what a task wants of it."""
+def page_of(shown: Mechanism | State | Motion, task: SynthesisTask | None = None, pair: str | None = None) -> str:
+    """The text of the page of a mechanism, a position or a motion, with what a task wants of it.
+
+    `pair` names the input that runs first.
+    """
     subject = _page_subject(shown)
+    if pair is not None:
+        running = running_input_index(subject.mechanism, pair)
+        if subject.window is None or subject.window.running != running:
+            subject = subject._replace(window=PageRange(running))
     if task is None:
         return page(*subject)
     mechanism, wanted = apply_task(subject.mechanism, task)
@@ -82,10 +98,11 @@ def _page_subject(shown: Mechanism | State | Motion) -> PageSubject:
     ends = {name: given.position for name, given in shown.inputs.items()}
     # of inputs that run in time together the one that goes farthest runs on the page
     pair = max(ends, key=lambda name: float(np.ptp(ends[name])))
-    window = PageRange(list(ends).index(pair), float(ends[pair].min()), float(ends[pair].max()))
+    low, high = float(ends[pair].min()), float(ends[pair].max())
     row = _start_row(shown, pair)
     there = replace_inputs(shown.mechanism, tuple(Drive(name, float(at[row])) for name, at in ends.items()))
-    return PageSubject(there, _unknowns(shown, there, row), window if window.low < window.high else None)
+    window = PageRange(list(ends).index(pair), low, high) if low < high else None
+    return PageSubject(there, _unknowns(shown, there, row), window)
 
 
 def _start_row(motion: Motion, pair: str) -> int:

@@ -17,7 +17,7 @@ from planar.foundation.arrays import Array
 from planar.foundation.errors import NoAnswer, Outcome, TrackingEnd
 from planar.foundation.geometry import Frame
 from planar.foundation.jets import Jet
-from planar.model.mechanism import Drive, Mechanism, replace_inputs
+from planar.model.mechanism import Drive, Mechanism, replace_inputs, with_unit_rate
 from planar.results.motion import State
 from planar.solving.assembly.block_assemblies import BlockAssemblies
 from planar.solving.assembly.nearest_assembly import (
@@ -395,6 +395,12 @@ def solved_mechanism(mechanism: Mechanism) -> SolvedMechanism:
     except TypeError:  # made in Python, of lists
         return SolvedMechanism(mechanism)
     return _cached_solved_mechanism(mechanism)
+
+
+def state_at_unit_rate(state: State) -> State:
+    """The same position at the unit rate of the first input where no input has a rate, else the state itself."""
+    moving = with_unit_rate(state.mechanism)
+    return state if moving is state.mechanism else PositionSolver(moving).state_with_rates(state)
 
 
 def stopped_at_start(solver: PositionSolver, z: Array, problem: NoAnswer) -> NoAnswer:

@@ -21,6 +21,7 @@ from planar.drawing.paper.scales import parse_scale
 from planar.foundation.errors import PlanarError
 from planar.model.file_units import rate_unit
 from planar.reports.tables.worked_solution import record, solution_text
+from tests.builders import four_bar_document
 from tests.command import run
 from tests.hostile import NAMES, hostile_document
 from tests.known import some_models, state_of
@@ -457,3 +458,21 @@ def test_a_wheel_that_turns_very_slowly_beside_others_turns():
     told = shown(worked_solution(state))
     assert "By the pair n: ω_c = 0" not in told
     assert "c does not turn" not in told
+
+
+def test_a_position_without_a_velocity_is_worked_out_at_the_unit_rate_of_its_first_input():
+    value = four_bar_document(0.04, 0.09, 0.07, 0.1, 1.0, 1, omega=None, name="still")
+    still, turning = (planar.solve(planar.from_dict(document)) for document in (value, with_velocity(value, "1 rad/s")))
+    solution, expected = worked_solution(still), worked_solution(turning)
+    assert solution.links == expected.links
+    assert solution.points == expected.points
+    assert any(link.velocity for link in solution.links)
+    pair = still.mechanism.inputs[0].pair
+    note = f"The file gives no velocity: velocities and accelerations are for 1 rad/s at the input {pair}."
+    assert [plain_text(phrase) for phrase in solution.given[len(expected.given) :]] == [note]
+    assert " ".join(shown(solution).split()).count(note) == 1
+    assert not any(link.angular_velocity for link in still.links.values())  # what is solved stays as the file has it
+
+
+def with_velocity(value: Any, velocity: str) -> Any:
+    return value | {"inputs": [value["inputs"][0] | {"velocity": velocity}]}

@@ -7,6 +7,7 @@ import os
 import re
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,9 @@ import pytest
 
 import planar
 from planar.document.files import MAX_FILE_BYTES
+from planar.foundation.errors import BadInput
+from planar.model.mechanism import unit_rate_note, with_unit_rate
+from tests.builders import slider_crank_document
 from tests.command import ROOT, process, run, written
 from tests.known import MODELS
 
@@ -614,3 +618,58 @@ def test_a_format_that_is_not_written_is_answered_with_those_that_are(
     assert "'.docx'" in sentence
     assert f"can be written to files that end in {endings}" in sentence
     assert not (tmp_path / "x.docx").exists()
+
+
+def test_a_run_of_a_file_without_a_velocity_is_at_the_unit_rate_of_the_input_that_runs(tmp_path: Path) -> None:
+    value = slider_crank_document(0.1, 0.4, 1.0, omega=None, name="still")
+    model = written(tmp_path, value)
+    pair = value["inputs"][0]["pair"]
+    found = json.loads(run(tmp_path, "cycle", model, "--steps", "6", "--json").out)
+    turning = planar.from_dict(value | {"inputs": [value["inputs"][0] | {"velocity": 1.0}]})
+    motion = planar.cycle(turning, 6)
+    assert found["inputs"][pair]["velocity"] == [1.0] * 7
+    for name, point in motion.points.items():
+        assert found["points"][name]["acceleration"] == pytest.approx(point.acceleration)
+    note = f"the file gives no velocity: velocities and accelerations are for 1 rad/s at the input {pair}"
+    assert found["remarks"].count(note) == 1
+    assert " ".join(run(tmp_path, "cycle", model, "--steps", "6").out.split()).count(note) == 1
+    solved = json.loads(run(tmp_path, "solve", model, "--json").out)
+    assert solved["inputs"][pair]["velocity"] == 0.0
+    timed = json.loads(run(tmp_path, "cycle", model, "--duration", "1", "--steps", "2", "--json").out)
+    assert timed["inputs"][pair]["velocity"] == [0.0] * 3  # in time it stands still
+
+
+def test_the_unit_rate_is_that_of_the_input_that_is_named_and_none_beside_a_law_or_an_acceleration() -> None:
+    mechanism = planar.load("pantograph")
+    still = replace(
+        mechanism, inputs=tuple(given._replace(velocity=0.0, acceleration=0.0) for given in mechanism.inputs)
+    )
+    first, second = (given.pair for given in still.inputs)
+    for named, driven in ((None, first), (second, second)):
+        moving = with_unit_rate(still, named)
+        assert {given.pair: given.velocity for given in moving.inputs if given.velocity} == {driven: 1.0}
+        assert moving.remarks[-1] == unit_rate_note(still, driven)
+    assert with_unit_rate(mechanism) is mechanism
+    started = replace(still, inputs=(still.inputs[0]._replace(acceleration=2.0), *still.inputs[1:]))
+    assert with_unit_rate(started) is started
+    with pytest.raises(BadInput, match="there is no input at 'nowhere'"):
+        with_unit_rate(still, "nowhere")
+    sliding = planar.load("excavator-arm")
+    (driven, *_) = (given.pair for given in sliding.inputs)
+    assert "for 1 m/s at the input" in unit_rate_note(sliding, driven)
+
+
+def test_explain_takes_the_unit_rate_of_the_input_that_is_named_and_refuses_it_beside_a_velocity(
+    tmp_path: Path,
+) -> None:
+    mechanism = planar.load("pantograph")
+    value = planar.to_dict(mechanism)
+    second = mechanism.inputs[1].pair
+    refused = run(tmp_path, "explain", "pantograph", "--input", second).refused(2)
+    assert refused.startswith("--input: it names an input with a unit rate")
+    for given in value["inputs"]:
+        given.pop("velocity", None)
+    shown = run(tmp_path, "explain", written(tmp_path, value | {"published": []}), "--input", second).out
+    assert " ".join(shown.split()).count(f"for 1 rad/s at the input {second}") == 1
+    solution = json.loads(run(tmp_path, "explain", "m.json", "--input", second, "--json").out)
+    assert any(link["velocity"] for link in solution["links"].values())

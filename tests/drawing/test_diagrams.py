@@ -19,6 +19,7 @@ pytest.importorskip("matplotlib")
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.text import Text
 
+from tests.builders import four_bar_document
 from tests.closed_forms import piston
 from tests.figures import text_boxes
 
@@ -403,3 +404,11 @@ def test_an_axis_of_the_least_and_the_greatest_numbers_has_ticks(most):
     assert 2 <= len(axis.ticks) < 20
     assert axis.low <= 0.0 < axis.high
     assert np.all(np.isfinite(axis.ticks))
+
+
+def test_a_coupler_that_only_slides_has_no_angular_acceleration_beside_change_points_either():
+    value = four_bar_document(0.04, 0.1, 0.04, 0.1, 1.0, 1, omega=10.0, name="parallelogram")
+    figure = diagrams(planar.from_dict(value), "BC")
+    for name, symbol in (("displacement", "φ"), ("velocity", "ω"), ("acceleration", "ε")):
+        _, values = curve(figure, name, symbol)
+        assert not values.any()

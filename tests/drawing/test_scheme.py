@@ -19,7 +19,7 @@ from planar.drawing.paper.scales import parse_scale as reading
 from planar.drawing.scheme import symbol_table
 from planar.drawing.scheme.details import AROUND, scheme_with_details
 from planar.drawing.scheme.ground import ground_marks
-from planar.drawing.scheme.link_bodies import convex_hull, link_bodies
+from planar.drawing.scheme.link_bodies import convex_hull, link_bodies, link_outlines
 from planar.drawing.scheme.link_strokes import body_marks
 from planar.drawing.scheme.scene import plain_frames
 from planar.drawing.scheme.scheme import scheme
@@ -30,6 +30,7 @@ from planar.model.link_shapes import link_shape
 from planar.model.mechanism import Drive, named_points, replace_inputs
 from planar.model.pairs import MeasureKind, pair_types
 from planar.model.pairs.symbols import BeltMark, GuideMark, PinMark, PitchLineMark, SliderMark, SlotMark, WheelMark
+from tests.builders import four_bar_document
 from tests.draws import draws, part
 from tests.known import some_models
 from tests.known import state_of as solved
@@ -782,3 +783,86 @@ def test_pins_however_near_each_other_are_drawn():
             whole, *details = scheme_with_details(made(value), None if scale is None else reading(scale))
             assert whole.marks
             assert all(picture.window is not None for picture in details)
+
+
+# outlines, and masses on one pin
+
+
+def outlined(points):
+    """A four-bar whose coupler BC carries points, in mm."""
+    value = four_bar_document(
+        40, 90, 70, 100, 60, 1, points=points, name="outlined", units={"length": "mm", "angle": "deg"}, omega=None
+    )
+    return planar.from_dict(value)
+
+
+def ring(count, centre=(45.0, 40.0), radius=12.0):
+    """Points on a circle by their names."""
+    turns = [2.0 * pi * k / count for k in range(count)]
+    return {f"b{k}": [centre[0] + radius * cos(turn), centre[1] + radius * sin(turn)] for k, turn in enumerate(turns)}
+
+
+def test_points_of_a_link_that_nothing_uses_are_its_outline_without_letters():
+    mechanism = outlined(ring(9))
+    picture = scheme(planar.solve(mechanism))
+    assert {mark.text for mark in picture.marks if isinstance(mark, Label) and mark.about.startswith("point ")} == set(
+        "ABCD"
+    )
+    assert not any(mark.about.startswith("point ") for mark in picture.marks if not isinstance(mark, Label))
+    (outline,) = [
+        mark for mark in picture.marks if isinstance(mark, Polyline) and mark.closed and len(mark.points) == 9
+    ]
+    assert outline.about == "link BC"
+    # nine points fan out to neither pin: the bar itself, and one line to the nearest corner
+    lines = [
+        mark for mark in picture.marks if isinstance(mark, Polyline) and mark.about == "link BC" and not mark.closed
+    ]
+    assert len(lines) == 2
+
+
+@pytest.mark.parametrize("count", [1, 2, 3])
+def test_few_points_that_nothing_uses_are_tracers_with_letters(count):
+    points = dict(list(ring(9).items())[:count])
+    mechanism = outlined(points)
+    assert not link_outlines(mechanism, parts_of(mechanism))
+    letters = {mark.text for mark in scheme(planar.solve(mechanism)).marks if isinstance(mark, Label)}
+    assert points.keys() <= letters
+
+
+def test_a_point_that_a_load_a_mass_a_spring_or_a_published_value_uses_is_on_no_outline():
+    value = planar.to_dict(outlined(ring(9)))
+    value["loads"] = [{"point": "b0", "force": [0, -10]}]
+    value["masses"] = [{"link": "BC", "mass": 2, "at": "b1"}]
+    value["springs"] = [{"points": ["b2", "A"], "stiffness": "10 N/mm", "free_length": 10}]
+    value["published"] = [{"symbol": "v", "quantity": "velocity", "of": "b3"}]
+    mechanism = planar.from_dict(value)
+    (outline,) = link_outlines(mechanism, parts_of(mechanism)).values()
+    assert outline.points == ("b4", "b5", "b6", "b7", "b8")
+
+
+def test_an_outline_keeps_the_order_of_its_points_unless_they_cross():
+    corners = {"p": [20, 20], "q": [60, 20], "r": [60, 60], "s": [40, 30], "t": [20, 60]}  # s is a notch
+    mechanism = outlined(corners)
+    (outline,) = link_outlines(mechanism, parts_of(mechanism)).values()
+    assert outline.corners == tuple("pqrst")
+    mechanism = outlined({name: corners[name] for name in "prqst"})  # these sides cross: the hull is taken
+    (outline,) = link_outlines(mechanism, parts_of(mechanism)).values()
+    assert sorted(outline.corners) == ["p", "q", "r", "t"]
+    assert sorted(outline.points) == sorted("pqrst")
+
+
+def test_a_link_with_one_pin_and_a_mass_has_a_line_to_its_mass_centre():
+    value = four_bar_document(40, 90, 70, 100, 60, 1, name="arm", units={"length": "mm", "angle": "deg"}, omega=None)
+    value["links"]["arm"] = {"points": {"C": [0, 0]}}
+    value["pairs"] = [{"turning": name} for name in "ABD"] + [{"turning": "C", "links": ["BC", "DC", "arm"]}]
+    value["inputs"].append({"pair": "C:BC,arm", "position": 20})
+    value["masses"] = [{"link": "arm", "mass": 2, "at": [30, 40]}]
+    mechanism = planar.from_dict(value)
+    body = link_bodies(mechanism, parts_of(mechanism))["arm"]
+    ((start, stop),) = body.sides
+    assert hypot(*(stop - start)) == pytest.approx(0.05)
+    assert body.dots == ()  # the centre of mass has its own symbol, and is no point
+
+
+def parts_of(mechanism):
+    return {link.name: link_shape(link) for link in mechanism.links}

@@ -97,13 +97,13 @@ def test_what_was_drawn_is_undone_to_nothing_and_done_again(drawing):
     hand = drawing()
     draw_quick_return(hand)
     drawn, steps = hand.file(), 0
-    undo = hand.window.get_by_role("button", name="Undo drawing")
+    undo = hand.window.get_by_role("button", name="Undo")
     while undo.is_enabled():
         undo.click()
         steps += 1
     assert hand.file()["links"] == {"frame": {"points": {}}}
     for _ in range(steps):
-        hand.window.get_by_role("button", name="Redo drawing").click()
+        hand.window.get_by_role("button", name="Redo").click()
     assert hand.file() == drawn
     assert hand.told() == "mobility 1, 1 input"
 
@@ -232,7 +232,7 @@ def test_names_are_changed_and_pins_and_links_go(drawing):
     assert "no . : or ," in hand.said()
     hand.button("Erase Zapfen 1")
     assert "Zapfen 1" not in json.dumps(hand.file())
-    hand.button("Undo drawing")
+    hand.button("Undo")
     assert "Zapfen 1" in planar.solve(hand.mechanism()).points
 
 
@@ -400,7 +400,7 @@ def test_without_its_server_what_is_drawn_stays_and_leaves_as_a_link(drawing):
     hand.tool("Bar")
     hand.drag((30, 40), (60, 90))
     assert "does not answer" in hand.told()
-    hand.button("Undo drawing")
+    hand.button("Undo")
     hand.button("Copy link")
     hand.window.wait_for_function("() => !editing.panel.link.hidden")
     link = hand.window.get_by_label("Link of the mechanism").input_value()
@@ -466,6 +466,47 @@ def test_the_rest_goes_along_with_a_pin_and_keeps_its_lengths(drawing):
     assert found.point(pin).position * 1000 == pytest.approx(start + np.array([6, 4]), abs=1e-6)
     for name, at in hand.window.evaluate("[...editing.at]"):
         assert found.point(name).position == pytest.approx(at, abs=CLOSE)
-    hand.button("Undo drawing")
-    hand.button("Undo drawing")
+    hand.button("Undo")
+    hand.button("Undo")
     assert planar.dimensions(hand.mechanism()) == before
+
+
+def test_an_empty_sheet_greets_with_a_hint_and_says_once_what_the_tool_does(drawing):
+    hand = drawing()
+    assert hand.told().startswith("Draw the first bar")
+    colour = "(name) => getComputedStyle(document.querySelector(name)).color"
+    greeting, hint = (
+        hand.window.evaluate(colour, name) for name in ("#pencil [role=status] p:not([hidden]).hint", "#pencil-hint")
+    )
+    assert greeting == hint
+    for tool, told in (("Bar", "From one place to another"), ("Plate", "A click for each pin")):
+        hand.tool(tool)
+        assert hand.window.locator("body").inner_text().count(told) == 1
+    hand.bars((0, 0), (40, 0))
+    assert hand.told().startswith("Nothing is fixed yet")
+    assert hand.window.locator("#pencil .why:visible").count() == 0
+
+
+def test_one_button_undoes_what_was_drawn_and_what_was_done_on_the_page(drawing):
+    hand = drawing(planar.to_dict("crank-rocker"))
+    for name in ("Undo", "Redo", "Save"):
+        assert hand.window.get_by_role("button", name=name, exact=True).count() == 1
+    start = hand.file()
+    length = "page.linkage.d[page.data.dimensions.findIndex((each) => each.what === 'length')]"
+    first = hand.window.evaluate(length)
+    hand.window.evaluate("page.changeTo(page.linkage.d.map((each) => 1.01 * each))")
+    changed = hand.window.evaluate(length)
+    assert changed == pytest.approx(1.01 * first)
+    hand.window.evaluate("editing.perform((draft) => Draw.renamePin(draft, [...editing.placed.pins.keys()][0], 'Q'))")
+    hand.wait()
+    assert "Q" in json.dumps(hand.file())
+    hand.button("Undo")
+    assert "Q" not in json.dumps(hand.file())
+    assert hand.window.evaluate(length) == pytest.approx(changed, rel=1e-12)
+    hand.button("Undo")
+    assert hand.file()["links"] == start["links"]
+    assert hand.window.evaluate(length) == pytest.approx(first, rel=1e-12)
+    assert hand.window.get_by_role("button", name="Undo", exact=True).is_disabled()
+    hand.button("Redo")
+    hand.button("Redo")
+    assert "Q" in json.dumps(hand.file())

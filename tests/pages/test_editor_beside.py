@@ -99,15 +99,15 @@ def test_a_picture_is_undone_step_by_step_with_what_is_drawn_and_comes_back(draw
     hand.window.on("request", lambda request: asked.append(request.url.rsplit("/", 1)[-1]))
     back, forth = [], []
     for _ in seen[1:]:
-        hand.button("Undo drawing")
+        hand.button("Undo")
         back.append(stands())
     for _ in seen[1:]:
-        hand.button("Redo drawing")
+        hand.button("Redo")
         forth.append(stands())
     assert back == seen[-2::-1]
     assert forth == seen[1:]
     assert asked.count("answer") == 2  # of the bar alone, there and back
-    hand.button("Undo drawing")
+    hand.button("Undo")
     hand.window.on("dialog", lambda dialog: dialog.accept())
     hand.window.reload()
     hand.wait()
@@ -170,14 +170,17 @@ def test_a_path_drawn_freehand_is_the_wanted_curve_of_a_point_and_a_task(drawing
     hand.window.get_by_label("Point that is to trace it").select_option("B")
     hand.wait()
     assert hand.window.evaluate("page.wanted.items[0].of") == "B"
-    # a place is dragged as on any page, and undone by the pencil with the rest
+    # a place is dragged as on any page, and one button undoes that, the choice of the point, and the path
     hand.tool("Move")
     x, y = (1000 * each for each in hand.window.evaluate("editing.wish.places[6]"))
     hand.drag((x, y), (x, y + 4), (x, y + 8))
     moved = np.array(hand.window.evaluate("editing.wish.places[6]")) * 1000
     assert moved == pytest.approx([x, y + 8], abs=0.5)
-    hand.button("Undo drawing")
-    hand.button("Undo drawing")
+    hand.button("Undo")
+    back = np.array(hand.window.evaluate("editing.wish.places[6]")) * 1000
+    assert back == pytest.approx([x, y], abs=1e-9)
+    hand.button("Undo")
+    hand.button("Undo")
     assert hand.window.evaluate("page.wanted") is None
     assert not hand.window.evaluate("editing.changed")
 
@@ -224,7 +227,7 @@ def test_designs_that_the_server_finds_are_listed_and_taken_over_in_one_step(dra
     hand.button("Take design 1")
     assert hand.file() == design
     assert hand.window.evaluate("page.wanted.items.length") == 1
-    hand.button("Undo drawing")
+    hand.button("Undo")
     assert hand.file() == before
     server.shutdown()
     server.server_close()
@@ -319,5 +322,5 @@ def test_whatever_the_pencil_shows_has_a_name_is_legible_and_reached_by_keys(dra
                 "document.activeElement.id || document.activeElement.ariaLabel || document.activeElement.textContent"
             )
         )
-    stops = [each for each in reached if each in ("Plate", "Undo drawing", "Full screen (F)", "drawing", "Play")]
-    assert stops == ["Undo drawing", "drawing", "Full screen (F)", "Play"]
+    stops = [each for each in reached if each in ("Plate", "Undo", "Full screen (F)", "drawing", "Play")]
+    assert stops == ["Undo", "drawing", "Full screen (F)", "Play"]

@@ -15,11 +15,12 @@ from planar.analysis.worked.givens import given_data
 from planar.analysis.worked.published import Comparison
 from planar.analysis.worked.sections import Section, sections
 from planar.model.file_units import rate_unit
-from planar.model.mechanism import PUBLISHED_QUANTITIES, PublishedValue, relative_motions
+from planar.model.mechanism import PUBLISHED_QUANTITIES, PublishedValue, relative_motions, unit_rate_note
 from planar.model.pairs import MeasureKind
-from planar.model.wording import REST_TOLERANCE, direction_sense, turning_sense
+from planar.model.wording import REST_TOLERANCE, direction_sense, sentence, turning_sense
 from planar.model.wording import join_all_names as words_listed
 from planar.results.motion import State
+from planar.solving.position import state_at_unit_rate
 
 POLYGON_QUANTITIES = ("velocity", "acceleration", "angular velocity", "angular acceleration")
 """Kinds of quantity that are read off the polygons."""
@@ -86,14 +87,21 @@ class WorkedSolution:
 
 
 def worked_solution(state: State, comparisons: Sequence[Comparison] = ()) -> WorkedSolution:
-    """The worked solution of a solved position; `comparisons` lay its published values beside the solved ones."""
+    """The worked solution of a solved position; `comparisons` lay its published values beside the solved ones.
+
+    Where no input has a rate, the first moves at its unit rate, and the last sentence of `given` says so.
+    """
+    original, state = state, state_at_unit_rate(state)
+    given_phrases = list(given_data(state))
+    if state is not original:
+        given_phrases.append((sentence(unit_rate_note(state.mechanism, state.mechanism.inputs[0].pair)),))
     velocity, acceleration = (
         WorkedPolygon(each.kind, each, sections(each))
         for each in (velocity_polygon(state), acceleration_polygon(state))
     )
     return WorkedSolution(
         state,
-        tuple(given_data(state)),
+        tuple(given_phrases),
         tuple(asked_phrases(state.mechanism.published)),
         velocity,
         acceleration,

@@ -8,6 +8,7 @@ import click
 
 from planar.cli.options import (
     at_option,
+    input_option,
     load_model,
     main,
     mode_option,
@@ -31,6 +32,7 @@ SUFFIXES = (".html", ".htm")
     "Write the page to an .html file; left out, it is written to a folder of its own and opened in the browser."
 )
 @at_option
+@input_option
 @mode_option
 @click.option(
     "--task",
@@ -38,8 +40,13 @@ SUFFIXES = (".html", ".htm")
     metavar="TASK",
     help="Show what a task wants under it, to be dragged: its free dimensions follow.",
 )
-def view(model: str, output: Path | None, at: tuple[str, ...], mode: int | None, task: Path | None) -> None:
-    """A page to take hold of it: it moves, with its numbers, and with other dimensions."""
+def view(
+    model: str, output: Path | None, at: tuple[str, ...], pair: str | None, mode: int | None, task: Path | None
+) -> None:
+    """A page to take hold of it: it moves, with its numbers, and with other dimensions.
+
+    The input that runs first is the first with a velocity, unless --input names another.
+    """
     from planar.pages.view import view as write
     from planar.solving.position import solve
 
@@ -51,7 +58,7 @@ def view(model: str, output: Path | None, at: tuple[str, ...], mode: int | None,
         refuse_overwriting(str(task), output, "the task's own file")
     with show_status(mechanism.name):
         moved = parse_drives(mechanism, at)
-        written = write(solve(mechanism, moved) if moved else mechanism, output, task=task)
+        written = write(solve(mechanism, moved) if moved else mechanism, output, task=task, pair=pair)
     click.echo(str(written))
 
 

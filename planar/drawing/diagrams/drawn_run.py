@@ -13,16 +13,15 @@ from planar.drawing.scheme.scene import plain_frames
 from planar.foundation.arrays import Array, IntArray
 from planar.foundation.errors import BadInput, Outcome, PlanarError, Unknown
 from planar.foundation.geometry import Frame
-from planar.model.file_units import rate_length
 from planar.model.mechanism import (
     Drive,
     Input,
     Mechanism,
-    relative_motions,
     replace_inputs,
     running_input_index,
+    unit_input_rate,
 )
-from planar.model.pairs import MeasureKind, Pair
+from planar.model.pairs import Pair
 from planar.results.motion import Motion
 from planar.results.records import PointMotion
 from planar.solving.cycle import cycle
@@ -186,7 +185,7 @@ def steady_run(
     given = next((each for each in mechanism.inputs if each.pair == pair), None)
     if given is None:
         raise BadInput(pair, f"there is no input at {pair!r}; inputs are at {_input_names(mechanism)}")
-    rate = given.velocity or _unit_rate(mechanism, pair)
+    rate = given.velocity or unit_input_rate(mechanism, pair)
     if isinstance(source, Motion) and source.time is not None:
         return DrawnRun(source, given, rate, has_speed=True, turns=0, stroke=None)
     timed = given.velocity != 0.0
@@ -282,12 +281,6 @@ def _repeat_range(motion: Motion, driven: Mechanism, pair: str, steps: int) -> M
         if np.allclose(ends, rows[[0, -1]], rtol=0.0, atol=1e-9 * span):
             return own
     return cycle(driven, steps, float(rows[0]), float(rows[-1]), pair)
-
-
-def _unit_rate(mechanism: Mechanism, pair: str) -> float:
-    """The rate at which an input without a speed runs, so that rates are by its own unit."""
-    slides = relative_motions(mechanism)[pair].input_kind is MeasureKind.LENGTH
-    return rate_length(mechanism.units)[1].to_si(1.0) if slides else 1.0
 
 
 def _whole_turns(motion: Motion, pair: str) -> int:

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from planar.drawing.diagrams.axes import FLAT_TOLERANCE
 from planar.drawing.diagrams.drawn_run import DrawnRun, frame_slides
 from planar.drawing.scheme.link_bodies import largest_span as size_of
 from planar.foundation.arrays import Array
@@ -15,8 +16,9 @@ from planar.model.link_graph import link_numbers
 from planar.model.mechanism import Mechanism, named_points, relative_motions
 from planar.model.pairs import MeasureKind
 
-ZERO_TOLERANCE = 1e-12
-"""A displacement below this part of the mechanism's size, or a rate of it, is round-off."""
+ZERO_TOLERANCE = FLAT_TOLERANCE
+"""A curve below this part of the mechanism's size, or of that times the input's rate, is round-off: beside a change
+point accelerations have errors a thousand times those of other positions."""
 
 
 class MotionCurve(NamedTuple):

@@ -14,7 +14,7 @@ from planar.drawing.labels.text_line import LETTER_PATTERN
 from planar.drawing.paper.picture import Circle, Fill, Label, Mark, Pen, Picture, Polyline, paper_point
 from planar.drawing.paper.scales import DRAWING_HEIGHT, DRAWING_WIDTH, Scale, round_scale
 from planar.drawing.scheme.ground import ground_marks
-from planar.drawing.scheme.link_bodies import link_bodies
+from planar.drawing.scheme.link_bodies import link_bodies, outline_point_names
 from planar.drawing.scheme.link_strokes import body_marks
 from planar.drawing.scheme.scheme import scheme
 from planar.foundation.arrays import Array
@@ -159,10 +159,12 @@ def _moving_point_names(run: DrawnRun) -> tuple[str, ...]:
 
 
 def _moving_points(run: DrawnRun) -> list[NamedPoint]:
-    """The points that do not stand still."""
+    """The points that do not stand still, but for those of outlines."""
     spans = {name: np.ptp(run.motion.point(name).position, axis=0).max() for name in run.motion.point_names}
     least = 1e-9 * max(spans.values(), default=0.0)
-    return [point for point in named_points(run.motion.mechanism) if spans[point.name] > least]
+    outlines = outline_point_names(run.motion.mechanism, run.motion.shapes)
+    moving = [point for point in named_points(run.motion.mechanism) if spans[point.name] > least]
+    return [point for point in moving if point.name not in outlines] or moving
 
 
 def coupler_points(run: DrawnRun) -> tuple[str, ...]:

@@ -14,7 +14,9 @@ from planar.drawing.scheme.scene import plain_frames
 from planar.drawing.scheme.scheme import scheme as scheme_picture
 from planar.drawing.scheme.scheme import space_scale
 from planar.model.file_units import unit_of_kind
+from planar.model.mechanism import unit_rate_note
 from planar.results.motion import State
+from planar.solving.position import state_at_unit_rate
 
 ScaleTexts = str | Sequence[str] | None
 """Scales as a reader writes them, each for what its unit measures: "1 cm = 100 mm", "1:5", "1 cm = 0.1 m/s"."""
@@ -23,7 +25,11 @@ PANEL_SIZE = (80.0, 80.0)
 
 
 def polygon_panels(state: State, scales: ScaleTexts, count: int) -> list[Picture]:
-    """Space diagram, velocity polygon and acceleration polygon, the first of them, each small enough for a row."""
+    """Space diagram, velocity polygon and acceleration polygon, the first of them, each small enough for a row.
+
+    Where no input has a rate, the polygons are those of the first input's unit rate, and the velocity polygon says so.
+    """
+    original, state = state, state_at_unit_rate(state)
     given = paper.parse_scales(scales, ("length", "velocity", "acceleration")[:count], state.mechanism.units)
     space = given.get("length")
     if space is None:
@@ -37,6 +43,8 @@ def polygon_panels(state: State, scales: ScaleTexts, count: int) -> list[Picture
         fits = given.get(polygon.kind) or paper.round_scale(polygon.kind, unit, width, height, PANEL_SIZE)
         drawn = polygon_picture(polygon, fits)
         rest = tuple(note for note in drawn.notes[1:] if note not in _scale_notes(fits))
+        if state is not original and polygon.kind == "velocity":
+            rest += (unit_rate_note(state.mechanism, state.mechanism.inputs[0].pair),)
         title = f"{polygon.kind} polygon".capitalize()
         pictures.append(drawn._replace(title=title, notes=(*_scale_notes(fits), *rest)))
     return pictures

@@ -17,6 +17,7 @@ from planar.analysis.rate_equations import RateEquations, SlideJoint, rate_equat
 from planar.drawing.labels.text_line import LETTER_PATTERN
 from planar.drawing.paper.picture import Arrow, Circle, Label, Mark, Pen, Picture, Polyline, paper_point
 from planar.drawing.paper.scales import Scale, round_scale
+from planar.drawing.scheme.link_bodies import outline_point_names
 from planar.model.file_units import unit_of_kind
 from planar.model.mechanism import named_points
 
@@ -45,8 +46,10 @@ def polygon_picture(polygon: Polygon, scale: Scale | None = None) -> Picture:
     Of velocities every vector of the construction is an arrow. Of accelerations the parts are thin arrows, and the
     totals strong: arrows where they start at the pole or are of one part, else lines, which may be read both ways.
     Points that follow from others of their link stand in its image. Strokes are `about` "velocity B/A",
-    "centripetal C/B", "acceleration C/B", "image BC", "tick e" or "pole", letters about "letter b_1".
+    "centripetal C/B", "acceleration C/B", "image BC", "tick e" or "pole", letters about "letter b_1". Points of the
+    outlines of links are left out.
     """
+    polygon = _without_outlines(polygon)
     values = np.array([(0.0, 0.0), *polygon.letters.values()])
     still = float(np.hypot(*values.T).max()) <= ROUND_OFF_RATIO * _largest_possible(polygon)
     if still:
@@ -68,6 +71,25 @@ def polygon_picture(polygon: Polygon, scale: Scale | None = None) -> Picture:
         notes.append(f"at the pole: {', '.join(polygon.points[letter] for letter in polygon.pole)}")
     notes += [] if still else _legend(polygon)
     return Picture(_PolygonDrawing(polygon, scale).marks(), polygon.state.mechanism.name, tuple(notes))
+
+
+def _without_outlines(polygon: Polygon) -> Polygon:
+    """The polygon without the points of the outlines of links, but for those by which other points are found."""
+    images = [stage for stage in polygon.stages if isinstance(stage, PointImage)]
+    hidden = outline_point_names(polygon.state.mechanism, polygon.state.shapes)
+    hidden -= {point for stage in images if stage.point not in hidden for point in stage.base}
+    letters = {letter for letter, point in polygon.points.items() if point in hidden}
+    if not letters:
+        return polygon
+    return replace(
+        polygon,
+        pole=tuple(letter for letter in polygon.pole if letter not in letters),
+        letters={letter: value for letter, value in polygon.letters.items() if letter not in letters},
+        points={letter: point for letter, point in polygon.points.items() if letter not in letters},
+        stages=tuple(
+            stage for stage in polygon.stages if not (isinstance(stage, PointImage) and stage.point in hidden)
+        ),
+    )
 
 
 def letter_text(polygon: Polygon, letter: str) -> tuple[str, bool]:

@@ -107,7 +107,7 @@ def fixed_point_strokes(scene: Scene) -> Iterator[PlacedSymbol]:
     pinned = {mark.name for mark in scene.marks if isinstance(mark, PinMark)}
     for each in named_points(scene.mechanism):
         point = dict(each.members).get(frame)
-        if point is not None and each.name not in pinned:
+        if point is not None and each.name not in pinned and not scene.is_on_outline(frame, point):
             yield PlacedSymbol(f"point {each.name}", frame, "fixed dot", scene.place(frame, point))
 
 
@@ -129,8 +129,11 @@ def _spring_anchors(scene: Scene) -> Iterator[tuple[str, Vector]]:
 
 
 def _fixed_wheels(scene: Scene) -> Iterator[PlacedStroke]:
-    """Wheels and racks of the frame."""
+    """The outline, wheels and racks of the frame."""
     frame, seen = scene.mechanism.frame, set()
+    corners = scene.outline_corners(frame)
+    if len(corners) > 1:
+        yield PlacedLine("ground outline", frame, Pen.PIN, corners, len(corners) > 2)
     banded = {mark.name for mark in scene.marks if isinstance(mark, BeltMark)}
     for mark in scene.marks:
         if isinstance(mark, WheelMark) and mark.link == frame and mark[2:] not in seen:

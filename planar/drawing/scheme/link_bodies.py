@@ -1,19 +1,34 @@
-"""What each moving link looks like in its own axes: the lines between its joints, its plate, its further points."""
+"""What each link looks like in its own axes: lines between its joints, its plate, its further points, its outline."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import combinations
 from math import hypot
 from typing import NamedTuple
 
-from planar.drawing.scheme.springs_masses import SpringMassMark, spring_mass_marks
+from planar.drawing.scheme.springs_masses import Coil, MassCentreMark, Spiral, SpringMassMark, spring_mass_marks
 from planar.foundation.geometry import Vector
 from planar.model.link_shapes import LinkShape
-from planar.model.mechanism import Mechanism
-from planar.model.pairs.symbols import DrawingMark, GuideMark, PinMark, PitchLineMark, SliderMark, SlotMark, WheelMark
+from planar.model.mechanism import Mechanism, named_points
+from planar.model.pairs.symbols import (
+    CamMark,
+    DrawingMark,
+    GuideMark,
+    PinMark,
+    PitchLineMark,
+    SliderMark,
+    SlotMark,
+    WheelMark,
+)
 
 RELATIVE_TOLERANCE = 1e-6
 """Points coincide, or lie on a line, within this part of the size of the mechanism."""
+
+MIN_OUTLINE_POINTS = 6
+"""The least number of points that make an outline, where nothing uses them; fewer are tracers, which are lettered."""
+MAX_ORDERED_CORNERS = 200
+"""Of more points the outline is their convex hull: whether their order crosses itself takes too long to find."""
 
 Segment = tuple[Vector, Vector]
 
@@ -43,6 +58,13 @@ class LinkBody(NamedTuple):
     guides: tuple[GuideLine, ...] = ()
 
 
+class LinkOutline(NamedTuple):
+    """The points of a link that nothing uses, and those of them that are the corners of its outline, in order."""
+
+    points: tuple[str, ...]
+    corners: tuple[str, ...]
+
+
 def all_marks(mechanism: Mechanism, shapes: Mapping[str, LinkShape]) -> tuple[DrawingMark | SpringMassMark, ...]:
     """What all pairs say of how they are drawn, and springs and masses."""
     of_pairs = (mark for pair in mechanism.pairs for mark in pair.drawing_marks(shapes, mechanism.pairs))
@@ -51,10 +73,108 @@ def all_marks(mechanism: Mechanism, shapes: Mapping[str, LinkShape]) -> tuple[Dr
 
 def link_bodies(mechanism: Mechanism, shapes: Mapping[str, LinkShape]) -> dict[str, LinkBody]:
     """The body of every moving link."""
-    moving = {
-        link.name: [*shapes[link.name].points.values()] for link in mechanism.links if link.name != mechanism.frame
+    points = body_points(mechanism, {link: shape.points for link, shape in shapes.items()}, shapes)
+    return bodies_of_points(points, all_marks(mechanism, shapes), RELATIVE_TOLERANCE * largest_span(shapes))
+
+
+def body_points(
+    mechanism: Mechanism, places: Mapping[str, Mapping[str, Vector]], shapes: Mapping[str, LinkShape]
+) -> dict[str, list[Vector]]:
+    """The places of the points of each moving link, those of its outline left out."""
+    outlines = link_outlines(mechanism, shapes)
+    return {
+        link.name: [
+            place
+            for point, place in places[link.name].items()
+            if link.name not in outlines or point not in outlines[link.name].points
+        ]
+        for link in mechanism.links
+        if link.name != mechanism.frame
     }
-    return bodies_of_points(moving, all_marks(mechanism, shapes), RELATIVE_TOLERANCE * largest_span(shapes))
+
+
+def link_outlines(mechanism: Mechanism, shapes: Mapping[str, LinkShape]) -> dict[str, LinkOutline]:
+    """The outlines of links that have `MIN_OUTLINE_POINTS` points, or more, that nothing uses.
+
+    A point is used by a pair, a load, a spring, a mass or a published value, as an end or on the axis of its link, and
+    where links share it. The corners have the order of the file, unless that crosses itself: then they are those of the
+    convex hull.
+    """
+    tolerance, marks = RELATIVE_TOLERANCE * largest_span(shapes), all_marks(mechanism, shapes)
+    named_in_file = {load.point for load in mechanism.loads} | {
+        name for item in mechanism.published for name in (item.of, item.relative_to)
+    }
+    used_names = {
+        member
+        for named in named_points(mechanism)
+        for member in named.members
+        if len(named.members) > 1 or not named_in_file.isdisjoint((named.name, ".".join(member)))
+    }
+    outlines = {}
+    for link in mechanism.links:
+        used_places = [*_joint_points(link.name, marks), *_action_places(link.name, marks)]
+        lines = [mark for mark in marks if isinstance(mark, LINE_MARKS) and mark.link == link.name]
+        unused = {
+            point: place
+            for point, place in shapes[link.name].points.items()
+            if point not in (*(link.ends or ()), *(link.axis or ()))
+            and (link.name, point) not in used_names
+            and all(distance_between(place, other) > tolerance for other in used_places)
+            and all(distance_from_line(place, line.through, line.direction) > tolerance for line in lines)
+        }
+        if len(unused) >= MIN_OUTLINE_POINTS:
+            corners = _outline_corners(list(unused.values()), tolerance)
+            names = tuple(next(point for point, place in unused.items() if place == corner) for corner in corners)
+            outlines[link.name] = LinkOutline(tuple(unused), names)
+    return outlines
+
+
+def outline_point_names(mechanism: Mechanism, shapes: Mapping[str, LinkShape]) -> frozenset[str]:
+    """The result names of the points of outlines."""
+    outlines = link_outlines(mechanism, shapes)
+    return frozenset(
+        named.name
+        for named in named_points(mechanism)
+        if any(link in outlines and point in outlines[link].points for link, point in named.members)
+    )
+
+
+def _outline_corners(points: Sequence[Vector], tolerance: float) -> tuple[Vector, ...]:
+    """The corners of an outline in their order; the two ends of points on one line."""
+    corners = distinct_points(points, tolerance)
+    hull = convex_hull(corners, tolerance)
+    if not hull:
+        return _end_points(corners) or corners
+    if len(corners) > MAX_ORDERED_CORNERS:
+        return hull
+    crosses = any(_segments_cross(one, other) for one, other in combinations(_edges(corners), 2))
+    return hull if crosses else corners
+
+
+def _segments_cross(one: Segment, other: Segment) -> bool:
+    """Whether two segments cross between their ends."""
+
+    def sides(line: Segment, endpoints: Segment) -> float:
+        along = line[1] - line[0]
+        return along.cross(endpoints[0] - line[0]) * along.cross(endpoints[1] - line[0])
+
+    return sides(one, other) < 0.0 and sides(other, one) < 0.0
+
+
+def _action_places(link: str, marks: Iterable[DrawingMark | SpringMassMark]) -> Iterator[Vector]:
+    """The places of a link at which springs, masses and cams are."""
+    for mark in marks:
+        if isinstance(mark, Coil):
+            yield from (place for owner, place in zip(mark.links, mark.at, strict=True) if owner == link)
+        elif (isinstance(mark, MassCentreMark) and mark.link == link) or (
+            isinstance(mark, Spiral) and mark.pin == link
+        ):
+            yield mark.at
+        elif isinstance(mark, CamMark):
+            if mark.link == link:
+                yield mark.centre
+            if mark.follower_link == link:
+                yield mark.middle
 
 
 def bodies_of_points(
@@ -77,6 +197,10 @@ def largest_span(shapes: Mapping[str, LinkShape]) -> float:
     return max(spans) or 1.0
 
 
+LINE_MARKS = GuideMark, SlotMark, PitchLineMark
+"""What pairs say of lines of links."""
+
+
 def _link_body(
     link: str, points: Sequence[Vector], marks: Sequence[DrawingMark | SpringMassMark], tolerance: float
 ) -> LinkBody:
@@ -87,6 +211,9 @@ def _link_body(
     if not joints and not guides:
         joints, others = tuple(others[:1]), others[1:]
     dots = tuple(others)
+    if len(joints) == 1 and not others and not guides:  # a link with one pin goes as far as its centre of mass
+        masses = [mark.at for mark in marks if isinstance(mark, MassCentreMark) and mark.link == link]
+        others = list(distinct_points((*joints, *masses), tolerance)[1:])
     base = joints if len(joints) > 1 or not others else (*joints, others.pop(0))
     if guides and len(joints) < 2:  # the guide is its body; points on it lengthen it
         on = [
@@ -127,7 +254,7 @@ def _guide_lines(
     link: str, marks: Iterable[DrawingMark | SpringMassMark], joints: Sequence[Vector], tolerance: float
 ) -> tuple[GuideLine, ...]:
     """The lines of a link, each with the joint on it, else the foot of the perpendicular from the nearest joint."""
-    lines = [mark for mark in marks if isinstance(mark, GuideMark | SlotMark | PitchLineMark) and mark.link == link]
+    lines = [mark for mark in marks if isinstance(mark, LINE_MARKS) and mark.link == link]
     made: list[GuideLine] = []
     for mark in lines:
         through, way = mark.through, mark.direction
@@ -172,8 +299,18 @@ def _is_inside(point: Vector, plate: Sequence[Vector], tolerance: float) -> bool
     return all((b - a).cross(point - a) >= -tolerance * distance_between(a, b) for a, b in _edges(plate))
 
 
+def is_inside_outline(point: Vector, corners: Sequence[Vector]) -> bool:
+    """Whether a point is inside a polygon: a ray from it crosses the sides an odd number of times."""
+    crossed = [
+        (a, b)
+        for a, b in _edges(corners)
+        if (a.y > point.y) != (b.y > point.y) and point.x < a.x + (b.x - a.x) * ((point.y - a.y) / (b.y - a.y))
+    ]
+    return len(crossed) % 2 == 1
+
+
 def _edges(plate: Sequence[Vector]) -> tuple[Segment, ...]:
-    return tuple(zip(plate, (*plate[1:], plate[0]), strict=True))
+    return tuple(zip(plate, (*plate[1:], *plate[:1]), strict=True))
 
 
 def _end_points(points: Sequence[Vector]) -> Segment | None:

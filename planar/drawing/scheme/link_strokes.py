@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from itertools import chain
+from itertools import chain, product
 from math import hypot, pi
 from typing import Any
 
 from planar.drawing.paper.picture import Fill, Outline, Pen
 from planar.drawing.paper.scales import Scale
 from planar.drawing.scheme import symbol_table, symbols
-from planar.drawing.scheme.link_bodies import LinkBody, distance_from_line
+from planar.drawing.scheme.link_bodies import LinkBody, distance_between, distance_from_line, is_inside_outline
 from planar.drawing.scheme.placed_strokes import (
     PlacedLine,
     PlacedSpring,
@@ -85,6 +85,10 @@ def _plate_strokes(scene: Scene, pen: Pen) -> Iterator[PlacedLine]:
     for body in scene.bodies.values():
         if body.plate:
             yield PlacedLine(f"link {body.link}", body.link, pen, body.plate, True, Fill.LINK)
+        corners = scene.outline_corners(body.link)
+        if len(corners) > 1:
+            thin = Pen.PIN if pen is Pen.LINK else pen
+            yield PlacedLine(f"link {body.link}", body.link, thin, corners, len(corners) > 2, Fill.LINK)
 
 
 def bar_strokes(scene: Scene, pen: Pen = Pen.LINK) -> Iterator[PlacedLine]:
@@ -102,7 +106,20 @@ def bar_strokes(scene: Scene, pen: Pen = Pen.LINK) -> Iterator[PlacedLine]:
                 yield PlacedLine(about, link, pen, side)
         for side in body.tracers:
             yield PlacedLine(about, link, thin, side)
+        support = _outline_support(scene, body)
+        if support is not None:
+            yield PlacedLine(about, link, thin if body.sides else pen, support)
         yield from _guide_strokes(scene, link, body, pen)
+
+
+def _outline_support(scene: Scene, body: LinkBody) -> tuple[Vector, Vector] | None:
+    """The line from the nearest joint to an outline that lies apart from the link's body."""
+    corners = scene.outline_corners(body.link)
+    supports = [*body.joints, *(guide.foot for guide in body.guides)]
+    is_apart = corners and supports and not any(is_inside_outline(place, corners) for place in supports)
+    if not is_apart or any(is_inside_outline(corner, body.plate) for corner in corners):
+        return None
+    return min(product(supports, corners), key=lambda endpoints: float(distance_between(*endpoints)))
 
 
 def _guide_strokes(scene: Scene, link: str, body: LinkBody, pen: Pen) -> Iterator[PlacedLine]:

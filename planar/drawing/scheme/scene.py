@@ -12,7 +12,15 @@ import numpy as np
 
 from planar.drawing.paper.picture import paper_point
 from planar.drawing.paper.scales import Scale
-from planar.drawing.scheme.link_bodies import RELATIVE_TOLERANCE, LinkBody, all_marks, distance_from_line, largest_span
+from planar.drawing.scheme.link_bodies import (
+    RELATIVE_TOLERANCE,
+    LinkBody,
+    LinkOutline,
+    all_marks,
+    distance_from_line,
+    largest_span,
+    link_outlines,
+)
 from planar.drawing.scheme.springs_masses import SpringMassMark
 from planar.foundation.geometry import Frame, Vector
 from planar.foundation.jets import Jet, Scalar
@@ -114,6 +122,19 @@ class Scene:
     def point_names(self) -> Mapping[tuple[str, str], str]:
         """The result name of each (link, point)."""
         return {member: each.name for each in named_points(self.mechanism) for member in each.members}
+
+    @cached_property
+    def outlines(self) -> Mapping[str, LinkOutline]:
+        """The outlines of links made of points that nothing uses."""
+        return link_outlines(self.mechanism, self.shapes)
+
+    def is_on_outline(self, link: str, point: str) -> bool:
+        """Whether a point belongs to its link's outline, and has no letter and no dot."""
+        return link in self.outlines and point in self.outlines[link].points
+
+    def outline_corners(self, link: str) -> tuple[Vector, ...]:
+        """The corners of a link's outline in its axes; none where it has no outline."""
+        return tuple(self.place(link, point) for point in self.outlines[link].corners) if link in self.outlines else ()
 
     @cached_property
     def running_points(self) -> Mapping[str, tuple[tuple[str, str], str] | None]:

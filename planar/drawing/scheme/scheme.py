@@ -170,12 +170,14 @@ class NamedPlace(NamedTuple):
 
 
 def point_names(scene: Scene) -> Iterator[NamedPlace]:
-    """The names of the points."""
+    """The names of the points, but for those of outlines."""
     blocks = {mark.name for mark in scene.marks if isinstance(mark, SliderMark)} - scene.cylinders.keys()
     on_blocks = {scene.running_point_name(name) for name in blocks}
     pinned = {mark.name for mark in scene.marks if isinstance(mark, PinMark)}
     for each in named_points(scene.mechanism):
         link, point = each.members[0]
+        if scene.is_on_outline(link, point):
+            continue
         away = symbol_table.PIN_RADIUS + 0.6 if each.name in pinned else 0.9
         if each.name in on_blocks:
             away = symbol_table.BLOCK_SIZE[1] / 2.0 + 0.6

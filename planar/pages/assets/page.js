@@ -12,8 +12,8 @@ class Page {
     this.linkage = new Linkage(data, program);
     this.listeners = { move: [], size: [], said: [], course: [], chosen: [], shown: [], view: [], tolerance: [], wanted: [], acting: [] };
     this.lifetime = new AbortController(); // ended where another page takes its place: of what it hears beside its own parts
-    this.running = 0; // which input is moved
-    this.given = data.inputs.map((each) => [each.velocity, each.acceleration]); // rates of the inputs
+    this.running = data.running ?? 0; // which input is moved
+    this.given = data.inputs.map(({ velocity, acceleration }) => [velocity, acceleration]); // rates of the inputs, as they are written
     this.acting = null; // the numbers of what acts
     this.recording = false; // whether the motion is gone through for a film: nobody is to remember that
     this.besides = () => []; // places that the drawing is to show, too
@@ -27,12 +27,14 @@ class Page {
   emit(event, ...more) { for (const act of this.listeners[event]) act(...more); }
   say(sentence) { this.emit("said", sentence); }
 
-  /** Solve where everything is, with the rates of the inputs as the file has them. */
+  /** Solve where everything is, at the rates of the inputs. */
   update() {
-    const rates = this.inputRates();
-    this.state = this.linkage.state(rates.map((each) => each[0]), rates.map((each) => each[1]));
+    this.state = this.stateOf(this.linkage, this.inputRates());
     this.frames = this.framesOf(this.state);
   }
+
+  /** The state of a linkage at rates of its inputs, [[velocity, acceleration], ...]. */
+  stateOf(linkage, rates) { return linkage.state(rates.map(([velocity]) => velocity), rates.map(([, acceleration]) => acceleration)); }
 
   /** Why there is no velocity and no acceleration here, as a sentence; "" where there are. */
   get undetermined() {
@@ -42,8 +44,27 @@ class Page {
     return told[this.state.why] ?? "";
   }
 
-  /** Velocity and acceleration of every input, SI. */
-  inputRates() { return this.given; }
+  /** Velocity and acceleration of every input, SI: as written, or the unit rate of the input that runs. */
+  inputRates() {
+    const { unitRate } = this;
+    return unitRate === null ? this.given : this.given.map((_, k) => [k === this.running ? unitRate.velocity : 0, 0]);
+  }
+
+  /** The unit rate that is used while no input has a rate, {velocity, note}; null where one has, or moves by a law. */
+  get unitRate() {
+    const { unit_rates: unitRates } = this.data;
+    return unitRates?.length && this.given.flat().every((rate) => rate === 0) ? unitRates[this.running] : null;
+  }
+
+  /** The state of a linkage by which forces are found: at rest while the unit rate is used, for which no force is given. */
+  loadedState(linkage, state) { return this.unitRate === null ? state : this.stateOf(linkage, this.given); }
+
+  /** Let another input run. */
+  run(k) {
+    this.running = k;
+    if (this.unitRate !== null) this.update();
+    this.emit("move");
+  }
 
   /** Give the inputs other rates: all that was remembered of the motion is void. */
   give(rates) {

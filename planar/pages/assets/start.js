@@ -18,7 +18,7 @@ function startPage(data, program, undo = new UndoHistory()) {
   new Assemblies(page, document.getElementById("assemblies"));
   if (!hasPencil) new PinDragging(page, svg, lens, () => controls.pause());
   undo.attach(page, controls.bar, () => controls.pause());
-  const saving = new Saving(page, document.getElementById("saving"), svg);
+  const saving = new Saving(page, document.getElementById("saving"), svg, hasPencil);
   new Films(page, saving, svg, () => controls.pause());
   page.tolerances = Tolerances.ofFile(page);
   startLayers(page);

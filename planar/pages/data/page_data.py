@@ -12,13 +12,21 @@ from planar.assemblies.circuits.circuits import Circuits, circuits
 from planar.assemblies.modes import Mode, modes
 from planar.codegen.javascript import write_javascript
 from planar.document.dimensions import Dimension, change_dimension
+from planar.drawing.scheme.link_bodies import outline_point_names
 from planar.equations.mechanism_numbers import scale_lengths, shapes_of_links
 from planar.equations.symbolic_equations import slice_length
 from planar.model.link_graph import link_numbers
 from planar.model.link_shapes import PointPlacementError
-from planar.model.mechanism import Mechanism, links_counting_turns, named_points, pair_misfits
+from planar.model.mechanism import (
+    Mechanism,
+    links_counting_turns,
+    named_points,
+    pair_misfits,
+    unit_input_rate,
+    unit_rate_note,
+)
 from planar.model.pairs import MeasureKind, Pair
-from planar.model.wording import amount
+from planar.model.wording import amount, sentence
 from planar.pages.data.centre_data import centre_data
 from planar.pages.data.column_data import column_heads, reported_function, uncounted_angles
 from planar.pages.data.dimension_numbers import DimensionNumbers
@@ -102,6 +110,8 @@ def page_data(mechanism: Mechanism, z: np.ndarray | None = None) -> tuple[dict[s
         "row_lengths": [row.kind is MeasureKind.LENGTH for row in e.rows],
         "owners": [e.coordinates[column].owner for column in e.unknowns],
         "inputs": [_input_data(given, solver.is_sliding(given.pair)) for given in mechanism.inputs],
+        "running": _starting_input(mechanism),
+        "unit_rates": _unit_rates(mechanism),
         "dimensions": [
             {**_dimension_data(mechanism, each, solver.unit), "tolerance": tolerance}
             for each, tolerance in zip(numbers.dimensions, tolerances.dimensions, strict=True)
@@ -139,11 +149,13 @@ def page_data(mechanism: Mechanism, z: np.ndarray | None = None) -> tuple[dict[s
 
 
 def _point_data(mechanism: Mechanism, numbers: DimensionNumbers) -> dict[str, Any]:
-    """The links and the points of a mechanism, their numbers as places."""
+    """The links and the points of a mechanism, their numbers as places; points of outlines are marked as such."""
+    outlines = outline_point_names(mechanism, shapes_of_links(mechanism))
     points = {
         name: {
             "links": [member[0] for member in members],
             "at": [numbers.add_point(numbers.shapes[link].position(point)) for link, point in members],
+            **({"is_outline": True} if name in outlines else {}),
         }
         for name, members in named_points(mechanism)
     }
@@ -163,6 +175,25 @@ def _input_data(given: Any, slides: bool) -> dict[str, Any]:
         "velocity": given.velocity,
         "acceleration": given.acceleration,
     }
+
+
+def _starting_input(mechanism: Mechanism) -> int:
+    """The number of the input that runs at first: the first that has a rate or a law, else the first."""
+    moving = (driven.velocity or driven.acceleration or driven.law is not None for driven in mechanism.inputs)
+    return next((number for number, is_moving in enumerate(moving) if is_moving), 0)
+
+
+def _unit_rates(mechanism: Mechanism) -> list[dict[str, Any]] | None:
+    """The unit rate (SI) of every input with the sentence on it; None where inputs move by laws.
+
+    A page uses that of the input that runs while all rates of the inputs are zero.
+    """
+    if any(driven.law is not None for driven in mechanism.inputs):
+        return None
+    return [
+        {"velocity": unit_input_rate(mechanism, driven.pair), "note": sentence(unit_rate_note(mechanism, driven.pair))}
+        for driven in mechanism.inputs
+    ]
 
 
 def _assembly_data(mechanism: Mechanism, solver: PositionSolver) -> dict[str, Any]:

@@ -29,17 +29,20 @@ IN_LINE_RATIO = 1e-9
 def polygon_data(mechanism: Mechanism, points: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
     """The points of polygons, their strokes by these points' numbers, and what letters stand for.
 
-    `points` are those of `drawing_data`. A polygon's point is that of the mechanism (`point`), whose velocity it has,
-    fixed or not, or one of a guide (`link`) below a point that slides (`over`). A stroke goes `from` a point `to`
-    another; it is an `image`, or a vector from the pole (`absolute`) or between two points (`relative`). That of two
-    points of one `link` has a part along their line and one across, of which the first ends in what is lettered `end`.
-    `legends` say what letters stand for, without such ends and with them.
+    `points` are those of `page_data`; those of outlines have no place in polygons. A polygon's point is that of the
+    mechanism (`point`), whose velocity it has, fixed or not, or one of a guide (`link`) below a point that slides
+    (`over`). A stroke goes `from` a point `to` another; it is an `image`, or a vector from the pole (`absolute`) or
+    between two points (`relative`). That of two points of one `link` has a part along their line and one across, of
+    which the first ends in what is lettered `end`. `legends` say what letters stand for, without such ends and with
+    them.
     """
     frame, letters = mechanism.frame, small_letters(points)
     rests = any(frame in each["links"] for each in points.values())
     vertices: list[dict[str, Any]] = [{"letter": "" if rests else POLE_LETTER, "fixed": True}]
     place = {}
     for name, point in points.items():
+        if "is_outline" in point:
+            continue
         place[name] = len(vertices)
         vertices.append({"letter": letters[name], "point": name, "fixed": frame in point["links"]})
     riders, own, below = _riders(mechanism), {}, {}
@@ -57,7 +60,7 @@ def polygon_data(mechanism: Mechanism, points: Mapping[str, Mapping[str, Any]]) 
             place[name]: Vector(*map(float, shapes[link].position(point)))
             for name, members in named_points(mechanism)
             for carrier, point in members
-            if carrier == link
+            if carrier == link and name in place
         }
         joints = [each for each in members if len(points[vertices[each]["point"]]["links"]) > 1]
         guided = [number for (_, guide), number in own.items() if guide == link]

@@ -18,7 +18,14 @@ from planar.drawing.paper.scales import Scale
 from planar.drawing.scheme.clearance import Clearance
 from planar.drawing.scheme.ground import fixed_pins, fixed_point_strokes, fixed_strokes, obstructing_strokes
 from planar.drawing.scheme.input_arrows import moving_input_arrow
-from planar.drawing.scheme.link_bodies import RELATIVE_TOLERANCE, LinkBody, all_marks, bodies_of_points, largest_span
+from planar.drawing.scheme.link_bodies import (
+    RELATIVE_TOLERANCE,
+    LinkBody,
+    all_marks,
+    bodies_of_points,
+    body_points,
+    largest_span,
+)
 from planar.drawing.scheme.link_strokes import moving_strokes
 from planar.drawing.scheme.motors import motor_strokes
 from planar.drawing.scheme.placed_strokes import PlacedSpring, PlacedStroke, PlacedTorsionSpring, stroke_marks
@@ -220,7 +227,7 @@ def moving_scene(
     own = {link.name: dict(dimensions.shapes[link.name].points) for link in mechanism.links}
     own, marks = dimensions.with_values((own, all_marks(dimensions.mechanism, dimensions.shapes)))
     size = largest_span(shapes)
-    moving = {link: list(points.values()) for link, points in own.items() if link != mechanism.frame}
+    moving = body_points(mechanism, own, shapes)
     bodies: dict[str, LinkBody] = bodies_of_points(moving, marks, RELATIVE_TOLERANCE * size)
     low, high = extent_corners(extent_places(own, bodies, marks), positions)
     spans = [(far / room) for far, room in zip(high - low, SMALL_ROOM, strict=True)]

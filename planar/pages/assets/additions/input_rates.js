@@ -26,14 +26,14 @@ class InputRates {
   }
 
   put(k, order, value) {
-    const rates = this.page.inputRates().map((each) => [...each]);
+    const rates = this.page.given.map((each) => [...each]);
     rates[k][order] = value;
     this.page.give(rates);
   }
 
   show() {
     for (const { field, reset, k, order, by, own } of this.rows) {
-      const now = this.page.inputRates()[k][order];
+      const now = this.page.given[k][order];
       field.value = Forms.shown(now * by);
       reset.disabled = now === own;
     }

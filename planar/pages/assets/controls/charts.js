@@ -92,13 +92,17 @@ class Charts {
     const { page, place } = this, [by, unitName] = unitOf(page, unit), k = course.input, { pair, slides } = page.data.inputs[k];
     const [byInput, inputUnit] = unitOf(page, slides ? "length" : "angle");
     const xs = Array.from(course.inputs, (each) => each * byInput);
-    const lines = names.map((name) => {
+    const solved = names.map((name) => {
       const columns = this.columns(kind, name, course);
       return Array.from(course.inputs, (_, i) => { const value = of(columns, i) * by; return Number.isFinite(value) ? value : null; });
     });
-    const most = Math.max(...lines.flat().map(Math.abs)); // what rounding leaves beside it is told as 0
-    const least = unit === "length" ? page.data.size * by : 0, now = (name) => by * of(this.columns(kind, name, null), 0);
-    const made = { by: byInput, tell: () => undefined, now: () => names.map(now), range: (here) => rangeOf([...lines, here], least) };
+    // values that are zero to round-off, beside the greatest of their kind, are drawn as zero
+    const scale = Math.max((course.scales[unit] ?? 0) * by, ...solved.flat().map(Math.abs));
+    const roundOff = solved.map((line) => (Math.max(...line.map(Math.abs)) <= AXIS.flat * scale ? AXIS.flat : NOTHING) * scale);
+    const withoutRoundOff = (value, k) => (value !== null && Math.abs(value) <= roundOff[k] ? 0 : value);
+    const lines = solved.map((line, k) => line.map((value) => withoutRoundOff(value, k)));
+    const now = (name, k) => withoutRoundOff(by * of(this.columns(kind, name, null), 0), k);
+    const made = { by: byInput, tell: () => undefined, now: () => names.map(now), range: (here) => rangeOf([...lines, here], scale) };
     made.limits = made.range(made.now());
     const style = getComputedStyle(document.documentElement), colour = (name) => style.getPropertyValue(name).trim();
     const [from, to] = [course.inputs[0], course.inputs[course.count - 1]].map((each) => inputTold(page, each, k));
@@ -132,8 +136,7 @@ class Charts {
     Object.assign(made, { tell: (idx) => {
       where.textContent = `${pair} = ${idx === null ? inputTold(page, page.input(), k) : `${short(xs[idx])} ${inputUnit}`}:`;
       told.forEach((each, i) => {
-        const value = idx === null ? now(names[i]) : lines[i][idx] ?? NaN;
-        each.textContent = `${short(Math.abs(value) <= NOTHING * most ? 0 : value)} ${unitName}`;
+        each.textContent = `${short(idx === null ? now(names[i], i) : lines[i][idx] ?? NaN)} ${unitName}`;
       });
     } });
     plot.root.setAttribute("aria-hidden", "true"); // the table above says its numbers
@@ -188,15 +191,14 @@ function turnsOf(page, course, name) {
   return angle[0] - wrapped(angle[0], page.data.counting.includes(name));
 }
 
-/** The range of an axis that holds all lines: the whole course, and the values of now. */
-function rangeOf(lines, least) {
+/** The range of an axis that holds all lines: the course, and the values of now; `scale` is the greatest of their kind. */
+function rangeOf(lines, scale) {
   let low = Infinity, high = -Infinity;
   for (const line of lines) for (const each of line) if (Number.isFinite(each)) [low, high] = [Math.min(low, each), Math.max(high, each)];
   if (!(high >= low)) return [0, 1];
-  // what stands still but for rounding is a straight line in the middle
-  const { flat, half, room: part, near_zero: near } = AXIS, most = Math.max(Math.abs(low), Math.abs(high));
-  const room = Math.max(part * (high - low), flat * least, flat * most, 1e-12);
-  if (high - low < flat * Math.max(most, least)) {
+  // what does not change is a straight line in the middle
+  const { flat, half, room: part, near_zero: near } = AXIS, room = part * (high - low);
+  if (high - low <= flat * Math.max(Math.abs(low), Math.abs(high), scale)) {
     const wide = half * (Math.abs(low) || 1);
     return [low - wide, high + wide];
   }

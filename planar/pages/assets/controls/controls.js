@@ -18,7 +18,7 @@ class Controls {
     svg.addEventListener("keydown", (event) => this.key(event));
     page.on("move", () => this.show());
     for (const event of ["course", "view"]) page.on(event, () => this.range());
-    page.on("size", () => this.known.clear());
+    page.on("size", () => { this.known.clear(); this.told(); });
     this.range();
     this.said();
   }
@@ -37,7 +37,8 @@ class Controls {
     home.addEventListener("click", () => this.home());
     bar.append(this.button, this.turn, home, this.speeds());
     this.rows = inputs.map((given, k) => this.row(given, k, inputs.length > 1));
-    section.append(...this.rows.map((row) => row.row));
+    this.unitRate = control("p", { class: "hint", id: "unit-rate" });
+    section.append(...this.rows.map((row) => row.row), this.unitRate);
     section.append(control("p", { class: "hint", id: "keys" }, "Take hold of any link and move it. Arrow keys step, space plays, Home goes back to the start."));
     this.svg.setAttribute("aria-describedby", "keys");
     this.svg.setAttribute("aria-keyshortcuts", "ArrowRight ArrowLeft Shift+ArrowRight Shift+ArrowLeft Space Home");
@@ -99,8 +100,7 @@ class Controls {
   /** Let another input run. */
   run(k) {
     if (this.page.running === k) return;
-    this.page.running = k;
-    this.page.emit("move");
+    this.page.run(k);
     this.range();
   }
 
@@ -176,7 +176,9 @@ class Controls {
     if (!given) return;
     const [own] = page.inputRates()[page.running], rate = this.rate(), { name, si } = page.data.paces[given.slides ? "length" : "angle"];
     let text = `${readable(+(rate / si).toPrecision(2))} ${name}`;
-    if (own) text += `, ${+(rate / Math.abs(own)).toPrecision(2)} times the input's`;
+    if (own) text += `, ${+(rate / Math.abs(own)).toPrecision(2)} times ${page.unitRate ? "the unit rate" : "the input's"}`;
+    this.unitRate.textContent = page.unitRate?.note ?? "";
+    this.unitRate.hidden = page.unitRate === null;
     pace.told.textContent = text;
     pace.slider.setAttribute("aria-valuetext", text);
     const [forth, back] = given.slides ? ["→ forwards", "← backwards"] : ["↺ anticlockwise", "↻ clockwise"];

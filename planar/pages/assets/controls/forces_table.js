@@ -21,7 +21,7 @@ class ForceTables {
     if (!found.efforts) { this.rows("inputs", "", [], []); this.rows("pairs", "", [], []); return; }
     const [force, couple] = page.forces.least(found);
     const number = (value, least, by) => [value, Math.abs(value) <= least ? "0" : Number.isFinite(value) ? figures(value * by) : ""];
-    const [degree, angle] = unitOf(page, "angle"), rates = page.inputRates();
+    const [degree, angle] = unitOf(page, "angle"), rates = page.given;
     const [[byForce, forceUnit], [byTorque, torqueUnit], [byPower, powerUnit]] = ["force", "torque", "power"].map((kind) => unitOf(page, kind));
     this.rows("inputs", `What inputs supply at ${at}`, [["input"], ["torque or force"], ["unit"], ["power", powerUnit]], found.inputs.map((each, k) => {
       const rate = rates[k][0], [least, by, unit] = each.slides ? [force, byForce, forceUnit] : [couple, byTorque, torqueUnit];

@@ -20,13 +20,13 @@ class Keeping {
     const { data, linkage, running } = page, kept = { u: Array.from(linkage.u), z: Array.from(linkage.z) };
     const moved = data.inputs.some((each, k) => each.position / linkage.scale[k] !== linkage.u[k]) || linkage.z.some((each, k) => each !== data.z[k]);
     const changed = data.dimensions.flatMap((each, k) => (each.value === linkage.d[k] ? [] : [[each.name, linkage.d[k]]]));
-    const acting = page.acting?.changes() ?? [], given = page.inputRates().flat();
+    const acting = page.acting?.changes() ?? [], given = page.given.flat();
     if (changed.length) kept.d = changed;
     if (acting.length) kept.f = acting;
-    if (running) kept.run = running;
+    if (running !== data.running) kept.run = running;
     const rated = data.inputs.some((each, k) => each.velocity !== given[2 * k] || each.acceleration !== given[2 * k + 1]);
     if (rated) kept.v = given;
-    memory.write("at", moved || changed.length || acting.length || running || rated ? JSON.stringify(kept) : "");
+    memory.write("at", moved || changed.length || acting.length || running !== data.running || rated ? JSON.stringify(kept) : "");
   }
 
   /** What the address keeps, if it is of this mechanism: the page stands there from the first; the numbers of what acts. */

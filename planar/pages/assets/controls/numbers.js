@@ -53,7 +53,7 @@ function inputTold(page, value, k) {
 
 /** The rates of an input at which the numbers are: ", ω = 10.5 rad/s, α = −26 rad/s²"; nothing where it rests. */
 function ratesTold(page, k) {
-  const { slides, velocity, acceleration } = page.data.inputs[k], letters = slides ? "va" : "ωα";
+  const { slides } = page.data.inputs[k], [velocity, acceleration] = page.inputRates()[k], letters = slides ? "va" : "ωα";
   if (!velocity && !acceleration) return "";
   const kinds = slides ? ["velocity", "acceleration"] : ["angular velocity", "angular acceleration"];
   return [velocity, acceleration].map((rate, order) => {

@@ -9,7 +9,8 @@ class Panels {
     for (const [id, text] of PANELS) {
       const section = document.getElementById(id);
       if (!section?.firstElementChild) continue;
-      const told = id === "acting" && !page.acting.list.length && section.querySelector(".rate") ? "Speeds" : text;
+      const heading = id === "saving" ? section.getAttribute("aria-label") : text;
+      const told = id === "acting" && !page.acting.list.length && section.querySelector(".rate") ? "Speeds" : heading;
       const press = Forms.element("button", { type: "button" }, told);
       press.addEventListener("click", () => {
         section.scrollIntoView({ block: "start" });

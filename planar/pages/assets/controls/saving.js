@@ -46,7 +46,7 @@ const Files = (() => {
       const { ratio, name } = units[kind];
       put(path, kind === "length" ? length(now) : `${Number(((now * ratio[1]) / ratio[0]).toPrecision(15))} ${name}`);
     });
-    page.inputRates().forEach((rates, k) => rates.forEach((now, order) => {
+    page.given.forEach((rates, k) => rates.forEach((now, order) => {
       const given = data.inputs[k], kind = InputRates.kind(given, order), { ratio, name } = units[kind];
       if (now !== (order ? given.acceleration : given.velocity)) file.inputs[k][RATE_KEYS[order]] = `${Number(((now * ratio[1]) / ratio[0]).toPrecision(15))} ${name}`;
     }));
@@ -152,19 +152,23 @@ const Files = (() => {
 })();
 
 class Saving {
-  constructor(page, section, drawing) {
-    Object.assign(this, { page, section });
+  /** Where the mechanism is drawn by hand its file is saved beside the drawing, and the rest is exported. */
+  constructor(page, section, drawing, hasPencil) {
+    Object.assign(this, { page, section, heading: hasPencil ? "Export" : "Save" });
     this.waits = false;
-    section.append(Forms.element("h2", {}, "Save"));
-    this.button(section, "Mechanism (JSON)", () => this.save("json", "application/json", `${JSON.stringify(Files.mechanism(page), null, 2)}\n`));
-    this.link = new LinkSaving(page, section);
+    section.setAttribute("aria-label", this.heading);
+    section.append(Forms.element("h2", {}, this.heading));
+    if (!hasPencil) {
+      this.button(section, "Mechanism (JSON)", () => this.save("json", "application/json", `${JSON.stringify(Files.mechanism(page), null, 2)}\n`));
+      this.link = new LinkSaving(page, section);
+    }
     this.button(section, "Picture (SVG)", () => this.save("svg", "image/svg+xml", Files.picture(page, drawing)));
     this.button(section, "Motion (CSV)", () => this.motion());
     page.on("course", () => { if (this.waits && page.course) this.motion(); });
   }
 
   button(section, text, act) {
-    const made = Forms.element("button", { type: "button", "aria-label": `Save: ${text}` }, text);
+    const made = Forms.element("button", { type: "button", "aria-label": `${this.heading}: ${text}` }, text);
     made.addEventListener("click", act);
     section.append(made);
   }

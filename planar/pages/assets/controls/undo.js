@@ -5,16 +5,18 @@
 const MOST_STEPS = 200;
 
 class UndoHistory {
-  /** `renew(there)` makes the page anew where a snapshot has other additions than the page. */
-  constructor(renew = null) {
-    Object.assign(this, { renew, done: [], undone: [], open: false, changed: new WeakSet() });
+  /** `renew(there)` makes the page anew where a snapshot has other additions than the page. `drawing` is what is drawn by
+      hand, whose steps come before all of the page: {done, undone, undo(), redo(), panel: {undo, redo}}, the last two buttons. */
+  constructor(renew = null, drawing = null) {
+    Object.assign(this, { renew, drawing, done: [], undone: [], open: false, changed: new WeakSet() });
   }
 
-  /** On a page, which may take the place of one before; its buttons stand in `bar`; `before` is done before a step is. */
+  /** On a page, which may take the place of one before; its buttons stand in `bar`, or are those of the drawing; `before` is
+      done before a step is. */
   attach(page, bar, before) {
     Object.assign(this, { page, before, stood: page.snapshot() });
-    this.undoButton = this.button(bar, "Undo", "Control+Z", () => this.undo());
-    this.redoButton = this.button(bar, "Redo", "Control+Shift+Z Control+Y", () => this.redo());
+    this.undoButton = this.drawing?.panel.undo ?? this.button(bar, "Undo", "Control+Z", () => this.undo());
+    this.redoButton = this.drawing?.panel.redo ?? this.button(bar, "Redo", "Control+Shift+Z Control+Y", () => this.redo());
     // what plays on while a button of these is pressed belongs to the step that it takes back
     const { signal } = page.lifetime, capture = { capture: true, signal };
     const own = ({ target }) => target === this.undoButton || target === this.redoButton;
@@ -76,8 +78,15 @@ class UndoHistory {
     this.show();
   }
 
-  undo() { this.go(this.done, this.undone, "Undone"); }
-  redo() { this.go(this.undone, this.done, "Redone"); }
+  undo() { if (this.done.length || !this.drawing) this.go(this.done, this.undone, "Undone"); else this.drawing.undo(); }
+  redo() { if (this.undone.length || !this.drawing) this.go(this.undone, this.done, "Redone"); else this.drawing.redo(); }
+
+  /** What was done on the page has become part of a step of the drawing. */
+  forget() {
+    [this.done, this.undone] = [[], []];
+    this.begin();
+    this.show();
+  }
 
   go(from, to, said) {
     this.before(); // what plays stops
@@ -101,8 +110,8 @@ class UndoHistory {
   }
 
   show() {
-    this.undoButton.disabled = !this.done.length;
-    this.redoButton.disabled = !this.undone.length;
+    this.undoButton.disabled = !this.done.length && !this.drawing?.done.length;
+    this.redoButton.disabled = !this.undone.length && !this.drawing?.undone.length;
   }
 }
 

@@ -18,7 +18,6 @@ class Editing {
     this.underlay = new Underlay(this);
     this.wishing = new DrawnWish(this);
     this.panel = new PencilPanel(this);
-    document.addEventListener("keydown", (event) => this.key(event), true);
     addEventListener("beforeunload", (event) => { if (this.changed) event.preventDefault(); });
     document.body.classList.add("sketching");
     EditServer.present();
@@ -49,7 +48,7 @@ class Editing {
       document.querySelector("h1").textContent = data.name;
       document.title = data.name;
     }
-    this.parts = startPage({ ...data, wanted: solved ? Wish.data(this.wish, this.file, data) : null }, program);
+    this.parts = startPage({ ...data, wanted: solved ? Wish.data(this.wish, this.file, data) : null }, program, new UndoHistory(null, this));
     this.solved = solved;
     this.parts.page.besides = () => (this.solved ? [] : [...this.at.values(), ...(this.wish?.places ?? [])]);
     const { page, svg, lens } = this.parts, stage = document.getElementById("stage");
@@ -128,7 +127,8 @@ class Editing {
     this.chosen = tool === "pin" ? this.chosen : null;
     this.parts.lens.show();
     this.show();
-    if (tool !== "hand") this.say(TOOLS[tool].told);
+    // the hint above the drawing says what a tool does, where there is room for it
+    this.say(tool === "hand" || this.panel.hint.offsetParent !== null ? "" : TOOLS[tool].told);
   }
 
   choose(one) {
@@ -148,8 +148,18 @@ class Editing {
     return { file: this.solved ? fileNow(page, file, units) : structuredClone(file), at: new Map(this.at), units, usual: this.usual };
   }
 
+  /** What was done on the page since the last step of the drawing becomes one: the file takes its numbers. */
+  absorb() {
+    const { undo } = this.parts;
+    if (!this.solved || !undo.done.length) return;
+    this.remember(this.drawn);
+    Object.assign(this, { file: this.draft().file, changed: true });
+    undo.forget();
+  }
+
   perform(make) {
     this.parts.controls.pause();
+    this.absorb();
     const draft = this.draft();
     try {
       const said = make(draft);
@@ -170,6 +180,7 @@ class Editing {
   }
 
   commit(made) {
+    this.parts.undo.forget();
     this.remember(this.drawn);
     this.take(made, this.changed || made.file !== this.file);
   }
@@ -234,16 +245,6 @@ class Editing {
     if (answer.conflicts) this.explain();
   }
 
-  key(event) {
-    const letter = event.key.toLowerCase(), typed = event.target.closest?.("input:not([type=range]), textarea");
-    if (!(event.ctrlKey || event.metaKey) || event.altKey || typed || this.tool === "hand") return;
-    const back = letter === "z" && !event.shiftKey, on = letter === "y" || (letter === "z" && event.shiftKey);
-    if (!back && !on) return;
-    event.preventDefault();
-    event.stopImmediatePropagation();
-    if (back) this.undo(); else this.redo();
-  }
-
   rename(pin, name) {
     this.perform((draft) => {
       const said = Draw.renamePin(draft, pin, name);
@@ -261,6 +262,7 @@ class Editing {
   /** Another file in place of this one: one step. `fits`: all of it is to be seen. */
   replace(file, fits = false) {
     this.fits = fits;
+    this.absorb();
     this.commit({ file, at: new Map() });
     this.guess();
   }

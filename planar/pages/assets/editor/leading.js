@@ -9,6 +9,7 @@ class PinLeading {
   take(pin) {
     const { editing } = this, { parts: { page, drawing, controls }, solved, panel, linkBefore } = editing;
     controls.pause();
+    editing.absorb();
     editing.nearest = {}; // what is led is drawn from pin to pin
     const { file, at, units } = editing.draft(), inputs = solved ? page.data.inputs.map((_, k) => page.input(k)) : null;
     drawing.hold(true);

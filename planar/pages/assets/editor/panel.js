@@ -1,6 +1,12 @@
 "use strict";
 /* The tools above the drawing, and beside it what is said of what is drawn, the numbers of what is chosen, and its file. */
 
+/** What a drawing that is no mechanism yet wants next. */
+const NEXT_STEPS = {
+  empty: "Draw the first bar: press on the paper, and drag to its other end. Then fix pins with Ground, and drive one with Input.",
+  drawn: "Nothing is fixed yet: take Ground, and click the pins that stand still.",
+};
+
 class PencilPanel {
   constructor(editing) {
     this.editing = editing;
@@ -29,10 +35,10 @@ class PencilPanel {
       return [key, made];
     });
     this.numbers = new ToolNumbers(editing);
-    this.undo = this.button("Undo", () => editing.undo(), { "aria-label": "Undo drawing" });
-    this.redo = this.button("Redo", () => editing.redo(), { "aria-label": "Redo drawing" });
+    this.undo = this.button("Undo", () => editing.parts.undo.undo(), { "aria-keyshortcuts": "Control+Z" });
+    this.redo = this.button("Redo", () => editing.parts.undo.redo(), { "aria-keyshortcuts": "Control+Shift+Z Control+Y" });
     this.bar.append(...this.numbers.boxes, this.undo, this.redo);
-    this.hint = Forms.element("p", { class: "hint", id: "pencil-hint" });
+    this.hint = Forms.element("p", { class: "hint", id: "pencil-hint", role: "status" });
     // one stop for the tab key, arrows from tool to tool
     this.bar.addEventListener("keydown", (event) => {
       const list = [...this.bar.querySelectorAll("button:enabled")], at = list.indexOf(document.activeElement);
@@ -70,12 +76,14 @@ class PencilPanel {
     this.numbers.show(tool);
     this.hint.textContent = tool === "hand" ? "" : `${TOOLS[tool].told} Keys: arrows lead the cross, Enter presses, N goes to the next pin, Esc leaves off.`;
     this.hint.hidden = tool === "hand";
-    [this.undo.disabled, this.redo.disabled] = [!editing.done.length, !editing.undone.length];
+    editing.parts.undo.show();
     this.mobility.textContent = answer?.mobility ?? "";
-    const unfixed = answer?.place === `$.links.${file.frame}` && !Pins.ofLink(file.links[file.frame]).length;
-    const why = unfixed ? "Nothing is fixed yet: take Ground, and click the pins that stand still." : `${answer?.place ? `${answer.place}: ` : ""}${answer?.problem}`;
-    this.problem.textContent = answer?.problem ? why : "";
+    // an answer is of the file that it was asked of, which may have changed since
+    if (answer) answer.isUnfixed ??= answer.place === `$.links.${file.frame}` && !Pins.ofLink(file.links[file.frame]).length;
+    const nextStep = !answer?.isUnfixed ? "" : Object.keys(file.links).length > 1 ? NEXT_STEPS.drawn : NEXT_STEPS.empty;
+    this.problem.textContent = nextStep || (answer?.problem ? `${answer.place ? `${answer.place}: ` : ""}${answer.problem}` : "");
     this.problem.hidden = !answer?.problem;
+    this.problem.className = nextStep ? "hint" : "why";
     this.remedies.replaceChildren(...(answer?.remedies ?? []).map((each) => Forms.element("li", {}, each)));
     this.saved.textContent = editing.fileName ? `${editing.fileName}${editing.changed ? ", not saved yet" : ""}` : "no file yet";
     if (this.whole.open && document.activeElement !== this.area) this.area.value = JSON.stringify(file, null, 2);

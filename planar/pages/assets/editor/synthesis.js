@@ -46,7 +46,9 @@ class DrawnWish {
   place({ at }) { this.take(WishStroke.more({ ordered: true, closed: false, places: [], ...this.editing.wish }, at, this.isNear(at))); }
 
   take(wish) {
-    const { editing } = this, drawn = editing.draft();
+    const { editing } = this;
+    editing.absorb();
+    const drawn = editing.draft();
     editing.commit({ file: editing.file, at: drawn.at, wish });
     editing.say(wish === null ? "Nothing is wanted any more." : `${wish.places.length} places are wanted.`);
   }

@@ -28,7 +28,7 @@ class PageForces {
     const { page } = this;
     if (this.state !== page.state) {
       this.state = page.state;
-      this.found = this.solver.at(page.state, page.data.inputs.map((_, k) => page.input(k)), page.linkage.d, this.wound, page.acting?.values);
+      this.found = this.solver.at(page.loadedState(page.linkage, page.state), page.data.inputs.map((_, k) => page.input(k)), page.linkage.d, this.wound, page.acting?.values);
     }
     return this.found;
   }
@@ -67,7 +67,7 @@ class PageForces {
     const { page, solver } = this, inputs = page.data.inputs.map((_, k) => page.input(k)), until = performance.now() + FORCES_SLICE;
     for (; known.done < course.count && performance.now() < until; known.done++) {
       const row = course.rows[known.done], there = inputs.map((each, k) => (k === course.input ? row.at : each));
-      const found = solver.at(row.state, there, page.linkage.d, this.wound, page.acting?.values);
+      const found = solver.at(row.loaded, there, page.linkage.d, this.wound, page.acting?.values);
       if (!found.efforts) continue;
       for (const each of found.inputs) known.efforts[each.pair][known.done] = this.clean(found, each);
       known.most[known.done] = greatestForce(found);

@@ -48,10 +48,10 @@ class Chosen {
       .filter(({ kind, name }) => (kind === "point" ? Object.keys(points).includes(name) : kind === "link" && links.includes(name)));
   }
 
-  /** Points that trace a curve of their own first, then joints that move; a few. */
+  /** Points that trace a curve of their own first, then joints that move; a few, and none of outlines. */
   usual() {
     const { page } = this, { points, frame } = page.data;
-    const moving = Object.keys(points).filter((name) => !points[name].links.includes(frame));
+    const moving = Object.keys(points).filter((name) => !points[name].links.includes(frame) && !points[name].is_outline);
     const alone = moving.filter((name) => points[name].links.length === 1);
     return [...alone, ...moving.filter((name) => !alone.includes(name))].slice(0, 3).map((name) => ({ kind: "point", name }));
   }

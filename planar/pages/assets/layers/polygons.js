@@ -103,7 +103,7 @@ function polygonFit(page, svg, rate, values, state) {
   const { course } = page, { unit, parts } = RATES[rate], { size: [width, height], border } = POLYGON_SHEET;
   const room = ([x0, y0, x1, y1]) => Math.max((x1 - x0) / (width - 2 * border), (y1 - y0) / (height - 2 * border));
   const now = boxOf(values.map(([x]) => x), values.map(([, y]) => y));
-  if (!(room(now) * width > 1e-12 * page.data.size)) return null;
+  if (!(room(now) * width > AXIS.flat * greatestNumbers(page)[unit])) return null; // zero to round-off
   // a centimetre is one of the screen's, however wide the sheet is shown
   const zoom = svg.getScreenCTM()?.a || 1;
   if (state.zoom !== zoom) Object.assign(state, { zoom, fit: null });

@@ -7,12 +7,16 @@ const PARTS = 360;           // of the range
 const CHUNK = Math.PI / 36;  // rad, sizes: how far the march to a limit goes at a time
 const FREE_SLIDE = 2;        // sizes: as far is gone each way where a slide has no limit
 const SLICE = 8;             // ms of work at a time
+const CHORD = 2e-4;          // sizes: how far a path may be from the chord between two of its positions
+const MAX_HALVINGS = 8;      // of the range between two rows
+const DEAD_POINT_PART = 0.25; // of the range beside a dead point: there paths go as the root of the input
 const OUTGROWN = 2;          // times the middle rate: beside a dead point rates outgrow every scale
 
 /** The motion over a range of the input: rows of positions and rates, in SI. */
 class Course {
-  constructor(page, k, rows, whole, dead) {
+  constructor(page, k, rows, whole, dead, between = new Map()) {
     this.page = page;
+    this.between = between;                 // frames of positions after a row, by its number, where paths bend
     this.input = k;
     this.rows = rows;
     this.inputs = Float64Array.from(rows, (row) => row.at);
@@ -36,6 +40,12 @@ class Course {
   /** A point over the motion: x, y, vx, vy, ax, ay. */
   point(name) { return this.keep(`point ${name}`, () => this.columns((frames) => pointNumbers(this.page, name, frames))); }
 
+  /** The path of a point, [[x, y], ...]: the rows, and more positions between them where it bends. */
+  path(name) {
+    return this.keep(`path ${name}`, () => this.rows.flatMap(({ frames }, i) => (
+      [frames, ...(this.between.get(i) ?? [])].map((links) => this.page.point(name, links).position))));
+  }
+
   /** The place of an input's position in the range, brought there by whole turns where that changes nothing. */
   within(position) {
     if (!this.periodic) return position;
@@ -54,6 +64,21 @@ class Course {
       }
       const middle = rates.map(([, rate]) => rate).sort((a, b) => a - b)[rates.length >> 1];
       return rates.filter(([, rate]) => !(this.dead[0] || this.dead[1]) || rate <= OUTGROWN * middle).map(([i]) => i);
+    });
+  }
+
+  /** The greatest size of each kind of quantity over the motion (SI), as the size of the mechanism and its speeds let it be. */
+  get scales() {
+    return this.keep("scales", () => {
+      const { page } = this, { size } = page.data;
+      const greatest = (list, key) => list.reduce((most, columns) => columns[key].reduce((a, b) => Math.max(a, Math.abs(b) || 0), most), 0);
+      const links = page.data.links.map((name) => this.link(name)), points = Object.keys(page.data.points).map((name) => this.point(name));
+      const turning = greatest(links, "w"), turningUp = Math.max(greatest(links, "e"), turning ** 2);
+      return {
+        length: size, angle: Math.PI, "angular velocity": turning, "angular acceleration": turningUp,
+        velocity: Math.max(turning * size, greatest(points, "vx"), greatest(points, "vy")),
+        acceleration: Math.max(turningUp * size, greatest(points, "ax"), greatest(points, "ay")),
+      };
     });
   }
 
@@ -172,7 +197,8 @@ class Courses {
         yield;
       }
     }
-    const made = new Course(page, k, rows, turns, [ends[0].stopped, ends[1].stopped]);
+    const dead = [ends[0].stopped, ends[1].stopped], between = yield* this.refine(start, k, rows, dead);
+    const made = new Course(page, k, rows, turns, dead, between);
     made.names = ends.map((each) => (each.met ? "stop" : "dead point"));
     return made;
   }
@@ -188,13 +214,52 @@ class Courses {
     return { at: made.u[k], made, stopped, met: stopped && made.met.length > 0 };
   }
 
+  /** Positions between rows, so that no chord of a path is far from it: frames by the number of the row before them. */
+  *refine(start, k, rows, dead) {
+    const { page } = this, names = Object.keys(page.data.points), last = rows.length - 1, between = new Map();
+    const places = (frames) => names.map((name) => page.point(name, frames).position);
+    const positions = rows.map(({ at, z, frames }) => ({ at, z, frames, places: places(frames) }));
+    const bend = (a, b, c) => Math.max(0, ...names.map((_, j) => chordDistance(a.places[j], b.places[j], c.places[j])));
+    const isDead = ({ at }) => (dead[0] && at === rows[0].at) || (dead[1] && at === rows[last].at);
+    /** The positions between two, the first of which is no dead point. */
+    const inner = function* (from, to, halvings) {
+      const linkage = start.copy(), part = isDead(to) ? 1 - DEAD_POINT_PART : 0.5, at = from.at + part * (to.at - from.at);
+      Object.assign(linkage, { z: Float64Array.from(from.z), last: null, stop: null });
+      linkage.u[k] = from.at / linkage.scale[k];
+      yield;
+      if (linkage.moveTo(linkage.u.map((position, j) => (j === k ? at / linkage.scale[k] : position))).reached < 1) return [];
+      const frames = page.framesOf(linkage.state()), middle = { at, z: linkage.z, frames, places: places(frames) };
+      if (bend(from, middle, to) <= CHORD * page.data.size) return [];
+      if (halvings === MAX_HALVINGS) return [frames];
+      return [...yield* inner(from, middle, halvings + 1), frames, ...yield* inner(middle, to, halvings + 1)];
+    };
+    for (let i = 0; i < last; i++) {
+      // a chord of two parts bends four times as far as one of its parts
+      const near = [i, i + 1].filter((row) => row > 0 && row < last);
+      const isFlat = near.length === 2 && near.every((row) => bend(positions[row - 1], positions[row], positions[row + 1]) <= CHORD * page.data.size);
+      if (isFlat) continue;
+      const [from, to] = [positions[i], positions[i + 1]];
+      const frames = isDead(from) ? (yield* inner(to, from, 1)).reverse() : yield* inner(from, to, 1);
+      if (frames.length) between.set(i, frames);
+    }
+    return between;
+  }
+
   /** A position with the rates of the file, and with those of the running input alone, at unit speed. */
   row(made, at) {
     const { page, running } = this, { inputs } = page.data;
     const rates = page.inputRates(), still = inputs.map(() => 0);
-    const state = made.state(rates.map((each) => each[0]), rates.map((each) => each[1])), frames = page.framesOf(state);
+    const state = page.stateOf(made, rates), frames = page.framesOf(state);
     const same = inputs.length === 1 && rates[0][0] !== 0;
     const alone = same ? frames : page.framesOf(made.state(still.map((_, k) => (k === running ? 1 : 0)), still));
-    return { at, z: Float64Array.from(made.z), state, frames, alone };
+    const loaded = page.forces ? page.loadedState(made, state) : state;
+    return { at, z: Float64Array.from(made.z), state, loaded, frames, alone };
   }
+}
+
+/** How far a place is from the chord between two others. */
+function chordDistance([ax, ay], [x, y], [bx, by]) {
+  const [dx, dy] = [bx - ax, by - ay], square = dx * dx + dy * dy;
+  const part = square > 0 ? Math.max(0, Math.min(1, ((x - ax) * dx + (y - ay) * dy) / square)) : 0;
+  return Math.hypot(x - ax - part * dx, y - ay - part * dy);
 }
