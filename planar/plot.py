@@ -338,15 +338,20 @@ def tolerance(
 
 @takes_result("Motion", "Simulation", "Mechanism")
 def diagrams(
-    motion: Motion | Simulation | Mechanism, of: str | None = None, chords: int | None = None, width: float = 120.0
+    motion: Motion | Simulation | Mechanism,
+    of: str | Sequence[str] | None = None,
+    chords: int | None = None,
+    width: float = 120.0,
 ) -> Figure:
-    """S-t, V-t and a-t diagrams of a slide, point or link over a motion in time, or a run at the input's steady speed.
+    """S-t, V-t and a-t diagrams of slides, points or links over a motion in time, or a run at the input's steady speed.
 
-    `of` left out: the first slide on the frame that is not driven, else the angle of the link on a pin of the frame
-    that is farthest along. A slide on the frame is measured from its top dead centre, where the run starts. `width` is
-    the length of the time axis in mm on paper; `chords` adds graphical differentiation over so many intervals (Machine
-    Elements, 1.3.6 (iii)). Where the file gives no speed, rates are per radian (or metre) of the input. Of a simulation
-    intervals in which friction holds the pair drawn, or else any, are shaded. Raises BadInput, and NoAnswer.
+    `of` names one or several: lengths share one axis for each of displacement, velocity and acceleration, angles have
+    axes of their own below them. `of` left out: the first slide on the frame that is not driven, else the angle of the
+    link on a pin of the frame that is farthest along. A slide on the frame is measured from its top dead centre, and
+    the run starts at that of the first one named. `width` is the length of the time axis in mm on paper; `chords` adds
+    graphical differentiation over so many intervals (Machine Elements, 1.3.6 (iii)). Where the file gives no speed,
+    rates are per radian (or metre) of the input. Intervals of a simulation in which friction holds the pairs drawn, or
+    any pair if it holds none of them, are shaded. Raises BadInput, and NoAnswer.
     """
     from planar.drawing.diagrams.kinematic_diagrams import diagrams as drawn
 

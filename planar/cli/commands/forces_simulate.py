@@ -250,7 +250,9 @@ def _forces_over_motion(
     metavar="FILE",
     help="Draw displacement, velocity and acceleration over time, what friction holds shaded.",
 )
-@click.option("--of", metavar="NAME", help="With --diagrams: the slide, link, point or pair that is drawn.")
+@click.option(
+    "--of", multiple=True, metavar="NAME", help="With --diagrams: the slide, link, point or pair that is drawn."
+)
 @output_option("Write positions, velocities, accelerations, energies to a .csv, .xlsx, .json, .npz or .parquet file.")
 # many: options of the command
 def simulate(
@@ -262,7 +264,7 @@ def simulate(
     driven: tuple[str, ...],
     moving: bool,
     diagrams: Path | None,
-    of: str | None,
+    of: tuple[str, ...],
     output: Path | None,
 ) -> None:
     """The mechanism let go: its motion in time under loads, weights, springs and friction."""
@@ -276,7 +278,7 @@ def simulate(
     mechanism = load_model(model, mode)
     refuse_overwriting(model, output)
     refuse_overwriting(model, diagrams)
-    if of is not None and diagrams is None:
+    if of and diagrams is None:
         raise BadInput("--of", "this says what diagrams are of; say where to with --diagrams")
     if output is not None:
         check_writable(output.suffix)
@@ -289,5 +291,5 @@ def simulate(
     if diagrams is not None:
         from planar import plot as drawn
 
-        drawn.save(drawn.diagrams(found, of), diagrams)
+        drawn.save(drawn.diagrams(found, of or None), diagrams)
     report_motion(found.motion, as_json, output, lambda: [tables(found)], energy_series(found), simulation_facts(found))
