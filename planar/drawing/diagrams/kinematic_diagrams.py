@@ -211,7 +211,14 @@ def _draw_diagram(axes: Axes, sheet: DiagramSheet, ordinate: Ordinate, index: in
         axes.plot(time, values, **style, lw=1.1, zorder=4, gid=f"{ordinate.symbol}{curve.label}")
         if sheet.chords is not None and index > 0:
             found = chord_rates(sheet.run, curve.derivatives[index - 1], sheet.chords)
-            _draw_chord_stems(axes, sheet, ordinate, curve, found, style["color"] if curve.subject else CHORD_COLOUR)
+            _draw_chord_stems(
+                axes,
+                sheet,
+                ordinate,
+                curve,
+                found,
+                style["color"] if len(sheet.subject.curves) > 1 and curve.subject else CHORD_COLOUR,
+            )
 
 
 def _curve_styles(sheet: DiagramSheet) -> list[dict[str, Any]]:
@@ -360,7 +367,7 @@ class _LegendEntry(NamedTuple):
 
 def _legend_rows(sheet: DiagramSheet) -> list[list[_LegendEntry]]:
     """Which curve is which, in rows that end where the diagrams do; none for a single curve."""
-    if len(sheet.subject.curves) == 1:
+    if len(sheet.subject.curves) == 1 and not sheet.subject.curves[0].subject:
         return []
     rows: list[list[tuple[float, str, dict[str, Any]]]] = [[]]
     for curve, style in zip(sheet.subject.curves, _curve_styles(sheet), strict=True):
