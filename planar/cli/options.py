@@ -129,13 +129,20 @@ def refuse_settings() -> None:
         raise BadInput("--set", "name the MODEL whose numbers are changed")
 
 
-def load_model(model: str, mode: int | None) -> Mechanism:
-    """The mechanism of a file, the assembly chosen that `--mode` names, else with the number of the sketch's own."""
+MODE_ADVICE = "`planar modes` lists them, --mode takes another"
+"""What a remark on a terminal says of other assemblies."""
+
+
+def load_model(model: str, mode: int | None, advice: str = MODE_ADVICE) -> Mechanism:
+    """The mechanism of a file, the assembly chosen that `--mode` names, else with the number of the sketch's own.
+
+    `advice` ends the remark that has this number; it is empty for what is printed and handed out.
+    """
     from planar.assemblies.selection import select_assembly, with_assembly_number
 
     mechanism = read_model(model)
     if mode is None:
-        return with_assembly_number(mechanism)
+        return with_assembly_number(mechanism, advice)
     with show_status(f"{mechanism.name}: assemblies"):
         return select_assembly(mechanism, mode)
 

@@ -206,7 +206,7 @@ def plot(  # many: options of a command; # long: each has its line
     if what == "diagrams" and has_steps and not chords:
         raise BadInput("--steps", "diagrams use this with --chords: the number of chords")
     subject = None if what == "diagrams" else _single_name("--of", of, what)
-    mechanism = load_model(model, mode)
+    mechanism = load_model(model, mode, advice="")
     refuse_overwriting(model, output)
     with show_status(f"{mechanism.name}: {what}"):
         if what in MAP_DRAWINGS:
@@ -275,7 +275,7 @@ def animate(
     """The mechanism in motion, to and fro or round and round."""
     from planar import plot as drawn
 
-    mechanism = load_model(model, mode)
+    mechanism = load_model(model, mode, advice="")
     refuse_overwriting(model, output)
     with show_progress(mechanism.name) as progress:
         drawn.animate(_run_or_mechanism(mechanism, pair, start, stop), output, points or None, progress)

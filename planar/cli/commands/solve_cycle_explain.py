@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from planar.cli.options import (
+    MODE_ADVICE,
     at_option,
     json_option,
     load_model,
@@ -109,7 +110,7 @@ def explain(  # many: one for each option
 
         if output.suffix not in SUFFIXES:
             raise unknown_format_error(output.suffix, "a worked solution", (*SUFFIXES, *PAGES))
-    state, comparisons = _solve_model(model, mode, at, as_json, output)
+    state, comparisons = _solve_model(model, mode, at, as_json, output, advice="")
     given = read(scales, units=state.mechanism.units)
     if output is not None and on_pages:
         from planar.drawing.output.solution_pages import encode_sheets, solution_pages
@@ -169,7 +170,12 @@ def _with_parts(text: RenderableType, state: State, parts: tuple[str, ...]) -> R
 
 
 def _solve_model(
-    model: str, mode: int | None, at: tuple[str, ...], as_json: bool, output: Path | None
+    model: str,
+    mode: int | None,
+    at: tuple[str, ...],
+    as_json: bool,
+    output: Path | None,
+    advice: str = MODE_ADVICE,
 ) -> tuple[State, tuple[Comparison, ...]]:
     """A model's position, moved to where `--at` says, with its published values unless it was moved."""
     from planar.analysis.worked.published import compare_published
@@ -177,7 +183,7 @@ def _solve_model(
 
     if as_json and output is not None:
         raise BadInput("-o", "tables go to a file or SI values are printed with --json; give one of the two")
-    mechanism = load_model(model, mode)
+    mechanism = load_model(model, mode, advice)
     refuse_overwriting(model, output)
     moved = parse_drives(mechanism, at)
     state = solve(mechanism, moved)

@@ -45,7 +45,7 @@ def view(model: str, output: Path | None, at: tuple[str, ...], mode: int | None,
 
     if output is not None and output.suffix.lower() not in SUFFIXES:
         raise unknown_format_error(output.suffix, "a page", SUFFIXES)
-    mechanism = load_model(model, mode)
+    mechanism = load_model(model, mode, advice="")
     refuse_overwriting(model, output)
     if task is not None:
         refuse_overwriting(str(task), output, "the task's own file")
