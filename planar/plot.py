@@ -101,9 +101,9 @@ def centres(
     """The scheme of a position with its instantaneous centres, and beside it the circle diagram.
 
     `links` chooses: of one all its centres, of several those between any two of them; left out, all centres, or of
-    more than 28 those that pairs show and those against the frame. Centres within `reach` times the mechanism's greater
-    extent (left out: twice) are drawn in their places, arrows lead to the others. Raises BadInput for a link that
-    there is not, a scale that is none, and a reach below 1.
+    more than 28 those that pairs show and those against the frame. The view grows to the nearest centres until it is
+    `reach` times the mechanism's greater extent (3 by default); arrows with coordinates lead to the others. Raises
+    BadInput for a link that there is not, a scale that is none, and a reach below 1.
     """
     from planar.analysis.centres.centres import centres as all_centres
     from planar.drawing.centres.centres import DEFAULT_REACH, centres_picture
