@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
+from click.core import ParameterSource
 
 from planar import __version__
 from planar.cli.exit_status import NO_ANSWER, CommandGroup
@@ -202,6 +203,14 @@ def refuse_overwriting(model: str, output: Path | None, what: str = "the mechani
     is_file = not model.startswith(LINK_PREFIX) and Path(model).exists()
     if output is not None and is_file and output.exists() and output.samefile(model):
         raise BadInput("-o", f"this is {what}, which would be lost; name another")
+
+
+def refuse_options(names: Iterable[str], reason: str) -> None:
+    """Refuse options, by the names of their values, that are on the command line but not used. Raises BadInput."""
+    context = click.get_current_context()
+    for option in context.command.params:
+        if option.name in names and context.get_parameter_source(option.name) is ParameterSource.COMMANDLINE:
+            raise BadInput(max(option.opts, key=len), reason)
 
 
 def show_status(description: str) -> AbstractContextManager[Any]:

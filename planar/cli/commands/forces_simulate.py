@@ -20,6 +20,7 @@ from planar.cli.options import (
     output_option,
     parse_drives,
     print_or_write,
+    refuse_options,
     refuse_overwriting,
     report_motion,
     run_motion,
@@ -101,7 +102,10 @@ def forces(
     if over is not None:
         _refuse_beside_over((("--at", at), ("--cycle", whole), ("--solve-for", solve_for), ("--effort", effort)))
     if not whole:
-        _refuse_motion_options(set(course) - ({"steps"} if over else set()) | {"fluctuation", "rim_radius"})
+        refuse_options(
+            set(course) - ({"steps"} if over else set()) | {"fluctuation", "rim_radius"},
+            "this is for the forces of a whole motion, with --cycle",
+        )
     if rim_radius is not None and fluctuation is None:
         raise BadInput("--rim-radius", "this is the radius of a flywheel; say for which --fluctuation")
     from planar.dynamics.load_validation import require_loads
@@ -132,14 +136,6 @@ def _refuse_beside_over(options: Iterable[tuple[str, Any]]) -> None:
 
 def _is_given(option: str) -> bool:
     return click.get_current_context().get_parameter_source(option) is ParameterSource.COMMANDLINE
-
-
-def _refuse_motion_options(course: Iterable[str]) -> None:
-    """Refuse options of a whole motion, which would not be heeded."""
-    context = click.get_current_context()
-    for option in context.command.params:
-        if option.name in course and context.get_parameter_source(option.name) is ParameterSource.COMMANDLINE:
-            raise BadInput(option.opts[0], "this is for the forces of a whole motion, with --cycle")
 
 
 def _require_held_loads(mechanism: Mechanism) -> None:
