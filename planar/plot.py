@@ -158,15 +158,21 @@ def loci(motion: Motion | Mechanism, points: Sequence[str] | None = None, scale:
 
 @takes_result("Motion", "Mechanism")
 def centrodes(
-    motion: Motion | Mechanism, link: str | None = None, other: str | None = None, scale: ScaleTexts = None
+    motion: Motion | Mechanism,
+    link: str | None = None,
+    other: str | None = None,
+    scale: ScaleTexts = None,
+    marks: int | None = None,
 ) -> Figure:
     """The fixed and the moving centrode of a link against another (left out: the frame), touching in their pole.
 
-    Without a `link` those of the first coupler. Raises BadInput for a link that is not there, or a scale that is none.
+    Without a `link` those of the first coupler. About `marks` round positions of the input (12 by default, 0 for none)
+    are marked on both. Raises BadInput for a link that does not exist, a scale or a number of marks that is none.
     """
-    from planar.drawing.centres.centrodes import centrodes_picture
+    from planar.drawing.centres.centrodes import DEFAULT_MARKS, centrodes_picture
 
-    return draw_pictures([centrodes_picture(motion, link, other, _length_scale(scale, motion))])
+    count = DEFAULT_MARKS if marks is None else marks
+    return draw_pictures([centrodes_picture(motion, link, other, _length_scale(scale, motion), count)])
 
 
 def chains(found: Chain | Sequence[Chain], mechanisms: bool = False) -> list[Figure]:

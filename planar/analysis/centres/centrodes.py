@@ -181,7 +181,8 @@ def centre_path(motion: Motion, link: str, other: str | None = None) -> CentrePa
     """The path of the instantaneous centre of two links (the second one by default the frame), from the motion's rates.
 
     Over the range of an input as `centrodes` has it, its limits included; in a motion in time by the rates at each
-    time, so that the centre is not determined where both links are at rest. Raises Unknown for a link that is not there.
+    time, so that the centre is not determined where both links are at rest. Raises Unknown for a link that does not
+    exist.
 
     >>> import planar
     >>> path = planar.centre_path(planar.cycle("four-bar", 12), "BC")

@@ -246,7 +246,7 @@ def plot(  # many: options of a command; # long: each has its line
             drawings: dict[str, Callable[[], Drawing]] = {
                 "positions": lambda: drawn.positions(moving, steps, points or None, scales),
                 "loci": lambda: drawn.loci(moving, points or None, scales),
-                "centrodes": lambda: drawn.centrodes(moving, link, other, scales),
+                "centrodes": lambda: drawn.centrodes(moving, link, other, scales, steps),
                 "diagrams": lambda: drawn.diagrams(moving, of or None, steps if chords else None),
                 "torque": lambda: drawn.torque(moving, subject, fluctuation),
                 "bearings": lambda: drawn.bearings(moving, pairs or None),

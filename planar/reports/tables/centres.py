@@ -87,7 +87,8 @@ def path_table(motion: Motion, paths: Sequence[CentrePath]) -> RenderableType:
     listed = [*range(0, len(abscissa) - 1, step), len(abscissa) - 1]
     for row in listed:
         cells = (cell for path in paths for cell in _coordinate_cells(path.homogeneous[row], units, size))
-        rows.add_row(_format_number(of.from_si(float(abscissa[row]))), *cells)
+        at_zero = abs(abscissa[row]) <= ZERO_RATIO * np.abs(abscissa).max()
+        rows.add_row("0" if at_zero else _format_number(of.from_si(float(abscissa[row]))), *cells)
     notes = [f"{path.name}: {' and '.join(path.links)}" + f"; {path.reason}" * bool(path.reason) for path in paths]
     notes.append("coordinates are in the axes of the frame")
     if step > 1:
