@@ -7,6 +7,7 @@ import os
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager, nullcontext
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -78,6 +79,25 @@ SETTINGS = "planar.settings"
 """Where a command's context keeps what `--set` says."""
 
 
+FRAME_NUMBER = "planar.frame_number"
+"""Where a command's context keeps what `--frame-number` says."""
+
+
+def frame_number_option(command: Any) -> Any:
+    """The option that makes the frame the first or the last link; `read_model` follows it."""
+
+    def keep(context: click.Context, _: click.Parameter, order: str | None) -> None:
+        context.meta[FRAME_NUMBER] = order
+
+    return click.option(
+        "--frame-number",
+        type=click.Choice(("first", "last")),
+        expose_value=False,
+        callback=keep,
+        help="Number the frame first, as link 1, or last; by default as the file says, or last.",
+    )(command)
+
+
 def model_argument(*names: str, **more: Any) -> Callable[[Any], Any]:
     """The MODEL of a command, with the option that changes numbers of it; `read_model` reads the one by the other."""
 
@@ -97,10 +117,20 @@ def model_argument(*names: str, **more: Any) -> Callable[[Any], Any]:
 
 
 def read_model(model: str) -> Mechanism:
-    """The mechanism of a file, or of a model's name, with the numbers that `--set` changes."""
+    """The mechanism of a file, or of a model's name, with what `--set` and `--frame-number` change."""
     from planar.document.files import load
 
-    return apply_settings(load(model))
+    mechanism = apply_settings(load(model))
+    order = click.get_current_context().meta.get(FRAME_NUMBER)
+    if order is None or order == mechanism.frame_number:
+        return mechanism
+    from planar.model.link_graph import frame_number_problem
+
+    renumbered = replace(mechanism, frame_number=order)
+    problem = frame_number_problem(renumbered)
+    if problem:
+        raise BadInput("--frame-number", problem)
+    return renumbered
 
 
 def apply_settings(mechanism: Mechanism) -> Mechanism:

@@ -24,8 +24,10 @@ from planar.document.schema import (
 from planar.document.sections.published import read_published
 from planar.foundation.units import UnitError, example_quantity
 from planar.model.file_units import FileUnits, OtherKind, parse_declared_unit
+from planar.model.link_graph import frame_number_problem
 from planar.model.link_shapes import Along, At, Distances, Link, Point, PointDefinition, PointPlacementError, link_shape
 from planar.model.mechanism import (
+    FRAME_NUMBERS,
     Input,
     Mechanism,
     pair_entries,
@@ -66,10 +68,14 @@ def read_mechanism(value: Any) -> Mechanism:
         notes=tuple(item.as_text() for item in full.list_items("notes")),
         remarks=_unpinned_link_remarks(full, pairs),
         closes_within=full["closes_within"].as_positive("length") if full.has("closes_within") else None,
+        frame_number=full.choice("frame_number", FRAME_NUMBERS) or "last",
     )
     inputs = _read_inputs(full, relative_motions(bare))
     entries = tuple(zip(full["pairs"].items(), pair_entries(bare), strict=True))
     driven = replace(bare, inputs=inputs, **_read_common_keys(entries))
+    problem = frame_number_problem(driven)
+    if problem:
+        raise full.error_at("frame_number", problem)
     shapes = {link.name: link_shape(link) for link in bare.links}
     told = tuple(sentence for pair in bare.pairs for sentence in pair.remarks(shapes))
     if told:

@@ -9,6 +9,7 @@ import click
 
 from planar.cli.options import (
     at_option,
+    frame_number_option,
     json_option,
     load_model,
     main,
@@ -65,6 +66,7 @@ def harmonics(
 @json_option
 @at_option
 @mode_option
+@frame_number_option
 @click.option("--cycle", "whole", is_flag=True, help="The paths of centres over the whole motion.")
 @click.option(
     "--of",

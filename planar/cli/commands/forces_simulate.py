@@ -11,6 +11,7 @@ from click.core import ParameterSource
 
 from planar.cli.options import (
     at_option,
+    frame_number_option,
     json_option,
     load_model,
     main,
@@ -43,6 +44,7 @@ ONE_DESTINATION = "results go to a file or are printed with --json; give one of 
 @json_option
 @at_option
 @mode_option
+@frame_number_option
 @click.option("--static", is_flag=True, help="Leave the links' inertia out: at rest, or in slow motion.")
 @click.option("--without-friction", "frictionless", is_flag=True, help="Leave the friction of the pairs out.")
 @click.option("--cycle", "whole", is_flag=True, help="Over the whole motion, as `planar cycle` has it.")

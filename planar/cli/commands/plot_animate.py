@@ -11,6 +11,7 @@ from click.core import ParameterSource
 
 from planar.cli.options import (
     at_option,
+    frame_number_option,
     load_model,
     main,
     mode_option,
@@ -90,6 +91,7 @@ OPTION_USES = {
     "--input": OptionUse((*MOTION_DRAWINGS, *CIRCUIT_DRAWINGS), _RANGE_ADVICE),
     "--from": OptionUse(MOTION_DRAWINGS, _RANGE_ADVICE),
     "--to": OptionUse(MOTION_DRAWINGS, _RANGE_ADVICE),
+    "--frame-number": OptionUse((*POSITION_DRAWINGS, "positions", "loci", "centrodes", "tolerance", "bearings")),
     "--mode": OptionUse((*POSITION_DRAWINGS, *MOTION_DRAWINGS, *MAP_DRAWINGS, *COGNATE_DRAWINGS)),
 }
 """The options of `plot` that are for some drawings only; the others are for all."""
@@ -132,6 +134,7 @@ def _single_name(option: str, names: tuple[str, ...], what: str) -> str | None:
 @_name_drawings
 @main.command()
 @model_argument()
+@frame_number_option
 @click.argument("what", type=click.Choice(DRAWINGS))
 @output_option("Write the drawing to a .png, .svg, .pdf or .dxf file.", required=True)
 @scale_option

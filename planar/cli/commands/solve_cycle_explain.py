@@ -11,6 +11,7 @@ import click
 from planar.cli.options import (
     MODE_ADVICE,
     at_option,
+    frame_number_option,
     json_option,
     load_model,
     main,
@@ -78,6 +79,7 @@ def solve(
 @json_option
 @at_option
 @mode_option
+@frame_number_option
 @scale_option
 @click.option(
     "--with",

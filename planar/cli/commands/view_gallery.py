@@ -8,6 +8,7 @@ import click
 
 from planar.cli.options import (
     at_option,
+    frame_number_option,
     load_model,
     main,
     mode_option,
@@ -27,6 +28,7 @@ SUFFIXES = (".html", ".htm")
 
 @main.command()
 @model_argument()
+@frame_number_option
 @output_option(
     "Write the page to an .html file; left out, it is written to a folder of its own and opened in the browser."
 )
