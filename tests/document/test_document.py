@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from math import cos, isfinite, pi, sin
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,7 @@ from planar.model.link_shapes import Along, At, Distances, Link, Point, link_sha
 from planar.model.loads import Course, Load, Mass, Spring
 from planar.model.mechanism import Input, Mechanism, PublishedValue, named_points, relative_motions
 from planar.model.pairs.guide_line import LinkLine
+from tests.command import run
 from tests.documents import EXAMPLES, FOUR_BAR, LOADED, MISTAKES, SLIDER_CRANK, base, mistaken, put, read, refused
 from tests.draws import draws
 from tests.known import MODELS
