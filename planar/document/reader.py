@@ -24,7 +24,6 @@ from planar.document.schema import (
 from planar.document.sections.published import read_published
 from planar.foundation.units import UnitError, example_quantity
 from planar.model.file_units import FileUnits, OtherKind, parse_declared_unit
-from planar.model.link_graph import frame_number_problem
 from planar.model.link_shapes import Along, At, Distances, Link, Point, PointDefinition, PointPlacementError, link_shape
 from planar.model.mechanism import (
     FRAME_NUMBERS,
@@ -73,9 +72,7 @@ def read_mechanism(value: Any) -> Mechanism:
     inputs = _read_inputs(full, relative_motions(bare))
     entries = tuple(zip(full["pairs"].items(), pair_entries(bare), strict=True))
     driven = replace(bare, inputs=inputs, **_read_common_keys(entries))
-    problem = frame_number_problem(driven)
-    if problem:
-        raise full.error_at("frame_number", problem)
+    _check_frame_number(full, driven)
     shapes = {link.name: link_shape(link) for link in bare.links}
     told = tuple(sentence for pair in bare.pairs for sentence in pair.remarks(shapes))
     if told:
@@ -97,6 +94,17 @@ def read_mechanism(value: Any) -> Mechanism:
     from planar.document.sections.tolerances import read_tolerances  # few files have any
 
     return replace(whole, tolerances=read_tolerances(full["tolerances"], whole))
+
+
+def _check_frame_number(top: Cursor, mechanism: Mechanism) -> None:
+    """Refuse a frame that is to be the first link but cannot be. Raises BadInput."""
+    if not top.has("frame_number"):
+        return
+    from planar.model.link_graph import frame_number_problem  # few files have the key
+
+    problem = frame_number_problem(mechanism)
+    if problem:
+        raise top.error_at("frame_number", problem)
 
 
 def read_units(top: Cursor) -> FileUnits:

@@ -653,7 +653,7 @@ def test_an_option_that_a_drawing_does_not_use_is_refused_by_name(tmp_path: Path
         assert named is not None, word
         listed = set(re.split(", | and ", named[2]))
         assert listed == ({*use.drawings} if named[1] == "For" else {*DRAWINGS} - {*use.drawings})
-        value = [] if options[word].is_flag else ["1"]
+        value = [] if options[word].is_flag else ["first" if word == "--frame-number" else "1"]
         for drawing in sorted({*DRAWINGS} - {*use.drawings}):
             sentence = run(tmp_path, "plot", "no such file", drawing, word, *value, "-o", "a.png").refused(2)
             assert sentence.startswith(f"{word}: this option is for "), (word, drawing)
