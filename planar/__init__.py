@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from planar.analysis.cams.cam_profile import CamProfile, cam_profile
     from planar.analysis.cams.contact_force import ContactForce, contact_forces
     from planar.analysis.centres.centres import Centre, Centres, centres
-    from planar.analysis.centres.centrodes import Centrodes, centrodes
+    from planar.analysis.centres.centrodes import CentrePath, Centrodes, centre_path, centrodes
     from planar.analysis.centres.curvature import Curvature, curvature
     from planar.analysis.centres.two_directions import centre_of
     from planar.analysis.centres.velocities import velocity_by_centres
@@ -162,6 +162,7 @@ __all__ = [
     "CamProfile",
     "CamShape",
     "Centre",
+    "CentrePath",
     "Centres",
     "Centrodes",
     "Chain",
@@ -309,6 +310,7 @@ __all__ = [
     "calibrate",
     "cam_profile",
     "centre_of",
+    "centre_path",
     "centres",
     "centrodes",
     "chain_of",

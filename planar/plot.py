@@ -101,9 +101,9 @@ def centres(
     """The scheme of a position with its instantaneous centres, and beside it the circle diagram.
 
     `links` chooses: of one all its centres, of several those between any two of them; left out, all centres, or of
-    more than 28 those that pairs show and those against the frame. Centres within `reach` times the mechanism's greater
-    extent (left out: twice) are drawn in their places, arrows lead to the others. Raises BadInput for a link that
-    there is not, a scale that is none, and a reach below 1.
+    more than 28 those that pairs show and those against the frame. The view grows to the nearest centres until it is
+    `reach` times the mechanism's greater extent (3 by default); arrows with coordinates lead to the others. Raises
+    BadInput for a link that there is not, a scale that is none, and a reach below 1.
     """
     from planar.analysis.centres.centres import centres as all_centres
     from planar.drawing.centres.centres import DEFAULT_REACH, centres_picture
@@ -158,15 +158,21 @@ def loci(motion: Motion | Mechanism, points: Sequence[str] | None = None, scale:
 
 @takes_result("Motion", "Mechanism")
 def centrodes(
-    motion: Motion | Mechanism, link: str | None = None, other: str | None = None, scale: ScaleTexts = None
+    motion: Motion | Mechanism,
+    link: str | None = None,
+    other: str | None = None,
+    scale: ScaleTexts = None,
+    marks: int | None = None,
 ) -> Figure:
     """The fixed and the moving centrode of a link against another (left out: the frame), touching in their pole.
 
-    Without a `link` those of the first coupler. Raises BadInput for a link that is not there, or a scale that is none.
+    Without a `link` those of the first coupler. About `marks` round positions of the input (12 by default, 0 for none)
+    are marked on both. Raises BadInput for a link that does not exist, a scale or a number of marks that is none.
     """
-    from planar.drawing.centres.centrodes import centrodes_picture
+    from planar.drawing.centres.centrodes import DEFAULT_MARKS, centrodes_picture
 
-    return draw_pictures([centrodes_picture(motion, link, other, _length_scale(scale, motion))])
+    count = DEFAULT_MARKS if marks is None else marks
+    return draw_pictures([centrodes_picture(motion, link, other, _length_scale(scale, motion), count)])
 
 
 def chains(found: Chain | Sequence[Chain], mechanisms: bool = False) -> list[Figure]:
@@ -338,15 +344,20 @@ def tolerance(
 
 @takes_result("Motion", "Simulation", "Mechanism")
 def diagrams(
-    motion: Motion | Simulation | Mechanism, of: str | None = None, chords: int | None = None, width: float = 120.0
+    motion: Motion | Simulation | Mechanism,
+    of: str | Sequence[str] | None = None,
+    chords: int | None = None,
+    width: float = 120.0,
 ) -> Figure:
-    """S-t, V-t and a-t diagrams of a slide, point or link over a motion in time, or a run at the input's steady speed.
+    """S-t, V-t and a-t diagrams of slides, points or links over a motion in time, or a run at the input's steady speed.
 
-    `of` left out: the first slide on the frame that is not driven, else the angle of the link on a pin of the frame
-    that is farthest along. A slide on the frame is measured from its top dead centre, where the run starts. `width` is
-    the length of the time axis in mm on paper; `chords` adds graphical differentiation over so many intervals (Machine
-    Elements, 1.3.6 (iii)). Where the file gives no speed, rates are per radian (or metre) of the input. Of a simulation
-    intervals in which friction holds the pair drawn, or else any, are shaded. Raises BadInput, and NoAnswer.
+    `of` names one or several: lengths share one axis for each of displacement, velocity and acceleration, angles have
+    axes of their own below them. `of` left out: the first slide on the frame that is not driven, else the angle of the
+    link on a pin of the frame that is farthest along. A slide on the frame is measured from its top dead centre, and
+    the run starts at that of the first one named. `width` is the length of the time axis in mm on paper; `chords` adds
+    graphical differentiation over so many intervals (Machine Elements, 1.3.6 (iii)). Where the file gives no speed,
+    rates are per radian (or metre) of the input. Intervals of a simulation in which friction holds the pairs drawn, or
+    any pair if it holds none of them, are shaded. Raises BadInput, and NoAnswer.
     """
     from planar.drawing.diagrams.kinematic_diagrams import diagrams as drawn
 

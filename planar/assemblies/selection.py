@@ -24,10 +24,11 @@ MAX_SOLVED_FOR_REMARK = 32
 """Dyads, or larger blocks by what they take, that are solved with every position for the sake of a remark."""
 
 
-def with_assembly_number(mechanism: Mechanism) -> Mechanism:
+def with_assembly_number(mechanism: Mechanism, advice: str = "") -> Mechanism:
     """The mechanism with a remark of which assembly the sketch means, where that is told within some milliseconds.
 
-    Where there is nothing to choose, or the numbers are not sure, the mechanism as it is.
+    `advice` says how another assembly is chosen, and ends the remark. Where there is nothing to choose, or the numbers
+    are not sure, the mechanism as it is.
     """
     known = solved_mechanism(mechanism)
     stages = known.solver.equations.blocks
@@ -47,10 +48,8 @@ def with_assembly_number(mechanism: Mechanism) -> Mechanism:
     if before is None or any(each.complete is Completeness.NOT for each in solved):
         return mechanism
     why = "the nearest to the sketch" if mechanism.sketch else "without a sketch"
-    told = (
-        f"assembly {before + 1} of {total} at the file's inputs, {why}; `planar modes` lists them, --mode takes another"
-    )
-    return replace(mechanism, remarks=(*mechanism.remarks, told))
+    remark = "; ".join(filter(None, (f"assembly {before + 1} of {total} at the file's inputs, {why}", advice)))
+    return replace(mechanism, remarks=(*mechanism.remarks, remark))
 
 
 def select_assembly(mechanism: Mechanism, number: int) -> Mechanism:

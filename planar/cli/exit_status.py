@@ -6,6 +6,7 @@ import gc
 import re
 import sys
 import warnings
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, nullcontext
 from importlib import import_module
@@ -63,8 +64,33 @@ COLLECTION_THRESHOLD = 200_000
 """Objects made before the rings among them are looked for: more than loading and one solution make."""
 
 
+REPEATABLE = "May be repeated."
+"""What the help says of an option that takes several values."""
+
+
+class OptionCheckedCommand(click.Command):
+    """A command that refuses an option given twice unless it takes several values; click would keep the last alone."""
+
+    def __init__(self, *args: Any, **more: Any):
+        super().__init__(*args, **more)
+        for option in self.params:
+            if isinstance(option, click.Option) and option.multiple and REPEATABLE not in (option.help or ""):
+                option.help = f"{option.help or ''} {REPEATABLE}".strip()
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        _, _, parameters = self.make_parser(ctx).parse_args(args=list(args))
+        for option, count in Counter(parameters).items():
+            if isinstance(option, click.Option) and count > 1 and not (option.multiple or option.is_eager):
+                raise BadInput(
+                    max(option.opts, key=len), f"this option is given {count} times but takes one value; give it once"
+                )
+        return super().parse_args(ctx, args)
+
+
 class CommandGroup(click.Group):
     """Every command ends with the same sentences and exit statuses; its module is loaded when it is asked for."""
+
+    command_class = OptionCheckedCommand
 
     modules: Mapping[str, str] = MappingProxyType({})
     """The commands by name, and the module of each."""

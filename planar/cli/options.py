@@ -7,10 +7,12 @@ import os
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager, nullcontext
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
+from click.core import ParameterSource
 
 from planar import __version__
 from planar.cli.exit_status import NO_ANSWER, CommandGroup
@@ -77,6 +79,25 @@ SETTINGS = "planar.settings"
 """Where a command's context keeps what `--set` says."""
 
 
+FRAME_NUMBER = "planar.frame_number"
+"""Where a command's context keeps what `--frame-number` says."""
+
+
+def frame_number_option(command: Any) -> Any:
+    """The option that makes the frame the first or the last link; `read_model` follows it."""
+
+    def keep(context: click.Context, _: click.Parameter, order: str | None) -> None:
+        context.meta[FRAME_NUMBER] = order
+
+    return click.option(
+        "--frame-number",
+        type=click.Choice(("first", "last")),
+        expose_value=False,
+        callback=keep,
+        help="Number the frame first, as link 1, or last; by default as the file says, or last.",
+    )(command)
+
+
 def model_argument(*names: str, **more: Any) -> Callable[[Any], Any]:
     """The MODEL of a command, with the option that changes numbers of it; `read_model` reads the one by the other."""
 
@@ -96,10 +117,20 @@ def model_argument(*names: str, **more: Any) -> Callable[[Any], Any]:
 
 
 def read_model(model: str) -> Mechanism:
-    """The mechanism of a file, or of a model's name, with the numbers that `--set` changes."""
+    """The mechanism of a file, or of a model's name, with what `--set` and `--frame-number` change."""
     from planar.document.files import load
 
-    return apply_settings(load(model))
+    mechanism = apply_settings(load(model))
+    order = click.get_current_context().meta.get(FRAME_NUMBER)
+    if order is None or order == mechanism.frame_number:
+        return mechanism
+    from planar.model.link_graph import frame_number_problem
+
+    renumbered = replace(mechanism, frame_number=order)
+    problem = frame_number_problem(renumbered)
+    if problem:
+        raise BadInput("--frame-number", problem)
+    return renumbered
 
 
 def apply_settings(mechanism: Mechanism) -> Mechanism:
@@ -129,13 +160,20 @@ def refuse_settings() -> None:
         raise BadInput("--set", "name the MODEL whose numbers are changed")
 
 
-def load_model(model: str, mode: int | None) -> Mechanism:
-    """The mechanism of a file, the assembly chosen that `--mode` names, else with the number of the sketch's own."""
+MODE_ADVICE = "`planar modes` lists them, --mode takes another"
+"""What a remark on a terminal says of other assemblies."""
+
+
+def load_model(model: str, mode: int | None, advice: str = MODE_ADVICE) -> Mechanism:
+    """The mechanism of a file, the assembly chosen that `--mode` names, else with the number of the sketch's own.
+
+    `advice` ends the remark that has this number; it is empty for what is printed and handed out.
+    """
     from planar.assemblies.selection import select_assembly, with_assembly_number
 
     mechanism = read_model(model)
     if mode is None:
-        return with_assembly_number(mechanism)
+        return with_assembly_number(mechanism, advice)
     with show_status(f"{mechanism.name}: assemblies"):
         return select_assembly(mechanism, mode)
 
@@ -195,6 +233,14 @@ def refuse_overwriting(model: str, output: Path | None, what: str = "the mechani
     is_file = not model.startswith(LINK_PREFIX) and Path(model).exists()
     if output is not None and is_file and output.exists() and output.samefile(model):
         raise BadInput("-o", f"this is {what}, which would be lost; name another")
+
+
+def refuse_options(names: Iterable[str], reason: str) -> None:
+    """Refuse options, by the names of their values, that are on the command line but not used. Raises BadInput."""
+    context = click.get_current_context()
+    for option in context.command.params:
+        if option.name in names and context.get_parameter_source(option.name) is ParameterSource.COMMANDLINE:
+            raise BadInput(max(option.opts, key=len), reason)
 
 
 def show_status(description: str) -> AbstractContextManager[Any]:

@@ -40,6 +40,7 @@ from planar.model.link_shapes import (
     link_shape,
 )
 from planar.model.mechanism import (
+    FRAME_NUMBERS,
     Input,
     Mechanism,
     pair_entries,
@@ -81,10 +82,12 @@ def read_mechanism(value: Any) -> Mechanism:
         notes=tuple(item.as_text() for item in full.list_items("notes")),
         remarks=_unpinned_link_remarks(full, pairs),
         closes_within=full["closes_within"].as_positive("length") if full.has("closes_within") else None,
+        frame_number=full.choice("frame_number", FRAME_NUMBERS) or "last",
     )
     inputs = _read_inputs(full, relative_motions(bare))
     entries = tuple(zip(full["pairs"].items(), pair_entries(bare), strict=True))
     driven = replace(bare, inputs=inputs, **_read_common_keys(entries))
+    _check_frame_number(full, driven)
     shapes = {link.name: link_shape(link) for link in bare.links}
     told = tuple(sentence for pair in bare.pairs for sentence in pair.remarks(shapes))
     if told:
@@ -132,6 +135,17 @@ def _completed_by_sketch(
                 pairs[pairs.index(pair)] = completed[0]
                 remarks.append(completed[1])
     return replace(mechanism, pairs=tuple(pairs), remarks=tuple(remarks))
+
+
+def _check_frame_number(top: Cursor, mechanism: Mechanism) -> None:
+    """Refuse a frame that is to be the first link but cannot be. Raises BadInput."""
+    if not top.has("frame_number"):
+        return
+    from planar.model.link_graph import frame_number_problem  # few files have the key
+
+    problem = frame_number_problem(mechanism)
+    if problem:
+        raise top.error_at("frame_number", problem)
 
 
 def read_units(top: Cursor) -> FileUnits:

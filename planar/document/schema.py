@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from planar.foundation.units import MAX_QUANTITY_LENGTH
 from planar.model.loads import MAX_LAW_ITEMS
-from planar.model.mechanism import LARGEST_NUMBER, PUBLISHED_QUANTITIES, SMALLEST_NUMBER
+from planar.model.mechanism import FRAME_NUMBERS, LARGEST_NUMBER, PUBLISHED_QUANTITIES, SMALLEST_NUMBER
 from planar.model.pairs import Pair, pair_types
 from planar.model.pairs.base import Schema, described, list_schema, schema_reference
 
@@ -303,6 +303,10 @@ FILE_SCHEMA: Schema = {
     "notes": described(_TEXTS, "remarks that are shown with its results"),
     "units": described(object_schema(UNITS_SCHEMA), "the units of bare numbers in this file, and of results"),
     "frame": described(TEXT, "the link that stands still"),
+    "frame_number": described(
+        {"enum": list(FRAME_NUMBERS)},
+        "where the frame is in the numbers of the links: first, so that it is link 1, or last; left out: last",
+    ),
     "links": described(_named_values_schema(schema_reference("link"), minProperties=1), "the links by their names"),
     "pairs": described({"type": "array", "items": schema_reference("pair")}, "what joins the links"),
     "inputs": described(

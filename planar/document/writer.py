@@ -37,6 +37,8 @@ def write_mechanism(mechanism: Mechanism) -> dict[str, Any]:
     )
     value["units"] = {key: unit for key, unit in mechanism.units._asdict().items() if unit}
     value["frame"] = mechanism.frame
+    if mechanism.frame_number != "last":
+        value["frame_number"] = mechanism.frame_number
     value["links"] = {link.name: write_link(link, quantity) for link in mechanism.links}
     stiffness = {name: quantity(each, "stiffness") for name, each in mechanism.pair_stiffness}
     value["pairs"] = [

@@ -61,7 +61,7 @@ planar schema --task > planar-task-schema.json
 
 
 SHOWN_KEYS = {
-    "file": ("sketch",),
+    "file": ("frame_number", "sketch"),
     "misfit": ("closes_within", "pairs"),
     "link": ("links",),
     "input": ("inputs",),

@@ -167,7 +167,8 @@ def link_numbers(mechanism: Mechanism) -> dict[str, str]:
     """The number of each link, in the order of the numbers.
 
     A link whose name is a number has that number. The others have the numbers that are left, in the manner of
-    textbooks: 1 drives, 2 is joined to it and so on; the frame is last. Breadth first over the moving links, links
+    textbooks: 1 drives, 2 is joined to it and so on; the frame is last, or with the mechanism's `frame_number` "first"
+    it is 1 and 2 drives. Breadth first over the moving links, links
     alike in that in the order of the file. What drives is the link that the first input moves: on the frame the other
     one, else the second; without inputs it is the file's first.
     """
@@ -187,10 +188,24 @@ def link_numbers(mechanism: Mechanism) -> dict[str, str]:
             if link not in order:
                 order[link] = None
                 waiting += sorted(beside[link], key=place.__getitem__)
-    own = {link for link in (*order, mechanism.frame) if _LINK_NUMBER.fullmatch(link)}
+    links = (mechanism.frame, *order) if mechanism.frame_number == "first" else (*order, mechanism.frame)
+    own = {link for link in links if _LINK_NUMBER.fullmatch(link)}
     free = (str(number) for number in count(1) if str(number) not in own)
-    numbers = {link: link if link in own else next(free) for link in (*order, mechanism.frame)}
+    numbers = {link: link if link in own else next(free) for link in links}
     return dict(sorted(numbers.items(), key=lambda item: int(item[1])))
+
+
+def frame_number_problem(mechanism: Mechanism) -> str:
+    """Why the frame cannot be the first link, although the mechanism says so; empty where it is, or is to be last."""
+    if mechanism.frame_number != "first":
+        return ""
+    first = next(iter(link_numbers(mechanism)))
+    if first == mechanism.frame:
+        return ""
+    return (
+        f"the frame {mechanism.frame!r} cannot be the first link: a link whose name is a number has that number, and "
+        f"{first!r} comes before it; rename the links"
+    )
 
 
 def link_label(number: str, link: str) -> str:

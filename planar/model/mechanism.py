@@ -79,6 +79,8 @@ PUBLISHED_QUANTITIES = {
 """What a published value may be of, and what it is measured in."""
 
 
+FRAME_NUMBERS = ("first", "last")
+"""Where the frame is in the numbering of the links."""
 LARGEST_NUMBER = 10**100
 """SI; beyond it squares, and squares of squares, overflow."""
 SMALLEST_NUMBER = 1e-100
@@ -148,8 +150,9 @@ class Mechanism(Displayable, Revisable):
 
     `pairs` are binary: a pin of n links is n - 1 of them. `gravity` is an acceleration (m/s^2), `stops` are those of
     pairs. `closes_within` is the misfit (m) up to which the pairs of a redundant linkage may stay open,
-    `pair_stiffness` by pair what resists it (N/m), `tolerances` how far numbers may be off. `remarks` are what the
-    reader of the file has to say.
+    `pair_stiffness` by pair what resists it (N/m), `tolerances` how far numbers may be off. `frame_number` says whether
+    the frame is the "first" or the "last" of the links when they are numbered. `remarks` are what the reader of the
+    file has to say.
     """
 
     name: str
@@ -174,6 +177,7 @@ class Mechanism(Displayable, Revisable):
     closes_within: float | None = None
     pair_stiffness: tuple[tuple[str, float], ...] = ()
     tolerances: Tolerances | None = None
+    frame_number: str = "last"
 
     def __repr__(self) -> str:
         driven = f", driven at {', '.join(given.pair for given in self.inputs)}" if self.inputs else ""
@@ -282,6 +286,10 @@ def check_mechanism(mechanism: Mechanism) -> None:
     for name in names:
         if first_unprintable(name):
             raise BadInput(name, f"the name {name!r} holds a character that cannot be shown")
+    if mechanism.frame_number not in FRAME_NUMBERS:
+        raise BadInput(
+            "frame_number", f"write {' or '.join(map(repr, FRAME_NUMBERS))}, not {mechanism.frame_number!r:.40}"
+        )
     if mechanism.frame not in points:
         raise BadInput("frame", f"there is no link {mechanism.frame!r} to be the frame; links are {join_names(points)}")
     for pair in mechanism.pairs:

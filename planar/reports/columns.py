@@ -19,7 +19,7 @@ _VECTOR_LETTERS = {"position": "", "velocity": "v", "acceleration": "a", "jerk":
 
 _GROUP_PREFIXES = {"inputs": "input ", "pairs": "pair ", "misfits": "misfit ", "reactions": "reaction "}
 _GROUP_PREFIXES |= {"friction": "friction ", "without friction": "without friction input "}
-_GROUP_PREFIXES |= {"rubbing": "rubbing ", "contacts": "contact "}
+_GROUP_PREFIXES |= {"rubbing": "rubbing ", "contacts": "contact ", "centres": "centre "}
 
 
 class ReportedSeries(NamedTuple):

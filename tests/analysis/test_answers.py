@@ -1,6 +1,7 @@
 """What designers ask of a motion, against closed forms, against fine samples, and by construction."""
 
 import json
+import re
 from itertools import pairwise
 from math import acos, asin, inf, pi, radians, sin, sqrt
 
@@ -13,6 +14,7 @@ from planar.cli import main
 from planar.foundation.errors import BadInput, Unknown
 from planar.model.mechanism import Drive, relative_motions, replace_inputs
 from planar.reports.tables.answers import record, tables
+from tests import command
 from tests.builders import crank_rocker, open_four_bar, slider_crank
 from tests.closed_forms import between, turn_apart
 from tests.draws import part
@@ -199,6 +201,55 @@ def test_the_area_of_a_coupler_curve_is_half_the_integral_of_x_dy_less_y_dx(seed
     assert found.value == pytest.approx(whole, abs=1e-11)
     back = planar.area(planar.cycle(mechanism, 10, 1.0, 1.0 - 2.0 * pi), "P")
     assert back.value == pytest.approx(-whole, abs=1e-11)
+
+
+def geared_arms(ratio, length):
+    """Two arms, the second of which turns `ratio` times as fast: P is exp(i t) + length exp(i ratio t)."""
+    return planar.from_dict(
+        {
+            "planar": 1,
+            "units": {"length": "m", "angle": "rad"},
+            "frame": "frame",
+            "links": {
+                "frame": {"points": {"O": [0, 0]}},
+                "arm": {"ends": ["O", "A"], "length": 1.0},
+                "bar": {"ends": ["A", "P"], "length": length},
+            },
+            "pairs": [
+                {"turning": "O"},
+                {"turning": "A"},
+                {"gear": "wheels", "links": ["arm", "bar"], "ratio": ratio},
+            ],
+            "inputs": [{"pair": "O", "position": 0.3}],
+        }
+    )
+
+
+def test_the_net_area_of_a_path_that_crosses_itself_is_the_sum_of_its_loops():
+    """A limacon r = 1 + 2 cos t, whose inner loop counts twice, and a path of three petals that cancel its middle."""
+    found = planar.area(planar.cycle(geared_arms(2, 1.0), 12), "P")
+    assert found.crossings == 1
+    assert sorted(found.loops) == pytest.approx([pi - 1.5 * sqrt(3.0), 2.0 * pi + 1.5 * sqrt(3.0)], rel=1e-12)
+    assert found.value == pytest.approx(sum(found.loops), rel=1e-12)
+    back = planar.area(planar.cycle(geared_arms(2, 1.0), 12, 0.3, 0.3 - 2.0 * pi), "P")
+    assert sorted(back.loops) == pytest.approx(sorted(-loop for loop in found.loops), rel=1e-12)
+    petals = planar.area(planar.cycle(geared_arms(-2, sqrt(0.5)), 12), "P")
+    assert petals.crossings == 3
+    *outer, middle = sorted(petals.loops)
+    assert outer == pytest.approx([outer[0]] * 3, rel=1e-10)
+    assert petals.value == pytest.approx(0.0, abs=1e-12)
+    assert sum(outer) == pytest.approx(-middle, rel=1e-10)
+    simple = planar.area(planar.cycle(geared_arms(2, 0.2), 12), "P")
+    assert (simple.crossings, simple.loops) == (0, (simple.value,))
+
+
+def test_the_table_says_that_the_area_of_a_figure_of_eight_is_net(tmp_path):
+    (tmp_path / "arms.json").write_text(planar.dumps(geared_arms(-2, sqrt(0.5))), encoding="utf-8")
+    text = command.run(tmp_path, "cycle", "arms.json", "--steps", "12", "--of", "P").done()
+    assert re.search(r"net area of its curve +0 m² +3 crossings; anticlockwise positive", text)
+    assert "loops, sum of sizes" in text
+    rows = command.run(tmp_path, "cycle", "arms.json", "--steps", "12", "--of", "A").done()
+    assert "net area" not in rows
 
 
 def test_an_open_curve_has_no_area():

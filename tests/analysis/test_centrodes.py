@@ -1,13 +1,22 @@
 """Centrodes: they touch in the pole and roll on each other; closed forms; infinity, limits, links at rest; drawings."""
 
+import json
 from dataclasses import replace
+from itertools import pairwise
 from math import hypot, pi
 
 import numpy as np
 import pytest
 
 import planar
-from planar.analysis.centres.centrodes import Centrode, _split_at_infinity, centrodes, usual_links
+from planar.analysis.centres.centrodes import (
+    Centrode,
+    _split_at_infinity,
+    centre_path,
+    centrodes,
+    links_of_centre,
+    usual_links,
+)
 from planar.analysis.relative_motion import quarter_turn
 from planar.drawing.centres.centrodes import DRAWING_SIZE, MAX_WINDOW_RATIO, centrodes_picture
 from planar.drawing.paper.clipping import clip_homogeneous_curve, remove_repeated_strokes
@@ -194,6 +203,72 @@ def test_centres_of_single_positions_are_on_the_curve():
         assert found.fixed.position[row] == pytest.approx(centre.position, abs=1e-9)
 
 
+@pytest.mark.parametrize("duration", [None, 0.5])
+@pytest.mark.parametrize("links", [("coupler", "frame"), ("rocker", "crank"), ("coupler", "crank")])
+def test_the_path_of_a_centre_goes_through_the_centres_of_single_positions(links, duration):
+    """Over the range of the input, and in time; in the axes of the frame, also of two links that both move."""
+    motion = planar.cycle(MODELS["crank-rocker"], 12, duration=duration)
+    path = centre_path(motion, *links)
+    for row in range(0, 12, 5):
+        state = planar.solve(MODELS["crank-rocker"], {"A0": float(motion.inputs["A0"].position[row])})
+        centre = planar.centres(state)[links]
+        assert path.position[row] == pytest.approx(centre.position, abs=1e-9)
+        assert path.name == centre.name
+        assert np.isnan(path.direction[row])
+    assert path.homogeneous.shape == (13, 3)
+
+
+def test_both_links_have_one_velocity_along_the_path_of_their_centre_where_several_inputs_run():
+    motion = planar.cycle("excavator-arm", 4, duration=0.5)
+    path = centre_path(motion, "bucket", "boom")
+    velocities = []
+    for link in ("bucket", "boom"):
+        frame = motion.frames[link]
+        x, y, angle = (np.stack(np.broadcast_arrays(*part.parts[:2])) for part in (frame.x, frame.y, frame.angle))
+        away = path.position - np.stack([x[0], y[0]], axis=1)
+        velocities.append(np.stack([x[1], y[1]], axis=1) + angle[1][:, None] * quarter_turn(away))
+    assert np.isfinite(path.position).any()
+    assert velocities[0] == pytest.approx(velocities[1], abs=1e-12, nan_ok=True)
+
+
+def test_a_centre_is_at_infinity_where_the_rod_only_slides():
+    path = centre_path(planar.cycle("slider-crank", 12, pi / 2.0, pi), "rod", "frame")
+    assert np.isnan(path.position[0]).all()
+    assert abs(np.sin(path.direction[0])) == pytest.approx(1.0)
+    assert np.isfinite(path.position[1:]).all()
+
+
+def test_a_centre_is_named_by_numbers_or_names_of_its_links():
+    mechanism = MODELS["four-bar"]
+    for text in ("24", "I24", "2,4", "BC,AD", "AD, BC", "I2,4"):
+        assert {*links_of_centre(mechanism, text)} == {"BC", "AD"}
+    many = MODELS["rotary-engine"]
+    assert links_of_centre(many, "I1,12") == links_of_centre(many, "1,12")
+    for text in ("44", "I5", "BC", "BC,BC", "", "BC,nothing"):
+        with pytest.raises(Unknown, match="there is no centre"):
+            links_of_centre(mechanism, text)
+
+
+def test_the_command_lists_writes_and_prints_the_path_of_a_centre(tmp_path):
+    words = ("centres", "slider-crank", "--cycle", "--steps", "4")
+    text = command.run(tmp_path, *words, "--of", "24", "--of", "rod,crank").done()
+    assert "I24 x" in text
+    assert "I12 y" in text
+    path = centre_path(planar.cycle("slider-crank", 4), "rod")
+    record = json.loads(command.run(tmp_path, *words, "--of", "I24", "--json").done())
+    assert np.array(record["centres"]["I24"]["position"]) == pytest.approx(path.position)
+    command.run(tmp_path, *words, "--of", "24", "-o", "path.csv").done()
+    head, *rows = [line.split(",") for line in (tmp_path / "path.csv").read_text(encoding="utf-8").splitlines()]
+    assert head[-2:] == ["centre I24 x [mm]", "centre I24 y [mm]"]
+    assert np.array([row[-2:] for row in rows], dtype=float) == pytest.approx(1e3 * path.position)
+    command.run(tmp_path, *words, "--of", "24", "-o", "path.txt").done()
+    assert "I24 x" in (tmp_path / "path.txt").read_text(encoding="utf-8")
+    assert "--of: name the centre" in command.run(tmp_path, *words).refused(2)
+    assert "--of: there is no centre '55'" in command.run(tmp_path, *words, "--of", "55").refused(2)
+    for extra in (("--of", "24"), ("--steps", "3"), ("--from", "1deg")):
+        assert f"{extra[0]}: this is for the path" in command.run(tmp_path, "centres", "four-bar", *extra).refused(2)
+
+
 @pytest.mark.parametrize(("model", "link"), [("crank-rocker", "coupler"), ("four-bar", "BC"), ("002-E3.6a", "AC")])
 def test_arcs_are_cut_where_the_link_slides_without_turning_and_nowhere_else(model, link):
     motion = run(model, 360)
@@ -338,6 +413,33 @@ def test_both_curves_are_drawn_touching_in_the_pole_inside_the_paper(model, link
     texts = {mark.text for mark in picture.marks if isinstance(mark, Label)}
     assert {"fixed centrode", "moving centrode"} <= texts
     assert any(text.startswith("$I_") for text in texts)
+
+
+def test_round_positions_of_the_input_are_marked_on_both_centrodes():
+    """The dots of the fixed centrode are the centres at these positions; those of the moving one lie as far apart."""
+    mechanism = MODELS["cardan-gears"]
+    picture = centrodes_picture(mechanism, scale=FULL)
+    dots = {
+        mark.about: np.array(mark.centre) for mark in picture.marks if isinstance(mark, Circle) and " at " in mark.about
+    }
+    fixed, moving = (
+        [f"{pen.value} at {30 * k}" for k in range(12)] for pen in (Pen.FIXED_CENTRODE, Pen.MOVING_CENTRODE)
+    )
+    assert set(dots) == {*fixed, *moving}
+    link, frame = usual_links(mechanism)
+    for name, degrees in ((fixed[1], 30.0), (fixed[8], 240.0)):
+        state = planar.solve(mechanism, {mechanism.inputs[0].pair: np.radians(degrees)})
+        assert dots[name] == pytest.approx(planar.centres(state)[link, frame].position / FULL.per_mm, abs=1e-3)
+    sides = [[np.hypot(*(dots[a] - dots[b])) for a, b in pairwise(names)] for names in (fixed, moving)]
+    # chords of equal arcs on circles of radii two to one
+    assert sides[0] == pytest.approx([2.0 * np.hypot(*dots[fixed[0]]) * np.sin(pi / 12.0)] * 11, rel=1e-4)
+    assert sides[1] == pytest.approx([np.hypot(*dots[fixed[0]]) * np.sin(pi / 6.0)] * 11, rel=1e-4)
+    labels = {mark.text for mark in picture.marks if isinstance(mark, Label)}
+    assert {str(30 * k) for k in range(12)} <= labels
+    assert "Dots: positions of the input O in deg" in picture.notes
+    assert not any(" at " in mark.about for mark in centrodes_picture(mechanism, marks=0).marks)
+    with pytest.raises(BadInput, match="whole number of marks"):
+        centrodes_picture(mechanism, marks=-1)
 
 
 def test_cardan_circles_are_drawn_once_and_in_their_places():

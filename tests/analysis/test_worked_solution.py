@@ -24,7 +24,7 @@ from planar.reports.tables.worked_solution import record, solution_text
 from tests.builders import four_bar_document
 from tests.command import run
 from tests.hostile import NAMES, hostile_document
-from tests.known import some_models, state_of
+from tests.known import MODELS, some_models, state_of
 from tests.linkages import random_linkage
 
 ROOT = Path(__file__).parents[2]
@@ -370,6 +370,17 @@ def test_the_command_prints_the_whole_solution(tmp_path: Path) -> None:
         "the printed denominator 0.56 is 0.056",
     ):
         assert words in out
+
+
+def test_a_worked_solution_speaks_of_no_command_or_option(tmp_path: Path) -> None:
+    """It is handed out on paper; the table on a terminal says how another assembly is chosen."""
+    hint = re.compile(r"(?<![\w-])--[a-z]|`|\bplanar [a-z]+")
+    text = run(tmp_path, "explain", "four-bar", "--with", "centres,forces").done()
+    assert "assembly 1 of 2 at the file's inputs" in " ".join(text.split())
+    assert not hint.search(text)
+    assert "--mode takes another" in run(tmp_path, "solve", "four-bar").done()
+    for model, mechanism in MODELS.items():
+        assert not any(hint.search(note) for note in mechanism.notes), model
 
 
 def test_the_command_moves_an_input_and_prints_data(tmp_path: Path) -> None:

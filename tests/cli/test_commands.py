@@ -11,9 +11,13 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import click
 import pytest
 
 import planar
+from planar.cli import main
+from planar.cli.commands.plot_animate import DRAWINGS, OPTION_USES
+from planar.cli.exit_status import REPEATABLE
 from planar.document.files import MAX_FILE_BYTES
 from planar.foundation.errors import BadInput
 from planar.model.mechanism import unit_rate_note, with_unit_rate
@@ -673,3 +677,46 @@ def test_explain_takes_the_unit_rate_of_the_input_that_is_named_and_refuses_it_b
     assert " ".join(shown.split()).count(f"for 1 rad/s at the input {second}") == 1
     solution = json.loads(run(tmp_path, "explain", "m.json", "--input", second, "--json").out)
     assert any(link["velocity"] for link in solution["links"].values())
+
+
+COMMAND_OPTIONS = [
+    (name, option)
+    for name, command in sorted(main.load_commands().items())
+    for option in command.params
+    if isinstance(option, click.Option) and not option.is_eager
+]
+"""Every option of every command, but those that print help."""
+
+
+def test_an_option_that_takes_one_value_is_refused_when_it_is_repeated(tmp_path: Path) -> None:
+    """No option of any command keeps its last value alone; the help says which options may be repeated."""
+    assert len(COMMAND_OPTIONS) > 100
+    for name, option in COMMAND_OPTIONS:
+        word = max(option.opts, key=len)
+        if option.multiple:
+            assert REPEATABLE in (option.help or ""), (name, word)
+            continue
+        assert REPEATABLE not in (option.help or ""), (name, word)
+        words = [word] if option.is_flag else [word, "1"]
+        sentence = run(tmp_path, name, *words, *words).refused(2)
+        assert sentence == f"{word}: this option is given 2 times but takes one value; give it once", name
+    assert "given 3 times" in run(tmp_path, "solve", "four-bar", "--mode=1", "--mode", "1", "--mode=2").refused(2)
+
+
+def test_an_option_that_a_drawing_does_not_use_is_refused_by_name(tmp_path: Path) -> None:
+    """The refusal and the help of `plot` name the same drawings."""
+    options = {word: option for name, option in COMMAND_OPTIONS if name == "plot" for word in option.opts}
+    assert {*options} - {*OPTION_USES} == {"-o", "--set"}
+    for word, use in OPTION_USES.items():
+        named = re.search(r"(Not for|For) ([^.]*)[.]", options[word].help or "")
+        assert named is not None, word
+        listed = set(re.split(", | and ", named[2]))
+        assert listed == ({*use.drawings} if named[1] == "For" else {*DRAWINGS} - {*use.drawings})
+        value = [] if options[word].is_flag else ["first" if word == "--frame-number" else "1"]
+        for drawing in sorted({*DRAWINGS} - {*use.drawings}):
+            sentence = run(tmp_path, "plot", "no such file", drawing, word, *value, "-o", "a.png").refused(2)
+            assert sentence.startswith(f"{word}: this option is for "), (word, drawing)
+            assert f"{drawing} does not use it" in sentence
+    assert "--of: torque is drawn of one name" in run(
+        tmp_path, "plot", "four-bar", "torque", "--of", "A", "--of", "B", "-o", "a.png"
+    ).refused(2)

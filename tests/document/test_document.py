@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from math import cos, isfinite, pi, sin
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,7 @@ from planar.model.link_shapes import Along, At, Distances, Link, Point, link_sha
 from planar.model.loads import Course, Load, Mass, Spring
 from planar.model.mechanism import Input, Mechanism, PublishedValue, named_points, relative_motions
 from planar.model.pairs.guide_line import LinkLine
+from tests.command import run
 from tests.documents import EXAMPLES, FOUR_BAR, LOADED, MISTAKES, SLIDER_CRANK, base, mistaken, put, read, refused
 from tests.draws import draws
 from tests.known import MODELS
@@ -632,3 +634,34 @@ def test_a_mutilated_file_is_read_or_refused_and_nothing_else(name: str, times: 
 def test_any_value_at_all_is_refused_and_nothing_else(value: Any) -> None:
     with pytest.raises(BadInput):
         planar.from_dict(value)
+
+
+def test_the_frame_is_the_first_or_the_last_link_as_the_file_says(tmp_path: Path) -> None:
+    value = planar.to_dict(planar.load("four-bar"))
+    assert "frame_number" not in value
+    first = planar.from_dict(value | {"frame_number": "first"})
+    assert planar.to_dict(first)["frame_number"] == "first"
+    assert planar.from_dict(planar.to_dict(first)) == first
+    assert dict(planar.centres(first).numbers) == {"AD": "1", "AB": "2", "BC": "3", "DC": "4"}
+    assert dict(planar.centres("four-bar").numbers) == {"AB": "1", "BC": "2", "DC": "3", "AD": "4"}
+    # the same centres under other names
+    one, other = planar.centres("four-bar"), planar.centres(first)
+    assert (one["BC", "AD"].name, other["BC", "AD"].name) == ("I24", "I13")
+    assert one["AB", "DC"].position == pytest.approx(other["AB", "DC"].position, rel=1e-12)
+    text = run(tmp_path, "centres", "four-bar", "--frame-number", "first").done()
+    assert "links: 1 AD, 2 AB, 3 BC and 4 DC" in text
+    (tmp_path / "first.json").write_text(planar.dumps(first), encoding="utf-8")
+    assert "links: 1 AD" in run(tmp_path, "centres", "first.json").done()
+    assert "links: 1 AB" in run(tmp_path, "centres", "first.json", "--frame-number", "last").done()
+
+
+def test_a_frame_that_cannot_be_the_first_link_is_refused(tmp_path: Path) -> None:
+    """A link whose name is a number has that number, so that another one may come before the frame."""
+    text = planar.dumps(planar.load("four-bar")).replace('"AB"', '"1"')
+    (tmp_path / "numbered.json").write_text(text, encoding="utf-8")
+    sentence = run(tmp_path, "centres", "numbered.json", "--frame-number", "first").refused(2)
+    assert "--frame-number: the frame 'AD' cannot be the first link" in sentence
+    with pytest.raises(BadInput, match=r"^\$.frame_number: the frame 'AD' cannot be the first link"):
+        planar.loads(text.replace('"frame": "AD"', '"frame": "AD", "frame_number": "first"'))
+    with pytest.raises(BadInput, match="none of first, last"):
+        planar.loads(text.replace('"frame": "AD"', '"frame": "AD", "frame_number": "frist"'))

@@ -334,6 +334,7 @@ def test_several_inputs_have_to_be_told_apart():
         ("jansen-leg", "foot", 120.0, 12),
         ("geared-five-bar", "P", 150.0, 36),
         ("landing-gear", None, 100.0, 12),
+        ("sewing-machine", ["bush", "eyelet", "needle", "rocker", "take-up"], 60.0, 12),
     ],
 )
 def test_no_text_lies_on_another_or_leaves_the_sheet(model, of, width, chords):
@@ -412,3 +413,35 @@ def test_a_coupler_that_only_slides_has_no_angular_acceleration_beside_change_po
     for name, symbol in (("displacement", "φ"), ("velocity", "ω"), ("acceleration", "ε")):
         _, values = curve(figure, name, symbol)
         assert not values.any()
+
+
+def test_several_outputs_share_the_axes_of_their_quantity_and_angles_have_axes_below():
+    mechanism = planar.load("sewing-machine")
+    figure = diagrams(mechanism, ["bush", "eyelet", "rocker", "take-up"])
+    run = diagrams(mechanism, "bush"), diagrams(mechanism, "rocker")
+    for name, symbols in (("displacement", "Sφ"), ("velocity", "Vω"), ("acceleration", "aε")):
+        length, angle = chart(figure, name), chart(figure, f"angular {name}")
+        assert {line.get_gid() for line in length.lines} >= {
+            f"{symbols[0]}{of}" for of in ("bush", "eyelet x", "eyelet y")
+        }
+        assert {line.get_gid() for line in angle.lines} >= {f"{symbols[1]}{of}" for of in ("rocker", "take-up")}
+        # the same curves as in diagrams of one output
+        _, values = curve(figure, name, f"{symbols[0]}bush")
+        assert values == pytest.approx(curve(run[0], name, symbols[0])[1])
+        ((_, values),) = [line.get_data() for line in lines(angle, f"{symbols[1]}rocker")]
+        assert values == pytest.approx(curve(run[1], name, symbols[1])[1])
+        low, high = length.get_ylim()
+        assert all(low <= value <= high for line in length.lines for value in np.ravel(line.get_ydata()))
+    colours = {line.get_gid(): line.get_color() for line in chart(figure, "velocity").lines}
+    assert colours["Veyelet x"] == colours["Veyelet y"] != colours["Vbush"]
+    legend = [text.get_text() for text in figure.texts if text.get_gid() == "legend"]
+    assert legend == ["bush", "eyelet x", "eyelet y", "rocker", "take-up"]
+    for sentence in (
+        "S of bush is from top dead centre",
+        "of bush 2.112 m/s",
+        "$V_x$ of eyelet",
+        "of take-up 60 rad/s",
+    ):
+        assert sentence in caption(figure)
+    with pytest.raises(BadInput, match="'bush' is named twice"):
+        diagrams(mechanism, ["bush", "bush"])

@@ -108,8 +108,8 @@ def test_scales_are_taken_by_what_they_measure(tmp_path):
     ("words", "said"),
     [
         (("scheme", "-o", "a.bmp"), "a drawing can be written to files that end in .png, .svg, .pdf or .dxf"),
-        (("scheme", "--input", "A", "-o", "a.png"), "a scheme is of one position"),
-        (("loci", "--at", "A=60deg", "-o", "a.png"), "say where it starts with --from"),
+        (("scheme", "--input", "A", "-o", "a.png"), "--input: this option is for positions"),
+        (("loci", "--at", "A=60deg", "-o", "a.png"), "--from says where a run starts"),
         (("loci", "--point", "nothing", "-o", "a.png"), "there is no point 'nothing'"),
         (("diagrams", "--of", "nothing", "-o", "a.png"), "there is no pair, point or link of this name"),
         (("positions", "--steps", "0", "-o", "a.png"), "a whole number of positions"),

@@ -197,9 +197,13 @@ def test_hostile_names_are_set_as_they_are() -> None:
 
 
 def test_the_command_writes_pages(tmp_path: Path) -> None:
-    ended = run(tmp_path, "explain", "single-link", "-o", "solution.pdf")
+    ended = run(tmp_path, "explain", "four-bar", "-o", "solution.pdf")
     assert (ended.status, ended.out, ended.err) == (0, "", "")
-    assert len(pypdfium2.PdfDocument((tmp_path / "solution.pdf").read_bytes())) >= 1
+    text = "".join(page.get_textpage().get_text_range() for page in pypdfium2.PdfDocument(tmp_path / "solution.pdf"))
+    assert "assembly 1 of 2" in text
+    # what is handed out speaks of no option of a command
+    assert "--" not in text
+    assert "`" not in text
 
 
 # formulas and lines

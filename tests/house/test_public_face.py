@@ -79,6 +79,7 @@ def results():
     yield from (centres := planar.centres(state), next(iter(centres)) if hasattr(centres, "__iter__") else centres)
     yield from (
         planar.centrodes(motion, "rod"),
+        planar.centre_path(motion, "rod"),
         planar.curvature(state, "rod"),
         planar.velocity_by_centres(centres, "B"),
     )

@@ -179,10 +179,10 @@ def test_columns_of_circuit_and_branch_stand_in_the_list_of_assemblies(tmp_path)
         (("circuits", "excavator-arm"), "several inputs"),
         (("circuits", "four-bar", "--input", "C"), "no input at 'C'"),
         (("modes", "four-bar", "--input", "A"), "without --circuits no input runs"),
-        (("plot", "four-bar", "circuits", "-o", "a.png", "--from", "10deg"), "whole range"),
-        (("plot", "four-bar", "circuits", "-o", "a.png", "--mode", "1"), "would not heed"),
+        (("plot", "four-bar", "circuits", "-o", "a.png", "--from", "10deg"), "circuits does not use it"),
+        (("plot", "four-bar", "circuits", "-o", "a.png", "--mode", "1"), "circuits does not use it"),
         (("plot", "four-bar", "circuits", "-o", "a.png", "--of", "Z"), "no pair, point or link of this name"),
-        (("plot", "four-bar", "modes", "-o", "a.png", "--of", "DC"), "would not heed"),
+        (("plot", "four-bar", "modes", "-o", "a.png", "--of", "DC"), "modes does not use it"),
     ],
 )
 def test_what_would_not_be_heeded_is_refused(words, sentence, tmp_path):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
@@ -12,11 +13,11 @@ from planar.analysis.interpolated_run import InterpolatedRun
 from planar.analysis.relative_motion import RelativeMotion, relative_motion
 from planar.document.first_argument import takes_result
 from planar.foundation.arrays import Array, IntArray
-from planar.foundation.errors import BadInput
+from planar.foundation.errors import BadInput, Unknown
 from planar.foundation.geometry import Frame, Vector, frame_at
 from planar.foundation.jets import Jet
 from planar.foundation.short_repr import short_repr
-from planar.model.link_graph import link_numbers
+from planar.model.link_graph import link_label, link_numbers, number_separator
 from planar.model.mechanism import Mechanism, relative_motions
 from planar.model.pairs import MeasureKind
 from planar.results.motion import Motion
@@ -76,6 +77,16 @@ class Centrode(NamedTuple):
         inner = self._between(rows[:-1], rows[1:], s)
         return np.concatenate([inner.reshape(-1, 3), self.homogeneous[rows[-1:]]])
 
+    def homogeneous_at(self, position: float) -> Array:
+        """The pole (3,) at a position of the input between the first and the last, by the curve between two rows."""
+        order = np.argsort(self.inputs, kind="stable")
+        last = min(max(int(np.searchsorted(self.inputs[order], position)), 1), len(order) - 1)
+        rows = order[last - 1 : last], order[last : last + 1]
+        step = self.inputs[rows[1]] - self.inputs[rows[0]]
+        part = (position - self.inputs[rows[0]]) / np.where(step == 0.0, 1.0, step)
+        pole: Array = self._between(*rows, part)[0, 0]
+        return pole
+
     def _between(self, first: IntArray, last: IntArray, s: Array) -> Array:
         """Steps from first rows to last ones (k,) at parts s of each: (k, parts, 3)."""
         step = (self.inputs[last] - self.inputs[first])[:, None, None]
@@ -134,25 +145,105 @@ class Centrodes:
         return np.flatnonzero(np.isfinite(self.fixed.homogeneous[:, 2]))
 
 
-@takes_result("Motion")
-def centrodes(motion: Motion, link: str, other: str | None = None) -> Centrodes:
-    """The fixed and the moving centrode of a link against another (left out: the frame), from the motion's rates.
+@dataclass(frozen=True)
+class CentrePath:
+    """The path of the instantaneous centre of two links over a motion, in the axes of the frame.
 
-    The input's speed does not matter; where it is zero in the file, a unit rate takes its place. At the limits of a
-    range, where rates are not determined, the pole is that of the motion that the constraints leave. Raises Unknown
-    for a link that is not there.
+    `homogeneous` (n, 3) is (x, y, w) in m: the point (x/w, y/w), for w = 0 at infinity in the direction (x, y); NaN
+    where the links move as one, or their motion is not determined. Rows are those of the motion, of one there and back
+    those of the first half.
+    """
+
+    links: tuple[str, str]
+    name: str
+    "I24, of the numbers of the links"
+    homogeneous: Array
+    reason: str
+    "why the centre does not move, or is nowhere; else empty"
+
+    __repr__ = short_repr
+
+    @property
+    def position(self) -> Array:
+        """(n, 2), m; NaN at infinity, and where the centre is not determined."""
+        w = self.homogeneous[:, 2:]
+        return self.homogeneous[:, :2] / np.where(w == 0.0, np.nan, w)
+
+    @property
+    def direction(self) -> Array:
+        """The angle (n,), rad, towards a centre at infinity; NaN where it is not at infinity."""
+        x, y, w = self.homogeneous.T
+        return np.where(w == 0.0, np.arctan2(y, x), np.nan)
+
+
+@takes_result("Motion")
+def centre_path(motion: Motion, link: str, other: str | None = None) -> CentrePath:
+    """The path of the instantaneous centre of two links (the second one by default the frame), from the motion's rates.
+
+    Over the range of an input as `centrodes` has it, its limits included; in a motion in time by the rates at each
+    time, so that the centre is not determined where both links are at rest. Raises Unknown for a link that does not
+    exist.
 
     >>> import planar
-    >>> motion = planar.cycle(planar.load("slider-crank"), 12)
-    >>> planar.centrodes(motion, "rod").fixed.homogeneous.shape
-    (13, 3)
+    >>> path = planar.centre_path(planar.cycle("four-bar", 12), "BC")
+    >>> path.name, path.position.shape
+    ('I24', (13, 2))
     """
-    frame = motion.mechanism.frame
-    other = frame if other is None else other
+    other = motion.mechanism.frame if other is None else other
     relative_motion(motion.frames, link, other)  # refuses what there is not
-    steady = InterpolatedRun(motion)
-    moved = replace(steady.samples, frames=_frames_with_limit_rates(steady))
-    size = steady.solver.unit
+    if motion.time is None:
+        found = centrodes(motion, link, other)
+        poles, reason = found.fixed.homogeneous, found.reason
+    else:
+        places = np.concatenate([motion.point(name).position for name in motion.point_names])
+        moved = _poles(motion, float(np.ptp(places, axis=0).max()) or 1.0, link, other)
+        poles = moved.paths[other][0] @ moved.scale[other].T
+        reason = "" if np.isfinite(poles).any() else f"{link} and {other} are at rest, or move as one, at all times"
+    frame = motion.frames[other]
+    x, y, cosine, sine = (
+        np.broadcast_to(getattr(part, "parts", (part,))[0], len(motion))[: len(poles)]
+        for part in (frame.x, frame.y, frame.cos, frame.sin)
+    )
+    a, b, w = poles.T
+    world = np.stack([x * w + cosine * a - sine * b, y * w + sine * a + cosine * b, w], axis=1)
+    return CentrePath((link, other), centre_name(motion.mechanism, link, other), world, reason)
+
+
+def centre_name(mechanism: Mechanism, link: str, other: str) -> str:
+    """The centre of two links by their numbers: I24."""
+    numbers = link_numbers(mechanism)
+    return "I" + number_separator(numbers).join(sorted((numbers[link], numbers[other]), key=int))
+
+
+def links_of_centre(mechanism: Mechanism, text: str) -> tuple[str, str]:
+    """The two links of a centre that is named by their numbers (I24, 24; 2,4) or by their names (BC,AD).
+
+    Raises Unknown for a name that means no two links.
+    """
+    by_number = {number: link for link, number in link_numbers(mechanism).items()}
+    parts = [part.strip() for part in text.split(",")]
+    if len(parts) == 2 and parts[0] != parts[1] and {*parts} <= {link.name for link in mechanism.links}:
+        return parts[0], parts[1]
+    numbers = ",".join(parts).removeprefix("I")
+    for first, second in combinations(sorted(by_number, key=int), 2):
+        if numbers in (f"{first},{second}", f"{first}{number_separator(link_numbers(mechanism))}{second}"):
+            return by_number[first], by_number[second]
+    listed = ", ".join(link_label(number, link) for number, link in by_number.items())
+    raise Unknown(f"there is no centre {text!r:.40}; write two numbers or names of links, as I12: {listed}")
+
+
+class _Poles(NamedTuple):
+    """The relative motion of two links, and their pole in the axes of each, with its rate, in the mechanism's size."""
+
+    relative: RelativeMotion
+    scale: Mapping[str, Array]
+    paths: Mapping[str, tuple[Array, Array]]
+    greatest: Array
+
+
+def _poles(moved: Motion, size: float, link: str, other: str) -> _Poles:
+    """The poles of a link against another from the frames and rates of a motion."""
+    frame = moved.mechanism.frame
     scale = {name: _link_scale(moved, name, size) for name in (frame, other, link)}
     greatest = np.max(
         [
@@ -167,14 +258,40 @@ def centrodes(motion: Motion, link: str, other: str | None = None) -> Centrodes:
         name: _unit_poles(pole, scale[name], AS_ONE_RATIO * greatest)
         for name, pole in ((other, found.fixed_pole), (link, found.moving_pole))
     }
-    signs = _continuous_signs(paths[other][0])
+    return _Poles(found, scale, paths, greatest)
+
+
+@takes_result("Motion")
+def centrodes(motion: Motion, link: str, other: str | None = None) -> Centrodes:
+    """The fixed and the moving centrode of a link against another (left out: the frame), from the motion's rates.
+
+    The input's speed does not matter; where it is zero in the file, a unit rate takes its place. At the limits of a
+    range, where rates are not determined, the pole is that of the motion that the constraints leave. Raises Unknown
+    for a link that is not there.
+
+    >>> import planar
+    >>> motion = planar.cycle(planar.load("slider-crank"), 12)
+    >>> planar.centrodes(motion, "rod").fixed.homogeneous.shape
+    (13, 3)
+    """
+    other = motion.mechanism.frame if other is None else other
+    relative_motion(motion.frames, link, other)  # refuses what there is not
+    steady = InterpolatedRun(motion)
+    moved = replace(steady.samples, frames=_frames_with_limit_rates(steady))
+    size = steady.solver.unit
+    poles = _poles(moved, size, link, other)
+    signs = _continuous_signs(poles.paths[other][0])
     fixed, moving = (
-        Centrode(steady.positions, signs * at @ scale[name].T, signs * rate @ scale[name].T / steady.rate)
-        for name, (at, rate) in paths.items()
+        Centrode(
+            steady.positions,
+            signs * place @ poles.scale[name].T,
+            signs * rate @ poles.scale[name].T / steady.rate,
+        )
+        for name, (place, rate) in poles.paths.items()
     )
-    reason = _reason(fixed, greatest, link, other, size)
+    reason = _reason(fixed, poles.greatest, link, other, size)
     return Centrodes(
-        link, other, steady.pair, fixed, moving, () if reason else _split_at_infinity(fixed), found, reason
+        link, other, steady.pair, fixed, moving, () if reason else _split_at_infinity(fixed), poles.relative, reason
     )
 
 

@@ -11,6 +11,7 @@ from click.core import ParameterSource
 
 from planar.cli.options import (
     at_option,
+    frame_number_option,
     json_option,
     load_model,
     main,
@@ -20,6 +21,7 @@ from planar.cli.options import (
     output_option,
     parse_drives,
     print_or_write,
+    refuse_options,
     refuse_overwriting,
     report_motion,
     run_motion,
@@ -42,6 +44,7 @@ ONE_DESTINATION = "results go to a file or are printed with --json; give one of 
 @json_option
 @at_option
 @mode_option
+@frame_number_option
 @click.option("--static", is_flag=True, help="Leave the links' inertia out: at rest, or in slow motion.")
 @click.option("--without-friction", "frictionless", is_flag=True, help="Leave the friction of the pairs out.")
 @click.option("--cycle", "whole", is_flag=True, help="Over the whole motion, as `planar cycle` has it.")
@@ -105,7 +108,10 @@ def forces(
     if over is not None:
         _refuse_beside_over((("--at", at), ("--cycle", whole), ("--solve-for", solve_for), ("--effort", effort)))
     if not whole:
-        _refuse_motion_options(set(course) - ({"steps"} if over else set()) | {"fluctuation", "rim_radius"})
+        refuse_options(
+            set(course) - ({"steps"} if over else set()) | {"fluctuation", "rim_radius"},
+            "this is for the forces of a whole motion, with --cycle",
+        )
     if rim_radius is not None and fluctuation is None:
         raise BadInput("--rim-radius", "this is the radius of a flywheel; say for which --fluctuation")
     from planar.dynamics.load_validation import require_loads
@@ -136,14 +142,6 @@ def _refuse_beside_over(options: Iterable[tuple[str, Any]]) -> None:
 
 def _is_given(option: str) -> bool:
     return click.get_current_context().get_parameter_source(option) is ParameterSource.COMMANDLINE
-
-
-def _refuse_motion_options(course: Iterable[str]) -> None:
-    """Refuse options of a whole motion, which would not be heeded."""
-    context = click.get_current_context()
-    for option in context.command.params:
-        if option.name in course and context.get_parameter_source(option.name) is ParameterSource.COMMANDLINE:
-            raise BadInput(option.opts[0], "this is for the forces of a whole motion, with --cycle")
 
 
 def _require_held_loads(mechanism: Mechanism) -> None:
@@ -254,7 +252,9 @@ def _forces_over_motion(
     metavar="FILE",
     help="Draw displacement, velocity and acceleration over time, what friction holds shaded.",
 )
-@click.option("--of", metavar="NAME", help="With --diagrams: the slide, link, point or pair that is drawn.")
+@click.option(
+    "--of", multiple=True, metavar="NAME", help="With --diagrams: the slide, link, point or pair that is drawn."
+)
 @output_option("Write positions, velocities, accelerations, energies to a .csv, .xlsx, .json, .npz or .parquet file.")
 # many: options of the command
 def simulate(
@@ -266,7 +266,7 @@ def simulate(
     driven: tuple[str, ...],
     moving: bool,
     diagrams: Path | None,
-    of: str | None,
+    of: tuple[str, ...],
     output: Path | None,
 ) -> None:
     """The mechanism let go: its motion in time under loads, weights, springs and friction."""
@@ -280,7 +280,7 @@ def simulate(
     mechanism = load_model(model, mode)
     refuse_overwriting(model, output)
     refuse_overwriting(model, diagrams)
-    if of is not None and diagrams is None:
+    if of and diagrams is None:
         raise BadInput("--of", "this says what diagrams are of; say where to with --diagrams")
     if output is not None:
         check_writable(output.suffix)
@@ -293,5 +293,5 @@ def simulate(
     if diagrams is not None:
         from planar import plot as drawn
 
-        drawn.save(drawn.diagrams(found, of), diagrams)
+        drawn.save(drawn.diagrams(found, of or None), diagrams)
     report_motion(found.motion, as_json, output, lambda: [tables(found)], energy_series(found), simulation_facts(found))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import click
 
 from planar.cli.options import (
+    frame_number_option,
     json_option,
     main,
     model_argument,
@@ -19,6 +20,7 @@ from planar.cli.streams import print_json
 @main.command()
 @model_argument()
 @json_option
+@frame_number_option
 def inspect(model: str, as_json: bool) -> None:
     """What it is: links, pairs, chain, mobility, motions, names."""
     from planar.analysis.identity.inspection import inspect as inspected

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import click
 from click.core import ParameterSource
 
 from planar.cli.options import (
     at_option,
+    frame_number_option,
     load_model,
     main,
     mode_option,
@@ -24,7 +25,7 @@ from planar.cli.options import (
     show_progress,
     show_status,
 )
-from planar.foundation.errors import BadInput
+from planar.foundation.errors import BadInput, join_names
 from planar.model.pairs import pair_types
 
 if TYPE_CHECKING:
@@ -49,40 +50,111 @@ SCALED_DRAWINGS = (
     *ASSEMBLY_DRAWINGS,
     *COGNATE_DRAWINGS,
 )
+DRAWINGS = (
+    *POSITION_DRAWINGS,
+    *MOTION_DRAWINGS,
+    *MAP_DRAWINGS,
+    *PROFILE_DRAWINGS,
+    *ASSEMBLY_DRAWINGS,
+    *CIRCUIT_DRAWINGS,
+    *COGNATE_DRAWINGS,
+)
 DRAWN_STEPS = 360
 """Steps of a run that is drawn."""
 
 
+class OptionUse(NamedTuple):
+    """The drawings that an option of `plot` is for, and what to do instead for another drawing."""
+
+    drawings: tuple[str, ...]
+    advice: str = ""
+
+
+_RANGE_ADVICE = "a drawing of one position moves an input with --at"
+OPTION_USES = {
+    "--scale": OptionUse(SCALED_DRAWINGS),
+    "--at": OptionUse(
+        (*POSITION_DRAWINGS, *ASSEMBLY_DRAWINGS, *CIRCUIT_DRAWINGS),
+        "--from says where a run starts, --set changes a position in the file",
+    ),
+    "--point": OptionUse(("positions", "loci")),
+    "--of": OptionUse(
+        ("diagrams", "torque", "sensitivity", "tolerance", *MAP_DRAWINGS, *CIRCUIT_DRAWINGS, *COGNATE_DRAWINGS)
+    ),
+    "--over": OptionUse(MAP_DRAWINGS),
+    "--result": OptionUse(("sensitivity", "tolerance")),
+    "--link": OptionUse(("centres", "centrodes")),
+    "--pair": OptionUse(("bearings", *PROFILE_DRAWINGS)),
+    "--fluctuation": OptionUse(("torque",)),
+    "--steps": OptionUse(("positions", "centrodes", "diagrams")),
+    "--chords": OptionUse(("diagrams",)),
+    "--input": OptionUse((*MOTION_DRAWINGS, *CIRCUIT_DRAWINGS), _RANGE_ADVICE),
+    "--from": OptionUse(MOTION_DRAWINGS, _RANGE_ADVICE),
+    "--to": OptionUse(MOTION_DRAWINGS, _RANGE_ADVICE),
+    "--frame-number": OptionUse((*POSITION_DRAWINGS, "positions", "loci", "centrodes", "tolerance", "bearings")),
+    "--mode": OptionUse((*POSITION_DRAWINGS, *MOTION_DRAWINGS, *MAP_DRAWINGS, *COGNATE_DRAWINGS)),
+}
+"""The options of `plot` that are for some drawings only; the others are for all."""
+
+
+def _name_drawings(command: click.Command) -> click.Command:
+    """Add to the help of every option of `plot` the drawings that it is for."""
+    for option in command.params:
+        use = OPTION_USES.get(option.opts[-1])
+        if isinstance(option, click.Option) and use is not None:
+            others = [drawing for drawing in DRAWINGS if drawing not in use.drawings]
+            named = f"Not for {join_names(others, None)}."
+            if len(others) >= len(use.drawings):
+                named = f"For {join_names(use.drawings, None)}."
+            option.help = f"{option.help} {named}"
+    return command
+
+
+def _refuse_unused_options(what: str) -> None:
+    """Raise BadInput for an option on the command line that the drawing does not use."""
+    context = click.get_current_context()
+    for option in context.command.params:
+        use = OPTION_USES.get(option.opts[-1])
+        is_set = option.name is not None and context.get_parameter_source(option.name) is ParameterSource.COMMANDLINE
+        if use is not None and is_set and what not in use.drawings:
+            advice = f"; {use.advice}" if use.advice else ""
+            raise BadInput(
+                option.opts[-1],
+                f"this option is for {join_names(use.drawings, None)}, and {what} does not use it{advice}",
+            )
+
+
+def _single_name(option: str, names: tuple[str, ...], what: str) -> str | None:
+    """The one name that an option gives for a drawing of one thing. Raises BadInput for several."""
+    if len(names) > 1:
+        raise BadInput(option, f"{what} is drawn of one name, and {len(names)} are given; draw each by itself")
+    return names[0] if names else None
+
+
+@_name_drawings
 @main.command()
 @model_argument()
-@click.argument(
-    "what",
-    type=click.Choice(
-        (
-            *POSITION_DRAWINGS,
-            *MOTION_DRAWINGS,
-            *MAP_DRAWINGS,
-            *PROFILE_DRAWINGS,
-            *ASSEMBLY_DRAWINGS,
-            *CIRCUIT_DRAWINGS,
-            *COGNATE_DRAWINGS,
-        )
-    ),
-)
+@frame_number_option
+@click.argument("what", type=click.Choice(DRAWINGS))
 @output_option("Write the drawing to a .png, .svg, .pdf or .dxf file.", required=True)
 @scale_option
 @at_option
 @click.option(
-    "--point", "points", multiple=True, metavar="NAME", help="A point to be lettered, or whose path is drawn."
+    "--point",
+    "points",
+    multiple=True,
+    metavar="NAME",
+    help="A point whose path is drawn, or that is lettered in every position.",
 )
 @click.option(
     "--of",
     "of",
+    multiple=True,
     metavar="NAME",
-    help="Diagrams, circuits, cognates, sensitivity or tolerance of this slide, point or link; torque of this input.",
+    help="The slide, point, link or input that is drawn; diagrams draw several together.",
 )
-@click.option("--over", metavar="INPUTS", help="With force-map: the inputs, as 'O,P' or 'O=10deg:50deg,P'.")
-@click.option("--result", metavar="NAME", help="With sensitivity and tolerance: which of its results, as velocity.")
+@click.option("--over", metavar="INPUTS", help="The inputs, as 'O,P' or 'O=10deg:50deg,P'.")
+@click.option("--result", metavar="NAME", help="Which result of the slide, point or link, as velocity.")
 @click.option(
     "--link",
     "links",
@@ -95,10 +167,16 @@ DRAWN_STEPS = 360
     "--fluctuation",
     type=float,
     metavar="C",
-    help="The flywheel's coefficient of fluctuation of speed, (greatest - least) / mean; 0.02 where left out.",
+    help="The flywheel's coefficient of fluctuation of speed, (greatest - least) / mean; 0.02 by default.",
 )
-@click.option("--steps", default=12, show_default=True, metavar="N", help="Positions, or chords of the diagrams.")
-@click.option("--chords", is_flag=True, help="Diagrams with graphical differentiation beside the curves.")
+@click.option(
+    "--steps",
+    default=12,
+    show_default=True,
+    metavar="N",
+    help="Equal parts of the range: positions drawn, marks on centrodes, or with --chords chords of diagrams.",
+)
+@click.option("--chords", is_flag=True, help="Graphical differentiation beside the curves.")
 @range_options
 @mode_option
 def plot(  # many: options of a command; # long: each has its line
@@ -108,7 +186,7 @@ def plot(  # many: options of a command; # long: each has its line
     scales: tuple[str, ...],
     at: tuple[str, ...],
     points: tuple[str, ...],
-    of: str | None,
+    of: tuple[str, ...],
     over: str | None,
     result: str | None,
     links: tuple[str, ...],
@@ -125,50 +203,27 @@ def plot(  # many: options of a command; # long: each has its line
     from planar import plot as drawn
     from planar.solving.position import solve
 
-    steps_told = click.get_current_context().get_parameter_source("steps") is ParameterSource.COMMANDLINE
-    for option, told, kinds in (
-        ("--point", points, ("positions", "loci")),
-        (
-            "--of",
-            of,
-            ("diagrams", "torque", "sensitivity", "tolerance", *MAP_DRAWINGS, *CIRCUIT_DRAWINGS, *COGNATE_DRAWINGS),
-        ),
-        ("--over", over, MAP_DRAWINGS),
-        ("--result", result, ("sensitivity", "tolerance")),
-        ("--pair", pairs, ("bearings", *PROFILE_DRAWINGS)),
-        ("--fluctuation", fluctuation is not None, ("torque",)),
-        ("--link", links, ("centres", "centrodes")),
-        ("--chords", chords, ("diagrams",)),
-        ("--steps", steps_told, ("positions", "diagrams") if chords else ("positions",)),
-        (
-            "--scale",
-            scales,
-            SCALED_DRAWINGS,
-        ),
-        ("--mode", mode is not None, (*POSITION_DRAWINGS, *MOTION_DRAWINGS, *COGNATE_DRAWINGS)),
-    ):
-        if told and what not in kinds:
-            raise BadInput(option, f"this is for {' and '.join(kinds)}; {what} would not heed it")
-    mechanism = load_model(model, mode)
+    _refuse_unused_options(what)
+    context = click.get_current_context()
+    has_steps = context.get_parameter_source("steps") is ParameterSource.COMMANDLINE
+    if what == "diagrams" and has_steps and not chords:
+        raise BadInput("--steps", "diagrams use this with --chords: the number of chords")
+    subject = None if what == "diagrams" else _single_name("--of", of, what)
+    mechanism = load_model(model, mode, advice="")
     refuse_overwriting(model, output)
     with show_status(f"{mechanism.name}: {what}"):
-        _refuse_range(what, pair, start, stop)
         if what in MAP_DRAWINGS:
             from planar.analysis.force_maps.force_map import force_map
             from planar.cli.commands.force_map import parse_ranges
 
             names = over or ",".join(given.pair for given in mechanism.inputs[:2])
-            drawn.save(drawn.force_map(force_map(mechanism, parse_ranges(mechanism, names, None)), of), output)
+            drawn.save(drawn.force_map(force_map(mechanism, parse_ranges(mechanism, names, None)), subject), output)
             return
         if what in PROFILE_DRAWINGS:
-            if at or len(pairs) > 1:
-                raise BadInput("--at" if at else "--pair", f"a profile of one {what} is drawn, over its whole turn")
-            drawn.save(drawn.cam_profile(mechanism, pairs[0] if pairs else None, scales), output)
+            drawn.save(drawn.cam_profile(mechanism, _single_name("--pair", pairs, what), scales), output)
             return
         if what in COGNATE_DRAWINGS:
-            if at:
-                raise BadInput("--at", f"{what} are drawn where the file's inputs stand; change those with --set")
-            drawn.save(drawn.cognates(mechanism, of, scales), output)
+            drawn.save(drawn.cognates(mechanism, subject, scales), output)
             return
         if what in (*ASSEMBLY_DRAWINGS, *CIRCUIT_DRAWINGS):
             from planar.assemblies.circuits.circuits import circuits
@@ -176,15 +231,15 @@ def plot(  # many: options of a command; # long: each has its line
 
             every = what in ASSEMBLY_DRAWINGS
             here = modes(mechanism, parse_drives(mechanism, at), certify=every)
-            sheets = drawn.modes(here, scales) if every else drawn.circuits(circuits(here.mechanism, pair), of, here)
+            sheets = (
+                drawn.modes(here, scales) if every else drawn.circuits(circuits(here.mechanism, pair), subject, here)
+            )
             drawn.save(sheets, output)
             return
         if what in POSITION_DRAWINGS:
             state = solve(mechanism, parse_drives(mechanism, at))
             figure = drawn.centres(state, scales, links) if what == "centres" else getattr(drawn, what)(state, scales)
         else:
-            if at:
-                raise BadInput("--at", f"{what} are of a run; say where it starts with --from")
             moving = _run_or_mechanism(mechanism, pair, start, stop)
             if len(links) > 2:
                 raise BadInput(
@@ -194,24 +249,15 @@ def plot(  # many: options of a command; # long: each has its line
             drawings: dict[str, Callable[[], Drawing]] = {
                 "positions": lambda: drawn.positions(moving, steps, points or None, scales),
                 "loci": lambda: drawn.loci(moving, points or None, scales),
-                "centrodes": lambda: drawn.centrodes(moving, link, other, scales),
-                "diagrams": lambda: drawn.diagrams(moving, of, steps if chords else None),
-                "torque": lambda: drawn.torque(moving, of, fluctuation),
+                "centrodes": lambda: drawn.centrodes(moving, link, other, scales, steps),
+                "diagrams": lambda: drawn.diagrams(moving, of or None, steps if chords else None),
+                "torque": lambda: drawn.torque(moving, subject, fluctuation),
                 "bearings": lambda: drawn.bearings(moving, pairs or None),
-                "sensitivity": lambda: drawn.sensitivity(moving, of, result),
-                "tolerance": lambda: drawn.tolerance(moving, of, result, scales),
+                "sensitivity": lambda: drawn.sensitivity(moving, subject, result),
+                "tolerance": lambda: drawn.tolerance(moving, subject, result, scales),
             }
             figure = drawings[what]()
         drawn.save(figure, output)
-
-
-def _refuse_range(what: str, pair: str | None, start: str | None, stop: str | None) -> None:
-    """Raise BadInput for a range that a drawing would not heed."""
-    if what in CIRCUIT_DRAWINGS and (start or stop):
-        raise BadInput("--from", f"{what} are of the whole range of an input")
-    if (pair or start or stop) and what not in (*MOTION_DRAWINGS, *MAP_DRAWINGS, *CIRCUIT_DRAWINGS):
-        told = f"{what} are" if what in (*ASSEMBLY_DRAWINGS, *COGNATE_DRAWINGS) else f"a {what} is"
-        raise BadInput("--input", f"{told} of one position; move an input there with --at")
 
 
 @main.command()
@@ -232,7 +278,7 @@ def animate(
     """The mechanism in motion, to and fro or round and round."""
     from planar import plot as drawn
 
-    mechanism = load_model(model, mode)
+    mechanism = load_model(model, mode, advice="")
     refuse_overwriting(model, output)
     with show_progress(mechanism.name) as progress:
         drawn.animate(_run_or_mechanism(mechanism, pair, start, stop), output, points or None, progress)

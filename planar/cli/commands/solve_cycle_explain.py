@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from planar.cli.options import (
+    MODE_ADVICE,
     at_option,
+    frame_number_option,
     json_option,
     load_model,
     main,
@@ -77,6 +79,7 @@ def solve(
 @json_option
 @at_option
 @mode_option
+@frame_number_option
 @scale_option
 @click.option(
     "--input", "pair", metavar="PAIR", help="The input that has a unit rate, where no input of the file has a velocity."
@@ -113,7 +116,7 @@ def explain(  # many: one for each option
 
         if output.suffix not in SUFFIXES:
             raise unknown_format_error(output.suffix, "a worked solution", (*SUFFIXES, *PAGES))
-    state, comparisons = _solve_model(model, mode, at, as_json, output, pair)
+    state, comparisons = _solve_model(model, mode, at, as_json, output, advice="", pair=pair)
     given = read(scales, units=state.mechanism.units)
     if output is not None and on_pages:
         from planar.drawing.output.solution_pages import encode_sheets, solution_pages
@@ -186,7 +189,13 @@ def _with_parts(text: RenderableType, state: State, parts: tuple[str, ...]) -> R
 
 
 def _solve_model(  # many: one for each option
-    model: str, mode: int | None, at: tuple[str, ...], as_json: bool, output: Path | None, pair: str | None = None
+    model: str,
+    mode: int | None,
+    at: tuple[str, ...],
+    as_json: bool,
+    output: Path | None,
+    advice: str = MODE_ADVICE,
+    pair: str | None = None,
 ) -> tuple[State, tuple[Comparison, ...]]:
     """A model's position, moved to where `--at` says, with its published values unless it was moved.
 
@@ -198,7 +207,7 @@ def _solve_model(  # many: one for each option
 
     if as_json and output is not None:
         raise BadInput("-o", "tables go to a file or SI values are printed with --json; give one of the two")
-    mechanism = load_model(model, mode)
+    mechanism = load_model(model, mode, advice)
     refuse_overwriting(model, output)
     if pair is not None:
         if has_input_rates(mechanism):

@@ -8,6 +8,7 @@ import click
 
 from planar.cli.options import (
     at_option,
+    frame_number_option,
     input_option,
     load_model,
     main,
@@ -28,6 +29,7 @@ SUFFIXES = (".html", ".htm")
 
 @main.command()
 @model_argument()
+@frame_number_option
 @output_option(
     "Write the page to an .html file; left out, it is written to a folder of its own and opened in the browser."
 )
@@ -52,7 +54,7 @@ def view(
 
     if output is not None and output.suffix.lower() not in SUFFIXES:
         raise unknown_format_error(output.suffix, "a page", SUFFIXES)
-    mechanism = load_model(model, mode)
+    mechanism = load_model(model, mode, advice="")
     refuse_overwriting(model, output)
     if task is not None:
         refuse_overwriting(str(task), output, "the task's own file")

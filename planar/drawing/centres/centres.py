@@ -45,8 +45,14 @@ from planar.foundation.errors import BadInput
 from planar.foundation.units import parse_unit
 from planar.model.mechanism import relative_motions
 
-DEFAULT_REACH = 2.0
-"""Of the mechanism's greater extent: how wide and high the window is in which centres are drawn."""
+DEFAULT_REACH = 3.0
+"""Width and height up to which the view grows to show centres, in greater extents of the mechanism."""
+CLOSE_REACH = 2.0
+"""The view that fits the size of a drawing, in the same extents."""
+SHEET_GROWTH = 1.7
+"""How many times as large the drawing becomes, before its scale does, to show the centres in a larger view."""
+ROUND_OFF_RATIO = 1e-9
+"""A coordinate below this part of the other one, or of the view, is zero."""
 DRAWING_SIZE = 211.0, 125.0
 """mm on paper that the mechanism and the centres in the window take at the most, the width less the circle's."""
 WINDOW_MARGIN, ARROW_MARGIN = 4.0, 9.0
@@ -73,13 +79,27 @@ def centres_picture(
 ) -> Picture:
     """The scheme with the centres shown: rings and dots, their lines, and arrows towards those far away.
 
-    The window is square, `reach` times the mechanism's greater extent. Strokes are `about` "centre I24",
+    The view grows from the mechanism to the nearest centres, as long as its width and height are at most `reach` times
+    the mechanism's greater extent. Strokes are `about` "centre I24",
     "line I12 I14" (or "normal at P"; several that coincide are one, their names parted by commas) and "arrow I34";
     letters "centre I24". Raises BadInput for a reach below 1.
     """
     if not (isfinite(reach) and reach >= 1.0):
         raise BadInput("reach", "a window is at least once as wide as the mechanism")
     return _CentresDrawing(found, shown, scale, reach).picture()
+
+
+def _centres_in_view(centres: Sequence[Centre], low: Array, high: Array, reach: float) -> dict[str, Array]:
+    """The places (m) of the centres, nearest first, to which a view from `low` to `high` (2,) grows within `reach`."""
+    middle, limit = (low + high) / 2.0, reach * float((high - low).max())
+    places = [(centre.name, centre.position) for centre in centres if centre.position is not None]
+    near = {}
+    for name, place in sorted(places, key=lambda item: float(np.abs(item[1] - middle).max())):
+        larger = np.minimum(low, place), np.maximum(high, place)
+        if (larger[1] - larger[0]).max() <= limit:
+            low, high = larger
+            near[name] = place
+    return near
 
 
 class _CentreArrow(NamedTuple):
@@ -100,16 +120,20 @@ class _CentresDrawing:
         mechanism = self.state.mechanism
         whole = space_scale(mechanism, plain_frames(self.state.frames), self.state.shapes)
         low, high = (np.array(each) * whole.per_mm for each in extent(scheme(self.state, whole, False, False).marks))
-        half, middle = reach * float((high - low).max()) / 2.0, (low + high) / 2.0
-        near = {
-            each.name: each.position
-            for each in shown
-            if each.position is not None and np.abs(each.position - middle).max() <= half
-        }
+        near = _centres_in_view(shown, low, high, reach)
         if scale is None:
-            width, height = map(float, np.ptp(np.array([low, high, *near.values()]), axis=0))
             room = DRAWING_SIZE[0] - 2.0 * circle_radius(len(found.numbers)), DRAWING_SIZE[1]
-            scale = round_scale("length", whole.unit, width, height, room)
+            close = _centres_in_view(shown, low, high, min(reach, CLOSE_REACH))
+            candidates = [
+                round_scale(
+                    "length",
+                    whole.unit,
+                    *map(float, np.ptp(np.array([low, high, *places.values()]), axis=0)),
+                    (growth * room[0], growth * room[1]),
+                )
+                for places, growth in ((close, 1.0), (near, SHEET_GROWTH))
+            ]
+            scale = max(candidates, key=lambda candidate: candidate.per_mm)
         self.scale = scale
         self.scheme_picture = scheme(self.state, scale, len(shown) <= CROWDED_CENTRES)
         self.paper_points = {name: at / scale.per_mm for name, at in near.items()}
@@ -337,7 +361,7 @@ class _CentresDrawing:
         yield Label(text, paper_point(at), about, LABEL_SIZE, away, math=True)
 
     def _arrow_labels(self, arrows: Sequence[_CentreArrow]) -> Iterator[Label]:
-        """Of every arrow the names of its centres, with a sign for infinity or with how far they are."""
+        """Of every arrow the names of its centres, with a sign for infinity or with their coordinates."""
         left = list(arrows)
         while left:
             first = left[0]
@@ -350,20 +374,20 @@ class _CentresDrawing:
             for each in here:
                 at = self._paper_point(each.centre.name)
                 if at is not None:
-                    texts.append(
-                        f"{_centre_mathtext(each.centre.name)} at "
-                        f"{self._length_text(float(np.hypot(*(at - each.tip))))}"
-                    )
+                    texts.append(f"{_centre_mathtext(each.centre.name)} {self._coordinate_text(at)}")
             about = ", ".join(f"centre {each.centre.name}" for each in here)
             yield Label(", ".join(texts), paper_point(first.tip), about, LABEL_SIZE, 0.8, math=True)
 
-    def _length_text(self, mm: float) -> str:
-        """A length on paper as it really is, in the unit of the file."""
-        written = self.scale.unit
-        value = parse_unit(written).from_si(mm * self.scale.per_mm)
-        if written == "mm" and value >= 1000.0:
-            value, written = value / 1000.0, "m"
-        return f"{float(f'{value:.3g}'):g} {written}"
+    def _coordinate_text(self, place: Array) -> str:
+        """The coordinates of a place on paper (mm) in the frame's axes, in the unit of the file."""
+        unit = self.scale.unit
+        least = ROUND_OFF_RATIO * max(float(np.abs(place).max()), PAPER_SIZE)
+        lengths = np.where(np.abs(place) > least, place, 0.0) * self.scale.per_mm
+        values = [parse_unit(unit).from_si(float(length)) for length in lengths]
+        if unit == "mm" and max(map(abs, values)) >= 10000.0:
+            values, unit = [value / 1000.0 for value in values], "m"
+        x, y = (f"{float(f'{value:.4g}'):g}".replace("-", "−") for value in values)
+        return f"({x}, {y}) {unit}"
 
     def _notes(self, arrows: Sequence[_CentreArrow], groups: Sequence[Sequence[str]]) -> Iterator[str]:
         """How many there are and how they were found, what is left out, how the drawing is read."""
@@ -374,7 +398,7 @@ class _CentresDrawing:
         if any(self.centres_by_name[name].how != "pair" for name in self.paper_points):
             yield "Dots: shown by pairs; rings: found on lines of centres"
         if any(each.centre.direction is None for each in arrows):
-            yield "Distances of centres outside: from their arrows' tips"
+            yield "Centres outside: coordinates in the axes of the frame"
         out = total - len(self.shown)
         if out:
             yield f"{out} of {total} centres are left out, and the lines through them"

@@ -4,22 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from numbers import Integral
 from typing import NamedTuple
 
 import numpy as np
 
-from planar.analysis.centres.centrodes import Centrodes, centrodes, usual_links
+from planar.analysis.centres.centrodes import Centrodes, centre_name, centrodes, usual_links
 from planar.analysis.centres.curvature import curvature
 from planar.drawing.diagrams.drawn_run import DrawnRun, closed_run, steady_run
+from planar.drawing.labels.text_metrics import format_tick
 from planar.drawing.paper.clipping import clip_homogeneous_curve, remove_repeated_strokes
-from planar.drawing.paper.picture import Circle, Fill, Label, Pen, Picture, Polyline, extent, paper_point
-from planar.drawing.paper.scales import Scale, round_scale
+from planar.drawing.paper.picture import Circle, Fill, Label, Mark, Pen, Picture, Polyline, extent, paper_point
+from planar.drawing.paper.scales import DECIMAL_STEPS, DEGREE_STEPS, Scale, round_scale, round_step
 from planar.drawing.scheme.scene import plain_frames
 from planar.drawing.scheme.scheme import scheme, space_scale
 from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput, NoAnswer, Unknown
 from planar.foundation.geometry import Vector
-from planar.model.link_graph import link_numbers, number_separator
+from planar.model.file_units import unit_of_kind
 from planar.model.mechanism import Drive, Mechanism, replace_inputs
 from planar.model.wording import amount
 from planar.results.motion import Motion, State
@@ -35,8 +37,10 @@ POLE_WINDOW_RATIO = 0.92
 """Part of the window within which a pole has room."""
 STEP_PARTS, MAX_DIVIDED_STEPS = 4, 1500
 """Parts of each step of a run that are drawn, unless it has more steps than that."""
-POLE_RADIUS = 0.9
-"""mm: the radius of the pole's mark."""
+POLE_RADIUS, DOT_RADIUS = 0.9, 0.45
+"""mm: the radius of the pole's mark, and of a position's."""
+DEFAULT_MARKS, MAX_MARKS = 12, 72
+"""Positions of the input that are marked."""
 
 
 class _MechanismExtent(NamedTuple):
@@ -59,15 +63,22 @@ class _MechanismExtent(NamedTuple):
 
 
 def centrodes_picture(
-    motion: Motion | Mechanism, link: str | None = None, other: str | None = None, scale: Scale | None = None
+    motion: Motion | Mechanism,
+    link: str | None = None,
+    other: str | None = None,
+    scale: Scale | None = None,
+    marks: int = DEFAULT_MARKS,
 ) -> Picture:
     """The scheme with both centrodes of a link against another (left out: the frame), touching in the pole.
 
     The fixed one, of `other`, is a full line, the moving one a dashed line where it is now; both as far as they lie in
-    a window of some extents of the mechanism. Without a `link` those of the first coupler are drawn. The position is
-    the file's, or where the pole is not in the window then, the nearest to it where it is. Raises BadInput for a link
-    that is not there, NoAnswer where there is no motion.
+    a window of some extents of the mechanism, with dots at about `marks` round positions of the input (0: none).
+    Without a `link` those of the first coupler are drawn. The position is the file's, or where the pole is not in the
+    window then, the nearest to it where it is. Raises BadInput for a link that does not exist or a number of marks that
+    is none, NoAnswer where there is no motion.
     """
+    if isinstance(marks, bool) or not isinstance(marks, Integral) or not 0 <= marks <= MAX_MARKS:
+        raise BadInput("marks", f"write a whole number of marks from 0 to {MAX_MARKS}, not {marks!r:.40}")
     mechanism = motion.mechanism if isinstance(motion, Motion) else motion
     if link is None:
         link, other = usual_links(mechanism)
@@ -93,17 +104,27 @@ def centrodes_picture(
     pieces = [clip_homogeneous_curve(curve, place.middle - half, place.middle + half) for curve in curves]
     drawn = scheme(state, scale, travel=run.slide_ranges)
     strokes, names = _centrode_strokes(pieces, drawn, scale)
-    name = _pole_name(found, mechanism)
-    marks = [*strokes, *(mark for mark in drawn.marks if not isinstance(mark, Label))]
+    name = centre_name(mechanism, found.link, found.other)
+    dots = [] if found.reason else _position_marks(run, found, state, marks)
+    inside_view = [dot for dot in dots if (np.abs(dot.place - place.middle) <= half).all()]
+    picture_marks: list[Mark] = [*strokes, *(mark for mark in drawn.marks if not isinstance(mark, Label))]
+    for dot in inside_view:
+        spot = paper_point(dot.place / scale.per_mm)
+        picture_marks.append(Circle(spot, DOT_RADIUS, dot.pen, dot.about, Fill.PAPER if dot.text else Fill.NONE))
+        if dot.text:
+            names.append(Label(dot.text, spot, dot.about, 7.0, DOT_RADIUS + 0.3))
     if inside and pole is not None:
         at = paper_point(pole / scale.per_mm)
-        marks.append(Circle(at, POLE_RADIUS, Pen.PIN, f"pole {name}", Fill.PAPER))
+        picture_marks.append(Circle(at, POLE_RADIUS, Pen.PIN, f"pole {name}", Fill.PAPER))
         names.append(Label(f"$I_{{{name[1:]}}}$", at, f"pole {name}", 9.0, POLE_RADIUS + 0.4, math=True))
     letters = [mark for mark in drawn.marks if isinstance(mark, Label)]
     against = "" if found.other == mechanism.frame else f" against {found.other}"
     told = (*_notes(run, found, name, inside, pole), *([_moved_note(run, state)] if moved else []))
+    if inside_view:
+        unit = "length" if run.is_sliding_input else "angle"
+        told = (*told, f"Dots: positions of the input {run.input.pair} in {unit_of_kind(unit, mechanism.units)[0]}")
     title = f"{mechanism.name}: centrodes of {found.link}{against}"
-    return Picture((*marks, *letters, *names), title, (*told, *drawn.notes))
+    return Picture((*picture_marks, *letters, *names), title, (*told, *drawn.notes))
 
 
 def _centrode_run(source: Motion | Mechanism) -> DrawnRun:
@@ -220,11 +241,41 @@ def _clearest_point(lines: Sequence[Array], drawn: Picture, names: Sequence[Labe
     return paper_point(spots[int(np.argmax(away))].tolist())
 
 
-def _pole_name(found: Centrodes, mechanism: Mechanism) -> str:
-    """The pole by the numbers of its links: I24."""
-    numbers = link_numbers(mechanism)
-    both = sorted((numbers[found.link], numbers[found.other]), key=int)
-    return "I" + number_separator(numbers).join(both)
+class _PositionMark(NamedTuple):
+    """A dot on a centrode: its place (m) in the axes of the frame, and its text, empty on the moving centrode."""
+
+    place: Array
+    text: str
+    pen: Pen
+    about: str
+
+
+def _position_marks(run: DrawnRun, found: Centrodes, state: State, count: int) -> list[_PositionMark]:
+    """Dots on both centrodes, where they are in a position, at round positions of the input."""
+    if not count:
+        return []
+    unit, of = unit_of_kind("length" if run.is_sliding_input else "angle", run.motion.mechanism.units)
+    low, high = (of.from_si(float(end)) for end in (run.position.min(), run.position.max()))
+    step = round_step((high - low) / count, DEGREE_STEPS if unit == "deg" else DECIMAL_STEPS)
+    # the end of a run that closes is its start
+    closes = run.makes_whole_turns and run.is_periodic
+    last = high - 1e-6 * step if closes else high
+    turn = of.from_si(2.0 * np.pi * run.turns)
+    values = step * np.arange(np.ceil(low / step - 1e-9), np.floor(last / step + 1e-9) + 1)
+    dots = []
+    for curve, link, pen in (
+        (found.fixed, found.other, Pen.FIXED_CENTRODE),
+        (found.moving, found.link, Pen.MOVING_CENTRODE),
+    ):
+        frame = plain_frames(state.frames)[link]
+        for value in values:
+            x, y, w = curve.homogeneous_at(float(np.clip(of.to_si(value), run.position.min(), run.position.max())))
+            if w != 0.0 and np.isfinite(w):
+                place = np.array(frame.to_world(Vector(x / w, y / w)))
+                text = format_tick(value % turn if closes else value)
+                about = f"{pen.value} at {text}"
+                dots.append(_PositionMark(place, text if curve is found.fixed else "", pen, about))
+    return dots
 
 
 def _notes(run: DrawnRun, found: Centrodes, name: str, inside: bool, pole: Array | None) -> Iterator[str]:

@@ -77,20 +77,31 @@ def has_unbounded_end(sheet: DiagramSheet) -> bool:
     return any(np.isnan(curve.rate[[0, -1]]).any() for curve in sheet.subject.curves)
 
 
-def caption_lines(sheet: DiagramSheet, ordinates: list[Ordinate], points: float, room: float) -> list[tuple[str, bool]]:
-    """The lines below the diagrams, at most `room` mm long; each with whether it is mathtext."""
-    lines = [(line, False) for line in wrap_text(_start_sentence(sheet), points, room)]
-    lines += [(line, True) for line in _fill_lines(_scale_phrases(sheet, ordinates), points, room)]
+def caption_lines(
+    sheets: Sequence[DiagramSheet], ordinates: Sequence[Sequence[Ordinate]], points: float, room: float
+) -> list[tuple[str, bool]]:
+    """The lines below the diagrams, at most `room` mm long; each with whether it is mathtext.
+
+    `ordinates` are the three of each sheet; the sheets are of one run.
+    """
+    sheet = sheets[0]
+    lines = [(line, False) for line in wrap_text(_start_sentence(sheets), points, room)]
+    lines += [(line, True) for line in _fill_lines(_scale_phrases(sheets, ordinates), points, room)]
     if sheet.held is not None and sheet.held.intervals:
         shaded = f"Shaded: friction holds {join_names(sheet.held.pairs, last_joiner=' or ')}."
         lines += [(line, False) for line in wrap_text(shaded, points, room)]
-    if has_unbounded_end(sheet):
+    if any(map(has_unbounded_end, sheets)):
         ends = "At an end of the range, a dead or change point, no rates exist; what grows without bound is cut off."
         lines += [(line, False) for line in wrap_text(ends, points, room)]
-    told = [line for index in (1, 2) for line in _peak_sentences(sheet, ordinates[index], index)]
+    sentences = [
+        line
+        for part, three in zip(sheets, ordinates, strict=True)
+        for index in (1, 2)
+        for line in _peak_sentences(part, three[index], index)
+    ]
     if sheet.chords is not None:
-        told.append(_chord_scale_sentence(sheet, ordinates))
-    return lines + [(line, True) for text in told for line in _fill_lines(text.split(" "), points, room)]
+        sentences += [_chord_scale_sentence(part, three) for part, three in zip(sheets, ordinates, strict=True)]
+    return lines + [(line, True) for text in sentences for line in _fill_lines(text.split(" "), points, room)]
 
 
 def _fill_lines(parts: Sequence[str], points: float, room: float) -> list[str]:
@@ -105,9 +116,9 @@ def _fill_lines(parts: Sequence[str], points: float, room: float) -> list[str]:
     return lines
 
 
-def _start_sentence(sheet: DiagramSheet) -> str:
+def _start_sentence(sheets: Sequence[DiagramSheet]) -> str:
     """Where position 0 is, and at what speed the input runs."""
-    run, units = sheet.run, sheet.units
+    run, units = sheets[0].run, sheets[0].units
     kind = "length" if run.is_sliding_input else "angle"
     at = f"input {run.input.pair} at {amount(run.start_position, kind, units)}"
     start = f"top dead centre (TDC) of {run.stroke.pair}, {at}" if run.starts_at_top and run.stroke else at
@@ -117,13 +128,7 @@ def _start_sentence(sheet: DiagramSheet) -> str:
             f"; {_travel_symbol(run)} is how far the input has "
             f"{'moved' if run.is_sliding_input else 'turned'} from there"
         )
-    told += ". "
-    if sheet.subject.is_angle:
-        told += "φ is from the x-axis of the frame. "
-    elif run.stroke is None or sheet.subject.slide != run.stroke.pair:
-        told += "Displacements are from position 0. "
-    elif not run.starts_at_top:
-        told += "S is from TDC. "
+    told += ". " + "".join(_origin_sentence(sheet) for sheet in sheets)
     if run.is_time_run:
         return f"{told}A motion in time."
     if not run.has_speed:
@@ -139,14 +144,29 @@ def _start_sentence(sheet: DiagramSheet) -> str:
     return f"{told}."
 
 
+def _origin_sentence(sheet: DiagramSheet) -> str:
+    """From where the displacements of a sheet are measured, where the start of the run does not say it."""
+    if sheet.subject.is_angle:
+        return "φ is from the x-axis of the frame. "
+    from_top = [curve.subject for curve in sheet.subject.curves if curve.from_top]
+    if not from_top:
+        return "Displacements are from position 0. "
+    if len(sheet.subject.curves) == 1:
+        return "" if sheet.run.starts_at_top else "S is from TDC. "
+    if len(from_top) == len(sheet.subject.curves):
+        return "S of each slide is from its own top dead centre. "
+    return f"S of {join_names(from_top)} is from top dead centre, other displacements are from position 0. "
+
+
 def _length_word(units: FileUnits) -> str:
     """The length by which rates are told where no time is, in a word."""
     name = rate_length(units)[0]
     return "metre" if name == "m" else name
 
 
-def _scale_phrases(sheet: DiagramSheet, ordinates: list[Ordinate]) -> list[str]:
+def _scale_phrases(sheets: Sequence[DiagramSheet], ordinates: Sequence[Sequence[Ordinate]]) -> list[str]:
     """The length of the axis and the calculating scales, in SI units to a millimetre, of inches in these to an inch."""
+    sheet = sheets[0]
     run = sheet.run
     parts = [f"Scales: OK = {paper_length(sheet.width, sheet.units)}"]
     if run.has_speed:
@@ -155,10 +175,10 @@ def _scale_phrases(sheet: DiagramSheet, ordinates: list[Ordinate]) -> list[str]:
         name, of = rate_length(sheet.units) if run.is_sliding_input else coherent_unit("rad")
         per_mm = of.from_si(float(run.input_travel[-1])) / sheet.width
         parts.append(_calculating_scale(_travel_symbol(run), per_mm, name, sheet.units))
-    symbols = _scale_subscripts(sheet)
     parts += [
-        _calculating_scale(name, each.scale.per_mm * each.si_factor, each.si_unit, sheet.units)
-        for name, each in zip(symbols, ordinates, strict=True)
+        _calculating_scale(name, ordinate.scale.per_mm * ordinate.si_factor, ordinate.si_unit, sheet.units)
+        for part, three in zip(sheets, ordinates, strict=True)
+        for name, ordinate in zip(_scale_subscripts(part), three, strict=True)
     ]
     return [*(f"{part}," for part in parts[:-1]), f"{parts[-1]}."]
 
@@ -182,6 +202,8 @@ def _peak_sentences(sheet: DiagramSheet, ordinate: Ordinate, index: int) -> list
             else None
         )
         name = f"${ordinate.symbol}_{curve.name}$" if curve.name else f"${ordinate.symbol}$"
+        if curve.subject:
+            name += " of " + curve.subject.replace("$", r"\$")
         written = format_unit(ordinate.si_unit)
         if exact is not None and exact.value == 0.0:
             continue
@@ -237,7 +259,7 @@ def _shortfall_text(found: ChordRates, exact: Peak) -> str:
     return f", {abs(100.0 * off):.2g} % {'less' if off >= 0.0 else 'more'}"
 
 
-def _chord_scale_sentence(sheet: DiagramSheet, ordinates: list[Ordinate]) -> str:
+def _chord_scale_sentence(sheet: DiagramSheet, ordinates: Sequence[Ordinate]) -> str:
     """The scale that a velocity would have if the rises were drawn as they are in the displacements."""
     step = sheet.span / sheet.interval_count
     symbols = _scale_subscripts(sheet)

@@ -100,6 +100,14 @@ class DrawnRun(NamedTuple):
         first %= 2.0 * pi
         return 0.0 if min(first, 2.0 * pi - first) < 1e-9 else first
 
+    def stroke_of(self, slide: str) -> Stroke | None:
+        """The stroke of a slide, None in a motion in time and for a slide that is driven or on a moving link."""
+        if self.stroke is not None and self.stroke.pair == slide:
+            return self.stroke
+        if self.is_time_run or slide not in (pair.name for pair in frame_slides(self.motion.mechanism)):
+            return None
+        return _slide_stroke(self.motion, slide)
+
     @property
     def starts_at_top(self) -> bool:
         """Whether the run starts in the top dead centre."""

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import ceil, degrees, floor, isclose
 from numbers import Integral, Real
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from planar.drawing.diagrams.motion_curves import (
     default_subject,
     diagram_subject,
     find_slide,
+    merge_subjects,
 )
 from planar.drawing.labels.fonts import DRAWING_FAMILY, font_families
 from planar.drawing.labels.text_metrics import clip_text, format_tick, text_size
@@ -47,14 +49,20 @@ MIN_WIDTH, MAX_WIDTH = 60.0, 1000.0
 MAX_CHORDS = 180
 SMALL_TEXT, NORMAL_TEXT, LARGE_TEXT = 7.0, 8.0, 10.0
 """points"""
-CURVE_DASHES = ("-", (0, (5.0, 2.0)))
+LEGEND_ROW = 4.5
+"""mm from one row of a legend to the next."""
+CURVE_DASHES = ("-", (0, (5.0, 2.0)), (0, (8.0, 2.0, 1.0, 2.0)), (0, (1.5, 1.5)), (0, (12.0, 3.0)), (0, (3.0, 3.0)))
+CURVE_COLOURS = ("black", "tab:red", "tab:green", "tab:purple", "tab:orange", "tab:brown")
 CURVE_COLOUR, POSITION_GREY, GRID_GREY, HELD_GREY, CHORD_COLOUR = "black", "0.72", "0.88", "0.92", "tab:blue"
 ORDINATE_SYMBOLS = {False: ("S", "V", "a"), True: ("φ", "ω", "ε")}
 """Of a slide or a point, and of a link; the chapter's α is the angle of the crank."""
 
 
 def diagrams(
-    source: Motion | Simulation | Mechanism, of: str | None = None, chords: int | None = None, width: float = 120.0
+    source: Motion | Simulation | Mechanism,
+    of: str | Sequence[str] | None = None,
+    chords: int | None = None,
+    width: float = 120.0,
 ) -> Figure:
     """S-t, V-t and a-t diagrams, as `planar.plot.diagrams` has them. Raises BadInput, NoAnswer."""
     if isinstance(width, bool) or not isinstance(width, Real) or not MIN_WIDTH <= width <= MAX_WIDTH:
@@ -65,48 +73,67 @@ def diagrams(
         raise BadInput("chords", f"a whole number of chords from 2 to {MAX_CHORDS} is wanted, not {chords!r:.40}")
     motion = source.motion if isinstance(source, Simulation) else source
     mechanism = motion.mechanism if isinstance(motion, Motion) else motion
-    of = default_subject(mechanism) if of is None else of
-    slide = find_slide(mechanism, of)
-    if slide is not None and mechanism.frame not in relative_motions(mechanism)[slide].links:
-        slide = None
+    names = [of] if isinstance(of, str) else list(of or ()) or [default_subject(mechanism)]
+    repeated = next((name for name in names if names.count(name) > 1), None)
+    if repeated is not None:
+        raise BadInput("of", f"{repeated!r:.40} is named twice; name each slide, point or link once")
+    pairs = relative_motions(mechanism)
+    slides = [slide for name in names if (slide := find_slide(mechanism, name)) is not None]
     count = chords or 12
-    run = steady_run(motion, slide, count=count)
-    held = held_intervals(source, of) if isinstance(source, Simulation) else None
-    return _draw_figure(DiagramSheet(run, diagram_subject(run, of), mechanism.units, float(width), count, chords, held))
+    run = steady_run(
+        motion, next((slide for slide in slides if mechanism.frame in pairs[slide].links), None), count=count
+    )
+    held = held_intervals(source, names) if isinstance(source, Simulation) else None
+    subjects = merge_subjects(names, [diagram_subject(run, name) for name in names])
+    return _draw_figure(
+        [DiagramSheet(run, subject, mechanism.units, float(width), count, chords, held) for subject in subjects]
+    )
 
 
-def _draw_figure(sheet: DiagramSheet) -> Figure:
+def _draw_figure(sheets: Sequence[DiagramSheet]) -> Figure:
+    """The diagrams of all sheets below each other, three of each, over one axis of the input or the time."""
     require_matplotlib()
     from matplotlib.figure import Figure
 
     from planar.drawing.labels.matplotlib_text import draw_text
 
-    ordinates = [_fit_ordinate(sheet, index) for index in range(3)]
-    lines = caption_lines(sheet, ordinates, SMALL_TEXT, LEFT_MARGIN + sheet.width + RIGHT_MARGIN - 8.0)
-    line = SMALL_TEXT * MM_PER_POINT * 1.45
-    rulers = [_draw_travel_axis] * (not sheet.run.is_time_run) + [_draw_time_axis] * sheet.run.has_speed
-    below = DIAGRAM_GAP / 2.0 + len(rulers) * AXIS_GAP + 2.0 + line * len(lines) + 3.0
-    heights = [each.high - each.low for each in ordinates]
-    size = (LEFT_MARGIN + sheet.width + RIGHT_MARGIN, TOP_MARGIN + sum(heights) + 2.0 * DIAGRAM_GAP + below)
+    run, width = sheets[0].run, sheets[0].width
+    ordinates = [[_fit_ordinate(sheet, index) for index in range(3)] for sheet in sheets]
+    lines = caption_lines(sheets, ordinates, SMALL_TEXT, LEFT_MARGIN + width + RIGHT_MARGIN - 8.0)
+    line_height = SMALL_TEXT * MM_PER_POINT * 1.45
+    rulers = [_draw_travel_axis] * (not run.is_time_run) + [_draw_time_axis] * run.has_speed
+    below = DIAGRAM_GAP / 2.0 + len(rulers) * AXIS_GAP + 2.0 + line_height * len(lines) + 3.0
+    heights = [ordinate.high - ordinate.low for three in ordinates for ordinate in three]
+    legends = [_legend_rows(sheet) for sheet in sheets]
+    # room above the first diagram of each sheet
+    heads = [TOP_MARGIN + LEGEND_ROW * max(len(legends[0]) - 1, 0)]
+    heads += [DIAGRAM_GAP + LEGEND_ROW * len(rows) for rows in legends[1:]]
+    size = (
+        LEFT_MARGIN + width + RIGHT_MARGIN,
+        sum(heads) + sum(heights) + 2.0 * DIAGRAM_GAP * len(sheets) + below,
+    )
     made = Figure(figsize=(size[0] * INCHES_PER_MM, size[1] * INCHES_PER_MM), facecolor="white")
-    bottom = size[1] - TOP_MARGIN
+    bottom = size[1]
     charts: list[Axes] = []
-    for index, each in enumerate(ordinates):
-        bottom -= heights[index]
-        box = (LEFT_MARGIN / size[0], bottom / size[1], sheet.width / size[0], heights[index] / size[1])
-        charts.append(made.add_axes(box, label=each.name))
-        _draw_diagram(charts[-1], sheet, each, index)
-        bottom -= DIAGRAM_GAP
-    bottom += DIAGRAM_GAP - DIAGRAM_GAP / 2.0
+    for number, (sheet, three) in enumerate(zip(sheets, ordinates, strict=True)):
+        bottom -= heads[number]
+        _draw_legend(made, legends[number], bottom, size)
+        for index, ordinate in enumerate(three):
+            height = ordinate.high - ordinate.low
+            bottom -= height + (DIAGRAM_GAP if index else 0.0)
+            box = (LEFT_MARGIN / size[0], bottom / size[1], width / size[0], height / size[1])
+            charts.append(made.add_axes(box, label=f"angular {ordinate.name}" if number else ordinate.name))
+            _draw_diagram(charts[-1], sheet, ordinate, index)
+    bottom -= DIAGRAM_GAP / 2.0
     for ruler in rulers:
         bottom -= AXIS_GAP / 2.0
-        axis = made.add_axes((LEFT_MARGIN / size[0], bottom / size[1], sheet.width / size[0], 0.01 / size[1]))
-        ruler(axis, sheet)
+        axis = made.add_axes((LEFT_MARGIN / size[0], bottom / size[1], width / size[0], 0.01 / size[1]))
+        ruler(axis, sheets[0])
         bottom -= AXIS_GAP / 2.0
-    _draw_head(made, sheet, charts[0], size)
+    _draw_head(made, sheets, charts[0], size)
     for index, (text, math) in enumerate(lines):
-        at = (4.0 / size[0], (3.0 + line * (len(lines) - index) - SMALL_TEXT * MM_PER_POINT) / size[1])
-        draw_text(made, text, at, SMALL_TEXT, math=math, gid="caption")
+        place = (4.0 / size[0], (3.0 + line_height * (len(lines) - index) - SMALL_TEXT * MM_PER_POINT) / size[1])
+        draw_text(made, text, place, SMALL_TEXT, math=math, gid="caption")
     return made
 
 
@@ -179,12 +206,31 @@ def _draw_diagram(axes: Axes, sheet: DiagramSheet, ordinate: Ordinate, index: in
     for start, end in sheet.held.intervals if sheet.held is not None else ():
         axes.axvspan(start, end, color=HELD_GREY, lw=0.0, zorder=0.2, gid="held")
     axes.axhline(0.0, color=CURVE_COLOUR, lw=0.7, zorder=2, gid="zero")
-    for curve, dash in zip(sheet.subject.curves, CURVE_DASHES, strict=False):
+    for curve, style in zip(sheet.subject.curves, _curve_styles(sheet), strict=True):
         values = _in_written_unit(curve.derivatives[index], ordinate)
-        axes.plot(time, values, color=CURVE_COLOUR, lw=1.1, ls=dash, zorder=4, gid=f"{ordinate.symbol}{curve.name}")
+        axes.plot(time, values, **style, lw=1.1, zorder=4, gid=f"{ordinate.symbol}{curve.label}")
         if sheet.chords is not None and index > 0:
             found = chord_rates(sheet.run, curve.derivatives[index - 1], sheet.chords)
-            _draw_chord_stems(axes, sheet, ordinate, curve, found)
+            _draw_chord_stems(
+                axes,
+                sheet,
+                ordinate,
+                curve,
+                found,
+                style["color"] if len(sheet.subject.curves) > 1 and curve.subject else CHORD_COLOUR,
+            )
+
+
+def _curve_styles(sheet: DiagramSheet) -> list[dict[str, Any]]:
+    """Colour and dashes of each curve: a colour for each subject, other dashes for each curve of one colour."""
+    subjects = list(dict.fromkeys(curve.subject for curve in sheet.subject.curves))
+    styles, counts = [], dict.fromkeys(subjects, 0)
+    for curve in sheet.subject.curves:
+        number = subjects.index(curve.subject)
+        dash = CURVE_DASHES[(counts[curve.subject] + 2 * number) % len(CURVE_DASHES)]
+        styles.append({"color": CURVE_COLOURS[number % len(CURVE_COLOURS)], "ls": dash})
+        counts[curve.subject] += 1
+    return styles
 
 
 def _in_written_unit(values: Array, ordinate: Ordinate) -> Array:
@@ -193,17 +239,15 @@ def _in_written_unit(values: Array, ordinate: Ordinate) -> Array:
 
 
 def _draw_chord_stems(
-    axes: Axes, sheet: DiagramSheet, ordinate: Ordinate, curve: MotionCurve, found: ChordRates
+    axes: Axes, sheet: DiagramSheet, ordinate: Ordinate, curve: MotionCurve, found: ChordRates, colour: str
 ) -> None:
     """Chords as points on thin stems at the middles of the intervals, lettered V_1, V_2 on the free side of zero."""
     from planar.drawing.labels.matplotlib_text import draw_text
 
     rates = _in_written_unit(found.rates, ordinate)
-    hollow = "white" if curve.name == "y" else CHORD_COLOUR
-    axes.vlines(found.times, 0.0, rates, color=CHORD_COLOUR, lw=0.5, zorder=3, gid="stem")
-    axes.plot(
-        found.times, rates, ls="", marker="o", ms=3.0, mew=0.6, mec=CHORD_COLOUR, mfc=hollow, zorder=5, gid="chords"
-    )
+    hollow = "white" if curve.name == "y" else colour
+    axes.vlines(found.times, 0.0, rates, color=colour, lw=0.5, zorder=3, gid="stem")
+    axes.plot(found.times, rates, ls="", marker="o", ms=3.0, mew=0.6, mec=colour, mfc=hollow, zorder=5, gid="chords")
     spacing = sheet.width / len(rates)
     if len(sheet.subject.curves) > 1 or spacing < 5.0:
         return
@@ -224,7 +268,7 @@ def _draw_chord_stems(
                 text = f"${ordinate.symbol}_{{{number}}}$"
                 _, high, below = text_size(text, SMALL_TEXT - 0.5, math=True)
                 at = (time, (0.7 + below if side > 0 else below - high - 0.7) * per_mm)
-                draw_text(axes, text, at, SMALL_TEXT - 0.5, math=True, ha="center", color=CHORD_COLOUR, gid=name)
+                draw_text(axes, text, at, SMALL_TEXT - 0.5, math=True, ha="center", color=colour, gid=name)
                 break
 
 
@@ -277,10 +321,11 @@ def _draw_scale_axis(
     )
 
 
-def _draw_head(made: Figure, sheet: DiagramSheet, chart: Axes, size: tuple[float, float]) -> None:
-    """Title, dead centres, stroke, and which curve is which."""
-    mechanism = sheet.run.motion.mechanism
-    rows = ((mechanism.name, LARGE_TEXT, 3.0), (f"Kinematic diagrams of {sheet.subject.title}", NORMAL_TEXT, 8.5))
+def _draw_head(made: Figure, sheets: Sequence[DiagramSheet], chart: Axes, size: tuple[float, float]) -> None:
+    """Title, dead centres and stroke."""
+    sheet = sheets[0]
+    mechanism, subjects = sheet.run.motion.mechanism, ", ".join(part.subject.title for part in sheets)
+    rows = ((mechanism.name, LARGE_TEXT, 3.0), (f"Kinematic diagrams of {subjects}", NORMAL_TEXT, 8.5))
     for whole, points, down in rows:
         text = clip_text(whole, points, size[0] - 8.0)
         made.text(
@@ -307,33 +352,63 @@ def _draw_head(made: Figure, sheet: DiagramSheet, chart: Axes, size: tuple[float
             va="bottom",
             gid=name,
         )
-    if len(sheet.subject.curves) > 1:
-        _draw_legend(made, sheet, size)
     stroke = sheet.run.stroke
-    if stroke is not None and sheet.subject.slide == stroke.pair:
+    if stroke is not None and sheet.subject.slide == stroke.pair and len(sheet.subject.curves) == 1:
         _draw_stroke(chart, sheet, stroke.length)
 
 
-def _draw_legend(made: Figure, sheet: DiagramSheet, size: tuple[float, float]) -> None:
-    """Which curve is which, in the row above the diagrams."""
+class _LegendEntry(NamedTuple):
+    """A curve in a legend: its label, where its line starts in the row (mm), and how it is drawn."""
+
+    label: str
+    start: float
+    style: dict[str, Any]
+
+
+def _legend_rows(sheet: DiagramSheet) -> list[list[_LegendEntry]]:
+    """Which curve is which, in rows that end where the diagrams do; none for a single curve."""
+    if len(sheet.subject.curves) == 1 and not sheet.subject.curves[0].subject:
+        return []
+    rows: list[list[tuple[float, str, dict[str, Any]]]] = [[]]
+    for curve, style in zip(sheet.subject.curves, _curve_styles(sheet), strict=True):
+        label = clip_text(curve.label, NORMAL_TEXT, sheet.width - 20.0)
+        width = max(12.0 + text_size(label, NORMAL_TEXT).width + 4.0, 18.0)
+        if rows[-1] and sum(entry[0] for entry in rows[-1]) + width > sheet.width:
+            rows.append([])
+        rows[-1].append((width, label, style))
+    right = LEFT_MARGIN + sheet.width
+    return [
+        [
+            _LegendEntry(label, right - sum(entry[0] for entry in row[index:]), style)
+            for index, (_, label, style) in enumerate(row)
+        ]
+        for row in rows
+    ]
+
+
+def _draw_legend(
+    made: Figure, rows: Sequence[Sequence[_LegendEntry]], chart_top: float, size: tuple[float, float]
+) -> None:
+    """The legend above a diagram whose upper edge is at a height (mm)."""
     from matplotlib.lines import Line2D
 
-    right = LEFT_MARGIN + sheet.width
-    row = size[1] - TOP_MARGIN + 3.0 * MM_PER_POINT + SMALL_TEXT * MM_PER_POINT / 2.0 + 3.5
-    for index, (curve, dash) in enumerate(zip(sheet.subject.curves, CURVE_DASHES, strict=False)):
-        start = right - 18.0 * (len(sheet.subject.curves) - index)
-        spots = np.array([[start, start + 10.0], [row, row]]) / np.array([[size[0]], [size[1]]])
-        made.add_artist(Line2D(*spots, color=CURVE_COLOUR, lw=1.1, ls=dash, gid="legend"))
-        made.text(
-            (start + 12.0) / size[0],
-            row / size[1],
-            curve.name,
-            family=DRAWING_FAMILY,
-            fontsize=NORMAL_TEXT,
-            va="center",
-            style="italic",
-            gid="legend",
-        )
+    lowest = chart_top + 3.0 * MM_PER_POINT + SMALL_TEXT * MM_PER_POINT / 2.0 + 3.5
+    for number, row in enumerate(reversed(rows)):
+        height = lowest + LEGEND_ROW * number
+        for entry in row:
+            spots = np.array([[entry.start, entry.start + 10.0], [height] * 2]) / np.array([[size[0]], [size[1]]])
+            made.add_artist(Line2D(*spots, **entry.style, lw=1.1, gid="legend"))
+            made.text(
+                (entry.start + 12.0) / size[0],
+                height / size[1],
+                entry.label,
+                family=list(font_families(entry.label)),
+                fontsize=NORMAL_TEXT,
+                va="center",
+                style="italic",
+                parse_math=False,
+                gid="legend",
+            )
 
 
 def _dead_centre_positions(sheet: DiagramSheet) -> list[tuple[str, float]]:

@@ -28,6 +28,15 @@ class MotionCurve(NamedTuple):
     value: Array
     rate: Array
     second: Array
+    from_top: bool = False
+    "whether the displacement is measured from the top dead centre of a slide"
+    subject: str = ""
+    "the slide, point or link of the curve, where a diagram has curves of several"
+
+    @property
+    def label(self) -> str:
+        """The name of the curve in a legend."""
+        return " ".join(filter(None, (self.subject, self.name)))
 
     @property
     def derivatives(self) -> tuple[Array, Array, Array]:
@@ -45,6 +54,20 @@ class DiagramSubject(NamedTuple):
     is_angle: bool
     curves: tuple[MotionCurve, ...]
     slide: str | None = None
+
+
+def merge_subjects(names: Sequence[str], subjects: Sequence[DiagramSubject]) -> list[DiagramSubject]:
+    """One subject for the lengths and one for the angles among several, every curve labelled by its name."""
+    if len(subjects) == 1:
+        return list(subjects)
+    merged = []
+    for is_angle in (False, True):
+        alike = [(name, subject) for name, subject in zip(names, subjects, strict=True) if subject.is_angle is is_angle]
+        if alike:
+            curves = tuple(curve._replace(subject=name) for name, subject in alike for curve in subject.curves)
+            slide = next((subject.slide for _, subject in alike if subject.slide), None)
+            merged.append(DiagramSubject(", ".join(subject.title for _, subject in alike), is_angle, curves, slide))
+    return merged
 
 
 class ChordRates(NamedTuple):
@@ -112,7 +135,10 @@ def diagram_subject(run: DrawnRun, of: str) -> DiagramSubject:
         for curve in found.curves
     )
     return found._replace(
-        curves=tuple(MotionCurve(curve.name, *values) for curve, values in zip(found.curves, cleaned, strict=True))
+        curves=tuple(
+            MotionCurve(curve.name, *values, from_top=curve.from_top)
+            for curve, values in zip(found.curves, cleaned, strict=True)
+        )
     )
 
 
@@ -161,11 +187,12 @@ def _pair_rates(run: DrawnRun, pair: str) -> Sequence[Array]:
 def _slide_curve(run: DrawnRun, pair: str) -> MotionCurve:
     """A slide from its top dead centre, growing away from it; where it has none from the start of the run."""
     value, rate, second = _pair_rates(run, pair)
-    if run.stroke is None or run.stroke.pair != pair:
+    slide_stroke = run.stroke_of(pair)
+    if slide_stroke is None:
         return MotionCurve("", value - value[0], rate, second)
-    top, bottom = run.stroke.top.value, run.stroke.bottom.value
-    way = 1.0 if bottom > top else -1.0
-    return MotionCurve("", way * (value - top), way * rate, way * second)
+    top, bottom = slide_stroke.top.value, slide_stroke.bottom.value
+    sign = 1.0 if bottom > top else -1.0
+    return MotionCurve("", sign * (value - top), sign * rate, sign * second, from_top=True)
 
 
 def chord_rates(run: DrawnRun, values: Array, count: int) -> ChordRates:

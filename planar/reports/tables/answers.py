@@ -14,7 +14,7 @@ from planar.analysis.motion.answers import Answers
 from planar.analysis.motion.output import Axis, Extreme
 from planar.foundation.units import parse_unit
 from planar.model.file_units import FileUnits, display_unit, unit_by_input
-from planar.model.wording import REST_TOLERANCE, amount
+from planar.model.wording import REST_TOLERANCE, amount, count_phrase
 from planar.reports.fitted_table import plain_table
 from planar.reports.number_format import DIGITS
 from planar.reports.tables.forces.mechanical_advantage import advantage_unit
@@ -102,7 +102,14 @@ def _use_rows(each: Answers, units: FileUnits, position: _PositionFormatter) -> 
     if each.area is not None:
         name, of = display_unit("area", units)
         value = of.from_si(each.area.value) if abs(each.area.value) > each.area.error else 0.0
-        yield "area of its curve", f"{value:.{DIGITS}g} {name}", "", "anticlockwise positive"
+        if not each.area.crossings:
+            yield "area of its curve", f"{value:.{DIGITS}g} {name}", "", "anticlockwise positive"
+        else:
+            crossings = count_phrase(each.area.crossings, "crossing")
+            yield "net area of its curve", f"{value:.{DIGITS}g} {name}", "", f"{crossings}; anticlockwise positive"
+            loops = [of.from_si(loop) for loop in each.area.loops]
+            listed = ", ".join(f"{loop:.{DIGITS}g}" for loop in loops)
+            yield "  loops, sum of sizes", f"{sum(map(abs, loops)):.{DIGITS}g} {name}", "", listed
     if each.transmission is not None and each.transmission.least is not None:
         least = each.transmission.least
         through = f"driven at {' and '.join(each.transmission.through)}"

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
+from math import ceil
 from typing import Any
 
 import numpy as np
@@ -10,14 +12,20 @@ from rich.console import Group, RenderableType
 from rich.text import Text
 
 from planar.analysis.centres.centres import Centres
+from planar.analysis.centres.centrodes import CentrePath
 from planar.foundation.units import parse_unit
+from planar.model.file_units import FileUnits, unit_of_kind
 from planar.model.link_graph import link_label
 from planar.model.mechanism import relative_motions
 from planar.model.wording import amount, count_phrase, join_all_names
+from planar.reports.columns import ReportedSeries
 from planar.reports.fitted_table import FittedTable, plain_table
 from planar.reports.number_format import DIGITS, SIZE_PHRASE, paragraphs, precision_text
-from planar.results.motion import State
+from planar.reports.tables.motion import motion_heading
+from planar.results.motion import Motion, State
 
+MAX_PATH_ROWS = 36
+"""Steps between the rows of a path that are printed, at most."""
 ZERO_RATIO = 1e-12
 """A coordinate below this part of the mechanism's size is printed as 0."""
 METHOD_WORDS = {
@@ -54,30 +62,74 @@ def _centres_table(centres: Centres) -> FittedTable:
         left=(1, 2, 3, 6),
         keys=2,
     )
+    size = _largest_coordinate(state)
     for centre in centres:
         order = "" if centre.how in ("as one", "open") else str(centre.order)
-        x, y = _coordinate_cells(centre.homogeneous, state)
+        x, y = _coordinate_cells(centre.homogeneous, state.mechanism.units, size)
         rows.add_row(order, centre.name, " - ".join(centre.links), centre.how, x, y, centre.derivation)
     return rows
 
 
+def path_table(motion: Motion, paths: Sequence[CentrePath]) -> RenderableType:
+    """The paths of centres over a motion: at most some of its rows, evenly spaced, the first and the last included."""
+    units = motion.mechanism.units
+    ranges = {name: float(np.ptp(given.position)) for name, given in motion.inputs.items()}
+    name = max(ranges, key=ranges.__getitem__)
+    kind = "length" if motion.has_length_motion(name) else "angle"
+    unit, of = unit_of_kind(kind, units) if motion.time is None else ("s", parse_unit("s"))
+    abscissa = (motion.inputs[name].position if motion.time is None else motion.time)[: len(paths[0].homogeneous)]
+    columns = [f"{path.name} {axis}, {units.length}" for path in paths for axis in "xy"]
+    rows = plain_table(
+        "Paths of instantaneous centres", f"{name if motion.time is None else 'time'}, {unit}", *columns, keys=1
+    )
+    size = max((float(np.abs(motion.point(point).position).max()) for point in motion.point_names), default=0.0)
+    step = max(ceil((len(abscissa) - 1) / MAX_PATH_ROWS), 1)
+    listed = [*range(0, len(abscissa) - 1, step), len(abscissa) - 1]
+    for row in listed:
+        cells = (cell for path in paths for cell in _coordinate_cells(path.homogeneous[row], units, size))
+        at_zero = abs(abscissa[row]) <= ZERO_RATIO * np.abs(abscissa).max()
+        rows.add_row("0" if at_zero else _format_number(of.from_si(float(abscissa[row]))), *cells)
+    notes = [f"{path.name}: {' and '.join(path.links)}" + f"; {path.reason}" * bool(path.reason) for path in paths]
+    notes.append("coordinates are in the axes of the frame")
+    if step > 1:
+        notes.append(f"{len(listed)} of {len(abscissa)} positions are listed; a file has all of them")
+    return Group(*motion_heading(motion), Text(), rows, paragraphs(("-", note) for note in notes))
+
+
+def path_series(paths: Sequence[CentrePath]) -> list[ReportedSeries]:
+    """The paths of centres beside a run, in SI: the position, and the direction of a centre at infinity."""
+    return [
+        ReportedSeries(
+            "centres",
+            path.name,
+            {"position": "length", "direction": "angle"},
+            {"position": path.position, "direction": path.direction if np.isfinite(path.direction).any() else None},
+        )
+        for path in paths
+    ]
+
+
 def _location_text(at: np.ndarray, state: State) -> str:
-    x, y = _coordinate_cells(at, state)
+    x, y = _coordinate_cells(at, state.mechanism.units, _largest_coordinate(state))
     return f"{x} {y}" if at[2] == 0.0 else f"at ({x}, {y}) {state.mechanism.units.length}"
 
 
-def _coordinate_cells(at: np.ndarray | None, state: State) -> tuple[str, str]:
-    """Where a homogeneous point (3,) lies, in the units of the file."""
-    if at is None:
+def _largest_coordinate(state: State) -> float:
+    """The largest coordinate of a point (m)."""
+    return max((float(np.abs(point.position).max()) for point in state.points.values()), default=0.0)
+
+
+def _coordinate_cells(at: np.ndarray | None, units: FileUnits, size: float) -> tuple[str, str]:
+    """Where a homogeneous point (3,) lies, in the units of the file, for a mechanism of some size (m)."""
+    if at is None or not np.isfinite(at).all():
         return "-", "-"
-    units = state.mechanism.units
     x, y, w = at
     if w == 0.0:
         angle = float(np.arctan2(y, x)) if abs(y) > ZERO_RATIO else 0.0
         return "at infinity", f"at {amount(angle, 'angle', units)}"
-    scale = max((float(np.abs(point.position).max()) for point in state.points.values()), default=0.0) or 1.0
     length = parse_unit(units.length)
-    placed = (length.from_si(float(value)) if abs(value) > ZERO_RATIO * scale else 0.0 for value in (x / w, y / w))
+    least = ZERO_RATIO * (size or 1.0)
+    placed = (length.from_si(float(value)) if abs(value) > least else 0.0 for value in (x / w, y / w))
     x, y = (_format_number(value) for value in placed)
     return x, y
 

@@ -18,6 +18,7 @@ from planar.cli.options import (
     output_option,
     parse_drives,
     print_or_write,
+    refuse_options,
     refuse_overwriting,
     run_motion,
     show_status,
@@ -60,6 +61,8 @@ def sensitivity(  # many: options of the command
         raise BadInput("-o", "the table goes to a file or SI values are printed with --json; give one of the two")
     if whole and at:
         raise BadInput("--at", "a whole motion has no one position; say where it starts with --from")
+    if not whole:
+        refuse_options(course, "this is for a whole motion, with --cycle")
     if static and not with_forces:
         raise BadInput("--static", "this is for forces, with --forces")
     from planar.analysis.sensitivity.sensitivity import sensitivity as derivatives

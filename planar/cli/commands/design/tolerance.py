@@ -19,6 +19,7 @@ from planar.cli.options import (
     output_option,
     parse_drives,
     print_or_write,
+    refuse_options,
     refuse_overwriting,
     run_motion,
     show_status,
@@ -78,6 +79,8 @@ def tolerance(  # many: options of the command
     whole = whole or named in ("travel", "time_ratio", "dead_points")
     if whole and at:
         raise BadInput("--at", "a whole motion has no one position; say where it starts with --from")
+    if not whole:
+        refuse_options(course, "this is for a whole motion, with --cycle")
     if statistical and allow is None:
         raise BadInput("--statistical", "this is for the tolerances of --allow")
     from planar.analysis.tolerance.allowance import allowance

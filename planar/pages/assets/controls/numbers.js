@@ -62,9 +62,11 @@ function ratesTold(page, k) {
   }).join("");
 }
 
-function lengthTold(page, value) {
-  const [by, name] = unitOf(page, "length");
-  return `${Number((value * by).toPrecision(3))} ${name}`;
+/** The coordinates of a place (m) in the unit of lengths; what is round-off beside the other one is 0. */
+function formatPlace(page, place) {
+  const [by, name] = unitOf(page, "length"), least = 1e-9 * Math.max(...place.map(Math.abs));
+  const texts = place.map((value) => `${Number((Math.abs(value) > least ? value * by : 0).toPrecision(4))}`.replace("-", "−"));
+  return `(${texts.join(", ")}) ${name}`;
 }
 
 /** As many figures as tables have. */

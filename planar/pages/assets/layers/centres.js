@@ -129,8 +129,7 @@ function drawCentre(ink, layers, room, { name, at, shown }, drawn, picked) {
   const length = Math.hypot(...along), [dx, dy] = along.map((each) => each / length);
   const reach = Math.min(...[[dx, 0], [dy, 1]].map(([d, k]) => (d ? (room[k + 2] - room[k] - 2 * edge) / 2 / Math.abs(d) : Infinity)));
   const tip = [middle[0] + dx * reach, middle[1] + dy * reach], tail = [dx, dy].map((each, k) => tip[k] - CENTRE_ARROW.length * ink.mm * each);
-  const { page } = layers, beyond = there === null ? 0 : Math.hypot(there[0] - tip[0], there[1] - tip[1]) / page.view.scale;
-  const far = w === 0 ? " at ∞" : ` at ${lengthTold(page, beyond)}`;
+  const far = w === 0 ? " at ∞" : ` ${formatPlace(layers.page, [x / w, y / w])}`;
   const key = `${tip.map((each) => Math.round(each / 6)).join()}${far}`;
   if (add(key, tail, far, [-dx, -dy])) ink.arrow(tail, tip, `arrow centre${picked ? " picked" : ""}`);
   return tip;
