@@ -71,11 +71,11 @@ FILES = {"rocker.json": DRIVEN_ROCKER, "piston.json": PISTON}
 
 
 def rocker_limits():
-    """Where crank and coupler are in line, by the law of cosines (deg), from the frame's x-axis."""
+    """Where crank and coupler are in line, by the law of cosines (deg): two ranges, each from -180 to 180."""
     ends = []
     for reach in (COUPLER - CRANK, COUPLER + CRANK):
         inner = degrees(between(ROCKER, BASE, reach))
-        ends += [180.0 - inner, 180.0 + inner]
+        ends += [180.0 - inner, inner - 180.0]
     return sorted(ends)
 
 
@@ -120,7 +120,7 @@ def test_the_command_tells_limits_branches_and_assemblies_in_a_process_of_its_ow
     value = json.loads(command.process(folder, "circuits", "rocker.json", "--json").done())
     ends = rocker_limits()
     told = [(each["low"], each["high"]) for circuit in value["circuits"] for each in circuit["branches"]]
-    assert np.degrees(told) == pytest.approx(np.array([ends[:2], ends[:2], ends[2:], ends[2:]]), abs=1e-6)
+    assert np.degrees(told) == pytest.approx(np.array([ends[2:], ends[2:], ends[:2], ends[:2]]), abs=1e-6)
     assert [[each["modes"] for each in circuit["branches"]] for circuit in value["circuits"]] == [[[1], [2]], [[], []]]
     assert value["nearest"] == 1
     assert np.degrees(value["assembles"]) == pytest.approx(np.array([ends[:2], ends[2:]]), abs=1e-6)
@@ -220,7 +220,7 @@ def test_no_line_leaps_and_what_leaves_at_one_side_comes_in_at_the_other(name, o
 
 def test_dead_points_stand_at_the_ends_of_the_branches_with_the_inputs_position():
     ends = rocker_limits()
-    for axes, own in zip(panels(sheets("rocker.json", "crank")[0]), (ends[:2], ends[2:]), strict=True):
+    for axes, own in zip(panels(sheets("rocker.json", "crank")[0]), (ends[2:], ends[:2]), strict=True):
         (dots,) = lines(axes, "dead point")
         assert sorted({round(x, 6) for x in dots[0]}) == pytest.approx(own, abs=1e-6)
         tips = np.concatenate([line[:, [0, -1]].T for line in branches(axes)])
