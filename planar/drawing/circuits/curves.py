@@ -29,6 +29,8 @@ MAX_COMPARED_CIRCUITS, MAX_COMPARED_CURVES, COMPARED_POSITIONS, SAME_OUTPUT_RATI
 """Circuits, strands and positions of the input at which outputs are compared, and what part of the range is seen."""
 FINE_TURNS, ROWS_PER_TURN = 2, 180
 """Turns of the input up to which a circuit's own rows are fine enough, and rows for each of more."""
+END_TOLERANCE = 1e-5
+"""Part of a curve: an assembly this near to its end lies on it."""
 MIN_GAP_RATIO = 1e-6
 """Part of a turn: a gap below this is none."""
 
@@ -346,7 +348,12 @@ def _mark_assemblies(
         there = [
             float(np.interp(at, *_sorted_by_input(strand)))
             for strand in each.branch_curves
-            if branch is not None and strand.branch == branch.number and strand.x.min() <= at <= strand.x.max()
+            if branch is not None
+            and strand.branch == branch.number
+            # a curve stops short of the ends of a branch
+            and strand.x.min() - END_TOLERANCE * np.ptp(strand.x)
+            <= at
+            <= strand.x.max() + END_TOLERANCE * np.ptp(strand.x)
         ]
         if state is None or not there:
             continue
