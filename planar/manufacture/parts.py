@@ -201,13 +201,7 @@ def parts(  # many: sizes of what is cut
         if value is not None and not 0.0 < value < 1e4:
             raise BadInput(name, f"a size above zero is wanted, not {value!r:.40}")
     drawn = rest_position(mechanism).frames
-    try:
-        linkage = slots_for_blocks(drawn_mechanism(mechanism, drawn, "plates", (ProfiledPair,)))
-    except BadInput as problem:
-        told = problem.sentence.replace("cannot be said in this format", "cannot be cut as plates that lie flat")
-        raise BadInput(problem.place, told) from None
-    held = {link for joint in linkage.joints for link in joined_links(joint)}
-    linkage = replace(linkage, links=tuple(link for link in linkage.links if link in held))
+    linkage = _joined_linkage(mechanism, drawn)
     if pair is None and len(mechanism.inputs) > 1:
         pair = mechanism.inputs[0].pair
     run = _Run(_Course(mechanism, steps, start, stop, pair), drawn, linkage)
@@ -222,6 +216,17 @@ def parts(  # many: sizes of what is cut
     )
     size = " x ".join(map(unit.format, sheet))
     raise BadInput("sheet", f"{told} of {size} {unit.name}; choose a larger one or a smaller scale")
+
+
+def _joined_linkage(mechanism: Mechanism, drawn: Mapping[str, Frame]) -> DrawnLinkage:
+    """The linkage where its links were drawn, without links that no joint holds. Raises BadInput."""
+    try:
+        linkage = slots_for_blocks(drawn_mechanism(mechanism, drawn, "plates", (ProfiledPair,)))
+    except BadInput as problem:
+        message = problem.sentence.replace("cannot be said in this format", "cannot be cut as plates that lie flat")
+        raise BadInput(problem.place, message) from None
+    joined = {link for joint in linkage.joints for link in joined_links(joint)}
+    return replace(linkage, links=tuple(link for link in linkage.links if link in joined))
 
 
 class _Course(NamedTuple):

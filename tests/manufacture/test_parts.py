@@ -124,8 +124,8 @@ def test_a_file_in_inches_gives_plates_pins_and_areas_in_inches(tmp_path):
     assert "in²" in shown
     assert "mm" not in shown
     rod = next(plate for plate in found.plates if plate.name == "rod")
-    assert f"{8.0 * 1.505 + pi * 0.7525**2 - 2 * pi * 0.2525**2:.5g}" in shown  # a bar, two half discs, two holes
-    assert plate_area(rod) / 25.4**2 == pytest.approx(8.0 * 1.505 + pi * 0.7525**2 - 2 * pi * 0.2525**2)
+    assert f"{8.0 * 1.5 + pi * 0.75**2 - 2 * pi * 0.2525**2:.5g}" in shown  # a bar, two half discs, two holes
+    assert plate_area(rod) / 25.4**2 == pytest.approx(8.0 * 1.5 + pi * 0.75**2 - 2 * pi * 0.2525**2)
     small = run(tmp_path, "parts", "engine-in-inches", "--sheet", "8x6").done()
     assert "at scale 1:2" in small
     assert "such as 24x16 (in)" in run(tmp_path, "parts", "engine-in-inches", "--sheet", "big").refused(2)
