@@ -179,8 +179,8 @@ def input_window(circuits: Circuits) -> InputWindow:
     )
     gaps = [(b, a) for (_, b), (a, _) in pairwise([*going, (going[0][0] + FULL_TURN, 0.0)]) if a - b > MIN_GAP_RATIO]
     if not gaps:
-        first = window_start(at)
-        return InputWindow(first, first + FULL_TURN, False, (), at)
+        first = _full_turn_start(circuits, at)
+        return InputWindow(first, first + FULL_TURN, False, (), first + (at - first) % FULL_TURN)
     # the turn is cut in the middle of a gap: beside the intervals as tables write them, if they lie in one turn
     around = (written[-1][1], written[0][0] + FULL_TURN)
     fits = around[1] - around[0] > MIN_GAP_RATIO
@@ -200,6 +200,15 @@ def input_window(circuits: Circuits) -> InputWindow:
         if a + FULL_TURN * k < high and b + FULL_TURN * k > low
     )
     return InputWindow(low, high, False, _gaps_between(here, low, high), place)
+
+
+def _full_turn_start(circuits: Circuits, position: float) -> float:
+    """Where a window of a whole turn starts: so that branches lie in it as tables write them, if one turn holds all."""
+    ends = [end for each in circuits for branch in each.branches if not branch.turns for end in branch[1:3]]
+    usual = window_start(position)
+    low, high = min(ends, default=usual), max(ends, default=usual)
+    middle = 0.5 * (low + high - FULL_TURN)
+    return next((first for first in (usual, 0.0, -pi, middle) if first <= low and high <= first + FULL_TURN), usual)
 
 
 def _gaps_between(going: Sequence[tuple[float, float]], low: float, high: float) -> tuple[tuple[float, float], ...]:
