@@ -79,7 +79,7 @@ if TYPE_CHECKING:
     from planar.dynamics.reactions import FixedWheel, Reaction
     from planar.dynamics.simulation import Simulation, simulate
     from planar.foundation.errors import BadInput, NoAnswer, Outcome, PlanarError, Unknown
-    from planar.manufacture.parts import PartPin, Parts, parts
+    from planar.manufacture.parts import PartPin, Parts, PartSpacer, parts
     from planar.manufacture.plates import Plate
     from planar.model.file_units import FileUnits
     from planar.model.input_laws.cam_rises import (
@@ -249,6 +249,7 @@ __all__ = [
     "PairFriction",
     "ParabolicRise",
     "PartPin",
+    "PartSpacer",
     "Parts",
     "PinnedLinkages",
     "PlanarError",

@@ -107,6 +107,7 @@ MODULES = {
     "PairFriction": "dynamics.forces",
     "ParabolicRise": "model.input_laws.cam_rises",
     "PartPin": "manufacture.parts",
+    "PartSpacer": "manufacture.parts",
     "Parts": "manufacture.parts",
     "PinnedLinkages": "model.pin_linkages",
     "Plate": "manufacture.plates",

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from math import atan2, degrees
 
 from planar.foundation.errors import BadInput
-from planar.manufacture.plates import Plate, convex_hull, moved_plate, sampled
+from planar.manufacture.plates import Plate, convex_hull, moved_plate, plate_box
 
 
 def nested(plates: Sequence[Plate], sheet: tuple[float, float], gap: float) -> list[list[Plate]]:
@@ -39,12 +39,6 @@ def _laid_flat(plate: Plate) -> tuple[Plate, tuple[float, float]]:
         for p, q in zip(corners, [*corners[1:], corners[0]], strict=True)
         if p != q
     ]
-    boxes = [(_box(moved_plate(plate, -way, 0.0, 0.0)), way) for way in ways]
+    boxes = [(plate_box([moved_plate(plate, -way, 0.0, 0.0)]), way) for way in ways]
     (left, low, right, top), way = min(boxes, key=lambda each: round(each[0][3] - each[0][1], 9))
     return moved_plate(plate, -way, -left, -low), (right - left, top - low)
-
-
-def _box(plate: Plate) -> tuple[float, float, float, float]:
-    points = sampled(plate.outline, 64)
-    x, y = [each[0] for each in points], [each[1] for each in points]
-    return min(x), min(y), max(x), max(y)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 from math import cos, radians, sin
@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planar.document.first_argument import takes_mechanism
+from planar.equations.mechanism_numbers import shapes_of_links
 from planar.formats.drawn.blocks import slots_for_blocks
 from planar.formats.drawn.drawn_linkage import (
     DrawnLinkage,
@@ -20,6 +21,7 @@ from planar.formats.drawn.drawn_linkage import (
     RackJoint,
     SlideJoint,
     SlotJoint,
+    Tracer,
     WheelJoint,
     joined_links,
 )
@@ -30,19 +32,18 @@ from planar.foundation.safe_files import save_file
 from planar.foundation.units import parse_unit
 from planar.manufacture.cam_plates import CamDrive, cam_drives, face_reach
 from planar.manufacture.clearances import places_over
+from planar.manufacture.cut_units import CutUnit, cut_unit
 from planar.manufacture.layers import find_layers
 from planar.manufacture.nesting import nested
 from planar.manufacture.plate_making import Pin, Sizes, Travel, make_plates
 from planar.manufacture.plates import Plate
-from planar.manufacture.stacking import joined_plates, layer_rules
-from planar.model.mechanism import Mechanism
+from planar.manufacture.stacking import Spacer, find_spacers, joined_plates, layer_rules
+from planar.model.mechanism import Mechanism, named_points
 from planar.model.pairs.cams.profiled import ProfiledPair
 from planar.results.motion import Motion
 from planar.solving.cycle import cycle
 from planar.solving.rest_position import rest_position
 
-NICE_PINS = (1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)
-"""Diameters that rods are sold in (mm)."""
 PIN_SHARE = 0.1
 """Of the middle one of the distances between pins, of which the pins' diameter is to be about so much."""
 SCALES = (1.0, 2.0, 2.5, 5.0, 10.0, 20.0, 25.0, 50.0, 100.0, 200.0, 500.0, 1000.0)
@@ -64,17 +65,31 @@ class PartPin:
 
 
 @dataclass(frozen=True)
+class PartSpacer:
+    """A spacer that fills the gap between two plates on a pin: its inner and outer diameter and its length (m), and its
+    first and last layer. The outer diameter is 0 if nothing wider than the pin clears the plates there."""
+
+    pin: str
+    inner: float
+    outer: float
+    length: float
+    layers: tuple[int, int]
+
+
+@dataclass(frozen=True)
 class Parts:
     """Plates of the links of a mechanism, in mm where they were drawn, and the same laid out on sheets.
 
     `is_clear` tells whether no plate meets another in its layer and no pin runs through one, all over the run, between
     positions too; `positions` are the most that this took. What meets, and what else is to know, is in `notes`.
-    `thickness`, `sheet` and `scale` are as they were asked for (m; a scale of 0.2 is 1:5).
+    `thickness`, `sheet` and `scale` are as they were asked for (m; a scale of 0.2 is 1:5). Drawings and lists are in
+    `unit`, which is inches for a file in inches.
     """
 
     mechanism: Mechanism
     plates: tuple[Plate, ...]
     pins: tuple[PartPin, ...]
+    spacers: tuple[PartSpacer, ...]
     sheets: tuple[tuple[Plate, ...], ...]
     thickness: float
     sheet: tuple[float, float]
@@ -87,6 +102,18 @@ class Parts:
         layers = len({plate.layer for plate in self.plates})
         many = f"{len(self.plates)} plates in {layers} layers"
         return f"<Parts of {self.mechanism.name!r}: {many}, sheets: {len(self.sheets)}>"
+
+    @property
+    def unit(self) -> CutUnit:
+        """The unit of length of drawings and lists."""
+        return cut_unit(self.mechanism.units)
+
+    @property
+    def heading(self) -> str:
+        """What is cut, from which plates, at which scale."""
+        unit = self.unit
+        plates = f"{unit.format(self.thickness)} {unit.name} plates"
+        return f"{self.mechanism.name}: {plates} at scale {_scale_text(self.scale)}"
 
     def encode(self, suffix: str) -> bytes:
         """The sheets side by side, with the list of parts, as a .dxf or .svg file has them; for .step the solids.
@@ -101,7 +128,7 @@ class Parts:
             return encode_step(self.plates, 1e3 * self.thickness, self.mechanism.name)
         numbers = {plate.name: number for number, plate in enumerate(self.plates, 1)}
         size = (1e3 * self.sheet[0], 1e3 * self.sheet[1])
-        return encode_layout(Layout(self.sheets, size, numbers, self.lines()), suffix)
+        return encode_layout(Layout(self.sheets, size, numbers, self.lines(), self.unit), suffix)
 
     def save(self, file: str | os.PathLike[str]) -> None:
         """Write the sheets to a .dxf or .svg file, or the stacked plates to a .step file. Raises BadInput."""
@@ -109,62 +136,77 @@ class Parts:
         save_file(path, self.encode(path.suffix))
 
     def lines(self) -> list[str]:
-        """The list of plates and pins, a line each."""
-        found = [f"{self.mechanism.name}, {1e3 * self.thickness:g} mm plates, 1:{1.0 / self.scale:g}"]
+        """The list of plates, pins and spacers, a line each."""
+        unit = self.unit
+        found = [self.heading]
         for number, plate in enumerate(self.plates, 1):
-            told = f", {plate.teeth} teeth of module {plate.module:.4g}" if plate.teeth else ""
-            found.append(f"{number}  {plate.name}: layer {plate.layer}{told}")
+            teeth = f", {plate.teeth} teeth of module {plate.module:.4g} mm" if plate.teeth else ""
+            found.append(f"{number}  {plate.name}: layer {plate.layer}{teeth}")
         for pin in self.pins:
-            size, (low, high) = f"{1e3 * pin.diameter:g} x {1e3 * pin.length:g} mm", pin.layers
+            size, (low, high) = f"{unit.format(pin.diameter)} x {unit.format(pin.length)} {unit.name}", pin.layers
             found.append(f"pin {pin.name}: {size}, layers {low} to {high}")
+        for spacer in self.spacers:
+            size = " x ".join(map(unit.format, (spacer.inner, spacer.outer, spacer.length)))
+            low, high = spacer.layers
+            where = f"layer {low}" if low == high else f"layers {low} to {high}"
+            found.append(f"spacer on pin {spacer.pin}: {size} {unit.name}, {where}")
         return found
+
+
+def _scale_text(scale: float) -> str:
+    """A scale as drawings have it: 1:5, 2:1."""
+    return f"1:{1.0 / scale:.6g}" if scale <= 1.0 else f"{scale:.6g}:1"
 
 
 @takes_mechanism
 def parts(  # many: sizes of what is cut
     mechanism: Mechanism,
     *,
-    thickness: float = 0.003,
+    thickness: float | None = None,
     pin: float | None = None,
     wall: float | None = None,
-    play: float = 1e-4,
-    sheet: tuple[float, float] = (0.6, 0.4),
-    gap: float = 0.004,
+    play: float | None = None,
+    sheet: tuple[float, float] | None = None,
+    gap: float | None = None,
+    holes: Sequence[str] = (),
     scale: float | None = None,
     steps: int = 90,
     start: float | None = None,
     stop: float | None = None,
     pair: str | None = None,
 ) -> Parts:
-    """The parts of a mechanism: a plate of this `thickness` for each link, gears with involute teeth, pins, sheets.
+    """The parts of a mechanism: a plate of this `thickness` for each link, gears, pins, spacers, sheets.
 
-    Lengths in m. A plate is what is within `pin` / 2 + `wall` of its pins and slots; holes and slots are wider than
-    their pins by `play`; the pins of the file keep its radii. Left out, pins are about a tenth of the middle distance
-    between pins, walls as wide as pins, and the scale is the largest that lets each plate fit a `sheet`, `gap` apart.
+    Lengths in m. A plate is what is within `pin` / 2 + `wall` of its pins, holes and slots; holes and slots are wider
+    than their pins by `play`; the pins of the file keep its radii. Points at which springs are fastened, and those
+    named in `holes`, get holes as wide as those of pins. By default pins are about a tenth of the middle distance
+    between pins, walls are as wide as pins, and the scale is the largest that lets each plate fit a `sheet`, `gap`
+    apart. By default plates are 3 mm thick and sheets 600 x 400 mm; for a file in inches 1/8 in and 24 x 16 in.
+
     The run is that of `planar.cycle` from `start` to `stop` of the input at `pair`. Layers are found by the distances
     of all plates and pins at so many steps of it, and at up to 64 times as many where those leave it open whether
-    something is met between positions. Raises BadInput for a pair that is none of plates, and where a plate cannot be;
-    NoAnswer where the mechanism does not run.
+    something is met between positions. Raises BadInput for a pair that is none of plates, for a hole at no point, and
+    where a plate cannot be; NoAnswer where the mechanism does not run.
 
     >>> import planar
     >>> planar.parts("four-bar", thickness=0.003)
     <Parts of 'Four-bar chain': 4 plates in 3 layers, sheets: 1>
     """
+    unit = cut_unit(mechanism.units)
+    thickness, play, sheet, gap = (
+        default if value is None else value
+        for value, default in ((thickness, unit.thickness), (play, unit.play), (sheet, unit.sheet), (gap, unit.gap))
+    )
     for name, value in {"thickness": thickness, "pin": pin, "wall": wall, "gap": gap, "scale": scale}.items():
         if value is not None and not 0.0 < value < 1e4:
             raise BadInput(name, f"a size above zero is wanted, not {value!r:.40}")
     drawn = rest_position(mechanism).frames
-    try:
-        linkage = slots_for_blocks(drawn_mechanism(mechanism, drawn, "plates", (ProfiledPair,)))
-    except BadInput as problem:
-        told = problem.sentence.replace("cannot be said in this format", "cannot be cut as plates that lie flat")
-        raise BadInput(problem.place, told) from None
-    held = {link for joint in linkage.joints for link in joined_links(joint)}
-    linkage = replace(linkage, links=tuple(link for link in linkage.links if link in held))
+    linkage = _joined_linkage(mechanism, drawn)
     if pair is None and len(mechanism.inputs) > 1:
         pair = mechanism.inputs[0].pair
     run = _Run(_Course(mechanism, steps, start, stop, pair), drawn, linkage)
-    sizes = _Request(thickness, pin, wall, play, sheet, gap, steps)
+    drilled = tuple(_drilled_points(mechanism, drawn, holes))
+    sizes = _Request(thickness, pin, wall, play, sheet, gap, steps, drilled)
     for made in SCALES if scale is None else (1.0 / scale,):
         found = _parts_at(mechanism, run, sizes, 1.0 / made)
         if found is not None:
@@ -172,9 +214,19 @@ def parts(  # many: sizes of what is cut
     told = (
         "at no scale down to 1:1000 do its plates fit the sheet" if scale is None else "its plates do not fit the sheet"
     )
-    raise BadInput(
-        "sheet", f"{told} of {sheet[0] * 1e3:g} x {sheet[1] * 1e3:g} mm; choose a larger one or a smaller scale"
-    )
+    size = " x ".join(map(unit.format, sheet))
+    raise BadInput("sheet", f"{told} of {size} {unit.name}; choose a larger one or a smaller scale")
+
+
+def _joined_linkage(mechanism: Mechanism, drawn: Mapping[str, Frame]) -> DrawnLinkage:
+    """The linkage where its links were drawn, without links that no joint holds. Raises BadInput."""
+    try:
+        linkage = slots_for_blocks(drawn_mechanism(mechanism, drawn, "plates", (ProfiledPair,)))
+    except BadInput as problem:
+        message = problem.sentence.replace("cannot be said in this format", "cannot be cut as plates that lie flat")
+        raise BadInput(problem.place, message) from None
+    joined = {link for joint in linkage.joints for link in joined_links(joint)}
+    return replace(linkage, links=tuple(link for link in linkage.links if link in joined))
 
 
 class _Course(NamedTuple):
@@ -203,6 +255,25 @@ class _Request:
     sheet: tuple[float, float]
     gap: float
     steps: int
+    drilled: tuple[Tracer, ...]
+
+
+def _drilled_points(mechanism: Mechanism, drawn: Mapping[str, Frame], holes: Sequence[str]) -> Iterator[Tracer]:
+    """The points of links that get holes, in metres where they were drawn: anchors of springs, and those named.
+
+    Raises BadInput for a name that is no point.
+    """
+    points = {point.name: point.members for point in named_points(mechanism)}
+    members = {f"{link}.{point}": ((link, point),) for each in points.values() for link, point in each}
+    anchors = [end for spring in mechanism.springs if not spring.is_torsional for end in spring.ends]
+    shapes = shapes_of_links(mechanism)
+    for name in dict.fromkeys((*anchors, *holes)):
+        known = points.get(name) or members.get(name)
+        if known is None:
+            raise BadInput("holes", f"there is no point {name!r}; points are {join_names(points)}")
+        for link, point in known:
+            place = drawn[link].to_world(shapes[link].position(point))
+            yield Tracer(name, link, (float(place.x), float(place.y)))
 
 
 class _Run:
@@ -258,13 +329,15 @@ class _Run:
 def _parts_at(mechanism: Mechanism, run: _Run, request: _Request, scale: float) -> Parts | None:
     """The parts at a scale; None where a plate does not fit the sheet."""
     linkage = _scaled(run.linkage, scale)
-    pin = _pin_diameter(linkage) if request.pin is None else 1e3 * request.pin
+    pin = _pin_diameter(linkage, cut_unit(mechanism.units)) if request.pin is None else 1e3 * request.pin
     wall = pin if request.wall is None else 1e3 * request.wall
     sizes = Sizes(pin, _own_pins(mechanism, scale, pin) if request.pin is None else {}, 1e3 * request.play, wall)
     angles = {pair.name: float(getattr(pair, "pressure_angle", radians(20.0))) for pair in mechanism.pairs}
     drives = cam_drives(mechanism, run.drawn, scale)
     travels = run.travels(linkage, scale) | run.faces(drives, scale)
-    plates, pins, meshing = make_plates(linkage, sizes, travels, angles, drives)
+    factor = 1e3 * scale
+    drilled = [each._replace(at=(factor * each.at[0], factor * each.at[1])) for each in request.drilled]
+    plates, pins, meshing = make_plates(linkage, sizes, travels, angles, drives, drilled)
     try:
         sheets = nested(plates, (1e3 * request.sheet[0], 1e3 * request.sheet[1]), 1e3 * request.gap)
     except BadInput:
@@ -276,11 +349,13 @@ def _parts_at(mechanism: Mechanism, run: _Run, request: _Request, scale: float) 
     layers, meets = find_layers(layer_rules(places, plates, pins, meshing, sizes))
     placed = tuple(plate._replace(layer=layer) for plate, layer in zip(plates, layers, strict=True))
     by_name = {plate.name: plate.layer for plate in placed}
-    notes = _notes(plates, meets, run, scale)
+    spacers = find_spacers(places, placed, pins, sizes)
+    notes = _notes(plates, meets, run, scale) + _spacer_notes(spacers)
     return Parts(
         mechanism,
         placed,
         tuple(_part_pin(each, placed, sizes, request.thickness) for each in pins),
+        tuple(_part_spacer(each, sizes, request.thickness) for each in spacers),
         tuple(tuple(plate._replace(layer=by_name[plate.name]) for plate in sheet) for sheet in sheets),
         request.thickness,
         request.sheet,
@@ -319,7 +394,7 @@ def _scaled(linkage: DrawnLinkage, scale: float) -> DrawnLinkage:
     return replace(linkage, joints=tuple(joints), tracers=tracers, length="mm")
 
 
-def _pin_diameter(linkage: DrawnLinkage) -> float:
+def _pin_diameter(linkage: DrawnLinkage, unit: CutUnit) -> float:
     """About a tenth of the middle distance between pins of a link, of those that rods are sold in."""
     places: dict[str, list[tuple[float, float]]] = {}
     for joint in linkage.joints:
@@ -331,7 +406,7 @@ def _pin_diameter(linkage: DrawnLinkage) -> float:
     )
     apart = [each for each in apart if each > 1e-6 * apart[-1]]
     wanted = PIN_SHARE * apart[len(apart) // 2] if apart else 5.0
-    return min(NICE_PINS, key=lambda each: abs(each - wanted))
+    return min(unit.pins, key=lambda each: abs(each - wanted))
 
 
 def _part_pin(pin: Pin, plates: Sequence[Plate], sizes: Sizes, thickness: float) -> PartPin:
@@ -340,8 +415,28 @@ def _part_pin(pin: Pin, plates: Sequence[Plate], sizes: Sizes, thickness: float)
     return PartPin(pin.name, sizes.diameter(pin.name) / 1e3, thickness * (high - low + 1), (low, high))
 
 
+def _part_spacer(spacer: Spacer, sizes: Sizes, thickness: float) -> PartSpacer:
+    low, high = spacer.layers
+    inner = sizes.diameter(spacer.pin) + sizes.play
+    return PartSpacer(spacer.pin, inner / 1e3, spacer.diameter / 1e3, thickness * (high - low + 1), spacer.layers)
+
+
+def _spacer_notes(spacers: Sequence[Spacer]) -> tuple[str, ...]:
+    """Which pins have no room for a spacer."""
+    pins = dict.fromkeys(repr(spacer.pin) for spacer in spacers if not spacer.diameter)
+    if not pins:
+        return ()
+    return (f"no spacer clears the plates on pin {join_names(pins)}; hold the plates apart there by rings on the pin",)
+
+
 def _notes(plates: Sequence[Plate], meets: Sequence[tuple[str, str | int]], run: _Run, scale: float) -> tuple[str, ...]:
-    found = [f"made at 1:{1.0 / scale:g}, so that each plate fits the sheet"] if scale != 1.0 else []
+    found = [f"made at {_scale_text(scale)}, so that each plate fits the sheet"] if scale != 1.0 else []
+    found += [
+        f"holes {one.pin!r} and {other.pin!r} of plate {plate.name!r} run into each other; choose smaller pins"
+        for plate in plates
+        for one, other in combinations(plate.drilled, 2)
+        if np.hypot(one.at[0] - other.at[0], one.at[1] - other.at[1]) <= (one.diameter + other.diameter) / 2.0
+    ]
     if meets:
         told = [_meeting(pin, what, plates) for pin, what in meets]
         found.append(f"no order of layers was found that keeps everything clear; in this one {join_names(told)}")

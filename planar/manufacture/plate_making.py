@@ -6,13 +6,21 @@ from collections.abc import Mapping, Sequence
 from math import cos, hypot, pi, radians, sin
 from typing import NamedTuple
 
-from planar.formats.drawn.drawn_linkage import DrawnLinkage, PinJoint, Place, SlideJoint, SlotJoint, WheelJoint
+from planar.formats.drawn.drawn_linkage import (
+    DrawnLinkage,
+    PinJoint,
+    Place,
+    SlideJoint,
+    SlotJoint,
+    Tracer,
+    WheelJoint,
+)
 from planar.formats.drawn.wheels import wheel_centre
 from planar.foundation.errors import BadInput
 from planar.manufacture.cam_plates import CamDrive, hull_of_profile, outline_of
 from planar.manufacture.gear_sizes import MeshedRack, MeshedWheel, Meshes, meshes
 from planar.manufacture.involute import ADDENDUM, DEDENDUM, gear_outline
-from planar.manufacture.plates import Hole, Plate, Slot, Vertex, convex_hull, room_within, rounded_hull
+from planar.manufacture.plates import SAME_HOLE, Hole, Plate, Slot, Vertex, convex_hull, room_within, rounded_hull
 from planar.manufacture.rack_teeth import rack_outline
 
 BACKLASH = 0.02
@@ -56,13 +64,14 @@ def make_plates(
     travels: Mapping[str, Travel],
     pressure_angles: Mapping[str, float],
     drives: Sequence[CamDrive] = (),
+    drilled: Sequence[Tracer] = (),
 ) -> tuple[list[Plate], list[Pin], list[tuple[str, str]]]:
     """Plates, pins, and the plates that mesh or touch, by name; the frame's first.
 
     `travels` are of slides and slots, of pinions along their racks, and of where cams touch flat faces, by the pairs'
-    names. Raises BadInput where a plate cannot be.
+    names; `drilled` are points that get a hole without a pin of a pair. Raises BadInput where a plate cannot be.
     """
-    maker = _Maker(linkage, sizes, travels)
+    maker = _Maker(linkage, sizes, travels, drilled)
     meshed = meshes(linkage, pressure_angles)
     racks = [maker.rack(rack, travels[rack.joint]) for rack, _ in meshed.racks]
     touching = [maker.touching(drive) for drive in drives]
@@ -76,7 +85,9 @@ def make_plates(
 class _Maker:
     """One linkage on its way to plates."""
 
-    def __init__(self, linkage: DrawnLinkage, sizes: Sizes, travels: Mapping[str, Travel]) -> None:
+    def __init__(
+        self, linkage: DrawnLinkage, sizes: Sizes, travels: Mapping[str, Travel], drilled: Sequence[Tracer] = ()
+    ) -> None:
         self.linkage, self.sizes, self.travels = linkage, sizes, travels
         self.holes: dict[str, dict[str, Place]] = {link: {} for link in linkage.links}
         self.slots: dict[str, list[Slot]] = {link: [] for link in linkage.links}
@@ -86,6 +97,10 @@ class _Maker:
                 self._add_pin(joint.name, joint.at, joint.links[0], joint.links, joint.links)
             elif isinstance(joint, SlideJoint | SlotJoint):
                 self._add_slot(joint, travels[joint.name])
+        for point in drilled:
+            holes = self.holes.get(point.link)
+            if holes is not None and all(_apart(at, point.at) > SAME_HOLE * sizes.pin for at in holes.values()):
+                holes[point.name] = point.at
 
     def _add_pin(self, name: str, at: Place, on: str, links: tuple[str, ...], drilled: tuple[str, ...]) -> None:
         self.pins.append(Pin(name, at, on, links))

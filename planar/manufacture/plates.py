@@ -9,6 +9,10 @@ from typing import NamedTuple
 Place = tuple[float, float]
 ROUND_OFF = 1e-12
 """Of the square of a hull's extent: a turn that is none."""
+ONE_PLACE = 1e-9
+"""mm: points that are all this near to each other are one."""
+SAME_HOLE = 1e-6
+"""Part of a hole's diameter: holes this near to each other are one."""
 Vertex = tuple[float, float, float]
 """x, y, and the bulge of the way to the next vertex: the tangent of a quarter of its arc's angle, 0 if straight."""
 
@@ -55,22 +59,40 @@ class Plate(NamedTuple):
         """All closed lines that are cut: the outline, what is cut out of it, slots; holes are apart."""
         return (self.outline, *self.inside, *(slot_outline(slot) for slot in self.slots))
 
+    @property
+    def drilled(self) -> tuple[Hole, ...]:
+        """The holes that are drilled: of two pins on one axis one hole, the wider."""
+        found: list[Hole] = []
+        for hole in sorted(self.holes, key=lambda each: -each.diameter):
+            if all(hypot(hole.at[0] - at[0], hole.at[1] - at[1]) > SAME_HOLE * hole.diameter for _, at, _ in found):
+                found.append(hole)
+        return tuple(found)
+
 
 def convex_hull(points: Iterable[Place]) -> list[Place]:
-    """The corners of the convex hull, anticlockwise (A. M. Andrew's monotone chain); on a line to round-off is none."""
-    order = sorted(set(points))
-    if len(order) < 3:
-        return order
-    span = max(order[-1][0] - order[0][0], max(y for _, y in order) - min(y for _, y in order))
-    straight = ROUND_OFF * span**2
+    """The corners of the convex hull, anticlockwise (A. M. Andrew's monotone chain); on a line to round-off is none.
+
+    Points are ordered along the direction to the one farthest from the first, so that points of one line, or at one
+    place, keep their order whatever rounding makes of their coordinates.
+    """
+    distinct = sorted(set(points))
+    if not distinct:
+        return []
+    x, y = distinct[0]
+    far = max(distinct, key=lambda point: hypot(point[0] - x, point[1] - y))
+    u, v = far[0] - x, far[1] - y
+    if hypot(u, v) <= ONE_PLACE:
+        return [distinct[0]]
+    order = sorted(distinct, key=lambda point: (u * (point[0] - x) + v * (point[1] - y), point))
+    straight = ROUND_OFF * (u**2 + v**2)
 
     def half(run: Sequence[Place]) -> list[Place]:
-        found: list[Place] = []
+        chain: list[Place] = []
         for point in run:
-            while len(found) > 1 and _turn(found[-2], found[-1], point) <= straight:
-                found.pop()
-            found.append(point)
-        return found[:-1]
+            while len(chain) > 1 and _turn(chain[-2], chain[-1], point) <= straight:
+                chain.pop()
+            chain.append(point)
+        return chain[:-1]
 
     return half(order) + half(order[::-1])
 
@@ -126,7 +148,7 @@ def room_within(loop: Sequence[Place], at: Place) -> float:
 
 def plate_area(plate: Plate) -> float:
     """The area of a plate (mm^2), of its straight edges and arcs."""
-    holes = sum(pi * hole.diameter**2 / 4.0 for hole in plate.holes)
+    holes = sum(pi * hole.diameter**2 / 4.0 for hole in plate.drilled)
     return _loop_area(plate.outline) - sum(_loop_area(loop) for loop in plate.loops[1:]) - holes
 
 
@@ -159,6 +181,35 @@ def moved_plate(plate: Plate, angle: float, x: float, y: float) -> Plate:
         slots=tuple(each._replace(start=place(each.start), end=place(each.end)) for each in plate.slots),
         core=tuple(place(each) for each in plate.core),
     )
+
+
+def scaled_plate(plate: Plate, factor: float) -> Plate:
+    """The plate with all lengths multiplied by a factor, as from millimetres to inches."""
+
+    def place(at: Place) -> Place:
+        return factor * at[0], factor * at[1]
+
+    def loop(vertices: tuple[Vertex, ...]) -> tuple[Vertex, ...]:
+        return tuple((factor * x, factor * y, bulge) for x, y, bulge in vertices)
+
+    return plate._replace(
+        outline=loop(plate.outline),
+        inside=tuple(map(loop, plate.inside)),
+        holes=tuple(hole._replace(at=place(hole.at), diameter=factor * hole.diameter) for hole in plate.holes),
+        slots=tuple(
+            slot._replace(start=place(slot.start), end=place(slot.end), width=factor * slot.width)
+            for slot in plate.slots
+        ),
+        core=tuple(map(place, plate.core)),
+        reach=factor * plate.reach,
+    )
+
+
+def plate_box(plates: Iterable[Plate]) -> tuple[float, float, float, float]:
+    """The box round plates: left, lower, right and upper side."""
+    points = [point for plate in plates for point in sampled(plate.outline, 64)]
+    x, y = [point[0] for point in points], [point[1] for point in points]
+    return min(x), min(y), max(x), max(y)
 
 
 def _arctan(value: float) -> float:

@@ -1,14 +1,27 @@
-"""What must not share a layer, and what no pin may run through, by the distances of plates and pins over a run."""
+"""What must not share a layer, what no pin may run through, and spacers, by distances of plates and pins over a run."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import combinations
+from itertools import combinations, pairwise
+from typing import NamedTuple
 
 from planar.manufacture.clearances import Body, PlacesOf, body_of, keep_apart
 from planar.manufacture.layers import LayerRules
 from planar.manufacture.plate_making import Pin, Sizes
 from planar.manufacture.plates import Plate
+
+SPACER_WALLS = (2.0, 1.0, 0.5)
+"""Walls by which a spacer is wider than its pin: the first for which there is room."""
+
+
+class Spacer(NamedTuple):
+    """What fills the gap between two plates on a pin: its outer diameter (mm), 0 if nothing clears the plates there,
+    and its first and last layer."""
+
+    pin: str
+    diameter: float
+    layers: tuple[int, int]
 
 
 def layer_rules(
@@ -67,3 +80,48 @@ def joined_plates(pin: Pin, plates: Sequence[Plate]) -> tuple[int, ...]:
         return plate.link in pin.links and (drilled or slid)
 
     return tuple(index for index, plate in enumerate(plates) if is_held(plate))
+
+
+def find_spacers(places: PlacesOf, plates: Sequence[Plate], pins: Sequence[Pin], sizes: Sizes) -> list[Spacer]:
+    """The spacers of all pins: one in every gap between layers that a pin joins, clear of all else over the run."""
+    layers = {pin.name: sorted({plates[index].layer for index in joined_plates(pin, plates)}) for pin in pins}
+    by_name = {pin.name: pin for pin in pins}
+    found: list[Spacer] = []
+    for pin in pins:
+        for low, high in pairwise(layers[pin.name]):
+            if high - low < 2:
+                continue
+            # pins and spacers that stand in one of these layers, with their diameters
+            others = [
+                (by_name[name], sizes.diameter(name))
+                for name, joined in layers.items()
+                if name != pin.name and joined and joined[0] < high and joined[-1] > low
+            ]
+            others += [
+                (by_name[spacer.pin], spacer.diameter)
+                for spacer in found
+                if spacer.pin != pin.name and spacer.layers[0] < high and spacer.layers[1] > low
+            ]
+            between = [plate for plate in plates if low < plate.layer < high]
+            diameters = [sizes.diameter(pin.name) + walls * sizes.wall for walls in SPACER_WALLS]
+            clear = (size for size in diameters if _is_clear(pin, size, between, others, places, sizes.play))
+            found.append(Spacer(pin.name, next(clear, 0.0), (low + 1, high - 1)))
+    return found
+
+
+def _is_clear(  # many: what a spacer must clear
+    pin: Pin,
+    diameter: float,
+    plates: Sequence[Plate],
+    others: Sequence[tuple[Pin, float]],
+    places: PlacesOf,
+    play: float,
+) -> bool:
+    """Whether a spacer of this diameter on a pin meets no plate and no other pin or spacer over the run."""
+    spot = Body(pin.on, (pin.at,))
+    return all(
+        keep_apart(spot, body_of(plate.link, plate.core), plate.reach + diameter / 2.0 + play, places)
+        for plate in plates
+    ) and all(
+        keep_apart(spot, Body(other.on, (other.at,)), (size + diameter) / 2.0 + play, places) for other, size in others
+    )

@@ -89,7 +89,7 @@ class _Writer:
         high = low + thickness
         loops = [(plate.outline, True)]
         loops += [(loop, False) for loop in plate.loops[1:]]
-        loops += [(_circle(hole), False) for hole in plate.holes]
+        loops += [(_circle(hole), False) for hole in plate.drilled]
         loops = [(_without_points(loop), outer) for loop, outer in loops]
         faces: list[int] = []
         below, above = [], []

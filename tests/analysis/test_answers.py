@@ -3,11 +3,14 @@
 import json
 import re
 from itertools import pairwise
-from math import acos, asin, inf, pi, radians, sin, sqrt
+from math import acos, asin, atan2, hypot, inf, pi, radians, sin, sqrt
+from pathlib import Path
 
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from rich.console import Console
+from scipy.optimize import minimize_scalar
 
 import planar
 from planar.cli import main
@@ -16,7 +19,7 @@ from planar.model.mechanism import Drive, relative_motions, replace_inputs
 from planar.reports.tables.answers import record, tables
 from tests import command
 from tests.builders import crank_rocker, open_four_bar, slider_crank
-from tests.closed_forms import between, turn_apart
+from tests.closed_forms import between, meeting, turn_apart
 from tests.draws import part
 
 SEEDS = part(range(8), 2)
@@ -92,7 +95,107 @@ def test_a_slide_has_no_swing_and_no_return_without_a_whole_turn():
     motion = planar.cycle(planar.load("004-QR"), 40, 0.0, 3.0)
     assert planar.swing(motion, "stroke") is None
     assert planar.time_ratio(motion, "stroke") is None
-    assert planar.swing(planar.cycle(planar.load("four-bar"), 40), "DC") is None
+
+
+def door_angle(o):
+    """The door hangs between the ends of arm and guide, 900 mm apart."""
+    a = 1250j + 492.4 * np.exp(1j * o)
+    b = meeting(a, 900.0, 700.0 + 1900.0j, 538.5)
+    return np.angle(b - a)
+
+
+def thigh_angle(b):
+    """Shank, rear link, thigh and front link; the thigh's axis is upright where the line DC is as drawn."""
+    d = -22.0 + 10.0j + abs(8.0 + 38.0j) * np.exp(1j * b)
+    c = meeting(d, abs(26.0 + 14.0j), 20.0 + 0.0j, abs(-8.0 + 62.0j))
+    return np.unwrap(np.atleast_1d(np.angle((c - d) / (26.0 + 14.0j) * 1j)))
+
+
+def terminal_lines(motion, name):
+    """The table of answers about a name, line by line."""
+    console = Console(width=200)
+    with console.capture() as shown:
+        console.print(tables(motion, {name: planar.answers(motion, name)}))
+    return [line.strip() for line in shown.get().splitlines()]
+
+
+@pytest.fixture(scope="module")
+def short_ranges():
+    """Runs between limits of the input: stops of a slide, stops of a pin, dead points."""
+    paths = {path.stem: path for path in (Path(__file__).parents[1] / "data" / "ranges").glob("*.json")}
+    return {name: planar.cycle(planar.load(path), 24) for name, path in paths.items()}
+
+
+def test_a_boom_swings_as_far_as_the_law_of_cosines_says_between_its_cylinders_stops(short_ranges):
+    motion = short_ranges["boom-on-a-cylinder"]
+    ground = hypot(0.6, 0.4)
+    least, greatest = (radians(8.0) - atan2(0.4, 0.6) + between(1.2, ground, cylinder) for cylinder in (0.8, 1.3))
+    swing = planar.swing(motion, "boom")
+    assert (swing.least.value, swing.greatest.value) == pytest.approx((least, greatest), abs=1e-12)
+    assert swing.angle == pytest.approx(greatest - least, abs=1e-12)
+    assert (swing.least.input, swing.greatest.input) == pytest.approx((0.8, 1.3), abs=1e-12)
+    assert swing.turning == (False, False)
+    assert [(each.kind, each.of, each.input) for each in motion.limits] == [
+        ("stop", "cylinder", pytest.approx(end)) for end in (0.8, 1.3)
+    ]
+    assert planar.extremes(motion, "boom")[2:] == (*swing[1:4], (False, False))
+    travel = planar.stroke(motion, "cylinder")
+    assert [*travel.top, *travel.bottom, travel.length] == pytest.approx([1.3, 1.3, 0.8, 0.8, 0.5], abs=1e-12)
+    assert planar.extremes(motion, "cylinder", "displacement").turning == travel.turning == (False, False)
+
+
+@pytest.mark.parametrize(
+    ("name", "link", "angle", "turning"),
+    [("garage-door", "door", door_angle, (False, True)), ("knee", "thigh", thigh_angle, (True, False))],
+)
+def test_one_extreme_may_turn_back_and_the_other_be_an_end_of_the_range(short_ranges, name, link, angle, turning):
+    motion = short_ranges[name]
+    swing = planar.swing(motion, link)
+    ends = motion.inputs[motion.running_input].position[[0, -1]]
+    inputs = np.linspace(*ends, 20001)[1:-1]
+    values = angle(inputs)
+    assert swing.turning == turning
+    for extreme, turns, row, sign in (
+        (swing.least, turning[0], np.argmin(values), 1.0),
+        (swing.greatest, turning[1], np.argmax(values), -1.0),
+    ):
+        if turns:
+            beside = inputs[[row - 1, row + 1]]
+
+            def signed_angle(position, sign=sign):
+                return sign * angle(np.array([position]))[0]
+
+            best = minimize_scalar(signed_angle, bounds=beside, method="bounded", options={"xatol": 1e-10})
+            assert extreme.input == pytest.approx(best.x, abs=1e-7)
+            assert extreme.value == pytest.approx(sign * best.fun, abs=1e-12)
+        else:
+            assert row == len(inputs) - 1
+            assert extreme.input == ends[1]
+            beside = angle(np.append(inputs, ends[1] - 1e-9))[-1]  # at a dead point it moves as a root there
+            assert extreme.value == pytest.approx(beside, abs=1e-3)
+    assert swing.angle == swing.greatest.value - swing.least.value
+
+
+def test_the_table_says_of_each_end_whether_it_turns_back(short_ranges):
+    lines = terminal_lines(short_ranges["knee"], "thigh")
+    (least,) = (line for line in lines if "least angle" in line)
+    (greatest,) = (line for line in lines if "greatest angle" in line)
+    assert least.split() == ["least", "angle", "79.7585", "deg", "126.017", "deg", "turns", "back"]
+    assert greatest.split()[-6:] == ["299.542", "deg", "end", "of", "the", "range"]
+    assert not any("does not turn back" in line for line in lines)
+    turning = terminal_lines(planar.cycle(planar.load("crank-rocker"), 24), "crank")
+    assert any("it rotates fully, 1 turn over the range" in line for line in turning)
+
+
+def test_extremes_of_an_angle_that_rotates_fully_are_the_ends_of_its_range():
+    motion = planar.cycle(planar.load("crank-rocker"), 24)
+    crank = planar.extremes(motion, "crank", "angle")
+    assert crank.length == pytest.approx(2.0 * pi, abs=1e-12)
+    assert crank.turning == (False, False)
+    with pytest.raises(BadInput, match="'crank' has no displacement, but an angle"):
+        planar.extremes(motion, "crank", "displacement")
+    rocker = planar.extremes(motion, "B", "angle")  # of the pair: without an axis the point of this name is meant
+    assert rocker.length == planar.swing(motion, "B").angle
 
 
 def test_extreme_positions_of_a_crank_pin_are_those_of_its_circle():
@@ -287,8 +390,10 @@ def test_what_there_is_not_is_refused_in_a_sentence():
     for ask in (planar.swing, planar.time_ratio, planar.dwells, planar.advantage_over, planar.answers, planar.greatest):
         with pytest.raises(Unknown, match="there is no"):
             ask(motion, "nothing")
-    with pytest.raises(Unknown, match="there is no point"):
+    with pytest.raises(Unknown, match="there is no pair and no link"):
         planar.extremes(motion, "nothing")
+    with pytest.raises(Unknown, match="there is no point"):
+        planar.extremes(motion, "nothing", "x")
     with pytest.raises(BadInput, match="'x', 'y' or a direction"):
         planar.extremes(motion, "A", "z")
     with pytest.raises(BadInput, match="direction"):

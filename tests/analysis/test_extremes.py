@@ -110,9 +110,13 @@ def test_of_a_part_of_a_turn_only_ends_within_it_count(way):
     def over(start, stop):
         return stroke(planar.cycle(mechanism, 40, *(radians(each) for each in (start, stop)[::way])), "stroke")
 
-    assert over(30, 120) is None
-    assert over(-20, 120) is None
+    assert over(30, 120).turning == (False, False)
+    part_of_turn = over(-20, 120)
+    assert part_of_turn.turning == (True, False)  # TDC at 0, BDC at 180 degrees
+    assert (part_of_turn.top.input, part_of_turn.bottom.input) == pytest.approx((0.0, radians(120)), abs=NEAR)
+    assert part_of_turn.length == pytest.approx(0.4 - piston(radians(120), 0.1, 0.3)[0], rel=NEAR)
     whole = over(-20, 200)
+    assert whole.turning == (True, True)
     assert (whole.top.input, whole.bottom.input) == pytest.approx((0.0, pi), abs=NEAR)
     # a range that begins and ends at the dead centres turns back there
     exactly = over(0, 180)
@@ -126,7 +130,7 @@ def test_of_two_turns_the_first_ends_are_told():
     assert found.top.input == pytest.approx(2.0 * pi, abs=NEAR)
 
 
-def test_between_limits_of_the_input_a_slide_turns_back_inside_or_has_no_stroke():
+def test_between_limits_of_the_input_a_slide_turns_back_inside_or_goes_from_end_to_end():
     # 002-E3.3 turns back inside its range; 000-P4's slides are farthest at the limits of the crank
     motion = planar.cycle(planar.load("002-E3.3"))
     found = stroke(motion, "stroke")
@@ -134,8 +138,11 @@ def test_between_limits_of_the_input_a_slide_turns_back_inside_or_has_no_stroke(
     assert np.isnan(motion.pair("stroke")["velocity"][[0, -1]]).all()
     assert found.length == pytest.approx(np.ptp(fine), rel=1e-5)
     run = planar.cycle(planar.load("000-P4"))
-    assert stroke(run, "guide B") is None
-    assert stroke(run, "guide D") is None
+    for slide in ("guide B", "guide D"):
+        travel, displacement = stroke(run, slide), run.pair(slide)["displacement"]
+        assert np.ptp(displacement) <= travel.length == pytest.approx(np.ptp(displacement), rel=1e-5)
+        assert False in travel.turning
+        assert {travel.top.input, travel.bottom.input} & {*run.inputs["O"].position[[0, -1]].tolist()}
 
 
 def test_a_stroke_between_the_last_sample_and_a_limit_is_found():

@@ -13,6 +13,7 @@ import planar
 from planar.assemblies.circuits.chebyshev_zeros import SignedLog, find_zeros
 from planar.assemblies.polynomial.completeness import Completeness
 from tests.builders import bare_four_bar, slider_crank_document
+from tests.closed_forms import between
 from tests.draws import draws, part
 from tests.linkages import random_linkage
 
@@ -145,7 +146,8 @@ def test_four_bars_have_the_circuits_and_branches_of_grashofs_types(sizes, by_cr
             for reach in (coupler + driven, coupler - driven)
         ]
         limits = sorted(angle % TURN for c in cosines if abs(c) < 1.0 for angle in (acos(c), -acos(c)))
-        assert found.critical == pytest.approx(limits, abs=1e-12)
+        assert sorted(angle % TURN for angle in found.critical) == pytest.approx(limits, abs=1e-12)
+        assert list(found.critical) == sorted(interval.low for interval in found.intervals if limits)
         turns = {branch.turns for each in found for branch in each.branches}
         assert turns == ({0} if limits else {1})
 
@@ -183,7 +185,7 @@ def test_an_assembly_lies_on_the_branch_of_its_side():
             b, c, d = (mode.points[name] for name in "BCD")
             side = (c - b)[0] * (d - c)[1] - (c - b)[1] * (d - c)[0] > 0.0
             circuit, branch = found.of(mode)
-            assert branch.low <= angle % TURN + TURN * (angle % TURN < branch.low) <= branch.high
+            assert (angle - branch.low) % TURN <= branch.high - branch.low
             # of the two circuits one has the input above, one below the frame
             sides.setdefault((circuit.number, branch.number), set()).add((side, sin(angle) > 0.0))
     assert sorted(map(list, sides.values())) == [[each] for each in product((False, True), repeat=2)]
@@ -207,6 +209,22 @@ def test_a_linkage_that_never_goes_together_has_no_circuit():
     assert len(found) == 0
     assert found.assembles == ()
     assert found.complete is CLAIMED
+
+
+@pytest.mark.parametrize("turns", [0, -1, 2])
+@pytest.mark.parametrize("position", [-0.6, 0.8])
+def test_an_interval_is_written_around_the_files_position_as_the_range_of_cycle_is(position, turns):
+    mechanism = bare_four_bar(2.0, 1.8, 3.0, 4.0, position + turns * TURN)
+    found = planar.circuits(mechanism)
+    run = planar.cycle(mechanism, 4).inputs["A"].position
+    limit = between(2.0, 4.0, 4.8)  # coupler and rocker stretched
+    assert run[[0, -1]] == pytest.approx([turns * TURN - limit, turns * TURN + limit], abs=1e-9)
+    assert found.assembles == (pytest.approx((run[0], run[-1]), abs=1e-9),)
+    assert {(each.low, each.high) for circuit in found for each in circuit.branches} == set(found.assembles)
+    inside, outside = sorted(found.intervals, key=lambda interval: interval.assemblies, reverse=True)
+    assert (inside.low, inside.high) == found.assembles[0]
+    assert (outside.low, outside.high) == pytest.approx((limit, TURN - limit), abs=1e-9)  # it starts in (-pi, pi]
+    assert [each.motion.inputs["A"].position.min() for each in found] == pytest.approx([run[0]], abs=1e-9)
 
 
 def test_a_circuit_that_is_not_there_at_the_files_input_is_found():

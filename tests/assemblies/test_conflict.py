@@ -278,7 +278,7 @@ def test_the_command_says_why_before_it_refuses(tmp_path):
     assert told.endswith(value["reason"])
     conflict = value["conflict"]
     assert (conflict["pairs"], conflict["inputs"]) == (["A", "B", "C", "D"], ["A"])
-    assert conflict["assembles"]["A"]["intervals"] == [pytest.approx([2.0 * pi - limit, 2.0 * pi + limit], abs=1e-7)]
+    assert conflict["assembles"]["A"]["intervals"] == [pytest.approx([-limit, limit], abs=1e-7)]
     assert conflict["positions"][0]["value"] == pytest.approx(limit, abs=1e-4)
 
 

@@ -152,7 +152,7 @@ def results():
     yield planar.chain_of("four-bar")
     yield from (found := planar.cognates("four-bar", "E"), found[1], found[1].inputs[0])
     yield planar.convert("four-bar", to_format="pmks")
-    yield from (made := planar.parts("four-bar"), made.pins[0], made.plates[0])
+    yield from (made := planar.parts("four-bar"), made.pins[0], made.plates[0], made.spacers[0])
     yield from (planar.BadInput("here", "wrong"), planar.Unknown("no such point"), planar.Outcome.SOLVED)
     yield planar.NoAnswer(planar.Outcome.DEAD_POINT, "it stops", links=["a"])
 

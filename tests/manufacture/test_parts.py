@@ -2,8 +2,10 @@
 
 import io
 import json
-from itertools import combinations
+import re
+from itertools import combinations, pairwise
 from math import acos, cos, hypot, pi, radians, sin, tan
+from pathlib import Path
 from xml.etree import ElementTree
 
 import ezdxf
@@ -88,12 +90,92 @@ def test_a_slot_is_as_long_as_the_stroke():
     assert hypot(slot.end[0] - slot.start[0], slot.end[1] - slot.start[1]) == pytest.approx(2 * 480 / 5)
 
 
-def test_the_svg_has_the_same_plates_in_millimetres():
-    found = planar.parts("four-bar")
+@pytest.mark.parametrize(("model", "unit"), [("four-bar", "mm"), ("engine-in-inches", "in")])
+def test_the_svg_is_as_large_as_its_parts_and_their_list(model, unit):
+    found = planar.parts(model)
     root = ElementTree.fromstring(found.encode(".svg"))
-    assert root.get("width") == "600mm" and root.get("viewBox").startswith("0 0 600 ")
+    width, height = (float(root.get(side).removesuffix(unit)) for side in ("width", "height"))
+    assert root.get("viewBox") == f"0 0 {width:.6g} {height:.6g}"
     paths = [each for each in root if each.tag.endswith("path")]
     assert len(paths) == len(found.plates)
+    numbers = np.array([re.findall(r"(-?[\d.]+) (-?[\d.]+)(?= [A-Z]|$)", each.get("d")) for each in paths[:1]], float)
+    assert numbers.min() >= 0.0
+    millimetre = 1.0 if unit == "mm" else 1 / 25.4
+    sides = [np.ptp(np.array(sampled(plate.outline)), axis=0) * millimetre for plate in found.sheets[0]]
+    assert max(side[0] for side in sides) < width < found.sheet[0] * 1e3 * millimetre
+    lowest = min(float(each.get("y")) for each in root if each.get("text-anchor") == "start")
+    assert lowest < (found.sheet[1] * 1e3 + 8.0) * millimetre  # the list stands right beneath the parts
+
+
+def test_a_file_in_inches_gives_plates_pins_and_areas_in_inches(tmp_path):
+    found = planar.parts("engine-in-inches")
+    document = ezdxf.read(io.StringIO(found.encode(".dxf").decode()))
+    assert document.units == document.header["$INSUNITS"] == ezdxf.units.IN
+    circles = [each for each in document.modelspace() if each.dxftype() == "CIRCLE"]
+    assert {round(2.0 * each.dxf.radius, 9) for each in circles} == {0.505}
+    apart = [
+        hypot(a.dxf.center.x - b.dxf.center.x, a.dxf.center.y - b.dxf.center.y) for a, b in combinations(circles, 2)
+    ]
+    assert min(abs(each - 8.0) for each in apart) < 1e-9  # the rod
+    (sheet,) = (each for each in document.modelspace() if each.dxf.layer == "SHEET")
+    assert max(map(tuple, sheet.get_points("xy"))) == pytest.approx((24.0, 16.0))
+    shown = run(tmp_path, "parts", "engine-in-inches").done()
+    assert "0.125 in plates at scale 1:1" in shown
+    assert "in²" in shown
+    assert "mm" not in shown
+    rod = next(plate for plate in found.plates if plate.name == "rod")
+    assert f"{8.0 * 1.5 + pi * 0.75**2 - 2 * pi * 0.2525**2:.5g}" in shown  # a bar, two half discs, two holes
+    assert plate_area(rod) / 25.4**2 == pytest.approx(8.0 * 1.5 + pi * 0.75**2 - 2 * pi * 0.2525**2)
+    small = run(tmp_path, "parts", "engine-in-inches", "--sheet", "8x6").done()
+    assert "at scale 1:2" in small
+    assert "such as 24x16 (in)" in run(tmp_path, "parts", "engine-in-inches", "--sheet", "big").refused(2)
+
+
+def test_springs_and_points_that_are_named_get_holes(tmp_path):
+    """The spring of the door from S of the wall to A, which has the hole of a pin already."""
+    door = Path(__file__).parents[1] / "data" / "ranges" / "garage-door.json"
+    found = planar.parts(door, holes=("bottom",))
+    holes = {plate.name: {hole.pin: hole.at for hole in plate.holes} for plate in found.plates}
+    assert {name: set(own) for name, own in holes.items()} == {
+        "wall": {"O", "Q", "S"},
+        "arm": {"O", "A"},
+        "guide": {"Q", "B"},
+        "door": {"A", "B", "bottom"},
+    }
+    assert np.subtract(holes["wall"]["S"], holes["wall"]["O"]) == pytest.approx([0.0, 1050.0 / 5], abs=1e-9)
+    assert np.hypot(*np.subtract(holes["door"]["bottom"], holes["door"]["B"])) == pytest.approx(1700.0 / 5)
+    assert {pin.name for pin in found.pins} == set("OQAB")
+    done = run(tmp_path, "parts", str(door), "--hole", "top", "--hole", "door.bottom", "--json")
+    record = json.loads(done.done())
+    assert {"top", "door.bottom"} < next(set(each["holes"]) for each in record["plates"] if each["plate"] == "door")
+    assert "there is no point 'knob'" in run(tmp_path, "parts", str(door), "--hole", "knob").refused(2)
+    near = planar.parts(door, pin=0.05, wall=0.01, scale=0.05)  # an arm of 24.6 mm
+    assert any("run into each other" in note for note in near.notes)
+
+
+@pytest.mark.parametrize("model", ["four-bar", "klann-leg"])
+def test_spacers_fill_the_gaps_of_pins_and_meet_no_plate(model):
+    found = planar.parts(model, scale=1.0, sheet=(9.0, 9.0))
+    motion = planar.cycle(model, steps=40)
+    layers = {plate.name: plate.layer for plate in found.plates}
+    gaps = []
+    for pin in found.pins:
+        joined = sorted({layers[p.name] for p in found.plates if pin.name in {hole.pin for hole in p.holes}})
+        gaps += [(pin.name, low + 1, high - 1) for low, high in pairwise(joined) if high - low > 1]
+    assert gaps
+    assert [(each.pin, *each.layers) for each in found.spacers] == gaps
+    for spacer in found.spacers:
+        low, high = spacer.layers
+        assert spacer.length == pytest.approx(found.thickness * (high - low + 1))
+        (diameter,) = (pin.diameter for pin in found.pins if pin.name == spacer.pin)
+        assert spacer.inner == pytest.approx(diameter + 1e-4) and spacer.outer > spacer.inner
+        ring = spacer.outer / 2.0 * np.exp(2j * pi * np.arange(48) / 48)
+        for plate in found.plates:
+            for row in range(41) if low <= plate.layer <= high else ():
+                place = motion.point(spacer.pin).position[row]
+                around = np.column_stack([place[0] + ring.real, place[1] + ring.imag])
+                assert not meet(around, drawn(plate, motion, row))
+    assert any(line.startswith(f"spacer on pin {found.spacers[0].pin}: ") for line in found.lines())
 
 
 def test_a_bar_is_its_length_and_two_half_discs():
@@ -102,6 +184,25 @@ def test_a_bar_is_its_length_and_two_half_discs():
     wanted = 50 * 12 + pi * 36 - pi * 6.25
     assert plate_area(plate) == pytest.approx(wanted, rel=1e-12)
     assert plate_area(moved_plate(plate, 33.0, 7.0, -2.0)) == pytest.approx(plate_area(plate))
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.3, pi / 2, 2.0])
+def test_the_hull_of_points_on_a_line_has_its_ends_whatever_rounding_makes_of_them(angle):
+    noise = (0.0, 1e-15, -2e-15, 4e-15)
+    spots = [(along, across) for along in (0.0, 1.0, 3.0) for across in noise]
+    points = [(cos(angle) * x - sin(angle) * y, sin(angle) * x + cos(angle) * y) for x, y in spots]
+    hull = convex_hull(points)
+    assert len(hull) == 2
+    assert hypot(hull[0][0] - hull[1][0], hull[0][1] - hull[1][1]) == pytest.approx(3.0)
+    assert len(convex_hull(points[:4])) == 1
+
+
+def test_a_block_with_two_pins_has_both_holes_in_its_plate():
+    found = planar.parts("engine-in-inches")
+    (block,) = (plate for plate in found.plates if plate.name == "block B")
+    inside = Polygon(np.array(sampled(block.outline)))
+    assert all(inside.contains_point(hole.at) for hole in block.holes)
+    assert len(block.drilled) == 2  # the pin of the slot and that of the rod are on one axis
 
 
 def test_the_hull_is_convex_and_holds_all_points():

@@ -7,7 +7,15 @@ from dataclasses import dataclass
 from planar.analysis.interpolated_run import InterpolatedRun
 from planar.analysis.motion.coupler_area import Area, area
 from planar.analysis.motion.dwells import Dwell, find_dwells
-from planar.analysis.motion.extremes import Extremes, Stroke, Swing, find_extremes, find_greatest, find_stroke
+from planar.analysis.motion.extremes import (
+    Extremes,
+    Stroke,
+    Swing,
+    find_extremes,
+    find_greatest,
+    find_stroke,
+    find_swing,
+)
 from planar.analysis.motion.mechanical_advantage_over_motion import AdvantageOver, advantage_over_run
 from planar.analysis.motion.output import Axis, Extreme, Output
 from planar.analysis.motion.time_ratio import TimeRatio, find_time_ratio
@@ -16,6 +24,7 @@ from planar.document.first_argument import takes_result
 from planar.foundation.errors import BadInput, Unknown, suggest_name_of_kinds
 from planar.foundation.short_repr import short_repr
 from planar.model.mechanism import relative_motions
+from planar.model.wording import count_phrase
 from planar.results.motion import Motion
 
 POINT_AXES: tuple[Axis, ...] = ("x", "y")
@@ -76,7 +85,7 @@ def answers(motion: Motion, name: str) -> tuple[Answers, ...]:
 
 def _output_answers(motion: Motion, steady: InterpolatedRun, name: str, what: str) -> Answers:
     output = Output(steady, name)
-    found, slides = output.turning_extremes(), output.kind == "length"
+    slides = output.kind == "length"
     driven, why = _transmission_or_reason(motion, steady, name)
     return Answers(
         of=name,
@@ -86,14 +95,14 @@ def _output_answers(motion: Motion, steady: InterpolatedRun, name: str, what: st
         per_unit=_is_per_unit(motion, steady),
         length=slides,
         stroke=find_stroke(steady, name) if slides else None,
-        swing=Swing(name, *found, found[1].value - found[0].value) if found and not slides else None,
+        swing=None if slides else find_swing(output),
         velocity=find_greatest(steady, output) if output.is_moving else None,
         acceleration=find_greatest(steady, output, "acceleration") if output.is_moving else None,
         time_ratio=find_time_ratio(output),
         dwells=tuple((None, each) for each in find_dwells(output)),
         transmission=driven,
         advantage=advantage_over_run(steady, output) if output.is_moving and name != steady.pair else None,
-        notes=(*_why_no_ends(output), *why),
+        notes=(*_why_no_range(output), *why),
     )
 
 
@@ -122,15 +131,16 @@ def _point_answers(motion: Motion, steady: InterpolatedRun, name: str) -> Answer
     )
 
 
-def _why_no_ends(output: Output) -> tuple[str, ...]:
+def _why_no_range(output: Output) -> tuple[str, ...]:
     """Why an output has no stroke or swing, if it has none."""
     if not output.is_moving:
         return ("it does not turn" if output.kind == "angle" else "it does not move",)
-    if output.turning_extremes() is not None:
-        return ()
-    if output.gain_per_period:
-        return ("it turns right round, so that it has no ends",)
-    return ("where it is least or greatest in the range of the input it does not turn back, so that it has no ends",)
+    if output.full_turns:
+        turns = count_phrase(abs(output.full_turns), "turn")
+        return (f"it rotates fully, {turns} over the range of the input, so that no angle is least or greatest",)
+    if output.range_extremes is None:
+        return ("where it is least or greatest is not determined: it has no velocity there",)
+    return ()
 
 
 def _transmission_or_reason(

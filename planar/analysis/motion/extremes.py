@@ -21,6 +21,8 @@ from planar.results.motion import Motion, State
 
 StateMeasure = Callable[[State], float | Array]
 
+PAIR_AXES = ("angle", "displacement")
+"""The quantities of a link or a pair that `extremes` takes for an axis."""
 RIVAL_RATIO = 0.5
 """Local maxima of the samples less than this part of the greatest are not looked into."""
 NEARER_RATIO, GROWTH_EXPONENT = 5.0, 0.6
@@ -31,28 +33,35 @@ than this power of it."""
 class Stroke(NamedTuple):
     """The stroke of a slide: its two ends, whose values are displacements (m), and its length (m).
 
-    `top` is the top dead centre (TDC), the end farther from the driving crank's fixed pin, `bottom` the other (BDC).
+    `top` is the end farther from the driving crank's fixed pin, `bottom` the other. `turning` says of each whether the
+    slide turns back there, so that it is a dead centre (TDC, BDC); otherwise the input's range ends there.
     """
 
     pair: str
     top: Extreme
     bottom: Extreme
     length: float
+    turning: tuple[bool, bool] = (True, True)
 
 
 class Swing(NamedTuple):
-    """The swing of a rocker: its extreme angles (rad), and the angle between them (rad)."""
+    """The swing of a link or a pair: its extreme angles (rad), and the angle between them (rad).
+
+    `turning` says of each extreme whether the link turns back there; otherwise the input's range ends there.
+    """
 
     of: str
     least: Extreme
     greatest: Extreme
     angle: float
+    turning: tuple[bool, bool] = (True, True)
 
 
 class Extremes(NamedTuple):
-    """The extreme positions of a point along an axis: coordinates (m), and the distance between them (m).
+    """The extremes of a point along an axis (m), of an angle (rad) or of a slide (m), and the distance between them.
 
-    `turning` says of each whether the point turns back there; else it is at an end of the input's range.
+    `point` is the name of the point, link or pair; `axis` is "angle" or "displacement" for a link or pair. `turning`
+    says of each whether it turns back there; otherwise the input's range ends there. NaN where no rates are determined.
     """
 
     point: str
@@ -65,12 +74,13 @@ class Extremes(NamedTuple):
 
 @takes_result("Motion")
 def stroke(motion: Motion, pair: str) -> Stroke | None:
-    """The ends of a slide's travel, where its velocity is zero, solved for to round-off (about 1e-14 rad of the input).
+    """The ends of a slide's travel, solved for to round-off (about 1e-14 rad of the input).
 
-    Top is the end farther from the driving crank's fixed pin, in the plane; where there is no such pin, or both are as
-    far, the end of greater displacement. Of ends that are reached more than once the first in the range is told. None
-    where the displacement is greatest or least at an end of the input's range and does not turn back there, where the
-    slide does not move, or where the relative motion at the pair is no length. Raises Unknown for another name.
+    The slide turns back at an end, where its velocity is zero, or the input's range ends there: `turning`. Top is the
+    end farther from the driving crank's fixed pin, in the plane; where there is no such pin, or both are as far, the
+    end of greater displacement. If an end is reached more than once, the first in the range is returned. None where the
+    slide does not move, where no rates are determined, or where the relative motion at the pair is no length. Raises
+    Unknown for another name.
 
     >>> import planar
     >>> motion = planar.cycle(planar.load("slider-crank"), 12)
@@ -83,21 +93,21 @@ def stroke(motion: Motion, pair: str) -> Stroke | None:
 
 def find_stroke(steady: InterpolatedRun, pair: str) -> Stroke | None:
     """See `stroke`; of a motion made ready for it."""
-    found = Output(steady, pair).turning_extremes()
-    if found is None:
+    output = Output(steady, pair)
+    if not output.is_moving or output.range_extremes is None:
         return None
-    low, high = found
-    top, bottom = (high, low) if _is_top(steady, pair, high, low) else (low, high)
-    return Stroke(pair, top, bottom, high.value - low.value)
+    low, high = output.range_extremes
+    top, bottom = (high, low) if _is_top(steady, pair, high.extreme, low.extreme) else (low, high)
+    return Stroke(pair, top.extreme, bottom.extreme, high.value - low.value, (top.turns_back, bottom.turns_back))
 
 
 @takes_result("Motion")
 def swing(motion: Motion, name: str) -> Swing | None:
-    """The extreme angles of a rocker, solved for to round-off: of a turning pair, else of a link, of this name.
+    """The extreme angles over a motion, solved for to round-off: of a turning pair, else of a link, of this name.
 
-    Angles are those of the motion, so that the swing may be more than a turn. None where it turns right round, where it
-    does not turn, where it is most at an end of the input's range and does not turn back there, and of a slide. Raises
-    Unknown for another name.
+    Angles are those of the motion, so that the swing may be more than a turn. The link turns back at an extreme, or the
+    input's range ends there: `turning`. None for a link that rotates fully with the input or does not turn, where no
+    rates are determined, and for a slide. Raises Unknown for another name.
 
     >>> import planar
     >>> motion = planar.cycle(planar.load("crank-rocker"), 12)
@@ -106,35 +116,52 @@ def swing(motion: Motion, name: str) -> Swing | None:
     """
     if name in relative_motions(motion.mechanism) and motion.has_length_motion(name):
         return None
-    found = Output(InterpolatedRun(motion), name).turning_extremes()
-    return found and Swing(name, *found, found[1].value - found[0].value)
+    return find_swing(Output(InterpolatedRun(motion), name))
+
+
+def find_swing(output: Output) -> Swing | None:
+    """See `swing`; of the output of this name, made already."""
+    if not output.is_moving or output.full_turns or output.range_extremes is None:
+        return None
+    least, greatest = output.range_extremes
+    turning = least.turns_back, greatest.turns_back
+    return Swing(output.name, least.extreme, greatest.extreme, greatest.value - least.value, turning)
 
 
 @takes_result("Motion")
-def extremes(motion: Motion, point: str, axis: Axis = "x") -> Extremes:
-    """The extreme positions of a point along an axis, "x" or "y" or a direction (rad), solved for to round-off.
+def extremes(motion: Motion, name: str, axis: Axis | None = None) -> Extremes:
+    """The extremes of a point along an axis, of the angle of a link or a pair, or of a slide, solved for to round-off.
 
-    Over a range that is not closed they may be at its ends. Of places that are alike the first in the range is told.
-    Raises Unknown for another name, BadInput for another axis.
+    `axis` of a point is "x" (by default), "y" or a direction (rad). "angle" is the angle of the pair, else of the link,
+    of this name, "displacement" that of a slide; they may be left out where no point has this name. Extremes may be at
+    the ends of the input's range, which `turning` says; those of a link that rotates fully are. Of places that are
+    alike the first in the range is returned. Raises Unknown for another name, BadInput for another axis.
 
     >>> import planar
     >>> motion = planar.cycle(planar.load("slider-crank"), 12)
     >>> round(planar.extremes(motion, "A").greatest.value, 6)
     0.48
+    >>> round(planar.extremes(motion, "rod").greatest.value, 6)
+    0.304693
     """
-    return find_extremes(Output(InterpolatedRun(motion), point, axis), axis)
+    if axis is None and (name in motion.point_names or name in motion._point_names):
+        axis = "x"
+    if axis is not None and axis not in PAIR_AXES:
+        return find_extremes(Output(InterpolatedRun(motion), name, axis), axis)
+    output = Output(InterpolatedRun(motion), name)
+    quantity = "displacement" if output.kind == "length" else "angle"
+    if axis is not None and axis != quantity:
+        raise BadInput("axis", f"{name!r} has no {axis}, but a{'n' * (quantity == 'angle')} {quantity}")
+    return find_extremes(output, quantity)
 
 
 def find_extremes(output: Output, axis: Axis) -> Extremes:
     """See `extremes`; of the output along this axis, made already."""
-    turns = output.turning_points
-    candidates = [(each, True) for each in turns] + [(each, False) for each in output.range_ends]
-    least, greatest = (
-        min((each for each in candidates if abs(each[0].value - end) <= output.tolerance), key=lambda each: not each[1])
-        for end in output.range
-    )
-    length = greatest[0].value - least[0].value
-    return Extremes(output.name, axis, least[0], greatest[0], length, (least[1], greatest[1]))
+    if output.range_extremes is None:
+        return Extremes(output.name, axis, Extreme(nan, nan), Extreme(nan, nan), nan, (False, False))
+    least, greatest = output.range_extremes
+    turning = least.turns_back, greatest.turns_back
+    return Extremes(output.name, axis, least.extreme, greatest.extreme, greatest.value - least.value, turning)
 
 
 @takes_result("Motion")
@@ -262,11 +289,16 @@ def _is_top(steady: InterpolatedRun, pair: str, high: Extreme, low: Extreme) -> 
     if steady.pin is None or rides is None:
         return True
     slider = "{}.{}".format(*rides[0])
-    far, near = (
-        float(np.hypot(*(state.point(slider).position - state.point(steady.pin).position)))
-        for state in (steady.state_at(high.input), steady.state_at(low.input))
-    )
+    far, near = (_distance_at(steady, slider, steady.pin, end.input) for end in (high, low))
     return far >= near - CLOSED_TOLERANCE * steady.solver.unit
+
+
+def _distance_at(steady: InterpolatedRun, point: str, other: str, position: float) -> float:
+    """How far two points are apart (m) at a position of the input, which may be a limit of the run."""
+    rows = np.flatnonzero(steady.positions == position)
+    moving: State | Motion = steady.samples if len(rows) else steady.state_at(position)
+    apart = np.hypot(*np.transpose(moving.point(point).position - moving.point(other).position))
+    return float(apart[rows[0]] if len(rows) else apart)
 
 
 def _is_unbounded(positions: Array, squares: Array, limit: float) -> bool:

@@ -12,6 +12,7 @@ import numpy as np
 
 from planar.analysis.interpolated_run import CLOSED_TOLERANCE, InterpolatedRun
 from planar.analysis.motion.zeros import bracket_near_zeros, bracket_zeros
+from planar.foundation.angles import TURN
 from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput, NoAnswer, Unknown, suggest_name_of_kinds
 from planar.foundation.jets import value_and_rates
@@ -33,6 +34,20 @@ class Extreme(NamedTuple):
 
     input: float
     value: float
+
+
+class RangeExtreme(NamedTuple):
+    """An extreme value (SI) over a range of the input, where it is, and whether the output turns back there; otherwise
+    the input's range ends there."""
+
+    input: float
+    value: float
+    turns_back: bool
+
+    @property
+    def extreme(self) -> Extreme:
+        """The place and the value."""
+        return Extreme(self.input, self.value)
 
 
 class Output:
@@ -101,6 +116,11 @@ class Output:
         """What it gains over a range that is closed: whole turns of an angle."""
         order = np.argsort(self.run.positions, kind="stable")
         return float(self._values[order[-1]] - self._values[order[0]]) if self.run.closed else 0.0
+
+    @property
+    def full_turns(self) -> int:
+        """The turns that an angle gains over a closed range of the input; 0 for what comes back, or a length."""
+        return round(self.gain_per_period / TURN) if self.kind == "angle" else 0
 
     @cached_property
     def range_ends(self) -> tuple[Extreme, ...]:
@@ -175,6 +195,33 @@ class Output:
                 except NoAnswer:
                     found[place] = Extreme(place, self.evaluate(position)[0])  # beside a limit, not on it
         return tuple(sorted(found.values()))
+
+    @cached_property
+    def range_extremes(self) -> tuple[RangeExtreme, RangeExtreme] | None:
+        """The least and the greatest value over the input's range, of several places the first; each says whether the
+        output turns back there.
+
+        None where no rates are determined, or a sample lies beyond every value that was solved for.
+        """
+        if not self.run.has_rates.any():
+            return None
+        ends = list(self.range_ends)
+        if self.full_turns:
+            ends.append(Extreme(self.run.highest, ends[0].value + self.gain_per_period))
+        candidates = [RangeExtreme(*point, True) for point in self.turning_points]
+        candidates += [RangeExtreme(*point, False) for point in ends]
+        values = [candidate.value for candidate in candidates]
+        low, high = min(values), max(values)
+        if self._values.min() < low - self.tolerance or self._values.max() > high + self.tolerance:
+            return None
+        least, greatest = (
+            min(
+                (candidate for candidate in candidates if abs(candidate.value - bound) <= self.tolerance),
+                key=lambda candidate: not candidate.turns_back,
+            )
+            for bound in (low, high)
+        )
+        return least, greatest
 
     def turning_extremes(self) -> tuple[Extreme, Extreme] | None:
         """The least and the greatest value where it turns back, of several places the first in the range.

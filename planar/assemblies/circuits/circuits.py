@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from math import pi
 from typing import Any, overload
 
 import numpy as np
@@ -14,15 +13,22 @@ from planar.assemblies.circuits.circuit_search import CircuitSearch, InputInterv
 from planar.assemblies.circuits.traced_circuit import Branch, TracedCircuit
 from planar.assemblies.modes import Mode
 from planar.document.first_argument import takes_mechanism
+from planar.foundation.angles import TURN, interval_offset
 from planar.foundation.arrays import Array
 from planar.foundation.notebook_display import Displayable
-from planar.model.mechanism import Drive, Mechanism, replace_inputs, running_input_index
+from planar.model.mechanism import (
+    Drive,
+    Mechanism,
+    links_counting_turns,
+    relative_motions,
+    replace_inputs,
+    running_input_index,
+)
 from planar.results.motion import Motion
 from planar.solving.cycle import cycle
 from planar.solving.position import solved_mechanism
 from planar.solving.prepared_mechanism import PreparedMechanism
 
-TURN = 2.0 * pi
 END_MARGIN = 1e-6
 """Of a branch that does not close: its very ends may be dead points, from which two branches lead."""
 TURN_TOLERANCE = 1e-12
@@ -70,9 +76,17 @@ class Circuit:
         """The positions all round it, or over the branch from which it was followed where it does not close."""
         if self.closed:
             return cycle(self.mechanism, pair=self.pair, circuit=True)
+        low, high = self.home_range
+        margin = END_MARGIN * (high - low)
+        return cycle(self.mechanism, start=low + margin, stop=high - margin, pair=self.pair)
+
+    @cached_property
+    def home_range(self) -> tuple[float, float]:
+        """The input's range on the branch from which the circuit was followed, around the position of `mechanism`."""
         home = self.branches[self.curve.home_branch]
-        room = END_MARGIN * (home.high - home.low)
-        return cycle(self.mechanism, start=home.low + room, stop=home.high - room, pair=self.pair)
+        position = next(given.position for given in self.mechanism.inputs if given.pair == self.pair)
+        offset = interval_offset(home.low, home.high, position) if self.curve.is_turning else 0.0
+        return home.low + offset, home.high + offset
 
     @cached_property
     def branch(self) -> Array:
@@ -90,25 +104,59 @@ def _circuit_again(mechanism: Mechanism, pair: str, number: int) -> Circuit:
 
 
 class Circuits(Displayable, Sequence[Circuit]):
-    """All circuits, in an order that does not depend on the sketch: by the lowest input, then by the assemblies there.
+    """All circuits, in an order that does not depend on the sketch: by the lowest input, angles counted from 0 to 2 pi,
+    then by the assemblies there.
 
-    `critical`: positions of the input (rad from 0 to 2 pi, or m) at which assemblies meet: dead points, and where
-    branches cross; `intervals`: the input's range cut there; `complete`: whether the number of circuits is claimed;
-    `remarks`: how they were found, and what is not claimed.
+    `critical`: positions of the input (rad or m) at which assemblies meet: dead points, and where branches cross;
+    `intervals`: the input's range cut there; `complete`: whether the number of circuits is claimed; `remarks`: how they
+    were found, and what is not claimed. An interval of an angle contains the file's position of the input if whole
+    turns can bring it there, as the range of `cycle` does; otherwise it starts in (-pi, pi]. A critical angle is the
+    start of an interval.
     """
 
     def __init__(self, mechanism: Mechanism, pair: str):
         found = CircuitSearch(mechanism, pair).find_circuits()
         self.mechanism, self.pair = mechanism, pair
-        self.critical, self.complete, self.remarks = found.critical, found.complete, found.remarks
-        self.intervals: tuple[InputInterval, ...] = found.intervals
+        self.complete, self.remarks = found.complete, found.remarks
+        self._is_sliding = solved_mechanism(mechanism).solver.is_sliding(pair)
+        self._search_intervals = found.intervals
+        placed = (
+            each._replace(low=low, high=high)
+            for each in found.intervals
+            for low, high in [self._place(*each[:2], with_ends=each.assemblies != 0)]
+        )
+        self.intervals: tuple[InputInterval, ...] = tuple(sorted(placed, key=lambda interval: interval.low))
+        self.critical = (
+            found.critical
+            if self._is_sliding or not found.critical
+            else tuple(interval.low for interval in self.intervals)
+        )
         self._found = tuple(self._circuit(number, *each) for number, each in enumerate(found.circuits, start=1))
 
+    def _place(self, low: float, high: float, with_ends: bool = True) -> tuple[float, float]:
+        """An interval of the input with the whole turns with which it is written."""
+        if self._is_sliding:
+            return low, high
+        position = next(given.position for given in self.mechanism.inputs if given.pair == self.pair)
+        offset = interval_offset(low, high, position, with_ends)
+        return low + offset, high + offset
+
     def _circuit(self, number: int, curve: TracedCircuit, mode: Mode) -> Circuit:
-        at = next(given.position for given in mode.mechanism.inputs if given.pair == self.pair)
-        moved = replace_inputs(self.mechanism, (Drive(self.pair, at),))
+        branches = tuple(
+            branch._replace(low=low, high=high)
+            for branch in curve.public_branches()
+            for low, high in [self._place(branch.low, branch.high)]
+        )
+        position = next(given.position for given in mode.mechanism.inputs if given.pair == self.pair)
+        counts_turns = not links_counting_turns(self.mechanism).isdisjoint(
+            relative_motions(self.mechanism)[self.pair].links
+        )
+        if not (self._is_sliding or counts_turns):
+            home = branches[curve.home_branch]
+            position -= interval_offset(home.low, home.high, position)
+        moved = replace_inputs(self.mechanism, (Drive(self.pair, position),))
         kept = replace(moved, sketch=mode.mechanism.sketch, published=())
-        return Circuit(number, tuple(curve.public_branches()), curve.closed, kept, self.pair, curve)
+        return Circuit(number, branches, curve.closed, kept, self.pair, curve)
 
     @overload
     def __getitem__(self, index: int) -> Circuit: ...
@@ -128,20 +176,20 @@ class Circuits(Displayable, Sequence[Circuit]):
 
     @cached_property
     def assembles(self) -> tuple[tuple[float, float], ...]:
-        """The intervals of the input within which the linkage goes together; a whole turn is (0, 2 pi)."""
+        """The intervals of the input within which the linkage can be assembled; a whole turn is (0, 2 pi)."""
         found: list[tuple[float, float]] = []
-        for low, high, assemblies in self.intervals:
+        for low, high, assemblies in self._search_intervals:
             if assemblies == 0:
                 continue
             joined = bool(found) and found[-1][1] == low
             found.append((found.pop()[0] if joined else low, high))
-        if not found or solved_mechanism(self.mechanism).solver.is_sliding(self.pair):
+        if not found or self._is_sliding:
             return tuple(found)
         if sum(high - low for low, high in found) >= TURN - TURN_TOLERANCE:
             return ((0.0, TURN),)
         if found[-1][1] >= found[0][0] + TURN - TURN_TOLERANCE:  # a turn ends where it starts
             found = [*found[1:-1], (found[-1][0], found[0][1] + TURN)]
-        return tuple(found)
+        return tuple(sorted(self._place(low, high) for low, high in found))
 
     def of(self, mode: Mode) -> tuple[Circuit, Branch] | None:
         """The circuit and the branch on which an assembly lies, at any position of the input."""

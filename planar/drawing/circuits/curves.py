@@ -13,6 +13,7 @@ from planar.assemblies.circuits.circuit_of_assembly import LocatedAssembly
 from planar.assemblies.circuits.circuits import Circuit, Circuits
 from planar.drawing.diagrams.drawn_run import MAX_TURNS
 from planar.drawing.diagrams.motion_curves import available_names, default_subject, find_slide
+from planar.foundation.angles import window_start
 from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput
 from planar.model.link_graph import link_numbers
@@ -28,6 +29,8 @@ MAX_COMPARED_CIRCUITS, MAX_COMPARED_CURVES, COMPARED_POSITIONS, SAME_OUTPUT_RATI
 """Circuits, strands and positions of the input at which outputs are compared, and what part of the range is seen."""
 FINE_TURNS, ROWS_PER_TURN = 2, 180
 """Turns of the input up to which a circuit's own rows are fine enough, and rows for each of more."""
+END_TOLERANCE = 1e-5
+"""Part of a curve: an assembly this near to its end lies on it."""
 MIN_GAP_RATIO = 1e-6
 """Part of a turn: a gap below this is none."""
 
@@ -170,30 +173,42 @@ def input_window(circuits: Circuits) -> InputWindow:
         shown = (low - beside, high + beside)
         inner = sorted((max(a, shown[0]), min(b, shown[1])) for a, b in circuits.assembles)
         return InputWindow(*shown, True, _gaps_between(inner, *shown), at)
+    written = sorted(circuits.assembles)
     going = sorted(
         (a - FULL_TURN * floor(a / FULL_TURN), b - FULL_TURN * floor(a / FULL_TURN)) for a, b in circuits.assembles
     )
     gaps = [(b, a) for (_, b), (a, _) in pairwise([*going, (going[0][0] + FULL_TURN, 0.0)]) if a - b > MIN_GAP_RATIO]
     if not gaps:
-        return InputWindow(0.0, FULL_TURN, False, (), at % FULL_TURN)
-    widest = max(gaps, key=lambda gap: gap[1] - gap[0])
-    half = 0.5 * (widest[1] - widest[0])
-    first = widest[1] - half  # the middle of the widest gap, where nothing is cut
+        first = _full_turn_start(circuits, at)
+        return InputWindow(first, first + FULL_TURN, False, (), first + (at - first) % FULL_TURN)
+    # the turn is cut in the middle of a gap: beside the intervals as tables write them, if they lie in one turn
+    around = (written[-1][1], written[0][0] + FULL_TURN)
+    fits = around[1] - around[0] > MIN_GAP_RATIO
+    cut = around if fits else max(gaps, key=lambda gap: gap[1] - gap[0])
+    half = 0.5 * (cut[1] - cut[0])
+    low, high = (cut[1] - FULL_TURN, cut[0]) if fits else (cut[1], cut[0] + FULL_TURN)
+    first = low - half
     place = first + (at - first) % FULL_TURN
-    low, high = widest[1], widest[0] + FULL_TURN
     beside = min(half, RANGE_MARGIN * (high - low))
     low, high = max(first, min(low, place) - beside), min(first + FULL_TURN, max(high, place) + beside)
-    back = FULL_TURN * ceil(
-        (0.5 * (low + high) - 1.5 * pi) / FULL_TURN
-    )  # so that its middle is from -90 to 270 degrees
-    low, high, place = low - back, high - back, place - back
+    if not fits:
+        low, high, place = low + at - place, high + at - place, at
     here = sorted(
         (max(a + FULL_TURN * k, low), min(b + FULL_TURN * k, high))
         for a, b in going
-        for k in (-2, -1, 0, 1)
+        for k in range(floor((low - FULL_TURN) / FULL_TURN) - 1, ceil(high / FULL_TURN) + 1)
         if a + FULL_TURN * k < high and b + FULL_TURN * k > low
     )
     return InputWindow(low, high, False, _gaps_between(here, low, high), place)
+
+
+def _full_turn_start(circuits: Circuits, position: float) -> float:
+    """Where a window of a whole turn starts: so that branches lie in it as tables write them, if one turn holds all."""
+    ends = [end for each in circuits for branch in each.branches if not branch.turns for end in branch[1:3]]
+    usual = window_start(position)
+    low, high = min(ends, default=usual), max(ends, default=usual)
+    middle = 0.5 * (low + high - FULL_TURN)
+    return next((first for first in (usual, 0.0, -pi, middle) if first <= low and high <= first + FULL_TURN), usual)
 
 
 def _gaps_between(going: Sequence[tuple[float, float]], low: float, high: float) -> tuple[tuple[float, float], ...]:
@@ -261,7 +276,7 @@ def drawn_motion(circuits: Circuits, circuit: Circuit, shown: InputWindow) -> Dr
     if shown.is_length or len(circuit.branches) > 1 or turns <= FINE_TURNS:
         return DrawnMotion(circuit, circuit.motion, circuit.branch, False)
     drawn = min(turns, MAX_TURNS)
-    start, stop = low, high
+    start, stop = circuit.home_range
     if circuit.closed or drawn < turns:
         start = next(given.position for given in circuit.mechanism.inputs if given.pair == circuits.pair)
         stop = start + drawn * FULL_TURN
@@ -342,7 +357,12 @@ def _mark_assemblies(
         there = [
             float(np.interp(at, *_sorted_by_input(strand)))
             for strand in each.branch_curves
-            if branch is not None and strand.branch == branch.number and strand.x.min() <= at <= strand.x.max()
+            if branch is not None
+            and strand.branch == branch.number
+            # a curve stops short of the ends of a branch
+            and strand.x.min() - END_TOLERANCE * np.ptp(strand.x)
+            <= at
+            <= strand.x.max() + END_TOLERANCE * np.ptp(strand.x)
         ]
         if state is None or not there:
             continue

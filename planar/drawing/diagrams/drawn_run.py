@@ -305,7 +305,9 @@ def _whole_turns(motion: Motion, pair: str) -> int:
 
 
 def _slide_stroke(motion: Motion, slide: str) -> Stroke | None:
-    return stroke(motion, slide) if motion.has_length_motion(slide) else None
+    """The stroke between the dead centres of a slide, if it turns back at both ends."""
+    travel = stroke(motion, slide) if motion.has_length_motion(slide) else None
+    return travel if travel is not None and all(travel.turning) else None
 
 
 def _is_even(time: Array) -> bool:

@@ -60,18 +60,30 @@ def _range_rows(each: Answers, units: FileUnits, position: _PositionFormatter) -
     """Stroke, swing, extreme positions, time ratio, dwells."""
     kind = "length" if each.length else "angle"
     if each.stroke is not None:
-        yield "stroke", amount(each.stroke.length, "length", units), "", ""
-        for word, end in (("TDC", each.stroke.top), ("BDC", each.stroke.bottom)):
-            yield f"  {word}", amount(end.value, "length", units, each.stroke.length), position(end.input), ""
+        stroke = each.stroke
+        yield "stroke", amount(stroke.length, "length", units), "", ""
+        words = ("greatest", "least") if stroke.top.value > stroke.bottom.value else ("least", "greatest")
+        for word, centre, end, turns in zip(
+            words, ("TDC", "BDC"), (stroke.top, stroke.bottom), stroke.turning, strict=True
+        ):
+            yield (
+                f"  {centre if turns else word}",
+                amount(end.value, "length", units, stroke.length),
+                position(end.input),
+                _end_text(turns),
+            )
     if each.swing is not None:
-        yield "swing", amount(each.swing.angle, "angle", units), "", ""
-        for word, end in (("least", each.swing.least), ("greatest", each.swing.greatest)):
-            yield f"  {word} angle", amount(end.value, "angle", units, 1.0), position(end.input), ""
+        swing = each.swing
+        yield "swing", amount(swing.angle, "angle", units), "", ""
+        for word, end, turns in zip(("least", "greatest"), (swing.least, swing.greatest), swing.turning, strict=True):
+            yield f"  {word} angle", amount(end.value, "angle", units, 1.0), position(end.input), _end_text(turns)
     for one in each.extremes:
         for word, end, turns in (("least", one.least, one.turning[0]), ("greatest", one.greatest, one.turning[1])):
-            told = "" if turns or not one.length else "an end of the range"
+            where = _end_text(turns) if one.length else ""
             size = max(abs(one.least.value), abs(one.greatest.value))
-            yield f"{word} {one.axis}", amount(end.value, "length", units, size), position(end.input), told
+            yield f"{word} {one.axis}", amount(end.value, "length", units, size), position(end.input), where
+        if one.length:
+            yield f"range of {one.axis}", amount(one.length, "length", units), "", ""
     if each.time_ratio is not None:
         ratio = each.time_ratio
         yield "time ratio", f"{ratio.ratio:.{DIGITS}g}", "", ""
@@ -121,6 +133,11 @@ def _use_rows(each: Answers, units: FileUnits, position: _PositionFormatter) -> 
         yield "least mechanical advantage", told, position(found.least.input), ""
         for place in found.infinite:
             yield "  beyond all bounds", "", position(place), ""
+
+
+def _end_text(turns_back: bool) -> str:
+    """What an extreme is."""
+    return "turns back" if turns_back else "end of the range"
 
 
 def _axis_suffix(axis: Axis | None) -> str:

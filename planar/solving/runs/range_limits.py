@@ -52,10 +52,11 @@ class RangeLimits:
         return len(u) > 2 and u[0] == u[-1] and u[1] == u[-2]
 
     def _limits_until(self, here: float, last: float, way: float) -> list[LocatedLimit]:
-        """What is met from the file's own position to another, if that lies that way."""
+        """The limits from the file's position to another one, if it lies that way; at the file's position its stops."""
         ranged, far = self.ranged, way * (last - here)
-        if far <= 0.0:
+        if far < -STEP_ROUNDING or (far <= 0.0 and ranged.solver.stops is None):
             return []
+        far = max(far, 0.0)
         walk = ranged.curve_tracker(ranged.assembly.z, here, way, work=ranged.arc_budget(far, here))
         met_there = events.limits_until(ranged.solver, ranged.pair, here, way, walk, far)
         # all with the input on its way up, whichever way it was followed

@@ -15,18 +15,35 @@ if TYPE_CHECKING:
 
 
 def parts_tables(found: Parts) -> RenderableType:
-    """The plates by layers, the pins, and what is to know of them."""
-    plates = plain_table("Plates", "no.", "plate", "layer", "holes", "slots", "teeth", "area, mm²", left=(1,))
+    """The plates by layers, the pins, the spacers, and what is to know of them."""
+    unit = found.unit
+    plates = plain_table("Plates", "no.", "plate", "layer", "holes", "slots", "teeth", f"area, {unit.name}²", left=(1,))
     for number, plate in enumerate(found.plates, 1):
-        counted = len(plate.holes), len(plate.slots), plate.teeth or ""
-        plates.add_row(str(number), plate.name, str(plate.layer), *map(str, counted), f"{plate_area(plate):.5g}")
-    pins = plain_table("Pins", "pin", "diameter, mm", "length, mm", "layers", left=(0,))
+        counted = len(plate.drilled), len(plate.slots), plate.teeth or ""
+        plates.add_row(
+            str(number),
+            plate.name,
+            str(plate.layer),
+            *map(str, counted),
+            f"{plate_area(plate) / unit.millimetres**2:.5g}",
+        )
+    pins = plain_table("Pins", "pin", f"diameter, {unit.name}", f"length, {unit.name}", "layers", left=(0,))
     for pin in found.pins:
         low, high = pin.layers
-        pins.add_row(pin.name, f"{1e3 * pin.diameter:g}", f"{1e3 * pin.length:g}", f"{low} to {high}")
+        pins.add_row(pin.name, unit.format(pin.diameter), unit.format(pin.length), f"{low} to {high}")
+    tables = [plates, pins]
+    if found.spacers:
+        heads = (f"{name}, {unit.name}" for name in ("inner", "outer", "length"))
+        spacers = plain_table("Spacers", "pin", *heads, "layers", left=(0,))
+        for spacer in found.spacers:
+            low, high = spacer.layers
+            outer = unit.format(spacer.outer) if spacer.outer else "-"
+            layers = str(low) if low == high else f"{low} to {high}"
+            spacers.add_row(spacer.pin, unit.format(spacer.inner), outer, unit.format(spacer.length), layers)
+        tables.append(spacers)
     clear = "every plate and pin is clear" if found.is_clear else "not everything is clear"
     told = [f"{clear} over the run, at {found.positions} positions and between them", *found.notes]
-    return Group(plates, pins, Text("\n".join(told)))
+    return Group(Text(found.heading, style="bold"), Text(), *tables, Text("\n".join(told)))
 
 
 def parts_record(found: Parts) -> dict[str, Any]:
@@ -55,5 +72,6 @@ def parts_record(found: Parts) -> dict[str, Any]:
             {"pin": pin.name, "diameter": pin.diameter, "length": pin.length, "layers": list(pin.layers)}
             for pin in found.pins
         ],
+        "spacers": [spacer.__dict__ | {"layers": list(spacer.layers)} for spacer in found.spacers],
         "sheets": [[plate.name for plate in sheet] for sheet in found.sheets],
     }
