@@ -289,4 +289,5 @@ FORMAT = FileFormat(
     source="ASMT*.cpp and testapp/*.asmt of FreeCAD/OndselSolver",
     recognise=recognise,
     read=read,
+    names_length_unit=False,
 )

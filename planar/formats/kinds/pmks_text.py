@@ -144,6 +144,7 @@ FORMAT = FileFormat(
     source="PMKSFileFormat.md and IOStringFunctions.cs of DesignEngrLab/PMKS",
     recognise=recognise,
     read=read,
+    names_length_unit=False,
     write=write,
     precision="double precision",
 )
