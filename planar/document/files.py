@@ -113,9 +113,7 @@ def read_source(
     ):
         mechanism = loads(content, place)
         if length_unit is not None:
-            raise BadInput(
-                "length unit", "a file of planar names its units; a unit is given only for a file that names none"
-            )
+            raise BadInput("length unit", "a file of planar names its units; leave the unit of length out")
         return mechanism, None, ()
     return _read_foreign(content, place, kind, length_unit)
 
@@ -141,9 +139,7 @@ def _read_foreign(
     found = named_format(kind, OWN_FORMAT) if kind not in (None, OWN_FORMAT) else recognised_format(source)
     if found is not None:
         if length_unit is not None and found.names_length_unit:
-            message = (
-                f"a file of {found.title} names its unit of length; a unit is given only for a file that names none"
-            )
+            message = f"a file of {found.title} names its unit of length; leave it out"
             raise BadInput("length unit", message)
         read = found.read(source)
         return read_mechanism(read.document), found.name, read.notes

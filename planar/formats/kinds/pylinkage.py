@@ -173,9 +173,7 @@ class _Reader:
         """The stops of a driver that goes to and fro between two angles of the line from its pin to its other joint."""
         other = next((key for key in self.links[link] if self.names[key] != pin.name), None)
         if other is None or not (given.has("arc_start") and given.has("arc_end")):
-            self.notes.append(
-                f"{link!r} goes to and fro between two angles that the file does not say; it has no stops"
-            )
+            self.notes.append(f"{link!r} goes to and fro between angles that the file does not say; it has no stops")
             return
         start, end = sorted((given.number("arc_start"), given.number("arc_end")))
         x, y = self.at(other)

@@ -45,8 +45,9 @@ def convert(
 
     The kind is that named by `to_format` ("planar", "linkage2", "pmks", "pmksplus", "pyslvs", "linkage_sim"), else that
     of the target's ending, else planar's own; the kind of the source is recognised, unless `from_format` names it.
-    `length_unit` is the unit of length of a file that names none, such as "m". The text is written to `target`, if that is named. Raises BadInput where a kind cannot say the mechanism, naming the
-    link or pair, and for files that cannot be read; NoAnswer where the mechanism cannot be assembled to be drawn.
+    `length_unit` is the unit of length of a file that names none, such as "m". The text is written to `target`, if that
+    is named. Raises BadInput where a kind cannot say the mechanism, naming the link or pair, and for files that cannot
+    be read; NoAnswer where the mechanism cannot be assembled to be drawn.
 
     >>> import planar
     >>> print(planar.convert("four-bar", to_format="pmks").text.splitlines()[1])
@@ -66,10 +67,10 @@ def write_conversion(
 ) -> Conversion:
     """A mechanism that was read, of this kind and with these notes, as the text of another kind of file."""
     named = to_format or _format_of(target)
-    text, more = (dumps(mechanism), ()) if named == OWN_FORMAT else written_text(mechanism, named)
+    written = WrittenText(dumps(mechanism), ()) if named == OWN_FORMAT else written_text(mechanism, named)
     if target is not None:
-        save_file(Path(target), text)
-    return Conversion(mechanism, kind or OWN_FORMAT, named, text, (*notes, *more))
+        save_file(Path(target), written.text)
+    return Conversion(mechanism, kind or OWN_FORMAT, named, written.text, (*notes, *written.notes))
 
 
 def _format_of(target: str | os.PathLike[str] | None) -> str:
