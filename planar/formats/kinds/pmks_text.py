@@ -147,4 +147,5 @@ FORMAT = FileFormat(
     names_length_unit=False,
     write=write,
     precision="double precision",
+    links=("http://.../?mech=...",),
 )
