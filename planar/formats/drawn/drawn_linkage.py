@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Container
 from dataclasses import dataclass, field, replace
 from math import cos, degrees, radians, sin
 from typing import NamedTuple
@@ -212,6 +213,19 @@ def stop_phrase(stop: DrawnStop, joint: Joint, length: str) -> str:
     limits = (None if value is None else degrees(value) if angle else value for value in (stop.low, stop.high))
     low, high = ("open" if value is None else f"{value:.6g}" for value in limits)
     return f"the stops of {joint_phrase(joint)}, {low} to {high} {'deg' if angle else length} from its drawn position,"
+
+
+def lost_stop_notes(linkage: DrawnLinkage, written: Container[DrawnStop] = ()) -> list[str]:
+    """The notes of the stops that a format does not say, and of the restitution of those that it says."""
+    joints = {joint.name: joint for joint in linkage.joints}
+    notes = []
+    for stop in linkage.stops:
+        phrase = stop_phrase(stop, joints[stop.joint], linkage.length)
+        if stop not in written:
+            notes.append(f"{phrase} are left out: the format has none there")
+        elif stop.restitution:
+            notes.append(f"{phrase} lose their restitution of {stop.restitution:g}: the format has none")
+    return notes
 
 
 def unit_note(length: str) -> str:

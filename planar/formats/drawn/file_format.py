@@ -32,8 +32,8 @@ class WrittenText(NamedTuple):
 
     text: str
     notes: tuple[str, ...]
-    stops: frozenset[str] = frozenset()
-    """The joints whose stops the text says; the stops of all others are lost, and a note names them."""
+    says_stops: bool = False
+    """Whether the text says stops, so that its notes name those that it does not say."""
 
 
 class FileFormat(NamedTuple):

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from planar.document.files import OWN_FORMAT, as_mechanism, dumps, read_source
-from planar.formats.drawn.drawn_linkage import DrawnLinkage, stop_phrase
+from planar.formats.drawn.drawn_linkage import DrawnLinkage, lost_stop_notes
 from planar.formats.drawn.file_format import WrittenText
 from planar.formats.known_formats import file_formats, format_by_ending, named_format, writable_endings
 from planar.foundation.errors import unknown_format_error
@@ -94,20 +94,13 @@ def written_text(mechanism: Mechanism, name: str) -> WrittenText:
         raise unknown_format_error("", f"a mechanism ({kind.title} is only read)", [*writable])
     drawn = drawn_mechanism(mechanism, rest_position(mechanism).frames, kind.title)
     found = kind.write(drawn)
-    notes = (*drawn.notes, *_omissions(drawn, name, found.stops), *found.notes)
-    return WrittenText(found.text, tuple(dict.fromkeys(notes)), found.stops)
+    notes = (*drawn.notes, *_omissions(drawn, name, found.says_stops), *found.notes)
+    return found._replace(notes=tuple(dict.fromkeys(notes)))
 
 
-def _omissions(drawn: DrawnLinkage, name: str, written_stops: frozenset[str]) -> list[str]:
+def _omissions(drawn: DrawnLinkage, name: str, says_stops: bool) -> list[str]:
     """What the text does not say of stops, masses, forces and gravity, as notes."""
-    joints = {joint.name: joint for joint in drawn.joints}
-    notes = []
-    for stop in drawn.stops:
-        phrase = stop_phrase(stop, joints[stop.joint], drawn.length)
-        if stop.joint not in written_stops:
-            notes.append(f"{phrase} are left out: the format has none there")
-        elif stop.restitution:
-            notes.append(f"{phrase} lose their restitution of {stop.restitution:g}: the format has none")
+    notes = [] if says_stops else lost_stop_notes(drawn)
     if drawn.masses and name != "linkage_sim":
         notes.append("masses are left out: the format has none, or no unit for them")
     if drawn.forces:

@@ -15,6 +15,7 @@ from planar.formats.drawn.drawn_linkage import (
     SlotJoint,
     joined_links,
     joint_phrase,
+    lost_stop_notes,
 )
 from planar.formats.drawn.file_format import WrittenText, cannot_say
 from planar.formats.kinds.parts.pmksplus_code import (
@@ -104,7 +105,7 @@ class _Writer:
             elif not isinstance(joint, PinJoint):
                 raise cannot_say(TITLE, joint_phrase(joint))
         text = ADDRESS + put_together(self._coded()) + "\n"
-        return WrittenText(text, tuple(self._notes()), frozenset(self.cylinders))
+        return WrittenText(text, tuple(self._notes()), says_stops=True)
 
     def _name(self, wanted: str) -> str:
         return self.book.fresh(re.sub(r"[^A-Za-z0-9]+", "_", wanted), "J")
@@ -236,8 +237,10 @@ class _Writer:
 
     def _notes(self) -> list[str]:
         linkage, rate = self.linkage, self._rpm()
+        written = [each for each in linkage.stops if each.joint in self.cylinders]
         found = [
             *linkage.notes,
+            *lost_stop_notes(linkage, written),
             "lengths are rounded to a thousandth of a cm, angles of rails to a thousandth of a radian",
         ]
         if abs(rate - round(rate)) > 1e-9:
