@@ -9,6 +9,8 @@ from typing import NamedTuple
 
 from planar.foundation.errors import join_names
 
+AT_END = 1e-6
+"""Of a slot's length, or rad of a curved one: a pin this far beyond the end of its slot is at that end."""
 Place = tuple[float, float]
 """x and y in the drawing, in the linkage's unit of length; y upwards."""
 
@@ -205,6 +207,16 @@ def position_on_line(joint: SlideJoint | SlotJoint) -> float:
         return 0.0
     x, y = joint.at[0] - joint.through[0], joint.at[1] - joint.through[1]
     return x * cos(radians(joint.angle)) + y * sin(radians(joint.angle))
+
+
+def slot_end_stop(slot: SlotJoint, length: float, unit: str) -> tuple[list[DrawnStop], list[str]]:
+    """The stops at the ends of a slot that begins at its point `through`, or a note where its pin lies beyond them."""
+    position = position_on_line(slot)
+    if -AT_END * length <= position <= (1.0 + AT_END) * length:
+        return [DrawnStop(slot.name, (slot.guide, slot.rider), min(-position, 0.0), max(length - position, 0.0))], []
+    beyond = max(-position, position - length)
+    place = f"its pin was drawn {beyond:.6g} {unit} beyond its end"
+    return [], [f"the slot of {slot.name!r} is {length:.6g} {unit} long, but {place}: it has no stops here"]
 
 
 def stop_phrase(stop: DrawnStop, joint: Joint, length: str) -> str:

@@ -9,6 +9,7 @@ from xml.etree.ElementTree import Element
 
 from planar.formats.drawn.drawn_document import drawn_document
 from planar.formats.drawn.drawn_linkage import (
+    AT_END,
     DrawnInput,
     DrawnLinkage,
     DrawnStop,
@@ -19,7 +20,7 @@ from planar.formats.drawn.drawn_linkage import (
     SlotJoint,
     Tracer,
     WheelJoint,
-    position_on_line,
+    slot_end_stop,
 )
 from planar.formats.drawn.file_format import FileFormat, ForeignText, ReadDocument
 from planar.formats.drawn.rigid_links import merge_links, merge_links_of_two_pins, without_loose_links
@@ -33,8 +34,6 @@ MECHANISM_LAYERS = 0xFFFFFFF0
 """The bits of `layer` of which one is set on what moves; other layers are drawings."""
 DEFAULT_RATE = 15.0
 """rpm, or strokes to and fro in a minute, where none is written."""
-AT_END = 1e-6
-"""Of a slot's length, or rad of a curved one: a pin this far beyond the end of its slot is at that end."""
 TURN = 2.0 * pi
 FRAME = "frame"
 LETTERS = ascii_uppercase + ascii_lowercase
@@ -238,21 +237,10 @@ class _Reader:
             self.joints.append(PinJoint(name, tuple(riders), at))
         slot = SlotJoint(along, guide, riders[0], at, degrees(atan2(v - y, u - x)), through=(x, y))
         self.joints.append(slot)
-        self._add_slot_ends(slot, hypot(u - x, v - y))
+        stops, notes = slot_end_stop(slot, hypot(u - x, v - y), "mm")
+        self.stops += stops
+        self.notes += notes
         return True
-
-    def _add_slot_ends(self, slot: SlotJoint, length: float) -> None:
-        """The stops at the ends of a slot that begins at its point `through`."""
-        position = position_on_line(slot)
-        if -AT_END * length <= position <= (1.0 + AT_END) * length:
-            limits = min(-position, 0.0), max(length - position, 0.0)
-            self.stops.append(DrawnStop(slot.name, (slot.guide, slot.rider), *limits))
-            return
-        beyond = max(-position, position - length)
-        self.notes.append(
-            f"the slot of {slot.name!r} is {length:.6g} mm long, but its pin was drawn {beyond:.6g} mm beyond its end; "
-            "it has no stops here"
-        )
 
     def _arc(self, key: str, guide: str, riders: list[str], centre: Place, ends: tuple[Place, Place]) -> None:
         """A pin in a curved slot, from one end anticlockwise to the other: a link about its centre holds it there."""

@@ -46,8 +46,11 @@ PARALLEL, CLOSED, EXACT = 1e-6, 1e-4, 1e-8
 """Of unit vectors that are parallel; of the assembly's size in space, gaps of joints that are closed, and noted."""
 AT_LIMIT = 1e-6
 """rad, or of the assembly's size: a joint this far beyond its limit is at it."""
-SOLVER_LINE = "OndselSolver"
-"""The first line of a file that the solver wrote for FreeCAD, which measures in mm; its examples have another one."""
+SOLVER_LINE, FREECAD_NAME = "OndselSolver", "OndselAssembly"
+"""The first line of a file that the solver wrote, and the name that FreeCAD gives an assembly.
+
+One of them with placeholder masses is a file of FreeCAD, which measures in mm; the solver's examples are in m.
+"""
 STANDARD_GRAVITY = (9.7, 9.9)
 """Between which magnitudes gravity is in m/s^2, whatever the unit of length."""
 KNOWN = (
@@ -89,7 +92,8 @@ class _Reader:
         self.assembly, self.place = assembly, source.place
         self.title = assembly.value("Name") or source.title
         self.has_placeholder_masses = _has_placeholder_masses(assembly)
-        is_from_freecad = self.has_placeholder_masses and source.text.lstrip().startswith(SOLVER_LINE)
+        is_named = assembly.value("Name") == FREECAD_NAME or source.text.lstrip().startswith(SOLVER_LINE)
+        is_from_freecad = self.has_placeholder_masses and is_named
         self.length = source.length_unit or ("mm" if is_from_freecad else "m")
         self.metres = parse_unit(self.length).to_si(1.0)
         self.book = NameBook({FRAME})
@@ -197,6 +201,10 @@ class _Reader:
     def _note_size(self) -> None:
         """Say how large the assembly is in the unit in which it is read."""
         places = [self.flat(held.pose.at) for held in self.markers.values()]
+        for part, pose in self.parts.values():
+            marker = part.find("PrincipalMassMarker")
+            if marker is not None and marker.find("Position3D") is not None:
+                places.append(self.flat(pose.place(read_pose(marker, self.place)).at))
         width, height = (max(values) - min(values) for values in zip(*places, strict=True))
         size = f"{height:.3g} {self.length} high and {width:.3g} {self.length} wide"
         self.notes.append(f"{unit_note(self.length)}: the assembly is {size}")
