@@ -35,7 +35,7 @@ def drawn_document(linkage: DrawnLinkage, place: str) -> ReadDocument:
     A link's angle is the direction from its first point to its second in the drawing; that of one with a single point
     is 0 as drawn, as is the frame's. What the linkage has to say of what was left out stands in the file's notes.
     """
-    whole = without_rigid_motions(_with_links_held(linkage))
+    whole = without_rigid_motions(_with_links_held(linkage), place)
     if not whole.joints:
         raise BadInput(place, "there is no joint in this file, so nothing moves")
     return _Writer(whole).write()

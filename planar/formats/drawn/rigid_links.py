@@ -18,6 +18,7 @@ from planar.formats.drawn.drawn_linkage import (
     joined_links,
     renamed_links,
 )
+from planar.foundation.errors import BadInput
 
 
 def merge_links(linkage: DrawnLinkage, groups: Iterable[Sequence[str]]) -> DrawnLinkage:
@@ -103,23 +104,24 @@ def without_loose_links(linkage: DrawnLinkage) -> DrawnLinkage:
     )
 
 
-def without_rigid_motions(linkage: DrawnLinkage) -> DrawnLinkage:
-    """The linkage without inputs and stops at joints that no longer move, with a note of each."""
+def without_rigid_motions(linkage: DrawnLinkage, place: str) -> DrawnLinkage:
+    """The linkage without stops at joints that cannot move, with notes. Raises BadInput for an input at such a joint."""
     links_of = {joint.name: joined_links(joint) for joint in linkage.joints}
 
     def moves(motion: DrawnInput | DrawnStop) -> bool:
         first, second = motion.links
         return first != second and {first, second} <= set(links_of.get(motion.joint, ()))
 
+    rigid = next((each for each in linkage.inputs if not moves(each)), None)
+    if rigid is not None:
+        message = f"the input at {rigid.joint!r} cannot move: the two links that it drives share two pins or are fixed"
+        raise BadInput(place, f"{message} to each other; drive another joint, or part these links")
     notes = [
-        f"the {kind} at {motion.joint!r} is left out: the two links that it joins cannot move against each other"
-        for kind, motions in (("input", linkage.inputs), ("stop", linkage.stops))
-        for motion in motions
-        if not moves(motion)
+        f"the stops at {stop.joint!r} are left out: the two links that it joins cannot move against each other"
+        for stop in linkage.stops
+        if not moves(stop)
     ]
-    kept_inputs = tuple(each for each in linkage.inputs if moves(each))
-    kept_stops = tuple(each for each in linkage.stops if moves(each))
-    return replace(linkage, inputs=kept_inputs, stops=kept_stops).with_notes(*notes)
+    return replace(linkage, stops=tuple(filter(moves, linkage.stops))).with_notes(*notes)
 
 
 def _apart(pins: Sequence[PinJoint]) -> bool:
