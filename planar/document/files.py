@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import sys
 from collections import Counter
 from collections.abc import Iterable, Iterator
@@ -19,6 +20,8 @@ OWN_FORMAT = "planar"
 """The name of planar's own form of file, among those of other programs."""
 PIPED = "-"
 """What stands for the input of the process in place of a file's name."""
+WEB_ADDRESS = re.compile(r"[A-Za-z][A-Za-z0-9+.-]*://|www\.|[A-Za-z0-9-]+(\.[A-Za-z0-9-]+)+(:\d+)?/\S*\?|\?[a-z]+=")
+"""How an address of the web begins, which is read and never opened."""
 MAX_FILES_SEARCHED = 10_000
 """Files of a folder that are looked at for one that may be meant."""
 MAX_FILE_BYTES = 8 * 1024 * 1024
@@ -82,12 +85,13 @@ def load(model: str | Path) -> Mechanism:
 
 
 def read_source(
-    model: str | os.PathLike[str], kind: str | None = None
+    model: str | os.PathLike[str], kind: str | None = None, length_unit: str | None = None
 ) -> tuple[Mechanism, str | None, tuple[str, ...]]:
     """The mechanism of a file, of another program's file, of a link, or of a model's name.
 
     With it the name of the other program's format, None for planar's own, and what could not be taken over; `kind`
-    names the format that is not to be recognised. Raises BadInput.
+    names the format that is not to be recognised, `length_unit` the unit of length of a file that names none. Raises
+    BadInput.
     """
     place = os.fsdecode(model)
     if place == PIPED:
@@ -96,8 +100,9 @@ def read_source(
         from planar.document.texts.mechanism_link import read_link
 
         return loads(read_link(place), "link"), None, ()
-    elif place.startswith(("http://", "https://")):
+    elif WEB_ADDRESS.match(place) and not Path(place).is_file():
         content = place.encode()  # the mechanism is in the address, which is not opened
+        place = f"link {place}" if len(place) <= 60 else f"link {place[:57]}..."
     else:
         path = find_model_file(place)
         place, content = str(path), read_limited(path)
@@ -106,13 +111,18 @@ def read_source(
         and content.lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"{")
         and b'"planar"' in content
     ):
-        return loads(content, place), None, ()
-    return _read_foreign(content, place, kind)
+        mechanism = loads(content, place)
+        if length_unit is not None:
+            raise BadInput("length unit", "a file of planar names its units; leave the unit of length out")
+        return mechanism, None, ()
+    return _read_foreign(content, place, kind, length_unit)
 
 
-def _read_foreign(content: bytes, place: str, kind: str | None) -> tuple[Mechanism, str | None, tuple[str, ...]]:
+def _read_foreign(
+    content: bytes, place: str, kind: str | None, length_unit: str | None
+) -> tuple[Mechanism, str | None, tuple[str, ...]]:
     """The mechanism of another program's text."""
-    from planar.formats.known_formats import foreign_text, named_format, recognised_format
+    from planar.formats.known_formats import foreign_text, known_links, named_format, recognised_format
 
     ending = Path(place).suffix
     told = "name a JSON file that describes a mechanism, another program's file of one, or a model that comes along"
@@ -125,11 +135,16 @@ def _read_foreign(content: bytes, place: str, kind: str | None) -> tuple[Mechani
             value = parse_json(content, place)
         except BadInput as found_problem:  # other forms open with a brace, too
             problem = found_problem
-    source = foreign_text(content, place, value)
+    source = foreign_text(content, place, value, length_unit)
     found = named_format(kind, OWN_FORMAT) if kind not in (None, OWN_FORMAT) else recognised_format(source)
     if found is not None:
+        if length_unit is not None and found.names_length_unit:
+            message = f"a file of {found.title} names its unit of length; leave it out"
+            raise BadInput("length unit", message)
         read = found.read(source)
         return read_mechanism(read.document), found.name, read.notes
+    if place.startswith("link "):
+        raise BadInput(place, f"no reader knows this link; links are read in these forms: {known_links()}")
     if problem is not None:
         raise problem
     if value is not None:

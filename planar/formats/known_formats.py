@@ -10,6 +10,7 @@ from typing import Any
 
 from planar.formats.drawn.file_format import FileFormat, ForeignText
 from planar.foundation.errors import BadInput, join_names
+from planar.foundation.units import UnitError, parse_unit
 
 
 @cache
@@ -42,11 +43,29 @@ def writable_endings() -> list[str]:
     return sorted({suffix for each in file_formats().values() if each.write for suffix in each.suffixes})
 
 
-def foreign_text(content: bytes, place: str, value: Any) -> ForeignText:
+def known_links() -> str:
+    """The forms of the links that are read, each with its program, as a list for a message."""
+    forms = [f"{link} ({kind.title})" for kind in file_formats().values() for link in kind.links]
+    return ", ".join([*forms, "planar:... (planar)"])
+
+
+def foreign_text(content: bytes, place: str, value: Any, length_unit: str | None = None) -> ForeignText:
     """A file's content as a text, beside its value where it is JSON. Raises BadInput where it is no text."""
     text = _decoded(content, place)
-    title = "linkage" if place.startswith(("http://", "https://", "standard input")) else PurePath(place).stem
-    return ForeignText(text, value, place, title)
+    title = "linkage" if place.startswith(("link ", "standard input")) else PurePath(place).stem
+    if length_unit is not None:
+        _check_length_unit(length_unit)
+    return ForeignText(text, value, place, title, length_unit)
+
+
+def _check_length_unit(name: str) -> None:
+    """Refuse what is no unit of length. Raises BadInput."""
+    try:
+        kind = parse_unit(name).kind
+    except UnitError as problem:
+        raise BadInput("length unit", str(problem)) from None
+    if kind != "length":
+        raise BadInput("length unit", f"{name!r} is a unit of {kind}, not of length; give one such as mm, m or in")
 
 
 def _decoded(content: bytes, place: str) -> str:

@@ -26,7 +26,7 @@ def test_a_pin_in_a_curved_slot_keeps_its_distance_from_the_centre(radius, centr
     place = f"C 100 {centre[1] - size if radius > 0 else centre[1] + size}"
     ends = 'P 60 0 anchor="true"\nQ 140 0 anchor="true"'
     text = linkage2(f'{CRANK}\n{ends}\n{place} slider="true" slideradius="{radius / PIXEL}" ~P ~Q', "A B\nB C\nP Q")
-    assert "curved slot of 'C'" in notes(text) and "where slots end" in notes(text)
+    assert "curved slot of 'C'" in notes(text) and "stops where the slot ends" in notes(text)
     motion = planar.cycle(read_text(text), steps=24)
     for x, y in 1000.0 * motion.point("C").position:
         assert hypot(x - centre[0], y - centre[1]) == pytest.approx(size)

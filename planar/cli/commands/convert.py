@@ -26,6 +26,7 @@ from planar.foundation.errors import BadInput
 @output_option("Write the mechanism to this file; its ending chooses the program, .json is planar's own.")
 @click.option("--to-format", metavar="NAME", help="The program that it is written for, where no ending says that.")
 @click.option("--from-format", metavar="NAME", help="What MODEL is, where it is not to be recognised.")
+@click.option("--length-unit", metavar="UNIT", help="The unit of length of a MODEL whose file names none, such as m.")
 @click.option("--formats", is_flag=True, help="List the programs whose files are read and written.")
 @json_option
 def convert(
@@ -33,6 +34,7 @@ def convert(
     output: Path | None,
     to_format: str | None,
     from_format: str | None,
+    length_unit: str | None,
     formats: bool,
     as_json: bool,
 ) -> None:
@@ -47,7 +49,7 @@ def convert(
     if model is None:
         raise BadInput("command line", "name the MODEL to convert, or give --formats")
     refuse_overwriting(model, output)
-    mechanism, kind, notes = read_source(model, from_format)
+    mechanism, kind, notes = read_source(model, from_format, length_unit)
     with show_status(mechanism.name):
         found = write_conversion(apply_settings(mechanism), kind, notes, output, to_format)
     if as_json:

@@ -11,7 +11,7 @@ from planar.formats.drawn.drawn_linkage import DrawnLinkage, Joint, PinJoint, Pl
 def slots_for_blocks(linkage: DrawnLinkage) -> DrawnLinkage:
     """The same motion of all other links, with a pin in a slot where a block slid that only carried this pin.
 
-    A block stays whose slide or pin is driven, or that has a point, a mass or a load of its own.
+    A block stays whose slide or pin is driven, whose pin has stops, or that has a point, a mass or a load of its own.
     """
     joints = linkage.joints
     for slide in linkage.joints_of(SlideJoint):
@@ -19,6 +19,12 @@ def slots_for_blocks(linkage: DrawnLinkage) -> DrawnLinkage:
         pin = _pin_of_block(replace(linkage, joints=joints), slide)
         if pin is not None:
             joints = tuple(made for each in joints for made in _replaced(each, slide, pin))
+            renamed = _slot_name(slide, pin)
+            stops = (
+                s._replace(joint=renamed, links=(slide.guide, _riders(slide, pin)[0])) if s.joint == slide.name else s
+                for s in linkage.stops
+            )
+            linkage = replace(linkage, stops=tuple(stops))
     return replace(linkage, joints=joints)
 
 
@@ -28,10 +34,16 @@ def _pin_of_block(linkage: DrawnLinkage, slide: SlideJoint) -> PinJoint | None:
     own = [each.link for each in linkage.tracers]
     own += [each.link for each in linkage.masses] + [each.link for each in linkage.forces]
     driven = {each.joint for each in linkage.inputs}
+    stopped = {each.joint for each in linkage.stops}
     if len(others) != 1 or slide.slider in own:
         return None
     pin = others[0]
-    if not isinstance(pin, PinJoint) or not near(pin.at, slide.at) or driven & {slide.name, pin.name}:
+    if (
+        not isinstance(pin, PinJoint)
+        or not near(pin.at, slide.at)
+        or driven & {slide.name, pin.name}
+        or pin.name in stopped
+    ):
         return None
     return pin
 
@@ -41,11 +53,19 @@ def _replaced(joint: Joint, slide: SlideJoint, pin: PinJoint) -> tuple[Joint, ..
         return ()
     if joint != pin:
         return (joint,)
-    riders = tuple(each for each in pin.links if each != slide.slider)
-    slot = SlotJoint(
-        pin.name if len(riders) == 1 else slide.name, slide.guide, riders[0], pin.at, slide.angle, slide.through
-    )
+    riders = _riders(slide, pin)
+    slot = SlotJoint(_slot_name(slide, pin), slide.guide, riders[0], pin.at, slide.angle, slide.through)
     return (slot,) if len(riders) == 1 else (pin._replace(links=riders), slot)
+
+
+def _riders(slide: SlideJoint, pin: PinJoint) -> tuple[str, ...]:
+    """The links that are pinned to the block."""
+    return tuple(link for link in pin.links if link != slide.slider)
+
+
+def _slot_name(slide: SlideJoint, pin: PinJoint) -> str:
+    """The name of the slot that replaces a block: that of its pin where only one link is pinned to the block."""
+    return pin.name if len(_riders(slide, pin)) == 1 else slide.name
 
 
 def near(one: Place, other: Place) -> bool:

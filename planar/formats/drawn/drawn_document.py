@@ -19,8 +19,10 @@ from planar.formats.drawn.drawn_linkage import (
     Tracer,
     WheelJoint,
     joined_links,
+    position_on_line,
 )
 from planar.formats.drawn.file_format import ReadDocument
+from planar.formats.drawn.rigid_links import without_rigid_motions
 from planar.foundation.errors import BadInput
 
 COINCIDENT = 1e-9
@@ -33,7 +35,7 @@ def drawn_document(linkage: DrawnLinkage, place: str) -> ReadDocument:
     A link's angle is the direction from its first point to its second in the drawing; that of one with a single point
     is 0 as drawn, as is the frame's. What the linkage has to say of what was left out stands in the file's notes.
     """
-    whole = _with_links_held(linkage)
+    whole = without_rigid_motions(_with_links_held(linkage), place)
     if not whole.joints:
         raise BadInput(place, "there is no joint in this file, so nothing moves")
     return _Writer(whole).write()
@@ -93,12 +95,12 @@ class _Writer:
 
     def _pair(self, joint: Joint) -> dict[str, Any]:
         if isinstance(joint, PinJoint):
-            return {"turning": joint.name, "links": list(joint.links)}
+            return {"turning": joint.name, "links": list(joint.links)} | self._stops(joint)
         if isinstance(joint, SlideJoint):
             entry = {"sliding": joint.name, "links": [joint.guide, joint.slider], **self._line(joint)}
-            return entry | {"turn": self.angle(joint.slider) - joint.angle}
+            return entry | {"turn": self.angle(joint.slider) - joint.angle} | self._stops(joint)
         if isinstance(joint, SlotJoint):
-            return {"slot": joint.name, "links": [joint.guide, joint.rider], **self._line(joint)}
+            return {"slot": joint.name, "links": [joint.guide, joint.rider], **self._line(joint)} | self._stops(joint)
         if isinstance(joint, RackJoint):
             return self._rack(joint)
         return self._wheels(joint)
@@ -124,29 +126,55 @@ class _Writer:
         mesh = {wheel: self.angle(wheel) - self.angle(joint.carrier) for wheel in joint.wheels}
         return entry | ({"mesh": mesh} if any(mesh.values()) else {})
 
+    def _stops(self, joint: PinJoint | SlideJoint | SlotJoint) -> dict[str, Any]:
+        """The stops of a joint as the keys of its entry; nothing where it has none."""
+        limits: dict[str, list[float | None]] = {}
+        restitution = 0.0
+        for stop in self.linkage.stops:
+            if stop.joint != joint.name:
+                continue
+            low, high, position, name = stop.low, stop.high, 0.0, joint.name
+            if isinstance(joint, PinJoint):
+                name, position, is_forward = self._pin_motion(joint, stop.links)
+                low, high = (None if value is None else degrees(value) for value in (low, high))
+                if not is_forward:
+                    low, high = (None if value is None else -value for value in (high, low))
+            else:
+                position = position_on_line(joint)
+            limits[name] = [None if value is None else position + value for value in (low, high)]
+            restitution = max(restitution, stop.restitution)
+        if not limits:
+            return {}
+        is_single = not isinstance(joint, PinJoint) or len(joint.links) == 2
+        entry: dict[str, Any] = {"stops": limits[joint.name] if is_single else limits}
+        return entry | ({"restitution": restitution} if restitution else {})
+
     def _input(self, given: DrawnInput) -> dict[str, Any]:
         joint = next(each for each in self.linkage.joints if each.name == given.joint)
         if isinstance(joint, PinJoint):
             return self._pin_input(given, joint)
         entry: dict[str, Any] = {"pair": joint.name, "position": 0}
         if isinstance(joint, SlideJoint | SlotJoint) and joint.through is not None:
-            way = radians(joint.angle)
-            x, y = joint.at[0] - joint.through[0], joint.at[1] - joint.through[1]
-            entry["position"] = x * cos(way) + y * sin(way)
+            entry["position"] = position_on_line(joint)
         return entry | _rate(given.velocity, given.unit or f"{self.linkage.length}/s") | _law(given, entry["position"])
 
     def _pin_input(self, given: DrawnInput, joint: PinJoint) -> dict[str, Any]:
-        """At a pin on the frame the angle of the other link, elsewhere of the later link against the earlier one."""
-        first, second = sorted(given.links, key=joint.links.index)
-        if self.linkage.frame in given.links:
-            other = first if second == self.linkage.frame else second
-            position, forwards = self.angle(other), given.links[1] == other
-        else:
-            position, forwards = self.angle(second) - self.angle(first), given.links[1] == second
-        name = joint.name if len(joint.links) == 2 else f"{joint.name}:{first},{second}"
-        rate = _rate(given.velocity if forwards else -given.velocity, given.unit or "rad/s")
-        turned = given if forwards else given._replace(table=_reversed(given))
+        name, position, is_forward = self._pin_motion(joint, given.links)
+        rate = _rate(given.velocity if is_forward else -given.velocity, given.unit or "rad/s")
+        turned = given if is_forward else given._replace(table=_reversed(given))
         return {"pair": name, "position": position} | rate | _law(turned, position, degrees)
+
+    def _pin_motion(self, joint: PinJoint, links: tuple[str, str]) -> tuple[str, float, bool]:
+        """The name and position (degrees) of a relative motion at a pin, and whether it grows as `links` say.
+
+        At a pin on the frame it is the angle of the other link, elsewhere that of the later link against the earlier.
+        """
+        first, second = sorted(links, key=joint.links.index)
+        name = joint.name if len(joint.links) == 2 else f"{joint.name}:{first},{second}"
+        if self.linkage.frame in links:
+            other = first if second == self.linkage.frame else second
+            return name, self.angle(other), links[1] == other
+        return name, self.angle(second) - self.angle(first), links[1] == second
 
     def _acting(self) -> dict[str, Any]:
         """Masses, loads and gravity, each in SI."""

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Container
 from dataclasses import dataclass, field, replace
-from math import cos, radians, sin
+from math import cos, degrees, radians, sin
 from typing import NamedTuple
 
 from planar.foundation.errors import join_names
 
+AT_END = 1e-6
+"""Of a slot's length, or rad of a curved one: a pin this far beyond the end of its slot is at that end."""
 Place = tuple[float, float]
 """x and y in the drawing, in the linkage's unit of length; y upwards."""
 
@@ -114,6 +117,20 @@ class DrawnInput(NamedTuple):
     """Times (s), and how far the input has moved by then, smoothly (rad, or the unit of length)."""
 
 
+class DrawnStop(NamedTuple):
+    """Between which positions a joint moves: at a pin the second of `links` against the first, at a slide its slider.
+
+    `low` and `high` are distances from the position as drawn (rad, or the unit of length), None where there is no stop;
+    the drawn position lies between them.
+    """
+
+    joint: str
+    links: tuple[str, str]
+    low: float | None
+    high: float | None
+    restitution: float = 0.0
+
+
 class DrawnMass(NamedTuple):
     """A mass of a link (kg) about a place of the drawing, with its moment of inertia there (kg m^2)."""
 
@@ -146,6 +163,7 @@ class DrawnLinkage:
     inputs: tuple[DrawnInput, ...] = ()
     masses: tuple[DrawnMass, ...] = ()
     forces: tuple[DrawnForce, ...] = ()
+    stops: tuple[DrawnStop, ...] = ()
     gravity: Place = (0.0, 0.0)
     length: str = "mm"
     links: tuple[str, ...] = ()
@@ -181,6 +199,50 @@ def joined_links(joint: Joint) -> tuple[str, ...]:
     if isinstance(joint, RackJoint):
         return joint.rack, joint.pinion
     return (*joint.wheels, joint.carrier)
+
+
+def position_on_line(joint: SlideJoint | SlotJoint) -> float:
+    """The position of a slide or of a pin in a slot as drawn: its distance from `through` along the line."""
+    if joint.through is None:
+        return 0.0
+    x, y = joint.at[0] - joint.through[0], joint.at[1] - joint.through[1]
+    return x * cos(radians(joint.angle)) + y * sin(radians(joint.angle))
+
+
+def slot_end_stop(slot: SlotJoint, length: float, unit: str) -> tuple[list[DrawnStop], list[str]]:
+    """The stops at the ends of a slot that begins at its point `through`, or a note where its pin lies beyond them."""
+    position = position_on_line(slot)
+    if -AT_END * length <= position <= (1.0 + AT_END) * length:
+        return [DrawnStop(slot.name, (slot.guide, slot.rider), min(-position, 0.0), max(length - position, 0.0))], []
+    beyond = max(-position, position - length)
+    place = f"its pin was drawn {beyond:.6g} {unit} beyond its end"
+    return [], [f"the slot of {slot.name!r} is {length:.6g} {unit} long, but {place}: it has no stops here"]
+
+
+def stop_phrase(stop: DrawnStop, joint: Joint, length: str) -> str:
+    """A stop in a note, measured from the position as drawn: "the stops of the slide 'C' (-5 to 20 mm as drawn)"."""
+    angle = isinstance(joint, PinJoint)
+    limits = (None if value is None else degrees(value) if angle else value for value in (stop.low, stop.high))
+    low, high = ("open" if value is None else f"{value:.6g}" for value in limits)
+    return f"the stops of {joint_phrase(joint)}, {low} to {high} {'deg' if angle else length} from its drawn position,"
+
+
+def lost_stop_notes(linkage: DrawnLinkage, written: Container[DrawnStop] = ()) -> list[str]:
+    """The notes of the stops that a format does not say, and of the restitution of those that it says."""
+    joints = {joint.name: joint for joint in linkage.joints}
+    notes = []
+    for stop in linkage.stops:
+        phrase = stop_phrase(stop, joints[stop.joint], linkage.length)
+        if stop not in written:
+            notes.append(f"{phrase} are left out: the format has none there")
+        elif stop.restitution:
+            notes.append(f"{phrase} lose their restitution of {stop.restitution:g}: the format has none")
+    return notes
+
+
+def unit_note(length: str) -> str:
+    """The note of a file that names no unit of length."""
+    return f"the file names no unit of length; its numbers are taken as {length}"
 
 
 def joint_phrase(joint: Joint) -> str:

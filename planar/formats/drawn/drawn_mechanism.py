@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from math import degrees
+from math import ceil, degrees, floor, pi
 
 from planar.formats.drawn.drawn_linkage import (
     DrawnForce,
     DrawnInput,
     DrawnLinkage,
     DrawnMass,
+    DrawnStop,
     Joint,
     PinJoint,
     Place,
@@ -18,6 +19,7 @@ from planar.formats.drawn.drawn_linkage import (
     SlotJoint,
     Tracer,
     WheelJoint,
+    position_on_line,
 )
 from planar.formats.drawn.file_format import cannot_say
 from planar.foundation.geometry import Frame, Vector
@@ -35,6 +37,8 @@ from planar.model.pairs.turning import TurningPair
 WHEELS = {GearPair: "gear", BeltPair: "belt", ChainPair: "chain"}
 LENGTHS = ("mm", "cm", "m", "in")
 """Units of length that drawn linkages have; any other is written as mm."""
+STOP_TOLERANCE = 1e-9
+"""rad: a position this far outside of its stops is at the stop."""
 
 
 def drawn_mechanism(
@@ -76,10 +80,11 @@ class _Drawing:
             tuple(self._inputs()),
             tuple(self._masses()),
             tuple(self._forces()),
+            tuple(self._stops(joints)),
             mechanism.gravity,
             self.length,
             tuple(link.name for link in mechanism.links),
-            tuple(self._notes()),
+            tuple(self._notes(joints)),
         )
 
     def _place(self, at: Vector) -> Place:
@@ -134,15 +139,39 @@ class _Drawing:
         motions = relative_motions(self.mechanism)
         found = []
         for given in self.mechanism.inputs:
-            pair, links = motions[given.pair], motions[given.pair].links
+            pair = motions[given.pair]
+            links = self._motion_links(pair)
             if pair.input_kind is MeasureKind.TURNS:
                 raise cannot_say(self.title, f"the input at {given.pair!r}", "its inputs are at pins and slides")
-            if links[1] == self.mechanism.frame and isinstance(pair, TurningPair):
-                links = (links[1], links[0])
             length = pair.input_kind is MeasureKind.LENGTH
             velocity = float(self.unit.from_si(given.velocity)) if length else float(given.velocity)
             found.append(DrawnInput(pair.entry_name(), links, velocity))
         return found
+
+    def _motion_links(self, pair: Pair) -> tuple[str, str]:
+        """The links of a relative motion, so that it is the motion of the second against the first."""
+        first, second = pair.links
+        return (second, first) if second == self.mechanism.frame and isinstance(pair, TurningPair) else (first, second)
+
+    def _stops(self, joints: Sequence[Joint]) -> list[DrawnStop]:
+        """The stops of pins, slides and pins in slots, measured from the positions as drawn."""
+        motions = relative_motions(self.mechanism)
+        by_name = {joint.name: joint for joint in joints}
+        stops = []
+        for stop in self.mechanism.stops:
+            pair = motions[stop.pair]
+            joint = by_name.get(pair.entry_name())
+            if not isinstance(joint, PinJoint | SlideJoint | SlotJoint):
+                continue
+            limits = (stop.low, stop.high)
+            if isinstance(joint, PinJoint):
+                low, high = _angle_limits(float(pair.input_position_at(self.shapes, self.frames, {})), *limits)
+            else:
+                position = position_on_line(joint)
+                low, high = (None if value is None else float(self.unit.from_si(value)) - position for value in limits)
+            low, high = None if low is None else min(low, 0.0), None if high is None else max(high, 0.0)
+            stops.append(DrawnStop(joint.name, self._motion_links(pair), low, high, stop.restitution))
+        return stops
 
     def _masses(self) -> list[DrawnMass]:
         found = []
@@ -168,12 +197,12 @@ class _Drawing:
             )
         return found
 
-    def _notes(self) -> list[str]:
+    def _notes(self, joints: Sequence[Joint]) -> list[str]:
         """What of the mechanism no drawn linkage says."""
         mechanism = self.mechanism
         held = {
             "springs and dampers": bool(mechanism.springs),
-            "stops": bool(mechanism.stops),
+            "stops of pairs that are no pins, slides or slots": len(self._stops(joints)) < len(mechanism.stops),
             "friction": any(pair.has_friction for pair in mechanism.pairs),
             "laws of inputs": any(given.law for given in mechanism.inputs),
             "motors": any(given.motor for given in mechanism.inputs),
@@ -184,6 +213,16 @@ class _Drawing:
             "torques, and loads that vary": len(self._forces()) < len(mechanism.loads),
         }
         return [f"{what} are left out: the format has none" for what, there in held.items() if there]
+
+
+def _angle_limits(position: float, low: float | None, high: float | None) -> tuple[float | None, float | None]:
+    """The distances of stops (rad) from a position, taken whole turns off so that it lies between them."""
+    if low is not None:
+        turns = floor((position - low + STOP_TOLERANCE) / (2.0 * pi))
+    else:
+        turns = ceil((position - (high or 0.0) - STOP_TOLERANCE) / (2.0 * pi))
+    position -= 2.0 * pi * turns
+    return None if low is None else low - position, None if high is None else high - position
 
 
 def _plain(angle: float) -> float:

@@ -16,6 +16,8 @@ class ForeignText(NamedTuple):
     value: Any
     place: str
     title: str
+    length_unit: str | None = None
+    """The unit of length that the caller gives for a file that names none."""
 
 
 class ReadDocument(NamedTuple):
@@ -30,6 +32,8 @@ class WrittenText(NamedTuple):
 
     text: str
     notes: tuple[str, ...]
+    says_stops: bool = False
+    """Whether the text says stops, so that its notes name those that it does not say."""
 
 
 class FileFormat(NamedTuple):
@@ -48,6 +52,10 @@ class FileFormat(NamedTuple):
     write: Callable[[DrawnLinkage], WrittenText] | None = None
     precision: str = ""
     """What its numbers are rounded to where it is written."""
+    links: tuple[str, ...] = ()
+    """The forms of the links that hold a mechanism of this kind, for a message that lists them."""
+    names_length_unit: bool = True
+    """Whether its files say their unit of length, so that none can be given."""
 
 
 def cannot_say(title: str, what: str, why: str = "") -> BadInput:

@@ -8,7 +8,9 @@ from itertools import combinations
 from math import hypot
 
 from planar.formats.drawn.drawn_linkage import (
+    DrawnInput,
     DrawnLinkage,
+    DrawnStop,
     Joint,
     PinJoint,
     Tracer,
@@ -16,6 +18,7 @@ from planar.formats.drawn.drawn_linkage import (
     joined_links,
     renamed_links,
 )
+from planar.foundation.errors import BadInput
 
 
 def merge_links(linkage: DrawnLinkage, groups: Iterable[Sequence[str]]) -> DrawnLinkage:
@@ -39,6 +42,10 @@ def merge_links(linkage: DrawnLinkage, groups: Iterable[Sequence[str]]) -> Drawn
     if not parent:
         return linkage
     names = {link: root(link) for link in parent}
+
+    def renamed_pair(links: tuple[str, str]) -> tuple[str, str]:
+        return names.get(links[0], links[0]), names.get(links[1], links[1])
+
     joints: list[Joint] = []
     tracers: list[Tracer] = []
     for joint in linkage.joints:
@@ -52,10 +59,8 @@ def merge_links(linkage: DrawnLinkage, groups: Iterable[Sequence[str]]) -> Drawn
         frame=names.get(linkage.frame, linkage.frame),
         joints=tuple(joints),
         tracers=(*(t._replace(link=names.get(t.link, t.link)) for t in linkage.tracers), *tracers),
-        inputs=tuple(
-            each._replace(links=(names.get(each.links[0], each.links[0]), names.get(each.links[1], each.links[1])))
-            for each in linkage.inputs
-        ),
+        inputs=tuple(each._replace(links=renamed_pair(each.links)) for each in linkage.inputs),
+        stops=tuple(each._replace(links=renamed_pair(each.links)) for each in linkage.stops),
         masses=tuple(each._replace(link=names.get(each.link, each.link)) for each in linkage.masses),
         forces=tuple(each._replace(link=names.get(each.link, each.link)) for each in linkage.forces),
         links=tuple(dict.fromkeys(names.get(link, link) for link in linkage.links)),
@@ -91,11 +96,32 @@ def without_loose_links(linkage: DrawnLinkage) -> DrawnLinkage:
         joints=tuple(joint for joint in linkage.joints if set(joined_links(joint)) <= reached),
         tracers=tuple(each for each in linkage.tracers if each.link in reached),
         inputs=tuple(each for each in linkage.inputs if set(each.links) <= reached),
+        stops=tuple(each for each in linkage.stops if set(each.links) <= reached),
         masses=tuple(each for each in linkage.masses if each.link in reached),
         forces=tuple(each for each in linkage.forces if each.link in reached),
         links=tuple(link for link in linkage.links if link in reached),
         notes=(*linkage.notes, *(f"link {link!r} is joined to nothing that is held and is left out" for link in loose)),
     )
+
+
+def without_rigid_motions(linkage: DrawnLinkage, place: str) -> DrawnLinkage:
+    """The linkage without stops at joints that cannot move, with notes. Raises BadInput for an input at such a joint."""
+    links_of = {joint.name: joined_links(joint) for joint in linkage.joints}
+
+    def moves(motion: DrawnInput | DrawnStop) -> bool:
+        first, second = motion.links
+        return first != second and {first, second} <= set(links_of.get(motion.joint, ()))
+
+    rigid = next((each for each in linkage.inputs if not moves(each)), None)
+    if rigid is not None:
+        message = f"the input at {rigid.joint!r} cannot move: the two links that it drives share two pins or are fixed"
+        raise BadInput(place, f"{message} to each other; drive another joint, or part these links")
+    notes = [
+        f"the stops at {stop.joint!r} are left out: the two links that it joins cannot move against each other"
+        for stop in linkage.stops
+        if not moves(stop)
+    ]
+    return replace(linkage, stops=tuple(filter(moves, linkage.stops))).with_notes(*notes)
 
 
 def _apart(pins: Sequence[PinJoint]) -> bool:

@@ -3,20 +3,24 @@
 from __future__ import annotations
 
 import re
-from math import atan2, degrees, hypot
+from math import atan2, degrees, hypot, pi, radians
 from string import ascii_lowercase, ascii_uppercase
 from xml.etree.ElementTree import Element
 
 from planar.formats.drawn.drawn_document import drawn_document
 from planar.formats.drawn.drawn_linkage import (
+    AT_END,
     DrawnInput,
     DrawnLinkage,
+    DrawnStop,
     Joint,
     PinJoint,
+    Place,
     SlideJoint,
     SlotJoint,
     Tracer,
     WheelJoint,
+    slot_end_stop,
 )
 from planar.formats.drawn.file_format import FileFormat, ForeignText, ReadDocument
 from planar.formats.drawn.rigid_links import merge_links, merge_links_of_two_pins, without_loose_links
@@ -30,6 +34,7 @@ MECHANISM_LAYERS = 0xFFFFFFF0
 """The bits of `layer` of which one is set on what moves; other layers are drawings."""
 DEFAULT_RATE = 15.0
 """rpm, or strokes to and fro in a minute, where none is written."""
+TURN = 2.0 * pi
 FRAME = "frame"
 LETTERS = ascii_uppercase + ascii_lowercase
 JOINED = re.compile(r'(=\s*"[^"<]*")(?=\w)')
@@ -60,6 +65,7 @@ class _Reader:
         self.notes: list[str] = []
         self.joints: list[Joint] = []
         self.inputs: list[DrawnInput] = []
+        self.stops: list[DrawnStop] = []
         self.tracers: list[Tracer] = []
         self.welds: list[tuple[str, ...]] = []
         self.connectors = {self._id(each): each for each in root.iter() if each in [*root] and each.tag == "connector"}
@@ -90,6 +96,7 @@ class _Reader:
             tuple(self.joints),
             tuple(self.tracers),
             tuple(self.inputs),
+            stops=tuple(self.stops),
             length="mm",
             links=(FRAME, *self.links),
             notes=tuple(dict.fromkeys(self.notes)),
@@ -164,10 +171,12 @@ class _Reader:
         offset = number_attribute(element, "startoffset", told, 0.0) / PIXELS_PER_MILLIMETRE
         begun, way = swing_phase(throw, offset) if throw > 0.0 else (0.0, 1)
         self.inputs.append(DrawnInput(joint, (name, rod), way * 2.0 * throw * cpm / 60.0))
+        if throw > 0.0:
+            self.stops.append(DrawnStop(joint, (name, rod), -begun, throw - begun))
         after = f", {begun:.6g} mm of it done as drawn" if begun else ""
         self.notes.append(
-            f"the actuator {name!r} goes to and fro by {throw:.6g} mm{after}, "
-            f"{abs(cpm):g} times a minute; here it runs on at that mean speed"
+            f"the actuator {name!r} goes to and fro by {throw:.6g} mm{after}, {abs(cpm):g} times a minute; "
+            "here it runs at that mean speed between stops"
         )
         self._by_hand(element, f"actuator {name!r}")
 
@@ -218,27 +227,38 @@ class _Reader:
                 f"{self.source.place}, connector {key}", "the ends of its slot coincide, so it has no direction"
             )
         at, name = self.places[key], self.names[key]
-        self.notes.append("where slots end is not kept: what slides in them goes on")
         radius = number_attribute(self.connectors[key], "slideradius", f"{self.source.place}, connector {key}", 0.0)
         if radius:
-            self._arc(key, guide, riders, arc_centre((x, y), (u, v), radius / PIXELS_PER_MILLIMETRE))
+            centre = arc_centre((x, y), (u, v), radius / PIXELS_PER_MILLIMETRE)
+            self._arc(key, guide, riders, centre, ((x, y), (u, v)) if radius > 0.0 else ((u, v), (x, y)))
             return True
         along = self.book.fresh(f"{name}_slot") if len(riders) > 1 else name
         if len(riders) > 1:
             self.joints.append(PinJoint(name, tuple(riders), at))
-        self.joints.append(SlotJoint(along, guide, riders[0], at, degrees(atan2(v - y, u - x)), through=(x, y)))
+        slot = SlotJoint(along, guide, riders[0], at, degrees(atan2(v - y, u - x)), through=(x, y))
+        self.joints.append(slot)
+        stops, notes = slot_end_stop(slot, hypot(u - x, v - y), "mm")
+        self.stops += stops
+        self.notes += notes
         return True
 
-    def _arc(self, key: str, guide: str, riders: list[str], centre: tuple[float, float]) -> None:
-        """A pin in a curved slot: a link from the slot's centre holds it there."""
+    def _arc(self, key: str, guide: str, riders: list[str], centre: Place, ends: tuple[Place, Place]) -> None:
+        """A pin in a curved slot, from one end anticlockwise to the other: a link about its centre holds it there."""
         name, at = self.names[key], self.places[key]
-        arc = self.book.fresh(f"{name}_arc")
+        arc, pin = self.book.fresh(f"{name}_arc"), self.book.fresh(f"{name}_centre")
         self.links[arc] = []
-        self.joints.append(PinJoint(self.book.fresh(f"{name}_centre"), (guide, arc), centre))
+        self.joints.append(PinJoint(pin, (guide, arc), centre))
         self.joints.append(PinJoint(name, (*riders, arc), at))
         radius = hypot(at[0] - centre[0], at[1] - centre[1])
-        told = f"the curved slot of {name!r} is here the link {arc!r} about its centre, {radius:.6g} mm long"
-        self.notes.append(told)
+        note = f"the curved slot of {name!r} is here the link {arc!r} about its centre, {radius:.6g} mm long"
+        start, position, end = (atan2(y - centre[1], x - centre[0]) for x, y in (ends[0], at, ends[1]))
+        length, offset = (end - start) % TURN, (position - start + AT_END) % TURN - AT_END
+        if offset <= length + AT_END:
+            self.stops.append(DrawnStop(pin, (guide, arc), min(-offset, 0.0), max(length - offset, 0.0)))
+            note += f", with stops where the slot ends, {degrees(length):.6g} deg apart"
+        else:
+            note += f"; its pin was drawn beyond the ends of the slot, {degrees(length):.6g} deg apart: it has no stops"
+        self.notes.append(note)
 
     def _drive(self, key: str, element: Element, members: list[str]) -> None:
         """The input of a connector: it turns the Link there that is not held elsewhere against the frame."""
@@ -260,8 +280,12 @@ class _Reader:
         if limit > 0.0:
             begun, way = swing_phase(limit, number_attribute(element, "startoffset", told, 0.0))
             after = f", {begun:g} of them done as drawn" if begun else ""
-            told = f"the input at {name!r} goes to and fro by {limit:g} degrees{after}; here it turns on at its speed"
-            self.notes.append(told)
+            self.notes.append(
+                f"the input at {name!r} goes to and fro by {limit:g} degrees{after}; here it turns at its speed "
+                "between stops"
+            )
+            ends = (-begun, limit - begun) if rate >= 0.0 else (begun - limit, begun)
+            self.stops.append(DrawnStop(name, (FRAME, turning[0]), *map(radians, ends)))
             rate *= way
         self._by_hand(element, f"input at {name!r}")
         self.inputs.append(DrawnInput(name, (FRAME, turning[0]), rate, "rpm"))

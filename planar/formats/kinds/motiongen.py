@@ -8,12 +8,14 @@ from planar.formats.drawn.drawn_document import drawn_document
 from planar.formats.drawn.drawn_linkage import (
     DrawnInput,
     DrawnLinkage,
+    DrawnStop,
     Joint,
     PinJoint,
     Place,
     SlideJoint,
     SlotJoint,
     Tracer,
+    slot_end_stop,
 )
 from planar.formats.drawn.file_format import FileFormat, ForeignText, ReadDocument
 from planar.formats.drawn.rigid_links import merge_links, merge_links_of_two_pins, without_loose_links
@@ -56,6 +58,7 @@ class _Reader:
         self.notes: list[str] = []
         self.found: list[Joint] = []
         self.inputs: list[DrawnInput] = []
+        self.stops: list[DrawnStop] = []
         self.places: dict[str, Place] = {}
         self.names: dict[str, str] = {}
         self.welded: set[str] = set()
@@ -113,6 +116,7 @@ class _Reader:
             tuple(self.found),
             tuple(tracers),
             tuple(self.inputs),
+            stops=tuple(self.stops),
             length="in",
             links=(FRAME, *(name for name in self.links if name != FRAME)),
             notes=tuple(self.notes),
@@ -139,9 +143,11 @@ class _Reader:
                     self.notes.append(f"joint {self.names[key]!r} rides in a slot but is on no link, and is left out")
                     continue
                 name = self.book.fresh(f"{self.names[key]}_slot")
-                self.found.append(
-                    SlotJoint(name, bar, holders[0], self.places[key], degrees(atan2(v - y, u - x)), (x, y))
-                )
+                rail = SlotJoint(name, bar, holders[0], self.places[key], degrees(atan2(v - y, u - x)), (x, y))
+                self.found.append(rail)
+                stop, note = slot_end_stop(rail, hypot(u - x, v - y), "in")
+                self.stops += stop
+                self.notes += note
                 found[key] = bar
         return found
 
@@ -163,9 +169,26 @@ class _Reader:
             for key, half in zip(keys, halves, strict=True):
                 self._attach(key, half)
             if each.has("stroke"):
-                self.notes.append(
-                    f"the cylinder {name!r} has a stroke of {each.number('stroke'):.6g} in, which is left out"
-                )
+                self._add_stroke(slide, hypot(u - x, v - y), each)
+        for keys, slide in self.strokes.items():  # a half may be one with a link by now
+            halves_of = slide.guide, slide.slider
+            self.stops = [s._replace(links=halves_of) if s.joint == slide.name else s for s in self.stops]
+            if not any(stop.joint == slide.name for stop in self.stops):
+                phrase = " and ".join(sorted(self.names[key] for key in keys))
+                self.notes.append(f"the cylinder between {phrase} has no stroke in the file, and no stops here")
+
+    def _add_stroke(self, slide: SlideJoint, length: float, given: ForeignValue) -> None:
+        """The stops of a cylinder, whose file says how long its stroke is, and not where in it the cylinder stands."""
+        stroke = given.number("stroke")
+        if not stroke > 0.0:
+            raise given.at("stroke").error(f"a stroke is above zero, not {stroke:.6g}")
+        low = max(-stroke, -length)
+        self.stops.append(DrawnStop(slide.name, (slide.guide, slide.slider), low, stroke))
+        self.notes.append(
+            f"the cylinder {slide.name!r} has a stroke of {stroke:.6g} in, but the file does not say where in it the "
+            f"cylinder was drawn: its stops are at {length + low:.6g} and {length + stroke:.6g} in, one stroke from "
+            f"its drawn length of {length:.6g} in"
+        )
 
     def _attach(self, key: str, half: str) -> None:
         """Join a half of a cylinder at a joint: to its pin, or rigidly to its link where the joint is welded."""
@@ -192,6 +215,14 @@ class _Reader:
             given.text("from" if given.has("from") else "fromId"),
         )
         rate = given.number("velocity", 0.0)
+        if given.has("min") and given.has("max"):
+            low, high = given.number("min"), given.number("max")
+            is_rotary = given.text("type", "rotary") == "rotary"
+            if not is_rotary or high - low < 360.0:
+                self.notes.append(
+                    f"the actuator at {self.names.get(at, at)!r} goes from {low:.6g} to {high:.6g} "
+                    f"{'deg' if is_rotary else 'in'}, but the file does not say from where: it has no stops for that"
+                )
         if given.text("type", "rotary") != "rotary":
             slide = self.strokes.get(frozenset((at, start)))
             if slide is None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import atan2, degrees, hypot
+from math import atan2, degrees, hypot, pi
 from typing import NamedTuple
 
 from planar.formats.drawn.drawn_document import drawn_document
@@ -10,6 +10,7 @@ from planar.formats.drawn.drawn_linkage import (
     DrawnInput,
     DrawnLinkage,
     DrawnMass,
+    DrawnStop,
     Joint,
     PinJoint,
     Place,
@@ -17,6 +18,8 @@ from planar.formats.drawn.drawn_linkage import (
     SlideJoint,
     Tracer,
     WheelJoint,
+    stop_phrase,
+    unit_note,
 )
 from planar.formats.drawn.file_format import FileFormat, ForeignText, ReadDocument
 from planar.formats.drawn.rigid_links import merge_links, merge_links_of_two_pins, without_loose_links
@@ -27,6 +30,7 @@ from planar.formats.kinds.parts.ondsel_tree import (
     Node,
     Pose,
     Triple,
+    cross,
     dot,
     markers,
     numbers,
@@ -35,10 +39,20 @@ from planar.formats.kinds.parts.ondsel_tree import (
 )
 from planar.formats.texts.names import NameBook
 from planar.foundation.errors import BadInput
+from planar.foundation.units import parse_unit
 
 FRAME = "ground"
 PARALLEL, CLOSED, EXACT = 1e-6, 1e-4, 1e-8
-"""Of unit vectors that are parallel; of the assembly's size, gaps of joints that are closed, and that are told."""
+"""Of unit vectors that are parallel; of the assembly's size in space, gaps of joints that are closed, and noted."""
+AT_LIMIT = 1e-6
+"""rad, or of the assembly's size: a joint this far beyond its limit is at it."""
+SOLVER_LINE, FREECAD_NAME = "OndselSolver", "OndselAssembly"
+"""The first line of a file that the solver wrote, and the name that FreeCAD gives an assembly.
+
+One of them with placeholder masses is a file of FreeCAD, which measures in mm; the solver's examples are in m.
+"""
+STANDARD_GRAVITY = (9.7, 9.9)
+"""Between which magnitudes gravity is in m/s^2, whatever the unit of length."""
 KNOWN = (
     *("RevoluteJoint", "CylindricalJoint", "TranslationalJoint", "FixedJoint"),
     *("GearJoint", "RackPinionJoint"),
@@ -77,6 +91,11 @@ class _Reader:
     def __init__(self, assembly: Node, source: ForeignText) -> None:
         self.assembly, self.place = assembly, source.place
         self.title = assembly.value("Name") or source.title
+        self.has_placeholder_masses = _has_placeholder_masses(assembly)
+        is_named = assembly.value("Name") == FREECAD_NAME or source.text.lstrip().startswith(SOLVER_LINE)
+        is_from_freecad = self.has_placeholder_masses and is_named
+        self.length = source.length_unit or ("mm" if is_from_freecad else "m")
+        self.metres = parse_unit(self.length).to_si(1.0)
         self.book = NameBook({FRAME})
         self.notes: list[str] = []
         self.markers: dict[str, Held] = {}
@@ -94,31 +113,42 @@ class _Reader:
         constraints = assembly.find("ConstraintSets")
         self.given = [] if constraints is None else constraints.walk("Joints")
         self.motions = [] if constraints is None else constraints.walk("Motions")
-        if constraints is not None and constraints.walk("Limits"):
-            self.notes.append("limits of joints are left out")
-        self.normal = self._normal()
-        self.first, self.second = _plane_axes(self.normal)
+        self.limits = [] if constraints is None else constraints.walk("Limits")
+        gravity = assembly.find("ConstantGravity")
+        self.gravity = numbers(gravity.children[0], 3, self.place) if gravity and gravity.children else (0.0, 0.0, 0.0)
+        normal = self._normal()
+        self.first, self.second = _plane_axes(normal, self.gravity)
+        self.normal = cross(self.first, self.second)
+        self.size = max(map(self._extent, (assembly, *assembly.walk("Parts"))), default=0.0) or 1.0
+
+    def _extent(self, node: Node) -> float:
+        """The largest distance from the axes of a node at which something of it lies."""
+        found = 0.0
+        for child in node.children:
+            if child.text == "Position3D" and len(child.children) == 1:
+                found = max(found, hypot(*numbers(child.children[0], 3, self.place)))
+            elif child.text not in ("ConstraintSets", "ForceTorques"):
+                found = max(found, self._extent(child))
+        return found
 
     def _ends(self, joint: Node) -> tuple[Held, Held]:
         found = [self.markers.get(joint.value(key) or "") for key in ("MarkerI", "MarkerJ")]
         if found[0] is None or found[1] is None:
-            raise BadInput(self._told(joint), "it names a marker that is not there")
+            raise BadInput(self._place_of(joint), "it names a marker that is not there")
         return found[0], found[1]
 
-    def _told(self, joint: Node) -> str:
+    def _place_of(self, joint: Node) -> str:
         return f"{self.place}, line {joint.line}, joint {joint.value('Name') or ''}"
 
     def _normal(self) -> Triple:
-        """The common direction of all axes about which parts turn, its largest part positive."""
+        """The common direction of all axes about which parts turn."""
         turning = [each for each in self.given if each.text == "RevoluteJoint"]
         if not turning:
             raise BadInput(self.place, "there is no revolute joint, so no plane in which the parts move")
         normal = self._ends(turning[0])[0].pose.column(2)
-        if max(normal, key=abs) < 0.0:
-            normal = (-normal[0], -normal[1], -normal[2])
         for each in turning:
             if abs(abs(dot(normal, self._ends(each)[0].pose.column(2))) - 1.0) > PARALLEL:
-                raise BadInput(self._told(each), "its axis is not parallel to the others: the parts move in space")
+                raise BadInput(self._place_of(each), "its axis is not parallel to the others: the parts move in space")
         return normal
 
     def flat(self, at: Triple) -> Place:
@@ -129,7 +159,6 @@ class _Reader:
         found: list[Joint] = []
         welds: list[tuple[str, ...]] = []
         named: dict[str, tuple[Joint, Node]] = {}
-        size = max((hypot(*self.flat(each.pose.at)) for each in self.markers.values()), default=0.0) or 1.0
         gears = [each for each in self.given if each.text == "GearJoint"]
         for each in (*(joint for joint in self.given if joint not in gears), *gears):
             if each.text not in KNOWN:
@@ -141,7 +170,7 @@ class _Reader:
             if each.text == "RackPinionJoint":
                 found.append(self._rack(each, one, other))
                 continue
-            joint = self._gear(each, found) if each in gears else self._joint(each, one, other, size)
+            joint = self._gear(each, found) if each in gears else self._joint(each, one, other)
             found.append(joint)
             named[(each.value("Name") or "").rpartition("/")[2]] = joint, each
         used = {each.value(key) for each in self.given for key in ("MarkerI", "MarkerJ")}
@@ -153,10 +182,7 @@ class _Reader:
         inputs = [given for motion in self.motions if (given := self._input(motion, named))]
         if self.assembly.walk("ForceTorques"):
             self.notes.append("forces and torques of the file are left out")
-        gravity = self.assembly.find("ConstantGravity")
-        weight = numbers(gravity.children[0], 3, self.place) if gravity and gravity.children else (0.0, 0.0, 0.0)
-        if abs(dot(weight, self.normal)) > 1e-9:
-            self.notes.append("what of gravity is upright to the plane of motion is left out")
+        self._note_size()
         linkage = DrawnLinkage(
             self.title,
             FRAME,
@@ -164,34 +190,119 @@ class _Reader:
             tuple(tracers),
             tuple(inputs),
             masses=tuple(self._masses(welds)),
-            gravity=self.flat(weight),
-            length="m",
+            stops=tuple(self._stops(named)),
+            gravity=self._plane_gravity(),
+            length=self.length,
             links=(FRAME, *self.parts),
             notes=tuple(self.notes),
         )
         return linkage, welds
 
-    def _joint(self, given: Node, one: Held, other: Held, size: float) -> Joint:
+    def _note_size(self) -> None:
+        """Say how large the assembly is in the unit in which it is read."""
+        places = [self.flat(held.pose.at) for held in self.markers.values()]
+        for part, pose in self.parts.values():
+            marker = part.find("PrincipalMassMarker")
+            if marker is not None and marker.find("Position3D") is not None:
+                places.append(self.flat(pose.place(read_pose(marker, self.place)).at))
+        width, height = (max(values) - min(values) for values in zip(*places, strict=True))
+        size = f"{height:.3g} {self.length} high and {width:.3g} {self.length} wide"
+        self.notes.append(f"{unit_note(self.length)}: the assembly is {size}")
+
+    def _plane_gravity(self) -> Place:
+        """Gravity in the plane of motion (m/s^2)."""
+        magnitude = hypot(*self.gravity)
+        low, high = STANDARD_GRAVITY
+        factor = 1.0 if low < magnitude < high else self.metres
+        if abs(dot(self.gravity, self.normal)) > 1e-9 * magnitude:
+            self.notes.append("the component of gravity across the plane of motion is left out")
+        x, y = self.flat(self.gravity)
+        return factor * x, factor * y
+
+    def _stops(self, named: dict[str, tuple[Joint, Node]]) -> list[DrawnStop]:
+        """The stops of joints by the limits of the file, two of which may be of one joint."""
+        bounds: dict[tuple[str, tuple[str, str]], dict[str, float]] = {}
+        for limit in self.limits:
+            name, text = limit.value("Name") or "", limit.value("Limit") or ""
+            joint, given = self._limited_joint(limit, named)
+            if joint is None or given is None:
+                self.notes.append(f"the limit {name!r} of {text} is at no pin or slide and is left out")
+                continue
+            value = motion_formula(text, self._place_of(limit))(0.0)
+            held = [self.markers.get(limit.value(key) or "") for key in ("MarkerI", "MarkerJ")]
+            one, other = (held[0], held[1]) if held[0] and held[1] else self._ends(given)
+            if isinstance(joint, PinJoint):
+                sense = 1.0 if dot(one.pose.column(2), self.normal) > 0.0 else -1.0
+                position, links = _turn_about_z(one.pose, other.pose), (one.part, other.part)
+            else:
+                guide, axis = self._ends(given)[0], one.pose.column(2)
+                sense = 1.0 if dot(axis, guide.pose.column(2)) > 0.0 else -1.0
+                sense *= 1.0 if one.part == joint.guide else -1.0
+                position = sum(axis[i] * (other.pose.at[i] - one.pose.at[i]) for i in range(3))
+                links = (joint.guide, joint.slider)
+            is_upper = (limit.value("Type") == "=<") == (sense > 0.0)
+            bounds.setdefault((joint.name, links), {})["high" if is_upper else "low"] = sense * (value - position)
+        return [stop for (name, links), found in bounds.items() if (stop := self._stop(name, links, found, named))]
+
+    def _limited_joint(
+        self, limit: Node, named: dict[str, tuple[Joint, Node]]
+    ) -> tuple[PinJoint | SlideJoint | None, Node | None]:
+        """The pin or slide of a limit: the one that it names, else that of its markers."""
+        joint, given = named.get((limit.value("MotionJoint") or "").rpartition("/")[2], (None, None))
+        if given is None:
+            ends = {limit.value("MarkerI"), limit.value("MarkerJ")}
+            at_markers = (
+                each for each in named.values() if {each[1].value("MarkerI"), each[1].value("MarkerJ")} == ends
+            )
+            joint, given = next(at_markers, (None, None))
+        wanted = {"RotationLimit": PinJoint, "TranslationLimit": SlideJoint}.get(limit.text)
+        return (joint, given) if wanted is not None and isinstance(joint, wanted) else (None, None)
+
+    def _stop(
+        self, name: str, links: tuple[str, str], found: dict[str, float], named: dict[str, tuple[Joint, Node]]
+    ) -> DrawnStop | None:
+        """The stop of these distances from the drawn position; None, with a note, where that is beyond it."""
+        joint = next(joint for joint, _ in named.values() if joint.name == name)
+        low, high = found.get("low"), found.get("high")
+        if isinstance(joint, PinJoint) and low is not None and high is not None:
+            turns = next((turn for turn in (0.0, -2.0 * pi, 2.0 * pi) if low + turn <= 0.0 <= high + turn), 0.0)
+            low, high = low + turns, high + turns
+        room = AT_LIMIT * (1.0 if isinstance(joint, PinJoint) else self.size)
+        stop = DrawnStop(name, links, low, high)
+        if (low or 0.0) > room or (high or 0.0) < -room or (low is not None and high is not None and not low < high):
+            self.notes.append(f"{stop_phrase(stop, joint, self.length)} are left out: it was drawn beyond them")
+            return None
+        return DrawnStop(name, links, None if low is None else min(low, 0.0), None if high is None else max(high, 0.0))
+
+    def _joint(self, given: Node, one: Held, other: Held) -> Joint:
         name, at = self.book.fresh(given.value("Name") or "joint"), self.flat(other.pose.at)
         start, axis = self.flat(one.pose.at), one.pose.column(2)
         across = abs(dot(axis, self.normal))
         gap = hypot(at[0] - start[0], at[1] - start[1])
         if given.text == "RevoluteJoint" or (given.text == "CylindricalJoint" and across > 1.0 - PARALLEL):
-            if gap > CLOSED * size:
-                raise BadInput(self._told(given), f"its markers are {gap:.3g} m apart; save the assembly closed")
-            if gap > EXACT * size:
-                self.notes.append(f"the joint {name!r} is open by {gap:.2g} m in the file, and closed here")
+            if gap > CLOSED * self.size:
+                message = f"its markers are {gap:.3g} {self.length} apart; save the assembly closed"
+                raise BadInput(self._place_of(given), message)
+            if gap > EXACT * self.size:
+                self.notes.append(f"the joint {name!r} is open by {gap:.2g} {self.length} in the file, and closed here")
             return PinJoint(name, (one.part, other.part), at)
         if given.text in ("TranslationalJoint", "CylindricalJoint") and across < PARALLEL:
             u, v = self.flat(axis)
             off = abs((at[0] - start[0]) * v - (at[1] - start[1]) * u)
-            if off > CLOSED * size:
-                raise BadInput(self._told(given), f"its markers are {off:.3g} m off its line; save the assembly closed")
+            if off > CLOSED * self.size:
+                message = f"its markers are {off:.3g} {self.length} off its line; save the assembly closed"
+                raise BadInput(self._place_of(given), message)
+            if off > EXACT * self.size:
+                self.notes.append(
+                    f"the joint {name!r} is {off:.2g} {self.length} off its line in the file, and on it here"
+                )
             return SlideJoint(name, one.part, other.part, at, degrees(atan2(v, u)), start)
         raise self._no_pair(given)
 
     def _no_pair(self, given: Node) -> BadInput:
-        return BadInput(self._told(given), f"a {given.text!r:.40} as this stands is no pair of the plane that is read")
+        return BadInput(
+            self._place_of(given), f"a {given.text!r:.40} as this stands is no pair of the plane that is read"
+        )
 
     def _rack(self, given: Node, rack: Held, pinion: Held) -> RackJoint:
         """x + r a stays as it is: of the pinion's marker along the x-axis of the rack's, and its turn about that z."""
@@ -199,10 +310,10 @@ class _Reader:
         way, axis = rack.pose.column(0), dot(rack.pose.column(2), self.normal)
         if abs(abs(axis) - 1.0) > PARALLEL or abs(dot(way, self.normal)) > PARALLEL:
             raise BadInput(
-                self._told(given), "its pinion's axis is not parallel to the others: the parts move in space"
+                self._place_of(given), "its pinion's axis is not parallel to the others: the parts move in space"
             )
         if radius == 0.0:
-            raise BadInput(self._told(given), "zero is no radius of a pinion")
+            raise BadInput(self._place_of(given), "zero is no radius of a pinion")
         u, v = self.flat(way)
         name, at = self.book.fresh(given.value("Name") or "rack"), self.flat(pinion.pose.at)
         sense = 1.0 if axis > 0.0 else -1.0
@@ -215,7 +326,7 @@ class _Reader:
         carrier = common_carrier(found, one, other)
         centres = [wheel_centre(found, wheel, carrier) for wheel in (one, other)] if carrier else []
         if carrier is None or centres[0] is None or centres[1] is None:
-            raise BadInput(self._told(given), "its wheels turn on no common part")
+            raise BadInput(self._place_of(given), "its wheels turn on no common part")
         apart = hypot(centres[0][0] - centres[1][0], centres[0][1] - centres[1][1])
         first, second = abs(radii[0]), abs(radii[1])
         if abs(apart - first - second) > CLOSED * (first + second):
@@ -233,7 +344,7 @@ class _Reader:
             self.notes.append(f"the motion {motion.value('Name') or ''!r:.40} is left out")
             return None
         one, other = self._ends(given)
-        formula = motion_formula(text, self._told(motion))
+        formula = motion_formula(text, self._place_of(motion))
         sense = -1.0 if turns and dot(one.pose.column(2), self.normal) < 0.0 else 1.0
         until = self._end_of_time()
         rate = constant_rate(formula, until)
@@ -256,6 +367,12 @@ class _Reader:
 
     def _masses(self, welds: list[tuple[str, ...]]) -> list[DrawnMass]:
         """The masses of moving parts, their moments of inertia about the plane's normal."""
+        if self.has_placeholder_masses:
+            self.notes.append(
+                "every part has a mass of 1 kg and moments of inertia of 1 kg m^2, which are placeholders; "
+                "no mass is read"
+            )
+            return []
         still = {FRAME, *(part for two in welds if FRAME in two for part in two)}
         found = []
         for name, (part, pose) in self.parts.items():
@@ -268,18 +385,63 @@ class _Reader:
             where = pose.place(read_pose(marker, self.place))
             about = sum(moments[i] * dot(where.column(i), self.normal) ** 2 for i in range(3))
             if mass > 0.0:
-                found.append(DrawnMass(name, mass, self.flat(where.at), max(about, 0.0)))
+                found.append(DrawnMass(name, mass, self.flat(where.at), max(about, 0.0) * self.metres**2))
         return found
 
 
-def _plane_axes(normal: Triple) -> tuple[Triple, Triple]:
-    """Two axes of the plane, anticlockwise seen against its normal: x and y where that is z."""
-    start: Triple = (1.0, 0.0, 0.0) if abs(normal[0]) < 0.9 else (0.0, 1.0, 0.0)
-    along = dot(start, normal)
-    first = tuple(start[i] - along * normal[i] for i in range(3))
-    size = hypot(*first)
-    x, y, z = (each / size for each in first)
-    return (x, y, z), (normal[1] * z - normal[2] * y, normal[2] * x - normal[0] * z, normal[0] * y - normal[1] * x)
+def _has_placeholder_masses(assembly: Node) -> bool:
+    """Whether every part has the mass and the moments of inertia that stand for none."""
+    markers_of_mass = [part.find("PrincipalMassMarker") for part in assembly.walk("Parts")]
+    values = [
+        [*(marker.value("Mass") or "").split(), *(marker.value("MomentOfInertias") or "").split()]
+        for marker in markers_of_mass
+        if marker is not None
+    ]
+    return bool(values) and all(len(each) == 4 and set(map(_number, each)) == {1.0} for each in values)
+
+
+def _number(text: str) -> float | None:
+    try:
+        return float(text)
+    except ValueError:
+        return None
+
+
+def _turn_about_z(one: Pose, other: Pose) -> float:
+    """The angle of the other's x-axis about the z-axis of the one (rad)."""
+    axis = other.column(0)
+    return atan2(dot(one.column(1), axis), dot(one.column(0), axis))
+
+
+def _plane_axes(normal: Triple, gravity: Triple) -> tuple[Triple, Triple]:
+    """The horizontal and the vertical axis of the plane of motion, as a view of the assembly shows them.
+
+    The view is that from above (x, y), else from the front (x, z) or from the right (y, z) or between them, and
+    in these the vertical axis points against gravity where that acts in the plane.
+    """
+    x, y, z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+    if abs(normal[2]) > 0.9:
+        upward = y
+    else:
+        weight = _along_plane(gravity, normal)
+        is_in_plane = hypot(*weight) > 0.9 * hypot(*gravity) > 0.0
+        upward = (-gravity[0], -gravity[1], -gravity[2]) if is_in_plane else z
+    vertical = _unit(_along_plane(upward, normal))
+    horizontal = _unit(cross(vertical, normal))
+    leading = dot(horizontal, x) if abs(dot(horizontal, x)) > 1e-9 else dot(horizontal, y) or dot(horizontal, z)
+    if leading < 0.0:
+        horizontal = (-horizontal[0], -horizontal[1], -horizontal[2])
+    return horizontal, vertical
+
+
+def _along_plane(vector: Triple, normal: Triple) -> Triple:
+    across = dot(vector, normal)
+    return vector[0] - across * normal[0], vector[1] - across * normal[1], vector[2] - across * normal[2]
+
+
+def _unit(vector: Triple) -> Triple:
+    size = hypot(*vector)
+    return vector[0] / size, vector[1] / size, vector[2] / size
 
 
 FORMAT = FileFormat(
@@ -289,4 +451,5 @@ FORMAT = FileFormat(
     source="ASMT*.cpp and testapp/*.asmt of FreeCAD/OndselSolver",
     recognise=recognise,
     read=read,
+    names_length_unit=False,
 )

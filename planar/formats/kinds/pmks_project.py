@@ -41,4 +41,5 @@ FORMAT = FileFormat(
     source="PMKSFileFormat.md of DesignEngrLab/PMKS, and the file that it saves",
     recognise=recognise,
     read=read,
+    names_length_unit=False,
 )

@@ -127,13 +127,10 @@ def _written_joint(joint: Joint, linkage: DrawnLinkage) -> tuple[tuple[str, ...]
 
 
 def _link_names(linkage: DrawnLinkage) -> dict[str, str]:
-    """The names of links as words that are neither a number nor a type of joint."""
+    """The names of links as words that are no type of joint; numbers stay, as PMKS has them."""
     book = NameBook({"ground", "gnd", *TYPES, *(each.upper() for each in TYPES)})
     links = dict.fromkeys((*linkage.links, *(link for joint in linkage.joints for link in joined_links(joint))))
-    found = {
-        link: book.fresh("_".join((f"link {link}" if NUMBER.fullmatch(link) else link).split()), "link")
-        for link in links
-    }
+    found = {link: book.fresh("_".join(link.split()), "link") for link in links}
     return found | {linkage.frame: "ground"}
 
 
@@ -144,6 +141,8 @@ FORMAT = FileFormat(
     source="PMKSFileFormat.md and IOStringFunctions.cs of DesignEngrLab/PMKS",
     recognise=recognise,
     read=read,
+    names_length_unit=False,
     write=write,
     precision="double precision",
+    links=("http://.../?mech=...",),
 )

@@ -4,146 +4,152 @@ from __future__ import annotations
 
 import re
 from math import atan2, degrees, hypot
+from urllib.parse import unquote
 
 from planar.formats.drawn.drawn_document import drawn_document
 from planar.formats.drawn.drawn_linkage import (
     DrawnForce,
     DrawnInput,
     DrawnLinkage,
+    DrawnStop,
     Joint,
     PinJoint,
-    Place,
     SlideJoint,
     SlotJoint,
     Tracer,
 )
 from planar.formats.drawn.file_format import FileFormat, ForeignText, ReadDocument
 from planar.formats.drawn.rigid_links import merge_links_of_two_pins, without_loose_links
-from planar.formats.kinds.parts.pmksplus_code import CodedLink, decode_decimal, decode_flags, decode_integer, take_apart
-from planar.formats.kinds.parts.pmksplus_text import FORCES, LENGTHS, write
+from planar.formats.kinds.parts.pmksplus_code import (
+    DRIVEN,
+    GROUNDED,
+    PRISMATIC,
+    SEALED,
+    WELDED,
+    PlusJoint,
+    PlusMechanism,
+    decode_mechanism,
+)
+from planar.formats.kinds.parts.pmksplus_query import decode_query
+from planar.formats.kinds.parts.pmksplus_text import cylinder_travel, write
 from planar.formats.texts.names import NameBook
 from planar.foundation.errors import BadInput
 
 FRAME = "ground"
-PRISMATIC, DRIVEN, GROUNDED, WELDED = 1, 2, 4, 8
-"""Bits of a joint's flags."""
-CODE = re.compile(r"(?:https?://[\w.:/-]+\?|\?)?([\w-]{1,6}\.[\w,-]*\.[\w,-]*\.[\w-]{3,5}\.[\w.,-]+)")
+CODE = re.compile(r"(?:https?://[\w.:/-]+\?|\?)?([\w-]{1,6}\.[\w,-]*\.[\w,-]*\.[\w-]{3,5}\.[^\n?&#]+)")
+QUERY = re.compile(r"(?:https?://[\w.:/-]+)?\??j=[^&]*&l=.*", re.DOTALL)
 SNAP = 5e-4
 """Rounding of a link's angles (rad): one this near to a multiple of 15 degrees is meant to be that."""
+ROUNDED = 2e-3
+"""Rounding of a link's lengths: a cylinder this far beyond an end of its stroke is at that end."""
 
 
 def recognise(source: ForeignText) -> bool:
     """Whether it is an address of PMKS+, or the code of one."""
     if source.value is not None or len(source.text) > 200_000:
         return False
-    found = CODE.fullmatch(source.text.strip())
+    text = unquote(source.text.strip())
+    if QUERY.fullmatch(text):
+        return True
+    found = CODE.fullmatch(text)
     return found is not None and found[1].count(",") > 4
 
 
 def read(source: ForeignText) -> ReadDocument:
     """The mechanism of a link. Raises BadInput."""
-    found = CODE.fullmatch(source.text.strip())
-    if found is None:
+    text = unquote(source.text.strip())
+    code = CODE.fullmatch(text)
+    if QUERY.fullmatch(text):
+        mechanism = decode_query(text, source.place)
+    elif code is not None:
+        mechanism = decode_mechanism(code[1], source.place)
+    else:
         raise BadInput(source.place, "this is no link of PMKS+")
-    linkage = _Reader(take_apart(found[1], source.place), source).read()
+    linkage = _Reader(mechanism, source).read()
     return drawn_document(without_loose_links(merge_links_of_two_pins(linkage)), source.place)
 
 
 class _Reader:
     """One link on its way to a linkage."""
 
-    def __init__(self, coded: CodedLink, source: ForeignText) -> None:
-        self.coded, self.place, self.source = coded, source.place, source
+    def __init__(self, mechanism: PlusMechanism, source: ForeignText) -> None:
+        self.mechanism, self.place, self.source = mechanism, source.place, source
         self.book = NameBook({FRAME})
-        self.joints: dict[str, list[str]] = {}
-        for fields in coded.joints:
-            if len(fields) < 5 or len(fields[0]) < 2:
-                raise BadInput(self.place, f"a joint of the link has too few parts: {','.join(fields)!r:.60}")
-            self.joints[fields[0][1:]] = fields
-        self.links: dict[str, list[str]] = {}
-        self.sliders: list[list[str]] = []
+        self.notes = list(mechanism.notes)
+        self.stops: list[DrawnStop] = []
+        self.links: dict[str, tuple[str, ...]] = {}
+        self.blocks: dict[str, str] = {}
+        "the prismatic joint of each pin that a block carries"
         self.ids: dict[str, str] = {}
-        for fields in coded.links:
-            self._add_link(fields)
-        self.notes: list[str] = []
+        for key, link in mechanism.links.items():
+            for each in link.joints:
+                if each not in mechanism.joints:
+                    raise BadInput(self.place, f"the link {key!r:.40} names a joint {each!r:.40} that is not there")
+            if link.is_block:
+                pin, rail = self._block(link.joints)
+                self.blocks[pin] = rail
+                continue
+            name = self.book.fresh(link.name, "link")
+            self.links[name] = link.joints
+            self.ids |= dict.fromkeys((key, *link.parts), name)
 
     def flags(self, joint: str) -> int:
-        return decode_flags(self.joints[joint][0][:1], self._told(joint))
+        return self.mechanism.joints[joint].flags
 
-    def at(self, joint: str) -> Place:
-        x, y = (decode_decimal(each, self._told(joint)) for each in self.joints[joint][2:4])
-        return x, y
-
-    def _told(self, joint: str) -> str:
+    def _place_of(self, joint: str) -> str:
         return f"{self.place}, joint {joint}"
 
-    def _add_link(self, fields: list[str]) -> None:
-        head = fields[0]
-        if len(head) < 3 or len(fields) < 8 or head[0] not in "YN" or head[1] not in "RP":
-            raise BadInput(self.place, f"a part of the link is no link: {','.join(fields)!r:.60}")
-        if head[0] == "N":  # a part of a link that was made of several
-            return
-        listed = fields[7:]
-        joints = listed[: listed.index("")] if "" in listed else listed
-        for each in joints:
-            if each not in self.joints:
-                raise BadInput(self.place, f"the link {head[2:]!r:.40} names a joint {each!r:.40} that is not there")
-        if head[1] == "P":
-            self.sliders.append(joints)
-            return
-        name = self.book.fresh(fields[1] or head[2:], "link")
-        self.ids[head[2:]] = name
-        self.links[name] = joints
-
     def read(self) -> DrawnLinkage:
-        names = {joint: self.book.fresh(fields[1] or joint, "joint") for joint, fields in self.joints.items()}
-        found: list[Joint] = []
+        mechanism = self.mechanism
+        names = {key: self.book.fresh(joint.name, "joint") for key, joint in mechanism.joints.items()}
+        joints: list[Joint] = []
         tracers: list[Tracer] = []
-        drives: list[DrawnInput] = []
-        slid = dict(map(self._slider, self.sliders))
-        for joint, name in names.items():
-            flags = self.flags(joint)
-            if flags & PRISMATIC:
-                continue
-            holders = [link for link, joints in self.links.items() if joint in joints]
-            members = tuple(([FRAME] if flags & GROUNDED else []) + holders)
-            if joint in slid:
-                made = self._sliding(names, joint, slid[joint], members)
-                found += made
-                if self.flags(slid[joint]) & DRIVEN and made and isinstance(made[-1], SlideJoint | SlotJoint):
-                    rail = made[-1]
-                    rider = rail.slider if isinstance(rail, SlideJoint) else rail.rider
-                    drives.append(DrawnInput(rail.name, (rail.guide, rider), self._speed()))
-            elif len(members) == 1 and not flags & GROUNDED:
-                tracers.append(Tracer(name, members[0], self.at(joint)))
+        inputs: list[DrawnInput] = []
+        for key, joint in mechanism.joints.items():
+            holders = [link for link, members in self.links.items() if key in members]
+            is_prismatic = bool(joint.flags & PRISMATIC)
+            rail = key if is_prismatic and holders else self.blocks.get(key)
+            is_grounded = bool(joint.flags & GROUNDED) and not is_prismatic
+            members = tuple(([FRAME] if is_grounded else []) + holders)
+            if rail is not None:
+                made = self._sliding(names, key, rail, members)
+                joints += made
+                slide = made[-1] if made else None
+                if self.flags(rail) & DRIVEN and isinstance(slide, SlideJoint | SlotJoint):
+                    rider = slide.slider if isinstance(slide, SlideJoint) else slide.rider
+                    inputs.append(DrawnInput(slide.name, (slide.guide, rider), self._linear_speed(rail, slide.name)))
+            elif len(members) == 1 and not is_grounded:
+                tracers.append(Tracer(names[key], members[0], joint.at))
             elif len(members) > 1:
-                found.append(PinJoint(name, members, self.at(joint)))
-            if flags & DRIVEN and len(members) > 1:
-                drives.append(DrawnInput(name, (members[0], members[1]), self._speed(), "rpm"))
-        if any(decode_decimal(fields[2], self.place) for fields in self.coded.links if fields[0][1] == "R"):
+                joints.append(PinJoint(names[key], members, joint.at))
+            if joint.flags & DRIVEN and not is_prismatic and len(members) > 1:
+                rpm = joint.speed * (-1.0 if mechanism.rpm < 0.0 else 1.0) or mechanism.rpm
+                inputs.append(DrawnInput(names[key], (members[0], members[1]), rpm, "rpm"))
+        if any(link.mass for link in mechanism.links.values() if not link.is_block):
             self.notes.append("masses of links are left out: the link does not say their unit")
         return DrawnLinkage(
             self.source.title,
             FRAME,
-            tuple(found),
+            tuple(joints),
             tuple(tracers),
-            tuple(drives),
+            tuple(inputs),
             forces=tuple(self._forces()),
-            length=self._unit(0, LENGTHS, "cm"),
+            stops=tuple(self.stops),
+            length=mechanism.length,
             links=(FRAME, *self.links),
             notes=tuple(self.notes),
         )
 
-    def _unit(self, index: int, units: dict[int, str], default: str) -> str:
-        text = self.coded.units
-        return units.get(decode_integer(text[index], self.place), default) if index < len(text) else default
+    def _linear_speed(self, rail: str, name: str) -> float:
+        """The speed of a driven slide: its own or that of the link."""
+        speed = self.mechanism.linear_speed
+        if speed is None:
+            self.notes.append(f"the driven slide {name!r} rests: the link does not say its speed")
+            return 0.0
+        return self.mechanism.joints[rail].speed * (-1.0 if speed < 0.0 else 1.0) or speed
 
-    def _speed(self) -> float:
-        rate = float(decode_integer(self.coded.integers[0], self.place)) if self.coded.integers[0] else 0.0
-        return -rate if decode_flags(self.coded.flags or "0", self.place) & 1 else rate
-
-    def _slider(self, joints: list[str]) -> tuple[str, str]:
-        """The pin and the prismatic joint that a block ties together."""
+    def _block(self, joints: tuple[str, ...]) -> tuple[str, str]:
+        """The pin and the prismatic joint that a block connects."""
         rails = [each for each in joints if self.flags(each) & PRISMATIC]
         pins = [each for each in joints if each not in rails]
         if len(rails) != 1 or len(pins) != 1:
@@ -152,27 +158,65 @@ class _Reader:
 
     def _sliding(self, names: dict[str, str], pin: str, rail: str, members: tuple[str, ...]) -> list[Joint]:
         """The pin of a block, and its slot in the frame or in a moving link."""
-        fields, at = self.joints[rail], self.at(pin)
+        slot, at = self.mechanism.joints[rail].slot, self.mechanism.joints[pin].at
         if not members:
             return []
-        if len(fields) >= 8 and fields[5]:
-            if fields[5] not in self.ids or fields[6] not in self.joints or fields[7] not in self.joints:
-                raise BadInput(self._told(rail), "its slot is of a link or between joints that are not there")
-            guide, ends = self.ids[fields[5]], (self.at(fields[6]), self.at(fields[7]))
-            (x, y), (u, v) = ends
-            if hypot(u - x, v - y) == 0.0:
-                raise BadInput(self._told(rail), "the ends of its slot coincide, so it has no direction")
-            angle, through = degrees(atan2(v - y, u - x)), ends[0]
-        else:
+        if slot is None:
             guide, through = FRAME, at
-            angle = self._angle(decode_decimal(fields[4], self._told(rail)))
+            angle = self._angle(self.mechanism.joints[rail].angle)
+        else:
+            guide, start, end = self._slot(rail, slot)
+            angle, through = degrees(atan2(end.at[1] - start.at[1], end.at[0] - start.at[0])), start.at
         riders = [each for each in members if each != guide]
+        if not riders:
+            raise BadInput(self._place_of(rail), "it slides on the link that carries it")
         name = names[pin]
-        if len(riders) == 1:
-            kind = SlideJoint if self.flags(pin) & WELDED else SlotJoint
-            return [kind(name, guide, riders[0], at, angle, through)]
-        slot = self.book.fresh(f"{name}_slot")
-        return [PinJoint(name, tuple(riders), at), SlotJoint(slot, guide, riders[0], at, angle, through)]
+        is_rigid = bool((self.flags(pin) & WELDED) or (self.flags(rail) & (WELDED | SEALED)))
+        if len(riders) == 1 or self.flags(rail) & SEALED:
+            kind = SlideJoint if is_rigid else SlotJoint
+            made = kind(name, guide, riders[0], at, angle, through)
+            if slot is not None and self.flags(rail) & SEALED:
+                self._add_stroke(made, pin, slot)
+            pins: list[Joint] = [PinJoint(self.book.fresh(f"{name}_pin"), tuple(riders), at)] if riders[1:] else []
+            return [*pins, made]
+        slot_name = self.book.fresh(f"{name}_slot")
+        return [PinJoint(name, tuple(riders), at), SlotJoint(slot_name, guide, riders[0], at, angle, through)]
+
+    def _slot(self, rail: str, slot: tuple[str, str, str]) -> tuple[str, PlusJoint, PlusJoint]:
+        """The link of a slot, and the joints between which it lies."""
+        link, *ends = slot
+        joints = self.mechanism.joints
+        if link not in self.ids or ends[0] not in joints or ends[1] not in joints:
+            raise BadInput(self._place_of(rail), "its slot is of a link or between joints that are not there")
+        start, end = joints[ends[0]], joints[ends[1]]
+        if start.at == end.at:
+            raise BadInput(self._place_of(rail), "the ends of its slot coincide, so it has no direction")
+        return self.ids[link], start, end
+
+    def _add_stroke(self, slide: SlideJoint | SlotJoint, pin: str, slot: tuple[str, str, str]) -> None:
+        """The stops of a hydraulic cylinder, by the length of its barrel and the scale of the drawn parts.
+
+        The barrel's mount is that of its two joints that is farther from the rod's mount.
+        """
+        joints = self.mechanism.joints
+        rod = next((m for m in self.links.values() if pin in m and len(m) == 2), None)
+        mounts = [joints[each].at for each in slot[1:]]
+        if rod is not None:
+            far = joints[next(each for each in rod if each != pin)].at
+            mounts.sort(key=lambda at: -hypot(at[0] - far[0], at[1] - far[1]))
+        (x, y), (u, v) = mounts
+        barrel = hypot(u - x, v - y)
+        position = ((slide.at[0] - x) * (u - x) + (slide.at[1] - y) * (v - y)) / barrel
+        low, high = cylinder_travel(barrel, self.mechanism.scale)
+        least, greatest = low - position, high - position
+        phrase = f"the cylinder at {slide.name!r} has a stroke of {high - low:.6g} {self.mechanism.length}"
+        if least > ROUNDED or greatest < -ROUNDED or not low < high:
+            self.notes.append(f"{phrase}, but was drawn {max(least, -greatest):.3g} beyond it; it has no stops here")
+            return
+        if mounts[0] != joints[slot[1]].at:
+            least, greatest = -greatest, -least
+        riding = slide.slider if isinstance(slide, SlideJoint) else slide.rider
+        self.stops.append(DrawnStop(slide.name, (slide.guide, riding), min(least, 0.0), max(greatest, 0.0)))
 
     def _angle(self, angle: float) -> float:
         """An angle of a rail (rad) in degrees: 1.571 is 90, where that is what was rounded."""
@@ -186,30 +230,32 @@ class _Reader:
         return given
 
     def _forces(self) -> list[DrawnForce]:
-        pounds = 4.4482216152605
-        found = []
-        for fields in self.coded.forces:
-            if len(fields) < 8 or fields[1] not in self.ids:
-                raise BadInput(self.place, f"a force of the link is none: {','.join(fields)!r:.60}")
-            flags = decode_flags(fields[0][:1], self.place)
-            x, y, u, v, size = (decode_decimal(each, self.place) for each in fields[3:8])
-            long = hypot(u - x, v - y)
-            if long == 0.0:
-                self.notes.append(f"the force {fields[2]!r} has no direction and is left out")
+        newton = 4.4482216152605 if self.mechanism.force == "lbf" else 1.0
+        forces = []
+        for force in self.mechanism.forces:
+            if force.link not in self.ids:
+                raise BadInput(
+                    self.place, f"the force {force.name!r:.40} is on a link {force.link!r:.40} that is not there"
+                )
+            (x, y), (u, v) = force.start, force.end
+            length = hypot(u - x, v - y)
+            if length == 0.0:
+                self.notes.append(f"the force {force.name!r} has no direction and is left out")
                 continue
-            newtons = size * (pounds if self._unit(2, FORCES, "N") == "lbf" else 1.0) * (1.0 if flags & 2 else -1.0)
-            force = (newtons * (u - x) / long, newtons * (v - y) / long)
-            found.append(DrawnForce(self.ids[fields[1]], (x, y), force, bool(flags & 1)))
-        return found
+            size = force.magnitude * newton * (1.0 if force.is_outward else -1.0)
+            vector = (size * (u - x) / length, size * (v - y) / length)
+            forces.append(DrawnForce(self.ids[force.link], (x, y), vector, force.is_local))
+        return forces
 
 
 FORMAT = FileFormat(
     name="pmksplus",
     title="PMKS+ (link)",
     suffixes=(".pmksplus",),
-    source="src/app/services/transcoding of PMKS-Web/PMKSWeb, and the links of its docs/fixture-urls.md",
+    source="src/app/services/transcoding of PMKS-Web/PMKSWeb, url-processor.service.ts of 2023, docs/fixture-urls.md",
     recognise=recognise,
     read=read,
     write=write,
     precision="thousandths of the unit of length and of a radian",
+    links=("https://app.pmksplus.com/?CODE", "https://app.pmksplus.com/?j=...&l=...&f=...&s=..."),
 )

@@ -2,10 +2,20 @@
 
 from __future__ import annotations
 
-from math import atan2, cos, degrees, sin
+from math import atan2, ceil, cos, degrees, pi, sin
 
 from planar.formats.drawn.drawn_document import drawn_document
-from planar.formats.drawn.drawn_linkage import DrawnInput, DrawnLinkage, Joint, PinJoint, Place, SlotJoint, Tracer
+from planar.formats.drawn.drawn_linkage import (
+    DrawnInput,
+    DrawnLinkage,
+    DrawnStop,
+    Joint,
+    PinJoint,
+    Place,
+    SlotJoint,
+    Tracer,
+    unit_note,
+)
 from planar.formats.drawn.file_format import FileFormat, ForeignText, ReadDocument
 from planar.formats.drawn.rigid_links import merge_links, merge_links_of_two_pins, without_loose_links
 from planar.formats.texts.foreign_value import ForeignValue
@@ -26,7 +36,7 @@ def recognise(source: ForeignText) -> bool:
 
 def read(source: ForeignText) -> ReadDocument:
     """The mechanism of a file. Raises BadInput at a JSON path."""
-    linkage, welds = _Reader(ForeignValue(source.value), source.title).read()
+    linkage, welds = _Reader(ForeignValue(source.value), source).read()
     whole = without_loose_links(merge_links_of_two_pins(merge_links(linkage, welds)))
     return drawn_document(whole, source.place)
 
@@ -34,9 +44,11 @@ def read(source: ForeignText) -> ReadDocument:
 class _Reader:
     """One file on its way to a linkage."""
 
-    def __init__(self, top: ForeignValue, title: str) -> None:
-        self.top, self.title = top, top.text("name", "") or title
+    def __init__(self, top: ForeignValue, source: ForeignText) -> None:
+        self.top, self.title = top, top.text("name", "") or source.title
+        self.length = source.length_unit or "mm"
         self.book = NameBook({FRAME})
+        self.stops: list[DrawnStop] = []
         self.notes: list[str] = []
         self.joints: dict[str, ForeignValue] = {}
         for each in top.items("joints"):
@@ -94,14 +106,17 @@ class _Reader:
                     found.append(PinJoint(name, members, self.at(key)))
                 elif holders:
                     tracers.append(Tracer(name, holders[0], self.at(key)))
+        inputs = self._inputs(found)
         linkage = DrawnLinkage(
             self.title,
             FRAME,
             tuple(found),
             tuple(tracers),
-            tuple(self._inputs(found)),
+            tuple(inputs),
+            stops=tuple(self.stops),
             links=(FRAME, *(each for each in self.links if each != FRAME)),
-            notes=(*self.notes, "the file names no unit of length; its numbers are taken as mm"),
+            length=self.length,
+            notes=(*self.notes, unit_note(self.length)),
         )
         return linkage, []
 
@@ -150,9 +165,26 @@ class _Reader:
             if rate:
                 self.notes.append(f"{link!r} turns by {rate:.6g} rad in a step; a step is taken as a second")
             if given.text("type") == "arc_driver":
-                self.notes.append(f"{link!r} goes to and fro between two angles, which are left out")
+                self._add_arc(link, given, pins[pin])
             inputs.append(DrawnInput(pin, (FRAME, link), rate))
         return inputs
+
+    def _add_arc(self, link: str, given: ForeignValue, pin: PinJoint) -> None:
+        """The stops of a driver that goes to and fro between two angles of the line from its pin to its other joint."""
+        other = next((key for key in self.links[link] if self.names[key] != pin.name), None)
+        if other is None or not (given.has("arc_start") and given.has("arc_end")):
+            self.notes.append(f"{link!r} goes to and fro between angles that the file does not say; it has no stops")
+            return
+        start, end = sorted((given.number("arc_start"), given.number("arc_end")))
+        x, y = self.at(other)
+        angle = atan2(y - pin.at[1], x - pin.at[0])
+        angle += 2.0 * pi * ceil((start - angle) / (2.0 * pi) - 1e-9)
+        limits = f"between {degrees(start):.6g} and {degrees(end):.6g} deg"
+        if start < end and angle <= end + 1e-9:
+            self.stops.append(DrawnStop(pin.name, (FRAME, link), min(start - angle, 0.0), max(end - angle, 0.0)))
+            self.notes.append(f"{link!r} goes to and fro {limits}; here it stops there")
+        else:
+            self.notes.append(f"{link!r} goes to and fro {limits}, but was drawn outside of these; it has no stops")
 
 
 FORMAT = FileFormat(
@@ -162,4 +194,5 @@ FORMAT = FileFormat(
     source="src/pylinkage/mechanism/serialization.py of HugoFara/pylinkage",
     recognise=recognise,
     read=read,
+    names_length_unit=False,
 )

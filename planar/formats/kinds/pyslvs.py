@@ -15,6 +15,7 @@ from planar.formats.drawn.drawn_linkage import (
     Tracer,
     joined_links,
     joint_phrase,
+    unit_note,
 )
 from planar.formats.drawn.file_format import FileFormat, ForeignText, ReadDocument, WrittenText, cannot_say
 from planar.formats.drawn.rigid_links import merge_links, merge_links_of_two_pins, without_loose_links
@@ -64,10 +65,8 @@ def _linkage(source: ForeignText, given: list[PyslvsJoint], pairs: list[tuple[in
                 blocks.append(own[1:])
             kind = SlotJoint if each.kind == "RP" else SlideJoint
             joints.append(kind(name, guide, first, at, each.angle))
-    linkage = DrawnLinkage(source.title, FRAME, tuple(joints), tuple(tracers))
-    linkage = _with_inputs(linkage, names, links, pairs).with_notes(
-        "the file names no unit of length; its numbers are taken as mm"
-    )
+    linkage = DrawnLinkage(source.title, FRAME, tuple(joints), tuple(tracers), length=source.length_unit or "mm")
+    linkage = _with_inputs(linkage, names, links, pairs).with_notes(unit_note(linkage.length))
     return without_loose_links(merge_links_of_two_pins(merge_links(linkage, blocks)))
 
 
@@ -163,6 +162,7 @@ FORMAT = FileFormat(
     source="pyslvs/expression_parser.py of KmolYuan/pyslvs, pyslvs_ui/io of KmolYuan/Pyslvs-UI",
     recognise=recognise,
     read=read,
+    names_length_unit=False,
     write=write,
     precision="double precision",
 )

@@ -5,9 +5,9 @@ from __future__ import annotations
 import os
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from planar.document.files import OWN_FORMAT, as_mechanism, dumps, read_source
+from planar.formats.drawn.drawn_linkage import DrawnLinkage, lost_stop_notes
 from planar.formats.drawn.file_format import WrittenText
 from planar.formats.known_formats import file_formats, format_by_ending, named_format, writable_endings
 from planar.foundation.errors import unknown_format_error
@@ -39,13 +39,15 @@ def convert(
     *,
     to_format: str | None = None,
     from_format: str | None = None,
+    length_unit: str | None = None,
 ) -> Conversion:
     """A mechanism, a file of any program, a link of PMKS+ or a model's name, as the text of another kind of file.
 
     The kind is that named by `to_format` ("planar", "linkage2", "pmks", "pmksplus", "pyslvs", "linkage_sim"), else that
-    of the target's ending, else planar's own; the kind of the source is recognised, unless `from_format` names it. The
-    text is written to `target`, if that is named. Raises BadInput where a kind cannot say the mechanism, naming the
-    link or pair, and for files that cannot be read; NoAnswer where the mechanism cannot be assembled to be drawn.
+    of the target's ending, else planar's own; the kind of the source is recognised, unless `from_format` names it.
+    `length_unit` is the unit of length of a file that names none, such as "m". The text is written to `target`, if that
+    is named. Raises BadInput where a kind cannot say the mechanism, naming the link or pair, and for files that cannot
+    be read; NoAnswer where the mechanism cannot be assembled to be drawn.
 
     >>> import planar
     >>> print(planar.convert("four-bar", to_format="pmks").text.splitlines()[1])
@@ -53,7 +55,7 @@ def convert(
     """
     if isinstance(source, Mechanism) or not isinstance(source, str | os.PathLike):
         return write_conversion(as_mechanism(source), None, (), target, to_format)
-    return write_conversion(*read_source(source, from_format), target, to_format)
+    return write_conversion(*read_source(source, from_format, length_unit), target, to_format)
 
 
 def write_conversion(
@@ -65,10 +67,10 @@ def write_conversion(
 ) -> Conversion:
     """A mechanism that was read, of this kind and with these notes, as the text of another kind of file."""
     named = to_format or _format_of(target)
-    text, more = (dumps(mechanism), ()) if named == OWN_FORMAT else written_text(mechanism, named)
+    written = WrittenText(dumps(mechanism), ()) if named == OWN_FORMAT else written_text(mechanism, named)
     if target is not None:
-        save_file(Path(target), text)
-    return Conversion(mechanism, kind or OWN_FORMAT, named, text, (*notes, *more))
+        save_file(Path(target), written.text)
+    return Conversion(mechanism, kind or OWN_FORMAT, named, written.text, (*notes, *written.notes))
 
 
 def _format_of(target: str | os.PathLike[str] | None) -> str:
@@ -92,14 +94,17 @@ def written_text(mechanism: Mechanism, name: str) -> WrittenText:
         raise unknown_format_error("", f"a mechanism ({kind.title} is only read)", [*writable])
     drawn = drawn_mechanism(mechanism, rest_position(mechanism).frames, kind.title)
     found = kind.write(drawn)
-    return WrittenText(found.text, tuple(dict.fromkeys((*drawn.notes, *_unsaid(drawn, name), *found.notes))))
+    notes = (*drawn.notes, *_omissions(drawn, name, found.says_stops), *found.notes)
+    return found._replace(notes=tuple(dict.fromkeys(notes)))
 
 
-def _unsaid(drawn: Any, name: str) -> list[str]:
-    """What the format does not take over of masses, forces and weights."""
-    found = []
+def _omissions(drawn: DrawnLinkage, name: str, says_stops: bool) -> list[str]:
+    """What the text does not say of stops, masses, forces and gravity, as notes."""
+    notes = [] if says_stops else lost_stop_notes(drawn)
     if drawn.masses and name != "linkage_sim":
-        found.append("masses are left out: the format has none, or no unit for them")
+        notes.append("masses are left out: the format has none, or no unit for them")
     if drawn.forces:
-        found.append("forces are left out: the format has none, or no unit for them")
-    return found
+        notes.append("forces are left out: the format has none, or no unit for them")
+    if any(drawn.gravity):
+        notes.append("gravity is left out: the format has none")
+    return notes

@@ -112,5 +112,11 @@ def dot(one: Triple, other: Triple) -> float:
     return one[0] * other[0] + one[1] * other[1] + one[2] * other[2]
 
 
+def cross(one: Triple, other: Triple) -> Triple:
+    """The vector product."""
+    (a, b, c), (x, y, z) = one, other
+    return b * z - c * y, c * x - a * z, a * y - b * x
+
+
 def _turned(rows: tuple[Triple, Triple, Triple], vector: Triple) -> Triple:
     return dot(rows[0], vector), dot(rows[1], vector), dot(rows[2], vector)

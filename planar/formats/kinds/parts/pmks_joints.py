@@ -5,7 +5,16 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from planar.formats.drawn.drawn_document import drawn_document
-from planar.formats.drawn.drawn_linkage import DrawnInput, DrawnLinkage, Joint, PinJoint, SlideJoint, SlotJoint, Tracer
+from planar.formats.drawn.drawn_linkage import (
+    DrawnInput,
+    DrawnLinkage,
+    Joint,
+    PinJoint,
+    SlideJoint,
+    SlotJoint,
+    Tracer,
+    unit_note,
+)
 from planar.formats.drawn.file_format import ForeignText, ReadDocument
 from planar.formats.drawn.rigid_links import merge_links_of_two_pins, without_loose_links
 from planar.formats.drawn.wheels import meshing_gears
@@ -13,7 +22,6 @@ from planar.formats.texts.names import NameBook
 from planar.foundation.errors import BadInput
 
 FRAME = "ground"
-UNIT_NOTE = "the file names no unit of length; its numbers are taken as mm"
 
 
 class PmksJoint(NamedTuple):
@@ -57,10 +65,13 @@ def pmks_document(
             raise BadInput(place, f"a joint of type {each.kind} cannot be driven; that is one of type R or P")
     if not drives:
         drives = _first_drive(joints, velocity)
-    linkage = DrawnLinkage(source.title, FRAME, tuple(joints), tuple(tracers), tuple(drives[:1]), notes=notes)
+    length = source.length_unit or "mm"
+    linkage = DrawnLinkage(
+        source.title, FRAME, tuple(joints), tuple(tracers), tuple(drives[:1]), length=length, notes=notes
+    )
     if len(drives) > 1:
         linkage = linkage.with_notes(f"the input at {drives[1].joint!r} is left out: the first drives alone")
-    whole = without_loose_links(merge_links_of_two_pins(linkage.with_notes(UNIT_NOTE)))
+    whole = without_loose_links(merge_links_of_two_pins(linkage.with_notes(unit_note(length))))
     return drawn_document(whole, source.place)
 
 
