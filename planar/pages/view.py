@@ -34,8 +34,8 @@ def view(shown: Mechanism | State | Motion, path: str | Path | None = None, *, t
     """Write the page of a mechanism, of a position, or of a motion, which keeps its range.
 
     Without a path it is written to a folder of its own and opened in the browser. A `task`, as `planar.synthesise`
-    takes it, is shown under the mechanism: what is wanted can be dragged, and the free dimensions follow. Gives the
-    file's path. Raises NoAnswer where the mechanism has no position to start from, BadInput where the file cannot be
+    takes it, is shown under the mechanism: what is wanted can be dragged, and the free dimensions follow. The page of a
+    structure, and of a mechanism without inputs as it is drawn, says that nothing moves it. Gives the file's path. Raises NoAnswer where the mechanism has no position to start from, BadInput where the file cannot be
     written, or the task is none of this mechanism.
 
     >>> import planar
@@ -76,7 +76,7 @@ def page_of(shown: Mechanism | State | Motion, task: SynthesisTask | None = None
 
 def _page_subject(shown: Mechanism | State | Motion) -> PageSubject:
     if isinstance(shown, Mechanism):
-        return PageSubject(shown)
+        return PageSubject(shown if shown.inputs else solved_mechanism(shown).completed_mechanism)
     if isinstance(shown, State):
         return PageSubject(shown.mechanism, _unknowns(shown, shown.mechanism))
     ends = {name: given.position for name, given in shown.inputs.items()}

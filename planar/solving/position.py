@@ -41,8 +41,12 @@ def solve(mechanism: Mechanism, drives: Mapping[str, float] | Sequence[Drive] = 
     `drives` change inputs, as {pair: position} (rad or m) or with rates as well: the position then is the one to which
     the assembly of the file's own inputs leads when they are moved there together.
 
+    A mechanism without inputs that can move is solved as it is drawn, at rest; its state has inputs that hold it there,
+    and a remark says so.
+
     Raises NoAnswer, whose outcome says whether the mechanism cannot be assembled, stands on a dead point or a change
-    point, or has too few or too many inputs; its text names links, pairs, position and remedy.
+    point, is a structure that an input cannot move, or has too few or too many inputs; its text names links, pairs,
+    position and remedy.
 
     >>> import planar
     >>> planar.solve(planar.load("four-bar"))
@@ -51,9 +55,14 @@ def solve(mechanism: Mechanism, drives: Mapping[str, float] | Sequence[Drive] = 
     if isinstance(drives, Mapping):
         drives = [Drive(pair, position) for pair, position in drives.items()]
     known = solved_mechanism(mechanism)
+    if not mechanism.inputs:
+        known = solved_mechanism(known.completed_mechanism)
     here, found = known.solver, known.assembly
     if not drives:
-        return here.state(found.z, known.remarks)
+        try:
+            return here.state(found.z, known.remarks)
+        except NoAnswer as problem:
+            raise known.structure_refusal(problem) or problem from None
     there = here.with_inputs_of(replace_inputs(mechanism, tuple(drives)))
     z = known.nearby_positions.unknowns_at(there.inputs.u) if there.unit == here.unit else None
     if z is not None:
@@ -370,6 +379,62 @@ class SolvedMechanism:
         return self.solver.remarks(self.assembly)
 
     @cached_property
+    def completed_mechanism(self) -> Mechanism:
+        """The mechanism; where its inputs leave links free, with further inputs that hold these as they are drawn."""
+        solver = self._plain_solver
+        if not any(block.is_free for block in solver.equations.blocks):
+            return solver.mechanism
+        from planar.solving.assembly.drawn_inputs import with_drawn_inputs  # few mechanisms have too few inputs
+
+        return with_drawn_inputs(solver) or solver.mechanism
+
+    @cached_property
+    def is_rigid(self) -> bool:
+        """Whether the pairs allow no motion from the position even to first order; False where there is no position.
+
+        Equations that are not more than their unknowns are not looked at: one Jacobian is all that this takes.
+        """
+        solver = self.solver
+        if solver.functions.is_square or solver.equations.open_rows:
+            return False
+        try:
+            z = self.assembly.z
+        except NoAnswer:
+            return False
+        from planar.solving.diagnosis.redundancy import is_rigid
+
+        return is_rigid(solver, solver.functions.coordinates(z, solver.inputs.u, solver.inputs.p))
+
+    def motion_refusal(self, pair: str | None = None) -> NoAnswer | None:
+        """Why no input can run from the mechanism's position, whatever its range; None where one can.
+
+        Every command asks this for the sentence: there is no position, nothing moves (a structure), there is no input,
+        or the other inputs hold the one at `pair` (None: each holds the others).
+        """
+        try:
+            z = self.assembly.z
+        except NoAnswer as problem:
+            return problem
+        if self.solver.functions.is_square and self.solver.mechanism.inputs and is_surely_regular(self.solver, z):
+            return None
+        from planar.solving.diagnosis.judgement import judge_motion  # regular positions need no judgement
+
+        return judge_motion(self.solver, z, pair)
+
+    def structure_refusal(self, problem: NoAnswer) -> NoAnswer | None:
+        """What to say where rates are not determined since nothing can move; None where something can."""
+        if problem.outcome not in (Outcome.DEAD_POINT, Outcome.CHANGE_POINT, Outcome.TOO_MANY_INPUTS):
+            return None
+        refusal = self.motion_refusal()
+        return refusal if refusal is not None and refusal.outcome is Outcome.STRUCTURE else None
+
+    def check_motion(self, pair: str | None = None) -> None:
+        """Raise NoAnswer where no input can run from the mechanism's position; see `motion_refusal`."""
+        problem = self.motion_refusal(pair)
+        if problem is not None:
+            raise problem
+
+    @cached_property
     def nearby_positions(self) -> StraightPathCache:
         """Positions to which it leads."""
         return StraightPathCache(self.solver, self.assembly.z)
@@ -387,6 +452,17 @@ def solved_mechanism(mechanism: Mechanism) -> SolvedMechanism:
     except TypeError:  # made in Python, of lists
         return SolvedMechanism(mechanism)
     return _cached_solved_mechanism(mechanism)
+
+
+def rest_remarks(mechanism: Mechanism) -> tuple[str, ...]:
+    """What a drawing or a page says of a mechanism that does not run: nothing moves, or no input is given."""
+    from planar.solving.assembly.drawn_inputs import DRAWN_REMARK
+
+    remarks = [remark for remark in mechanism.remarks if remark.startswith(DRAWN_REMARK)]
+    problem = solved_mechanism(mechanism).motion_refusal()
+    if problem is not None and problem.outcome is Outcome.STRUCTURE:
+        remarks.append(problem.reason)
+    return tuple(remarks)
 
 
 def stopped_at_start(solver: PositionSolver, z: Array, problem: NoAnswer) -> NoAnswer:

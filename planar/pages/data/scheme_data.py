@@ -121,7 +121,7 @@ class MovingScene(Scene):
 
 
 def motion_positions(mechanism: Mechanism, z: Array) -> Positions:
-    """Where the links are at the unknowns z, and over the motion of every input from there."""
+    """Where the links are at the unknowns z, and over the motion of every input from there, if anything moves."""
     solver = solved_mechanism(mechanism).solver
     u, p = solver.inputs.u, solver.inputs.p
 
@@ -131,7 +131,7 @@ def motion_positions(mechanism: Mechanism, z: Array) -> Positions:
         return plain_frames(found)
 
     positions = [frames(z, u)]
-    for number, given in enumerate(mechanism.inputs):
+    for number, given in enumerate(() if solved_mechanism(mechanism).is_rigid else mechanism.inputs):
         step = np.zeros_like(u)
         sliding = solver.is_sliding(given.pair)
         step[number] = (FREE_SLIDE_RATIO if sliding else 2.0 * pi) / MOTION_STEPS

@@ -7,6 +7,8 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from planar.foundation.arrays import Array
+from planar.model.mechanism import Mechanism, pair_entries
+from planar.model.pairs import Pair
 from planar.solving.checks.singular_values import null_space
 from planar.solving.full_constraints import (
     PROBE_DISTANCE,
@@ -86,6 +88,50 @@ def find_jammed_inputs(setup: PreparedMechanism) -> tuple[list[str], list[str]] 
 def count_motions(setup: PreparedMechanism, w: Array) -> int | None:
     """In how many ways the mechanism can move on from a position w, inputs left aside; None where it is too large."""
     return motion_dimension(FullConstraints(setup), w)[0] if w.size <= MAX_COORDINATES else None
+
+
+def releasing_link(setup: PreparedMechanism, w: Array) -> str | None:
+    """A link of a structure at a position w whose removal, with its pairs, lets the inputs move; None if none does.
+
+    Links at driven pairs are left out. A link whose removal leaves one freedom for each input is preferred.
+    """
+    mechanism = setup.mechanism
+    names = tuple(given.pair for given in mechanism.inputs)
+    driven = {link for name in names for link in setup.relative_motions[name].bodies}
+    input_rows = FullConstraints(setup).relative_jacobian(names, w)
+    fewest, candidate = w.size + 1, None
+    for link in (each.name for each in mechanism.links if each.name not in driven | {mechanism.frame}):
+        constraints = FullConstraints(setup, _pairs_without(mechanism, link))
+        kept = {pair.name for pair in constraints.pairs} | {each.name for each in mechanism.links if each.name != link}
+        columns = [each.owner in kept for each in constraints.coordinates]
+        free = null_space(constraints.jacobian(w)[:, columns])
+        rates = np.abs(input_rows[:, columns] @ free).max(axis=1, initial=0.0)
+        if free.size and np.all(rates > 100.0 * ZERO_COMPONENT) and free.shape[1] < fewest:
+            fewest, candidate = free.shape[1], link
+        if fewest <= max(1, len(names)):
+            break
+    return candidate
+
+
+def _pairs_without(mechanism: Mechanism, link: str) -> list[Pair]:
+    """The pairs of a mechanism without a link; the other links of its pins stay joined to one another."""
+    pairs: list[Pair] = []
+    for group in pair_entries(mechanism):
+        rest = [pair for pair in type(group[0]).relative_motions(group) if link not in pair.bodies]
+        pairs += [pair for pair in rest if pair.links[0] == rest[0].links[0]]
+    return pairs
+
+
+def can_move_alone(setup: PreparedMechanism, w: Array, pair: str) -> bool:
+    """Whether the input at a pair can move from a position w, to first order, while the other inputs stand still."""
+    constraints = FullConstraints(setup)
+    others = tuple(given.pair for given in setup.mechanism.inputs if given.pair != pair)
+    return null_space(np.vstack([constraints.jacobian(w), constraints.relative_jacobian(others, w)])).size > 0
+
+
+def is_rigid(setup: PreparedMechanism, w: Array) -> bool:
+    """Whether the pairs, inputs left aside, allow no motion from a position w even to first order."""
+    return not null_space(FullConstraints(setup).jacobian(w)).size
 
 
 def find_conflicting_inputs(setup: PreparedMechanism) -> tuple[tuple[str, ...], ...]:
