@@ -460,9 +460,7 @@ def rest_remarks(mechanism: Mechanism) -> tuple[str, ...]:
 
     remarks = [remark for remark in mechanism.remarks if remark.startswith(DRAWN_REMARK)]
     problem = solved_mechanism(mechanism).motion_refusal()
-    if problem is not None and problem.outcome is Outcome.STRUCTURE:
-        remarks.append(problem.reason)
-    return tuple(remarks)
+    return (*remarks, problem.reason) if problem is not None else tuple(remarks)
 
 
 def stopped_at_start(solver: PositionSolver, z: Array, problem: NoAnswer) -> NoAnswer:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 
 import click
 
+from planar.cli.exit_status import NO_ANSWER
 from planar.cli.options import (
     at_option,
     load_model,
@@ -41,7 +43,7 @@ SUFFIXES = (".html", ".htm")
 def view(model: str, output: Path | None, at: tuple[str, ...], mode: int | None, task: Path | None) -> None:
     """A page to take hold of it: it moves, with its numbers, and with other dimensions."""
     from planar.pages.view import view as write
-    from planar.solving.position import solve
+    from planar.solving.position import solve, solved_mechanism
 
     if output is not None and output.suffix.lower() not in SUFFIXES:
         raise unknown_format_error(output.suffix, "a page", SUFFIXES)
@@ -52,7 +54,12 @@ def view(model: str, output: Path | None, at: tuple[str, ...], mode: int | None,
     with show_status(mechanism.name):
         moved = parse_drives(mechanism, at)
         written = write(solve(mechanism, moved) if moved else mechanism, output, task=task)
+        problem = solved_mechanism(mechanism).motion_refusal()
     click.echo(str(written))
+    if problem is not None:
+        click.echo(f"planar: {problem}", err=True)
+        if mechanism.inputs:
+            sys.exit(NO_ANSWER)
 
 
 @main.command()

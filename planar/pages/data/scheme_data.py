@@ -122,7 +122,8 @@ class MovingScene(Scene):
 
 def motion_positions(mechanism: Mechanism, z: Array) -> Positions:
     """Where the links are at the unknowns z, and over the motion of every input from there, if anything moves."""
-    solver = solved_mechanism(mechanism).solver
+    known = solved_mechanism(mechanism)
+    solver = known.solver
     u, p = solver.inputs.u, solver.inputs.p
 
     def frames(z: Array, u: Array) -> Mapping[str, Frame]:
@@ -131,7 +132,9 @@ def motion_positions(mechanism: Mechanism, z: Array) -> Positions:
         return plain_frames(found)
 
     positions = [frames(z, u)]
-    for number, given in enumerate(() if solved_mechanism(mechanism).is_rigid else mechanism.inputs):
+    for number, given in enumerate(mechanism.inputs):
+        if known.motion_refusal(given.pair) is not None:
+            continue
         step = np.zeros_like(u)
         sliding = solver.is_sliding(given.pair)
         step[number] = (FREE_SLIDE_RATIO if sliding else 2.0 * pi) / MOTION_STEPS

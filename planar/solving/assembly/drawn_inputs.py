@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from math import pi, remainder
 
 import numpy as np
 
@@ -37,11 +38,19 @@ def with_drawn_inputs(setup: PreparedMechanism) -> Mechanism | None:
     names = _driving_pairs(constraints, w, free)
     if not names or len(names) < free.shape[1]:
         return None
-    units = [setup.unit if setup.is_sliding(name) else 1.0 for name in names]
-    positions = constraints.relative_positions(names, w) * units
-    inputs = (Input(name, float(position)) for name, position in zip(names, positions, strict=True))
+    inputs = (
+        Input(name, _input_position(setup, name, float(position)))
+        for name, position in zip(names, constraints.relative_positions(names, w), strict=True)
+    )
     remark = f"{DRAWN_REMARK} at {quote_names(names)}, where it stands as drawn: {free_links(setup).reason}"
     return replace(mechanism, inputs=(*mechanism.inputs, *inputs), remarks=(*mechanism.remarks, remark))
+
+
+def _input_position(setup: PreparedMechanism, name: str, position: float) -> float:
+    """A position (rad, sizes) as an input has it (rad, m): an angle whose turns are not counted within half a turn."""
+    if setup.is_sliding(name):
+        return position * setup.unit
+    return position if setup.structure.counts else remainder(position, 2.0 * pi)
 
 
 def _driving_pairs(constraints: FullConstraints, w: Array, free: Array) -> tuple[str, ...]:
