@@ -116,10 +116,9 @@ def structure(setup: PreparedMechanism, w: Array) -> NoAnswer:
     links = [link.name for link in mechanism.links if link.name != mechanism.frame]
     if not links:
         return NoAnswer(Outcome.STRUCTURE, f"nothing moves: the frame {mechanism.frame!r} is the only link; add links")
-    form = "forms" if len(links) == 1 else "form"
     return NoAnswer(
         Outcome.STRUCTURE,
-        f"nothing moves: {_links(links)} {form} a structure with the frame {mechanism.frame!r} (mobility 0) "
+        f"nothing moves: it is a structure of {_links(links)} with the frame {mechanism.frame!r} (mobility 0) "
         f"{setup.describe_position()}; {_structure_remedy(setup, w)}",
         **_all_links(links),
     )
