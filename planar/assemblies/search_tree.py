@@ -277,7 +277,9 @@ class AssemblyTree:
             link.name: tuple(setup.column.get((link.name, part), -1) for part in ("x", "y", "angle"))
             for link in setup.mechanism.links
         }
-        link_level = {name: max((level[at] for at in columns if at >= 0), default=-1) for name, columns in parts.items()}
+        link_level = {
+            name: max((level[at] for at in columns if at >= 0), default=-1) for name, columns in parts.items()
+        }
         driven = [setup.relative_motions[given.pair] for given in setup.mechanism.inputs]
         boundaries = []
         for index in range(len(self.stages)):

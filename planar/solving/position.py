@@ -17,7 +17,7 @@ from planar.foundation.arrays import Array
 from planar.foundation.errors import NoAnswer, Outcome, TrackingEnd
 from planar.foundation.geometry import Frame
 from planar.foundation.jets import Jet
-from planar.model.mechanism import Drive, Mechanism, replace_inputs
+from planar.model.mechanism import Drive, Input, Mechanism, replace_inputs
 from planar.results.motion import State
 from planar.solving.assembly.block_assemblies import BlockAssemblies
 from planar.solving.assembly.nearest_assembly import Assembly, AssemblySearchFailure, find_nearest_assembly
@@ -415,11 +415,16 @@ class SolvedMechanism:
             z = self.assembly.z
         except NoAnswer as problem:
             return problem
-        if self.solver.functions.is_square and self.solver.mechanism.inputs and is_surely_regular(self.solver, z):
-            return None
-        from planar.solving.diagnosis.judgement import judge_motion  # regular positions need no judgement
-
-        return judge_motion(self.solver, z, pair)
+        mechanism = self.solver.mechanism
+        if self.solver.functions.is_square and mechanism.inputs and is_surely_regular(self.solver, z):
+            return None  # regular positions need no judgement
+        inputs = tuple(Input(given.pair, given.position) for given in mechanism.inputs)
+        at_rest = replace(mechanism, inputs=inputs, remarks=(), loads=())
+        try:
+            hash(at_rest)
+        except TypeError:  # made in Python, of lists
+            return _motion_judgement(at_rest, pair)
+        return _cached_motion_judgement(at_rest, pair)
 
     def structure_refusal(self, problem: NoAnswer) -> NoAnswer | None:
         """What to say where rates are not determined since nothing can move; None where something can."""
@@ -443,6 +448,17 @@ class SolvedMechanism:
 @lru_cache(maxsize=MAX_CACHED_STRUCTURES)
 def _cached_solved_mechanism(mechanism: Mechanism) -> SolvedMechanism:
     return SolvedMechanism(mechanism)
+
+
+def _motion_judgement(mechanism: Mechanism, pair: str | None) -> NoAnswer | None:
+    """Why an input of a mechanism at rest cannot run: rates, loads and remarks make no difference to that."""
+    from planar.solving.diagnosis.judgement import judge_motion  # few mechanisms are judged
+
+    known = solved_mechanism(mechanism)
+    return judge_motion(known.solver, known.assembly.z, pair)
+
+
+_cached_motion_judgement = lru_cache(maxsize=MAX_CACHED_STRUCTURES)(_motion_judgement)
 
 
 def solved_mechanism(mechanism: Mechanism) -> SolvedMechanism:
