@@ -253,7 +253,7 @@ class AssemblyTree:
         """
         links, columns = self._boundaries[index]
         w = self.setup.functions.coordinates(z, self.setup.inputs.u, self.setup.inputs.p)
-        poses = np.array([[0.0 if at < 0 else w[at] for at in link] for link in links]).reshape(-1, 3)
+        poses = np.array([[w[column] if column >= 0 else 0.0 for column in link] for link in links]).reshape(-1, 3)
         if len(poses):
             angle = poses[0, 2]
             poses = poses - poses[0]
@@ -278,7 +278,8 @@ class AssemblyTree:
             for link in setup.mechanism.links
         }
         link_level = {
-            name: max((level[at] for at in columns if at >= 0), default=-1) for name, columns in parts.items()
+            name: max((level[column] for column in columns if column >= 0), default=-1)
+            for name, columns in parts.items()
         }
         driven = [setup.relative_motions[given.pair] for given in setup.mechanism.inputs]
         boundaries = []

@@ -57,8 +57,8 @@ def write_gallery(
     taken, shown, refused = {"index"}, [], []
     for done, (name, mechanism) in enumerate(models, start=1):
         try:
-            mechanism = solved_mechanism(mechanism).completed_mechanism
-            text, moving = page(mechanism, back=PageLink("index.html", "All mechanisms")), small_picture_data(mechanism)
+            drawn = solved_mechanism(mechanism).completed_mechanism
+            text, moving = page(drawn, back=PageLink("index.html", "All mechanisms")), small_picture_data(drawn)
         except NoAnswer as problem:
             refused.append((name, problem))
             continue

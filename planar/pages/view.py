@@ -35,8 +35,9 @@ def view(shown: Mechanism | State | Motion, path: str | Path | None = None, *, t
 
     Without a path it is written to a folder of its own and opened in the browser. A `task`, as `planar.synthesise`
     takes it, is shown under the mechanism: what is wanted can be dragged, and the free dimensions follow. The page of a
-    structure, and of a mechanism without inputs as it is drawn, says that nothing moves it. Gives the file's path. Raises NoAnswer where the mechanism has no position to start from, BadInput where the file cannot be
-    written, or the task is none of this mechanism.
+    structure, and of a mechanism without inputs as it is drawn, says that nothing moves it. Gives the file's path.
+    Raises NoAnswer where the mechanism has no position to start from, BadInput where the file cannot be written, or the
+    task is none of this mechanism.
 
     >>> import planar
     >>> from tempfile import mkdtemp
