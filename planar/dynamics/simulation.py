@@ -140,7 +140,7 @@ def simulate(
     PositionSolver(mechanism).refuse_misfit("a motion that is let go is not told")
     mechanism = solved_mechanism(mechanism).completed_mechanism
     problem = solved_mechanism(mechanism).motion_refusal()
-    if problem is not None and problem.outcome is Outcome.STRUCTURE:
+    if problem is not None and problem.outcome is Outcome.STRUCTURE and mechanism.inputs:
         raise problem
     started = (
         mechanism

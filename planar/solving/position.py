@@ -384,7 +384,7 @@ class SolvedMechanism:
         solver = self._plain_solver
         if not any(block.is_free for block in solver.equations.blocks):
             return solver.mechanism
-        from planar.solving.assembly.drawn_inputs import with_drawn_inputs  # few mechanisms have too few inputs
+        from planar.solving.drawn_inputs import with_drawn_inputs  # few mechanisms have too few inputs
 
         return with_drawn_inputs(solver) or solver.mechanism
 
@@ -472,7 +472,7 @@ def solved_mechanism(mechanism: Mechanism) -> SolvedMechanism:
 
 def rest_remarks(mechanism: Mechanism) -> tuple[str, ...]:
     """What a drawing or a page says of a mechanism that does not run: nothing moves, or no input is given."""
-    from planar.solving.assembly.drawn_inputs import DRAWN_REMARK
+    from planar.solving.drawn_inputs import DRAWN_REMARK
 
     remarks = [remark for remark in mechanism.remarks if remark.startswith(DRAWN_REMARK)]
     problem = solved_mechanism(mechanism).motion_refusal()

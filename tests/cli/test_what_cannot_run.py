@@ -140,7 +140,7 @@ WAYS: dict[str, tuple[dict[str, Any], Outcome, str, dict[str, str]]] = {
         structure(
             "links 'a' and 'b'", " as drawn; remove link 'a' with its pairs 'O' and 'A' to let it move, and give"
         ),
-        STILL,
+        STILL | {"simulate": DONE},
     ),
     "no input": (
         four_bar(),

@@ -21,6 +21,8 @@ from planar.solving.prepared_mechanism import PreparedMechanism
 
 ZERO_COMPONENT = 1e-7
 """A part of a unit vector that is zero but for rounding."""
+MAX_REMOVALS = 60
+"""Links or pairs of a structure whose removal is tried."""
 MAX_COORDINATES = 600
 """Coordinates: a larger mechanism is not searched for inputs that are stuck, or for how it moves in general."""
 
@@ -90,27 +92,38 @@ def count_motions(setup: PreparedMechanism, w: Array) -> int | None:
     return motion_dimension(FullConstraints(setup), w)[0] if w.size <= MAX_COORDINATES else None
 
 
-def releasing_link(setup: PreparedMechanism, w: Array) -> str | None:
-    """A link of a structure at a position w whose removal, with its pairs, lets the inputs move; None if none does.
+def releasing_parts(setup: PreparedMechanism, w: Array) -> tuple[str | None, tuple[str, ...]]:
+    """What lets the inputs of a structure at a position w move when it is removed: a link with its pairs, or one pair.
 
-    Links at driven pairs are left out. A link whose removal leaves one freedom for each input is preferred.
+    Returns the link (None: a pair alone, where no link will do) and the names of the pairs; none if nothing is found.
+    Links at driven pairs and driven pairs are left out. What leaves one freedom for each input is preferred.
     """
     mechanism = setup.mechanism
     names = tuple(given.pair for given in mechanism.inputs)
     driven = {link for name in names for link in setup.relative_motions[name].bodies}
     input_rows = FullConstraints(setup).relative_jacobian(names, w)
-    fewest, candidate = w.size + 1, None
-    for link in (each.name for each in mechanism.links if each.name not in driven | {mechanism.frame}):
-        constraints = FullConstraints(setup, _pairs_without(mechanism, link))
-        kept = {pair.name for pair in constraints.pairs} | {each.name for each in mechanism.links if each.name != link}
-        columns = [each.owner in kept for each in constraints.coordinates]
+
+    def freedoms(pairs: Sequence[Pair], removed: str | None) -> int:
+        """How many freedoms these pairs leave; 0 where some input cannot move."""
+        constraints = FullConstraints(setup, pairs)
+        owners = {pair.name for pair in pairs} | {link.name for link in mechanism.links if link.name != removed}
+        columns = [each.owner in owners for each in constraints.coordinates]
         free = null_space(constraints.jacobian(w)[:, columns])
         rates = np.abs(input_rows[:, columns] @ free).max(axis=1, initial=0.0)
-        if free.size and np.all(rates > 100.0 * ZERO_COMPONENT) and free.shape[1] < fewest:
-            fewest, candidate = free.shape[1], link
-        if fewest <= max(1, len(names)):
-            break
-    return candidate
+        return free.shape[1] if np.all(rates > 100.0 * ZERO_COMPONENT) else 0
+
+    links = [link.name for link in mechanism.links if link.name not in driven | {mechanism.frame}]
+    choices: list[tuple[str | None, list[Pair]]] = [(link, _pairs_without(mechanism, link)) for link in links]
+    entries = [group for group in pair_entries(mechanism) if len(group) == 1 and group[0].name not in names]
+    for kind in (choices, [(None, [pair for pair in mechanism.pairs if pair not in group]) for group in entries]):
+        counted = [(freedoms(pairs, link), link, pairs) for link, pairs in kind[:MAX_REMOVALS]]
+        released = [each for each in counted if each[0]]
+        if released:
+            _, link, pairs = min(released, key=lambda each: each[0])
+            kept = {pair.name for pair in pairs}
+            gone = [pair for pair in mechanism.pairs if (link in pair.bodies if link else pair.name not in kept)]
+            return link, tuple(dict.fromkeys(pair.entry_name() for pair in gone))
+    return None, ()
 
 
 def _pairs_without(mechanism: Mechanism, link: str) -> list[Pair]:

@@ -126,15 +126,13 @@ def structure(setup: PreparedMechanism, w: Array) -> NoAnswer:
 
 def _structure_remedy(setup: PreparedMechanism, w: Array) -> str:
     """What to remove from a structure: its inputs, or what lets it move."""
-    from planar.solving.diagnosis.redundancy import releasing_link
+    from planar.solving.diagnosis.redundancy import releasing_parts
 
     mechanism = setup.mechanism
-    link = releasing_link(setup, w)
+    link, pairs = releasing_parts(setup, w)
+    removal = f"pair{'s' * (len(pairs) != 1)} {quote_names(list(pairs))}" if pairs else "links or pairs"
     if link is not None:
-        pairs = dict.fromkeys(pair.entry_name() for pair in mechanism.pairs if link in pair.bodies)
-        removal = f"link {link!r} with its pair{'s' * (len(pairs) != 1)} {quote_names(list(pairs))}"
-    else:
-        removal = "links or pairs"
+        removal = f"link {link!r} with its {removal}"
     if not mechanism.inputs:
         return f"remove {removal} to let it move, and give an input"
     return f"remove {_inputs(setup)}, or remove {removal} to let it move"
