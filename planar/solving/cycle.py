@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
 from numbers import Integral
+
+import numpy as np
 
 from planar.document.first_argument import takes_mechanism
 from planar.foundation.errors import BadInput, NoAnswer
 from planar.model.mechanism import LARGEST_COUNTED_ANGLE, Mechanism
 from planar.model.run_arguments import check_number, check_steps
+from planar.model.wording import quote_names
 from planar.results.motion import Motion
 from planar.solving.position import SolvedMechanism, solved_mechanism
 from planar.solving.runs.range_run import RangeRun
@@ -100,8 +104,18 @@ def cycle(
 
 
 def _explained_run(known: SolvedMechanism, pair: str | None, run: Callable[[], Motion]) -> Motion:
-    """A run; where it fails because no input can run from the position, `motion_refusal` says why."""
+    """A run; where it fails because no input can run from the position, `motion_refusal` says why.
+
+    Of a run in which every input stands still a remark says so.
+    """
     try:
-        return run()
+        motion = run()
     except NoAnswer as problem:
         raise known.motion_refusal(pair) or problem from None
+    positions = [given.position for given in motion.inputs.values()]
+    if any(each[0] != each[-1] or np.ptp(each) for each in positions):
+        return motion
+    subject = "inputs" if len(positions) > 1 else "input"
+    remark = f"nothing moves over the whole run, as the {subject} at {quote_names(list(motion.inputs))} "
+    remark += f"stand{'' if len(positions) > 1 else 's'} still; give a velocity, a law or a range"
+    return replace(motion, remarks=(*motion.remarks, remark))
