@@ -117,6 +117,7 @@ def page_data(mechanism: Mechanism, z: np.ndarray | None = None) -> tuple[dict[s
         "starting": uncounted_angles(mechanism),
         "assemblies": _assembly_data(mechanism, solver),
         "z": z.tolist(),
+        "fixed": solved_mechanism(mechanism).motion_refusal() is not None,
         "tolerance": solver.tolerance,
         "stops": stop_data(solver),
         "sizes": len(numbers.values),

@@ -173,7 +173,7 @@ class Courses {
       }
     }
     const made = new Course(page, k, rows, turns, [ends[0].stopped, ends[1].stopped]);
-    made.names = ends.map((each) => (each.met ? "stop" : "dead point"));
+    made.names = ends.map((each) => (each.met ? "stop" : page.data.fixed ? "fixed at" : "dead point"));
     return made;
   }
 
