@@ -247,6 +247,19 @@ def designs_around(mechanism, spread, many=5, seed=0):
     return {name: value * (1 + spread * rng.uniform(-1, 1, many)) for name, value in own.items() if value}
 
 
+def lift_document(stages: int) -> dict[str, Any]:
+    """A scissor lift: pairs of bars that cross in the middle, the lowest on a pivot and on a slide that is driven."""
+    links: dict[str, Any] = {"g": {"points": {"P0": [0, 0]}}}
+    pairs: list[dict[str, Any]] = [{"turning": "P0"}]
+    for k in range(1, stages + 1):
+        for name, ends in ((f"a{k}", [f"P{k - 1}", f"Q{k}"]), (f"b{k}", [f"Q{k - 1}", f"P{k}"])):
+            links[name] = {"ends": ends, "length": 2, "points": {f"M{k}": {"along": ends, "distance": 1}}}
+        pairs += [{"turning": f"M{k}"}, *({"turning": f"{name}{k}"} for name in "PQ" if k < stages)]
+    pairs.append({"sliding": "s", "on": "g", "block": "Q0", "line": {"through": "P0", "angle": 0}})
+    inputs = [{"pair": "s", "position": 1.2}]
+    return {"planar": 1, "frame": "g", "links": links, "pairs": pairs, "inputs": inputs}
+
+
 def tower(many: int) -> planar.Mechanism:
     """Triangles one on a side of the other, each of which can be turned over: two assemblies each, whatever before."""
     links = {"crank": ("A", "B", 1.0)}

@@ -34,6 +34,9 @@ MAX_SOLVED_FOR_COUNT = 4096
 MAX_CERTIFIED_FOR_CLAIM = 256
 """The same, certified, for the sake of a claim about the whole list."""
 
+MAX_PRINTED, MAX_PRINTED_POINTS = 5, 4
+"""Assemblies that `print` lists, and the last points of each."""
+
 
 @takes_mechanism
 def modes(mechanism: Mechanism, drives: Mapping[str, float] | Sequence[Drive] = (), *, certify: bool = True) -> Modes:
@@ -82,8 +85,9 @@ class ModesBlock(NamedTuple):
 class Modes(Displayable, Sequence["Mode"]):
     """All assemblies in a fixed order, which does not depend on the sketch: group after group of links.
 
-    The list is made as it is read. It has a length where that can be told by solving a few thousand groups, those that
-    do not hang on each other not listed together; else TypeError is raised, and `bound` says how many there may be.
+    The list is made as it is read, one assembly after another. `len()` counts without listing: groups that do not
+    depend on each other are multiplied, and groups that are joined to congruent positions are counted once. Where even
+    that takes more than a few thousand groups, `total` is None, `len()` raises TypeError and `bound` is an upper bound.
     """
 
     def __init__(self, solver: PositionSolver, mechanism: Mechanism, drives: tuple[Drive, ...], certify: bool):
@@ -97,7 +101,18 @@ class Modes(Displayable, Sequence["Mode"]):
         self._listed: list[Mode] = []
 
     def __repr__(self) -> str:
-        return f"<Modes of {self.mechanism.name!r} {self._solver.describe_position()}>"
+        count = "more than are counted" if self.total is None else str(self.total)
+        return f"<Modes of {self.mechanism.name!r} {self._solver.describe_position()}: {count}>"
+
+    def __str__(self) -> str:
+        lines = [repr(self)]
+        for mode in islice(self, MAX_PRINTED):
+            last = list(mode.points.items())[-MAX_PRINTED_POINTS:]
+            places = ", ".join(f"{name} ({at[0]:.6g}, {at[1]:.6g})" for name, at in last)
+            lines.append(f"{mode.number}: {'..., ' if len(mode.points) > len(last) else ''}{places} m")
+        if self.total is None or self.total > MAX_PRINTED:
+            lines.append("..." if self.total is None else f"and {self.total - MAX_PRINTED} more")
+        return "\n".join(lines)
 
     def __reduce__(self) -> tuple[Any, ...]:
         # compiled equations stay in their process: another one lists them again

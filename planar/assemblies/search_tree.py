@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -24,6 +25,8 @@ SAME_ROOT_DISTANCE, SAME_DOUBLE_ROOT_DISTANCE = 1e-6, 1e-4
 """How near to a root unknowns are that root, and one where two meet, which rounding puts farther off."""
 REGULAR_SINGULAR_VALUE = 1e-9
 """A linear block whose Jacobian is weaker than this part of itself has no single assembly."""
+CONGRUENCE_DIGITS = 9
+"""Decimals (sizes, rad) by which positions are compared that are congruent but for rounding."""
 JACOBIAN_ROUNDING = 1e-12
 """What is rounding in a Jacobian."""
 
@@ -38,12 +41,59 @@ class AssemblyPath(NamedTuple):
 
 
 class _CountingNode:
-    """A block on the way of counting: the root that is next, and how many assemblies there are with those before."""
+    """A block on the path of counting: the root that is next, and the number of assemblies with those before."""
 
     def __init__(self, index: int, key: bytes, real: Array):
         self.index, self.key, self.real = index, key, real
         self.rank = self.total = 0
         self.is_over_budget = False
+
+
+class _Count:
+    """Counting of assemblies block after block: blocks with equal keys have equally many, and are counted once."""
+
+    def __init__(
+        self,
+        tree: AssemblyTree,
+        key: Callable[[int, Array], bytes],
+        counted: list[dict[bytes, int]],
+        budget: list[int],
+    ):
+        self.tree, self.key, self.counted, self.budget = tree, key, counted, budget
+
+    def count_from(self, first: int, z: Array) -> int | None:
+        """How many assemblies the blocks from one on have; None where the budget does not reach."""
+        z = z.copy()
+        path: list[_CountingNode] = []
+        count = self._count_or_push(first, z, path)
+        while path:
+            node = path[-1]
+            if count is not None:
+                node.total += count
+            elif node.is_over_budget:
+                return None
+            if node.rank == len(node.real):
+                self.counted[node.index][node.key] = count = node.total
+                path.pop()
+                continue
+            z[self.tree.stages[node.index].unknowns] = node.real[node.rank]
+            node.rank += 1
+            count = self._count_or_push(node.index + 1, z, path)
+        return count
+
+    def _count_or_push(self, index: int, z: Array, path: list[_CountingNode]) -> int | None:
+        """How many the blocks from one on have if that is known, else the block is put on the path to be counted."""
+        if index == len(self.tree.stages):
+            return 1
+        key = self.key(index, z)
+        if key not in self.counted[index]:
+            self.budget[0] -= max(1, slice_length(self.tree.stages[index].unknowns) ** 3 // 8)
+            if self.budget[0] >= 0:
+                path.append(_CountingNode(index, key, self.tree.roots(index, z).real))
+            elif path:
+                path[-1].is_over_budget = True
+            return None
+        return self.counted[index][key]
 
 
 class AssemblyTree:
@@ -67,6 +117,7 @@ class AssemblyTree:
         self._solved: list[dict[bytes, BlockRoots]] = [{} for _ in self.stages]
         self._dead_ends: list[set[bytes]] = [set() for _ in self.stages]
         self._counted: list[dict[bytes, int]] = [{} for _ in self.stages]
+        self._counted_congruent: list[dict[bytes, int]] = [{} for _ in self.stages]
 
     def roots(self, index: int, z: Array) -> BlockRoots:
         """The assemblies of one block, the unknowns of those before it in z (unknowns,)."""
@@ -162,15 +213,15 @@ class AssemblyTree:
 
     def count_before(self, path: AssemblyPath, most: int) -> int | None:
         """How many assemblies stand before one in order; None where telling takes more than so many dyads solved."""
-        z, found, room = np.zeros_like(path.z), 0, [most]
+        z, found, budget = np.zeros_like(path.z), 0, [most]
         for depth, rank in enumerate(path.choices):
             real = self.roots(depth, z).real
             for other in range(rank):
                 z[self.stages[depth].unknowns] = real[other]
-                many = self._count_from(depth + 1, z, room)
-                if many is None:
+                count = self._count_from(depth + 1, z, budget)
+                if count is None:
                     return None
-                found += many
+                found += count
             z[self.stages[depth].unknowns] = real[rank]
         return found
 
@@ -181,39 +232,73 @@ class AssemblyTree:
         """
         return self._count_from(0, np.zeros(len(self.setup.equations.unknowns)), [most])
 
-    def _count_from(self, first: int, z: Array, room: list[int]) -> int | None:
-        """How many assemblies the blocks from one on have; `room` runs down as blocks are solved."""
-        z = z.copy()
-        way: list[_CountingNode] = []
-        many = self._count_or_push(first, z, way, room)
-        while way:
-            here = way[-1]
-            if many is not None:
-                here.total += many
-            elif here.is_over_budget:
-                return None
-            if here.rank == len(here.real):
-                self._counted[here.index][here.key] = many = here.total
-                way.pop()
-                continue
-            z[self.stages[here.index].unknowns] = here.real[here.rank]
-            here.rank += 1
-            many = self._count_or_push(here.index + 1, z, way, room)
-        return many
+    def _count_from(self, first: int, z: Array, budget: list[int]) -> int | None:
+        """How many assemblies the blocks from one on have; `budget` runs down as blocks are solved.
 
-    def _count_or_push(self, index: int, z: Array, way: list[_CountingNode], room: list[int]) -> int | None:
-        """How many the blocks from one on have if that is known, else the block is put on the way to be counted."""
-        if index == len(self.stages):
-            return 1
-        key = self._choice_key(index, z)
-        if key not in self._counted[index]:
-            room[0] -= max(1, slice_length(self.stages[index].unknowns) ** 3 // 8)
-            if room[0] >= 0:
-                way.append(_CountingNode(index, key, self.roots(index, z).real))
-            elif way:
-                way[-1].is_over_budget = True
-            return None
-        return self._counted[index][key]
+        Where counting by equal choices takes more than that, congruent positions count as equal: blocks that differ by
+        a common rigid motion of all that they are joined to have equally many assemblies. A certified tree is not
+        counted so, since each of its blocks is to be proved.
+        """
+        remaining = budget[0]
+        count = _Count(self, self._choice_key, self._counted, budget).count_from(first, z)
+        if count is not None or self.certify:
+            return count
+        budget[0] = remaining
+        return _Count(self, self._congruence_key, self._counted_congruent, budget).count_from(first, z)
+
+    def _congruence_key(self, index: int, z: Array) -> bytes:
+        """Where the links that blocks from one on are joined to lie relative to the first of them, and its own parts.
+
+        Rounded, so that positions that are congruent but for rounding are one.
+        """
+        links, columns = self._boundaries[index]
+        w = self.setup.functions.coordinates(z, self.setup.inputs.u, self.setup.inputs.p)
+        poses = np.array([[w[column] if column >= 0 else 0.0 for column in link] for link in links]).reshape(-1, 3)
+        if len(poses):
+            angle = poses[0, 2]
+            poses = poses - poses[0]
+            turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+            poses[:, :2] = poses[:, :2] @ turn
+            if not self.setup.structure.counts:
+                poses[:, 2] = np.remainder(poses[:, 2] + np.pi, 2.0 * np.pi)
+        return (np.round(np.concatenate([poses.ravel(), w[columns]]), CONGRUENCE_DIGITS) + 0.0).tobytes()
+
+    @cached_property
+    def _boundaries(self) -> list[tuple[list[tuple[int, int, int]], list[int]]]:
+        """For every block: the columns x, y and angle in w of the links placed before it to which it or a later block
+        is joined (-1: fixed), and the columns of the own coordinates of the joining pairs that are known before it."""
+        setup = self.setup
+        sparsity = setup.functions.coordinate_function.jac_sparsity(0, 0)
+        starts = np.array([stage.unknowns.start for stage in self.stages])
+        level = np.full(len(setup.equations.coordinates), -1)
+        for row, unknown in zip(*sparsity.get_triplet(), strict=True):
+            level[row] = max(level[row], int(np.searchsorted(starts, unknown, side="right")) - 1)
+        parts = {
+            link.name: tuple(setup.column.get((link.name, part), -1) for part in ("x", "y", "angle"))
+            for link in setup.mechanism.links
+        }
+        link_level = {
+            name: max((level[column] for column in columns if column >= 0), default=-1)
+            for name, columns in parts.items()
+        }
+        driven = [setup.relative_motions[given.pair] for given in setup.mechanism.inputs]
+        boundaries = []
+        for index in range(len(self.stages)):
+            later = {name for stage in self.stages[index:] for name in stage.pairs}
+            joining = [
+                pair
+                for pair in (*setup.mechanism.pairs, *driven)
+                if pair.name in later or any(link_level[link] >= index for link in pair.bodies)
+            ]
+            bodies = dict.fromkeys(link for pair in joining for link in pair.bodies if link_level[link] < index)
+            names = {pair.name for pair in joining}
+            columns = [
+                column
+                for column, coordinate in enumerate(setup.equations.coordinates)
+                if not coordinate.of_link and coordinate.owner in names and level[column] < index
+            ]
+            boundaries.append(([parts[link] for link in bodies], columns))
+        return boundaries
 
     def _choice_key(self, index: int, z: Array) -> bytes:
         """What of the choices before a block matters for it and for all later ones."""

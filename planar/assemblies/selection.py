@@ -47,9 +47,14 @@ def with_assembly_number(mechanism: Mechanism, advice: str = "") -> Mechanism:
     solved = (each for index in range(len(stages)) for each in tree.solved_roots(index))
     if before is None or any(each.complete is Completeness.NOT for each in solved):
         return mechanism
-    why = "the nearest to the sketch" if mechanism.sketch else "without a sketch"
-    remark = "; ".join(filter(None, (f"assembly {before + 1} of {total} at the file's inputs, {why}", advice)))
+    number = f"assembly {before + 1} of {total} at the file's inputs, {selection_words(mechanism)}"
+    remark = "; ".join(filter(None, (number, advice)))
     return replace(mechanism, remarks=(*mechanism.remarks, remark))
+
+
+def selection_words(mechanism: Mechanism) -> str:
+    """How the assembly that is solved is chosen, in words for solutions, lists and drawings."""
+    return "the nearest to the sketch" if mechanism.sketch else "taken without a sketch"
 
 
 def select_assembly(mechanism: Mechanism, number: int) -> Mechanism:

@@ -32,7 +32,7 @@ from planar.model.pairs import MeasureKind
 from planar.model.pairs.base import Pair
 from planar.solving.assembly.block_assemblies import BlockAssemblies
 from planar.solving.checks.residual_check import SHORT_ARM, residual_tolerance
-from planar.solving.position import PositionSolver
+from planar.solving.position import PositionSolver, solved_mechanism
 
 Array = np.ndarray
 
@@ -48,6 +48,8 @@ class ReferenceDesign:
 
     def __init__(self, mechanism: Mechanism, pair: str | None, is_timed: bool = False):
         names = [given.pair for given in mechanism.inputs]
+        if not names:
+            solved_mechanism(mechanism).check_motion()
         self.running_index = 0 if is_timed else running_input_index(mechanism, pair)
         self.pair = names[self.running_index]
         still = () if is_timed else tuple(Drive(name, None, 0.0, 0.0) for name in names if name != self.pair)

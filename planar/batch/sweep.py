@@ -42,6 +42,7 @@ from planar.model.link_shapes import PointName
 from planar.model.mechanism import LARGEST_COUNTED_ANGLE, Mechanism
 from planar.model.run_arguments import check_number, check_steps
 from planar.solving.cycle import MAX_DURATION
+from planar.solving.position import solved_mechanism
 
 MIN_BLOCK_POSITIONS, MAX_BLOCK_POSITIONS = 2**20, 2**22
 """Positions of a block at least, where there are as many: so many that solving them is more than beginning it."""
@@ -288,7 +289,7 @@ def run_duration(mechanism: Mechanism, duration: float | None, range_: tuple[obj
     if not duration > 0.0:
         raise BadInput("duration", f"a time from zero on is wanted, not {duration!r:.40}")
     if not mechanism.inputs:
-        raise BadInput("inputs", "the mechanism has no input that could run")
+        solved_mechanism(mechanism).check_motion()
     if ranged:
         raise BadInput("duration", "a run in time has no range of one input; give the one or the other")
     return float(duration)

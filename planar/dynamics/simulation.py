@@ -30,7 +30,7 @@ from planar.model.mechanism import Input, Mechanism
 from planar.model.run_arguments import check_steps
 from planar.model.wording import join_all_names
 from planar.results.motion import Motion, State
-from planar.solving.position import PositionSolver, solve
+from planar.solving.position import PositionSolver, solve, solved_mechanism
 
 RELATIVE_TOLERANCE = 1e-12
 """What a step may be off, of sizes and turns and of the rates that are reached."""
@@ -109,7 +109,8 @@ def simulate(
 
     An input that has a motor runs by it: by what that supplies at the input's speed. Of the others those that have a
     law keep to it, and the rest only say where the motion starts; `driven` names inputs that are to keep to their laws,
-    or to the file's velocity and acceleration. From rest, or `moving` with the file's velocities.
+    or to the file's velocity and acceleration. Where there are fewer inputs than freedoms it starts as it is drawn, and
+    a remark says at which pairs. From rest, or `moving` with the file's velocities.
     Accelerations come from masses, loads, weights, springs and dampers; they are integrated by the method of order 8 of
     Dormand and Prince (E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, 1993, II.5), and
     after every step the position is brought back onto the constraints. A pair that meets its stop strikes it, with the
@@ -119,7 +120,7 @@ def simulate(
 
     A motion that cannot go on says so in its `outcome` and `reason`, as where friction leaves no solution or several.
     Raises BadInput for a duration or names that are none, and where what friction follows is not determined, NoAnswer
-    where there is no position to start from, or something can move that has no mass.
+    where there is no position to start from, nothing can move, or something can move that has no mass.
 
     >>> import planar
     >>> planar.simulate(planar.load("door-closer"), 0.1, 10).motion.outcome.value
@@ -140,6 +141,10 @@ def simulate(
     ]
     check_loads(mechanism)
     PositionSolver(mechanism).refuse_misfit("a motion that is let go is not told")
+    mechanism = solved_mechanism(mechanism).completed_mechanism
+    problem = solved_mechanism(mechanism).motion_refusal()
+    if problem is not None and problem.outcome is Outcome.STRUCTURE and mechanism.inputs:
+        raise problem
     started = (
         mechanism
         if moving

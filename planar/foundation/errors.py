@@ -25,6 +25,7 @@ class Outcome(StrEnum):
     BRANCH_LOST = "branch lost"
     TOO_INEXACT = "too inexact"
     STOP = "stop"
+    STRUCTURE = "structure"
 
 
 class TrackingEnd(StrEnum):

@@ -11,6 +11,7 @@ from urllib.parse import quote
 import numpy as np
 
 from planar.document.files import read_asset
+from planar.drawing.scheme.scene import plain_frames
 from planar.foundation.errors import BadInput, NoAnswer
 from planar.foundation.safe_files import make_folder, save_file
 from planar.model.mechanism import Mechanism
@@ -23,6 +24,7 @@ from planar.pages.page import PageLink, fill_template, page, script_safe_json
 from planar.results.motion import Motion
 from planar.solving.cycle import cycle
 from planar.solving.position import solved_mechanism
+from planar.solving.rest_position import rest_position
 
 SCRIPTS = (
     "stage/plane.js",
@@ -55,7 +57,8 @@ def write_gallery(
     taken, shown, refused = {"index"}, [], []
     for done, (name, mechanism) in enumerate(models, start=1):
         try:
-            text, moving = page(mechanism, back=PageLink("index.html", "All mechanisms")), small_picture_data(mechanism)
+            drawn = solved_mechanism(mechanism).completed_mechanism
+            text, moving = page(drawn, back=PageLink("index.html", "All mechanisms")), small_picture_data(drawn)
         except NoAnswer as problem:
             refused.append((name, problem))
             continue
@@ -108,15 +111,19 @@ def small_picture_data(mechanism: Mechanism) -> dict[str, Any]:
     """What a small picture is drawn from: how the links look, and where they are at every step.
 
     `closed` says whether the motion comes back to its start, so that it goes round, not to and fro; `drawn` is a
-    function of scripts.
+    function of scripts. What nothing can move is shown where it stands.
     """
-    motion = _picture_motion(mechanism)
+    if solved_mechanism(mechanism).motion_refusal() is None:
+        positions = frames_of_rows(_picture_motion(mechanism))
+    else:
+        positions = [plain_frames(rest_position(mechanism).frames)]
     fixed = DimensionNumbers(mechanism, live=False)
-    scheme, numbers = scheme_data(mechanism, fixed, frames_of_rows(motion), PICTURE_DIGITS)
+    scheme, numbers = scheme_data(mechanism, fixed, positions, PICTURE_DIGITS)
     links = [link.name for link in mechanism.links]
     paths = [
-        np.stack([np.broadcast_to(part.parts[0], (len(motion),)) for part in (frame.x, frame.y, frame.angle)], axis=1)
-        for frame in (motion.frames[link] for link in links if link != mechanism.frame)
+        np.array([[frames[link].x, frames[link].y, frames[link].angle] for frames in positions])
+        for link in links
+        if link != mechanism.frame
     ]
     whole = 2.0 * np.pi
     closed = all(
@@ -128,7 +135,7 @@ def small_picture_data(mechanism: Mechanism) -> dict[str, Any]:
         "scheme": scheme | {"arrows": [], "letters": []},
         "size": solved_mechanism(mechanism).solver.unit,
         "frames": [[_round_digits(value) for value in path.ravel()] for path in paths],
-        "closed": closed and len(motion) > 1,
+        "closed": closed and len(positions) > 1,
         "drawn": numbers.to_javascript(),
     }
 

@@ -16,6 +16,7 @@ from planar.pages.drawing_style import pen_styles, symbol_script
 from planar.pages.notebook import pack_scripts
 from planar.pages.overlay_style import overlay_script, overlay_styles
 from planar.pages.still_picture import still_svg
+from planar.solving.position import rest_remarks
 
 
 class PageLink(NamedTuple):
@@ -176,7 +177,7 @@ def page(  # many: what is shown, and how
     parts = {
         "title": escape(mechanism.name),
         "back": f'<a class="back" href="{escape(back.address)}">{escape(back.words)}</a>' if back else "",
-        "about": _about(mechanism),
+        "about": _about(mechanism) + _rest(mechanism),
         "still": still_svg(mechanism, z),
         "notes": _notes(mechanism),
         "styles": styles,
@@ -192,6 +193,11 @@ def _about(mechanism: Mechanism) -> str:
     about = f"<p>{escape(mechanism.about)}</p>" if mechanism.about else ""
     source = f'<p class="source">Source: {escape(mechanism.source)}</p>' if mechanism.source else ""
     return about + source
+
+
+def _rest(mechanism: Mechanism) -> str:
+    """Why nothing moves the mechanism, where nothing does."""
+    return "".join(f'<p class="rest">{escape(remark)}</p>' for remark in rest_remarks(mechanism))
 
 
 def _notes(mechanism: Mechanism) -> str:

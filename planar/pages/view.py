@@ -42,7 +42,8 @@ def view(
     Without a path it is written to a folder of its own and opened in the browser. A `task`, as `planar.synthesise`
     takes it, is shown under the mechanism: what is wanted can be dragged, and the free dimensions follow. `pair` names
     the input that runs first, by default the first that has a velocity. While no input has a velocity, rates are those
-    at the unit rate of the input that runs, and the page says so. Returns the file's path.
+    at the unit rate of the input that runs, and the page says so. The page of a structure, and of a mechanism without
+    inputs as it is drawn, says that nothing moves it. Returns the file's path.
 
     Raises NoAnswer where the mechanism has no position to start from, BadInput where the file cannot be
     written, the task is none of this mechanism, or there is no input at `pair`.
@@ -92,7 +93,7 @@ def page_of(shown: Mechanism | State | Motion, task: SynthesisTask | None = None
 
 def _page_subject(shown: Mechanism | State | Motion) -> PageSubject:
     if isinstance(shown, Mechanism):
-        return PageSubject(shown)
+        return PageSubject(shown if shown.inputs else solved_mechanism(shown).completed_mechanism)
     if isinstance(shown, State):
         return PageSubject(shown.mechanism, _unknowns(shown, shown.mechanism))
     ends = {name: given.position for name, given in shown.inputs.items()}

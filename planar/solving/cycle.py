@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
 from numbers import Integral
 
+import numpy as np
+
 from planar.document.first_argument import takes_mechanism
-from planar.foundation.errors import BadInput
+from planar.foundation.errors import BadInput, NoAnswer
 from planar.model.mechanism import LARGEST_COUNTED_ANGLE, Mechanism
 from planar.model.run_arguments import check_number, check_steps
+from planar.model.wording import quote_names
 from planar.results.motion import Motion
+from planar.solving.position import SolvedMechanism, solved_mechanism
 from planar.solving.runs.range_run import RangeRun
 from planar.solving.runs.running_input import Progress
 from planar.solving.runs.time_run import TimeRun
@@ -60,7 +65,7 @@ def cycle(
     no velocity is determined: rates are NaN there. One that takes too much work ends as well: more than 5,000 arcs of
     the curve of positions, and 100 more for each turn of the range. `progress(done, total)` is called while a long
     range is followed, in rad or m of the input's way. Raises BadInput for an input or a range that is not there,
-    NoAnswer where there is no position to start from.
+    NoAnswer where there is no position to start from or nothing can move (see `planar.inspect`).
 
     >>> import planar
     >>> len(planar.cycle(planar.load("slider-crank"), steps=12))
@@ -76,17 +81,41 @@ def cycle(
     numbered = not any(isinstance(each, bool) or not isinstance(each, Integral) or each < 1 for each in numbers)
     if not numbered or not isinstance(branches, Iterable):
         raise BadInput("branches", f"a list of numbers of branches from 1 on is wanted, not {branches!r:.60}")
-    if not mechanism.inputs:
-        raise BadInput("inputs", "the mechanism has no input that could run")
     ranged = (start is not None, stop is not None, pair is not None, there_and_back, circuit)
     lawful = any(given.law is not None for given in mechanism.inputs)
-    if duration is not None or (lawful and not any(ranged)):
+    is_timed = duration is not None or (lawful and not any(ranged))
+    known, count = solved_mechanism(mechanism), len(mechanism.inputs)
+    if not count or known.is_rigid or (count > 1 and pair is None and not is_timed):
+        known.check_motion(pair)
+    if is_timed:
         if any(ranged):
             raise BadInput("duration", "a run in time has no range of one input; give the one or the other")
-        return TimeRun(mechanism, branches, jerk).run(int(steps), duration)
+        return _explained_run(known, pair, lambda: TimeRun(mechanism, branches, jerk).run(int(steps), duration))
     if circuit and (stop is not None or there_and_back):
         raise BadInput("circuit", "a circuit goes all round; it has no end to stop at, and comes back by itself")
-    runner = RangeRun(mechanism, pair, branches, jerk, progress)
-    return (
-        runner.run_circuit(int(steps), start) if circuit else runner.run_range(int(steps), start, stop, there_and_back)
-    )
+
+    def run() -> Motion:
+        runner = RangeRun(mechanism, pair, branches, jerk, progress)
+        if circuit:
+            return runner.run_circuit(int(steps), start)
+        return runner.run_range(int(steps), start, stop, there_and_back)
+
+    return _explained_run(known, pair, run)
+
+
+def _explained_run(known: SolvedMechanism, pair: str | None, run: Callable[[], Motion]) -> Motion:
+    """A run; where it fails because no input can run from the position, `motion_refusal` says why.
+
+    Of a run in which every input stands still a remark says so.
+    """
+    try:
+        motion = run()
+    except NoAnswer as problem:
+        raise known.motion_refusal(pair) or problem from None
+    positions = [given.position for given in motion.inputs.values()]
+    if any(each[0] != each[-1] or np.ptp(each) for each in positions):
+        return motion
+    subject = "inputs" if len(positions) > 1 else "input"
+    remark = f"nothing moves over the whole run, as the {subject} at {quote_names(list(motion.inputs))} "
+    remark += f"stand{'' if len(positions) > 1 else 's'} still; give a velocity, a law or a range"
+    return replace(motion, remarks=(*motion.remarks, remark))

@@ -77,6 +77,14 @@ class FullConstraints:
         frames, own = self._frames_and_own(w)
         return input_positions([self.setup.relative_motions[name] for name in names], frames, self._numbers, own)
 
+    def points_and_jacobian(self, members: Sequence[tuple[str, str]], w: Array) -> tuple[Array, Array]:
+        """Where points (link, point) are, x and y of each (2 points,), in sizes, and the Jacobian (2 points,
+        coordinates)."""
+        frames, _ = self._frames_and_own(_complex_steps(w))
+        shapes, scale = self.setup.shapes, 1.0 / self.setup.unit
+        places = [frames[link].to_world(shapes[link].points[point] * scale) for link, point in members]
+        return _derivatives([part for place in places for part in place], w.size)
+
     def _frames_and_own(self, w: Array | Sequence[Scalar]) -> tuple[dict[str, Frame], dict[str, tuple[Scalar, ...]]]:
         return frames_from_coordinates(w, self.setup.column, self.setup.shapes, self.setup.pairs)
 
@@ -139,9 +147,11 @@ def motion_dimension(constraints: FullConstraints, w: Array) -> tuple[int, Array
     """The dimension of the motion that leads away from a position, and a position on it."""
     free = null_space(constraints.jacobian(w))
     found, place, held = 0, w, -1
-    for seed in range(MAX_PROBES if free.size else 0):
+    single = free.shape[1] == 1  # which leaves two directions to probe, and no random ones
+    for seed in range((2 if single else MAX_PROBES) if free.size else 0):
         rng = np.random.default_rng(seed)
-        away = constraints.correct(w + random_step(free, rng, PROBE_DISTANCE))
+        step = (1.0 - 2.0 * seed) * PROBE_DISTANCE * free[:, 0] if single else random_step(free, rng, PROBE_DISTANCE)
+        away = constraints.correct(w + step)
         if away is not None:
             free_there = null_space(constraints.jacobian(away))
             ways, holds = _spread_dimension(constraints, away, free_there, rng), w.size - free_there.shape[1]

@@ -17,7 +17,7 @@ from planar.foundation.arrays import Array
 from planar.foundation.errors import NoAnswer, Outcome, TrackingEnd
 from planar.foundation.geometry import Frame
 from planar.foundation.jets import Jet
-from planar.model.mechanism import Drive, Mechanism, replace_inputs, with_unit_rate
+from planar.model.mechanism import Drive, Input, Mechanism, replace_inputs, with_unit_rate
 from planar.results.motion import State
 from planar.solving.assembly.block_assemblies import BlockAssemblies
 from planar.solving.assembly.nearest_assembly import (
@@ -46,8 +46,12 @@ def solve(mechanism: Mechanism, drives: Mapping[str, float] | Sequence[Drive] = 
     `drives` change inputs, as {pair: position} (rad or m) or with rates as well: the position then is the one to which
     the assembly of the file's own inputs leads when they are moved there together.
 
+    A mechanism without inputs that can move is solved as it is drawn, at rest; its state has inputs that hold it there,
+    and a remark says so.
+
     Raises NoAnswer, whose outcome says whether the mechanism cannot be assembled, stands on a dead point or a change
-    point, or has too few or too many inputs; its text names links, pairs, position and remedy.
+    point, is a structure that an input cannot move, or has too few or too many inputs; its text names links, pairs,
+    position and remedy.
 
     >>> import planar
     >>> planar.solve(planar.load("four-bar"))
@@ -56,9 +60,14 @@ def solve(mechanism: Mechanism, drives: Mapping[str, float] | Sequence[Drive] = 
     if isinstance(drives, Mapping):
         drives = [Drive(pair, position) for pair, position in drives.items()]
     known = solved_mechanism(mechanism)
+    if not mechanism.inputs:
+        known = solved_mechanism(known.completed_mechanism)
     here, found = known.solver, known.assembly
     if not drives:
-        return here.state(found.z, known.remarks)
+        try:
+            return here.state(found.z, known.remarks)
+        except NoAnswer as problem:
+            raise known.structure_refusal(problem) or problem from None
     there = here.with_inputs_of(replace_inputs(mechanism, tuple(drives)))
     z = known.nearby_positions.unknowns_at(there.inputs.u) if there.unit == here.unit else None
     if z is not None:
@@ -378,6 +387,67 @@ class SolvedMechanism:
         return self.solver.remarks(self.assembly)
 
     @cached_property
+    def completed_mechanism(self) -> Mechanism:
+        """The mechanism; where its inputs leave links free, with further inputs that hold these as they are drawn."""
+        solver = self._plain_solver
+        if not any(block.is_free for block in solver.equations.blocks):
+            return solver.mechanism
+        from planar.solving.drawn_inputs import with_drawn_inputs  # few mechanisms have too few inputs
+
+        return with_drawn_inputs(solver) or solver.mechanism
+
+    @cached_property
+    def is_rigid(self) -> bool:
+        """Whether the pairs allow no motion from the position even to first order; False where there is no position.
+
+        Equations that are not more than their unknowns are not looked at: one Jacobian is all that this takes.
+        """
+        solver = self.solver
+        if solver.functions.is_square or solver.equations.open_rows:
+            return False
+        try:
+            z = self.assembly.z
+        except NoAnswer:
+            return False
+        from planar.solving.diagnosis.redundancy import is_rigid
+
+        return is_rigid(solver, solver.functions.coordinates(z, solver.inputs.u, solver.inputs.p))
+
+    def motion_refusal(self, pair: str | None = None) -> NoAnswer | None:
+        """Why no input can run from the mechanism's position, whatever its range; None where one can.
+
+        Every command asks this for the sentence: there is no position, nothing moves (a structure), there is no input,
+        or the other inputs hold the one at `pair` (None: each holds the others).
+        """
+        try:
+            z = self.assembly.z
+        except NoAnswer as problem:
+            return problem
+        mechanism = self.solver.mechanism
+        if self.solver.functions.is_square and mechanism.inputs and is_surely_regular(self.solver, z):
+            return None  # regular positions need no judgement
+        inputs = tuple(Input(given.pair, given.position) for given in mechanism.inputs)
+        at_rest = replace(mechanism, inputs=inputs, remarks=(), loads=())
+        try:
+            hash(at_rest)
+        except TypeError:  # made in Python, of lists
+            return _motion_judgement(at_rest, pair)
+        return _cached_motion_judgement(at_rest, pair)
+
+    def structure_refusal(self, problem: NoAnswer) -> NoAnswer | None:
+        """What to say where rates are not determined since nothing can move; None where something can."""
+        if problem.outcome not in (Outcome.DEAD_POINT, Outcome.CHANGE_POINT, Outcome.TOO_MANY_INPUTS):
+            return None
+        refusal = self.motion_refusal()
+        return refusal if refusal is not None and refusal.outcome is Outcome.STRUCTURE else None
+
+    def check_motion(self, pair: str | None = None) -> None:
+        """Raise NoAnswer where no input can run from the mechanism's position; see `motion_refusal`."""
+        problem = self.motion_refusal(pair)
+        if problem is not None:
+            raise problem
+
+    @cached_property
     def nearby_positions(self) -> StraightPathCache:
         """Positions to which it leads."""
         return StraightPathCache(self.solver, self.assembly.z)
@@ -386,6 +456,17 @@ class SolvedMechanism:
 @lru_cache(maxsize=MAX_CACHED_STRUCTURES)
 def _cached_solved_mechanism(mechanism: Mechanism) -> SolvedMechanism:
     return SolvedMechanism(mechanism)
+
+
+def _motion_judgement(mechanism: Mechanism, pair: str | None) -> NoAnswer | None:
+    """Why an input of a mechanism at rest cannot run: rates, loads and remarks make no difference to that."""
+    from planar.solving.diagnosis.judgement import judge_motion  # few mechanisms are judged
+
+    known = solved_mechanism(mechanism)
+    return judge_motion(known.solver, known.assembly.z, pair)
+
+
+_cached_motion_judgement = lru_cache(maxsize=MAX_CACHED_STRUCTURES)(_motion_judgement)
 
 
 def solved_mechanism(mechanism: Mechanism) -> SolvedMechanism:
@@ -401,6 +482,15 @@ def state_at_unit_rate(state: State) -> State:
     """The same position at the unit rate of the first input where no input has a rate, else the state itself."""
     moving = with_unit_rate(state.mechanism)
     return state if moving is state.mechanism else PositionSolver(moving).state_with_rates(state)
+
+
+def rest_remarks(mechanism: Mechanism) -> tuple[str, ...]:
+    """What a drawing or a page says of a mechanism that does not run: nothing moves, or no input is given."""
+    from planar.solving.drawn_inputs import DRAWN_REMARK
+
+    remarks = [remark for remark in mechanism.remarks if remark.startswith(DRAWN_REMARK)]
+    problem = solved_mechanism(mechanism).motion_refusal()
+    return (*remarks, problem.reason) if problem is not None else tuple(remarks)
 
 
 def stopped_at_start(solver: PositionSolver, z: Array, problem: NoAnswer) -> NoAnswer:

@@ -229,7 +229,8 @@ def test_a_structure_is_no_mechanism():
     }
     each = inspected(links=links, pairs=[{"turning": name} for name in "ACD"], inputs=[], sketch={"C": [0.5, 0.5]})
     assert not each.is_mechanism
-    assert "nothing moves: it is a structure" in each.mechanism_reason
+    assert "nothing moves: it is a structure of links 'a' and 'c' with the frame 'f'" in each.mechanism_reason
+    assert {each.links[name].motion for name in "ac"} <= {"unknown", "stands still"}
     assert (each.gruebler, each.mobility.finite, each.closed) == (0, 0, True)
 
 

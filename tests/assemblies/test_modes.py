@@ -11,12 +11,13 @@ from PIL import Image
 
 import planar
 from planar.assemblies.polynomial.completeness import Completeness
+from planar.assemblies.search_tree import _Count
 from planar.drawing.paper.picture import Circle, Label
 from planar.drawing.paper.scales import parse_scale
 from planar.drawing.scheme import symbol_table
 from planar.drawing.scheme.assemblies import ASSEMBLIES_PER_SHEET, assembly_sheets
 from tests import command, known
-from tests.builders import bar_linkage, bare_four_bar, tower
+from tests.builders import bar_linkage, bare_four_bar, lift_document, tower
 from tests.draws import part
 from tests.linkages import conditioning, determinate, random_linkage
 
@@ -176,9 +177,7 @@ def test_a_chain_of_twenty_dyads_is_listed_lazily_from_its_start():
     first = list(islice(modes, 5))
     assert [mode.choices[-3:] for mode in first] == [(1, 1, 1), (1, 1, 2), (1, 2, 1), (1, 2, 2), (2, 1, 1)]
     assert sum(group.solved for group in modes.groups) < 40
-    assert modes.total is None
-    with pytest.raises(TypeError, match="up to 1048576"):
-        len(modes)
+    assert len(modes) == modes.total == 2**20
     for mode in first:
         b, p, q = (mode.points[name] for name in ("B", "P0", "P1"))
         assert hypot(*(p - b)) == pytest.approx(0.9)
@@ -189,6 +188,35 @@ def test_groups_that_hang_on_one_another_are_counted_by_listing():
     modes = planar.modes(tower(7), certify=False)
     assert len(modes) == modes.bound == 2**7
     assert len({mode.z.round(9).tobytes() for mode in modes}) == 2**7
+
+
+def test_congruent_positions_are_counted_once_and_to_the_same_number():
+    """A scissor lift: counted by listing, and by how the links lie to each other."""
+    for stages in (3, 6):
+        modes = planar.modes(planar.from_dict(lift_document(stages)), certify=False)
+        tree = modes._uncertified_tree
+        z = np.zeros(len(tree.setup.equations.unknowns))
+        counted = _Count(tree, tree._congruence_key, [{} for _ in tree.stages], [100]).count_from(0, z)
+        assert counted == len(list(modes)) == 2**stages
+    modes = planar.modes(planar.from_dict(lift_document(20)), certify=False)
+    assert len(modes) == modes.bound == 2**20
+    lines = str(modes).splitlines()
+    assert lines[0].endswith("1048576>")
+    assert (len(lines), lines[-1]) == (7, "and 1048571 more")
+    assert modes.nearest.number is not None
+
+
+def test_a_list_that_cannot_be_counted_has_a_bound_and_is_read_one_by_one():
+    """Dyads from pin to pin and to pivots of the frame, none congruent to another."""
+    frame, links = {"A": [0.0, 0.0]}, {"crank": ("A", "P0", 1.0)}
+    for k in range(20):
+        frame[f"O{k}"] = [0.37 * k, 0.1 * k * k % 1.0]
+        links |= {f"a{k}": (f"P{k}", f"P{k + 1}", 50.0), f"b{k}": (f"O{k}", f"P{k + 1}", 50.1 + 0.03 * k)}
+    modes = planar.modes(bar_linkage(frame, links, ("A", 0.5)), certify=False)
+    assert modes.total is None
+    with pytest.raises(TypeError, match=f"up to {2**20}"):
+        len(modes)
+    assert [mode.number for mode in islice(modes, 3)] == [1, 2, 3]
 
 
 def test_groups_that_do_not_hang_on_each_other_are_counted_without_listing():
@@ -238,7 +266,7 @@ def test_the_command_lists_them_in_a_process_of_its_own(tmp_path):
     assert [group["links"] for group in value["groups"]] == [["BC", "DC"]]
     text = command.run(tmp_path, "modes", "four-bar", "--at", "A=80deg", "--no-certify").done()
     assert "at A = 80 deg" in text
-    assert "as sketched" in text
+    assert "the nearest to the sketch" in text
 
 
 def test_the_command_refuses_in_a_sentence(tmp_path):
@@ -281,7 +309,7 @@ def test_the_sheet_has_a_window_for_each_with_its_number(tmp_path):
     ((pictures, heading),) = assembly_sheets(planar.modes(planar.load("jansen-leg"), certify=False))
     assert "8 assemblies" in heading
     titles = [picture.title for picture in pictures]
-    assert titles == ["1", "2", "3", "4", "5", "6, the sketch's own", "7", "8"]
+    assert titles == ["1", "2", "3", "4", "5", "6, the nearest to the sketch", "7", "8"]
     scale = parse_scale(pictures[0].notes[0])
     windows = [next(mark for mark in picture.marks if mark.about.startswith("window")) for picture in pictures]
     assert len({window.points for window in windows}) == 1

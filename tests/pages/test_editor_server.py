@@ -216,10 +216,11 @@ def test_what_is_driven_and_cannot_move_is_told_at_once():
         "inputs": [{"pair": "A", "position": 0, "velocity": "10 rad/s"}],
     }
     found = edit_answer(value)
-    assert "too many inputs" in found["problem"]
+    assert "nothing moves: it is a structure of link 'AB'" in found["problem"]
+    assert "remove the input at 'A', or remove pair 'slot'" in found["problem"]
     assert found["mobility"] == "mobility 0, 1 input"
     assert "data" not in found
-    with pytest.raises(NoAnswer, match="cannot move"):
+    with pytest.raises(NoAnswer, match="nothing moves"):
         planar.circuits(planar.from_dict(value))
 
 

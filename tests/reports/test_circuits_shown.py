@@ -132,7 +132,7 @@ def test_the_table_says_what_the_values_are(folder):
     assert "2 circuits, numerically complete" in text
     for end in rocker_limits():
         assert f"{end:.6g}" in text
-    assert "dead points 1 as sketched" in text
+    assert "dead points 1, the nearest to the sketch" in text
     text = " ".join(command.run(folder, "circuits", "crank-rocker").done().split())
     assert "goes together all round" in text
     assert text.count("goes all round") == 2

@@ -81,7 +81,9 @@ def test_near_the_dead_point_the_velocity_is_right_to_what_rounding_leaves(withi
 
 
 def test_too_few_inputs_names_the_links_that_stay_free_and_where_to_drive():
-    problem = refused(changed(inputs=[]))
+    with pytest.raises(NoAnswer) as caught:
+        planar.cycle(files.from_dict(changed(inputs=[])))
+    problem = caught.value
     assert problem.outcome is Outcome.TOO_FEW_INPUTS
     assert "0 inputs" in problem.reason
     assert all(f"'{name}'" in problem.reason for name in ("AB", "BC", "DC", "A", "B", "C", "D"))

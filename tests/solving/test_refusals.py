@@ -130,6 +130,10 @@ CASES = {
         ["A = 0 deg", "link 'BC' has an arm of 1e-13", "lengthen link 'BC'"],
     ),
     "input jammed": (beside(("U", 60)), ["'U'", "'f' and 'p' fast", "'AB', 'BC' and 'DC'", "drive 'A' or 'B'"]),
+    "structure": (
+        value({name: BESIDE[name] for name in ("f", "p", "q")}, pins("UVP"), [("U", BRACED - 90)], {"P": [50, -230]}),
+        ["nothing moves", "links 'p' and 'q' with the frame 'f'", "remove link 'q' with its pairs 'V' and 'P'"],
+    ),
     "stop": (
         mm_four_bar() | {"pairs": [{"turning": "A", "stops": [70, 90]}, *pins("BCD")]},
         ["A = 60 deg", "pair 'A' is at 60 deg", "its stops at 70 deg and 90 deg", "move the input"],
@@ -358,7 +362,6 @@ def test_a_further_input_leads_over_a_change_point(theta):
 @pytest.mark.parametrize(
     ("inputs", "ways", "free"),
     [
-        ([], "2 ways", ["AB", "BC", "DC", "p", "r", "q"]),
         ([("A", 50)], "1 way", ["p", "r", "q"]),
         ([("U", 50)], "1 way", ["AB", "BC", "DC"]),
     ],
@@ -370,9 +373,15 @@ def test_too_few_inputs_name_what_stays_free_and_a_pair_that_helps(inputs, ways,
     told, advice = problem.reason.split("; give an input at ")
     assert set(re.findall(r"'(\w+)'", told)) == set(free)
     offered = re.findall(r"'(\w)'", advice)
-    if inputs:
-        position = {"U": 50, "V": 100, "P": 10, "A": 50, "B": 10, "D": 100}
-        assert solved(twins(*inputs, (offered[0], position[offered[0]]))).mobility == 2
+    position = {"U": 50, "V": 100, "P": 10, "A": 50, "B": 10, "D": 100}
+    assert solved(twins(*inputs, (offered[0], position[offered[0]]))).mobility == 2
+
+
+def test_without_inputs_the_position_is_as_drawn_and_says_where_to_drive():
+    state = solved(twins())
+    assert state.mobility == len(state.mechanism.inputs) == 2
+    (remark,) = state.remarks
+    assert "with 0 inputs links 'AB', 'BC', 'DC', 'p', 'r' and 'q' can still move in 2 ways" in remark
 
 
 def test_of_three_inputs_two_conflict_and_are_named():

@@ -116,7 +116,8 @@ def force_map(
     the greatest force and couple are solved for between the positions, and where one grows without bound it is said
     towards which dead point; dead points are looked for along the lines of the grid.
 
-    Raises BadInput for another input or range, and more than a million positions; NoAnswer where none is reached.
+    Raises BadInput for another input or range, and more than a million positions; NoAnswer where none is reached or
+    nothing can move.
 
     >>> import planar
     >>> arm = planar.load("excavator-arm")
@@ -124,8 +125,9 @@ def force_map(
     >>> found.effort["boom cylinder"].shape
     (5, 3)
     """
-    axes = _read_ranges(mechanism, over)
     known = solved_mechanism(mechanism)
+    known.check_motion()
+    axes = _read_ranges(mechanism, over)
     solver = known.solver
     columns = [[given.pair for given in mechanism.inputs].index(name) for name in axes]
     scales = [solver.unit if solver.is_sliding(name) else 1.0 for name in axes]

@@ -25,7 +25,7 @@ from planar.model.pairs import MeasureKind
 from planar.model.wording import count_phrase, join_all_names
 from planar.results.motion import Motion
 from planar.solving.cycle import cycle
-from planar.solving.position import solve
+from planar.solving.position import solve, solved_mechanism
 from planar.structures.recognition import MechanismStructure, chain_of
 
 LINK_ORDERS = ("single", "unary", "binary", "ternary", "quaternary", "quinary")
@@ -171,32 +171,35 @@ def _linkage_reason(is_mechanism: bool, higher: int) -> str:
     return f"it has {count_phrase(higher, 'higher pair')}" if higher else "all its pairs are lower"
 
 
-def _judge_mechanism(mechanism: Mechanism, found: Mobility | None, trouble: str) -> tuple[bool, str]:
+def _judge_mechanism(mechanism: Mechanism, count: Mobility | None, trouble: str) -> tuple[bool, str]:
     """One link fixed, as many driving links as freedoms, and the rest moving in a definite way."""
-    if found is None:
+    if count is None:
         return False, trouble
     if unconnected_links(mechanism):
         return (
             False,
             f"nothing joins {join_all_names([repr(link) for link in unconnected_links(mechanism)])} to the frame",
         )
-    given = len(mechanism.inputs)
-    if given != found.finite or not given:
-        moves = (
-            f"it moves in {count_phrase(found.finite, 'way')}" if found.finite else "nothing moves: it is a structure"
-        )
-        return False, f"it has {count_phrase(given, 'driving link')}, and {moves}"
-    told = f"one link is fixed, {count_phrase(given, 'link')} driven, and the rest follows definitely"
+    given = count_phrase(len(mechanism.inputs), "driving link")
+    refusal = solved_mechanism(mechanism).motion_refusal()
+    if refusal is not None and refusal.outcome is Outcome.STRUCTURE:
+        return False, f"it has {given}; {refusal.reason}"
+    if len(mechanism.inputs) != count.finite:
+        return False, f"it has {given}, and it moves in {count_phrase(count.finite, 'way')}"
+    reason = f"one link is fixed, {count_phrase(len(mechanism.inputs), 'link')} driven, and the rest follows definitely"
     try:
         solve(mechanism)
     except NoAnswer as problem:
         passing = problem.outcome in (Outcome.DEAD_POINT, Outcome.CHANGE_POINT, Outcome.CANNOT_BE_ASSEMBLED)
-        return passing, f"{told}; but here: {problem.reason}" if passing else str(problem)
-    return True, told
+        return passing, f"{reason}; but here: {problem.reason}" if passing else str(problem)
+    return True, reason
 
 
 def _describe_motions(mechanism: Mechanism) -> dict[str, str]:
     """How each link moves while the inputs run through their ranges, one after the other."""
+    problem = solved_mechanism(mechanism).motion_refusal() if mechanism.inputs else None
+    if problem is not None and problem.outcome is Outcome.STRUCTURE:
+        return {link.name: "fixed" if link.name == mechanism.frame else "stands still" for link in mechanism.links}
     runs: list[Motion] = []
     for given in mechanism.inputs:
         try:

@@ -19,6 +19,7 @@ from planar.model.mechanism import Drive, Mechanism, relative_motions, replace_i
 from planar.model.pairs import MeasureKind
 from planar.results.motion import Motion
 from planar.solving.cycle import cycle
+from planar.solving.position import solved_mechanism
 
 MIN_SAMPLES, MAX_SAMPLES = 64, 4096
 """Positions of a turn: doubled from the first until harmonics come to their end, up to the last."""
@@ -175,7 +176,7 @@ def _at_steady_rate(mechanism: Mechanism, pair: str | None, unit_rate: bool = Tr
     """The mechanism with the input that turns at a steady rate, and the name of that input."""
     names = [given.pair for given in mechanism.inputs]
     if not names:
-        raise BadInput("inputs", "the mechanism has no input that could turn")
+        solved_mechanism(mechanism).check_motion()
     if pair is None and len(names) > 1:
         raise BadInput("inputs", f"there are several inputs, {', '.join(names)}; name the one that turns")
     running = names[0] if pair is None else pair

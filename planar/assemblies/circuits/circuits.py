@@ -15,6 +15,7 @@ from planar.assemblies.modes import Mode
 from planar.document.first_argument import takes_mechanism
 from planar.foundation.angles import TURN, interval_offset
 from planar.foundation.arrays import Array
+from planar.foundation.errors import Outcome
 from planar.foundation.notebook_display import Displayable
 from planar.model.mechanism import (
     Drive,
@@ -42,13 +43,18 @@ def circuits(mechanism: Mechanism, pair: str | None = None) -> Circuits:
     A circuit is a connected curve of positions, a branch a part of it without a dead point (T. Chase, J. Mirth,
     J. Mech. Des. 115, 1993). `pair` names the input that runs, where there are several.
 
-    Raises BadInput where there is no such input, NoAnswer where the inputs leave links free whatever the dimensions.
+    Raises BadInput where there is no such input, NoAnswer where the inputs leave links free whatever the dimensions, or
+    nothing can move.
 
     >>> import planar
     >>> planar.circuits(planar.load("four-bar"))
     <1 circuits of 'Four-bar chain' over A, numerically complete>
     """
     PreparedMechanism(mechanism).refuse_misfit("the circuits are not listed")
+    problem = solved_mechanism(mechanism).motion_refusal(pair)
+    # another position of the input may be assembled, and within the stops
+    if problem is not None and problem.outcome not in (Outcome.CANNOT_BE_ASSEMBLED, Outcome.STOP):
+        raise problem
     return Circuits(mechanism, mechanism.inputs[running_input_index(mechanism, pair)].pair)
 
 

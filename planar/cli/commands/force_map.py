@@ -43,6 +43,10 @@ def parse_ranges(
     from planar.document import read_drive
 
     names = [given.pair for given in mechanism.inputs]
+    if not names:
+        from planar.solving.position import solved_mechanism
+
+        solved_mechanism(mechanism).check_motion()
     found: dict[str, tuple[float, float, int] | tuple[float, float] | int | None] = {}
     for part in over.split(","):
         name, _, limits = (each.strip() for each in part.partition("="))

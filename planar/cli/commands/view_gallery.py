@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 
 import click
 
+from planar.cli.exit_status import NO_ANSWER
 from planar.cli.options import (
     at_option,
     frame_number_option,
@@ -50,7 +52,7 @@ def view(
     The input that runs first is the first with a velocity, unless --input names another.
     """
     from planar.pages.view import view as write
-    from planar.solving.position import solve
+    from planar.solving.position import solve, solved_mechanism
 
     if output is not None and output.suffix.lower() not in SUFFIXES:
         raise unknown_format_error(output.suffix, "a page", SUFFIXES)
@@ -61,7 +63,12 @@ def view(
     with show_status(mechanism.name):
         moved = parse_drives(mechanism, at)
         written = write(solve(mechanism, moved) if moved else mechanism, output, task=task, pair=pair)
+        problem = solved_mechanism(mechanism).motion_refusal()
     click.echo(str(written))
+    if problem is not None:
+        click.echo(f"planar: {problem}", err=True)
+        if mechanism.inputs:
+            sys.exit(NO_ANSWER)
 
 
 @main.command()

@@ -11,6 +11,7 @@ import numpy as np
 
 from planar.assemblies.circuits.circuit_of_assembly import LocatedAssembly
 from planar.assemblies.circuits.circuits import Circuits
+from planar.assemblies.selection import selection_words
 from planar.drawing.circuits.curves import (
     CircuitChart,
     InputWindow,
@@ -304,7 +305,7 @@ def _key_rows(sheet: PanelLayout, drawn: Sequence[CircuitChart], room: float) ->
     if any(not each.is_sketch for each in marked):
         keys.append(("assembly there, numbered", {"mfc": "white"} | ASSEMBLY_MARK))
     if any(each.is_sketch for each in marked):
-        keys.append(("the sketch's own", {"mfc": "black"} | ASSEMBLY_MARK))
+        keys.append((selection_words(mechanism), {"mfc": "black"} | ASSEMBLY_MARK))
     rows: list[list[KeyEntry]] = [[]]
     for key in keys:
         if rows[-1] and sum(_entry_width(each) for each in (*rows[-1], key)) > room + KEY_GAP:

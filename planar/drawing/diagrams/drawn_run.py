@@ -25,6 +25,7 @@ from planar.model.pairs import Pair
 from planar.results.motion import Motion
 from planar.results.records import PointMotion
 from planar.solving.cycle import cycle
+from planar.solving.position import solved_mechanism
 
 COARSE_STEPS = 36
 """Steps of a turn, at least, that tell where slides turn back, and whether the mechanism is back after it."""
@@ -269,7 +270,9 @@ def _round_near_limit(rows: Array) -> Array:
 
 
 def _only_input(mechanism: Mechanism) -> str:
-    """The one input; where there are several, one has to be named."""
+    """The one input; where there are several, one has to be named. Raises NoAnswer where none can run."""
+    if len(mechanism.inputs) != 1:
+        solved_mechanism(mechanism).check_motion()
     return mechanism.inputs[running_input_index(mechanism, None)].pair
 
 

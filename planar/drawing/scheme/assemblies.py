@@ -7,6 +7,7 @@ from dataclasses import replace
 from math import ceil, floor, log10
 
 from planar.assemblies.modes import Mode, Modes
+from planar.assemblies.selection import selection_words
 from planar.drawing.paper.picture import Arrow, Circle, Mark, PaperPoint, Pen, Picture, Polyline, extent
 from planar.drawing.paper.scales import Scale
 from planar.drawing.scheme.ground import fixed_marks
@@ -54,9 +55,9 @@ def assembly_sheets(modes: Modes, scale: Scale | None = None) -> list[tuple[list
     # letters keep near their spots, within the window
     low, high = extent([mark for marks in drawn for mark in marks])
     window = (low[0] - WINDOW_MARGIN, low[1] - WINDOW_MARGIN), (high[0] + WINDOW_MARGIN, high[1] + WINDOW_MARGIN)
-    near = modes.nearest
+    near, words = modes.nearest, selection_words(modes.mechanism)
     pictures = [
-        _assembly_picture(mode, marks, window, near is not None and near.choices == mode.choices)
+        _assembly_picture(mode, marks, window, words if near is not None and near.choices == mode.choices else "")
         for mode, marks in zip(shown, drawn, strict=True)
     ]
     # sheets that are about as full as each other
@@ -119,18 +120,16 @@ def _scale_mark(mark: Mark, factor: float) -> Mark:
 
 
 def _assembly_picture(
-    mode: Mode, marks: Sequence[Mark], window: tuple[PaperPoint, PaperPoint], is_nearest: bool
+    mode: Mode, marks: Sequence[Mark], window: tuple[PaperPoint, PaperPoint], selection: str
 ) -> Picture:
-    """One assembly in its window, with its number below."""
+    """One assembly in its window, with its number below and, of the one that is solved, how it is selected."""
     (left, bottom), (right, top) = window
     about = f"window of {mode.number}"
     boxes = []
-    for k in range(OWN_WINDOW_LINES if is_nearest else 1):
+    for k in range(OWN_WINDOW_LINES if selection else 1):
         off = 0.25 * k
         corners = ((left, bottom), (right, bottom), (right, top), (left, top))
         spots = tuple((x + (off if x == right else -off), y + (off if y == top else -off)) for x, y in corners)
-        boxes.append(Polyline(spots, Pen.INPUT if is_nearest else Pen.CIRCLE, about, closed=True))
-    told = [str(mode.number)]
-    told += ["the sketch's own"] if is_nearest else []
-    told += [] if mode.outcome is Outcome.SOLVED else [mode.outcome.value]
-    return Picture((*boxes, *marks), ", ".join(told))
+        boxes.append(Polyline(spots, Pen.INPUT if selection else Pen.CIRCLE, about, closed=True))
+    outcome = "" if mode.outcome is Outcome.SOLVED else mode.outcome.value
+    return Picture((*boxes, *marks), ", ".join(filter(None, (str(mode.number), selection, outcome))))

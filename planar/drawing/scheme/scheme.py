@@ -31,6 +31,7 @@ from planar.model.link_shapes import LinkShape
 from planar.model.mechanism import Mechanism, named_points
 from planar.model.pairs.symbols import CamMark, DrawingMark, OutlineMark, PinMark, SliderMark, WheelMark
 from planar.results.motion import State
+from planar.solving.position import rest_remarks
 
 __all__ = ["body_marks", "ground_marks", "plain_frames", "point_labels", "scheme", "scheme_scale", "space_scale"]
 
@@ -75,7 +76,7 @@ def scheme(
         strokes += _link_number_labels(scene, strokes, clear)
     if letters:
         strokes += (*point_labels(scene), *_labels(scene, mass_centre_names(scene), 9.0))
-    return Picture(tuple(strokes), mechanism.name, (f"Space diagram, {scale}",))
+    return Picture(tuple(strokes), mechanism.name, (f"Space diagram, {scale}", *rest_remarks(mechanism)))
 
 
 def space_scale(

@@ -18,7 +18,7 @@ from planar.model.link_shapes import LinkShape
 from planar.model.mechanism import Drive, Input, Mechanism
 from planar.results.motion import Motion
 from planar.solving.cycle import cycle
-from planar.solving.position import solve
+from planar.solving.position import solve, solved_mechanism
 
 RUN_STEPS = (37, 53)
 """Steps of the runs whose positions are taken: coprime, so that no function of the input is nought at all of both and
@@ -98,6 +98,8 @@ def _generic_motions(mechanism: Mechanism, seed: int) -> Iterator[Motion]:
     Where they cannot stand there, or the input not run, nearer positions are tried. Raises NoAnswer where the input
     does not run from the file's position.
     """
+    if not mechanism.inputs:
+        solved_mechanism(mechanism).check_motion()
     random = np.random.default_rng(seed)
     for name in [given.pair for given in mechanism.inputs]:
         if len(mechanism.inputs) == 1:

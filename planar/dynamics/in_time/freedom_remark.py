@@ -6,12 +6,14 @@ from collections.abc import Iterator, Sequence
 
 from planar.model.mechanism import Mechanism
 from planar.model.wording import quote_names
+from planar.solving.position import solved_mechanism
 
 
 def freedom_remarks(mechanism: Mechanism, driven: Sequence[str]) -> Iterator[str]:
     """That nothing moves freely, by what it is held or driven, and what to leave out."""
     if not driven:
-        yield "nothing can move: the pairs hold every link"
+        problem = solved_mechanism(mechanism).motion_refusal()
+        yield problem.reason if problem is not None else "nothing can move: the pairs hold every link"
         return
     by_law = [given.pair for given in mechanism.inputs if given.law is not None]
     options = [f"--drive {name}" for name in driven if name not in by_law]

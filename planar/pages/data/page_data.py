@@ -59,8 +59,8 @@ def page_data(mechanism: Mechanism, z: np.ndarray | None = None) -> tuple[dict[s
     known = solved_mechanism(mechanism)
     solver, z = known.solver, known.assembly.z if z is None else z
     e, program, state = solver.equations, solver.functions, rest_position(mechanism)
-    if state.mobility < len(mechanism.inputs):
-        solve(mechanism)  # which says why nothing moves
+    if 0 < state.mobility < len(mechanism.inputs):
+        solve(mechanism)  # refuses inputs that contradict one another; a structure is shown as it stands
     # other lengths might agree less than the file allows, and some pairs take plain numbers alone
     is_live = not e.open_rows and all(pair.measures_symbols for pair in mechanism.pairs)
     numbers = DimensionNumbers(mechanism, live=is_live)
@@ -127,6 +127,7 @@ def page_data(mechanism: Mechanism, z: np.ndarray | None = None) -> tuple[dict[s
         "starting": uncounted_angles(mechanism),
         "assemblies": _assembly_data(mechanism, solver),
         "z": z.tolist(),
+        "fixed": solved_mechanism(mechanism).motion_refusal() is not None,
         "tolerance": solver.tolerance,
         "stops": stop_data(solver),
         "sizes": len(numbers.values),
@@ -209,7 +210,8 @@ def _assembly_data(mechanism: Mechanism, solver: PositionSolver) -> dict[str, An
     )
     # a rack goes on without end, and comes back nowhere
     goes_on = any(pair.counts_turns and MeasureKind.LENGTH in pair.residual_kinds for pair in mechanism.pairs)
-    every = circuits(mechanism) if small and not goes_on else None
+    runs = small and not goes_on and solved_mechanism(mechanism).motion_refusal() is None
+    every = circuits(mechanism) if runs else None
     return {
         "more": len(listed) > MAX_ASSEMBLIES,
         "list": [

@@ -128,8 +128,9 @@ class MovingScene(Scene):
 
 
 def motion_positions(mechanism: Mechanism, z: Array) -> Positions:
-    """Where the links are at the unknowns z, and over the motion of every input from there."""
-    solver = solved_mechanism(mechanism).solver
+    """Where the links are at the unknowns z, and over the motion of every input from there, if anything moves."""
+    known = solved_mechanism(mechanism)
+    solver = known.solver
     u, p = solver.inputs.u, solver.inputs.p
 
     def frames(z: Array, u: Array) -> Mapping[str, Frame]:
@@ -139,6 +140,8 @@ def motion_positions(mechanism: Mechanism, z: Array) -> Positions:
 
     positions = [frames(z, u)]
     for number, given in enumerate(mechanism.inputs):
+        if known.motion_refusal(given.pair) is not None:
+            continue
         step = np.zeros_like(u)
         sliding = solver.is_sliding(given.pair)
         step[number] = (FREE_SLIDE_RATIO if sliding else 2.0 * pi) / MOTION_STEPS

@@ -56,6 +56,8 @@ def edit_answer(value: Any) -> dict[str, Any]:
     try:
         mechanism = from_dict(value)
         found |= {"units": _units(mechanism), "usual": _usual_amounts(mechanism)}
+        if mechanism.inputs:
+            solved_mechanism(mechanism).check_motion()
         data, functions = page_data(mechanism)
     except BadInput as problem:
         return found | {"problem": problem.sentence, "place": problem.place}

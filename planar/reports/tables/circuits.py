@@ -13,6 +13,7 @@ from planar.assemblies.circuits.circuit_of_assembly import MAX_LOCATED, LocatedA
 from planar.assemblies.circuits.circuits import Circuit, Circuits
 from planar.assemblies.circuits.traced_circuit import Branch
 from planar.assemblies.modes import Modes
+from planar.assemblies.selection import selection_words
 from planar.foundation.errors import Outcome
 from planar.foundation.units import parse_unit
 from planar.model.mechanism import relative_motions
@@ -83,7 +84,7 @@ def _branches_table(circuits: Circuits, lying: tuple[LocatedAssembly, ...]) -> F
     for circuit in circuits:
         for branch in circuit.branches:
             here = [
-                f"{each.mode.number}{' as sketched' if each.is_sketched else ''}"
+                f"{each.mode.number}{f', {selection_words(circuits.mechanism)}' if each.is_sketched else ''}"
                 for each in lying
                 if each.is_on(circuit, branch)
             ]

@@ -12,6 +12,7 @@ from rich.text import Text
 
 from planar.assemblies.circuits.circuits import Circuits
 from planar.assemblies.modes import Mode, Modes, ModesBlock
+from planar.assemblies.selection import selection_words
 from planar.foundation.errors import BadInput, Outcome, suggest_name
 from planar.foundation.units import parse_unit
 from planar.model.mechanism import relative_motions
@@ -137,7 +138,7 @@ def _assemblies_table(
             *(_point_cell(mode, name, by) for name in names),
             "-" if distance is None else f"{by.from_si(distance):.4g}",
             "yes" if mode.certified else "no",
-            join_all_names(_mode_remarks(mode, near)) if _mode_remarks(mode, near) else "",
+            ", ".join(_mode_remarks(modes, mode, near)),
         )
     return rows
 
@@ -148,8 +149,8 @@ def _circuit_and_branch(circuits: Circuits, mode: Mode) -> tuple[int | None, int
     return (None, None) if place is None else (place[0].number, place[1].number)
 
 
-def _mode_remarks(mode: Mode, near: Mode | None) -> list[str]:
-    found = ["as sketched"] if near is not None and mode.choices == near.choices else []
+def _mode_remarks(modes: Modes, mode: Mode, near: Mode | None) -> list[str]:
+    found = [selection_words(modes.mechanism)] if near is not None and mode.choices == near.choices else []
     found += ["two that meet"] if mode.double else []
     return found + ([] if mode.outcome is Outcome.SOLVED else [mode.outcome.value])
 

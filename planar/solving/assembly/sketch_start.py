@@ -14,10 +14,18 @@ START_SPREAD = 0.5
 
 
 def sketch_coordinates(setup: PreparedMechanism, seed: int) -> Array:
-    """Coordinates w with the links about where the sketch has their points; what it does not show is at random."""
+    """Coordinates w with the links about where the sketch has their points; what it does not show is at random.
+
+    Pins on the frame are where the frame has them.
+    """
     rng = np.random.default_rng(seed)
     w = rng.uniform(-1.0, 1.0, len(setup.equations.coordinates))
     shown = {name: Vector(x / setup.unit, y / setup.unit) for name, x, y in setup.mechanism.sketch}
+    frame = setup.mechanism.frame
+    for each in named_points(setup.mechanism):
+        for link, point in each.members:
+            if link == frame and len(each.members) > 1:
+                shown[each.name] = setup.shapes[frame].points[point] * (1.0 / setup.unit)
     ends: dict[str, list[tuple[Vector, Vector]]] = {}
     for each in named_points(setup.mechanism):
         if each.name in shown:

@@ -7,6 +7,8 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from planar.foundation.arrays import Array
+from planar.model.mechanism import Mechanism, pair_entries
+from planar.model.pairs import Pair
 from planar.solving.checks.singular_values import null_space
 from planar.solving.full_constraints import (
     PROBE_DISTANCE,
@@ -19,6 +21,8 @@ from planar.solving.prepared_mechanism import PreparedMechanism
 
 ZERO_COMPONENT = 1e-7
 """A part of a unit vector that is zero but for rounding."""
+MAX_REMOVALS = 60
+"""Links or pairs of a structure whose removal is tried."""
 MAX_COORDINATES = 600
 """Coordinates: a larger mechanism is not searched for inputs that are stuck, or for how it moves in general."""
 
@@ -86,6 +90,61 @@ def find_jammed_inputs(setup: PreparedMechanism) -> tuple[list[str], list[str]] 
 def count_motions(setup: PreparedMechanism, w: Array) -> int | None:
     """In how many ways the mechanism can move on from a position w, inputs left aside; None where it is too large."""
     return motion_dimension(FullConstraints(setup), w)[0] if w.size <= MAX_COORDINATES else None
+
+
+def releasing_parts(setup: PreparedMechanism, w: Array) -> tuple[str | None, tuple[str, ...]]:
+    """What lets the inputs of a structure at a position w move when it is removed: a link with its pairs, or one pair.
+
+    Returns the link (None: a pair alone, where no link will do) and the names of the pairs; none if nothing is found.
+    Links at driven pairs and driven pairs are left out. What leaves one freedom for each input is preferred.
+    """
+    mechanism = setup.mechanism
+    names = tuple(given.pair for given in mechanism.inputs)
+    driven = {link for name in names for link in setup.relative_motions[name].bodies}
+    input_rows = FullConstraints(setup).relative_jacobian(names, w)
+
+    def freedoms(pairs: Sequence[Pair], removed: str | None) -> int:
+        """How many freedoms these pairs leave; 0 where some input cannot move."""
+        constraints = FullConstraints(setup, pairs)
+        owners = {pair.name for pair in pairs} | {link.name for link in mechanism.links if link.name != removed}
+        columns = [each.owner in owners for each in constraints.coordinates]
+        free = null_space(constraints.jacobian(w)[:, columns])
+        rates = np.abs(input_rows[:, columns] @ free).max(axis=1, initial=0.0)
+        return free.shape[1] if np.all(rates > 100.0 * ZERO_COMPONENT) else 0
+
+    links = [link.name for link in mechanism.links if link.name not in driven | {mechanism.frame}]
+    choices: list[tuple[str | None, list[Pair]]] = [(link, _pairs_without(mechanism, link)) for link in links]
+    entries = [group for group in pair_entries(mechanism) if len(group) == 1 and group[0].name not in names]
+    for kind in (choices, [(None, [pair for pair in mechanism.pairs if pair not in group]) for group in entries]):
+        counted = [(freedoms(pairs, link), link, pairs) for link, pairs in kind[:MAX_REMOVALS]]
+        released = [each for each in counted if each[0]]
+        if released:
+            _, link, pairs = min(released, key=lambda each: each[0])
+            kept = {pair.name for pair in pairs}
+            gone = [pair for pair in mechanism.pairs if (link in pair.bodies if link else pair.name not in kept)]
+            return link, tuple(dict.fromkeys(pair.entry_name() for pair in gone))
+    return None, ()
+
+
+def _pairs_without(mechanism: Mechanism, link: str) -> list[Pair]:
+    """The pairs of a mechanism without a link; the other links of its pins stay joined to one another."""
+    pairs: list[Pair] = []
+    for group in pair_entries(mechanism):
+        rest = [pair for pair in type(group[0]).relative_motions(group) if link not in pair.bodies]
+        pairs += [pair for pair in rest if pair.links[0] == rest[0].links[0]]
+    return pairs
+
+
+def can_move_alone(setup: PreparedMechanism, w: Array, pair: str) -> bool:
+    """Whether the input at a pair can move from a position w, to first order, while the other inputs stand still."""
+    constraints = FullConstraints(setup)
+    others = tuple(given.pair for given in setup.mechanism.inputs if given.pair != pair)
+    return null_space(np.vstack([constraints.jacobian(w), constraints.relative_jacobian(others, w)])).size > 0
+
+
+def is_rigid(setup: PreparedMechanism, w: Array) -> bool:
+    """Whether the pairs, inputs left aside, allow no motion from a position w even to first order."""
+    return not null_space(FullConstraints(setup).jacobian(w)).size
 
 
 def find_conflicting_inputs(setup: PreparedMechanism) -> tuple[tuple[str, ...], ...]:

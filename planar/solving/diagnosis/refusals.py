@@ -110,6 +110,49 @@ def _links_at(setup: PreparedMechanism, names: Sequence[str]) -> list[str]:
     return list(dict.fromkeys(link for name in names for link in setup.relative_motions[name].links))
 
 
+def structure(setup: PreparedMechanism, w: Array) -> NoAnswer:
+    """Links that no input can move from a position w, since their pairs leave no freedom: a structure."""
+    mechanism = setup.mechanism
+    links = [link.name for link in mechanism.links if link.name != mechanism.frame]
+    if not links:
+        return NoAnswer(Outcome.STRUCTURE, f"nothing moves: the frame {mechanism.frame!r} is the only link; add links")
+    return NoAnswer(
+        Outcome.STRUCTURE,
+        f"nothing moves: it is a structure of {_links(links)} with the frame {mechanism.frame!r} (mobility 0) "
+        f"{setup.describe_position()}; {_structure_remedy(setup, w)}",
+        **_all_links(links),
+    )
+
+
+def _structure_remedy(setup: PreparedMechanism, w: Array) -> str:
+    """What to remove from a structure: its inputs, or what lets it move."""
+    from planar.solving.diagnosis.redundancy import releasing_parts
+
+    mechanism = setup.mechanism
+    link, pairs = releasing_parts(setup, w)
+    removal = f"pair{'s' * (len(pairs) != 1)} {quote_names(list(pairs))}" if pairs else "links or pairs"
+    if link is not None:
+        removal = f"link {link!r} with its {removal}"
+    if not mechanism.inputs:
+        return f"remove {removal} to let it move, and give an input"
+    return f"remove {_inputs(setup)}, or remove {removal} to let it move"
+
+
+def undriven(setup: PreparedMechanism) -> NoAnswer:
+    """A mechanism without inputs that can move although the count of its constraints gives no freedom."""
+    links = [link.name for link in setup.mechanism.links if link.name != setup.mechanism.frame]
+    return always_free(setup, links)
+
+
+def surplus_inputs(setup: PreparedMechanism, mobility: int) -> NoAnswer:
+    """More inputs than freedoms, so that none of those that move one another can run while the others stand still."""
+    return NoAnswer(
+        Outcome.TOO_MANY_INPUTS,
+        f"the mobility is {mobility} {setup.describe_position()}, and {_inputs(setup)} are more"
+        f"{_inputs_to_leave_out(setup)}",
+    )
+
+
 def change_point(setup: PreparedMechanism, links: Sequence[str], mobility: int, z: Array) -> NoAnswer:
     """A position from which the mechanism may go on in several ways, and how one is chosen."""
     return NoAnswer(

@@ -164,9 +164,6 @@ class RangeRun(RunningInput):
         if high.position - low.position < MIN_RANGE:
             self.solver.state(self.assembly.z)  # says why nothing goes on from a dead point or a change point
             at = self.solver.describe_input(self.pair, here)
-            if len(self.u) > 1:
-                told = f"the input at {self.pair!r} cannot move from {at} while the other inputs stand still"
-                raise NoAnswer(Outcome.TOO_MANY_INPUTS, told)
             told = f"the input at {self.pair!r} can all but not move from {at}, as its motion ends close by both ways"
             raise NoAnswer(Outcome.DEAD_POINT, f"{told}; change a dimension, or drive another pair")
         # from within to the limits: from a limit two branches lead inwards
