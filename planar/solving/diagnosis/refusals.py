@@ -248,17 +248,22 @@ def _open_block_sentence(setup: PreparedMechanism, failure: AssemblySearchFailur
 
 
 def _remedy(setup: PreparedMechanism, failure: AssemblySearchFailure, links: str) -> str:
-    """A clause on what would let the block close: a change of one number, or a misfit that is accepted."""
+    """A clause on what would let the block close; general advice where the search for that fails."""
+    otherwise = f"change the input or a dimension of {links}"
+    try:
+        return _search_remedy(setup, failure, otherwise)
+    except Exception:  # the text of a refusal never raises, whatever numbers the search for a remedy meets
+        return otherwise
+
+
+def _search_remedy(setup: PreparedMechanism, failure: AssemblySearchFailure, otherwise: str) -> str:
+    """A change of one number that lets the block close, or a misfit to accept; `otherwise` where there is neither."""
     from planar.solving.assembly.least_misfit_offer import offer_least_misfit
     from planar.solving.diagnosis.remedy import describe_remedy
 
-    stage, otherwise = failure.stage, f"change the input or a dimension of {links}"
-    try:
-        remedy = describe_remedy(setup, failure, otherwise)
-        is_redundant = slice_length(stage.rows) > slice_length(stage.unknowns)
-        offer = offer_least_misfit(setup.mechanism) if is_redundant else ""
-    except Exception:  # the text of a refusal never raises, whatever numbers the search for a remedy meets
-        return otherwise
+    remedy = describe_remedy(setup, failure, otherwise)
+    is_redundant = slice_length(failure.stage.rows) > slice_length(failure.stage.unknowns)
+    offer = offer_least_misfit(setup.mechanism) if is_redundant else ""
     return f"{remedy}{'; or, ' * bool(offer)}{offer}"
 
 
