@@ -291,7 +291,8 @@ def parse_json(text: str | bytes, place: str) -> Any:
         raise BadInput(place, f"the file is not UTF-8 text (byte {problem.start})") from None
     except json.JSONDecodeError as problem:
         where = f"line {problem.lineno}, column {problem.colno}"
-        raise BadInput(place, f"this is not JSON: {problem.msg} at {where}") from None
+        what = problem.msg.removesuffix(" at")  # some messages of the library end in it
+        raise BadInput(place, f"this is not JSON: {what} at {where}") from None
     except RecursionError:
         raise BadInput(place, "the file is nested too deeply to be a mechanism") from None
     except ValueError:

@@ -7,7 +7,10 @@ import os
 import re
 import stat
 import sys
-from contextlib import suppress
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from hashlib import sha256
 from pathlib import Path
 from typing import Any, TextIO
 
@@ -19,6 +22,10 @@ NO_SPACE_ERRORS = {
 """What comes of writing, and not of where."""
 NOT_REPLACEABLE_ERRORS = {errno.EACCES, errno.EPERM, errno.EROFS, errno.EBUSY, errno.EXDEV}
 """What comes of a folder that takes no other file, as where one file alone is mounted or may be written."""
+NO_LOCK_ERRORS = {errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP}
+"""What comes of a file system without locks."""
+LOCK_WAIT, LOCK_PAUSE = 5.0, 0.01
+"""s that a lock is waited for, and s between two attempts."""
 PARTIAL_FILE_NAME = re.compile(r"\.[0-9a-f]{24}\.part")
 """Names of files that are not whole yet."""
 MAX_SYMLINKS = 40
@@ -183,6 +190,71 @@ def _overwrite(path: Path, content: bytes) -> None:
                 raise
         _write_all(file.fileno(), content)
         file.truncate(len(content))
+
+
+@contextmanager
+def file_lock(path: Path) -> Iterator[None]:
+    """Keep other processes that take this lock from writing a file, so that it can be checked and then replaced.
+
+    The lock is a file beside the one that `path` leads to, which the system unlocks if the process dies. Where the
+    folder takes no file, or the file system has no locks, nothing is locked. Raises BadInput where another process
+    holds the lock for longer than `LOCK_WAIT`.
+    """
+    try:
+        target, _ = _resolve_target(path)
+        name = sha256(os.fsencode(target.name)).hexdigest()[:24]
+        lock = target.with_name(f".{name}.lock")
+        number = _lock_file(lock, str(path))
+    except OSError as problem:
+        if problem.errno not in NOT_REPLACEABLE_ERRORS | NO_LOCK_ERRORS:
+            raise write_error(str(path), "the file", problem) from None
+        yield
+        return
+    try:
+        yield
+    finally:
+        if sys.platform == "win32":  # an open file cannot be removed there
+            os.close(number)
+        with suppress(OSError):
+            lock.unlink(missing_ok=True)
+        if sys.platform != "win32":
+            os.close(number)
+
+
+def _lock_file(lock: Path, place: str) -> int:
+    """The number of a lock file that this process has made, or taken over, and locked. Raises OSError, BadInput."""
+    flags = os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0)
+    end = time.monotonic() + LOCK_WAIT
+    while True:
+        number = os.open(lock, flags, 0o666)
+        try:
+            if _try_lock(number) and lock.exists() and os.path.samestat(os.fstat(number), lock.stat()):
+                return number  # else its former owner has removed it
+        except BaseException:
+            os.close(number)
+            raise
+        os.close(number)
+        if time.monotonic() > end:
+            raise BadInput(place, "another program is writing this file; try again when it is done")
+        time.sleep(LOCK_PAUSE)
+
+
+def _try_lock(number: int) -> bool:
+    """Lock an open file, if no other process has. Raises OSError where the file system has no locks."""
+    try:
+        if sys.platform == "win32":
+            import msvcrt
+
+            msvcrt.locking(number, msvcrt.LK_NBLCK, 1)
+        else:
+            import fcntl
+
+            fcntl.flock(number, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError as problem:
+        if problem.errno in (errno.EAGAIN, errno.EACCES, errno.EDEADLK):
+            return False
+        raise
+    return True
 
 
 def _is_private(known: os.stat_result) -> bool:

@@ -29,13 +29,14 @@ class PageLink(NamedTuple):
 class EditedFile(NamedTuple):
     """A file that is drawn on: its JSON value, its name if it has one, and what is told of it (`edit_answer`).
 
-    `mark` is what tells its content from any other.
+    `mark` is what tells its content from any other; `note` is a sentence that the page shows when it is opened.
     """
 
     value: Any
     name: str | None
     answer: dict[str, Any]
     mark: str = ""
+    note: str = ""
 
 
 class PageRange(NamedTuple):

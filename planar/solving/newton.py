@@ -59,6 +59,7 @@ class NewtonResult(NamedTuple):
     converged: Array
 
 
+@np.errstate(over="ignore", invalid="ignore", divide="ignore")  # a step that overflows is not better, and not taken
 def damped_newton(
     residual_function: ResidualFunction,
     starts: Array,

@@ -4,8 +4,13 @@ from __future__ import annotations
 
 import http.client
 import json
+import os
 import shutil
+import socket
 import subprocess
+import threading
+import time
+from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 from click.testing import CliRunner
@@ -20,6 +25,7 @@ from planar.pages.editor import server as serving
 from planar.pages.editor.answer import BLANK, conflict_answer, edit_answer, nearest_places
 from planar.pages.editor.authors_file import carry_over
 from planar.pages.editor.edit_page import edit_page
+from planar.pages.editor.worker import ComputationStopped, Superseded, Worker
 from tests.hostile import HARMFUL_LINE, harmful_mechanism
 from tests.pencil import served
 from tests.watchdog import watched
@@ -140,6 +146,177 @@ def test_it_ends_when_its_page_is_closed_and_not_when_that_is_loaded_again(monke
         assert not server.is_over()
         monkeypatch.setattr(serving, "SILENCE", -1.0)  # a browser that is gone says nothing
         assert server.is_over()
+
+
+# what is written
+
+
+def test_of_two_servers_that_save_at_once_one_writes_and_the_other_is_refused(tmp_path):
+    path = tmp_path / "shared.json"
+    documents = [FOUR_BAR | {"name": name} for name in ("first", "second")]
+    for round_number in range(30):
+        path.write_text(json.dumps(FOUR_BAR | {"name": str(round_number)}))
+        name = None if round_number % 2 else "new"  # a file that there is already, and one that both begin
+        servers = [serving.EditServer(FOUR_BAR, path, tmp_path) for _ in documents]
+        barrier = threading.Barrier(2)
+
+        def save(server, document, barrier=barrier, name=name):
+            barrier.wait()
+            return server.save(document, name, server.mark)
+
+        with ThreadPoolExecutor(2) as pool:
+            answers = list(pool.map(save, servers, documents))
+        for server in servers:
+            server.server_close()
+        target = path if name is None else tmp_path / "new.json"
+        (accepted,) = [k for k, answer in enumerate(answers) if "file" in answer]
+        assert answers[1 - accepted]["taken"] == target.name
+        assert json.loads(target.read_text())["name"] == documents[accepted]["name"]
+        (tmp_path / "new.json").unlink(missing_ok=True)
+    assert [each.name for each in tmp_path.iterdir()] == ["shared.json"]
+
+
+@pytest.mark.parametrize("name", [5, ["a"], {}, True, "x" * 300, "é" * 130, "\udcff", "a\0b", "", "../a", "a/b"])
+def test_what_no_file_can_be_called_is_refused_in_a_sentence(server, name):
+    status, text, _ = asked(server, what="save", body={"document": FOUR_BAR, "name": name})
+    assert status == 400
+    assert json.loads(text)["problem"].startswith("name: ")
+    assert list(server.folder.iterdir()) == []
+
+
+@pytest.mark.parametrize("length", ["9" * 5000, "\u00b2", "-1", "1e3", "", " "])
+def test_a_request_whose_length_is_no_number_is_refused_in_a_sentence(server, length):
+    status, text, _ = asked(server, Length=length)
+    assert status in (400, 413)
+    assert len(text.splitlines()) == 1
+
+
+def test_pipes_folders_and_links_out_of_the_folder_are_not_written(tmp_path):
+    folder, outside = tmp_path / "folder", tmp_path / "outside"
+    for made in (folder, outside, folder / "sub.json"):
+        made.mkdir()
+    os.mkfifo(folder / "pipe.json")
+    (outside / "there.json").write_text("{}")
+    for name, target in {"dangling": outside / "new.json", "live": outside / "there.json", "ring": "ring.json"}.items():
+        (folder / f"{name}.json").symlink_to(target)
+    (folder / "beside.json").symlink_to("new.json")
+    with watched(), served(FOUR_BAR, None, folder) as server:
+        for name in ("sub", "pipe", "dangling", "live", "ring"):
+            for replaces in (False, True):
+                body = {"document": FOUR_BAR, "name": name, "replaces": replaces}
+                status, text, _ = asked(server, what="save", body=body)
+                assert status == 400, name
+                assert json.loads(text)["problem"].startswith("name: ")
+        assert server.save(FOUR_BAR, "beside")["file"] == "beside.json"
+    assert (folder / "new.json").is_file()
+    assert [each.name for each in outside.iterdir()] == ["there.json"]
+    assert (outside / "there.json").read_text() == "{}"
+
+
+def test_a_page_that_is_loaded_again_shows_what_another_server_saved(tmp_path):
+    path = tmp_path / "own.json"
+    path.write_text(json.dumps(FOUR_BAR))
+    with served(FOUR_BAR, path, tmp_path) as server:
+        assert "own.json was written by" not in asked(server, "GET", "")[1]
+        other = serving.EditServer(FOUR_BAR, path, tmp_path)
+        other.save(FOUR_BAR | {"name": "Changed elsewhere"}, None, other.mark)
+        other.server_close()
+        text = asked(server, "GET", "")[1]
+        assert "<h1>Changed elsewhere</h1>" in text
+        assert "own.json was written by another window or program" in text
+        assert server.mark == serving.file_mark(path)
+        server.save(FOUR_BAR, None, server.mark)
+        assert "own.json was written by" not in asked(server, "GET", "")[1]
+        for broken in ("[", "[1]"):
+            path.write_text(broken)
+            text = asked(server, "GET", "")[1]
+            assert "the page shows the drawing as it was before" in text
+            assert "<h1>Four-bar chain</h1>" in text
+        path.unlink()
+        assert "there is no such file any more" in asked(server, "GET", "")[1]
+
+
+def test_a_file_whose_name_is_no_text_is_drawn_and_saved(tmp_path):
+    path = tmp_path / os.fsdecode(b"\xff.json")
+    path.write_text(json.dumps(FOUR_BAR))
+    with served(FOUR_BAR, path, tmp_path) as server:
+        assert "\ufffd.json" in asked(server, "GET", "")[1]
+        saved = json.loads(asked(server, what="save", body={"document": FOUR_BAR, "mark": server.mark})[1])
+        assert saved["file"] == "\ufffd.json"
+    assert path.stat().st_size > 0
+
+
+# the process that computes
+
+
+@pytest.fixture(scope="module")
+def worker():
+    return Worker(int)  # nothing is imported: it starts fast
+
+
+def interrupted(worker, page):
+    """A computation without an end, begun in another thread: its future, once it is computed."""
+    pool = ThreadPoolExecutor(1)
+    future = pool.submit(worker.compute, time.sleep, 3600, page=page)
+    pool.shutdown(wait=False)
+    while not worker._turn.locked():
+        time.sleep(0.01)
+    return future
+
+
+def test_a_newer_computation_of_a_page_stops_the_older(worker):
+    with watched():
+        older = interrupted(worker, "one")
+        with pytest.raises(ComputationStopped, match="another drawing"):
+            worker.compute(abs, -3, page="two", queue_limit=0.1)
+        assert worker.compute(abs, -3, page="one") == 3
+        with pytest.raises(Superseded):
+            older.result()
+
+
+def test_a_computation_ends_at_its_limit_and_with_its_client(worker):
+    with watched():
+        with pytest.raises(ComputationStopped, match="more than 0 s"):
+            worker.compute(time.sleep, 3600, limit=0.1)
+        with pytest.raises(Superseded):
+            worker.compute(time.sleep, 3600, has_client=lambda: False)
+        assert worker.compute(abs, -3) == 3
+
+
+def test_what_goes_wrong_in_a_computation_is_a_sentence(worker):
+    with watched():
+        with pytest.raises(BadInput, match="folders"):
+            worker.compute(serving._file_name, "a/b")
+        with pytest.raises(ComputationStopped, match="ValueError: invalid literal"):
+            worker.compute(int, "three")
+        with pytest.raises(ComputationStopped, match="ended without an answer"):
+            worker.compute(os._exit, 3)
+        assert worker.compute(abs, -3) == 3
+
+
+def test_the_server_saves_hears_and_sends_its_page_while_it_computes(server):
+    with watched():
+        older = interrupted(serving.WORKER, "a page")
+        text = asked(server, "GET", "")[1]
+        assert '"is_pending":true' in text.replace(" ", "")
+        assert "<h1>Four-bar chain</h1>" in text
+        assert asked(server, what="open", body={"page": "b"})[0] == 200
+        saved = json.loads(asked(server, what="save", body={"document": FOUR_BAR, "name": "meanwhile"})[1])
+        assert saved["file"] == "meanwhile.json"
+        assert not older.done()
+        answer = json.loads(asked(server, body={"document": FOUR_BAR, "page": "a page"})[1])
+        assert answer["mobility"] == "mobility 1, 1 input"
+        with pytest.raises(Superseded):
+            older.result()
+
+
+def test_a_client_that_is_gone_stops_its_computation(server, worker):
+    handler = object.__new__(serving._Handler)
+    handler.server, (handler.connection, client) = server, socket.socketpair()
+    assert handler._has_client()
+    client.close()
+    with handler.connection, watched(), pytest.raises(Superseded):
+        worker.compute(time.sleep, 3600, has_client=handler._has_client)
 
 
 # searches

@@ -11,14 +11,16 @@ import pytest
 import planar
 from planar.document import files
 from planar.foundation.errors import NoAnswer, Outcome
+from planar.solving.assembly import nearest_assembly
 from planar.solving.assembly.block_assemblies import BlockAssemblies
 from planar.solving.assembly.nearest_assembly import AssemblySearchFailure, find_nearest_assembly
-from planar.solving.diagnosis import remedy
+from planar.solving.diagnosis import refusals, remedy
 from planar.solving.prepared_mechanism import PreparedMechanism
 from tests.builders import four_bar_document, six_bar_document, slider_crank_document
 from tests.closed_forms import between
 from tests.command import run, written
 from tests.draws import part
+from tests.known import MODELS
 
 DEG = np.pi / 180
 
@@ -609,3 +611,54 @@ def test_what_is_held_twice_wants_an_input_where_it_has_none(model):
         planar.solve(replace(planar.load(model), inputs=()))
     assert refused.value.outcome is planar.Outcome.TOO_FEW_INPUTS
     assert "give an input at" in refused.value.reason
+
+
+# numbers that no mechanism has
+
+EXTREMES = (1e15, -1e15, 1e12, 1e-15, -1e-15, 2.0**53)
+KNOWN_EXTREMES = [
+    ("rack-differential", "lower.position", 1e12),
+    ("tipper", "chassis.A.x", 2.0**53),
+    ("tipper", "stroke.position", -(2.0**53)),
+    ("umbrella", "stroke.position", 1e16),
+    ("elliptical-trammel", "across.position", 1e15),
+    ("excavator-arm", "boom cylinder.position", 2.0**53),
+    ("tangent-cam", "lift.noses.0.at.y", 1e12),
+    ("tangent-cam", "lift.noses.0.at.x", -1e15),
+]
+
+
+def random_extremes(count):
+    """Numbers of the smaller models, each at an extreme value (SI)."""
+    rng = np.random.default_rng(5)
+    small = [name for name, mechanism in MODELS.items() if len(mechanism.links) <= 8]
+    for name in rng.choice(small, count):
+        yield str(name), str(rng.choice(list(planar.dimensions(MODELS[name])))), float(rng.choice(EXTREMES))
+
+
+@pytest.mark.parametrize(("model", "number", "size"), [*KNOWN_EXTREMES, *random_extremes(25)])
+def test_of_extreme_numbers_there_is_an_answer_or_a_sentence_and_no_warning(model, number, size, monkeypatch):
+    def unguarded(setup, failure, links):
+        return refusals._search_remedy(setup, failure, links)
+
+    monkeypatch.setattr(refusals, "_remedy", unguarded)  # what it suppresses is seen here
+    try:
+        planar.solve(MODELS[model].with_values({number: size}))
+    except planar.PlanarError as problem:
+        assert len(str(problem).splitlines()) == 1
+
+
+def test_a_refusal_has_its_text_where_the_search_for_a_remedy_fails(monkeypatch):
+    def fail(*_):
+        raise ZeroDivisionError
+
+    monkeypatch.setattr(remedy, "describe_remedy", fail)
+    reason = refused(mm_four_bar(theta=151) | {"name": "without a remedy"}).reason
+    assert "change the input or a dimension of link" in reason
+
+
+def test_the_search_for_an_assembly_stops_after_a_number_of_blocks(monkeypatch):
+    monkeypatch.setattr(nearest_assembly, "MAX_SOLVED_BLOCKS", 60)
+    monkeypatch.setattr(refusals, "_remedy", lambda *_: "change it")
+    with pytest.raises(NoAnswer, match="the search stopped after 60 blocks"):
+        planar.solve(MODELS["chain-42"].with_values({"frame.A15.y": 1e13}))

@@ -51,23 +51,33 @@ def edit_answer(value: Any) -> dict[str, Any]:
     `usual` what is drawn of a force, a mass, a stiffness at first: a number and its unit; `rises` the motions of a
     cam's lift.
     """
-    found: dict[str, Any] = {"problem": "", "place": "", "mobility": "", "loose": [], "remedies": []}
-    found["rises"] = rise_motions()
+    answer, mechanism = file_answer(value)
+    if mechanism is None:
+        return answer
     try:
-        mechanism = from_dict(value)
-        found |= {"units": _units(mechanism), "usual": _usual_amounts(mechanism)}
         if mechanism.inputs:
             solved_mechanism(mechanism).check_motion()
         data, functions = page_data(mechanism)
     except BadInput as problem:
-        return found | {"problem": problem.sentence, "place": problem.place}
+        return answer | {"problem": problem.sentence, "place": problem.place}
     except NoAnswer as problem:
         if problem.outcome is Outcome.CANNOT_BE_ASSEMBLED:
-            return found | {"problem": problem.outcome.value, "conflicts": True}
-        told = {"mobility": _mobility_words(mechanism), "loose": loose_links(mechanism)}
-        return found | told | {"problem": str(problem)}
+            return answer | {"problem": problem.outcome.value, "conflicts": True}
+        freedom = {"mobility": _mobility_words(mechanism), "loose": loose_links(mechanism)}
+        return answer | freedom | {"problem": str(problem)}
     shown = {"window": None, "layers": ["paths"], "wanted": None, "edited": None}
-    return found | {"mobility": _mobility_words(mechanism), "data": data | shown, "functions": functions}
+    return answer | {"mobility": _mobility_words(mechanism), "data": data | shown, "functions": functions}
+
+
+def file_answer(value: Any) -> tuple[dict[str, Any], Mechanism | None]:
+    """The part of `edit_answer` that is read from the file without computing, and the mechanism if it is one."""
+    answer: dict[str, Any] = {"problem": "", "place": "", "mobility": "", "loose": [], "remedies": []}
+    answer["rises"] = rise_motions()
+    try:
+        mechanism = from_dict(value)
+    except BadInput as problem:
+        return answer | {"problem": problem.sentence, "place": problem.place}, None
+    return answer | {"units": _units(mechanism), "usual": _usual_amounts(mechanism)}, mechanism
 
 
 def loose_links(mechanism: Mechanism) -> list[str]:

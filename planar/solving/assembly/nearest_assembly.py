@@ -26,6 +26,8 @@ MAX_TIED = 64
 """Assemblies that fit alike among which one is looked for whose rates are determined."""
 MAX_EXPANSIONS = 1000
 """Blocks solved before the search stops looking for a nearer assembly and takes the best way to an end."""
+MAX_SOLVED_BLOCKS = 2 * MAX_EXPANSIONS
+"""Blocks solved before the search stops without an assembly: combinations of earlier blocks grow exponentially."""
 FAR_FROM_SKETCH = 0.1
 """The part of the mechanism's size by which a point may be off its sketch without a remark."""
 TURNED_FROM_SKETCH = pi / 4
@@ -44,12 +46,13 @@ class AssemblySearchFailure(NamedTuple):
     """The block at which every way to assemble ends.
 
     `z`: the unknowns where it is nearest to closing, those of earlier blocks filled in; `solved_blocks`: how many
-    were solved in search of it.
+    were solved in search of it; `is_cut_off`: whether the search stopped before it had tried all combinations.
     """
 
     stage: Block
     z: Array
     solved_blocks: int = 0
+    is_cut_off: bool = False
 
 
 class _BlockSearch:
@@ -104,8 +107,8 @@ def find_nearest_assembly(
     """Best first: of all assemblies the one with the least sum of squared distances to the sketch.
 
     The cost of a partial assembly never falls as it grows, so the first whole one is the nearest. Of several that fit
-    alike a `sound` one is taken, whose rates are determined, if there is one among the first. After EXPANSIONS blocks
-    the search only goes on to an end, and says so.
+    alike one is taken that `is_regular`, whose rates are determined, if there is one among the first. After
+    `MAX_EXPANSIONS` blocks the search only goes on to an end, and says so; after `MAX_SOLVED_BLOCKS` it stops.
     """
     stages = candidates.equations.blocks
     number, groups = count(), _BlockSearch(candidates)
@@ -114,7 +117,7 @@ def find_nearest_assembly(
     taken: _Node | None = None
     tied = 0
     for expansions in count():
-        if not heap or (chosen is not None and expansions > MAX_EXPANSIONS):
+        if not heap or expansions >= MAX_SOLVED_BLOCKS or (chosen is not None and expansions > MAX_EXPANSIONS):
             break
         if expansions < MAX_EXPANSIONS:
             node = heapq.heappop(heap)
@@ -148,7 +151,8 @@ def find_nearest_assembly(
             )
     if chosen is None:
         assert groups.last_failure is not None
-        return groups.last_failure._replace(solved_blocks=expansions)
+        is_cut_off = bool(heap) and not groups.is_hopeless
+        return groups.last_failure._replace(solved_blocks=expansions, is_cut_off=is_cut_off)
     return Assembly((taken or chosen).z, (taken or chosen).ties if tied else (), expansions >= MAX_EXPANSIONS)
 
 

@@ -283,23 +283,31 @@ def _open_block_sentence(setup: PreparedMechanism, failure: AssemblySearchFailur
     kind = next(row.kind for row in setup.equations.rows[stage.rows] if row.pair == pair)
     by, what = (setup.unit, "length") if kind is MeasureKind.LENGTH else (1.0, "angle")
     links = _links(stage.links or setup.pairs.get(pair, setup.relative_motions[pair]).links)
-    offer = ""
-    if slice_length(stage.rows) > slice_length(stage.unknowns):
-        from planar.solving.assembly.least_misfit_offer import offer_least_misfit
-
-        offer = offer_least_misfit(setup.mechanism)
+    cut_off = f" (the search stopped after {failure.solved_blocks} blocks)" if failure.is_cut_off else ""
     return (
-        f"{setup.describe_position()} {links} cannot be joined: at the nearest, pair {pair!r} stays open by "
-        f"{amount(gaps[pair] * by, what, setup.mechanism.units)}; "
-        f"{_remedy(setup, failure, links)}{'; or, ' * bool(offer)}{offer}"
+        f"{setup.describe_position()} {links} cannot be joined{cut_off}: at the nearest, pair {pair!r} stays open by "
+        f"{amount(gaps[pair] * by, what, setup.mechanism.units)}; {_remedy(setup, failure, links)}"
     )
 
 
 def _remedy(setup: PreparedMechanism, failure: AssemblySearchFailure, links: str) -> str:
-    """What would mend it."""
+    """A clause on what would let the block close; general advice where the search for that fails."""
+    otherwise = f"change the input or a dimension of {links}"
+    try:
+        return _search_remedy(setup, failure, otherwise)
+    except Exception:  # the text of a refusal never raises, whatever numbers the search for a remedy meets
+        return otherwise
+
+
+def _search_remedy(setup: PreparedMechanism, failure: AssemblySearchFailure, otherwise: str) -> str:
+    """A change of one number that lets the block close, or a misfit to accept; `otherwise` where there is neither."""
+    from planar.solving.assembly.least_misfit_offer import offer_least_misfit
     from planar.solving.diagnosis.remedy import describe_remedy
 
-    return describe_remedy(setup, failure, f"change the input or a dimension of {links}")
+    remedy = describe_remedy(setup, failure, otherwise)
+    is_redundant = slice_length(failure.stage.rows) > slice_length(failure.stage.unknowns)
+    offer = offer_least_misfit(setup.mechanism) if is_redundant else ""
+    return f"{remedy}{'; or, ' * bool(offer)}{offer}"
 
 
 def too_many_inputs(setup: PreparedMechanism) -> NoAnswer:

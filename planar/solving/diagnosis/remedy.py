@@ -15,6 +15,7 @@ from planar.document.dimensions import change_dimension, link_lengths
 from planar.equations.mechanism_numbers import pair_numbers, shapes_of_links
 from planar.equations.symbolic_equations import Block
 from planar.foundation.arrays import Array
+from planar.foundation.errors import PlanarError
 from planar.foundation.units import parse_unit
 from planar.model.link_shapes import PointPlacementError
 from planar.model.mechanism import Drive, Mechanism, replace_inputs
@@ -47,8 +48,8 @@ MIN_SENSITIVITY = 1e-3
 MAX_CHANGES_TRIED = 4
 """Changes, the least first, that are tried by assembling the whole."""
 PRINTED_DIGITS, ALL_DIGITS = 5, 15
-MIN_BLOCK_BUDGET = 200
-"""Blocks that may be solved in search of a remedy though that of an assembly took fewer."""
+MIN_BLOCK_BUDGET, MAX_BLOCK_BUDGET = 200, 400
+"""Blocks that may be solved in search of a remedy: as many as the search for an assembly took, within these bounds."""
 MOVED_BLOCK_COST = 0.1
 """What it takes to move a block on from where it was, for one of solving it from a sketch."""
 
@@ -104,16 +105,24 @@ class _ChangeableNumber:
     size: float
     "what is large for it (m or rad)"
     least: float
-    changed: Callable[[float], Mechanism]
+    change: Callable[[float], Mechanism]
+
+    def changed(self, value: float) -> Mechanism | None:
+        """The mechanism with this number at a value (m or rad); None where no mechanism may have it."""
+        try:
+            return self.change(value)
+        except PlanarError:
+            return None
 
 
+@np.errstate(over="ignore", invalid="ignore", divide="ignore")  # a change that overflows is not offered
 def describe_remedy(setup: PreparedMechanism, failure: AssemblySearchFailure, otherwise: str) -> str:
     """A clause that says which dimension to make how long, or where to move an input; `otherwise` where there is none.
 
     A change is offered only after the mechanism with it, rounded as it is printed, has been assembled. No more is spent
     on it than on the search for an assembly; where that did not do it is said.
     """
-    effort = BlockBudget(max(MIN_BLOCK_BUDGET, failure.solved_blocks))
+    effort = BlockBudget(min(max(MIN_BLOCK_BUDGET, failure.solved_blocks), MAX_BLOCK_BUDGET))
     beside = (link for name in failure.stage.pairs for link in setup.pairs[name].bodies)
     links = frozenset((*failure.stage.links, *beside))
     told, cut = [], False
@@ -332,10 +341,12 @@ class _ChangedBlock:
 
 
 def _changed_block(
-    setup: PreparedMechanism, stage: Block, mechanism: Mechanism, z: Array, effort: BlockBudget
+    setup: PreparedMechanism, stage: Block, mechanism: Mechanism | None, z: Array, effort: BlockBudget
 ) -> _ChangedBlock | None:
     """A block of a mechanism with other numbers, those before it moved on from z; None where they cannot be."""
     effort.spend(MOVED_BLOCK_COST)
+    if mechanism is None:
+        return None
     try:
         p = pair_numbers(mechanism, shapes_of_links(mechanism), setup.unit)
     except PointPlacementError:
@@ -352,8 +363,10 @@ def _rounded_beyond(value: float, up: bool) -> float:
     return (ceil if up else floor)(value / size) * size
 
 
-def can_be_assembled(mechanism: Mechanism, effort: BlockBudget) -> bool:
-    """Whether the whole can be assembled at its inputs. Raises BlockBudgetSpent."""
+def can_be_assembled(mechanism: Mechanism | None, effort: BlockBudget) -> bool:
+    """Whether there is a mechanism and it can be assembled at its inputs. Raises BlockBudgetSpent."""
+    if mechanism is None:
+        return False
     try:
         return isinstance(find_nearest_assembly(_BudgetedAssemblies(PreparedMechanism(mechanism), effort)), Assembly)
     except PointPlacementError:

@@ -181,10 +181,8 @@ def _root(square: Scalar) -> Scalar:
     """A square root; NaN of a number below zero."""
     if isinstance(square, float):
         return sqrt(square) if square >= 0.0 else nan
-    if not isinstance(square, np.ndarray):
-        return sqrt(square)
-    with np.errstate(invalid="ignore"):
-        return np.sqrt(square)
+    with np.errstate(invalid="ignore", divide="ignore"):  # a jet takes the roots of arrays as well
+        return np.sqrt(square) if isinstance(square, np.ndarray) else sqrt(square)
 
 
 def _ratio(above: Scalar, below: Scalar) -> Scalar:

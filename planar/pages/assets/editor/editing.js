@@ -8,7 +8,7 @@ const BLANK_WIDTH = 0.3;    // m that are seen of empty paper
 
 class Editing {
   constructor(data, program) {
-    const { value, name, answer, mark } = data.edited;
+    const { value, name, answer, mark, note } = data.edited;
     Object.assign(this, { file: value, fileName: name, answer, units: answer.units ?? { length: 1e-3, angle: Math.PI / 180 }, usual: answer.usual, rises: answer.rises, wish: null, mark });
     Object.assign(this, { at: new Map(), done: [], undone: [], tool: "hand", chosen: null, linkBefore: null, changed: false, asked: 0, settled: true, nearest: {}, led: null });
     this.sketch = new Sketch(this);
@@ -25,10 +25,16 @@ class Editing {
     this.begin(data, program, !answer.problem);
     if (!this.solved) this.guess();
     if (answer.conflicts) this.explain();
-    if (kept?.file) this.mark = kept.mark ?? mark; // of the file from which it was drawn on
-    if (kept?.file) this.take({ file: kept.file, at: new Map(kept.at), wish: Wish.valid(kept.wish) }, kept.changed);
+    const isCurrent = (kept?.mark ?? mark) === mark, keeps = kept?.changed || isCurrent; // a newer file replaces what is saved
+    this.fits = answer.is_pending;
+    if (kept?.file) {
+      this.mark = keeps ? kept.mark ?? mark : mark; // of the file from which it was drawn on
+      this.take({ file: keeps ? kept.file : value, at: new Map(keeps ? kept.at : this.at), wish: Wish.valid(kept.wish) }, kept.changed);
+    } else if (answer.is_pending) this.ask();
     else if (!this.placed.pins.size) this.use("bar");
     this.wishing.resume();
+    if (kept?.changed && !isCurrent) this.say(`${name} was written by another window or program. This page shows what you have drawn since; Save asks before it replaces the file.`);
+    else if (note) this.say(note);
   }
 
   // what is kept in the window until it is saved; without a store it lasts as long as the page
@@ -212,20 +218,16 @@ class Editing {
     return this.ask();
   }
 
-  /** Ask what Python says of what is drawn: one question at a time, of the last there is, however quick the hand. */
+  /** Ask for the server's answer to what is drawn, at once: it stops computing the answer to the drawing before. */
   async ask() {
-    this.asked++;
+    const number = ++this.asked;
     this.settled = false;
-    if (this.asking) return;
-    this.asking = true;
-    try {
-      for (let number = 0; number !== this.asked;) {
-        number = this.asked;
-        const answer = await EditServer.post("answer", { document: this.file });
-        await this.hand.rest(); // nothing is taken from under a hand that draws
-        if (number === this.asked) this.hear(answer);
-      }
-    } finally { this.asking = false; }
+    let answer;
+    do answer = await EditServer.post("answer", { document: this.file });
+    while (answer.is_superseded && number === this.asked); // requests may arrive in another order
+    await this.hand.rest(); // nothing is taken from under a hand that draws
+    if (number !== this.asked) return;
+    this.hear(answer);
     this.settled = true;
   }
 
@@ -273,7 +275,7 @@ class Editing {
     await new Promise((go) => setTimeout(go, EXPLAIN_PAUSE));
     if (number !== this.asked) return;
     const answer = await EditServer.post("conflict", { document: this.file });
-    if (number !== this.asked) return;
+    if (number !== this.asked || answer.is_superseded) return;
     Object.assign(this.answer, { problem: answer.problem || this.answer.problem, remedies: answer.remedies ?? [] });
     if (this.hand.dragged === null) this.approach(answer.nearest ?? {});
     this.panel.show();

@@ -4,12 +4,14 @@
 const ALIVE_PAUSE = 45000; // ms between two signs to the server that the page is open
 
 const EditServer = {
+  page: crypto.randomUUID(), // a newer drawing of a page takes the place of its older ones
+
   /** Ask: the answer, or {problem} in place of one; {gone} where nobody answers. */
   async post(what, asked) {
     try {
-      const response = await fetch(what, { method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify(asked) });
-      if (!response.ok) return { problem: await response.text() };
-      return await response.json();
+      const response = await fetch(what, { method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify({ page: EditServer.page, ...asked }) });
+      const isJson = response.headers.get("Content-Type") === "application/json";
+      return isJson ? await response.json() : { problem: await response.text() };
     } catch {
       return { gone: true, problem: "The server of this page does not answer: start `planar edit` again with the link that “Copy link” gives. What is drawn stays here." };
     }
@@ -17,7 +19,7 @@ const EditServer = {
 
   /** It hears that the page is open, and when it goes. */
   present() {
-    const page = crypto.randomUUID(), open = () => { EditServer.post("open", { page }); };
+    const { page } = EditServer, open = () => { EditServer.post("open", {}); };
     open();
     setInterval(open, ALIVE_PAUSE);
     addEventListener("pagehide", () => navigator.sendBeacon("gone", JSON.stringify({ page })));
