@@ -79,7 +79,7 @@ class Forces(Displayable):
     what equilibrium does not tell, and why; `bodies` are the links whose balance was proved. `friction["B"]` see
     `PairFriction`, `frictionless` are the same forces without friction, `others` the further
     solutions at a position, `solution_count` how many there are in all (of a motion (n,)), and `remarks` what there is
-    to say of friction.
+    to say of friction. `with_inertia` and `with_friction` say what was taken into account.
     """
 
     moving: State | Motion
@@ -95,6 +95,8 @@ class Forces(Displayable):
     others: tuple[Forces, ...] = ()
     solution_count: IntArray | int = 1
     remarks: tuple[str, ...] = ()
+    with_inertia: bool = True
+    with_friction: bool = True
 
     def __repr__(self) -> str:
         return f"<Forces in {self.moving!r}: {len(self.reactions)} pairs, {len(self.acting)} acting>"
@@ -203,6 +205,7 @@ def forces(moving: State | Motion, inertia: bool = True, friction: bool = True) 
     found = balanced.forces(solved)
     if friction and any(pair.has_friction for pair in mechanism.pairs):
         found = _with_friction(balanced, solved, found)
+    found = replace(found, with_inertia=inertia, with_friction=friction)
     return found if state is None else _single_position(found)
 
 
@@ -351,4 +354,6 @@ def _single_position(found: Forces) -> Forces:
         tuple(map(_single_position, found.others)),
         int(np.ravel(found.solution_count)[0]),
         found.remarks,
+        found.with_inertia,
+        found.with_friction,
     )

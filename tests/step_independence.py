@@ -1,0 +1,149 @@
+"""Whether printed numbers depend on the number of steps of a run; `python -m tests.step_independence` asks all models.
+
+A number that is printed without "among these positions" is solved for, so it has the same six digits for every number
+of steps. Run by hand over all models and commands:
+
+    nice .venv/bin/python -m tests.step_independence [MODEL ...]
+"""
+
+from __future__ import annotations
+
+import re
+import sys
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from tests.command import ROOT, run
+
+STEPS = (90, 91, 1440)
+AMONG = "among these positions"
+ROUND_OFF = re.compile(r"exactly|round-off|digits|residual|of the energy that changes|positions?;|^\d+ positions")
+"""Lines that say how well laws are kept, or how many positions there are: no results of the mechanism."""
+NUMBER = re.compile(r"(?<![\w.])[-−]?\d+(?:\.\d+)?(?:e[-+]\d+)?")
+SIXTH_DIGIT = 1.05e-5
+"""Relative: two numbers of six digits that differ by rounding differ by one in the sixth, 1e-5 at most."""
+NOTHING = 1e-9
+"""SI or a file's units: what is smaller is round-off of a sum."""
+
+COMMANDS: tuple[tuple[str, ...], ...] = (
+    ("cycle",),
+    ("cycle", "--json"),
+    ("forces", "--cycle"),
+    ("forces", "--cycle", "--fluctuation", "0.02"),
+    ("forces", "--cycle", "--json", "--fluctuation", "0.02"),
+    ("balance",),
+)
+"""Commands over a motion that print results, without the model and the number of steps."""
+
+
+def solved_lines(text: str) -> Iterator[str]:
+    """The lines of a printed result that claim to be solved for: tables and sentences without `AMONG`."""
+    for paragraph in _paragraphs(text):
+        if AMONG not in " ".join(paragraph):
+            yield from (" ".join(line.split()) for line in paragraph if not ROUND_OFF.search(line))
+
+
+def _paragraphs(text: str) -> Iterator[list[str]]:
+    """Tables with their titles; else facts and sentences, each with the lines that it runs on to."""
+    lines = text.splitlines()
+    table: list[str] = []
+    for k, line in enumerate(lines):
+        is_title = k + 1 < len(lines) and bool(line.strip()) and lines[k + 1] != "" and not lines[k + 1].strip()
+        if is_title or (table and not _is_table_line(line, table)):
+            if table:
+                yield table
+            table = [line] if is_title else []
+            if is_title:
+                continue
+        if table:
+            table.append(line)
+        elif line.strip():
+            yield [line]
+    if table:
+        yield table
+
+
+def _is_table_line(line: str, table: Sequence[str]) -> bool:
+    """Whether a line belongs to the table: a line of blanks ends it, but for that beneath its title."""
+    return len(table) == 1 or bool(table[-1].strip()) or len(table) == 2
+
+
+def differences(first: str, second: str) -> list[tuple[str, str]]:
+    """Lines of two outputs whose solved numbers differ in their sixth digit, or whose words differ."""
+    before, after = list(solved_lines(first)), list(solved_lines(second))
+    pairs = [(a, b) for a, b in zip(before, after, strict=False) if not _agree(a, b)]
+    if len(before) != len(after):
+        pairs.append((f"{len(before)} lines", f"{len(after)} lines"))
+    return pairs
+
+
+def _agree(first: str, second: str) -> bool:
+    if NUMBER.sub("#", first) != NUMBER.sub("#", second):
+        return False
+    return all(
+        abs(a - b) <= SIXTH_DIGIT * max(abs(a), abs(b)) or max(abs(a), abs(b)) < NOTHING
+        for a, b in zip(_numbers(first), _numbers(second), strict=True)
+    )
+
+
+def _numbers(line: str) -> list[float]:
+    return [float(each.replace("−", "-")) for each in NUMBER.findall(line)]
+
+
+def compare_steps(
+    folder: Path, words: Sequence[str], model: str, steps: Sequence[int] = STEPS
+) -> list[tuple[int, str, str]]:
+    """What a command prints differently for a model with other numbers of steps than the first: (steps, line, line)."""
+    command, *options = words
+    results = [run(folder, command, model, "--steps", str(count), *options) for count in steps]
+    if any(each.status for each in results):
+        return [(0, results[0].err, each.err) for each in results if each.status != results[0].status]
+    return [
+        (count, *lines)
+        for count, result in zip(steps[1:], results[1:], strict=True)
+        for lines in differences(_facts(results[0].out), _facts(result.out))
+    ]
+
+
+def _facts(text: str) -> str:
+    """Of JSON its facts, a line each, without the values at every position."""
+    if not text.startswith("{"):
+        return text
+    import json
+
+    return "\n".join(_json_lines("", json.loads(text)))
+
+
+def _json_lines(place: str, value: object) -> Iterator[str]:
+    if isinstance(value, dict):
+        for key, part in value.items():
+            if key not in ("proof", "residual", "remarks", "rows"):
+                yield from _json_lines(f"{place}.{key}", part)
+    elif isinstance(value, list):
+        if len(value) < min(STEPS):
+            for k, part in enumerate(value):
+                yield from _json_lines(f"{place}[{k}]", part)
+    else:
+        yield f"{place} {value}"
+
+
+def check_models(models: Sequence[str], commands: Sequence[Sequence[str]] = COMMANDS) -> int:
+    """Print what depends on the number of steps, over models and commands; how many lines these are."""
+    count = 0
+    with TemporaryDirectory() as folder:
+        for model in models:
+            for words in commands:
+                try:
+                    found = compare_steps(Path(folder), words, model)
+                except Exception as problem:  # noqa: BLE001 - the next model is asked all the same
+                    found = [(0, type(problem).__name__, str(problem)[:200])]
+                count += len(found)
+                for steps, before, after in found:
+                    print(f"{model}: {' '.join(words)}, {STEPS[0]} and {steps} steps\n  {before}\n  {after}", flush=True)
+    return count
+
+
+if __name__ == "__main__":
+    all_models = sorted(str(each) for each in (ROOT / "models").rglob("*.json"))
+    print(check_models(sys.argv[1:] or all_models), "lines depend on the number of steps")
