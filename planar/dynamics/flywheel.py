@@ -148,8 +148,10 @@ class _EffortOverCycle:
         course = force_course(forces)
         assert course is not None
         self.name, self.course = name, course
-        series = course.series(self._power_and_torque)
-        if series is None or series.has_gaps:
+        rate = 1.0 if course.run.motion.time is None else float(np.abs(forces.moving.inputs[name].velocity).max())
+        least = course.effort_scale(name)
+        series = course.series(self._power_and_torque, np.array([least * rate, least]))
+        if series is None:
             raise BadInput(name, UNKNOWN_TORQUE)
         self.series = series
         self.start, stop = (float(each) for each in self._angles([course.run.low, course.run.high]))

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from functools import cached_property, lru_cache
 
 import numpy as np
 
-from planar.dynamics.forces import Forces, forces
+from planar.dynamics.forces import Forces, forces, greatest_moment_and_force
 from planar.foundation.arrays import Array
 from planar.foundation.errors import NoAnswer
 from planar.foundation.piecewise_series import PiecewiseSeries, fit_series
@@ -17,6 +17,8 @@ from planar.solving.runs.continuous_run import ContinuousRun
 
 TURN_TOLERANCE = 1e-9
 """rad: what rounding leaves of a turn that the places of a load span."""
+LEAST_SCALE_RATIO = 1e-3
+"""Of the greatest force or moment: smaller ones have errors of rounding of the greatest."""
 
 
 class ForceCourse:
@@ -38,13 +40,31 @@ class ForceCourse:
             self._known[key] = forces(motion, self.forces.with_inertia, self.forces.with_friction)
         return self._known[key]
 
-    def series(self, measure: Callable[[Forces], Array]) -> PiecewiseSeries | None:
-        """The series of what is measured of forces at n places, (n,) or (n, columns); None where it has none."""
+    def series(self, measure: Callable[[Forces], Array], least_scale: Array | float = 0.0) -> PiecewiseSeries | None:
+        """The series of what is measured of forces at n places, (n,) or (n, columns); see `fit_series`.
+
+        None where it has none, or not over the whole motion.
+        """
         try:
-            found = fit_series(lambda places: measure(self.forces_at(places)), self.ends)
+            found = fit_series(lambda places: measure(self.forces_at(places)), self.ends, least_scale)
         except NoAnswer:
             return None
-        return found if found is not None and found.pieces else None
+        return None if found is None or found.has_gaps else found
+
+    def positions(self, places: Sequence[float] | Array) -> Array:
+        """Where places are, as tables say it: the time (s) of a run in time, else the running input (rad or m)."""
+        at = np.asarray(places, dtype=float)
+        return at if self.run.motion.time is not None else self.run.positions(at)
+
+    @cached_property
+    def least_scales(self) -> tuple[float, float]:
+        """Moments (N m) and forces (N) beside which the series of smaller ones are judged: these are rounding in part."""
+        moment, force = greatest_moment_and_force(self.forces)
+        return LEAST_SCALE_RATIO * moment, LEAST_SCALE_RATIO * force
+
+    def effort_scale(self, name: str) -> float:
+        """The least scale of the effort of an input."""
+        return self.least_scales[self.forces.is_force_input(name)]
 
     @cached_property
     def ends(self) -> tuple[float, ...]:

@@ -29,6 +29,7 @@ from planar.dynamics.reactions import ZERO_COUPLE_TOLERANCE, Reaction, input_eff
 from planar.dynamics.sharing.least_work import Wrench, yielding_power
 from planar.dynamics.virtual_velocities import has_length_motion, refuse_surplus_inputs, unit_rate_state
 from planar.dynamics.virtual_work import balance_function
+from planar.equations.mechanism_numbers import mechanism_size
 from planar.foundation.arrays import Array, IntArray
 from planar.foundation.errors import BadInput, NoAnswer, Outcome
 from planar.foundation.notebook_display import Displayable
@@ -207,6 +208,17 @@ def forces(moving: State | Motion, inertia: bool = True, friction: bool = True) 
         found = _with_friction(balanced, solved, found)
     found = replace(found, with_inertia=inertia, with_friction=friction)
     return found if state is None else _single_position(found)
+
+
+def greatest_moment_and_force(forces: Forces) -> tuple[float, float]:
+    """The greatest moment (N m) and force (N) of all that acts and all pairs; smaller values are judged beside them."""
+    reactions = forces.reactions.values()
+    exerted = [(each.force, each.couple) for each in (*forces.acting, *reactions)]
+    couples = [couple for _, couple in exerted]
+    couples += [couple for reaction in reactions for couple in reaction.couples.values()]
+    force = _greatest_size(force for force, _ in exerted)
+    couple = _greatest_size(couples)
+    return max(couple, force * mechanism_size(forces.mechanism, forces.moving.shapes)), force
 
 
 class _LinkEquilibrium:

@@ -22,8 +22,8 @@ twice as long."""
 SHORTEST_PIECE_RATIO = 1e-12
 """Of the whole range: a piece that has not converged at this length contains a jump."""
 JOINT_TOLERANCE, JOINT_RATIO = 1e-9, 0.01
-"""Of the scale: two pieces meet that differ by less at their joint. Parts of the shorter piece to either side of a joint
-in which a hidden jump lies: the outermost node is nearer to the end."""
+"""Of the scale: two pieces meet that differ by less at their joint. Parts of the shorter piece on either side of a joint
+that contain a hidden jump: the outermost node is nearer to the end."""
 LONGEST_PIECE_RATIO = 1.0 / 6.0
 """Of the range: a longer piece could have features between its nodes."""
 MAX_ENCLOSURES = 40
@@ -37,11 +37,12 @@ _NODES = chebyshev.chebpts1(NODE_COUNT)
 _FIT = np.linalg.inv(chebyshev.chebvander(_NODES, NODE_COUNT - 1))
 
 
-class Extreme(NamedTuple):
-    """An extreme value of a function, and its place."""
+class SeriesExtreme(NamedTuple):
+    """An extreme value of a column, its place, and the values of all columns there (columns,), on the side of its piece."""
 
     place: float
     value: float
+    columns: Array
 
 
 class SeriesPiece(NamedTuple):
@@ -161,24 +162,30 @@ class PiecewiseSeries(NamedTuple):
         if start is not None:
             yield start, end
 
-    def greatest(self, column: int = 0, sign: float = 1.0) -> Extreme:
-        """The greatest value of a column (with `sign` -1 the least), and its first place; at a jump a one-sided value."""
-        places, values = [], []
-        for piece in self.pieces:
-            critical = piece.critical_places(column)
-            places += critical.tolist()
-            values += piece.evaluate(critical)[:, column].tolist()
-        signed = sign * np.array(values)
-        best = int(np.argmax(signed >= signed.max() - TIE_TOLERANCE * np.abs(signed).max()))
-        return Extreme(float(places[best]), float(values[int(np.argmax(signed))]))
+    def greatest(self, column: int = 0, sign: float = 1.0) -> SeriesExtreme:
+        """The greatest value of a column (with `sign` -1 the least), and the first of its places.
 
-    def least(self, column: int = 0) -> Extreme:
-        """The least value of a column, and its first place."""
+        At a jump the value is that of one side.
+        """
+        critical = [piece.critical_places(column) for piece in self.pieces]
+        places = np.concatenate(critical)
+        values = np.vstack([piece.evaluate(part) for piece, part in zip(self.pieces, critical, strict=True)])
+        signed = sign * values[:, column]
+        first = int(np.argmax(signed >= signed.max() - TIE_TOLERANCE * self.scale[column]))
+        return SeriesExtreme(float(places[first]), float(sign * signed.max()), values[first])
+
+    def least(self, column: int = 0) -> SeriesExtreme:
+        """The least value of a column, and the first of its places."""
         return self.greatest(column, -1.0)
 
 
-def fit_series(function: Callable[[Array], Array], ends: Sequence[float]) -> PiecewiseSeries | None:
+def fit_series(
+    function: Callable[[Array], Array], ends: Sequence[float], least_scale: Array | float = 0.0
+) -> PiecewiseSeries | None:
     """The series of a function (n,) -> (n, columns) between places in their order, where it may jump or bend.
+
+    Its errors are judged beside the greatest value of each column, or beside `least_scale` (columns,) where that is
+    greater: a column that is rounding alone has no series of its own.
 
     The function is asked for values inside pieces only, never at their ends, so that each piece has the values of its
     side. A piece is halved until its series converges, and where two halves do not meet, the jump or bend that `ends`
@@ -187,7 +194,7 @@ def fit_series(function: Callable[[Array], Array], ends: Sequence[float]) -> Pie
     Piecewise-smooth chebfuns, IMA J. Numer. Anal. 30, 2010). Parts without finite values are gaps. None where too many
     pieces do not converge.
     """
-    fit = _Fit(function, float(ends[0]), float(ends[-1]))
+    fit = _Fit(function, (float(ends[0]), float(ends[-1])), least_scale)
     longest = LONGEST_PIECE_RATIO * (fit.high - fit.low)
     pieces: list[_OpenPiece] = []
     for low, high in pairwise(ends):
@@ -214,11 +221,11 @@ class _OpenPiece(NamedTuple):
 class _Fit:
     """The pieces of a function that have converged, and the greatest values that it had (columns,)."""
 
-    def __init__(self, function: Callable[[Array], Array], low: float, high: float):
-        self.function, self.low, self.high = function, low, high
-        self.shortest = SHORTEST_PIECE_RATIO * (high - low)
+    def __init__(self, function: Callable[[Array], Array], ends: tuple[float, float], least_scale: Array | float):
+        self.function, (self.low, self.high) = function, ends
+        self.shortest = SHORTEST_PIECE_RATIO * (self.high - self.low)
         self.pieces: list[SeriesPiece] = []
-        self.scale: Array = np.zeros(1)
+        self.scale: Array = np.atleast_1d(np.asarray(least_scale, dtype=float))
 
     def add(self, pieces: list[_OpenPiece]) -> bool:
         """Fit pieces, halved until they converge; False where they are too many."""

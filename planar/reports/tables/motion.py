@@ -106,6 +106,12 @@ def position_cell(motion: Motion, row: int) -> str:
     return format_number(_to_file_unit(motion, driver, float(motion.inputs[driver].position[row]))) if driver else ""
 
 
+def place_cell(motion: Motion, place: float) -> str:
+    """A time (s) of a run in time, else a position of the running input (rad or m), under that heading."""
+    driver = running_pair(motion)
+    return format_number(place if driver is None else _to_file_unit(motion, driver, place))
+
+
 def _to_file_unit(motion: Motion, pair: str, value: float) -> float:
     units = motion.mechanism.units
     return parse_unit(units.length if motion.has_length_motion(pair) else units.angle).from_si(value)

@@ -8,7 +8,6 @@ import numpy as np
 
 from planar.foundation.arrays import Array, BoolArray, IntArray
 from planar.foundation.jets import value_and_rates
-from planar.model.mechanism import relative_motions
 from planar.model.pairs import MeasureKind
 from planar.results.motion import Motion
 from planar.solving.continuation.fast_path import FastSamples
@@ -218,9 +217,7 @@ class ContinuousRun:
         between = self.rows[(self.rows > targets[0]) & (self.rows < targets[-1])]
         places = np.sort(np.concatenate([targets, between]))
         given = self._input_rates(np.concatenate([[self.rows[base]], places]))
-        found = follow_samples(
-            self.solver, self.solver.inputs.p, self.z[base], given.u, rates=(given.u1, given.u2)
-        )
+        found = follow_samples(self.solver, self.solver.inputs.p, self.z[base], given.u, rates=(given.u1, given.u2))
         if found.stopped is not None:
             raise found.stopped
         wanted = 1 + np.searchsorted(places, targets)

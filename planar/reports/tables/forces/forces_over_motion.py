@@ -10,27 +10,30 @@ from rich.console import Group, RenderableType
 from rich.text import Text
 
 from planar.analysis.efforts.unknown_load import UnknownLoad
-from planar.dynamics.forces import Forces
+from planar.dynamics.flywheel import explain_no_cycle, mean_effort
+from planar.dynamics.force_course import LEAST_SCALE_RATIO
+from planar.dynamics.forces import Forces, greatest_moment_and_force
 from planar.dynamics.load_attachment import attachment_remarks
 from planar.dynamics.reactions import Reaction
 from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput
 from planar.model.file_units import display_unit
-from planar.model.wording import count_phrase, join_all_names
+from planar.model.wording import count_phrase, join_all_names, quote_names
 from planar.reports.columns import ReportedSeries
 from planar.reports.fitted_table import FittedTable, plain_table
 from planar.reports.number_format import column_heading, format_or_zero, format_quantity, paragraphs
 from planar.reports.tables.forces import cam_contacts, flywheels, friction, loads, motors, unknown_loads
 from planar.reports.tables.forces import position_forces as at_one
-from planar.reports.tables.motion import motion_heading, position_cell, position_heading, running_pair
+from planar.reports.tables.forces.run_extremes import RunExtremes
+from planar.reports.tables.motion import motion_heading, position_heading
 from planar.results.motion import Motion
 
 
 def tables(
     forces: Forces, wanted: flywheels.WantedFlywheel | None = None, unknown: UnknownLoad | None = None
 ) -> RenderableType:
-    """Mean, least and greatest effort of every input, the greatest force and couple in every pair, each with where; the
-    flywheel that is wanted, and the load that is solved for."""
+    """Mean, least and greatest effort of every input, the greatest force and couple in every pair, each with its place;
+    the flywheel and the load that are asked for."""
     motion = _motion_of(forces)
     parts: list[RenderableType] = [
         *motion_heading(motion),
@@ -57,6 +60,7 @@ def tables(
     notes = (
         *motors.motor_sentences(forces, duties),
         *_undetermined_sentences(forces, len(motion)),
+        *_mean_remarks(forces),
         *cam_contacts.lift_off_remarks(forces),
         *forces.remarks,
         *attachment_remarks(forces.mechanism),
@@ -74,81 +78,120 @@ def _motion_of(forces: Forces) -> Motion:
 
 
 def _efforts_table(forces: Forces, motion: Motion) -> FittedTable:
-    at, most = position_heading(motion), at_one.greatest_moment_and_force(forces)
-    table = plain_table(
-        "Inputs, among these positions", "input", ("mean effort", "unit"), ("least", at), ("greatest", at), left=(0, 2)
-    )
-    for name, effort in forces.inputs.items():
+    at, largest = position_heading(motion), greatest_moment_and_force(forces)
+    extremes = effort_extremes(forces)
+    headings = ("input", ("mean effort", "unit"), ("least", at), ("greatest", at))
+    table = plain_table(f"Inputs{extremes.title}", *headings, left=(0, 2))
+    for column, name in enumerate(forces.inputs):
         _, unit, of = at_one.effort_name_and_unit(forces, name)
-        values = np.asarray(effort)
-        least, greatest = (_greatest_with_place(motion, sense * values) for sense in (-1.0, 1.0))
+        least, greatest = extremes.greatest(column, -1.0), extremes.greatest(column)
         mean, low, high = (
-            format_or_zero(of.from_si(each), of.from_si(most[forces.is_force_input(name)]))
-            for each in (_mean(motion, values), -least[0], greatest[0])
+            format_or_zero(of.from_si(value), of.from_si(largest[forces.is_force_input(name)]))
+            for value in (known_mean(forces, name), least.value, greatest.value)
         )
-        table.add_row(name, mean, unit, low, least[1], high, greatest[1])
+        table.add_row(name, mean, unit, low, least.place, high, greatest.place)
     return table
 
 
-def _mean(motion: Motion, values: Array) -> float:
-    """Over the time, or over the way of the input that runs, there and back: work by way where it does not turn."""
-    driver = running_pair(motion)
-    ways = motion.time if driver is None else motion.inputs[driver].position
-    steps = np.zeros(0) if ways is None else np.abs(np.diff(ways))
-    if not steps.any():
-        return float(values[0])
-    return float(np.sum(0.5 * (values[1:] + values[:-1]) * steps) / np.sum(steps))
+def effort_extremes(forces: Forces) -> RunExtremes:
+    """The extreme efforts of all inputs, a column each."""
+    moment, force = greatest_moment_and_force(forces)
+    scales = [LEAST_SCALE_RATIO * (force if forces.is_force_input(name) else moment) for name in forces.inputs]
+    return RunExtremes(forces, lambda found: np.stack([*found.inputs.values()], axis=-1), np.array(scales))
 
 
-def _greatest_with_place(motion: Motion, values: Array) -> tuple[float, str]:
-    """The greatest of the values that are determined, and where it is."""
-    if not np.isfinite(values).any():
-        return np.nan, ""
-    row = int(np.nanargmax(values))
-    return float(values[row]), position_cell(motion, row)
+def known_mean(forces: Forces, name: str) -> float:
+    """The mean effort of an input over a whole cycle of it; NaN where there is none."""
+    return np.nan if explain_no_cycle(forces, name) else mean_effort(forces, name)
+
+
+def _mean_remarks(forces: Forces) -> Iterator[str]:
+    """Of which inputs there is no mean effort, and why."""
+    reasons: dict[str, list[str]] = {}
+    for name in forces.inputs:
+        reason = explain_no_cycle(forces, name)
+        if reason:
+            reasons.setdefault(reason, []).append(name)
+    for reason, names in reasons.items():
+        yield f"no mean effort of {quote_names(names)}: {reason}"
 
 
 def _reactions_table(forces: Forces, motion: Motion) -> FittedTable:
     units, at, (moment, greatest) = (
         forces.mechanism.units,
         position_heading(motion),
-        at_one.greatest_moment_and_force(forces),
+        greatest_moment_and_force(forces),
     )
     force = (column_heading("greatest force", "force", units), column_heading("its direction", "angle", units), at)
     headings = ("pair", "on", "by", force, (column_heading("greatest couple", "torque", units), at))
-    table = plain_table("Reactions in the pairs, among these positions", *headings, left=(0, 1, 2), keys=3)
+    small = LEAST_SCALE_RATIO * moment, LEAST_SCALE_RATIO * greatest
+    scales = [
+        scale
+        for each in forces.reactions.values()
+        for scale in (
+            (small[1], small[1], small[1] ** 2, small[0]) if each.at is not None else small[:1] * len(each.couples)
+        )
+    ]
+    extremes = RunExtremes(forces, _reaction_columns, np.array(scales))
+    table = plain_table(f"Reactions in the pairs{extremes.title}", *headings, left=(0, 1, 2), keys=3)
+    column = 0
     for name, each in forces.reactions.items():
         first, second = each.links
         if each.at is not None:
-            sizes = np.hypot(*each.force.T)
-            most, where = _greatest_with_place(motion, sizes)
-            way = loads.polar_cells(each.force[int(np.nanargmax(sizes))], units, "force", greatest)[1] if where else ""
-            told = format_quantity(most, "force", units, greatest), way, where if way else ""
-            table.add_row(name, second, first, *told, *_greatest_couple(motion, each.couple, moment))
-        for link, couple in each.couples.items():
-            table.add_row(name, link, "", "-", "", "", *_greatest_couple(motion, couple, moment))
+            most = extremes.greatest(column + 2)
+            size = float(np.sqrt(most.value))
+            way = (
+                loads.polar_cells(most.columns[column : column + 2], units, "force", greatest)[1] if most.place else ""
+            )
+            cells = format_quantity(size, "force", units, greatest), way, most.place if way else ""
+            table.add_row(name, second, first, *cells, *_couple_cells(extremes, column + 3, forces, moment))
+            column += 4
+        for link in each.couples:
+            table.add_row(name, link, "", "-", "", "", *_couple_cells(extremes, column, forces, moment))
+            column += 1
     return table
 
 
-def _greatest_couple(motion: Motion, couple: Array | float, beside: float) -> tuple[str, str]:
-    """The greatest couple, whatever its sense, and where; nowhere if there is none."""
-    most, where = _greatest_with_place(motion, np.abs(np.asarray(couple)))
-    told = format_quantity(most, "torque", motion.mechanism.units, beside)
-    return told, "" if told == "0" else where
+def _reaction_columns(forces: Forces) -> Array:
+    """Of every pair the force, its square and the couple (n, 4), or the couples on its links (n, links)."""
+    columns: list[Array] = []
+    for each in forces.reactions.values():
+        if each.at is not None:
+            columns += [*each.force.T, np.sum(each.force**2, axis=-1), np.asarray(each.couple)]
+        columns += [np.asarray(couple) for couple in each.couples.values()]
+    return np.stack(columns, axis=-1)
+
+
+def _couple_cells(extremes: RunExtremes, column: int, forces: Forces, beside: float) -> tuple[str, str]:
+    """The greatest couple in either sense, and where; nowhere if there is none."""
+    most = extremes.greatest_size(column)
+    cell = format_quantity(most.value, "torque", forces.mechanism.units, beside)
+    return cell, "" if cell == "0" else most.place
 
 
 def _shaking_facts(forces: Forces, motion: Motion) -> Iterator[tuple[str, str]]:
     if not at_one.has_inertia(forces):
         return
+    name, measure = position_heading(motion).split(", ")
+    units, (moment, greatest) = motion.mechanism.units, greatest_moment_and_force(forces)
+    scales = np.array([(LEAST_SCALE_RATIO * greatest) ** 2, LEAST_SCALE_RATIO * moment])
+    extremes = RunExtremes(forces, _shaking_columns, scales)
+    most = extremes.greatest(0), extremes.greatest_size(1)
+    cells = []
+    for value, kind, beside, place in (
+        (np.sqrt(most[0].value), "force", greatest, most[0].place),
+        (most[1].value, "torque", moment, most[1].place),
+    ):
+        cell = format_quantity(float(value), kind, units, beside)
+        where = f" ({name} = {place} {measure})" if place and cell != "0" else ""
+        cells.append(f"up to {cell} {display_unit(kind, units)[0]}{where}")
+    yield "shaking", f"{cells[0]}, and {cells[1]} about the frame's origin{extremes.title}"
+
+
+def _shaking_columns(forces: Forces) -> Array:
+    """The square of the shaking force, and the shaking moment (n, 2)."""
     force, moment = forces.shaking
-    (name, measure), told = position_heading(motion).split(", "), []
-    sizes, most_of_all = (np.hypot(*force.T), np.abs(np.asarray(moment))), at_one.greatest_moment_and_force(forces)
-    units = motion.mechanism.units
-    for values, kind, beside in zip(sizes, ("force", "torque"), most_of_all[::-1], strict=True):
-        most, where = _greatest_with_place(motion, values)
-        unit = display_unit(kind, units)[0]
-        told.append(f"up to {format_quantity(most, kind, units, beside)} {unit} ({name} = {where} {measure})")
-    yield "shaking", f"{told[0]}, and {told[1]} about the frame's origin"
+    return np.stack([np.sum(force**2, axis=-1), np.asarray(moment)], axis=-1)
 
 
 def _undetermined_sentences(forces: Forces, position_count: int) -> Iterator[str]:
