@@ -119,12 +119,11 @@ def explain_no_cycle(forces: Forces, name: str) -> str:
     if not np.isfinite(torque).all():
         return UNKNOWN_TORQUE
     course = force_course(forces)
+    differs = abs(torque[-1] - torque[0]) > CYCLE_TOLERANCE * float(np.abs(torque).max())
     if course is None:
         return "the motion is known at its positions alone, and not between them"
-    differs = abs(torque[-1] - torque[0]) > CYCLE_TOLERANCE * float(np.abs(torque).max())
-    if differs and not course.has_step_at_ends:
-        return "the motion is no whole cycle: the torque does not end as it began"
-    return ""
+    is_open = differs and not course.has_step_at_ends
+    return "the motion is no whole cycle: the torque does not end as it began" if is_open else ""
 
 
 def _steady_speed(velocity: Array) -> float | None:

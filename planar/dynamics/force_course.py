@@ -58,7 +58,7 @@ class ForceCourse:
 
     @cached_property
     def least_scales(self) -> tuple[float, float]:
-        """Moments (N m) and forces (N) beside which the series of smaller ones are judged: these are rounding in part."""
+        """The moment (N m) and force (N) that are the least scales of series: smaller values are partly rounding."""
         moment, force = greatest_moment_and_force(self.forces)
         return LEAST_SCALE_RATIO * moment, LEAST_SCALE_RATIO * force
 

@@ -22,8 +22,8 @@ twice as long."""
 SHORTEST_PIECE_RATIO = 1e-12
 """Of the whole range: a piece that has not converged at this length contains a jump."""
 JOINT_TOLERANCE, JOINT_RATIO = 1e-9, 0.01
-"""Of the scale: two pieces meet that differ by less at their joint. Parts of the shorter piece on either side of a joint
-that contain a hidden jump: the outermost node is nearer to the end."""
+"""Two pieces meet that differ at their joint by less than this part of the scale. A hidden jump lies within this part
+of the shorter piece from the joint, because the outermost node is nearer to the end."""
 LONGEST_PIECE_RATIO = 1.0 / 6.0
 """Of the range: a longer piece could have features between its nodes."""
 MAX_ENCLOSURES = 40
@@ -38,7 +38,7 @@ _FIT = np.linalg.inv(chebyshev.chebvander(_NODES, NODE_COUNT - 1))
 
 
 class SeriesExtreme(NamedTuple):
-    """An extreme value of a column, its place, and the values of all columns there (columns,), on the side of its piece."""
+    """An extreme value of a column, its place, and all columns there (columns,), on the side of its piece."""
 
     place: float
     value: float
