@@ -18,7 +18,7 @@ from tests.command import ROOT, run
 
 STEPS = (90, 91, 1440)
 AMONG = "among these positions"
-ROUND_OFF = re.compile(r"exactly|round-off|digits|residual|of the energy that changes|positions?;|^\d+ positions")
+ROUND_OFF = re.compile(r"exactly|round-off|digits|residual|of the energy that changes|positions?;|^\d+ positions|steps")
 """Lines that say how well laws are kept, or how many positions there are: no results of the mechanism."""
 NUMBER = re.compile(r"(?<![\w.])[-−]?\d+(?:\.\d+)?(?:e[-+]\d+)?")
 SIXTH_DIGIT = 1.05e-5
@@ -32,6 +32,7 @@ COMMANDS: tuple[tuple[str, ...], ...] = (
     ("forces", "--cycle"),
     ("forces", "--cycle", "--fluctuation", "0.02"),
     ("forces", "--cycle", "--json", "--fluctuation", "0.02"),
+    ("forces", "--cycle", "--static", "--without-friction"),
     ("balance",),
 )
 """Commands over a motion that print results, without the model and the number of steps."""
@@ -45,28 +46,24 @@ def solved_lines(text: str) -> Iterator[str]:
 
 
 def _paragraphs(text: str) -> Iterator[list[str]]:
-    """Tables with their titles; else facts and sentences, each with the lines that it runs on to."""
+    """Tables with their titles, the line above a line of blanks and a rule; other lines one by one."""
     lines = text.splitlines()
-    table: list[str] = []
+    tables: dict[int, int] = {}
     for k, line in enumerate(lines):
-        is_title = k + 1 < len(lines) and bool(line.strip()) and lines[k + 1] != "" and not lines[k + 1].strip()
-        if is_title or (table and not _is_table_line(line, table)):
-            if table:
-                yield table
-            table = [line] if is_title else []
-            if is_title:
-                continue
-        if table:
-            table.append(line)
-        elif line.strip():
-            yield [line]
-    if table:
-        yield table
+        if line.strip() and not line.strip(" ─"):
+            first = max((i for i in range(k) if _is_blank(lines[i])), default=0) - 1
+            last = next((i for i in range(k, len(lines)) if _is_blank(lines[i])), len(lines))
+            tables[max(first, 0)] = last
+    k = 0
+    while k < len(lines):
+        stop = tables.get(k, k + 1)
+        if lines[k].strip():
+            yield [line for line in lines[k:stop] if line.strip(" ─")]
+        k = stop
 
 
-def _is_table_line(line: str, table: Sequence[str]) -> bool:
-    """Whether a line belongs to the table: a line of blanks ends it, but for that beneath its title."""
-    return len(table) == 1 or bool(table[-1].strip()) or len(table) == 2
+def _is_blank(line: str) -> bool:
+    return not line.strip()
 
 
 def differences(first: str, second: str) -> list[tuple[str, str]]:
@@ -96,7 +93,7 @@ def compare_steps(
 ) -> list[tuple[int, str, str]]:
     """What a command prints differently for a model with other numbers of steps than the first: (steps, line, line)."""
     command, *options = words
-    results = [run(folder, command, model, "--steps", str(count), *options) for count in steps]
+    results = [run(folder, command, model, "--steps", str(count), *options, COLUMNS="400") for count in steps]
     if any(each.status for each in results):
         return [(0, results[0].err, each.err) for each in results if each.status != results[0].status]
     return [
@@ -136,11 +133,12 @@ def check_models(models: Sequence[str], commands: Sequence[Sequence[str]] = COMM
             for words in commands:
                 try:
                     found = compare_steps(Path(folder), words, model)
-                except Exception as problem:  # noqa: BLE001 - the next model is asked all the same
+                except Exception as problem:
                     found = [(0, type(problem).__name__, str(problem)[:200])]
                 count += len(found)
                 for steps, before, after in found:
-                    print(f"{model}: {' '.join(words)}, {STEPS[0]} and {steps} steps\n  {before}\n  {after}", flush=True)
+                    title = f"{Path(model).stem}: {' '.join(words)}, {STEPS[0]} and {steps} steps"
+                    print(title, before, after, sep="\n  ", flush=True)
     return count
 
 

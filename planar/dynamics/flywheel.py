@@ -9,7 +9,7 @@ from math import isclose, pi
 import numpy as np
 
 from planar.document.first_argument import takes_result
-from planar.dynamics.force_course import force_course
+from planar.dynamics.force_course import force_course, has_unknown_intervals
 from planar.dynamics.forces import Forces
 from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput
@@ -116,13 +116,13 @@ def explain_no_cycle(forces: Forces, name: str) -> str:
         return "a flywheel turns; this input is a length"
     if not whole_turns(motion, name):
         return "the motion is no whole cycle: it does not end as it began after whole turns of this input"
-    if not np.isfinite(torque).all():
+    if has_unknown_intervals(torque):
         return UNKNOWN_TORQUE
     course = force_course(forces)
-    differs = abs(torque[-1] - torque[0]) > CYCLE_TOLERANCE * float(np.abs(torque).max())
     if course is None:
         return "the motion is known at its positions alone, and not between them"
-    is_open = differs and not course.has_step_at_ends
+    largest = max(float(np.nanmax(np.abs(torque))), course.effort_scale(name))
+    is_open = abs(torque[-1] - torque[0]) > CYCLE_TOLERANCE * largest and not course.has_step_at_ends
     return "the motion is no whole cycle: the torque does not end as it began" if is_open else ""
 
 

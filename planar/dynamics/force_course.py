@@ -17,6 +17,8 @@ from planar.solving.runs.continuous_run import ContinuousRun
 
 TURN_TOLERANCE = 1e-9
 """rad: what rounding leaves of a turn that the places of a load span."""
+STEP_SIDE_RATIO = 1e-9
+"""Of a run: how far from a step its two sides are shown."""
 LEAST_SCALE_RATIO = 1e-3
 """Of the greatest force or moment: smaller ones have errors of rounding of the greatest."""
 
@@ -40,16 +42,27 @@ class ForceCourse:
             self._known[key] = forces(motion, self.forces.with_inertia, self.forces.with_friction)
         return self._known[key]
 
+    def with_steps(self) -> Forces:
+        """The forces at the positions of the motion, and on both sides of each place where they may step or bend."""
+        inside, room = np.array(self.ends[1:-1]), STEP_SIDE_RATIO * (self.run.high - self.run.low)
+        sides = np.concatenate([inside - room, inside + room, [self.run.high - room] * self.has_step_at_ends])
+        if not len(sides):
+            return self.forces
+        rows = self.run.rows
+        if len(inside):
+            rows = rows[np.abs(np.subtract.outer(rows, inside)).min(axis=1) > room]
+        return self.forces_at(np.sort(np.concatenate([rows, sides])))
+
     def series(self, measure: Callable[[Forces], Array], least_scale: Array | float = 0.0) -> PiecewiseSeries | None:
         """The series of what is measured of forces at n places, (n,) or (n, columns); see `fit_series`.
 
-        None where it has none, or not over the whole motion.
+        None where it has none, not over the whole motion, or where a column grows without bound.
         """
         try:
             found = fit_series(lambda places: measure(self.forces_at(places)), self.ends, least_scale)
         except NoAnswer:
             return None
-        return None if found is None or found.has_gaps else found
+        return None if found is None or found.has_gaps or found.has_poles else found
 
     def positions(self, places: Sequence[float] | Array) -> Array:
         """Where places are, as tables say it: the time (s) of a run in time, else the running input (rad or m)."""
@@ -110,6 +123,12 @@ class ForceCourse:
         for given in self.run.motion.mechanism.inputs:
             if given.motor is not None and self.run.motion.time is not None:
                 yield from self.run.speed_crossings(given.pair, given.motor.speeds).tolist()
+
+
+def has_unknown_intervals(values: Array) -> bool:
+    """Whether values (n,) are unknown at two positions in a row, and not at isolated ones such as change points."""
+    is_unknown = ~np.isfinite(values)
+    return bool((is_unknown[1:] & is_unknown[:-1]).any() or is_unknown.all())
 
 
 def force_course(forces: Forces) -> ForceCourse | None:

@@ -27,6 +27,10 @@ of the shorter piece from the joint, because the outermost node is nearer to the
 LONGEST_PIECE_RATIO = 1.0 / 6.0
 """Of the range: a longer piece could have features between its nodes."""
 MAX_ENCLOSURES = 40
+POLE_PIECE_RATIO, POLE_GROWTH = 1e-7, 1e3
+"""Near a pole pieces are shorter than this part of the range, and values greater by this factor than on long pieces."""
+LONG_PIECE_RATIO = 1e-3
+"""Of the range: a longer piece is far from a pole."""
 MAX_PIECES_AT_ONCE = 1000
 """Pieces in one generation of halving; a function that needs more has no series."""
 TIE_TOLERANCE = 1e-9
@@ -89,7 +93,9 @@ class SeriesPiece(NamedTuple):
 
 
 class PiecewiseSeries(NamedTuple):
-    """A function (places) -> (columns) on smooth pieces in their order, and its greatest absolute values (columns,).
+    """A function (places) -> (columns) on smooth pieces in their order.
+
+    `scale` (columns,) are its greatest absolute values, or `least_scale` where that is greater, see `fit_series`.
 
     Between two pieces the function may jump. A gap between them, longer than rounding, is a part of the range where
     the function has no finite values.
@@ -99,6 +105,7 @@ class PiecewiseSeries(NamedTuple):
     low: float
     high: float
     scale: Array
+    least_scale: Array
 
     @property
     def has_gaps(self) -> bool:
@@ -108,6 +115,17 @@ class PiecewiseSeries(NamedTuple):
         known = sum(piece.high - piece.low for piece in self.pieces)
         jumps = 1e3 * SHORTEST_PIECE_RATIO * (len(self.pieces) + 1)
         return bool(known < (self.high - self.low) * (1.0 - jumps))
+
+    @property
+    def has_poles(self) -> bool:
+        """Whether a column grows without bound towards a place, so that pieces about it become very short."""
+        lengths = np.array([piece.high - piece.low for piece in self.pieces])
+        if lengths.min() > POLE_PIECE_RATIO * (self.high - self.low):
+            return False
+        length = min(LONG_PIECE_RATIO * (self.high - self.low), float(lengths.max()))
+        long = [piece for piece in self.pieces if piece.high - piece.low >= length]
+        typical = np.max([np.abs(piece.coefficients).sum(axis=0) for piece in long], axis=0)
+        return bool((self.scale > POLE_GROWTH * np.maximum(typical, self.least_scale)).any())
 
     def integral(self, column: int = 0) -> float:
         """The integral of a column over the range."""
@@ -207,7 +225,9 @@ def fit_series(
         pieces = fit.open_joints(known)
         if not pieces:
             break
-    return PiecewiseSeries(tuple(fit.pieces), fit.low, fit.high, fit.scale)
+    return PiecewiseSeries(
+        tuple(fit.pieces), fit.low, fit.high, fit.scale, np.broadcast_to(least_scale, fit.scale.shape)
+    )
 
 
 class _OpenPiece(NamedTuple):

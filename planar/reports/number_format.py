@@ -19,6 +19,9 @@ ROUND_OFF_THRESHOLD = 1e-10
 ROUNDING_RATIO = 1e-12
 """What is less than this part of what it is told beside is printed as 0."""
 
+AMONG_POSITIONS = ", among these positions"
+"""Said of extreme values and means that are read off the positions of a run, and not solved for between them."""
+
 
 def paragraphs(rows: Iterable[tuple[str, str]]) -> Table:
     """Paragraphs with what they are about before them."""

@@ -10,7 +10,7 @@ import numpy as np
 from planar.analysis.cams.cam_profile import cams_with_profiles
 from planar.document.first_argument import takes_result
 from planar.dynamics.external_actions import KinematicArrays
-from planar.dynamics.force_course import force_course
+from planar.dynamics.force_course import force_course, has_unknown_intervals
 from planar.dynamics.forces import Forces
 from planar.foundation.arrays import Array
 from planar.foundation.short_repr import short_repr
@@ -76,7 +76,7 @@ def _contact_force(forces: Forces, pair: ProfiledPair) -> ContactForce:
         return contact._replace(least=float(contact.force[0]))
     course = force_course(forces)
     series = None
-    if course is not None and np.isfinite(contact.force).all():
+    if course is not None and not has_unknown_intervals(contact.force):
         series = course.series(lambda found: _contact_at_rows(found, pair).force, course.least_scales[1])
     if course is None or series is None:
         return contact._replace(

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from typing import NamedTuple
 
 import numpy as np
 
 from planar.foundation.arrays import Array, BoolArray, IntArray
+from planar.foundation.errors import NoAnswer
 from planar.foundation.jets import value_and_rates
 from planar.model.pairs import MeasureKind
 from planar.results.motion import Motion
+from planar.results.records import Limit
 from planar.solving.continuation.fast_path import FastSamples
 from planar.solving.continuation.path import follow_samples
 from planar.solving.position import PositionSolver, solved_mechanism
@@ -41,8 +44,9 @@ class ContinuousRun:
             np.concatenate([[0.0], np.cumsum(np.abs(steps))]) if motion.time is None else np.asarray(motion.time)
         )
         self.turning_rows: IntArray = np.flatnonzero(steps[1:] * steps[:-1] < 0.0) + 1
-        self.z = run_unknowns(self.solver, motion)
         course = motion.course
+        kept = None if course is None else course.unknowns
+        self.z = run_unknowns(self.solver, motion) if kept is None else kept[: len(motion)]
         singular = [] if course is None else [row for row in course.singular_rows if row < len(motion)]
         self._is_sound: BoolArray = rows_with_rates(motion)
         self._is_sound[singular] = False
@@ -94,7 +98,11 @@ class ContinuousRun:
             first += len(part.z)
         run = RunSamples(z, self._input_rates(places), branch_rates=local, fast_samples=fast)
         time = None if self.motion.time is None else places
-        return build_motion(self.solver, self.assembly, run, False, self.motion.course, time)
+        path = _PathAtPlaces(frozenset(local), z, self.motion)
+        motion = build_motion(self.solver, self.assembly, run, False, path, time)
+        if len(motion) < len(places):  # a pair that may stay open does so by too much
+            raise NoAnswer(motion.outcome, motion.reason)
+        return motion
 
     def breaks(self) -> Array:
         """Places inside the run at which the file says that something may bend or jump, and forks of the path."""
@@ -228,6 +236,23 @@ class ContinuousRun:
             fast = FastSamples(fast.coordinate_rates[wanted], fast.is_sure[wanted], fast.residual)
         rates = InputRates(*(part[wanted] for part in given))
         return RunSamples(found.z[wanted], rates, branch_rates=local, fast_samples=fast)
+
+
+class _PathAtPlaces(NamedTuple):
+    """The path of a motion at chosen places of another one; see `FollowedPath`."""
+
+    singular_rows: frozenset[int]
+    unknowns: Array
+    source: Motion
+
+    @property
+    def fork_positions(self) -> tuple[float, ...]:
+        """See `FollowedPath.fork_positions`."""
+        return () if self.source.course is None else self.source.course.fork_positions
+
+    def limits(self, motion: Motion) -> tuple[Limit, ...]:
+        """See `Motion.limits`."""
+        return () if self.source.course is None else self.source.course.limits(self.source)
 
 
 def _input_scale(solver: PositionSolver, name: str) -> float:

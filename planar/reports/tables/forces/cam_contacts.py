@@ -14,8 +14,8 @@ from planar.foundation.arrays import Array
 from planar.model.wording import amount, join_all_names
 from planar.reports.columns import ReportedSeries
 from planar.reports.fitted_table import FittedTable, plain_table
-from planar.reports.number_format import column_heading, format_quantity
-from planar.reports.tables.forces.run_extremes import AMONG_POSITIONS, RunExtremes
+from planar.reports.number_format import AMONG_POSITIONS, column_heading, format_quantity
+from planar.reports.tables.forces.run_extremes import RunExtremes
 from planar.reports.tables.motion import place_cell, position_heading
 from planar.results.motion import Motion
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from planar.analysis.efforts.self_locking import LockedInterval, jamming, self_locking
-from planar.dynamics.force_course import LEAST_SCALE_RATIO, force_course
+from planar.dynamics.force_course import LEAST_SCALE_RATIO, force_course, has_unknown_intervals
 from planar.dynamics.forces import Forces, PairFriction
 from planar.dynamics.friction.holding import Holding, holding
 from planar.foundation.arrays import Array
@@ -98,9 +98,10 @@ def mean_efficiency(forces: Forces) -> float | None:
     None where friction is unknown at a position, or the motion between its positions.
     """
     course = force_course(forces)
-    if course is None or not np.isfinite(_powers(forces)).all():
+    powers = _powers(forces)
+    if course is None or any(has_unknown_intervals(column) for column in powers.T):
         return None
-    series = course.series(_powers, LEAST_SCALE_RATIO * float(np.abs(_powers(forces)).max()))
+    series = course.series(_powers, LEAST_SCALE_RATIO * float(np.nanmax(np.abs(powers))))
     if series is None:
         return None
     lost, *supplied = (series.integral(k) if k == 0 else series.positive_integral(k) for k in range(len(series.scale)))

@@ -14,8 +14,7 @@ from planar.model.file_units import display_unit
 from planar.model.mechanism import relative_motions
 from planar.model.wording import amount, join_all_names
 from planar.reports.fitted_table import FittedTable, plain_table
-from planar.reports.number_format import column_heading, format_number, format_quantity, quantity_text
-from planar.reports.tables.forces.run_extremes import AMONG_POSITIONS
+from planar.reports.number_format import AMONG_POSITIONS, column_heading, format_number, format_quantity, quantity_text
 from planar.results.motion import Motion
 
 

@@ -7,13 +7,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.dynamics.force_course import force_course
+from planar.dynamics.force_course import force_course, has_unknown_intervals
 from planar.dynamics.forces import Forces
 from planar.foundation.arrays import Array
+from planar.reports.number_format import AMONG_POSITIONS
 from planar.reports.tables.motion import place_cell
 from planar.results.motion import Motion
-
-AMONG_POSITIONS = ", among these positions"
 
 
 class RunExtreme(NamedTuple):
@@ -36,7 +35,8 @@ class RunExtremes:
         assert isinstance(motion, Motion)
         self.motion = motion
         self.rows = np.asarray(measure(forces), dtype=float).reshape(len(motion), -1)
-        known, is_finite = np.isfinite(self.rows).any(axis=0), np.isfinite(self.rows).all(axis=0)
+        known = np.isfinite(self.rows).any(axis=0)
+        is_finite = np.array([not has_unknown_intervals(column) for column in self.rows.T])
         self.course = force_course(forces)
         self.series = None
         self._solved_columns = np.flatnonzero(is_finite).tolist()
