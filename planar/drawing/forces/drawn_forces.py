@@ -74,13 +74,21 @@ class ForceRun(NamedTuple):
         """A place on the axis: at 120 deg."""
         return f"at {format_number(value, 4)} {self.unit}"
 
-    def solved_extremes(self, measure: Callable[[Forces], Array]) -> tuple[tuple[float, float], ...] | None:
+    @property
+    def least_scales(self) -> tuple[float, float]:
+        """See `ForceCourse.least_scales`."""
+        course = force_course(self.forces)
+        return (0.0, 0.0) if course is None else course.least_scales
+
+    def solved_extremes(
+        self, measure: Callable[[Forces], Array], least_scale: float
+    ) -> tuple[tuple[float, float], ...] | None:
         """The greatest and the least value of what is measured of forces (n,), each as (abscissa, value).
 
-        Solved for between the positions; None where the motion is known at these alone.
+        Solved for between the positions; None where the motion is known at these alone. See `fit_series`.
         """
         course = force_course(self.forces)
-        series = None if course is None else course.series(measure, max(course.least_scales))
+        series = None if course is None else course.series(measure, least_scale)
         if course is None or series is None:
             return None
         found = []
@@ -92,11 +100,12 @@ class ForceRun(NamedTuple):
         return tuple(found)
 
 
-def forces_over_cycle(source: Forces | Motion | Mechanism) -> ForceRun:
+def forces_over_cycle(source: Forces | Motion | Mechanism, with_steps: bool = True) -> ForceRun:
     """Forces as they are given, or those over a whole cycle at the input's steady speed.
 
-    Without a speed in the file inertia is left out. Raises BadInput for the forces of one position, for a mechanism on
-    which nothing acts, and what `planar.cycle` and `planar.forces` raise.
+    `with_steps` adds positions on both sides of each place where a force may step or bend. If the file gives no speed,
+    inertia is left out. Raises BadInput for the forces of one position, for a mechanism on which nothing acts, and what
+    `planar.cycle` and `planar.forces` raise.
     """
     require_loads(source if isinstance(source, Mechanism) else source.mechanism)
     notes = []
@@ -110,7 +119,7 @@ def forces_over_cycle(source: Forces | Motion | Mechanism) -> ForceRun:
         if not run.has_speed and run.motion.mechanism.masses:
             notes.append("without inertia: the file gives no speed of the input")
     course = force_course(found)
-    if course is not None:
+    if course is not None and with_steps:
         found = course.with_steps()
     motion = found.moving
     if not isinstance(motion, Motion):

@@ -95,7 +95,7 @@ def torque_picture(  # long: one part of the diagram after the other
 
 def _effort_extremes(drawn: ForceRun, name: str, effort: Array) -> tuple[tuple[float, float], ...]:
     """The greatest and the least effort, each with its place on the axis: solved for, else of the positions."""
-    solved = drawn.solved_extremes(lambda forces: np.asarray(forces.inputs[name]))
+    solved = drawn.solved_extremes(lambda forces: np.asarray(forces.inputs[name]), max(drawn.least_scales))
     if solved is not None:
         return solved
     rows = int(np.nanargmax(effort)), int(np.nanargmin(effort))
