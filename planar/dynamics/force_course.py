@@ -62,7 +62,7 @@ class ForceCourse:
             found = fit_series(lambda places: measure(self.forces_at(places)), self.ends, least_scale)
         except NoAnswer:
             return None
-        return None if found is None or found.has_gaps or found.has_poles else found
+        return None if found is None or found.has_gaps else found
 
     def positions(self, places: Sequence[float] | Array) -> Array:
         """Where places are, as tables say it: the time (s) of a run in time, else the running input (rad or m)."""

@@ -27,9 +27,9 @@ of the shorter piece from the joint, because the outermost node is nearer to the
 LONGEST_PIECE_RATIO = 1.0 / 6.0
 """Of the range: a longer piece could have features between its nodes."""
 MAX_ENCLOSURES = 40
-POLE_PIECE_RATIO, POLE_GROWTH = 1e-7, 1e3
+POLE_PIECE_RATIO, POLE_GROWTH = 1e-4, 100.0
 """Near a pole pieces are shorter than this part of the range, and values greater by this factor than on long pieces."""
-LONG_PIECE_RATIO = 1e-3
+LONG_PIECE_RATIO = 1e-2
 """Of the range: a longer piece is far from a pole."""
 MAX_PIECES_AT_ONCE = 1000
 """Pieces in one generation of halving; a function that needs more has no series."""
@@ -105,7 +105,6 @@ class PiecewiseSeries(NamedTuple):
     low: float
     high: float
     scale: Array
-    least_scale: Array
 
     @property
     def has_gaps(self) -> bool:
@@ -115,17 +114,6 @@ class PiecewiseSeries(NamedTuple):
         known = sum(piece.high - piece.low for piece in self.pieces)
         jumps = 1e3 * SHORTEST_PIECE_RATIO * (len(self.pieces) + 1)
         return bool(known < (self.high - self.low) * (1.0 - jumps))
-
-    @property
-    def has_poles(self) -> bool:
-        """Whether a column grows without bound towards a place, so that pieces about it become very short."""
-        lengths = np.array([piece.high - piece.low for piece in self.pieces])
-        if lengths.min() > POLE_PIECE_RATIO * (self.high - self.low):
-            return False
-        length = min(LONG_PIECE_RATIO * (self.high - self.low), float(lengths.max()))
-        long = [piece for piece in self.pieces if piece.high - piece.low >= length]
-        typical = np.max([np.abs(piece.coefficients).sum(axis=0) for piece in long], axis=0)
-        return bool((self.scale > POLE_GROWTH * np.maximum(typical, self.least_scale)).any())
 
     def integral(self, column: int = 0) -> float:
         """The integral of a column over the range."""
@@ -210,7 +198,7 @@ def fit_series(
     do not name is enclosed more and more closely (Z. Battles and L. N. Trefethen, An extension of MATLAB to continuous
     functions and operators, SIAM J. Sci. Comput. 25, 2004; R. Pachón, R. B. Platte and L. N. Trefethen,
     Piecewise-smooth chebfuns, IMA J. Numer. Anal. 30, 2010). Parts without finite values are gaps. None where too many
-    pieces do not converge.
+    pieces do not converge, or where a column grows without bound.
     """
     fit = _Fit(function, (float(ends[0]), float(ends[-1])), least_scale)
     longest = LONGEST_PIECE_RATIO * (fit.high - fit.low)
@@ -225,9 +213,7 @@ def fit_series(
         pieces = fit.open_joints(known)
         if not pieces:
             break
-    return PiecewiseSeries(
-        tuple(fit.pieces), fit.low, fit.high, fit.scale, np.broadcast_to(least_scale, fit.scale.shape)
-    )
+    return PiecewiseSeries(tuple(fit.pieces), fit.low, fit.high, fit.scale)
 
 
 class _OpenPiece(NamedTuple):
@@ -245,12 +231,13 @@ class _Fit:
         self.function, (self.low, self.high) = function, ends
         self.shortest = SHORTEST_PIECE_RATIO * (self.high - self.low)
         self.pieces: list[SeriesPiece] = []
-        self.scale: Array = np.atleast_1d(np.asarray(least_scale, dtype=float))
+        self.least_scale: Array = np.atleast_1d(np.asarray(least_scale, dtype=float))
+        self.scale: Array = self.least_scale
 
     def add(self, pieces: list[_OpenPiece]) -> bool:
-        """Fit pieces, halved until they converge; False where they are too many."""
+        """Fit pieces, halved until they converge; False where they are too many, or about a pole."""
         while pieces:
-            if len(pieces) > MAX_PIECES_AT_ONCE:
+            if len(pieces) > MAX_PIECES_AT_ONCE or self._has_pole(pieces):
                 return False
             nodes = np.array([piece.low + 0.5 * (1.0 + _NODES) * (piece.high - piece.low) for piece in pieces])
             values = np.asarray(self.function(nodes.ravel()), dtype=float).reshape(*nodes.shape, -1)
@@ -260,6 +247,16 @@ class _Fit:
             pieces = [half for row in rows for half in self._fit_or_halve(*row)]
         self.pieces.sort(key=lambda piece: piece.low)
         return True
+
+    def _has_pole(self, pieces: list[_OpenPiece]) -> bool:
+        """Whether a column has grown by much on its way to very short pieces."""
+        span = self.high - self.low
+        if min(piece.high - piece.low for piece in pieces) > POLE_PIECE_RATIO * span:
+            return False
+        long = [piece for piece in self.pieces if piece.high - piece.low >= LONG_PIECE_RATIO * span]
+        sizes = [np.abs(piece.coefficients).sum(axis=0) for piece in long]
+        typical = np.max([*sizes, np.broadcast_to(self.least_scale, self.scale.shape)], axis=0)
+        return bool(long) and bool((self.scale > POLE_GROWTH * typical).any())
 
     def _fit_or_halve(self, piece: _OpenPiece, values: Array, is_finite: BoolArray) -> Iterator[_OpenPiece]:
         low, high, parent_error = piece

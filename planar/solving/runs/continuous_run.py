@@ -23,6 +23,8 @@ from planar.solving.runs.time_run import input_law_rates
 PLACE_TOLERANCE = 1e-12
 """Of a run: places nearer to each other are one."""
 MAX_ROOT_STEPS = 60
+LONGEST_GAP = 16.0
+"""Steps of a run: places that are farther apart are not followed from one to the other."""
 
 
 class ContinuousRun:
@@ -78,7 +80,7 @@ class ContinuousRun:
         order = np.argsort(places, kind="stable")
         back = np.argsort(order, kind="stable")
         targets = places[order]
-        parts = [self._follow(part) for part in self._between_forks(targets) if len(part)]
+        parts = [self._follow(part) for part in self._divided(targets) if len(part)]
         samples = [part.fast_samples for part in parts]
         fast = (
             FastSamples(
@@ -209,10 +211,12 @@ class ContinuousRun:
         u1, u2 = (np.array([getattr(each, rate)[along] for each in given]) for rate in ("velocity", "acceleration"))
         return InputRates(*(part.T / self.scale for part in (u, u1, u2, np.zeros_like(u1))))
 
-    def _between_forks(self, targets: Array) -> list[Array]:
-        """Sorted places, divided where the path does not go on smoothly."""
+    def _divided(self, targets: Array) -> list[Array]:
+        """Sorted places, divided where the path does not go on smoothly, and where no others are near."""
         seams = np.sort([*self.forks.tolist(), *self.rows[~rows_with_rates(self.motion)].tolist()])
-        return np.split(targets, np.searchsorted(targets, seams))
+        spacing = (self.high - self.low) / (len(self.rows) - 1)
+        gaps = np.flatnonzero(np.diff(targets) > LONGEST_GAP * spacing) + 1
+        return np.split(targets, np.unique([*np.searchsorted(targets, seams), *gaps]).astype(int))
 
     def _follow(self, targets: Array) -> RunSamples:
         """The unknowns at sorted places, followed over the rows between them from the nearest sound row."""

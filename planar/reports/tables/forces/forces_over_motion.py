@@ -257,7 +257,9 @@ def run_facts(
         *forces.moving.remarks,
     ]
     duties = motors.motor_duties(forces)
-    told = {"motors": motors.record(duties)} if duties else {}
+    means = {name: known_mean(forces, name) for name in forces.inputs}
+    told: dict[str, Any] = {"mean_effort": {name: None if np.isnan(mean) else mean for name, mean in means.items()}}
+    told |= {"motors": motors.record(duties)} if duties else {}
     told |= {} if wanted is None else {"flywheel": flywheels.record(wanted)}
     told |= {} if unknown is None else {"solved_for": unknown_loads.record(unknown)}
     told |= friction.motion_record(forces) | cam_contacts.record(forces)
