@@ -19,7 +19,8 @@ from tests.command import ROOT, run
 STEPS = (90, 91, 1440)
 AMONG = "among these positions"
 ROUND_OFF = re.compile(
-    r"exactly|round-off|digits|residual|energy that changes|positions?;|^\d+ positions|steps|rows? without|of \d+ positions"
+    r"exactly|round-off|digits|residual|energy that changes|positions?;|^\d+ positions|steps|rows? without"
+    r"|of \d+ positions|balances as a free body|all powers add up"
 )
 """Lines that say how well laws are kept, or how many positions there are: no results of the mechanism."""
 NUMBER = re.compile(r"(?<![\w.])[-−]?\d+(?:\.\d+)?(?:e[-+]\d+)?")

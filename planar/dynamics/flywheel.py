@@ -9,7 +9,7 @@ from math import isclose, pi
 import numpy as np
 
 from planar.document.first_argument import takes_result
-from planar.dynamics.force_course import force_course, has_unknown_intervals
+from planar.dynamics.force_course import ForceCourse, force_course, has_unknown_intervals
 from planar.dynamics.forces import Forces
 from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput
@@ -121,7 +121,16 @@ def explain_no_cycle(forces: Forces, name: str) -> str:
     course = force_course(forces)
     if course is None:
         return "the motion is known at its positions alone, and not between them"
+    return _explain_open_end(course, name)
+
+
+def _explain_open_end(course: ForceCourse, name: str) -> str:
+    """Why the end of a motion is not its start, by the speed and the effort of an input; empty where it is."""
+    motion, torque = course.run.motion, np.asarray(course.forces.inputs[name])
+    speed = motion.inputs[name].velocity
     largest = max(float(np.nanmax(np.abs(torque))), course.effort_scale(name))
+    if abs(speed[-1] - speed[0]) > CYCLE_TOLERANCE * float(np.abs(speed).max()):
+        return "the motion is no whole cycle: the speed does not end as it began"
     is_open = abs(torque[-1] - torque[0]) > CYCLE_TOLERANCE * largest and not course.has_step_at_ends
     return "the motion is no whole cycle: the torque does not end as it began" if is_open else ""
 

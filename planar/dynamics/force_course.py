@@ -87,8 +87,10 @@ class ForceCourse:
 
     @property
     def has_step_at_ends(self) -> bool:
-        """Whether the places of a load include the first or the last place, where it may have a step."""
+        """Whether a load or a law of an input may have a step at the first or the last place."""
         motion = self.run.motion
+        if motion.time is not None and any(given.law is not None for given in motion.mechanism.inputs):
+            return True
         for load in motion.mechanism.loads:
             if load.varies is None:
                 continue

@@ -152,7 +152,10 @@ class PiecewiseSeries(NamedTuple):
         """The intervals in which a column is below a value; their ends are crossings or ends of the range."""
         start: float | None = None
         end = self.low
-        shortest, below = TIE_TOLERANCE * (self.high - self.low), level - TIE_TOLERANCE * float(self.scale[column])
+        shortest, below = (
+            SHORTEST_PIECE_RATIO * (self.high - self.low),
+            level - TIE_TOLERANCE * float(self.scale[column]),
+        )
         for piece in self.pieces:
             ends = np.concatenate([[piece.low], piece.level_roots(column, level), [piece.high]])
             for low, high in pairwise(ends.tolist()):
