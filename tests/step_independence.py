@@ -8,6 +8,7 @@ of steps. Run by hand over all models and commands:
 
 from __future__ import annotations
 
+import json
 import re
 import sys
 from collections.abc import Iterator, Sequence
@@ -102,28 +103,26 @@ def compare_steps(
     return [
         (count, *lines)
         for count, result in zip(steps[1:], results[1:], strict=True)
-        for lines in differences(_facts(results[0].out), _facts(result.out))
+        for lines in differences(_facts(results[0].out, min(steps)), _facts(result.out, min(steps)))
     ]
 
 
-def _facts(text: str) -> str:
-    """Of JSON its facts, a line each, without the values at every position."""
+def _facts(text: str, row_count: int) -> str:
+    """The facts of JSON, a line each, without lists of so many values, which are those of positions."""
     if not text.startswith("{"):
         return text
-    import json
-
-    return "\n".join(_json_lines("", json.loads(text)))
+    return "\n".join(_json_lines("", json.loads(text), row_count))
 
 
-def _json_lines(place: str, value: object) -> Iterator[str]:
+def _json_lines(place: str, value: object, row_count: int) -> Iterator[str]:
     if isinstance(value, dict):
         for key, part in value.items():
             if key not in ("proof", "residual", "remarks", "rows"):
-                yield from _json_lines(f"{place}.{key}", part)
+                yield from _json_lines(f"{place}.{key}", part, row_count)
     elif isinstance(value, list):
-        if len(value) < min(STEPS):
+        if len(value) < row_count:
             for k, part in enumerate(value):
-                yield from _json_lines(f"{place}[{k}]", part)
+                yield from _json_lines(f"{place}[{k}]", part, row_count)
     else:
         yield f"{place} {value}"
 

@@ -2,6 +2,8 @@
 
 import pytest
 
+import planar
+from planar.reports.tables.forces.friction import mean_efficiency
 from tests.command import run
 from tests.step_independence import AMONG, compare_steps, differences, solved_lines
 
@@ -15,12 +17,17 @@ FORCES = ("forces", "--cycle")
         ("motor-press", (*FORCES, "--fluctuation", "0.02", "--json")),
         ("motor-press", FORCES),
         ("cam-with-spring", FORCES),
-        ("toggle-clamp", FORCES),
         ("geneva-wheel", ("cycle",)),
     ],
 )
 def test_printed_numbers_do_not_depend_on_the_steps(tmp_path, model, words):
     assert compare_steps(tmp_path, words, model, (45, 46)) == []
+
+
+def test_the_efficiency_over_a_motion_does_not_depend_on_the_steps():
+    """Of a clamp whose guide bears now on this side, now on that, so that its friction steps between positions."""
+    first, second = (mean_efficiency(planar.forces(planar.cycle("toggle-clamp", steps))) for steps in (24, 31))
+    assert first == pytest.approx(second, rel=1e-8)
 
 
 def test_what_is_read_off_positions_is_not_asked_for(tmp_path):
