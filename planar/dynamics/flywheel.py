@@ -162,9 +162,8 @@ class _EffortOverCycle:
         if series is None:
             raise BadInput(name, UNKNOWN_TORQUE)
         self.series = series
-        self.start, stop = (float(each) for each in self._angles([course.run.low, course.run.high]))
-        self.direction = 1.0 if stop > self.start else -1.0
-        mean = series.integral(0) / (stop - self.start)
+        self.start, self.stop = (float(each) for each in self._angles([course.run.low, course.run.high]))
+        mean = series.integral(0) / (self.stop - self.start)
         self.mean = 0.0 if abs(mean) <= ZERO_MEAN_TOLERANCE * float(series.scale[1]) else mean
 
     def stored_energy(self) -> tuple[Array, Array]:
@@ -174,7 +173,8 @@ class _EffortOverCycle:
         places = np.concatenate([[self.course.run.low], crossings])
         angles = self._angles(places)
         energy: Array = self.mean * (angles - self.start) - self.series.running_integral(places, 0)
-        return angles, energy
+        rounding = ZERO_MEAN_TOLERANCE * float(self.series.scale[1]) * abs(self.stop - self.start)
+        return angles, energy if np.ptp(energy) > rounding else np.zeros_like(energy)
 
     def _power_and_torque(self, forces: Forces) -> Array:
         """The torque times the rate of the angle along the run, and the torque (n, 2)."""
