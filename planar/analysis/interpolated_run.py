@@ -17,6 +17,7 @@ from planar.model.pairs import MeasureKind
 from planar.results.motion import Motion, State
 from planar.solving.continuation.path import follow_samples
 from planar.solving.position import PositionSolver
+from planar.solving.runs.continuous_run import rows_with_rates, run_unknowns
 
 CLOSED_TOLERANCE = 1e-9
 """rad, or part of the size: a motion that comes so near to where it started is closed."""
@@ -46,9 +47,9 @@ class InterpolatedRun:
         )
         self.positions: Array = motion.inputs[self.pair].position
         self.lowest, self.highest = float(self.positions.min()), float(self.positions.max())
-        self.z = self._unknowns(motion)
+        self.z = run_unknowns(self.solver, motion)
         self.samples = self._samples_at_rate(motion, given.velocity, given.acceleration)
-        self.has_rates = self._find_rates()
+        self.has_rates = rows_with_rates(self.samples)
         course = motion.course
         self._singular = np.zeros(len(self.positions), dtype=bool)
         self._singular[[row for row in course.singular_rows if row < len(motion)] if course is not None else []] = True
@@ -139,29 +140,6 @@ class InterpolatedRun:
 
     def _solver_at(self, position: float) -> PositionSolver:
         return self.solver.with_inputs_of(replace_inputs(self.mechanism, (Drive(self.pair, position),)))
-
-    def _find_rates(self) -> BoolArray:
-        """Which samples have rates (samples,)."""
-        jets = [each for f in self.samples.frames.values() if not f.fixed for each in (f.x, f.y, f.angle)]
-        jets += [jet for own in self.samples.own.values() for jet in own]
-        parts = [np.broadcast_to(part, len(self.positions)) for jet in jets for part in jet.parts]
-        if not parts:
-            return np.ones(len(self.positions), dtype=bool)
-        return np.asarray(np.isfinite(parts).all(axis=0))
-
-    def _unknowns(self, motion: Motion) -> Array:
-        """The unknowns at every sample (samples, unknowns), from the frames."""
-        solver, many = self.solver, len(motion)
-        values: dict[tuple[str, str], Array] = {}
-        for link, frame in motion.frames.items():
-            if not frame.fixed:
-                values |= {(link, part): getattr(frame, part).parts[0] for part in ("x", "y", "angle")}
-        for name, own in motion.own.items():
-            parts = solver.pairs[name].coordinate_kinds
-            values |= {(name, part): jet.parts[0] for (part, _), jet in zip(parts, own, strict=True)}
-        coordinates = solver.equations.coordinates
-        w = np.array([np.broadcast_to(values[c.owner, c.part], many) for c in coordinates]).reshape(-1, many)
-        return (w / solver.scale[:, None])[list(solver.equations.unknowns)].T
 
     def _samples_at_rate(self, motion: Motion, velocity: float, acceleration: float) -> Motion:
         """The samples at the steady rate."""

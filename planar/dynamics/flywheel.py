@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import isclose, pi
 
 import numpy as np
 
 from planar.document.first_argument import takes_result
+from planar.dynamics.force_course import ForceCourse, force_course, has_unknown_intervals
 from planar.dynamics.forces import Forces
 from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput
+from planar.foundation.piecewise_series import TIE_TOLERANCE
 from planar.results.motion import Motion, State
 
 DEFAULT_FLUCTUATION = 0.02
@@ -20,8 +23,9 @@ CYCLE_TOLERANCE = 1e-6
 STEADY_SPEED_TOLERANCE = 1e-6
 """Of the speed: what it may differ by and be steady."""
 
-ZERO_MEAN_TOLERANCE = 1e-13
-"""Of the greatest torque: a smaller mean is none."""
+ZERO_MEAN_TOLERANCE = 1e-10
+"""Of the greatest torque: a smaller mean is rounding of its series."""
+UNKNOWN_TORQUE = "the torque is not known over the whole cycle"
 
 
 @dataclass(frozen=True)
@@ -57,10 +61,11 @@ class Flywheel:
 def flywheel(forces: Forces, of: str | None = None, fluctuation: float = DEFAULT_FLUCTUATION) -> Flywheel:
     """The flywheel of an input (left out: the one that runs) after forces over a whole cycle of it.
 
-    The torque goes through all positions by a periodic cubic spline, whose integral and places are exact; the links'
-    own inertia is in the torque already, at the speed without fluctuation (J. E. Shigley, Mechanical Engineering
-    Design, chapter on flywheels; R. L. Norton, Design of Machinery, section on flywheels). Raises BadInput for an input
-    that is not there or is no angle, forces that are not over a whole cycle, and a fluctuation that is none.
+    Mean, energy and angles are solved for between the positions, on each smooth piece of the motion, so they do not
+    depend on the number of steps; the inertia of the links is part of the torque, at the speed without fluctuation
+    (J. E. Shigley, Mechanical Engineering Design, chapter on flywheels; R. L. Norton, Design of Machinery, section on
+    flywheels). Raises BadInput for an input that does not exist or is no angle, forces that are not over a whole cycle,
+    and a fluctuation outside 0 to 2.
 
     >>> import planar
     >>> motion = planar.cycle(planar.load("two-stroke-engine"), 72)
@@ -75,13 +80,19 @@ def flywheel(forces: Forces, of: str | None = None, fluctuation: float = DEFAULT
     name = motion.running_input if of is None else of
     if name not in forces.inputs:
         raise BadInput(name, f"there is no input of this name; inputs are at {', '.join(forces.inputs)}")
-    angle, torque = motion.inputs[name].position, np.asarray(forces.inputs[name])
-    refused = explain_no_cycle(forces, name)
-    if refused:
-        raise BadInput(name, refused)
-    if angle[-1] < angle[0]:
-        angle, torque = angle[::-1], torque[::-1]
-    return _flywheel_over_cycle(name, angle, torque, fluctuation, _steady_speed(motion.inputs[name].velocity))
+    effort = _EffortOverCycle(forces, name)
+    angles, stored = effort.stored_energy()
+    energy, speed = float(np.ptp(stored)), _steady_speed(motion.inputs[name].velocity)
+    return Flywheel(
+        name,
+        effort.mean,
+        energy,
+        _first_place(angles, stored, 1.0),
+        _first_place(angles, stored, -1.0),
+        fluctuation,
+        speed,
+        energy / (fluctuation * speed**2) if speed else None,
+    )
 
 
 def whole_turns(motion: Motion, name: str) -> int:
@@ -97,7 +108,7 @@ def whole_turns(motion: Motion, name: str) -> int:
 
 
 def explain_no_cycle(forces: Forces, name: str) -> str:
-    """Why forces over a motion are not those of a whole cycle of an input; nothing where they are."""
+    """Why there is no mean effort of an input: its forces are not those of a whole cycle. Empty where they are."""
     motion, torque = forces.moving, np.asarray(forces.inputs[name])
     if isinstance(motion, State):
         return "one position is no cycle; give the forces over a motion"
@@ -105,11 +116,23 @@ def explain_no_cycle(forces: Forces, name: str) -> str:
         return "a flywheel turns; this input is a length"
     if not whole_turns(motion, name):
         return "the motion is no whole cycle: it does not end as it began after whole turns of this input"
-    if not np.isfinite(torque).all():
-        return "the torque is not told all over the cycle"
-    if abs(torque[-1] - torque[0]) > CYCLE_TOLERANCE * float(np.abs(torque).max()):
-        return "the motion is no whole cycle: the torque does not end as it began"
-    return ""
+    if has_unknown_intervals(torque):
+        return UNKNOWN_TORQUE
+    course = force_course(forces)
+    if course is None:
+        return "the motion is known at its positions alone, and not between them"
+    return _explain_open_end(course, name)
+
+
+def _explain_open_end(course: ForceCourse, name: str) -> str:
+    """Why the end of a motion is not its start, by the speed and the effort of an input; empty where it is."""
+    motion, torque = course.run.motion, np.asarray(course.forces.inputs[name])
+    speed = motion.inputs[name].velocity
+    largest = max(float(np.nanmax(np.abs(torque))), course.effort_scale(name))
+    if abs(speed[-1] - speed[0]) > CYCLE_TOLERANCE * float(np.abs(speed).max()):
+        return "the motion is no whole cycle: the speed does not end as it began"
+    is_open = abs(torque[-1] - torque[0]) > CYCLE_TOLERANCE * largest and not course.has_step_at_ends
+    return "the motion is no whole cycle: the torque does not end as it began" if is_open else ""
 
 
 def _steady_speed(velocity: Array) -> float | None:
@@ -118,25 +141,60 @@ def _steady_speed(velocity: Array) -> float | None:
     return mean if mean and float(np.ptp(velocity)) <= STEADY_SPEED_TOLERANCE * mean else None
 
 
-def _flywheel_over_cycle(name: str, angle: Array, torque: Array, fluctuation: float, speed: float | None) -> Flywheel:
-    from scipy.interpolate import CubicSpline  # slow to load, and only needed here
+def mean_effort(forces: Forces, name: str) -> float:
+    """The mean effort (N m) of an input over a whole cycle of it, by its angle. Raises BadInput where there is none."""
+    return _EffortOverCycle(forces, name).mean
 
-    closed = np.append(torque[:-1], torque[0])
-    mean = float(CubicSpline(angle, closed, bc_type="periodic").integrate(angle[0], angle[-1]) / (angle[-1] - angle[0]))
-    if abs(mean) <= ZERO_MEAN_TOLERANCE * float(np.abs(torque).max()):
-        mean = 0.0
-    over = CubicSpline(angle, closed - mean, bc_type="periodic")
-    turning = over.roots(extrapolate=False)
-    places = np.concatenate([angle[:1], turning[np.isfinite(turning)]])
-    stored = -over.antiderivative()(places)
-    energy = float(np.ptp(stored))
-    return Flywheel(
-        name,
-        mean,
-        energy,
-        float(places[np.argmax(stored)]),
-        float(places[np.argmin(stored)]),
-        fluctuation,
-        speed,
-        energy / (fluctuation * speed**2) if speed else None,
-    )
+
+class _EffortOverCycle:
+    """The effort of an input over a whole cycle: its mean and what it stores against that, between all positions."""
+
+    def __init__(self, forces: Forces, name: str):
+        refused = explain_no_cycle(forces, name)
+        if refused:
+            raise BadInput(name, refused)
+        course = force_course(forces)
+        assert course is not None
+        self.name, self.course = name, course
+        rate = 1.0 if course.run.motion.time is None else float(np.abs(forces.moving.inputs[name].velocity).max())
+        least = course.effort_scale(name)
+        series = course.series(self._power_and_torque, np.array([least * rate, least]))
+        if series is None:
+            raise BadInput(name, UNKNOWN_TORQUE)
+        self.series = series
+        self.start, self.stop = (float(each) for each in self._angles([course.run.low, course.run.high]))
+        mean = series.integral(0) / (self.stop - self.start)
+        self.mean = 0.0 if abs(mean) <= ZERO_MEAN_TOLERANCE * float(series.scale[1]) else mean
+
+    def stored_energy(self) -> tuple[Array, Array]:
+        """The angles of the input at which it is fastest or slowest by turns, and the energy that it has stored there
+        since the start."""
+        crossings = self.series.crossings(self.mean, 1)
+        places = np.concatenate([[self.course.run.low], crossings])
+        angles = self._angles(places)
+        energy: Array = self.mean * (angles - self.start) - self.series.running_integral(places, 0)
+        rounding = ZERO_MEAN_TOLERANCE * float(self.series.scale[1]) * abs(self.stop - self.start)
+        return angles, energy if np.ptp(energy) > rounding else np.zeros_like(energy)
+
+    def _power_and_torque(self, forces: Forces) -> Array:
+        """The torque times the rate of the angle along the run, and the torque (n, 2)."""
+        motion, torque = forces.moving, np.asarray(forces.inputs[self.name])
+        assert isinstance(motion, Motion)
+        rate = motion.inputs[self.name].velocity if motion.time is not None else self._range_direction
+        return np.stack([torque * rate, torque], axis=-1)
+
+    @property
+    def _range_direction(self) -> float:
+        position = self.course.run.motion.inputs[self.name].position
+        return 1.0 if position[-1] > position[0] else -1.0
+
+    def _angles(self, places: Sequence[float] | Array) -> Array:
+        """The angles of the input at places (n,)."""
+        return self.course.run.motion_at(np.asarray(places)).inputs[self.name].position
+
+
+def _first_place(angles: Array, energy: Array, sign: float) -> float:
+    """The angle at which the energy is greatest (`sign` 1) or least, the first of equal ones."""
+    signed = sign * energy
+    near = signed >= signed.max() - TIE_TOLERANCE * float(np.ptp(energy))
+    return float(angles[int(np.argmax(near))])

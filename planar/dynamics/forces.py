@@ -36,6 +36,7 @@ from planar.dynamics.reactions import (
 from planar.dynamics.sharing.least_work import Wrench, yielding_power
 from planar.dynamics.virtual_velocities import has_length_motion, refuse_surplus_inputs, unit_rate_state
 from planar.dynamics.virtual_work import balance_function
+from planar.equations.mechanism_numbers import mechanism_size
 from planar.foundation.arrays import Array, IntArray
 from planar.foundation.errors import BadInput, NoAnswer, Outcome
 from planar.foundation.notebook_display import Displayable
@@ -86,7 +87,7 @@ class Forces(Displayable):
     what equilibrium does not tell, and why; `bodies` are the links whose balance was proved. `friction["B"]` see
     `PairFriction`, `frictionless` are the same forces without friction, `others` the further
     solutions at a position, `solution_count` how many there are in all (of a motion (n,)), and `remarks` what there is
-    to say of friction.
+    to say of friction. `with_inertia` and `with_friction` say what was taken into account.
     """
 
     moving: State | Motion
@@ -102,6 +103,8 @@ class Forces(Displayable):
     others: tuple[Forces, ...] = ()
     solution_count: IntArray | int = 1
     remarks: tuple[str, ...] = ()
+    with_inertia: bool = True
+    with_friction: bool = True
 
     def __repr__(self) -> str:
         return f"<Forces in {self.moving!r}: {len(self.reactions)} pairs, {len(self.acting)} acting>"
@@ -222,7 +225,19 @@ def forces(moving: State | Motion, inertia: bool = True, friction: bool = True) 
     found = balanced.forces(solved)
     if friction and any(pair.has_friction for pair in mechanism.pairs):
         found = _with_friction(balanced, solved, found)
+    found = replace(found, with_inertia=inertia, with_friction=friction)
     return found if state is None else _single_position(found)
+
+
+def greatest_moment_and_force(forces: Forces) -> tuple[float, float]:
+    """The greatest moment (N m) and force (N) of all that acts and all pairs; smaller values are judged beside them."""
+    reactions = forces.reactions.values()
+    exerted = [(each.force, each.couple) for each in (*forces.acting, *reactions)]
+    couples = [couple for _, couple in exerted]
+    couples += [couple for reaction in reactions for couple in reaction.couples.values()]
+    force = _greatest_size(force for force, _ in exerted)
+    couple = _greatest_size(couples)
+    return max(couple, force * mechanism_size(forces.mechanism, forces.moving.shapes)), force
 
 
 class _LinkEquilibrium:
@@ -370,4 +385,6 @@ def _single_position(found: Forces) -> Forces:
         tuple(map(_single_position, found.others)),
         int(np.ravel(found.solution_count)[0]),
         found.remarks,
+        found.with_inertia,
+        found.with_friction,
     )

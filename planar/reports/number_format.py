@@ -21,6 +21,8 @@ ROUNDING_RATIO = 1e-12
 
 ZERO_THRESHOLD = 1e-14
 """A number of which it is not known what it is told beside is printed as 0 below this."""
+AMONG_POSITIONS = ", among these positions"
+"""Said of extreme values and means that are read off the positions of a run, and not solved for between them."""
 
 
 def paragraphs(rows: Iterable[tuple[str, str]]) -> Table:

@@ -136,6 +136,10 @@ class FollowedPath(Protocol):
     fork_positions: tuple[float, ...]
     """Positions of the running input (rad or m) at which another way was taken than the smooth one."""
 
+    @property
+    def unknowns(self) -> Array | None:
+        """The unknowns of the solver at the rows (rows, unknowns); None where they were not kept."""
+
     def limits(self, motion: Motion) -> tuple[Limit, ...]:
         """See `Motion.limits`."""
 
@@ -146,6 +150,7 @@ class RecordedPath(NamedTuple):
     singular_rows: frozenset[int]
     fork_positions: tuple[float, ...]
     known_limits: tuple[Limit, ...]
+    unknowns: Array | None = None
 
     def limits(self, motion: Motion) -> tuple[Limit, ...]:
         """See `Motion.limits`."""
@@ -206,7 +211,7 @@ class Motion(KinematicResult):
         state = {each.name: getattr(self, each.name) for each in fields(self)}
         if self.course is not None:
             path = self.course
-            state["course"] = RecordedPath(path.singular_rows, path.fork_positions, path.limits(self))
+            state["course"] = RecordedPath(path.singular_rows, path.fork_positions, path.limits(self), path.unknowns)
         return state
 
     def up_to_row(self, row: int) -> Motion:

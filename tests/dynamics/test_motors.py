@@ -92,7 +92,13 @@ def test_forces_tell_where_a_motor_is_too_weak():
     there = planar.forces(planar.solve(mechanism, {"O": last}))
     assert float(there.inputs["O"]) == pytest.approx(150.0, abs=1e-9)
     assert planar.motor_duty(there).margin == pytest.approx(0.0, abs=1e-9)
-    assert duty.least == pytest.approx(150.0 - float(np.max(planar.forces(motion).inputs["O"])))
+    needed = planar.forces(planar.solve(mechanism, {"O": np.radians(200.0) + 1e-12})).inputs[
+        "O"
+    ]  # where the load is on
+    assert duty.is_solved
+    assert duty.least == pytest.approx(150.0 - float(needed), rel=1e-9)
+    assert duty.least_at == pytest.approx(np.radians(200.0), abs=1e-9)
+    assert duty.greatest_power_needed == pytest.approx(2.0 * np.pi * float(needed), rel=1e-9)
     # by its motor the press comes through, below the speed without load
     found = planar.simulate(mechanism, 1.5, 150, moving=True)
     speeds = found.motion.inputs["O"].velocity * 30.0 / np.pi

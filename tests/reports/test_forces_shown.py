@@ -164,28 +164,31 @@ def test_a_load_that_varies_with_time_is_told_at_the_start(tmp_path):
 
 def test_over_a_turn_inertia_supplies_nothing_and_the_mean_torque_is_the_work_of_the_gas(tmp_path):
     """The closed integral of the gas force over the piston's way, by its closed form, straight between the places."""
-    text = run(tmp_path, "forces", "two-stroke-engine", "--cycle", "--steps", "3600").done()
+    text = run(tmp_path, "forces", "two-stroke-engine", "--cycle", "--steps", "36").done()
     (load,) = MODELS["two-stroke-engine"].loads
     at, r, rod = np.linspace(0, 2 * pi, 200_001), 0.03, 0.11
     way = piston(at, r, rod)[1]
     work = np.trapezoid(-283 * np.interp(at, load.varies.at, load.varies.factors) * way, at)
-    assert float(row(text, "Inputs", "O")[1]) == pytest.approx(-work / (2 * pi), rel=1e-4)
+    assert float(row(text, "Inputs", "O")[1]) == pytest.approx(-work / (2 * pi), rel=2e-6)
 
 
-def test_the_tables_have_the_extremes_of_every_position_and_where(tmp_path):
-    text = run(tmp_path, "forces", "two-stroke-engine", "--cycle").done()
-    motion = planar.cycle(MODELS["two-stroke-engine"])
+def test_the_tables_have_the_extremes_between_the_positions_and_where(tmp_path):
+    """Of few steps those of very many, with places that are steps of neither."""
+    text = run(tmp_path, "forces", "two-stroke-engine", "--cycle", "--steps", "36").done()
+    motion = planar.cycle(MODELS["two-stroke-engine"], 3600)
     found = planar.forces(motion)
     effort, at = found.inputs["O"], np.degrees(motion.inputs["O"].position)
-    told = [float(each) for each in row(text, "Inputs", "O")[3:]]
-    wanted = [effort.min(), at[effort.argmin()], effort.max(), at[effort.argmax()]]
-    assert told == pytest.approx(wanted, rel=1e-5)
+    shown = [float(each) for each in row(text, "Inputs", "O")[3:]]
+    assert shown[::2] == pytest.approx([effort.min(), effort.max()], rel=1e-5)
+    assert shown[1::2] == pytest.approx([at[effort.argmin()], at[effort.argmax()]], abs=0.06)
     force = np.hypot(*found.reactions["A"].force.T)
     most = int(force.argmax())
     way = np.degrees(np.arctan2(*found.reactions["A"].force[most, ::-1]))
-    assert [float(each) for each in row(text, "Reactions", "A")[3:6]] == pytest.approx([force[most], way, at[most]])
-    shaken = np.hypot(*found.shaking[0].T)
-    assert f"shaking up to {shaken.max():#.6g} N (at O = {at[shaken.argmax()]:#.6g} deg)" in text
+    cells = [float(each) for each in row(text, "Reactions", "A")[3:6]]
+    assert cells == pytest.approx([force[most], way, at[most]], rel=2e-5)
+    shaken = float(np.hypot(*found.shaking[0].T).max())
+    assert f"shaking up to {shaken:#.6g} N (at O = " in text
+    assert text.count("among these positions") == 0
 
 
 @pytest.mark.parametrize("suffix", ["csv", "npz", "json"])

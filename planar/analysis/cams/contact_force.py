@@ -10,10 +10,12 @@ import numpy as np
 from planar.analysis.cams.cam_profile import cams_with_profiles
 from planar.document.first_argument import takes_result
 from planar.dynamics.external_actions import KinematicArrays
+from planar.dynamics.force_course import force_course, has_unknown_intervals
 from planar.dynamics.forces import Forces
 from planar.foundation.arrays import Array
 from planar.foundation.short_repr import short_repr
 from planar.model.pairs.cams.profiled import ProfiledPair
+from planar.results.motion import Motion
 
 NO_FORCE_RATIO = 1e-9
 """Of the greatest force: what is less is none."""
@@ -26,13 +28,19 @@ class ContactForce(NamedTuple):
     said of such positions is not what happens. `lifts_off` (n,) says where; NaN where the force is not determined.
     `stress` (n,) is the greatest pressure between the two (Pa), where the file says what they are made of: Hertz's
     sqrt(F E* / (pi b R)) of two cylinders of width b, 1/R the sum of their curvatures (K. L. Johnson, Contact
-    Mechanics, Cambridge University Press 1985, ch. 4); none where they do not press.
+    Mechanics, Cambridge University Press 1985, ch. 4); none where they do not press. `lift_off` are the intervals
+    (from, to) of the running input, or of the time of a run in time, in which the follower lifts off, and `least` the
+    least force. Over a motion both are solved for between its positions (`is_solved`), unless the motion is known at
+    these alone.
     """
 
     force: Array
     grooved: bool
     lifts_off: Array
     stress: Array | None = None
+    lift_off: tuple[tuple[float, float], ...] = ()
+    least: float = np.nan
+    is_solved: bool = True
 
     def __repr__(self) -> str:
         return short_repr(self)
@@ -50,7 +58,45 @@ def contact_forces(forces: Forces) -> Mapping[str, ContactForce]:
     return {pair.name: _contact_force(forces, pair) for pair in cams_with_profiles(forces.mechanism)}
 
 
+def contact_columns(forces: Forces) -> Array:
+    """Of every cam with a profile its force, and the square of its stress where there is one, at n positions
+    (n, columns)."""
+    columns = []
+    for pair in cams_with_profiles(forces.mechanism):
+        contact = _contact_at_rows(forces, pair)
+        columns.append(contact.force)
+        if contact.stress is not None:
+            columns.append(contact.stress**2)
+    return np.stack(columns, axis=-1)
+
+
 def _contact_force(forces: Forces, pair: ProfiledPair) -> ContactForce:
+    contact = _contact_at_rows(forces, pair)
+    if not isinstance(forces.moving, Motion):
+        return contact._replace(least=float(contact.force[0]))
+    course = force_course(forces)
+    series = None
+    if course is not None and not has_unknown_intervals(contact.force):
+        series = course.series(lambda found: _contact_at_rows(found, pair).force, course.least_scales[1])
+    if course is None or series is None:
+        return contact._replace(
+            lift_off=_row_intervals(forces.moving, contact.lifts_off),
+            least=float(np.nanmin(contact.force)) if np.isfinite(contact.force).any() else np.nan,
+            is_solved=False,
+        )
+    intervals = () if contact.grooved else (course.positions(each) for each in series.intervals_below(0.0))
+    lift_off = tuple((float(start), float(stop)) for start, stop in intervals)
+    return contact._replace(lift_off=lift_off, least=series.least().value)
+
+
+def _row_intervals(motion: Motion, chosen: Array) -> tuple[tuple[float, float], ...]:
+    """From where to where rows of a motion are chosen, in their order."""
+    along = motion.inputs[motion.running_input].position if motion.time is None else motion.time
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], chosen, [False]]).astype(int)))
+    return tuple((float(along[first]), float(along[stop - 1])) for first, stop in edges.reshape(-1, 2))
+
+
+def _contact_at_rows(forces: Forces, pair: ProfiledPair) -> ContactForce:
     field = KinematicArrays(forces.moving, forces.moving.shapes)
     contact = pair.tooth_contact(field.frames, field.shapes, forces.mechanism.pairs)
     assert contact is not None

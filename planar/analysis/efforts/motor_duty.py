@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from itertools import groupby
 from typing import NamedTuple
 
 import numpy as np
 
-from planar.analysis.interpolated_run import InterpolatedRun
-from planar.analysis.motion.zeros import bracket_zeros
 from planar.document.first_argument import takes_result
-from planar.dynamics.forces import Forces, forces
+from planar.dynamics.force_course import force_course
+from planar.dynamics.forces import Forces
 from planar.foundation.arrays import Array
-from planar.foundation.errors import BadInput, NoAnswer
-from planar.foundation.root_finding import find_root
+from planar.foundation.errors import BadInput
 from planar.foundation.short_repr import short_repr
 from planar.model.motors import Motor
 from planar.results.motion import Motion, State
@@ -25,8 +23,10 @@ class MotorDuty(NamedTuple):
     `available` is what it supplies at the input's speed, `needed` what the input needs, `margin` how much more there
     is, in the sense in which the motor drives: below zero it is too weak, and slows down. `power` is what the input
     needs. `least` is the least margin, and `least_at` the position of the running input there (the time of a run in
-    time); `too_weak` are the stretches (from, to) where the margin is below zero, their ends solved for.
-    `greatest_power` is the most that the motor can supply, at the speed `best_speed`.
+    time); `too_weak` are the intervals (from, to) in which the margin is below zero. `greatest_power` is the most that
+    the motor can supply, at the speed `best_speed`, and `greatest_power_needed` the most that the input needs.
+    `is_solved` says whether least margin, intervals and power needed are solved for between the positions of a motion;
+    where the motion is known at its positions alone, they are read off these.
     """
 
     input: str
@@ -40,6 +40,8 @@ class MotorDuty(NamedTuple):
     too_weak: tuple[tuple[float, float], ...]
     greatest_power: float
     best_speed: float
+    greatest_power_needed: float
+    is_solved: bool = True
 
     def __repr__(self) -> str:
         return short_repr(self)
@@ -49,9 +51,9 @@ class MotorDuty(NamedTuple):
 def motor_duty(forces: Forces, of: str | None = None) -> MotorDuty:
     """What the motor of an input (left out: of the only one that has a motor) supplies, beside what the input needs.
 
-    At the speed that the motion has: a simulation runs by the motor. Of a motion in a range of the input the ends of
-    stretches where it is too weak are solved for on exact positions, of others through a straight line between rows.
-    Raises BadInput for an input that has no motor.
+    At the speed that the motion has: a simulation runs by the motor. The least margin and the ends of intervals in
+    which the motor is too weak are solved for between the positions, on each smooth piece of the motion. Raises
+    BadInput for an input that has no motor.
 
     >>> import planar
     >>> motion = planar.cycle(planar.load("motor-press"), 72)
@@ -63,72 +65,67 @@ def motor_duty(forces: Forces, of: str | None = None) -> MotorDuty:
     if of is None and len(motors) == 1:
         (of,) = motors
     if of is None or of not in motors:
-        told = f"inputs with motors are at {', '.join(motors)}" if motors else "no input has a motor"
-        raise BadInput(of or "motor", f"{told}; name one" if of is None else f"there is no motor here; {told}")
-    motor, needed = motors[of], forces.inputs[of]
-    velocity = moving.inputs[of].velocity
-    available = motor.effort_at(velocity)
-    margin = motor.sense * (available - needed)
-    power = np.asarray(needed) * np.asarray(velocity)
-    most, best = motor.greatest_power
+        message = f"inputs with motors are at {', '.join(motors)}" if motors else "no input has a motor"
+        raise BadInput(of or "motor", f"{message}; name one" if of is None else f"there is no motor here; {message}")
+    motor, needed = motors[of], np.asarray(forces.inputs[of])
+    measure = _MarginMeasure(of, motor)
+    available = motor.effort_at(moving.inputs[of].velocity)
+    margin, power = measure(forces).T
+    greatest, best_speed = motor.greatest_power
     if isinstance(moving, State):
-        at, left = float(moving.inputs[of].position), float(margin)
-        numbers = float(available), float(needed), left, float(power), left, at
-        return MotorDuty(of, motor, *numbers, ((at, at),) if left < 0.0 else (), most, best)
-    where = moving.inputs[moving.running_input].position if moving.time is None else moving.time
-    weak = tuple(_too_weak(moving, of, motor, where, margin))
-    if np.isfinite(margin).any():
-        row = int(np.nanargmin(margin))
-        least, at = float(margin[row]), float(where[row])
-    else:
-        least = at = np.nan
-    return MotorDuty(of, motor, available, np.asarray(needed), margin, power, least, at, weak, most, best)
+        position, left = float(moving.inputs[of].position), float(margin[0])
+        numbers = float(available), float(needed), left, float(power[0]), left, position
+        weak = ((position, position),) if left < 0.0 else ()
+        return MotorDuty(of, motor, *numbers, weak, greatest, best_speed, float(power[0]))
+    rows = available, needed, margin, power
+    solved = _solved_margin(forces, of, measure)
+    if solved is not None:
+        return MotorDuty(of, motor, *rows, *solved[:3], greatest, best_speed, solved[3])
+    least, least_at, weak, most = _margin_at_rows(moving, margin, power)
+    return MotorDuty(of, motor, *rows, least, least_at, weak, greatest, best_speed, most, is_solved=False)
 
 
-def _too_weak(motion: Motion, name: str, motor: Motor, where: Array, margin: Array) -> Iterator[tuple[float, float]]:
-    """The stretches where the margin is below zero, in the order of the rows."""
-    known = np.isfinite(margin)
-    where, margin = where[known], margin[known]
-    if not len(where) or not (margin < 0.0).any():
-        return
-    zeros = [
-        _find_zero(motion, name, motor, (low, high), margin_at(where, margin, low, high))
-        for low, high in bracket_zeros(where, margin)
-    ]
-    begin = float(where[0]) if margin[0] < 0.0 else None
-    for zero in zeros:
-        if begin is None:
-            begin = zero
-        else:
-            yield begin, zero
-            begin = None
-    if begin is not None:
-        yield begin, float(where[-1])
+Margins = tuple[float, float, tuple[tuple[float, float], ...], float]
+"""The least margin, where it is, the intervals in which the motor is too weak, and the greatest power needed."""
 
 
-def margin_at(where: Array, margin: Array, low: float, high: float) -> tuple[float, float]:
-    """The margins at two rows' positions."""
-    rows = [int(np.flatnonzero(where == each)[0]) for each in (low, high)]
-    return float(margin[rows[0]]), float(margin[rows[1]])
+class _MarginMeasure(NamedTuple):
+    """The margin of a motor and the power that its input needs, of forces (n, 2)."""
+
+    input: str
+    motor: Motor
+
+    def __call__(self, forces: Forces) -> Array:
+        needed, velocity = np.asarray(forces.inputs[self.input]), np.asarray(forces.moving.inputs[self.input].velocity)
+        margin = self.motor.sense * (self.motor.effort_at(velocity) - needed)
+        return np.stack(np.broadcast_arrays(margin, needed * velocity), axis=-1).reshape(-1, 2)
 
 
-def _find_zero(
-    motion: Motion, name: str, motor: Motor, ends: tuple[float, float], margins: tuple[float, float]
-) -> float:
-    """Where the margin is zero between two positions: on exact ones where the motion has them."""
-    (low, high), (first, last) = ends, margins
-    straight = low + (high - low) * first / (first - last)
-    if motion.time is not None or any(given.acceleration for given in motion.mechanism.inputs):
-        return straight
-    try:
-        run = InterpolatedRun(motion)
+def _solved_margin(forces: Forces, name: str, measure: _MarginMeasure) -> Margins | None:
+    """The margins between the positions of a motion; None where the motion is known at these alone."""
+    course = force_course(forces)
+    if course is None:
+        return None
+    least = course.effort_scale(name)
+    speed = float(np.abs(np.asarray(forces.moving.inputs[name].velocity)).max())
+    series = course.series(measure, np.array([least, least * speed]))
+    if series is None:
+        return None
+    smallest, most = series.least(0), series.greatest(1)
+    ends = [course.positions(interval) for interval in series.intervals_below(0.0, 0)]
+    weak = tuple((float(start), float(stop)) for start, stop in ends)
+    return smallest.value, float(course.positions([smallest.place])[0]), weak, most.value
 
-        def margin(position: float) -> float:
-            state = run.state_at(position)
-            return motor.sense * float(motor.effort_at(state.inputs[name].velocity) - forces(state).inputs[name])
 
-        if run.rate != next(each.velocity for each in motion.mechanism.inputs if each.pair == run.pair):
-            return straight  # an input at rest
-        return find_root(margin, low, high)
-    except (BadInput, NoAnswer):
-        return straight
+def _margin_at_rows(motion: Motion, margin: Array, power: Array) -> Margins:
+    """The margins at the positions of a motion; intervals go from one position to another."""
+    places = motion.inputs[motion.running_input].position if motion.time is None else motion.time
+    if not np.isfinite(margin).any():
+        return np.nan, np.nan, (), np.nan
+    row = int(np.nanargmin(margin))
+    weak = []
+    for is_weak, rows in groupby(range(len(margin)), key=lambda row: bool(margin[row] < 0.0)):
+        ends = list(rows)
+        if is_weak:
+            weak.append((float(places[ends[0]]), float(places[ends[-1]])))
+    return float(margin[row]), float(places[row]), tuple(weak), float(np.nanmax(power))

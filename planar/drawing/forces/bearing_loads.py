@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from math import floor
 from typing import NamedTuple
 
@@ -110,18 +110,22 @@ def _pair_pictures(drawn: ForceRun, pair: Pair, reaction: Reaction) -> Iterator[
     index, told = link_pair_index(number[second], number[first]), f"on {second} by {first}"
     least = drawn.round_off
     couple = np.where(np.abs(couple) <= least * drawn.arm, 0.0, couple)
+
+    def couple_of(found: Forces) -> Array:
+        return sense * np.asarray(found.reactions[pair.name].couple)
+
     of_couple = _BearingLoad(pair.name, ActionSymbol("M", index), told, "couple", reaction.why)
     if reaction.at is None:
-        yield _curve_picture(drawn, couple, of_couple)
+        yield _curve_picture(drawn, couple, of_couple, couple_of)
     elif pair.is_lower_pair and pair.input_kind is MeasureKind.LENGTH:
-        across = _lateral_force(drawn, pair, force)
+        across = drawn.in_order(sense * _lateral_force(drawn.forces, pair))
         across = np.where(np.abs(across) <= least, 0.0, across)
         of_force = _BearingLoad(
             pair.name, ActionSymbol("F", index), f"{told}, to the left of its line", "load", reaction.why
         )
-        yield _curve_picture(drawn, across, of_force)
+        yield _curve_picture(drawn, across, of_force, lambda found: sense * _lateral_force(found, pair))
         if np.nanmax(np.abs(couple), initial=0.0) > 0.0:
-            yield _curve_picture(drawn, couple, of_couple)
+            yield _curve_picture(drawn, couple, of_couple, couple_of)
     else:
         force = np.where(np.hypot(*force.T)[:, None] <= least[:, None], 0.0, force)
         yield _polar_picture(
@@ -149,9 +153,14 @@ def _polar_picture(drawn: ForceRun, force: Array, load: _BearingLoad) -> Picture
     strokes += _input_marks(drawn, seen, across, up)
     notes = [str(scale), *_load_notes(drawn, long, load)]
     row = int(np.nanargmax(long))
-    text = format_force(long[row], "force", units)
+    place, size = drawn.abscissa[row], long[row]
+    least_scale = max(drawn.least_scales) ** 2
+    solved = drawn.solved_extremes(lambda found: np.sum(found.reactions[load.pair].force ** 2, axis=-1), least_scale)
+    if solved is not None:
+        place, size = solved[0][0], np.sqrt(solved[0][1])
+    text = format_force(size, "force", units)
     if np.nanmin(long) < (1.0 - CONSTANT_TOLERANCE) * long[row]:
-        text = f"{text} {drawn.place_text(row)}"
+        text = f"{text} {drawn.abscissa_text(place)}"
     if np.isfinite(seen[row]).all():
         tip = axes.point_on_paper(seen[row, 0], seen[row, 1], across, up)
         strokes.append(Arrow(axes.point_on_paper(0.0, 0.0, across, up), tip, Pen.REACTION, "greatest"))
@@ -193,8 +202,10 @@ def _input_marks(drawn: ForceRun, force: Array, across: axes.Axis, up: axes.Axis
             yield Label(axes.format_number(place), at, name, 6.5, 0.7)
 
 
-def _curve_picture(drawn: ForceRun, values: Array, load: _BearingLoad) -> Picture | _Undrawn:
-    """A force along a line's left, or a couple, over the input."""
+def _curve_picture(
+    drawn: ForceRun, values: Array, load: _BearingLoad, measure: Callable[[Forces], Array]
+) -> Picture | _Undrawn:
+    """A force to the left of a line, or a couple, over the input; `measure` takes it (n,) of forces."""
     if not np.nanmax(np.abs(values), initial=0.0):
         return _empty_picture(load, values)
     seen, kind = axes.without_outliers(values), "torque" if load.about == "couple" else "force"
@@ -209,9 +220,13 @@ def _curve_picture(drawn: ForceRun, values: Array, load: _BearingLoad) -> Pictur
     ]
     notes = [*_load_notes(drawn, values, load)]
     row = int(np.nanargmax(np.abs(values)))
-    text = f"{format_force(values[row], kind, units)} {drawn.place_text(row)}"
+    place, value = drawn.abscissa[row], values[row]
+    solved = drawn.solved_extremes(measure, max(drawn.least_scales))
+    if solved is not None:
+        place, value = max(solved, key=lambda extreme: abs(extreme[1]))
+    text = f"{format_force(value, kind, units)} {drawn.abscissa_text(place)}"
     if np.isfinite(seen[row]):
-        at: PaperPoint = axes.point_on_paper(drawn.abscissa[row], values[row], across, up)
+        at: PaperPoint = axes.point_on_paper(place, value, across, up)
         strokes.append(Circle(at, MARK_RADIUS, Pen.CURVE, "greatest", Fill.PAPER))
         strokes.append(Label(text, at, "greatest", 8.0, 1.0))
     else:
@@ -229,11 +244,12 @@ def _load_notes(drawn: ForceRun, values: Array, load: _BearingLoad) -> Iterator[
         yield f"not told {join_all_names([drawn.place_text(row) for row in gaps.tolist()])}"
 
 
-def _lateral_force(drawn: ForceRun, pair: Pair, force: Array) -> Array:
-    """The force (n,) on the left of the pair's line."""
-    motion = drawn.motion
+def _lateral_force(forces: Forces, pair: Pair) -> Array:
+    """The force (n,) on the second link of a pair, to the left of the line of the pair."""
+    motion, force = forces.moving, np.asarray(forces.reactions[pair.name].force)
     marks = pair.drawing_marks(motion.shapes, motion.mechanism.pairs)
     guide = next(mark for mark in marks if isinstance(mark, GuideMark))
     way = KinematicArrays(motion, motion.shapes).frame(guide.link).rotate_to_world(guide.direction)
-    left = np.stack(np.broadcast_arrays(-way.y, way.x, np.zeros(len(motion)))[:2], axis=-1)
-    return (force * drawn.in_order(left)).sum(axis=1)
+    left = np.stack(np.broadcast_arrays(-way.y, way.x, np.zeros(len(force)))[:2], axis=-1)
+    lateral: Array = (force * left).sum(axis=1)
+    return lateral

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from math import pi
 from typing import NamedTuple
 
@@ -10,6 +11,7 @@ import numpy as np
 from planar.drawing.diagrams.axes import format_number
 from planar.drawing.diagrams.drawn_run import closed_run, steady_run
 from planar.dynamics.flywheel import whole_turns
+from planar.dynamics.force_course import force_course
 from planar.dynamics.forces import Forces, forces
 from planar.dynamics.load_validation import require_loads
 from planar.equations.mechanism_numbers import mechanism_size
@@ -66,14 +68,44 @@ class ForceRun(NamedTuple):
 
     def place_text(self, row: int) -> str:
         """Where a row is: at 120 deg."""
-        return f"at {format_number(self.abscissa[row], 4)} {self.unit}"
+        return self.abscissa_text(float(self.abscissa[row]))
+
+    def abscissa_text(self, value: float) -> str:
+        """A place on the axis: at 120 deg."""
+        return f"at {format_number(value, 4)} {self.unit}"
+
+    @property
+    def least_scales(self) -> tuple[float, float]:
+        """See `ForceCourse.least_scales`."""
+        course = force_course(self.forces)
+        return (0.0, 0.0) if course is None else course.least_scales
+
+    def solved_extremes(
+        self, measure: Callable[[Forces], Array], least_scale: float
+    ) -> tuple[tuple[float, float], ...] | None:
+        """The greatest and the least value of what is measured of forces (n,), each as (abscissa, value).
+
+        Solved for between the positions; None where the motion is known at these alone. See `fit_series`.
+        """
+        course = force_course(self.forces)
+        series = None if course is None else course.series(measure, least_scale)
+        if course is None or series is None:
+            return None
+        found = []
+        for extreme in (series.greatest(), series.least()):
+            value = float(course.positions([extreme.place])[0])
+            if self.unit != "s":
+                value = parse_unit(self.unit).from_si(value)
+            found.append((float(np.mod(value, self.period)) if self.period else value, extreme.value))
+        return tuple(found)
 
 
-def forces_over_cycle(source: Forces | Motion | Mechanism) -> ForceRun:
+def forces_over_cycle(source: Forces | Motion | Mechanism, with_steps: bool = True) -> ForceRun:
     """Forces as they are given, or those over a whole cycle at the input's steady speed.
 
-    Without a speed in the file inertia is left out. Raises BadInput for the forces of one position, for a mechanism on
-    which nothing acts, and what `planar.cycle` and `planar.forces` raise.
+    `with_steps` adds positions on both sides of each place where a force may step or bend. If the file gives no speed,
+    inertia is left out. Raises BadInput for the forces of one position, for a mechanism on which nothing acts, and what
+    `planar.cycle` and `planar.forces` raise.
     """
     require_loads(source if isinstance(source, Mechanism) else source.mechanism)
     notes = []
@@ -86,6 +118,9 @@ def forces_over_cycle(source: Forces | Motion | Mechanism) -> ForceRun:
         found = forces(run.motion, inertia=run.has_speed)
         if not run.has_speed and run.motion.mechanism.masses:
             notes.append("without inertia: the file gives no speed of the input")
+    course = force_course(found)
+    if course is not None and with_steps:
+        found = course.with_steps()
     motion = found.moving
     if not isinstance(motion, Motion):
         raise BadInput("forces", "this is drawn over a motion; give the forces over one")

@@ -34,7 +34,7 @@ def balance_pictures(found: Balance, tradeoff: BalanceTradeoff | None = None) ->
     Before and after; and the least moment over the force, where that is given. Strokes are `about` "before", "after"
     and "tradeoff".
     """
-    drawn = forces_over_cycle(forces(found.motion, friction=False))
+    drawn = forces_over_cycle(forces(found.motion, friction=False), with_steps=False)
     units = found.motion.mechanism.units
     pictures = [_polar_picture(found, units)]
     of_moment = {name: getattr(found, name).moment for name in PENS}
@@ -96,7 +96,10 @@ def _polar_picture(found: Balance, units: FileUnits) -> Picture:
         at = axes.point_on_paper(force[row, 0], force[row, 1], across, up)
         marks += [_mark(at, about), Label(about, at, about, 8.0, 1.0)]
     shown = {about: size if size > NEGLIGIBLE * greatest else 0.0 for about, size in sizes.items()}
-    notes = [f"greatest {about}: {format_force(size, 'force', units)}" for about, size in shown.items()]
+    notes = [
+        f"greatest {about}, among these positions: {format_force(size, 'force', units)}"
+        for about, size in shown.items()
+    ]
     notes += [
         f"{each.link}: {amount(each.mass, 'mass', units)} at {amount(each.radius, 'length', units)}, "
         f"{amount(each.angle, 'angle', units)} from x ({each.axes})"
@@ -115,7 +118,8 @@ def _curves(drawn: ForceRun, of: dict[str, Array], symbol: str, kind: str, title
     up = axes.force_axis(np.concatenate([*shown.values()]), DIAGRAM_HEIGHT, symbol, kind, units)
     marks: list[Mark] = [*axes.axes_frame(across, up), *_curve_marks(drawn, shown, across, up)]
     notes = tuple(
-        f"greatest {name}: {format_force(float(np.nanmax(np.abs(each))), kind, units)}" for name, each in of.items()
+        f"greatest {name}, among these positions: {format_force(float(np.nanmax(np.abs(each))), kind, units)}"
+        for name, each in of.items()
     )
     return Picture(tuple(marks), title, notes)
 

@@ -76,20 +76,30 @@ def torque_picture(  # long: one part of the diagram after the other
         strokes.append(Label(text, (DIAGRAM_WIDTH, level), "mean", 8.0, 1.2, math=True, side=(1, 0)))
     strokes += axes.curve_strokes(drawn.abscissa, seen, across, up, Pen.CURVE, "effort")
     notes = [*drawn.notes]
-    extremes = {"greatest": int(np.nanargmax(effort)), "least": int(np.nanargmin(effort))}
-    if np.ptp(effort[[*extremes.values()]]) <= ROUND_OFF_RATIO * np.nanmax(np.abs(effort)):
-        extremes = {}
+    greatest, least = _effort_extremes(drawn, name, effort)
+    if greatest[1] - least[1] <= ROUND_OFF_RATIO * max(abs(greatest[1]), abs(least[1])):
         notes.append("the same at every position")
-    for told, row in extremes.items():
-        text = f"{format_force(effort[row], kind, units)} {drawn.place_text(row)}"
-        if np.isfinite(seen[row]):
-            at = axes.point_on_paper(drawn.abscissa[row], effort[row], across, up)
-            strokes.append(Circle(at, MARK_RADIUS, Pen.CURVE, told, Fill.PAPER))
-            strokes.append(Label(text, at, told, 8.0, 1.0))
-        else:
-            notes.append(f"beyond the axis: {text}")
+    else:
+        for label, (place, value) in (("greatest", greatest), ("least", least)):
+            text = f"{format_force(value, kind, units)} {drawn.abscissa_text(place)}"
+            row = int(np.argmin(np.abs(drawn.abscissa - place)))
+            if np.isfinite(seen[row]):
+                at = axes.point_on_paper(place, value, across, up)
+                strokes.append(Circle(at, MARK_RADIUS, Pen.CURVE, label, Fill.PAPER))
+                strokes.append(Label(text, at, label, 8.0, 1.0))
+            else:
+                notes.append(f"beyond the axis: {text}")
     notes += _notes(even, why, kind, drawn)
     return Picture(tuple(strokes), f"{found.mechanism.name}: {kind} of the input {name}", tuple(notes))
+
+
+def _effort_extremes(drawn: ForceRun, name: str, effort: Array) -> tuple[tuple[float, float], ...]:
+    """The greatest and the least effort, each with its place on the axis: solved for, else of the positions."""
+    solved = drawn.solved_extremes(lambda forces: np.asarray(forces.inputs[name]), max(drawn.least_scales))
+    if solved is not None:
+        return solved
+    rows = int(np.nanargmax(effort)), int(np.nanargmin(effort))
+    return tuple((float(drawn.abscissa[row]), float(effort[row])) for row in rows)
 
 
 def _notes(even: Flywheel | None, why: str, kind: str, drawn: ForceRun) -> Iterator[str]:

@@ -207,6 +207,10 @@ class Pair(ABC):
         """
         return None
 
+    def piece_ends(self, shapes: Mapping[str, LinkShape]) -> PieceEnds | None:
+        """The angles at which its law goes over from one piece to the next, where it has pieces."""
+        return None
+
     @property
     def measures_symbols(self) -> bool:
         """Whether `measure` takes symbols too, and not numbers and arrays alone."""
@@ -249,6 +253,14 @@ class Pair(ABC):
     @abstractmethod
     def samples(cls) -> tuple[PairSample, ...]:
         """Small closed configurations, in general position, on which every law is tried."""
+
+
+class PieceEnds(NamedTuple):
+    """Angles of a link against another (rad, over one turn) at which the law of a pair may bend or jump."""
+
+    link: str
+    carrier: str
+    angles: tuple[float, ...]
 
 
 class EffortAction(NamedTuple):

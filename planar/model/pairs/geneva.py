@@ -17,6 +17,7 @@ from planar.model.pairs.base import (
     MeasureKind,
     Pair,
     PairSample,
+    PieceEnds,
     Schema,
     described,
     list_schema,
@@ -95,6 +96,12 @@ class GenevaPair(Pair):
     def input_position(self, frames: Sequence[Frame], numbers: Sequence[Scalar], own: Sequence[Scalar]) -> Scalar:
         """The angle of the crank against the carrier."""
         return frames[0].angle - frames[2].angle
+
+    def piece_ends(self, shapes: Mapping[str, LinkShape]) -> PieceEnds:
+        """Where the pin enters a slot and leaves it."""
+        engaged = 0.5 * pi - pi / self.slots
+        middle = self.mesh_reference[0]
+        return PieceEnds(self.links[0], self.carrier, (middle - engaged, middle + engaged))
 
     def effort_action(self, frames: Mapping[str, Frame], shapes: Mapping[str, LinkShape]) -> EffortAction:
         return EffortAction(self.links[0], self.carrier)

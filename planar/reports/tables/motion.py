@@ -98,12 +98,10 @@ def position_heading(motion: Motion) -> str:
     )
 
 
-def position_cell(motion: Motion, row: int) -> str:
-    """Where in a run a row is, under that heading."""
+def place_cell(motion: Motion, place: float) -> str:
+    """A time (s) of a run in time, else a position of the running input (rad or m), under that heading."""
     driver = running_pair(motion)
-    if motion.time is not None:
-        return format_number(float(motion.time[row]))
-    return format_number(_to_file_unit(motion, driver, float(motion.inputs[driver].position[row]))) if driver else ""
+    return format_number(place if driver is None else _to_file_unit(motion, driver, place))
 
 
 def _to_file_unit(motion: Motion, pair: str, value: float) -> float:

@@ -14,6 +14,7 @@ from planar.model.file_units import display_unit
 from planar.reports.columns import ReportedSeries
 from planar.reports.fitted_table import FittedTable, plain_table
 from planar.reports.number_format import (
+    AMONG_POSITIONS,
     column_heading,
     format_number,
     format_or_zero,
@@ -133,7 +134,7 @@ def _energies_table(simulation: Simulation) -> FittedTable:
         "of",
         *(column_heading(each, "energy", units) for each in ("at the start", "at the end", "least", "greatest")),
     )
-    table = plain_table("Energy", *headings)
+    table = plain_table(f"Energy{AMONG_POSITIONS}", *headings)
     most = max(float(np.abs(getattr(simulation, what)).max()) for what in ENERGIES)
     there = {"lost": bool(simulation.impacts), "heat": bool(simulation.rubbing)}
     for what, name in ENERGIES.items():

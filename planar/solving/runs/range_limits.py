@@ -26,6 +26,11 @@ class RangeLimits:
             float(each.u[ranged.index]) * ranged.scale for each in found.passed if each.passed.is_switched
         )
 
+    @property
+    def unknowns(self) -> Array:
+        """See `FollowedPath.unknowns`."""
+        return self.found.z
+
     def limits(self, motion: Motion) -> tuple[Limit, ...]:
         """See `Motion.limits`."""
         ranged, found = self.ranged, self.found

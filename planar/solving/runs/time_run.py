@@ -112,6 +112,11 @@ class _TimeCourse:
         self.singular_rows = frozenset(found.branch_rates)
         self.fork_positions: tuple[float, ...] = ()
 
+    @property
+    def unknowns(self) -> Array:
+        """See `FollowedPath.unknowns`."""
+        return self.found.z
+
     def limits(self, motion: Motion) -> tuple[Limit, ...]:
         """See `Motion.limits`."""
         solver, found = self.timed.solver, self.found

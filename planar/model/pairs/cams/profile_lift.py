@@ -165,6 +165,11 @@ class ProfileLift:
             if stop - start > 1e-9
         ]
 
+    def piece_starts(self, rest: FollowerRest) -> list[float]:
+        """Angles of the law at which one polynomial of the lift ends and the next begins."""
+        first, _, _, _, *pieces = self.solved(rest).numbers
+        return [first + start for start in pieces[::PIECE]]
+
     def find_problem(self, rest: FollowerRest) -> str:
         """Why the follower cannot go round; empty where it can."""
         wrong = find_profile_problem(_floats(self.points))  # which changed numbers may bring

@@ -14,7 +14,7 @@ from planar.foundation.geometry import Frame, Vector, direction, frame_at
 from planar.foundation.jets import Scalar
 from planar.model.entry_reader import EntryReader, QuantityWriter
 from planar.model.link_shapes import LinkShape
-from planar.model.pairs.base import LengthFormatter, MeasureKind, Pair, ToothContact
+from planar.model.pairs.base import LengthFormatter, MeasureKind, Pair, PieceEnds, ToothContact
 from planar.model.pairs.cams import (
     CamContact,
     FollowerAxes,
@@ -188,6 +188,15 @@ class ProfiledPair(Pair):
         circles: Any = self.law
         found: list[LiftPiece] = circles.lift_pieces(self.law_numbers(shapes))
         return found
+
+    def piece_ends(self, shapes: Mapping[str, LinkShape]) -> PieceEnds:
+        """Where one piece of the lift ends and the next begins."""
+        of_bodies = [shapes[body] for body in self.bodies]
+        if self.profile_by_points is not None:
+            angles = self.profile_by_points.piece_starts(self._follower_rest(of_bodies))
+        else:
+            angles = [piece.start for piece in self.lift_pieces(of_bodies)]
+        return PieceEnds(self.links[0], self.carrier, tuple(self.start + self.sense * angle for angle in angles))
 
     def contact(self, shapes: Sequence[LinkShape], law_angle: Scalar) -> CamContact | None:
         """Where cam and follower touch at an angle of the law (rad), seen from the carrier; None without a shape."""

@@ -20,7 +20,14 @@ from planar.equations.mechanism_numbers import mechanism_size
 from planar.foundation.units import parse_unit
 from planar.model.file_units import FileUnits, display_unit
 from planar.reports.fitted_table import FittedTable, plain_table
-from planar.reports.number_format import column_heading, format_quantity, paragraphs, precision_text, quantity_text
+from planar.reports.number_format import (
+    AMONG_POSITIONS,
+    column_heading,
+    format_quantity,
+    paragraphs,
+    precision_text,
+    quantity_text,
+)
 
 POWERS = dict(zip(QUANTITIES, (int(power) for power in QUANTITY_POWERS), strict=True))
 ROUNDING = 1e-12
@@ -63,7 +70,7 @@ def balance_tables(found: BalanceReport) -> RenderableType:
     if found.best is not None:
         parts += [Text(), _shaking_table(found.best, units), paragraphs(_best_facts(found.best, units))]
         if found.best.counterweights:
-            parts.append(_counterweight_table("Counterweights", found.best.counterweights, units))
+            parts.append(_counterweight_table(f"Counterweights{AMONG_POSITIONS}", found.best.counterweights, units))
     if found.tradeoff is not None:
         parts += [Text(), _tradeoff_table(found.tradeoff, units)]
     return Group(*parts)
@@ -177,7 +184,9 @@ def _counterweight_table(title: str, weights: Iterable[Counterweight], units: Fi
 
 
 def _shaking_table(found: Balance, units: FileUnits) -> FittedTable:
-    table = plain_table("Shaking", "", ("before", "after"), ("root mean square before", "after"), left=(0,), keys=1)
+    table = plain_table(
+        f"Shaking{AMONG_POSITIONS}", "", ("before", "after"), ("root mean square before", "after"), left=(0,), keys=1
+    )
     names = {"shaking moment": f"shaking moment about {found.about_name}", "peak torque": f"effort of {found.input}"}
     slides = found.motion.has_length_motion(found.input)
     arm = mechanism_size(found.motion.mechanism, found.motion.shapes)
@@ -198,12 +207,11 @@ def _best_facts(found: Balance, units: FileUnits) -> Iterator[tuple[str, str]]:
     kind = "force" if slides and found.minimised == "peak torque" else OBJECTIVE_KINDS[found.minimised]
     value, bound = (_beside(each, found.value_before, kind, units) for each in (found.value, found.bound))
     borne = ", ".join(found.links)
-    rows = f"among {len(found.motion)} positions" if found.measure == "greatest" else "over the motion"
-    yield "least", f"{found.measure} {found.minimised} {rows}: {value}, by counterweights on {borne}"
+    yield "least", f"{found.measure} {found.minimised}{AMONG_POSITIONS}: {value}, by counterweights on {borne}"
     if found.is_searched:
-        yield "", f"the best discs that were found by search; none within the limits go below {bound}"
+        yield "", f"the best discs of a search{AMONG_POSITIONS}; none within the limits go below {bound}"
     else:
-        yield "", f"none within the limits go below {bound}"
+        yield "", f"none within the limits go below {bound}{AMONG_POSITIONS}"
     if not found.counterweights:
         yield "", "no counterweight within the limits makes it less"
     if found.frame_error is not None:
@@ -218,7 +226,7 @@ def _beside(value: float, before: float, kind: str, units: FileUnits) -> str:
 
 def _tradeoff_table(found: BalanceTradeoff, units: FileUnits) -> FittedTable:
     table = plain_table(
-        f"Shaking moment beside shaking force, about {found.about_name}",
+        f"Shaking moment beside shaking force, about {found.about_name}{AMONG_POSITIONS}",
         column_heading("force", "force", units),
         column_heading("moment", "torque", units),
         column_heading("bound", "torque", units),

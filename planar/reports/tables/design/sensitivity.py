@@ -18,7 +18,7 @@ from planar.model.file_units import FileUnits, display_unit
 from planar.model.mechanism import relative_motions
 from planar.model.wording import amount, join_all_names
 from planar.reports.fitted_table import FittedTable, plain_table
-from planar.reports.number_format import column_heading, format_number, paragraphs
+from planar.reports.number_format import AMONG_POSITIONS, column_heading, format_number, paragraphs
 from planar.results.motion import Motion
 
 MAX_ROWS = 24
@@ -62,7 +62,8 @@ def _influence_table(found: Sensitivity, name: str, influences: tuple[Influence,
     if motion is not None:
         headings = ["greatest slope", "at time" if motion.time is not None else f"at {motion.running_input}"]
     what = name.replace("_", " ")
-    title = f"{what[0].upper()}{what[1:]} of {found.of}, by the numbers of the file"
+    among = "" if motion is None else AMONG_POSITIONS
+    title = f"{what[0].upper()}{what[1:]} of {found.of}, by the numbers of the file{among}"
     columns = ("value", *headings, column_heading("effect", kind, units))
     shown = plain_table(title, "number", *columns)
     effect_unit = display_unit(kind, units)[1]

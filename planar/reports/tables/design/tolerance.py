@@ -15,7 +15,7 @@ from planar.foundation.arrays import Array
 from planar.model.file_units import display_unit
 from planar.model.wording import amount
 from planar.reports.fitted_table import FittedTable, plain_table
-from planar.reports.number_format import column_heading, format_number, paragraphs
+from planar.reports.number_format import AMONG_POSITIONS, column_heading, format_number, paragraphs
 from planar.results.motion import Motion
 
 MAX_ROWS = 24
@@ -42,7 +42,8 @@ def _band_table(band: ToleranceBand) -> FittedTable:
     if band.has_rows and isinstance(band.moving, Motion):
         running = band.moving.running_input
         kind = band.moving._relative_motions[running].input_kind.value
-        where = f" at {running} = {amount(float(band.moving.inputs[running].position[row]), kind, units)}"
+        position = float(band.moving.inputs[running].position[row])
+        where = f" at {running} = {amount(position, kind, units)}{AMONG_POSITIONS}"
     title = f"{band.result.replace('_', ' ').capitalize()} of {band.of} within the tolerances{where}"
     shown = plain_table(
         title,
@@ -71,7 +72,7 @@ def _band_table(band: ToleranceBand) -> FittedTable:
 def _contribution_table(band: ToleranceBand) -> FittedTable:
     units, row = band.moving.mechanism.units, band.row
     shown = plain_table(
-        "Contributions",
+        f"Contributions{_among_positions(band)}",
         "number",
         "tolerance",
         column_heading("deviation", band.kind, units),
@@ -83,6 +84,11 @@ def _contribution_table(band: ToleranceBand) -> FittedTable:
         if share > LEAST_SHARE or far > 0.0:
             shown.add_row(name, _tolerance_text(band, name), format_number(unit.from_si(far)), f"{100.0 * share:.1f}")
     return shown
+
+
+def _among_positions(band: ToleranceBand) -> str:
+    """What is said of the widest band over a motion, which is that of one of its positions."""
+    return AMONG_POSITIONS if band.has_rows and isinstance(band.moving, Motion) else ""
 
 
 def _deviations(band: ToleranceBand) -> Array:
@@ -115,7 +121,8 @@ def _allowance_table(band: ToleranceBand, allowed: Allowance) -> FittedTable:
     units = band.moving.mechanism.units
     kinds = {each.number: each.kind for each in band.variations.numbers}
     by = "three standard deviations" if allowed.statistical else "the worst case"
-    title = f"Tolerances that keep {band.of} within {amount(allowed.limit, band.kind, units)} by {by}"
+    limit = amount(allowed.limit, band.kind, units)
+    title = f"Tolerances that keep {band.of} within {limit} by {by}{_among_positions(band)}"
     shown = plain_table(title, "number", "equal contribution", "least cost")
     for name, value in allowed.equal.items():
         texts = (f"± {amount(each, kinds[name], units)}" for each in (value, allowed.least_cost[name]))
@@ -125,8 +132,9 @@ def _allowance_table(band: ToleranceBand, allowed: Allowance) -> FittedTable:
 
 def _remarks(band: ToleranceBand, allowed: Allowance | None) -> Iterator[str]:
     units = band.moving.mechanism.units
+    among = _among_positions(band)
     worst = amount(float(np.atleast_1d(band.worst)[band.row]), band.kind, units)
-    yield f"worst case, all deviations at their limits: off by {worst} at most, to the first order"
+    yield f"worst case, all deviations at their limits: off by {worst} at most{among}, to the first order"
     spread = "limits are at three standard deviations" if band.distribution == "normal" else "all within limits alike"
     yield f"statistical: deviations are independent and {band.distribution}, {spread}; pins stand on their circles"
     if band.limit is not None:
@@ -134,10 +142,11 @@ def _remarks(band: ToleranceBand, allowed: Allowance | None) -> Iterator[str]:
         told = ""
         if band.sampled is not None and band.sampled.within_all is not None:
             told = f"; of those sampled {100.0 * band.sampled.within_all:.2f} % at all positions"
-        yield f"{share:.2f} % of all mechanisms keep the limit{' at the worst position' if band.has_rows else ''}{told}"
+        place = f" at the worst position{among}" if band.has_rows else ""
+        yield f"{share:.2f} % of all mechanisms keep the limit{place}{told}"
     if band.sampled is not None:
         worst = amount(float(band.sampled.worst.max()), band.kind, units)
-        yield f"of {band.sampled.mechanisms} random mechanisms the farthest is off by {worst}"
+        yield f"of {band.sampled.mechanisms} random mechanisms the farthest is off by {worst}{among}"
     if band.guaranteed is not None:
         worst = amount(float(band.guaranteed.worst.max()), band.kind, units)
         where = ", at any position of the motion" if band.has_rows else ""

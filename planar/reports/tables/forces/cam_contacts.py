@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from itertools import groupby
 from typing import Any
 
 import numpy as np
 
-from planar.analysis.cams.contact_force import ContactForce, contact_forces
+from planar.analysis.cams.contact_force import ContactForce, contact_columns, contact_forces
+from planar.dynamics.force_course import LEAST_SCALE_RATIO
 from planar.dynamics.forces import Forces
 from planar.foundation.arrays import Array
 from planar.model.wording import amount, join_all_names
 from planar.reports.columns import ReportedSeries
 from planar.reports.fitted_table import FittedTable, plain_table
-from planar.reports.number_format import column_heading, format_quantity
-from planar.reports.tables.motion import position_cell, position_heading
+from planar.reports.number_format import AMONG_POSITIONS, column_heading, format_quantity
+from planar.reports.tables.forces.run_extremes import RunExtremes
+from planar.reports.tables.motion import place_cell, position_heading
 from planar.results.motion import Motion
 
 
@@ -25,58 +26,70 @@ def contacts_table(forces: Forces) -> FittedTable | None:
     if not contacts:
         return None
     has_stress = any(each.stress is not None for each in contacts.values())
+    extremes = _contact_extremes(forces)
     at = (position_heading(moving),) if isinstance(moving, Motion) else ()
     most = "greatest " if at else ""
     columns = [(column_heading(f"{most}force", "force", units), *at)]
     if has_stress:
         columns.append((column_heading(f"{most}stress", "stress", units), *at))
-    title = "Contact of cams, among these positions" if at else "Contact of cams"
+    title = "Contact of cams" + (extremes.title if extremes is not None else "")
     table = plain_table(title, "pair", *columns, left=(0,))
-    for name, each in contacts.items():
-        cells = _cells(forces, each.force, "force")
-        if has_stress:
-            cells += _cells(forces, each.stress, "stress")
+    column = 0
+    for name, contact in contacts.items():
+        cells = _cells(forces, extremes, column, contact.force, "force")
+        column += 1
+        if contact.stress is not None:
+            cells += _cells(forces, extremes, column, contact.stress, "stress")
+            column += 1
+        elif has_stress:
+            cells += ("-", "") if at else ("-",)
         table.add_row(name, *cells)
     return table
 
 
-def _cells(forces: Forces, values: Array | None, kind: str) -> tuple[str, ...]:
+def _contact_extremes(forces: Forces) -> RunExtremes | None:
+    """The extreme forces and stresses of all contacts over a motion; None at a position."""
+    if not isinstance(forces.moving, Motion):
+        return None
+    rows = contact_columns(forces)
+    return RunExtremes(forces, contact_columns, LEAST_SCALE_RATIO * np.nan_to_num(np.abs(rows)).max(axis=0))
+
+
+def _cells(forces: Forces, extremes: RunExtremes | None, column: int, values: Array, kind: str) -> tuple[str, ...]:
     """The greatest value, and over a motion where it is."""
-    over = isinstance(forces.moving, Motion)
-    if values is None or not np.isfinite(values).any():
-        return ("-", "") if over else ("-",)
-    row = int(np.nanargmax(values))
-    told = format_quantity(float(values[row]), kind, forces.mechanism.units)
-    return (told, position_cell(forces.moving, row)) if isinstance(forces.moving, Motion) else (told,)
+    if extremes is None:
+        value = float(values[0])
+        return (format_quantity(value, kind, forces.mechanism.units) if np.isfinite(value) else "-",)
+    most = extremes.greatest(column)
+    size = float(np.sqrt(most.value)) if kind == "stress" else most.value
+    return (format_quantity(size, kind, forces.mechanism.units), most.place)
 
 
 def lift_off_remarks(forces: Forces) -> list[str]:
     """A sentence for each cam whose follower lifts off somewhere: where, and how hard the cam would have to pull."""
-    told = []
-    for name, each in contact_forces(forces).items():
-        if not each.lifts_off.any():
+    remarks = []
+    for name, contact in contact_forces(forces).items():
+        is_lifted = bool(contact.lift_off) if isinstance(forces.moving, Motion) else bool(contact.lifts_off.any())
+        if not is_lifted:
             continue
-        pull = amount(-float(np.nanmin(each.force)), "force", forces.mechanism.units)
-        told.append(
-            f"the follower of {name!r} lifts off {_places(forces, each.lifts_off)}: the cam would have to pull it by "
+        pull = amount(-contact.least, "force", forces.mechanism.units)
+        among = "" if contact.is_solved else AMONG_POSITIONS
+        remarks.append(
+            f"the follower of {name!r} lifts off {_places(forces, contact)}{among}: the cam would have to pull it by "
             f"up to {pull}; a stronger spring, a groove or less speed keeps it down"
         )
-    return told
+    return remarks
 
 
-def _places(forces: Forces, lifts_off: Array) -> str:
-    """Where a follower lifts off, by positions of the motion."""
+def _places(forces: Forces, contact: ContactForce) -> str:
+    """Where a follower lifts off."""
     motion = forces.moving
     if not isinstance(motion, Motion):
         return "here"
     name, unit = position_heading(motion).rsplit(", ", 1)
-    spans = []
-    for lifted, rows in groupby(range(len(lifts_off)), key=lambda row: bool(lifts_off[row])):
-        ends = list(rows)
-        if lifted:
-            first, last = (position_cell(motion, row) for row in (ends[0], ends[-1]))
-            spans.append(first if first == last else f"{first} to {last}")
-    return f"{name} = {join_all_names(spans)} {unit}".replace("at at", "at")
+    intervals = [[place_cell(motion, end) for end in interval] for interval in contact.lift_off]
+    texts = [first if first == last else f"{first} to {last}" for first, last in intervals]
+    return f"{name} = {join_all_names(texts)} {unit}"
 
 
 def contact_series(forces: Forces) -> Iterator[ReportedSeries]:
@@ -87,11 +100,25 @@ def contact_series(forces: Forces) -> Iterator[ReportedSeries]:
 
 
 def record(forces: Forces) -> dict[str, Any]:
-    """The contacts as JSON values (SI); over a motion the greatest."""
-    found = {name: _contact_record(each) for name, each in contact_forces(forces).items()}
-    return {"contacts": found} if found else {}
+    """The contacts as JSON values (SI); over a motion the greatest, and the intervals in which followers lift off."""
+    contacts = contact_forces(forces)
+    if not contacts:
+        return {}
+    extremes, column, records = _contact_extremes(forces), 0, {}
+    for name, contact in contacts.items():
+        values = [contact.force] + ([] if contact.stress is None else [contact.stress])
+        if extremes is None:
+            greatest = [float(each[0]) for each in values]
+        else:
+            greatest = [extremes.greatest(column + k).value for k in range(len(values))]
+            greatest[1:] = [float(np.sqrt(each)) for each in greatest[1:]]
+        column += len(values)
+        records[name] = _contact_record(forces, contact, greatest)
+    return {"contacts": records}
 
 
-def _contact_record(each: ContactForce) -> dict[str, float | None]:
-    values = {"force": each.force} | ({} if each.stress is None else {"stress": each.stress})
-    return {what: float(np.nanmax(value)) if np.isfinite(value).any() else None for what, value in values.items()}
+def _contact_record(forces: Forces, contact: ContactForce, greatest: list[float]) -> dict[str, Any]:
+    names = ["force"] + ([] if contact.stress is None else ["stress"])
+    values = dict(zip(names, (each if np.isfinite(each) else None for each in greatest), strict=True))
+    over = {"lift_off": [list(interval) for interval in contact.lift_off]} if isinstance(forces.moving, Motion) else {}
+    return {**values, **over}

@@ -10,27 +10,30 @@ from rich.console import Group, RenderableType
 from rich.text import Text
 
 from planar.analysis.efforts.unknown_load import UnknownLoad
-from planar.dynamics.forces import Forces
+from planar.dynamics.flywheel import explain_no_cycle, mean_effort
+from planar.dynamics.force_course import LEAST_SCALE_RATIO
+from planar.dynamics.forces import Forces, greatest_moment_and_force
 from planar.dynamics.load_attachment import attachment_remarks
 from planar.dynamics.reactions import Reaction
 from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput
 from planar.model.file_units import display_unit
-from planar.model.wording import count_phrase, join_all_names
+from planar.model.wording import count_phrase, join_all_names, quote_names
 from planar.reports.columns import ReportedSeries
 from planar.reports.fitted_table import FittedTable, plain_table
-from planar.reports.number_format import ROUNDING_RATIO, column_heading, format_or_zero, format_quantity, paragraphs
+from planar.reports.number_format import column_heading, format_or_zero, format_quantity, paragraphs
 from planar.reports.tables.forces import cam_contacts, fixed_wheels, flywheels, friction, loads, motors, unknown_loads
 from planar.reports.tables.forces import position_forces as at_one
-from planar.reports.tables.motion import motion_heading, position_cell, position_heading, running_pair
+from planar.reports.tables.forces.run_extremes import RunExtremes
+from planar.reports.tables.motion import motion_heading, position_heading
 from planar.results.motion import Motion
 
 
 def tables(
     forces: Forces, wanted: flywheels.WantedFlywheel | None = None, unknown: UnknownLoad | None = None
 ) -> RenderableType:
-    """Mean, least and greatest effort of every input, the greatest force and couple in every pair, each with where; the
-    flywheel that is wanted, and the load that is solved for."""
+    """Mean, least and greatest effort of every input, the greatest force and couple in every pair, each with its place;
+    the flywheel and the load that are asked for."""
     motion = _motion_of(forces)
     parts: list[RenderableType] = [
         *motion_heading(motion),
@@ -58,6 +61,7 @@ def tables(
     notes = (
         *motors.motor_sentences(forces, duties),
         *_undetermined_sentences(forces, len(motion)),
+        *_mean_remarks(forces),
         *cam_contacts.lift_off_remarks(forces),
         *forces.remarks,
         *attachment_remarks(forces.mechanism),
@@ -75,105 +79,140 @@ def _motion_of(forces: Forces) -> Motion:
 
 
 def _efforts_table(forces: Forces, motion: Motion) -> FittedTable:
-    at, most = position_heading(motion), at_one.greatest_moment_and_force(forces)
-    table = plain_table(
-        "Inputs, among these positions", "input", ("mean effort", "unit"), ("least", at), ("greatest", at), left=(0, 2)
-    )
-    for name, effort in forces.inputs.items():
+    at, largest = position_heading(motion), greatest_moment_and_force(forces)
+    extremes = effort_extremes(forces)
+    headings = ("input", ("mean effort", "unit"), ("least", at), ("greatest", at))
+    table = plain_table(f"Inputs{extremes.title}", *headings, left=(0, 2))
+    for column, name in enumerate(forces.inputs):
         _, unit, of = at_one.effort_name_and_unit(forces, name)
-        values = np.asarray(effort)
-        scale = most[forces.is_force_input(name)]
-        least, greatest = _extremes_with_places(motion, values, scale)
+        scale = largest[forces.is_force_input(name)]
+        least, greatest = extremes.least_and_greatest(column, scale)
         mean, low, high = (
-            format_or_zero(of.from_si(each), of.from_si(scale))
-            for each in (_mean(motion, values), least[0], greatest[0])
+            format_or_zero(of.from_si(value), of.from_si(scale))
+            for value in (known_mean(forces, name), least.value, greatest.value)
         )
-        table.add_row(name, mean, unit, low, least[1], high, greatest[1])
+        table.add_row(name, mean, unit, low, least.place, high, greatest.place)
     return table
 
 
 def _holding_torques_table(forces: Forces, motion: Motion) -> FittedTable:
     """The least and the greatest torque that holds wheels of the frame, about each centre."""
-    at, moment, units = position_heading(motion), at_one.greatest_moment_and_force(forces)[0], forces.mechanism.units
-    title = f"Holding torque on wheels of {forces.mechanism.frame}, anticlockwise, among these positions"
+    at, moment, units = position_heading(motion), greatest_moment_and_force(forces)[0], forces.mechanism.units
+    extremes = RunExtremes(
+        forces,
+        lambda found: np.stack([wheel.torque for wheel in found.fixed_wheels.values()], axis=-1),
+        LEAST_SCALE_RATIO * moment,
+    )
+    title = f"Holding torque on wheels of {forces.mechanism.frame}, anticlockwise{extremes.title}"
     heading = column_heading("least", "torque", units), column_heading("greatest", "torque", units)
     table = plain_table(title, "about", "pair", (heading[0], at), (heading[1], at), left=(0, 1), keys=2)
-    for name, wheel in forces.fixed_wheels.items():
-        values = np.asarray(wheel.torque)
-        least, greatest = _extremes_with_places(motion, values, moment)
-        low, high = (format_quantity(value, "torque", units, moment) for value in (least[0], greatest[0]))
+    for column, (name, wheel) in enumerate(forces.fixed_wheels.items()):
+        least, greatest = extremes.least_and_greatest(column, moment)
+        low, high = (format_quantity(extreme.value, "torque", units, moment) for extreme in (least, greatest))
         about = "-" if wheel.centre is None else name
-        table.add_row(about, join_all_names([*wheel.shares]), low, least[1], high, greatest[1])
+        table.add_row(about, join_all_names([*wheel.shares]), low, least.place, high, greatest.place)
     return table
 
 
-def _mean(motion: Motion, values: Array) -> float:
-    """Over the time, or over the way of the input that runs, there and back: work by way where it does not turn."""
-    driver = running_pair(motion)
-    ways = motion.time if driver is None else motion.inputs[driver].position
-    steps = np.zeros(0) if ways is None else np.abs(np.diff(ways))
-    if not steps.any():
-        return float(values[0])
-    return float(np.sum(0.5 * (values[1:] + values[:-1]) * steps) / np.sum(steps))
+def effort_extremes(forces: Forces) -> RunExtremes:
+    """The extreme efforts of all inputs, a column each."""
+    moment, force = greatest_moment_and_force(forces)
+    scales = [LEAST_SCALE_RATIO * (force if forces.is_force_input(name) else moment) for name in forces.inputs]
+    return RunExtremes(forces, lambda found: np.stack([*found.inputs.values()], axis=-1), np.array(scales))
 
 
-def _extremes_with_places(motion: Motion, values: Array, scale: float) -> tuple[tuple[float, str], tuple[float, str]]:
-    """The least and the greatest of values, each with its place; without one where they differ by round-off of a scale
-    alone."""
-    least, greatest = (_greatest_with_place(motion, sense * values) for sense in (-1.0, 1.0))
-    is_constant = greatest[0] + least[0] <= ROUNDING_RATIO * scale
-    return (-least[0], "" if is_constant else least[1]), (greatest[0], "" if is_constant else greatest[1])
+def known_mean(forces: Forces, name: str) -> float:
+    """The mean effort of an input over a whole cycle of it; NaN where there is none."""
+    return np.nan if explain_no_cycle(forces, name) else mean_effort(forces, name)
 
 
-def _greatest_with_place(motion: Motion, values: Array) -> tuple[float, str]:
-    """The greatest of the values that are determined, and where it is."""
-    if not np.isfinite(values).any():
-        return np.nan, ""
-    row = int(np.nanargmax(values))
-    return float(values[row]), position_cell(motion, row)
+def _mean_remarks(forces: Forces) -> Iterator[str]:
+    """Of which inputs there is no mean effort, and why."""
+    reasons: dict[str, list[str]] = {}
+    for name in forces.inputs:
+        reason = explain_no_cycle(forces, name)
+        if reason:
+            reasons.setdefault(reason, []).append(name)
+    for reason, names in reasons.items():
+        yield f"no mean effort of {quote_names(names)}: {reason}"
 
 
 def _reactions_table(forces: Forces, motion: Motion) -> FittedTable:
     units, at, (moment, greatest) = (
         forces.mechanism.units,
         position_heading(motion),
-        at_one.greatest_moment_and_force(forces),
+        greatest_moment_and_force(forces),
     )
     force = (column_heading("greatest force", "force", units), column_heading("its direction", "angle", units), at)
     headings = ("pair", "on", "by", force, (column_heading("greatest couple", "torque", units), at))
-    table = plain_table("Reactions in the pairs, among these positions", *headings, left=(0, 1, 2), keys=3)
+    small = LEAST_SCALE_RATIO * moment, LEAST_SCALE_RATIO * greatest
+    scales = [
+        scale
+        for each in forces.reactions.values()
+        for scale in (
+            (small[1], small[1], small[1] ** 2, small[0]) if each.at is not None else small[:1] * len(each.couples)
+        )
+    ]
+    extremes = RunExtremes(forces, _reaction_columns, np.array(scales))
+    table = plain_table(f"Reactions in the pairs{extremes.title}", *headings, left=(0, 1, 2), keys=3)
+    column = 0
     for name, each in forces.reactions.items():
         first, second = each.links
         if each.at is not None:
-            sizes = np.hypot(*each.force.T)
-            most, where = _greatest_with_place(motion, sizes)
-            way = loads.polar_cells(each.force[int(np.nanargmax(sizes))], units, "force", greatest)[1] if where else ""
-            told = format_quantity(most, "force", units, greatest), way, where if way else ""
-            table.add_row(name, second, first, *told, *_greatest_couple(motion, each.couple, moment))
-        for link, couple in each.couples.items():
-            table.add_row(name, link, "", "-", "", "", *_greatest_couple(motion, couple, moment))
+            most = extremes.greatest(column + 2)
+            size = float(np.sqrt(most.value))
+            way = (
+                loads.polar_cells(most.columns[column : column + 2], units, "force", greatest)[1] if most.place else ""
+            )
+            cells = format_quantity(size, "force", units, greatest), way, most.place if way else ""
+            table.add_row(name, second, first, *cells, *_couple_cells(extremes, column + 3, forces, moment))
+            column += 4
+        for link in each.couples:
+            table.add_row(name, link, "", "-", "", "", *_couple_cells(extremes, column, forces, moment))
+            column += 1
     return table
 
 
-def _greatest_couple(motion: Motion, couple: Array | float, beside: float) -> tuple[str, str]:
-    """The greatest couple, whatever its sense, and where; nowhere if there is none."""
-    most, where = _greatest_with_place(motion, np.abs(np.asarray(couple)))
-    told = format_quantity(most, "torque", motion.mechanism.units, beside)
-    return told, "" if told == "0" else where
+def _reaction_columns(forces: Forces) -> Array:
+    """Of every pair the force, its square and the couple (n, 4), or the couples on its links (n, links)."""
+    columns: list[Array] = []
+    for each in forces.reactions.values():
+        if each.at is not None:
+            columns += [*each.force.T, np.sum(each.force**2, axis=-1), np.asarray(each.couple)]
+        columns += [np.asarray(couple) for couple in each.couples.values()]
+    return np.stack(columns, axis=-1)
+
+
+def _couple_cells(extremes: RunExtremes, column: int, forces: Forces, beside: float) -> tuple[str, str]:
+    """The greatest couple in either sense, and where; nowhere if there is none."""
+    most = extremes.greatest_size(column)
+    cell = format_quantity(most.value, "torque", forces.mechanism.units, beside)
+    return cell, "" if cell == "0" else most.place
 
 
 def _shaking_facts(forces: Forces, motion: Motion) -> Iterator[tuple[str, str]]:
     if not at_one.has_inertia(forces):
         return
+    name, measure = position_heading(motion).split(", ")
+    units, (moment, greatest) = motion.mechanism.units, greatest_moment_and_force(forces)
+    scales = np.array([(LEAST_SCALE_RATIO * greatest) ** 2, LEAST_SCALE_RATIO * moment])
+    extremes = RunExtremes(forces, _shaking_columns, scales)
+    most = extremes.greatest(0), extremes.greatest_size(1)
+    cells = []
+    for value, kind, beside, place in (
+        (np.sqrt(most[0].value), "force", greatest, most[0].place),
+        (most[1].value, "torque", moment, most[1].place),
+    ):
+        cell = format_quantity(float(value), kind, units, beside)
+        where = f" ({name} = {place} {measure})" if place and cell != "0" else ""
+        cells.append(f"up to {cell} {display_unit(kind, units)[0]}{where}")
+    yield "shaking", f"{cells[0]}, and {cells[1]} about the frame's origin{extremes.title}"
+
+
+def _shaking_columns(forces: Forces) -> Array:
+    """The square of the shaking force, and the shaking moment (n, 2)."""
     force, moment = forces.shaking
-    (name, measure), told = position_heading(motion).split(", "), []
-    sizes, most_of_all = (np.hypot(*force.T), np.abs(np.asarray(moment))), at_one.greatest_moment_and_force(forces)
-    units = motion.mechanism.units
-    for values, kind, beside in zip(sizes, ("force", "torque"), most_of_all[::-1], strict=True):
-        most, where = _greatest_with_place(motion, values)
-        unit = display_unit(kind, units)[0]
-        told.append(f"up to {format_quantity(most, kind, units, beside)} {unit} ({name} = {where} {measure})")
-    yield "shaking", f"{told[0]}, and {told[1]} about the frame's origin"
+    return np.stack([np.sum(force**2, axis=-1), np.asarray(moment)], axis=-1)
 
 
 def _undetermined_sentences(forces: Forces, position_count: int) -> Iterator[str]:
@@ -240,7 +279,9 @@ def run_facts(
         *forces.moving.remarks,
     ]
     duties = motors.motor_duties(forces)
-    told = {"motors": motors.record(duties)} if duties else {}
+    means = {name: known_mean(forces, name) for name in forces.inputs}
+    told: dict[str, Any] = {"mean_effort": {name: None if np.isnan(mean) else mean for name, mean in means.items()}}
+    told |= {"motors": motors.record(duties)} if duties else {}
     told |= {} if wanted is None else {"flywheel": flywheels.record(wanted)}
     told |= {} if unknown is None else {"solved_for": unknown_loads.record(unknown)}
     told |= friction.motion_record(forces) | cam_contacts.record(forces)

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from planar.analysis.efforts.self_locking import LockedInterval, jamming, self_locking
+from planar.dynamics.force_course import LEAST_SCALE_RATIO, force_course, has_unknown_intervals
 from planar.dynamics.forces import Forces, PairFriction
 from planar.dynamics.friction.holding import Holding, holding
 from planar.foundation.arrays import Array
@@ -18,6 +19,7 @@ from planar.model.wording import join_all_names
 from planar.reports.columns import ReportedSeries
 from planar.reports.fitted_table import FittedTable, plain_table
 from planar.reports.number_format import column_heading, format_quantity, quantity_text
+from planar.reports.tables.forces.run_extremes import RunExtremes
 from planar.results.motion import Motion
 
 
@@ -40,23 +42,24 @@ def friction_table(forces: Forces) -> FittedTable:
 
 
 def friction_over_motion_table(forces: Forces) -> FittedTable:
-    """The greatest friction in every pair, and its heat on average over the positions."""
+    """The greatest friction in every pair, and its mean heat over the motion."""
     units = forces.mechanism.units
     headings = ("pair", ("greatest", "unit"), column_heading("mean heat", "power", units), "contacts")
-    table = plain_table("Friction, among these positions", *headings, left=(0, 2, 4))
-    for name, each in forces.friction.items():
-        sides = "; ".join(sorted({side for side in each.side if side}))
-        efforts = np.abs(np.asarray(each.effort))
-        mean = float(np.mean(_finite(each.heat))) if len(_finite(each.heat)) else np.nan
-        most = float(_finite(efforts).max(initial=0.0))
-        heat = format_quantity(mean, "power", units)
-        table.add_row(name, *_effort_cells(forces.mechanism, name, most), heat, sides)
+    rows = _friction_columns(forces)
+    extremes = RunExtremes(forces, _friction_columns, LEAST_SCALE_RATIO * np.nan_to_num(np.abs(rows)).max(axis=0))
+    table = plain_table(f"Friction{extremes.title}", *headings, left=(0, 2, 4))
+    for k, (name, friction) in enumerate(forces.friction.items()):
+        sides = "; ".join(sorted({side for side in friction.side if side}))
+        greatest, heat = extremes.greatest_size(2 * k).value, extremes.mean(2 * k + 1)
+        cells = _effort_cells(forces.mechanism, name, 0.0 if np.isnan(greatest) else greatest)
+        table.add_row(name, *cells, format_quantity(heat, "power", units), sides)
     return table
 
 
-def _finite(values: Array | float) -> Array:
-    flat = np.ravel(np.asarray(values, dtype=float))
-    return flat[np.isfinite(flat)]
+def _friction_columns(forces: Forces) -> Array:
+    """Of every pair with friction its effort and its heat (n, 2 pairs)."""
+    columns = [np.asarray(part) for each in forces.friction.values() for part in (each.effort, each.heat)]
+    return np.stack(columns, axis=-1)
 
 
 def _effort_kind(mechanism: Mechanism, name: str) -> str:
@@ -90,17 +93,26 @@ def efficiency_facts(forces: Forces) -> Iterator[tuple[str, str]]:
 
 
 def mean_efficiency(forces: Forces) -> float | None:
-    """The part of all that goes in over a motion that comes out again; None where friction is not told everywhere."""
-    heat = np.ravel(np.asarray(forces.heat_flow, dtype=float))
-    supplied = sum((np.maximum(each.power, 0.0) for each in forces.acting), np.zeros(()))
-    ways = forces.moving.time if isinstance(forces.moving, Motion) else None
-    if ways is None and isinstance(forces.moving, Motion):
-        ways = forces.moving.inputs[forces.moving.running_input].position
-    if ways is None or not (np.isfinite(heat).all() and np.isfinite(supplied).all()) or len(heat) < 2:
+    """The part of all work that goes in over a motion that comes out again, by integrals over its smooth pieces.
+
+    None where friction is unknown at a position, or the motion between its positions.
+    """
+    course = force_course(forces)
+    powers = _powers(forces)
+    if course is None or any(has_unknown_intervals(column) for column in powers.T):
         return None
-    steps = np.abs(np.diff(ways))
-    lost, whole = (float(np.sum(0.5 * (each[1:] + each[:-1]) * steps)) for each in (heat, np.ravel(supplied)))
-    return 1.0 - lost / whole if whole > 0.0 else None
+    series = course.series(_powers, LEAST_SCALE_RATIO * float(np.nanmax(np.abs(powers))))
+    if series is None:
+        return None
+    lost, *supplied = (series.integral(k) if k == 0 else series.positive_integral(k) for k in range(len(series.scale)))
+    return 1.0 - lost / sum(supplied) if sum(supplied) > 0.0 else None
+
+
+def _powers(forces: Forces) -> Array:
+    """The heat flow, and the power of all that acts (n, 1 + acting)."""
+    heat = np.asarray(forces.heat_flow, dtype=float)
+    parts = [heat, *(np.asarray(each.power, dtype=float) for each in forces.acting)]
+    return np.stack(np.broadcast_arrays(*parts), axis=-1)
 
 
 def held_at_rest(forces: Forces) -> Holding | None:

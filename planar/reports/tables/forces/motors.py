@@ -8,12 +8,13 @@ from typing import Any
 import numpy as np
 
 from planar.analysis.efforts.motor_duty import MotorDuty, motor_duty
+from planar.dynamics.force_course import force_course
 from planar.dynamics.forces import Forces
 from planar.model.file_units import display_unit
 from planar.model.mechanism import relative_motions
 from planar.model.wording import amount, join_all_names
 from planar.reports.fitted_table import FittedTable, plain_table
-from planar.reports.number_format import column_heading, format_number, format_quantity, quantity_text
+from planar.reports.number_format import AMONG_POSITIONS, column_heading, format_number, format_quantity, quantity_text
 from planar.results.motion import Motion
 
 
@@ -25,29 +26,43 @@ def motor_duties(forces: Forces) -> tuple[MotorDuty, ...]:
 def motors_table(forces: Forces, duties: tuple[MotorDuty, ...]) -> FittedTable:
     """What motors supply at the speeds that there are, and what is needed; over a motion where the margin is least."""
     moving = forces.moving
-    title = "Motors, where the margin is least" if isinstance(moving, Motion) else "Motors"
+    title = "Motors"
+    if isinstance(moving, Motion):
+        title += ", where the margin is least" + ("" if all(duty.is_solved for duty in duties) else AMONG_POSITIONS)
     units = forces.mechanism.units
     powers = (column_heading(each, "power", units) for each in ("power needed", "at most"))
     efforts = ("supplies", "needs", "margin", "unit")
     table = plain_table(title, "input", "at", "speed", efforts, *powers, left=(0, 1, 2, 6))
-    for each in duties:
-        velocity, row = np.atleast_1d(np.asarray(moving.inputs[each.input].velocity)), 0
-        margins = np.atleast_1d(np.asarray(each.margin))
-        if np.isfinite(margins).any():
-            row = int(np.nanargmin(margins))
-        rate_kind = relative_motions(forces.mechanism)[each.input].input_quantity_kinds()[1]
-        kind = "force" if forces.is_force_input(each.input) else "torque"
-        values = (np.atleast_1d(np.asarray(part))[row] for part in (each.available, each.needed, each.margin))
+    for duty in duties:
+        rate_kind = relative_motions(forces.mechanism)[duty.input].input_quantity_kinds()[1]
+        kind = "force" if forces.is_force_input(duty.input) else "torque"
+        velocity = _velocity_at(forces, duty)
+        available = float(duty.motor.effort_at(velocity))
+        needed = available - duty.motor.sense * duty.least if isinstance(moving, Motion) else float(duty.needed)
         table.add_row(
-            each.input,
-            _place(forces, each.least_at),
-            quantity_text(float(velocity[row]), rate_kind, units),
-            *(format_quantity(float(value), kind, units) for value in values),
+            duty.input,
+            _place(forces, duty.least_at),
+            quantity_text(velocity, rate_kind, units),
+            *(format_quantity(value, kind, units) for value in (available, needed, duty.least)),
             display_unit(kind, units)[0],
-            format_quantity(float(np.nanmax(np.atleast_1d(np.asarray(each.power)))), "power", units),
-            format_quantity(each.greatest_power, "power", units),
+            format_quantity(duty.greatest_power_needed, "power", units),
+            format_quantity(duty.greatest_power, "power", units),
         )
     return table
+
+
+def _velocity_at(forces: Forces, duty: MotorDuty) -> float:
+    """The velocity of the input where the margin is least."""
+    moving = forces.moving
+    if not isinstance(moving, Motion):
+        return float(moving.inputs[duty.input].velocity)
+    along = moving.inputs[moving.running_input].position if moving.time is None else moving.time
+    velocity = np.asarray(moving.inputs[duty.input].velocity)
+    course = force_course(forces)
+    if moving.time is not None and duty.is_solved and course is not None:
+        velocity = np.asarray(course.run.motion_at(np.array([duty.least_at])).inputs[duty.input].velocity)
+        return float(velocity[0])
+    return float(velocity[int(np.argmin(np.abs(along - duty.least_at)))] if np.isfinite(duty.least_at) else velocity[0])
 
 
 def motor_sentences(forces: Forces, duties: tuple[MotorDuty, ...]) -> Iterator[str]:
@@ -59,9 +74,10 @@ def motor_sentences(forces: Forces, duties: tuple[MotorDuty, ...]) -> Iterator[s
             yield f"the motor at {each.input!r} is too weak for this speed here: it slows down, or stalls"
             continue
         stretches = [f"from {_place(forces, low)} to {_place(forces, high)}" for low, high in each.too_weak]
+        among = "" if each.is_solved else AMONG_POSITIONS
         yield (
-            f"the motor at {each.input!r} is too weak for this speed {join_all_names(stretches)}: there it slows down, "
-            "and lives on what is stored; a simulation tells how far"
+            f"the motor at {each.input!r} is too weak for this speed {join_all_names(stretches)}{among}: it slows down "
+            "there and uses the kinetic energy of the links; a simulation computes by how much"
         )
 
 

@@ -11,10 +11,9 @@ from rich.text import Text
 
 from planar.analysis.efforts.unknown_load import UnknownLoad
 from planar.analysis.worked.published import Comparison
-from planar.dynamics.forces import Forces
+from planar.dynamics.forces import Forces, greatest_moment_and_force
 from planar.dynamics.load_attachment import attachment_remarks
 from planar.dynamics.reactions import Reaction
-from planar.equations.mechanism_numbers import mechanism_size
 from planar.foundation.errors import Outcome
 from planar.foundation.units import Unit
 from planar.model.file_units import display_unit
@@ -114,23 +113,6 @@ def effort_name_and_unit(forces: Forces, name: str) -> tuple[str, str, Unit]:
     """What an input's effort is called, which is its kind of quantity, and its unit, with the name that is printed."""
     kind = "force" if forces.is_force_input(name) else "torque"
     return (kind, *display_unit(kind, forces.mechanism.units))
-
-
-def greatest_moment_and_force(forces: Forces) -> tuple[float, float]:
-    """The greatest moment (N m) and the greatest force (N) of all that acts and all pairs: what rounding is beside."""
-    reactions = forces.reactions.values()
-    exerted = [(each.force, each.couple) for each in forces.acting] + [(each.force, each.couple) for each in reactions]
-    couples = [
-        *(couple for _, couple in exerted),
-        *(each for reaction in reactions for each in reaction.couples.values()),
-    ]
-    force = max((_largest(force) for force, _ in exerted), default=0.0)
-    couple = max(map(_largest, couples), default=0.0)
-    return max(couple, force * mechanism_size(forces.mechanism, forces.moving.shapes)), force
-
-
-def _largest(values: np.ndarray | float) -> float:
-    return float(np.max(np.abs(np.nan_to_num(values)), initial=0.0))
 
 
 def _inputs_table(forces: Forces) -> FittedTable:

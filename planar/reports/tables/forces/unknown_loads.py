@@ -9,7 +9,7 @@ import numpy as np
 
 from planar.analysis.efforts.unknown_load import UnknownLoad
 from planar.dynamics.forces import Forces
-from planar.reports.number_format import format_number, format_quantity, quantity_text
+from planar.reports.number_format import AMONG_POSITIONS, format_number, format_quantity, quantity_text
 
 
 def unknown_load_facts(forces: Forces, found: UnknownLoad) -> Iterator[tuple[str, str]]:
@@ -32,7 +32,7 @@ def _size_sentence(forces: Forces, found: UnknownLoad) -> str:
     if len(factor) > 1 and not found.is_constant:
         low = format_quantity(float(known.min()) * found.value, kind, units)
         high = quantity_text(float(known.max()) * found.value, kind, units)
-        return f"{holds} with a {found.what} from {low} to {high} over the motion"
+        return f"{holds} with a {found.what} from {low} to {high} over the motion{AMONG_POSITIONS}"
     over = " all over the motion" if len(factor) > 1 else ""
     return f"{holds}{over} with {_best_phrase(forces, found)}"
 
@@ -42,7 +42,7 @@ def _best_sentences(forces: Forces, found: UnknownLoad) -> Iterator[str]:
     if np.ndim(found.factor) and not found.is_constant and np.isfinite(found.left):
         effort = "force" if forces.is_force_input(found.input) else "torque"
         left = quantity_text(found.left, effort, forces.mechanism.units)
-        yield f"{_best_phrase(forces, found)}, comes nearest: it leaves up to {left}"
+        yield f"{_best_phrase(forces, found)}, comes nearest{AMONG_POSITIONS}: it leaves up to {left}"
 
 
 def _best_phrase(forces: Forces, found: UnknownLoad) -> str:

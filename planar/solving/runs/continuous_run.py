@@ -1,0 +1,294 @@
+"""A run between its rows: motions at any other places along it, and the places at which its law may bend or jump."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from typing import NamedTuple
+
+import numpy as np
+
+from planar.foundation.arrays import Array, BoolArray, IntArray
+from planar.foundation.errors import NoAnswer
+from planar.foundation.jets import value_and_rates
+from planar.model.pairs import MeasureKind
+from planar.results.motion import Motion
+from planar.results.records import Limit
+from planar.solving.continuation.fast_path import FastSamples
+from planar.solving.continuation.path import follow_samples
+from planar.solving.position import PositionSolver, solved_mechanism
+from planar.solving.rates.sample_rates import InputRates
+from planar.solving.runs.samples import RunSamples, build_motion
+from planar.solving.runs.time_run import input_law_rates
+
+PLACE_TOLERANCE = 1e-12
+"""Of a run: places nearer to each other are one."""
+MAX_ROOT_STEPS = 60
+LONGEST_GAP = 16.0
+"""Steps of a run: places that are farther apart are not followed from one to the other."""
+
+
+class ContinuousRun:
+    """A run of positions, made continuous.
+
+    A place is the time (s) of a run in time, else how far the running input has gone since the first row (rad or m).
+    The run keeps the branch of its rows. A simulated motion follows no law of its inputs and is not continuous.
+    """
+
+    def __init__(self, motion: Motion):
+        self.motion = motion
+        self.name = motion.running_input
+        known = solved_mechanism(motion.mechanism)
+        self.solver, self.assembly = known.solver, known.assembly
+        self.scale = np.array([_input_scale(self.solver, name) for name in motion.inputs])
+        position = motion.inputs[self.name].position
+        steps = np.diff(position)
+        self.rows: Array = (
+            np.concatenate([[0.0], np.cumsum(np.abs(steps))]) if motion.time is None else np.asarray(motion.time)
+        )
+        self.turning_rows: IntArray = np.flatnonzero(steps[1:] * steps[:-1] < 0.0) + 1
+        course = motion.course
+        kept = None if course is None else course.unknowns
+        self.z = run_unknowns(self.solver, motion) if kept is None else kept[: len(motion)]
+        singular = [] if course is None else [row for row in course.singular_rows if row < len(motion)]
+        self._is_sound: BoolArray = rows_with_rates(motion)
+        self._is_sound[singular] = False
+        forks = () if course is None or motion.time is not None else course.fork_positions
+        self.forks = self._places_of_positions(forks)
+
+    @property
+    def low(self) -> float:
+        """The first place."""
+        return float(self.rows[0])
+
+    @property
+    def high(self) -> float:
+        """The last place."""
+        return float(self.rows[-1])
+
+    @property
+    def is_regular(self) -> bool:
+        """Whether every row has rates, so that no dead point or unsolved row is on the way."""
+        return bool(rows_with_rates(self.motion).all()) and self.high > self.low
+
+    def positions(self, places: Array) -> Array:
+        """The position of the running input at places (n,), rad or m."""
+        return self._input_rates(np.asarray(places)).u[:, self._running] * self.scale[self._running]
+
+    def motion_at(self, places: Array) -> Motion:
+        """The motion at places (n,), in their order. Raises NoAnswer where the branch cannot be followed."""
+        places = np.asarray(places, dtype=float)
+        order = np.argsort(places, kind="stable")
+        back = np.argsort(order, kind="stable")
+        targets = places[order]
+        parts = [self._follow(part) for part in self._divided(targets) if len(part)]
+        samples = [part.fast_samples for part in parts]
+        fast = (
+            FastSamples(
+                np.concatenate([each.coordinate_rates for each in samples if each]),
+                np.concatenate([each.is_sure for each in samples if each]),
+                max(each.residual for each in samples if each),
+            )
+            if all(samples)
+            else None
+        )
+        z = np.vstack([part.z for part in parts])[back]
+        if fast is not None:
+            fast = FastSamples(fast.coordinate_rates[back], fast.is_sure[back], fast.residual)
+        local, first = {}, 0
+        for part in parts:
+            local |= {int(back[first + row]): rates for row, rates in part.branch_rates.items()}
+            first += len(part.z)
+        run = RunSamples(z, self._input_rates(places), branch_rates=local, fast_samples=fast)
+        time = None if self.motion.time is None else places
+        path = _PathAtPlaces(frozenset(local), z, self.motion)
+        motion = build_motion(self.solver, self.assembly, run, False, path, time)
+        if len(motion) < len(places):  # a pair that may stay open does so by too much
+            raise NoAnswer(motion.outcome, motion.reason)
+        return motion
+
+    def breaks(self) -> Array:
+        """Places inside the run at which the file says that something may bend or jump, and forks of the path."""
+        places = [*self.forks.tolist(), *self.rows[self.turning_rows].tolist()]
+        if self.motion.time is not None:
+            for given in self.motion.mechanism.inputs:
+                places += [] if given.law is None else given.law.joint_times
+        for pair in self.motion.mechanism.pairs:
+            ends = pair.piece_ends(self.motion.shapes)
+            if ends is not None:
+                link, carrier = ends.link, ends.carrier
+
+                def angle(motion: Motion, link: str = link, carrier: str = carrier) -> Array:
+                    angles = (value_and_rates(motion.frames[name].angle)[0] for name in (link, carrier))
+                    return np.broadcast_to(np.subtract(*angles), (len(motion),))
+
+                places += self.crossings(angle, ends.angles, 2.0 * np.pi).tolist()
+        return self.distinct(places)
+
+    def input_crossings(self, name: str, levels: Iterable[float], period: float = 0.0) -> Array:
+        """The places at which an input passes one of its positions, or one whole periods (rad) away."""
+        if self.motion.time is None and name == self.name:
+            low, high = np.min(self.motion.inputs[name].position), np.max(self.motion.inputs[name].position)
+            return self._places_of_positions([each for level in levels for each in _repeated(level, period, low, high)])
+        return self.crossings(lambda motion: motion.inputs[name].position, levels, period)
+
+    def speed_crossings(self, name: str, speeds: Iterable[float]) -> Array:
+        """The places at which an input passes one of these speeds."""
+        return self.crossings(lambda motion: motion.inputs[name].velocity, speeds)
+
+    def crossings(self, signal: Callable[[Motion], Array], levels: Iterable[float], period: float = 0.0) -> Array:
+        """The places at which a signal (n,) of a motion passes a level, or one whole periods away; each to round-off.
+
+        A level that is passed twice between two rows is not seen.
+        """
+        values = np.asarray(signal(self.motion), dtype=float)
+        brackets: list[tuple[float, float, float, float, float]] = []
+        for level in levels:
+            for target in _repeated(level, period, float(np.nanmin(values)), float(np.nanmax(values))):
+                gap = values - target
+                for k in np.flatnonzero((gap[1:] * gap[:-1] <= 0.0) & (gap[1:] != gap[:-1])):
+                    brackets.append((self.rows[k], self.rows[k + 1], gap[k], gap[k + 1], target))
+        if not brackets:
+            return np.zeros(0)
+        a, b, fa, fb, target = np.array(brackets).T
+        return self.distinct(self._refine(signal, (a, b), (fa, fb), target))
+
+    def distinct(self, places: Iterable[float]) -> Array:
+        """Places inside the run in their order, those that differ by rounding once."""
+        room = PLACE_TOLERANCE * (self.high - self.low)
+        inside = np.sort([place for place in places if self.low + room < place < self.high - room])
+        return inside[np.diff(inside, prepend=-np.inf) > room] if len(inside) else inside
+
+    def _refine(
+        self, signal: Callable[[Motion], Array], ends: tuple[Array, Array], values: tuple[Array, Array], target: Array
+    ) -> Array:
+        """Roots in brackets, all at once: false position with the weights of Anderson and Bjorck, else bisection."""
+        a, b, fa, fb = (each.copy() for each in (*ends, *values))
+        room = 1e-15 * max(abs(self.low), abs(self.high))
+        for step in range(MAX_ROOT_STEPS):
+            is_open = (np.abs(b - a) > room) & (fa != 0.0) & (fb != 0.0)
+            if not is_open.any():
+                break
+            with np.errstate(invalid="ignore", divide="ignore"):
+                middle = b - fb * (b - a) / (fb - fa)
+            half = 0.5 * (a + b)
+            middle = np.where(np.isfinite(middle) & (step % 3 < 2), middle, half)
+            middle = np.clip(middle, np.minimum(a, b), np.maximum(a, b))
+            f = np.asarray(signal(self.motion_at(middle[is_open])), dtype=float) - target[is_open]
+            for k, value in zip(np.flatnonzero(is_open), f, strict=True):
+                if value * fb[k] < 0.0:
+                    a[k], fa[k] = b[k], fb[k]
+                else:
+                    weight = 1.0 - value / fb[k]
+                    fa[k] *= weight if weight > 0.0 else 0.5
+                b[k], fb[k] = middle[k], value
+        return np.where(fa == 0.0, a, b)
+
+    @property
+    def _running(self) -> int:
+        return list(self.motion.inputs).index(self.name)
+
+    def _places_of_positions(self, positions: Iterable[float]) -> Array:
+        """The places at which the running input of a range has positions, each as often as it comes there."""
+        row_positions = self.motion.inputs[self.name].position
+        found = []
+        for position in positions:
+            gap = row_positions - position
+            k = np.flatnonzero(gap[1:] * gap[:-1] <= 0.0)
+            found += (self.rows[k] + np.abs(gap[k])).tolist()
+        return self.distinct(found)
+
+    def _input_rates(self, places: Array) -> InputRates:
+        motion = self.motion
+        if motion.time is not None:
+            parts = np.array([input_law_rates(each, places) for each in motion.mechanism.inputs])
+            return InputRates(*(part.T / self.scale for part in parts.transpose(1, 0, 2)))
+        k = np.clip(np.searchsorted(self.rows, places, side="right") - 1, 0, len(self.rows) - 2)
+        along = np.where(np.isin(k, self.turning_rows), k + 1, k)  # a turning row has the rates of the way before it
+        given = motion.inputs.values()
+        u = np.array([each.position[k] for each in given])
+        running = motion.inputs[self.name].position
+        u[self._running] = running[k] + (places - self.rows[k]) * np.sign(running[k + 1] - running[k])
+        u1, u2 = (np.array([getattr(each, rate)[along] for each in given]) for rate in ("velocity", "acceleration"))
+        return InputRates(*(part.T / self.scale for part in (u, u1, u2, np.zeros_like(u1))))
+
+    def _divided(self, targets: Array) -> list[Array]:
+        """Sorted places, divided where the path does not go on smoothly, and where no others are near."""
+        seams = np.sort([*self.forks.tolist(), *self.rows[~rows_with_rates(self.motion)].tolist()])
+        spacing = (self.high - self.low) / (len(self.rows) - 1)
+        gaps = np.flatnonzero(np.diff(targets) > LONGEST_GAP * spacing) + 1
+        return np.split(targets, np.unique([*np.searchsorted(targets, seams), *gaps]).astype(int))
+
+    def _follow(self, targets: Array) -> RunSamples:
+        """The unknowns at sorted places, followed over the rows between them from the nearest sound row."""
+        seams = [self.low - 1.0, *self.forks.tolist(), *self.rows[~rows_with_rates(self.motion)].tolist()]
+        start = max(seam for seam in seams if seam <= targets[0])
+        stop = min((seam for seam in seams if seam >= targets[-1]), default=np.inf)
+        usable = self._is_sound & (self.rows >= start) & (self.rows <= stop)
+        usable = usable if usable.any() else self._is_sound
+        base = int(np.argmin(np.where(usable, np.abs(self.rows - targets[0]), np.inf)))
+        between = self.rows[(self.rows > targets[0]) & (self.rows < targets[-1])]
+        places = np.sort(np.concatenate([targets, between]))
+        given = self._input_rates(np.concatenate([[self.rows[base]], places]))
+        found = follow_samples(self.solver, self.solver.inputs.p, self.z[base], given.u, rates=(given.u1, given.u2))
+        if found.stopped is not None:
+            raise found.stopped
+        wanted = 1 + np.searchsorted(places, targets)
+        where = {int(row): k for k, row in enumerate(wanted)}
+        local = {where[row]: rates for row, rates in found.branch_rates.items() if row in where}
+        fast = found.fast_samples
+        if fast is not None:
+            fast = FastSamples(fast.coordinate_rates[wanted], fast.is_sure[wanted], fast.residual)
+        rates = InputRates(*(part[wanted] for part in given))
+        return RunSamples(found.z[wanted], rates, branch_rates=local, fast_samples=fast)
+
+
+class _PathAtPlaces(NamedTuple):
+    """The path of a motion at chosen places of another one; see `FollowedPath`."""
+
+    singular_rows: frozenset[int]
+    unknowns: Array
+    source: Motion
+
+    @property
+    def fork_positions(self) -> tuple[float, ...]:
+        """See `FollowedPath.fork_positions`."""
+        return () if self.source.course is None else self.source.course.fork_positions
+
+    def limits(self, motion: Motion) -> tuple[Limit, ...]:
+        """See `Motion.limits`."""
+        return () if self.source.course is None else self.source.course.limits(self.source)
+
+
+def _input_scale(solver: PositionSolver, name: str) -> float:
+    return solver.unit if solver.relative_motions[name].input_kind is MeasureKind.LENGTH else 1.0
+
+
+def _repeated(level: float, period: float, low: float, high: float) -> list[float]:
+    """A level between two values, and all that are whole periods away."""
+    if not period:
+        return [level] if low <= level <= high else []
+    first, last = np.ceil((low - level) / period - 1e-9), np.floor((high - level) / period + 1e-9)
+    return [level + period * k for k in np.arange(first, last + 1.0).tolist()]
+
+
+def rows_with_rates(motion: Motion) -> BoolArray:
+    """Which rows have velocities and accelerations (n,)."""
+    jets = [each for f in motion.frames.values() if not f.fixed for each in (f.x, f.y, f.angle)]
+    jets += [jet for own in motion.own.values() for jet in own]
+    parts = [np.broadcast_to(part, len(motion)) for jet in jets for part in jet.parts]
+    return np.isfinite(parts).all(axis=0) if parts else np.ones(len(motion), dtype=bool)
+
+
+def run_unknowns(solver: PositionSolver, motion: Motion) -> Array:
+    """The unknowns at every row of a motion (rows, unknowns), from its frames."""
+    count = len(motion)
+    values: dict[tuple[str, str], Array] = {}
+    for link, frame in motion.frames.items():
+        if not frame.fixed:
+            values |= {(link, part): getattr(frame, part).parts[0] for part in ("x", "y", "angle")}
+    for name, own in motion.own.items():
+        kinds = solver.pairs[name].coordinate_kinds
+        values |= {(name, part): jet.parts[0] for (part, _), jet in zip(kinds, own, strict=True)}
+    coordinates = solver.equations.coordinates
+    w = np.array([np.broadcast_to(values[c.owner, c.part], count) for c in coordinates]).reshape(-1, count)
+    return (w / solver.scale[:, None])[list(solver.equations.unknowns)].T
