@@ -193,10 +193,9 @@ def parts(  # many: sizes of what is cut
     <Parts of 'Four-bar chain': 4 plates in 3 layers, sheets: 1>
     """
     unit = cut_unit(mechanism.units)
-    thickness, play, sheet, gap = (
-        default if value is None else value
-        for value, default in ((thickness, unit.thickness), (play, unit.play), (sheet, unit.sheet), (gap, unit.gap))
-    )
+    thickness = unit.thickness if thickness is None else thickness
+    play, gap = unit.play if play is None else play, unit.gap if gap is None else gap
+    sheet = unit.sheet if sheet is None else sheet
     for name, value in {"thickness": thickness, "pin": pin, "wall": wall, "gap": gap, "scale": scale}.items():
         if value is not None and not 0.0 < value < 1e4:
             raise BadInput(name, f"a size above zero is wanted, not {value!r:.40}")
