@@ -138,19 +138,19 @@ class Parts:
     def lines(self) -> list[str]:
         """The list of plates, pins and spacers, a line each."""
         unit = self.unit
-        found = [self.heading]
+        lines = [self.heading]
         for number, plate in enumerate(self.plates, 1):
             teeth = f", {plate.teeth} teeth of module {plate.module:.4g} mm" if plate.teeth else ""
-            found.append(f"{number}  {plate.name}: layer {plate.layer}{teeth}")
+            lines.append(f"{number}  {plate.name}: layer {plate.layer}{teeth}")
         for pin in self.pins:
             size, (low, high) = f"{unit.format(pin.diameter)} x {unit.format(pin.length)} {unit.name}", pin.layers
-            found.append(f"pin {pin.name}: {size}, layers {low} to {high}")
+            lines.append(f"pin {pin.name}: {size}, layers {low} to {high}")
         for spacer in self.spacers:
             size = " x ".join(map(unit.format, (spacer.inner, spacer.outer, spacer.length)))
             low, high = spacer.layers
             where = f"layer {low}" if low == high else f"layers {low} to {high}"
-            found.append(f"spacer on pin {spacer.pin}: {size} {unit.name}, {where}")
-        return found
+            lines.append(f"spacer on pin {spacer.pin}: {size} {unit.name}, {where}")
+        return lines
 
 
 def _scale_text(scale: float) -> str:
