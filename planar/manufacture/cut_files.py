@@ -134,18 +134,18 @@ def _encode_svg(layout: Layout) -> bytes:
     letter, unit = layout.letter_height, layout.unit.name
     boxes = [plate_box(sheet) for sheet in layout.scaled_sheets]
     height = max(upper - lower for _, lower, _, upper in boxes) + 2.0 * letter
-    found: list[str] = []
+    elements: list[str] = []
     edge = 0.0
     for sheet, (left, lower, right, _) in zip(layout.scaled_sheets, boxes, strict=True):
         x, floor = edge + letter - left, height - letter + lower
         width = right - left + 2.0 * letter
         if len(boxes) > 1:
-            found.append(f'<rect x="{edge:.6g}" y="0" width="{width:.6g}" height="{height:.6g}" stroke="#999999"/>')
+            elements.append(f'<rect x="{edge:.6g}" y="0" width="{width:.6g}" height="{height:.6g}" stroke="#999999"/>')
         edge += width + (letter if len(boxes) > 1 else 0.0)
         for plate in sheet:
-            found += _svg_plate(plate, layout, x, floor)
+            elements += _svg_plate(plate, layout, x, floor)
     for number, line in enumerate(layout.lines):
-        found.append(_svg_text(escape(line), letter, height + 2.0 * letter * (number + 1), letter, "start"))
+        elements.append(_svg_text(escape(line), letter, height + 2.0 * letter * (number + 1), letter, "start"))
     across = max(edge, *(LETTER_WIDTH * letter * len(line) + 2.0 * letter for line in layout.lines))
     down = height + 2.0 * letter * (len(layout.lines) + 1)
     head = (
@@ -153,20 +153,20 @@ def _encode_svg(layout: Layout) -> bytes:
         f'viewBox="0 0 {across:.6g} {down:.6g}" fill="none" stroke="black" '
         f'stroke-width="{0.2 * layout.millimetre:.4g}">'
     )
-    return ("\n".join([head, *found, "</svg>"]) + "\n").encode()
+    return ("\n".join([head, *elements, "</svg>"]) + "\n").encode()
 
 
 def _svg_plate(plate: Plate, layout: Layout, x: float, floor: float) -> list[str]:
     """A plate with its number, its origin at x from the left and `floor` from the top of the drawing."""
     way = " ".join(_svg_path(loop, x, floor) for loop in plate.loops)
-    found = [f'<path d="{way}"/>']
-    found += [
+    elements = [f'<path d="{way}"/>']
+    elements += [
         f'<circle cx="{hole.at[0] + x:.6f}" cy="{floor - hole.at[1]:.6f}" r="{hole.diameter / 2.0:.6f}"/>'
         for hole in plate.drilled
     ]
     u, v, size = _number_place(plate, layout.millimetre)
-    found.append(_svg_text(str(layout.numbers[plate.name]), u + x, floor - v + 0.35 * size, size, "middle"))
-    return found
+    elements.append(_svg_text(str(layout.numbers[plate.name]), u + x, floor - v + 0.35 * size, size, "middle"))
+    return elements
 
 
 def _svg_text(text: str, x: float, y: float, size: float, anchor: str) -> str:

@@ -138,19 +138,19 @@ class Parts:
     def lines(self) -> list[str]:
         """The list of plates, pins and spacers, a line each."""
         unit = self.unit
-        found = [self.heading]
+        lines = [self.heading]
         for number, plate in enumerate(self.plates, 1):
             teeth = f", {plate.teeth} teeth of module {plate.module:.4g} mm" if plate.teeth else ""
-            found.append(f"{number}  {plate.name}: layer {plate.layer}{teeth}")
+            lines.append(f"{number}  {plate.name}: layer {plate.layer}{teeth}")
         for pin in self.pins:
             size, (low, high) = f"{unit.format(pin.diameter)} x {unit.format(pin.length)} {unit.name}", pin.layers
-            found.append(f"pin {pin.name}: {size}, layers {low} to {high}")
+            lines.append(f"pin {pin.name}: {size}, layers {low} to {high}")
         for spacer in self.spacers:
             size = " x ".join(map(unit.format, (spacer.inner, spacer.outer, spacer.length)))
             low, high = spacer.layers
             where = f"layer {low}" if low == high else f"layers {low} to {high}"
-            found.append(f"spacer on pin {spacer.pin}: {size} {unit.name}, {where}")
-        return found
+            lines.append(f"spacer on pin {spacer.pin}: {size} {unit.name}, {where}")
+        return lines
 
 
 def _scale_text(scale: float) -> str:
@@ -193,10 +193,9 @@ def parts(  # many: sizes of what is cut
     <Parts of 'Four-bar chain': 4 plates in 3 layers, sheets: 1>
     """
     unit = cut_unit(mechanism.units)
-    thickness, play, sheet, gap = (
-        default if value is None else value
-        for value, default in ((thickness, unit.thickness), (play, unit.play), (sheet, unit.sheet), (gap, unit.gap))
-    )
+    thickness = unit.thickness if thickness is None else thickness
+    play, gap = unit.play if play is None else play, unit.gap if gap is None else gap
+    sheet = unit.sheet if sheet is None else sheet
     for name, value in {"thickness": thickness, "pin": pin, "wall": wall, "gap": gap, "scale": scale}.items():
         if value is not None and not 0.0 < value < 1e4:
             raise BadInput(name, f"a size above zero is wanted, not {value!r:.40}")

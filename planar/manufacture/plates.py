@@ -62,11 +62,11 @@ class Plate(NamedTuple):
     @property
     def drilled(self) -> tuple[Hole, ...]:
         """The holes that are drilled: of two pins on one axis one hole, the wider."""
-        found: list[Hole] = []
-        for hole in sorted(self.holes, key=lambda each: -each.diameter):
-            if all(hypot(hole.at[0] - at[0], hole.at[1] - at[1]) > SAME_HOLE * hole.diameter for _, at, _ in found):
-                found.append(hole)
-        return tuple(found)
+        distinct: list[Hole] = []
+        for hole in sorted(self.holes, key=lambda hole: -hole.diameter):
+            if all(hypot(hole.at[0] - at[0], hole.at[1] - at[1]) > SAME_HOLE * hole.diameter for _, at, _ in distinct):
+                distinct.append(hole)
+        return tuple(distinct)
 
 
 def convex_hull(points: Iterable[Place]) -> list[Place]:

@@ -86,7 +86,7 @@ def find_spacers(places: PlacesOf, plates: Sequence[Plate], pins: Sequence[Pin],
     """The spacers of all pins: one in every gap between layers that a pin joins, clear of all else over the run."""
     layers = {pin.name: sorted({plates[index].layer for index in joined_plates(pin, plates)}) for pin in pins}
     by_name = {pin.name: pin for pin in pins}
-    found: list[Spacer] = []
+    spacers: list[Spacer] = []
     for pin in pins:
         for low, high in pairwise(layers[pin.name]):
             if high - low < 2:
@@ -99,14 +99,14 @@ def find_spacers(places: PlacesOf, plates: Sequence[Plate], pins: Sequence[Pin],
             ]
             others += [
                 (by_name[spacer.pin], spacer.diameter)
-                for spacer in found
+                for spacer in spacers
                 if spacer.pin != pin.name and spacer.layers[0] < high and spacer.layers[1] > low
             ]
             between = [plate for plate in plates if low < plate.layer < high]
             diameters = [sizes.diameter(pin.name) + walls * sizes.wall for walls in SPACER_WALLS]
             clear = (size for size in diameters if _is_clear(pin, size, between, others, places, sizes.play))
-            found.append(Spacer(pin.name, next(clear, 0.0), (low + 1, high - 1)))
-    return found
+            spacers.append(Spacer(pin.name, next(clear, 0.0), (low + 1, high - 1)))
+    return spacers
 
 
 def _is_clear(  # many: what a spacer must clear
