@@ -222,7 +222,7 @@ def replace_inputs(mechanism: Mechanism, drives: tuple[Drive, ...]) -> Mechanism
 
 def has_input_rates(mechanism: Mechanism) -> bool:
     """Whether an input has a velocity, an acceleration or a law."""
-    return any(given.velocity or given.acceleration or given.law is not None for given in mechanism.inputs)
+    return any(driven.velocity or driven.acceleration or driven.law is not None for driven in mechanism.inputs)
 
 
 def unit_input_rate(mechanism: Mechanism, pair: str) -> float:
@@ -246,9 +246,9 @@ def with_unit_rate(mechanism: Mechanism, pair: str | None = None) -> Mechanism:
     """
     if not mechanism.inputs or has_input_rates(mechanism):
         return mechanism
-    driven = mechanism.inputs[0 if pair is None else running_input_index(mechanism, pair)].pair
-    moving = replace_inputs(mechanism, (Drive(driven, velocity=unit_input_rate(mechanism, driven)),))
-    return replace(moving, remarks=(*moving.remarks, unit_rate_note(mechanism, driven)))
+    name = mechanism.inputs[0 if pair is None else running_input_index(mechanism, pair)].pair
+    moving = replace_inputs(mechanism, (Drive(name, velocity=unit_input_rate(mechanism, name)),))
+    return replace(moving, remarks=(*moving.remarks, unit_rate_note(mechanism, name)))
 
 
 def running_input_index(mechanism: Mechanism, pair: str | None, place: str | None = None) -> int:

@@ -98,10 +98,11 @@ def _page_subject(shown: Mechanism | State | Motion) -> PageSubject:
     ends = {name: given.position for name, given in shown.inputs.items()}
     # of inputs that run in time together the one that goes farthest runs on the page
     pair = max(ends, key=lambda name: float(np.ptp(ends[name])))
-    window = PageRange(list(ends).index(pair), float(ends[pair].min()), float(ends[pair].max()))
+    low, high = float(ends[pair].min()), float(ends[pair].max())
     row = _start_row(shown, pair)
     there = replace_inputs(shown.mechanism, tuple(Drive(name, float(at[row])) for name, at in ends.items()))
-    return PageSubject(there, _unknowns(shown, there, row), window if window.low < window.high else None)
+    window = PageRange(list(ends).index(pair), low, high) if low < high else None
+    return PageSubject(there, _unknowns(shown, there, row), window)
 
 
 def _start_row(motion: Motion, pair: str) -> int:

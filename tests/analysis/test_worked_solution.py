@@ -452,7 +452,7 @@ def test_a_wheel_that_turns_very_slowly_beside_others_turns():
 
 def test_a_position_without_a_velocity_is_worked_out_at_the_unit_rate_of_its_first_input():
     value = four_bar_document(0.04, 0.09, 0.07, 0.1, 1.0, 1, omega=None, name="still")
-    still, turning = (planar.solve(planar.from_dict(each)) for each in (value, with_velocity(value, "1 rad/s")))
+    still, turning = (planar.solve(planar.from_dict(document)) for document in (value, with_velocity(value, "1 rad/s")))
     solution, expected = worked_solution(still), worked_solution(turning)
     assert solution.links == expected.links
     assert solution.points == expected.points

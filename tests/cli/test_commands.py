@@ -657,3 +657,19 @@ def test_the_unit_rate_is_that_of_the_input_that_is_named_and_none_beside_a_law_
     sliding = planar.load("excavator-arm")
     (driven, *_) = (given.pair for given in sliding.inputs)
     assert "for 1 m/s at the input" in unit_rate_note(sliding, driven)
+
+
+def test_explain_takes_the_unit_rate_of_the_input_that_is_named_and_refuses_it_beside_a_velocity(
+    tmp_path: Path,
+) -> None:
+    mechanism = planar.load("pantograph")
+    value = planar.to_dict(mechanism)
+    second = mechanism.inputs[1].pair
+    refused = run(tmp_path, "explain", "pantograph", "--input", second).refused(2)
+    assert refused.startswith("--input: it names an input with a unit rate")
+    for given in value["inputs"]:
+        given.pop("velocity", None)
+    shown = run(tmp_path, "explain", written(tmp_path, value | {"published": []}), "--input", second).out
+    assert " ".join(shown.split()).count(f"for 1 rad/s at the input {second}") == 1
+    solution = json.loads(run(tmp_path, "explain", "m.json", "--input", second, "--json").out)
+    assert any(link["velocity"] for link in solution["links"].values())

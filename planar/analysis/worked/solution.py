@@ -91,17 +91,17 @@ def worked_solution(state: State, comparisons: Sequence[Comparison] = ()) -> Wor
 
     Where no input has a rate, the first moves at its unit rate, and the last sentence of `given` says so.
     """
-    filed, state = state, state_at_unit_rate(state)
-    given = list(given_data(state))
-    if state is not filed:
-        given.append((sentence(unit_rate_note(state.mechanism, state.mechanism.inputs[0].pair)),))
+    original, state = state, state_at_unit_rate(state)
+    given_phrases = list(given_data(state))
+    if state is not original:
+        given_phrases.append((sentence(unit_rate_note(state.mechanism, state.mechanism.inputs[0].pair)),))
     velocity, acceleration = (
         WorkedPolygon(each.kind, each, sections(each))
         for each in (velocity_polygon(state), acceleration_polygon(state))
     )
     return WorkedSolution(
         state,
-        tuple(given),
+        tuple(given_phrases),
         tuple(asked_phrases(state.mechanism.published)),
         velocity,
         acceleration,

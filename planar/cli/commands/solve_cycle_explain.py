@@ -79,6 +79,9 @@ def solve(
 @mode_option
 @scale_option
 @click.option(
+    "--input", "pair", metavar="PAIR", help="The input that has a unit rate, where no input of the file has a velocity."
+)
+@click.option(
     "--with",
     "also",
     metavar="PARTS",
@@ -91,6 +94,7 @@ def explain(  # many: one for each option
     at: tuple[str, ...],
     mode: int | None,
     scales: tuple[str, ...],
+    pair: str | None,
     also: str | None,
     output: Path | None,
 ) -> None:
@@ -109,7 +113,7 @@ def explain(  # many: one for each option
 
         if output.suffix not in SUFFIXES:
             raise unknown_format_error(output.suffix, "a worked solution", (*SUFFIXES, *PAGES))
-    state, comparisons = _solve_model(model, mode, at, as_json, output)
+    state, comparisons = _solve_model(model, mode, at, as_json, output, pair)
     given = read(scales, units=state.mechanism.units)
     if output is not None and on_pages:
         from planar.drawing.output.solution_pages import encode_sheets, solution_pages
@@ -168,17 +172,25 @@ def _with_parts(text: RenderableType, state: State, parts: tuple[str, ...]) -> R
     return Group(*found)
 
 
-def _solve_model(
-    model: str, mode: int | None, at: tuple[str, ...], as_json: bool, output: Path | None
+def _solve_model(  # many: one for each option
+    model: str, mode: int | None, at: tuple[str, ...], as_json: bool, output: Path | None, pair: str | None = None
 ) -> tuple[State, tuple[Comparison, ...]]:
-    """A model's position, moved to where `--at` says, with its published values unless it was moved."""
+    """A model's position, moved to where `--at` says, with its published values unless it was moved.
+
+    `pair` names an input with a unit rate. Raises BadInput where an input of the file has a rate.
+    """
     from planar.analysis.worked.published import compare_published
+    from planar.model.mechanism import has_input_rates, with_unit_rate
     from planar.solving.position import solve
 
     if as_json and output is not None:
         raise BadInput("-o", "tables go to a file or SI values are printed with --json; give one of the two")
     mechanism = load_model(model, mode)
     refuse_overwriting(model, output)
+    if pair is not None:
+        if has_input_rates(mechanism):
+            raise BadInput("--input", "it names an input with a unit rate, but an input of the file has a velocity")
+        mechanism = with_unit_rate(mechanism, pair)
     moved = parse_drives(mechanism, at)
     state = solve(mechanism, moved)
     return state, () if moved else compare_published(state)

@@ -29,7 +29,7 @@ def polygon_panels(state: State, scales: ScaleTexts, count: int) -> list[Picture
 
     Where no input has a rate, the polygons are those of the first input's unit rate, and the velocity polygon says so.
     """
-    filed, state = state, state_at_unit_rate(state)
+    original, state = state, state_at_unit_rate(state)
     given = paper.parse_scales(scales, ("length", "velocity", "acceleration")[:count], state.mechanism.units)
     space = given.get("length")
     if space is None:
@@ -43,7 +43,7 @@ def polygon_panels(state: State, scales: ScaleTexts, count: int) -> list[Picture
         fits = given.get(polygon.kind) or paper.round_scale(polygon.kind, unit, width, height, PANEL_SIZE)
         drawn = polygon_picture(polygon, fits)
         rest = tuple(note for note in drawn.notes[1:] if note not in _scale_notes(fits))
-        if state is not filed and polygon.kind == "velocity":
+        if state is not original and polygon.kind == "velocity":
             rest += (unit_rate_note(state.mechanism, state.mechanism.inputs[0].pair),)
         title = f"{polygon.kind} polygon".capitalize()
         pictures.append(drawn._replace(title=title, notes=(*_scale_notes(fits), *rest)))

@@ -26,7 +26,7 @@ RELATIVE_TOLERANCE = 1e-6
 """Points coincide, or lie on a line, within this part of the size of the mechanism."""
 
 MIN_OUTLINE_POINTS = 4
-"""So many points of a link that nothing uses are its outline; fewer are tracers, which are lettered."""
+"""The least number of points that make an outline, where nothing uses them; fewer are tracers, which are lettered."""
 MAX_ORDERED_CORNERS = 200
 """Of more points the outline is their convex hull: whether their order crosses itself takes too long to find."""
 
@@ -106,9 +106,9 @@ def link_outlines(mechanism: Mechanism, shapes: Mapping[str, LinkShape]) -> dict
     }
     used_names = {
         member
-        for each in named_points(mechanism)
-        for member in each.members
-        if len(each.members) > 1 or not named_in_file.isdisjoint((each.name, ".".join(member)))
+        for named in named_points(mechanism)
+        for member in named.members
+        if len(named.members) > 1 or not named_in_file.isdisjoint((named.name, ".".join(member)))
     }
     outlines = {}
     for link in mechanism.links:
@@ -133,9 +133,9 @@ def outline_point_names(mechanism: Mechanism, shapes: Mapping[str, LinkShape]) -
     """The result names of the points of outlines."""
     outlines = link_outlines(mechanism, shapes)
     return frozenset(
-        each.name
-        for each in named_points(mechanism)
-        if any(link in outlines and point in outlines[link].points for link, point in each.members)
+        named.name
+        for named in named_points(mechanism)
+        if any(link in outlines and point in outlines[link].points for link, point in named.members)
     )
 
 
@@ -154,9 +154,9 @@ def _outline_corners(points: Sequence[Vector], tolerance: float) -> tuple[Vector
 def _segments_cross(one: Segment, other: Segment) -> bool:
     """Whether two segments cross between their ends."""
 
-    def sides(line: Segment, ends: Segment) -> float:
+    def sides(line: Segment, endpoints: Segment) -> float:
         along = line[1] - line[0]
-        return along.cross(ends[0] - line[0]) * along.cross(ends[1] - line[0])
+        return along.cross(endpoints[0] - line[0]) * along.cross(endpoints[1] - line[0])
 
     return sides(one, other) < 0.0 and sides(other, one) < 0.0
 

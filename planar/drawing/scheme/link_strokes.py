@@ -106,19 +106,20 @@ def bar_strokes(scene: Scene, pen: Pen = Pen.LINK) -> Iterator[PlacedLine]:
                 yield PlacedLine(about, link, pen, side)
         for side in body.tracers:
             yield PlacedLine(about, link, thin, side)
-        if (side := _outline_support(scene, body)) is not None:
-            yield PlacedLine(about, link, thin if body.sides else pen, side)
+        support = _outline_support(scene, body)
+        if support is not None:
+            yield PlacedLine(about, link, thin if body.sides else pen, support)
         yield from _guide_strokes(scene, link, body, pen)
 
 
 def _outline_support(scene: Scene, body: LinkBody) -> tuple[Vector, Vector] | None:
     """The line from the nearest joint to an outline that lies apart from the link's body."""
     corners = scene.outline_corners(body.link)
-    ends = [*body.joints, *(guide.foot for guide in body.guides)]
-    apart = corners and ends and not any(is_inside_outline(end, corners) for end in ends)
-    if not apart or any(is_inside_outline(corner, body.plate) for corner in corners):
+    supports = [*body.joints, *(guide.foot for guide in body.guides)]
+    is_apart = corners and supports and not any(is_inside_outline(place, corners) for place in supports)
+    if not is_apart or any(is_inside_outline(corner, body.plate) for corner in corners):
         return None
-    return min(product(ends, corners), key=lambda both: float(distance_between(*both)))
+    return min(product(supports, corners), key=lambda endpoints: float(distance_between(*endpoints)))
 
 
 def _guide_strokes(scene: Scene, link: str, body: LinkBody, pen: Pen) -> Iterator[PlacedLine]:

@@ -13,7 +13,7 @@ class Page {
     this.listeners = { move: [], size: [], said: [], course: [], chosen: [], shown: [], view: [], tolerance: [], wanted: [], acting: [] };
     this.lifetime = new AbortController(); // ended where another page takes its place: of what it hears beside its own parts
     this.running = data.running ?? 0; // which input is moved
-    this.given = data.inputs.map((each) => [each.velocity, each.acceleration]); // rates of the inputs, as they are written
+    this.given = data.inputs.map(({ velocity, acceleration }) => [velocity, acceleration]); // rates of the inputs, as they are written
     this.acting = null; // the numbers of what acts
     this.recording = false; // whether the motion is gone through for a film: nobody is to remember that
     this.besides = () => []; // places that the drawing is to show, too
@@ -34,7 +34,7 @@ class Page {
   }
 
   /** The state of a linkage at rates of its inputs, [[velocity, acceleration], ...]. */
-  stateOf(linkage, rates) { return linkage.state(rates.map((each) => each[0]), rates.map((each) => each[1])); }
+  stateOf(linkage, rates) { return linkage.state(rates.map(([velocity]) => velocity), rates.map(([, acceleration]) => acceleration)); }
 
   /** Why there is no velocity and no acceleration here, as a sentence; "" where there are. */
   get undetermined() {

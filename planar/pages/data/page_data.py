@@ -179,8 +179,8 @@ def _input_data(given: Any, slides: bool) -> dict[str, Any]:
 
 def _starting_input(mechanism: Mechanism) -> int:
     """The number of the input that runs at first: the first that has a rate or a law, else the first."""
-    moving = (given.velocity or given.acceleration or given.law is not None for given in mechanism.inputs)
-    return next((number for number, moves in enumerate(moving) if moves), 0)
+    moving = (driven.velocity or driven.acceleration or driven.law is not None for driven in mechanism.inputs)
+    return next((number for number, is_moving in enumerate(moving) if is_moving), 0)
 
 
 def _unit_rates(mechanism: Mechanism) -> list[dict[str, Any]] | None:
@@ -188,11 +188,11 @@ def _unit_rates(mechanism: Mechanism) -> list[dict[str, Any]] | None:
 
     A page uses that of the input that runs while all rates of the inputs are zero.
     """
-    if any(given.law is not None for given in mechanism.inputs):
+    if any(driven.law is not None for driven in mechanism.inputs):
         return None
     return [
-        {"velocity": unit_input_rate(mechanism, given.pair), "note": sentence(unit_rate_note(mechanism, given.pair))}
-        for given in mechanism.inputs
+        {"velocity": unit_input_rate(mechanism, driven.pair), "note": sentence(unit_rate_note(mechanism, driven.pair))}
+        for driven in mechanism.inputs
     ]
 
 

@@ -21,7 +21,7 @@ const paths = {
     const range = inputs[count - 1] - inputs[0], step = course.whole ? range / PATH_MARKS : roundUp((range * by) / PATH_MARKS) / by;
     names.forEach((name, k) => {
       const { x, y } = course.point(name), place = (i) => layers.at([x[i], y[i]]);
-      ink.line(course.path(name).map((each) => layers.at(each)), `path series${k % SERIES}`);
+      ink.line(course.path(name).map((place) => layers.at(place)), `path series${k % SERIES}`);
       for (let m = Math.ceil(inputs[0] / step - 1e-9); m * step <= inputs[count - 1] + 1e-9; m++) {
         const row = Math.max(0, Math.min(count - 1, ((m * step - inputs[0]) / range) * (count - 1)));
         const i = Math.min(count - 2, Math.floor(row));

@@ -43,7 +43,7 @@ class Course {
   /** The path of a point, [[x, y], ...]: the rows, and more positions between them where it bends. */
   path(name) {
     return this.keep(`path ${name}`, () => this.rows.flatMap(({ frames }, i) => (
-      [frames, ...(this.between.get(i) ?? [])].map((each) => this.page.point(name, each).position))));
+      [frames, ...(this.between.get(i) ?? [])].map((links) => this.page.point(name, links).position))));
   }
 
   /** The place of an input's position in the range, brought there by whole turns where that changes nothing. */
@@ -218,17 +218,17 @@ class Courses {
   *refine(start, k, rows, dead) {
     const { page } = this, names = Object.keys(page.data.points), last = rows.length - 1, between = new Map();
     const places = (frames) => names.map((name) => page.point(name, frames).position);
-    const ends = rows.map(({ at, z, frames }) => ({ at, z, frames, places: places(frames) }));
+    const positions = rows.map(({ at, z, frames }) => ({ at, z, frames, places: places(frames) }));
     const bend = (a, b, c) => Math.max(0, ...names.map((_, j) => chordDistance(a.places[j], b.places[j], c.places[j])));
     const isDead = ({ at }) => (dead[0] && at === rows[0].at) || (dead[1] && at === rows[last].at);
     /** The positions between two, the first of which is no dead point. */
     const inner = function* (from, to, halvings) {
-      const made = start.copy(), part = isDead(to) ? 1 - DEAD_POINT_PART : 0.5, at = from.at + part * (to.at - from.at);
-      Object.assign(made, { z: Float64Array.from(from.z), last: null, stop: null });
-      made.u[k] = from.at / made.scale[k];
+      const linkage = start.copy(), part = isDead(to) ? 1 - DEAD_POINT_PART : 0.5, at = from.at + part * (to.at - from.at);
+      Object.assign(linkage, { z: Float64Array.from(from.z), last: null, stop: null });
+      linkage.u[k] = from.at / linkage.scale[k];
       yield;
-      if (made.moveTo(made.u.map((each, j) => (j === k ? at / made.scale[k] : each))).reached < 1) return [];
-      const frames = page.framesOf(made.state()), middle = { at, z: made.z, frames, places: places(frames) };
+      if (linkage.moveTo(linkage.u.map((position, j) => (j === k ? at / linkage.scale[k] : position))).reached < 1) return [];
+      const frames = page.framesOf(linkage.state()), middle = { at, z: linkage.z, frames, places: places(frames) };
       if (bend(from, middle, to) <= CHORD * page.data.size) return [];
       if (halvings === MAX_HALVINGS) return [frames];
       return [...yield* inner(from, middle, halvings + 1), frames, ...yield* inner(middle, to, halvings + 1)];
@@ -236,9 +236,10 @@ class Courses {
     for (let i = 0; i < last; i++) {
       // a chord of two parts bends four times as far as one of its parts
       const near = [i, i + 1].filter((row) => row > 0 && row < last);
-      const isFlat = near.length === 2 && near.every((row) => bend(ends[row - 1], ends[row], ends[row + 1]) <= CHORD * page.data.size);
+      const isFlat = near.length === 2 && near.every((row) => bend(positions[row - 1], positions[row], positions[row + 1]) <= CHORD * page.data.size);
       if (isFlat) continue;
-      const frames = isDead(ends[i]) ? (yield* inner(ends[i + 1], ends[i], 1)).reverse() : yield* inner(ends[i], ends[i + 1], 1);
+      const [from, to] = [positions[i], positions[i + 1]];
+      const frames = isDead(from) ? (yield* inner(to, from, 1)).reverse() : yield* inner(from, to, 1);
       if (frames.length) between.set(i, frames);
     }
     return between;
