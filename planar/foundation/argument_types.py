@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ast
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import fields, is_dataclass
 from functools import cache, wraps
 from typing import Any, NamedTuple, TypeVar, cast
@@ -42,7 +42,7 @@ def check_field_types(made: Any) -> None:
     are not classes are not checked.
     """
     kind = type(made)
-    for field in _annotated_fields(kind):
+    for field in _annotated_fields(cast("Hashable", kind)):
         value = getattr(made, field.name)
         if field.options and not any(_is_of_type(value, option) for option in field.options):
             wanted = " or ".join(dict.fromkeys(_describe(option) for option in field.options))
@@ -64,7 +64,7 @@ class _Field(NamedTuple):
 
 
 @cache
-def _annotated_fields(kind: type) -> tuple[_Field, ...]:
+def _annotated_fields(kind: Any) -> tuple[_Field, ...]:
     if issubclass(kind, tuple):
         texts: dict[str, Any] = {name: kind.__annotations__[name] for name in getattr(kind, "_fields", ())}
     else:

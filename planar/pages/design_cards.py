@@ -25,7 +25,7 @@ from planar.reports.tables.design.synthesis import input_text
 from planar.synthesis.exact.complete_synthesis import CompleteSynthesis, ExactDesign
 from planar.synthesis.synthesis import Synthesis, SynthesisedDesign
 from planar.synthesis.task.synthesis_task import WantedFunction
-from planar.synthesis.task.task_numbers import miss_kind
+from planar.synthesis.task.task_numbers import miss_text
 
 STYLES = ("page.css", "designs/designs.css", "print.css")
 LEGEND = '<span><i class="wanted"></i>wanted</span><span><i class="path"></i>made by the design</span>'
@@ -148,11 +148,12 @@ def _figures(found: Synthesis, design: SynthesisedDesign) -> Iterator[str]:
 
 def _facts(found: Synthesis, design: SynthesisedDesign) -> Iterator[tuple[str, str]]:
     """What is told of a design beside its drawing."""
-    kind, units = miss_kind(found.task), found.task.units
+    units = found.task.units
     if not isnan(design.error):
         share = f", {100.0 * design.greatest_miss / found.size:.3g} % of the size"
-        yield "greatest miss", amount(design.greatest_miss, kind, units) + (share if found.task.wants_places else "")
-        yield "root mean square", amount(design.error, kind, units)
+        greatest = miss_text(found.task, design.greatest_miss, found.size)
+        yield "greatest miss", greatest + (share if found.task.wants_places else "")
+        yield "root mean square", miss_text(found.task, design.error, found.size)
     if isinstance(design, ExactDesign):
         yield "proved", "yes" if design.certified else "no"
     if design.motion is None:
@@ -172,11 +173,10 @@ def _dimensions(found: Synthesis, design: SynthesisedDesign) -> Iterator[tuple[s
 
 def _misses(found: Synthesis, design: SynthesisedDesign) -> Iterator[tuple[str, str]]:
     """What a design misses of every entry."""
-    kind, units = miss_kind(found.task), found.task.units
     for wanted, own in zip(found.task.wanted, design.misses, strict=True):
         for number, miss in enumerate(own.tolist(), start=1):
             if not isnan(miss):
-                yield f"{wanted.of} {number}", amount(miss, kind, units)
+                yield f"{wanted.of} {number}", miss_text(found.task, miss, found.size)
 
 
 def _details(heading: str, rows: Iterator[tuple[str, str]]) -> str:

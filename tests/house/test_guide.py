@@ -291,7 +291,7 @@ def test_entries_that_the_page_on_writing_shows_are_such(folder):
     value = json.loads((folder / "press.json").read_text(encoding="utf-8"))
     acting = next(block for block in blocks("begin/writing", "json") if '"loads"' in block)
     mechanism = planar.from_dict(value | json.loads("{" + acting + "}"))
-    assert [len(each) for each in (mechanism.loads, mechanism.springs, mechanism.masses)] == [3, 1, 1]
+    assert [len(each) for each in (mechanism.loads, mechanism.springs, mechanism.masses)] == [4, 1, 1]
     assert planar.forces(planar.solve(mechanism)).proof.equilibrium < 1e-10
 
 

@@ -1,13 +1,16 @@
 """Complete lists against closed forms, published numbers, and the linkages that made the tasks."""
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
+from rich.console import Console
 
 import planar
 from benchmarks.exact_makers import KINDS
 from planar.foundation.jets import value_and_rates
+from planar.reports.tables.design.synthesis import table
 from planar.synthesis.exact.component_solutions import with_ball_paths, with_doubtful
 from planar.synthesis.exact.exact_linkage import evaluate
 from planar.synthesis.exact.relations.exact_problem import ExactProblem
@@ -282,6 +285,22 @@ def test_the_command_tells_what_is_expected_found_and_proved(tmp_path):
     told = json.loads(run(tmp_path, "synthesise", "throw.json", "--complete", "--json").done())
     assert (told["expected"], told["found"], told["curves"]) == (3, 3, [])
     assert all(isinstance(each["certified"], bool) for each in told["designs"])
+
+
+def test_the_table_of_a_list_has_the_dimensions_of_each_design_and_no_file_where_none_is_written():
+    found = planar.synthesise(task(with_points_on_coupler(), five_poses()), complete=True)
+    console = Console(width=200)
+    with console.capture() as printed:
+        console.print(table(found, []))
+    told = printed.get()
+    numbers = found[0].numbers
+    assert f"AB.length {1e3 * numbers['AB.length']:.6g} mm" in told
+    assert f"AD.A.x {1e3 * numbers['AD.A.x']:.6g} mm" in told
+    assert "file" not in told
+    assert "e-1" not in told  # a miss that is round-off is 0
+    with console.capture() as printed:
+        console.print(table(found, [Path("all/01.json")]))
+    assert "all/01.json" in printed.get()
 
 
 def test_an_interrupted_list_says_that_its_search_is_kept(tmp_path, monkeypatch):

@@ -9,10 +9,9 @@ from planar.drawing.designs.function_picture import function_picture
 from planar.drawing.output.matplotlib_figure import draw_on_sheets
 from planar.drawing.paper.picture import Picture
 from planar.foundation.errors import BadInput
-from planar.model.wording import amount
 from planar.synthesis.synthesis import check_synthesis
 from planar.synthesis.task.synthesis_task import WantedFunction
-from planar.synthesis.task.task_numbers import miss_kind
+from planar.synthesis.task.task_numbers import miss_text
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -30,11 +29,10 @@ def design_sheets(found: Any) -> list[Figure]:
     found = check_synthesis(found)
     if not len(found):
         raise BadInput("found", "there is no design without a defect, and so nothing to draw")
-    kind, units = miss_kind(found.task), found.task.units
     pictures: list[Picture] = []
     for number, design in enumerate(found, start=1):
         drawn = design_picture(design, found.task, SHEET_ROOM, f"{number}: {design.start}")
-        note = f"greatest miss {amount(design.greatest_miss, kind, units)}"
+        note = f"greatest miss {miss_text(found.task, design.greatest_miss, found.size)}"
         pictures.append(drawn._replace(notes=(note, *((NOTE,) if number == 1 else ()))))
         for item, wanted in enumerate(found.task.wanted):
             if isinstance(wanted, WantedFunction):

@@ -17,7 +17,7 @@ from planar.model.wording import amount
 from planar.pages.editor.authors_file import carry_over
 from planar.synthesis.search_progress import SearchProgress, progress_words
 from planar.synthesis.synthesis import Synthesis, SynthesisedDesign
-from planar.synthesis.task.task_numbers import miss_kind
+from planar.synthesis.task.task_numbers import miss_text
 from planar.synthesis.task.task_reader import read_task
 from planar.synthesis.task_search import TaskSearch
 
@@ -115,9 +115,9 @@ def _result(found: Synthesis, start: Mapping[str, Any]) -> dict[str, Any]:
 
 def _words(found: Synthesis, design: SynthesisedDesign) -> str:
     """What a design misses, and how it moves."""
-    kind, units = miss_kind(found.task), found.task.units
-    words = [f"misses by {amount(design.error, kind, units)} (root mean square)"]
-    words.append(f"by {amount(design.greatest_miss, kind, units)} at most")
+    units = found.task.units
+    error, greatest = (miss_text(found.task, miss, found.size) for miss in (design.error, design.greatest_miss))
+    words = [f"misses by {error} (root mean square)", f"by {greatest} at most"]
     if design.motion is not None:
         turns = "turns fully" if design.motion.is_whole_turn else "does not turn fully"
         words.append(f"{design.motion.pair} {turns}")

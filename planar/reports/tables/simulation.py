@@ -89,9 +89,9 @@ def _impacts_table(simulation: Simulation) -> FittedTable:
 def _oscillations_table(simulation: Simulation) -> FittedTable:
     """How often released inputs turn back, the period of their swings, and where the last ends."""
     motion, units = simulation.motion, simulation.motion.mechanism.units
-    periods = ("period, s", "least", "greatest")
-    headings = ("input", "turnings", periods, ("last oscillation from", "to", "unit"))
-    table = plain_table("Oscillations, solved for", *headings, left=(0, 7), keys=1)
+    periods = ("period, s", "least, s", "greatest, s")
+    headings = ("input", periods, ("last one from", "to", "unit"))
+    table = plain_table("Oscillations, solved for", *headings, left=(0, 6), keys=1)
     for name, oscillation in simulation.oscillations.items():
         own = units.length if motion.has_length_motion(name) else units.angle
         values = [
@@ -100,9 +100,7 @@ def _oscillations_table(simulation: Simulation) -> FittedTable:
         ]
         last = [float(place) for place in oscillation.positions[-2:]]
         places = [np.nan] * (2 - len(last)) + [parse_unit(own).from_si(place) for place in last]
-        table.add_row(
-            name, str(len(oscillation.times)), *map(format_or_zero, values), *map(format_or_zero, places), own
-        )
+        table.add_row(name, *map(format_or_zero, values), *map(format_or_zero, places), own)
     return table
 
 

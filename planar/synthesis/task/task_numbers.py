@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from planar.derivatives.design_equations import design_dimensions
 from planar.document.dimensions import Dimension
 from planar.model.mechanism import Mechanism, named_points, relative_motions
+from planar.model.wording import amount
 from planar.synthesis.task.starts import with_wanted_points
 from planar.synthesis.task.synthesis_task import ChainStart, SynthesisTask, Wanted, WantedFunction, WantedPath
 
@@ -47,3 +48,9 @@ def wanted_miss_kind(task: SynthesisTask, wanted: Wanted) -> str:
 def miss_kind(task: SynthesisTask) -> str:
     """What misses of a task are together: an "angle" where all of them are."""
     return "angle" if all(wanted_miss_kind(task, each) == "angle" for each in task.wanted) else "length"
+
+
+def miss_text(task: SynthesisTask, miss: float, size: float) -> str:
+    """A miss of a task with its unit: 0 where it is round-off of the size (m) of what is wanted, or of a radian."""
+    kind = miss_kind(task)
+    return amount(miss, kind, task.units, size if kind == "length" else 1.0)

@@ -14,12 +14,12 @@ from planar.document.dimensions import file_dimensions
 from planar.foundation.arrays import Array
 from planar.model.wording import amount, count_phrase
 from planar.reports.fitted_table import FittedTable, plain_table
-from planar.reports.number_format import format_number, paragraphs
+from planar.reports.number_format import format_or_zero, paragraphs
 from planar.reports.tables.design.cognates import cognate_record
 from planar.synthesis.design_record import design_record
 from planar.synthesis.exact.complete_synthesis import CompleteSynthesis, ExactDesign
 from planar.synthesis.synthesis import Synthesis, SynthesisedDesign
-from planar.synthesis.task.task_numbers import miss_kind, motion_kind
+from planar.synthesis.task.task_numbers import miss_text, motion_kind
 
 MAX_REJECTED = 8
 """Rejected designs whose defects are listed."""
@@ -111,11 +111,11 @@ def _rejected_table(found: Synthesis) -> FittedTable:
 
 
 def _misses(found: Synthesis, design: SynthesisedDesign) -> tuple[str, str, str]:
-    kind, units = miss_kind(found.task), found.task.units
     if design.error != design.error:
         return "", "", ""
-    share = format_number(100.0 * design.greatest_miss / found.size) if found.task.wants_places else ""
-    return amount(design.greatest_miss, kind, units), amount(design.error, kind, units), share
+    share = format_or_zero(100.0 * design.greatest_miss / found.size, 100.0) if found.task.wants_places else ""
+    greatest, error = (miss_text(found.task, miss, found.size) for miss in (design.greatest_miss, design.error))
+    return greatest, error, share
 
 
 def input_text(found: Synthesis, design: SynthesisedDesign) -> str:
