@@ -264,7 +264,7 @@ class AssemblyTree:
         return (np.round(np.concatenate([poses.ravel(), w[columns]]), CONGRUENCE_DIGITS) + 0.0).tobytes()
 
     @cached_property
-    def _boundaries(self) -> list[tuple[list[tuple[int, int, int]], list[int]]]:
+    def _boundaries(self) -> list[tuple[list[tuple[int, ...]], list[int]]]:
         """For every block: the columns x, y and angle in w of the links placed before it to which it or a later block
         is joined (-1: fixed), and the columns of the own coordinates of the joining pairs that are known before it."""
         setup = self.setup

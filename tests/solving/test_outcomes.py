@@ -82,7 +82,7 @@ def test_near_the_dead_point_the_velocity_is_right_to_what_rounding_leaves(withi
 
 def test_too_few_inputs_names_the_links_that_stay_free_and_where_to_drive():
     with pytest.raises(NoAnswer) as caught:
-        planar.cycle(files.from_dict(changed(inputs=[])))
+        planar.cycle(changed(inputs=[]))
     problem = caught.value
     assert problem.outcome is Outcome.TOO_FEW_INPUTS
     assert "0 inputs" in problem.reason
