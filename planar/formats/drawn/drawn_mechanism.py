@@ -38,7 +38,7 @@ WHEELS = {GearPair: "gear", BeltPair: "belt", ChainPair: "chain"}
 LENGTHS = ("mm", "cm", "m", "in")
 """Units of length that drawn linkages have; any other is written as mm."""
 STOP_TOLERANCE = 1e-9
-"""rad: a position this far outside of its stops is at the stop."""
+"""rad, or the drawing's unit of length: a position this far from a stop is at it."""
 
 
 def drawn_mechanism(
@@ -170,6 +170,10 @@ class _Drawing:
                 position = position_on_line(joint)
                 low, high = (None if value is None else float(self.unit.from_si(value)) - position for value in limits)
             low, high = None if low is None else min(low, 0.0), None if high is None else max(high, 0.0)
+            low, high = (
+                0.0 if value is not None and -STOP_TOLERANCE < value < STOP_TOLERANCE else value
+                for value in (low, high)
+            )
             stops.append(DrawnStop(joint.name, self._motion_links(pair), low, high, stop.restitution))
         return stops
 

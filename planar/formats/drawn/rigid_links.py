@@ -105,7 +105,7 @@ def without_loose_links(linkage: DrawnLinkage) -> DrawnLinkage:
 
 
 def without_rigid_motions(linkage: DrawnLinkage, place: str) -> DrawnLinkage:
-    """The linkage without stops at joints that cannot move, with notes. Raises BadInput for an input at such a joint."""
+    """The linkage without stops at joints that cannot move, with notes. Raises BadInput for an input at such one."""
     links_of = {joint.name: joined_links(joint) for joint in linkage.joints}
 
     def moves(motion: DrawnInput | DrawnStop) -> bool:
