@@ -152,7 +152,7 @@ class _Reader:
         return result
 
     def _cylinders(self) -> None:
-        """A barrel and a rod for cylinder, which slide on the line of its two joints."""
+        """A barrel and a rod for each cylinder, which slide on the line of its two joints."""
         self.strokes: dict[frozenset[str], SlideJoint] = {}
         for cylinder in self.body.items("cylinders", optional=True):
             keys = [item.text() for item in cylinder.items("joints" if cylinder.has("joints") else "jointIds")]
