@@ -3,13 +3,40 @@
 from __future__ import annotations
 
 import json
+import re
 from math import cos, hypot, pi, sin
+from random import Random
 
 FOUR_BAR = {"A": (0.0, 0.0), "B": (30.0, 40.0), "C": (90.0, 70.0), "D": (100.0, 0.0), "E": (60.0, 90.0)}
 """The frame AD, the crank AB, the coupler BC with its point E, the rocker DC."""
 SLIDER_CRANK = {"A": (0.0, 0.0), "B": (30.0, 40.0), "C": (150.0, 0.0)}
 """The crank AB, the rod BC, and a pin C on the x-axis."""
 PIXEL = 25.4 / 96.0
+HOSTILE_WORDS = (
+    "0",
+    "-1",
+    "1e9",
+    "nan",
+    "1e999",
+    "",
+    "null",
+    "true",
+    "[]",
+    "{}",
+    "R",
+    "P",
+    "ground",
+    "x" * 50,
+    "<",
+    "|",
+)
+OLD_PLUS_SLIDER = (
+    "https://app.pmksplus.com/?j=a,0,0,ab,R,t,Null,t%0Ab,3,4,ab%7Cbc,R,f,Null,f%0Ac,15,0,bc%7Ccd,R,f,Null,f%0A"
+    "d,15,0,cd,P,t,0,f%0A&l=ab,R,1,1,1.5,2,a%7Cb,,line,0,0,0,0,0,0,0,0%0Abc,R,1,1,9,2,b%7Cc,F1,line,0,0,0,0,0,0,0,0%0A"
+    "cd,P,Null,Null,Null,Null,c%7Cd,,Null,Null,Null,Null,Null,Null,Null,Null,Null%0A"
+    "&f=F1,bc,9,2,9,5,t,true,7%0A&s=10,false,false,cm"
+)
+"""The slider-crank in a link of PMKS+ as it wrote them until 2023, with a force."""
 
 
 def coupler_point(turn: float) -> tuple[float, float]:
@@ -79,6 +106,24 @@ def _plus(joints: str, links: str) -> str:
     return pmksplus(f"1G.Fe.K,0.1011.{told}.{made}..N_")
 
 
+def pmksplus_cylinder(scale: float, barrel: float, seal: float, rod: float) -> str:
+    """A bar on a driven hydraulic cylinder along the x-axis: the barrel's length, where the rod begins, its length."""
+    end = seal + rod
+    joints = "".join(
+        f"{flags}{name},{name},{base64(x)},{base64(y)},0{more}."
+        for flags, name, x, y, more in (
+            ("4", "A", 0.0, 0.0, ""),
+            ("0", "B", barrel, 0.0, ""),
+            ("8", "C", seal, 0.0, ""),
+            ("0", "D", end, 0.0, ""),
+            ("4", "E", end, 3.0, ""),
+            ("Z", "P", seal, 0.0, f",AB,A,B,{base64(3.0)}"),
+        )
+    )
+    links = "".join(f"AR{on},{on},0,0,0,0,c5cae9,{on[0]},{on[1]},,." for on in ("AB", "CD", "DE"))
+    return pmksplus(f"1G.{base64(scale)},1E8.K,0.1011.{joints}.{links}YPCP,CP,0,0,0,0,,C,P,,...N_")
+
+
 ASMT_POSE = "\n{0}Position3D\n{0}\t{1} {2} 0.0\n{0}RotationMatrix\n{0}\t1 0 0\n{0}\t0 1 0\n{0}\t0 0 1"
 
 
@@ -118,6 +163,36 @@ def asmt(parts: dict[str, dict[str, tuple[float, float]]], joints: str, motion: 
     )
     text += f"\n\t\t\t\tRotationZ\n\t\t\t\t\t{formula}"
     return f"{text}\n\tForceTorques\n\tConstantGravity\n\t\t0.0 -9.81 0.0\nTimeSeries\n"
+
+
+def asmt_limit(kind: str, joint: str, limit: str, sign: str) -> str:
+    """A limit of a joint of an assembly, to stand under `Limits`."""
+    rows = {"Name": f"{joint}{sign}", "MotionJoint": f"/Asm/{joint}", "Limit": limit, "Type": sign, "Tol": "1.0e-9"}
+    return f"\n\t\t\t{kind}" + "".join(f"\n\t\t\t\t{key}\n\t\t\t\t\t{value}" for key, value in rows.items())
+
+
+def mutated(text: str, draw: Random) -> str:
+    """A text with one to three words, lines or marks changed, doubled, exchanged or left out."""
+    for _ in range(draw.choice((1, 1, 2, 3))):
+        words = re.findall(r"[A-Za-z_]+|-?\d+\.?\d*(?:e-?\d+)?|\s+|.", text, re.DOTALL) or [""]
+        index, other = draw.randrange(len(words)), draw.randrange(len(words))
+        change = draw.randrange(6)
+        if change == 0:
+            words[index] = draw.choice(HOSTILE_WORDS)
+        elif change == 1:
+            del words[index : index + draw.choice((1, 2, 5, 20))]
+        elif change == 2:
+            words[index], words[other] = words[other], words[index]
+        elif change == 3:
+            words[index:index] = words[other : other + draw.choice((1, 3, 10, 40))]
+        elif change == 4:
+            words[index] *= 2
+        else:
+            lines = text.split("\n")
+            lines.insert(draw.randrange(len(lines)), lines[draw.randrange(len(lines))])
+            words = ["\n".join(lines)]
+        text = "".join(words)
+    return text
 
 
 def _lists(points: dict[str, tuple[float, float]]) -> list[dict[str, object]]:

@@ -2,12 +2,23 @@
 
 import json
 import pickle
+from random import Random
 
 import pytest
 
 import planar
+from planar.document.files import _read_foreign
 from planar.formats.kinds.parts.ondsel_motion import motion_formula
-from tests.foreign_samples import FOUR_BARS, LINKAGE_SIM, linkage2, pmksplus
+from tests.foreign_samples import (
+    FOUR_BARS,
+    LINKAGE_SIM,
+    OLD_PLUS_SLIDER,
+    SLIDER_CRANKS,
+    linkage2,
+    mutated,
+    pmksplus,
+    pmksplus_cylinder,
+)
 from tests.round_trips import read_text
 
 BOMB = '<!DOCTYPE x [<!ENTITY a "ha"><!ENTITY b "&a;&a;&a;&a;">]><linkage2><connector id="&b;"/></linkage2>'
@@ -144,3 +155,65 @@ def test_texts_that_are_cut_short_anywhere_are_refused_in_a_sentence(tmp_path):
                 planar.load(path)
             except planar.BadInput as problem:
                 assert "\n" not in str(problem)
+
+
+def slices(count):
+    """Some mutations of each sample, always the same ones."""
+    texts = [*FOUR_BARS.items(), *SLIDER_CRANKS.items(), ("linkage_sim", json.dumps(LINKAGE_SIM))]
+    texts += [("pmksplus", OLD_PLUS_SLIDER), ("pmksplus", pmksplus_cylinder(0.7, 4.0, 2.0, 4.0))]
+    draw = Random(20)
+    return [(name, mutated(text, draw)) for name, text in texts for _ in range(count)]
+
+
+def with_last_sign(name, text):
+    """A link of PMKS+ with the sign that fits its length, so that its parts are read."""
+    code = text.partition("?")[2]
+    return pmksplus(code[:-1]) if name == "pmksplus" and code and "j=" not in code else text
+
+
+def test_mutated_files_of_every_program_are_read_or_refused_in_a_sentence():
+    read = 0
+    for name, text in slices(8):
+        content = with_last_sign(name, text).encode()
+        try:
+            mechanism = _read_foreign(content, "a.txt", name, None)[0]
+        except planar.BadInput as problem:
+            assert "\n" not in str(problem)
+            continue
+        read += 1
+        assert mechanism.links and mechanism.pairs
+    assert read > 10
+
+
+JOINT_TWICE = """mech=
+ground,crank,R,0.0,0.0,0.0,tfft
+ground,hip,c,R,-38.0,-7.8,0.0,tfff
+crank,j,c,R,-38.0,-7.8,0.0,tfff
+j,hip,R,-38.0,33.7,0.0,tfff
+"""
+
+
+def test_an_input_between_links_that_share_two_pins_is_refused(tmp_path):
+    path = tmp_path / "twice.txt"
+    path.write_text(JOINT_TWICE)
+    with pytest.raises(planar.BadInput, match="the input at 'A' cannot move: the two links that it drives share two"):
+        planar.load(path)
+
+
+@pytest.mark.parametrize(
+    "address",
+    [
+        "https://example.org/mechanisms/4?id=7",
+        "http://example.org",
+        "www.example.org/x",
+        "ftp://example.org/a.linkage2",
+        "app.pmksplus.com/?something",
+    ],
+)
+def test_an_address_that_no_reader_knows_is_called_a_link(address):
+    with pytest.raises(planar.BadInput) as raised:
+        planar.load(address)
+    message = str(raised.value)
+    assert message.startswith(f"link {address}: no reader knows this link")
+    assert all(form in message for form in ("?mech=...", "?j=...&l=...", "?CODE", "planar:..."))
+    assert "no such file" not in message

@@ -13,6 +13,7 @@ from planar.solving.rest_position import rest_position
 from tests.foreign_samples import (
     FOUR_BARS,
     LINKAGE_SIM,
+    OLD_PLUS_SLIDER,
     PIXEL,
     SLIDER_CRANKS,
     asmt,
@@ -20,9 +21,10 @@ from tests.foreign_samples import (
     coupler_point,
     linkage2,
     pmksplus,
+    pmksplus_cylinder,
     slider_place,
 )
-from tests.round_trips import read_document, read_text
+from tests.round_trips import read_back, read_document, read_text
 
 ROUNDED = 1e-12
 TURNS = (0.4, -1.1)
@@ -194,3 +196,119 @@ def test_joints_of_ondsel_that_no_plane_has_are_refused_by_their_kind():
     text = FOUR_BARS["ondsel"].replace("RevoluteJoint", "CurveCurveContact", 1).replace("/Asm/m1", "/Asm/curve", 1)
     with pytest.raises(planar.BadInput, match="joint A: a 'CurveCurveContact' as this stands is no pair"):
         read_text(text)
+
+
+def test_a_link_of_pmksplus_until_2023_is_read():
+    mechanism = planar.load(OLD_PLUS_SLIDER)
+    assert [link.name for link in mechanism.links] == ["ground", "ab", "bc"]
+    assert mechanism.inputs[0].velocity == pytest.approx(pi / 3)  # 10 rpm
+    for turn in TURNS:
+        assert nearest(points_after(mechanism, turn), slider_place(turn)) < 1e-9
+    (load,) = mechanism.loads
+    assert load.force == (0.0, 7.0) and load.axes is None
+    turned = planar.load(OLD_PLUS_SLIDER.replace("&s=10,false", "&s=10,true"))
+    assert turned.inputs[0].velocity == pytest.approx(-pi / 3)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("b,3,4", "b,3,x", "joint b: 'x' is no number"),
+        ("a,0,0,ab,R,t", "a,0,0,ab,R,maybe", "joint a: 't' or 'f' is expected"),
+        ("a%7Cb,,line", "a%7Cq,,line", "the link 'ab' names a joint 'q'"),
+        ("F1,bc,9", "F1,zz,9", "the force 'F1' is on a link 'zz'"),
+        ("a,0,0,ab,R,t,Null,t", "a,0", "no joint of PMKS"),
+    ],
+)
+def test_a_broken_link_of_pmksplus_until_2023_is_refused_at_its_part(old, new, message):
+    with pytest.raises(planar.BadInput, match=message):
+        planar.load(OLD_PLUS_SLIDER.replace(old, new, 1))
+
+
+def test_links_with_newer_signs_and_a_locked_part_are_read():
+    code = FOUR_BARS["pmksplus"].partition("?")[2][:-1].replace("YRAB", "ARAB").replace("YRCD", "3RCD")
+    assert len(read_text(pmksplus(f"{code}.JA,KJB~red")).links) == 4
+
+
+def test_the_speed_of_a_driven_slide_of_pmksplus_is_not_that_of_a_pin():
+    text = pmksplus_cylinder(0.7, 4.0, 2.0, 4.0)
+    without = text.replace(f",{base64(3.0)}.", ".")
+    assert read_text(pmksplus(without.partition("?")[2][:-1])).inputs[0].velocity == pytest.approx(0.05)
+
+
+MASS = "\n{0}PrincipalMassMarker\n{0}\tName\n{0}\t\tm{1}\n{0}\tMass\n{0}\t\t{2}\n{0}\tMomentOfInertias\n{0}\t\t{3}"
+
+
+def with_masses(text, mass, inertia):
+    """An assembly whose parts have these masses and moments of inertia."""
+    place = "\n{0}Position3D\n{0}\t0 0 0\n{0}RotationMatrix\n{0}\t1 0 0\n{0}\t0 1 0\n{0}\t0 0 1".format("\t" * 4)
+    return text.replace("\n\t\t\tRefPoints", MASS.format("\t" * 3, place, mass, inertia) + "\n\t\t\tRefPoints")
+
+
+def test_an_assembly_of_freecad_is_in_millimetres_and_its_placeholders_are_no_masses():
+    freecad = with_masses(FOUR_BARS["ondsel"], "1", "1 1 1")
+    document = read_document(freecad)
+    assert document["units"]["length"] == "mm" and "masses" not in document
+    told = " ".join(document["notes"])
+    assert "0.09 mm high and 0.1 mm wide" in told and "placeholders; no mass is read" in told
+    weighed = read_document(with_masses(FOUR_BARS["ondsel"], "2", "1 1 1"))
+    assert weighed["units"]["length"] == "m" and len(weighed["masses"]) == 4
+    example = freecad.replace("OndselSolver", "freeCAD: 3D CAD", 1)
+    assert read_document(example)["units"]["length"] == "m"
+
+
+def test_a_unit_of_length_may_be_given_where_a_file_names_none(tmp_path):
+    for name, ending in (("ondsel", "asmt"), ("pmks", "txt"), ("pyslvs", "pyslvs"), ("pylinkage", "json")):
+        path = tmp_path / f"a.{ending}"
+        path.write_text(FOUR_BARS[name])
+        found = planar.convert(path, length_unit="in")
+        assert any("its numbers are taken as in" in note for note in found.notes)
+        assert found.mechanism.units.length == "in"
+    path = tmp_path / "a.linkage2"
+    path.write_text(FOUR_BARS["linkage2"])
+    with pytest.raises(planar.BadInput, match="names its unit of length"):
+        planar.convert(path, length_unit="in")
+    with pytest.raises(planar.BadInput, match="length unit"):
+        planar.convert(tmp_path / "a.txt", length_unit="kg")
+
+
+def rotated(text, rows):
+    """An assembly turned in space as a whole, gravity included."""
+    turned = "\n".join(f"\t\t{row}" for row in rows)
+    head, _, tail = text.partition("\n\tRotationMatrix\n\t\t1 0 0\n\t\t0 1 0\n\t\t0 0 1")
+    gravity = " ".join(str(-9.81 * float(row.split()[1])) for row in rows)
+    return f"{head}\n\tRotationMatrix\n{turned}{tail}".replace("0.0 -9.81 0.0", gravity)
+
+
+@pytest.mark.parametrize(
+    "rows",
+    [
+        ("1 0 0", "0 1 0", "0 0 1"),  # seen from above
+        ("1 0 0", "0 0 -1", "0 1 0"),  # from the front, y of the drawing along z
+        ("0 0 1", "1 0 0", "0 1 0"),  # from the right
+        ("0 0 -1", "0 1 0", "1 0 0"),  # in the plane of y and z, y upwards
+    ],
+)
+def test_gravity_of_an_assembly_points_downwards_in_every_view(rows):
+    mechanism = read_text(rotated(FOUR_BARS["ondsel"], rows))
+    assert mechanism.gravity == pytest.approx((0.0, -9.81))
+    state = planar.solve(mechanism)
+    heights = sorted(1000.0 * point.position[1] for point in state.points.values())
+    assert (heights[0], heights[-1]) == (pytest.approx(0.0), pytest.approx(90.0))
+
+
+def test_an_assembly_that_its_solver_left_open_is_closed_with_a_note():
+    for gap, size in ((0.63e-6, 0.3), (1e-6, 0.1)):
+        text = asmt(
+            {"": {"m1": (0, 0)}, "bar": {"a": (0, 0), "b": (size * 1000, 0)}}, "RevoluteJoint A m1 bar/a", "A 1.0*time"
+        )
+        moved = text.replace("\n\t\t\tPosition3D\n\t\t\t\t0.0 0.0 0.0", f"\n\t\t\tPosition3D\n\t\t\t\t{gap} 0.0 0.0", 1)
+        assert "is open by" in " ".join(read_document(moved)["notes"])
+        assert planar.solve(read_text(moved)).residual < 1e-12
+
+
+def test_names_of_links_that_are_numbers_stay_so_in_texts_of_pmks():
+    text = "ground,6,R,0,0,0,tfft\n6,3,R,30,40\n3,5,R,90,70\n5,ground,R,100,0\n"
+    mechanism = read_text(text)
+    assert [link.name for link in mechanism.links] == ["ground", "6", "3", "5"]
+    assert [link.name for link in read_back(mechanism, "pmks").links] == ["ground", "6", "3", "5"]
