@@ -106,13 +106,9 @@ def centrodes_picture(
     strokes, names = _centrode_strokes(pieces, drawn, scale)
     name = centre_name(mechanism, found.link, found.other)
     dots = [] if found.reason else _position_marks(run, found, state, marks)
-    inside_view = [dot for dot in dots if (np.abs(dot.place - place.middle) <= half).all()]
-    picture_marks: list[Mark] = [*strokes, *(mark for mark in drawn.marks if not isinstance(mark, Label))]
-    for dot in inside_view:
-        spot = paper_point(dot.place / scale.per_mm)
-        picture_marks.append(Circle(spot, DOT_RADIUS, dot.pen, dot.about, Fill.PAPER if dot.text else Fill.NONE))
-        if dot.text:
-            names.append(Label(dot.text, spot, dot.about, 7.0, DOT_RADIUS + 0.3))
+    circles, texts = _dot_marks([dot for dot in dots if (np.abs(dot.place - place.middle) <= half).all()], scale)
+    names += texts
+    picture_marks: list[Mark] = [*strokes, *(mark for mark in drawn.marks if not isinstance(mark, Label)), *circles]
     if inside and pole is not None:
         at = paper_point(pole / scale.per_mm)
         picture_marks.append(Circle(at, POLE_RADIUS, Pen.PIN, f"pole {name}", Fill.PAPER))
@@ -120,9 +116,9 @@ def centrodes_picture(
     letters = [mark for mark in drawn.marks if isinstance(mark, Label)]
     against = "" if found.other == mechanism.frame else f" against {found.other}"
     told = (*_notes(run, found, name, inside, pole), *([_moved_note(run, state)] if moved else []))
-    if inside_view:
-        unit = "length" if run.is_sliding_input else "angle"
-        told = (*told, f"Dots: positions of the input {run.input.pair} in {unit_of_kind(unit, mechanism.units)[0]}")
+    if circles:
+        unit = unit_of_kind("length" if run.is_sliding_input else "angle", mechanism.units)[0]
+        told = (*told, f"Dots: positions of the input {run.input.pair} in {unit}")
     title = f"{mechanism.name}: centrodes of {found.link}{against}"
     return Picture((*picture_marks, *letters, *names), title, (*told, *drawn.notes))
 
@@ -248,6 +244,21 @@ class _PositionMark(NamedTuple):
     text: str
     pen: Pen
     about: str
+
+
+def _dot_marks(dots: Sequence[_PositionMark], scale: Scale) -> tuple[list[Circle], list[Label]]:
+    """The dots on paper, and the texts of those that have one."""
+    spots = [paper_point(dot.place / scale.per_mm) for dot in dots]
+    circles = [
+        Circle(spot, DOT_RADIUS, dot.pen, dot.about, Fill.PAPER if dot.text else Fill.NONE)
+        for dot, spot in zip(dots, spots, strict=True)
+    ]
+    texts = [
+        Label(dot.text, spot, dot.about, 7.0, DOT_RADIUS + 0.3)
+        for dot, spot in zip(dots, spots, strict=True)
+        if dot.text
+    ]
+    return circles, texts
 
 
 def _position_marks(run: DrawnRun, found: Centrodes, state: State, count: int) -> list[_PositionMark]:
