@@ -84,7 +84,7 @@ class EditServer(ThreadingHTTPServer):
         "of value, path, mark, note and target"
         self.page_state = threading.Lock()
         "of the open pages"
-        self.work = threading.Lock()
+        self.work = threading.RLock()
         "one thread at a time reads a task or makes a page: a library below must not be entered by many"
         self.search: BackgroundSearch | None = None
         "the last one that a page has begun"
