@@ -211,6 +211,21 @@ def test_every_option_stands_on_a_page_and_every_option_of_a_page_is_one():
     assert shown - known - {"--set", "--write"} == set()  # that of every command; that of the benchmarks
 
 
+@pytest.mark.parametrize("page", [*PAGES, "README"])
+def test_the_commands_and_options_that_prose_names_exist(page):
+    """In prose a command stands between back quotes, as `planar solve --json`."""
+    text = README if page == "README" else PAGES[page]
+    commands = main.load_commands()
+    shared = {"--set", "--help", "--version"}
+    for code in re.findall(r"`(planar [^`]+)`", re.sub(r"```.*?```", "", text, flags=re.DOTALL)):
+        words = code.split()
+        if words[1].startswith("-") or words[1].isupper():  # an option of the program, a placeholder
+            continue
+        assert words[1] in commands, code
+        options = {option for part in commands[words[1]].params for option in (*part.opts, *part.secondary_opts)}
+        assert {word.partition("=")[0] for word in words if word.startswith("--")} <= options | shared, code
+
+
 def test_every_page_of_an_answer_shows_how_and_says_where_its_theory_is_from():
     for page in (each for each in PAGES if each.startswith(("answers/", "design/"))):
         assert blocks(page, "sh") or blocks(page, "python"), page

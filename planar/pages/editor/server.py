@@ -41,7 +41,7 @@ SILENCE = 200.0
 """s: an open page is heard of more often; browsers wake pages that nobody sees once a minute."""
 REQUEST_TIMEOUT = 30.0
 """s, after which a connection that says nothing is dropped."""
-QUEUE_LIMIT, PAGE_LIMIT = 0.02, 3.0
+QUEUE_LIMIT, PAGE_LIMIT = 0.02, 10.0
 """s that a page waits for other computations, and s that it may take; else it is sent without positions."""
 WORKER = Worker(partial(edit_answer, BACKDROP))
 """The process in which all servers of this process compute."""
@@ -84,7 +84,7 @@ class EditServer(ThreadingHTTPServer):
         "of value, path, mark, note and target"
         self.page_state = threading.Lock()
         "of the open pages"
-        self.work = threading.Lock()
+        self.work = threading.RLock()
         "one thread at a time reads a task or makes a page: a library below must not be entered by many"
         self.search: BackgroundSearch | None = None
         "the last one that a page has begun"

@@ -19,8 +19,8 @@ from planar.foundation.errors import PlanarError
 
 COMPUTATION_LIMIT = 60.0
 """s that one computation may take."""
-GRACE = 0.3
-"""s that a computation may go on after its result became unnecessary: a restart of the process takes longer."""
+GRACE = 1.5
+"""s that a computation may take although nobody needs its result any more: about what a restart of the process takes."""
 POLL_INTERVAL = 0.05
 """s between two checks of whether a result is still needed."""
 
