@@ -129,7 +129,7 @@ def _explain_open_end(course: ForceCourse, name: str) -> str:
     motion, torque = course.run.motion, np.asarray(course.forces.inputs[name])
     speed = motion.inputs[name].velocity
     largest = max(float(np.nanmax(np.abs(torque))), course.effort_scale(name))
-    if abs(speed[-1] - speed[0]) > CYCLE_TOLERANCE * float(np.abs(speed).max()):
+    if motion.time is not None and abs(speed[-1] - speed[0]) > CYCLE_TOLERANCE * float(np.abs(speed).max()):
         return "the motion is no whole cycle: the speed does not end as it began"
     is_open = abs(torque[-1] - torque[0]) > CYCLE_TOLERANCE * largest and not course.has_step_at_ends
     return "the motion is no whole cycle: the torque does not end as it began" if is_open else ""
@@ -157,12 +157,12 @@ class _EffortOverCycle:
         assert course is not None
         self.name, self.course = name, course
         rate = 1.0 if course.run.motion.time is None else float(np.abs(forces.moving.inputs[name].velocity).max())
-        least = course.effort_scale(name)
-        series = course.series(self._power_and_torque, np.array([least * rate, least]))
+        scale = course.effort_scale(name)
+        series = course.series(self._power_and_torque, np.array([scale * rate, scale]))
         if series is None:
             raise BadInput(name, UNKNOWN_TORQUE)
         self.series = series
-        self.start, self.stop = (float(each) for each in self._angles([course.run.low, course.run.high]))
+        self.start, self.stop = map(float, self._angles([course.run.low, course.run.high]))
         mean = series.integral(0) / (self.stop - self.start)
         self.mean = 0.0 if abs(mean) <= ZERO_MEAN_TOLERANCE * float(series.scale[1]) else mean
 

@@ -59,15 +59,15 @@ class ForceCourse:
         None where it has none, not over the whole motion, or where a column grows without bound.
         """
         try:
-            found = fit_series(lambda places: measure(self.forces_at(places)), self.ends, least_scale)
+            series = fit_series(lambda places: measure(self.forces_at(places)), self.ends, least_scale)
         except NoAnswer:
             return None
-        return None if found is None or found.has_gaps else found
+        return None if series is None or series.has_gaps else series
 
     def positions(self, places: Sequence[float] | Array) -> Array:
         """Where places are, as tables say it: the time (s) of a run in time, else the running input (rad or m)."""
-        at = np.asarray(places, dtype=float)
-        return at if self.run.motion.time is not None else self.run.positions(at)
+        values = np.asarray(places, dtype=float)
+        return values if self.run.motion.time is not None else self.run.positions(values)
 
     @cached_property
     def least_scales(self) -> tuple[float, float]:
@@ -89,7 +89,7 @@ class ForceCourse:
     def has_step_at_ends(self) -> bool:
         """Whether a load or a law of an input may have a step at the first or the last place."""
         motion = self.run.motion
-        if motion.time is not None and any(given.law is not None for given in motion.mechanism.inputs):
+        if motion.time is not None and any(driven.law is not None for driven in motion.mechanism.inputs):
             return True
         for load in motion.mechanism.loads:
             if load.varies is None:
@@ -122,9 +122,9 @@ class ForceCourse:
         return turn if is_angle and abs(places[-1] - places[0] - turn) < TURN_TOLERANCE else 0.0
 
     def _motor_breaks(self) -> Iterator[float]:
-        for given in self.run.motion.mechanism.inputs:
-            if given.motor is not None and self.run.motion.time is not None:
-                yield from self.run.speed_crossings(given.pair, given.motor.speeds).tolist()
+        for driven in self.run.motion.mechanism.inputs:
+            if driven.motor is not None and self.run.motion.time is not None:
+                yield from self.run.speed_crossings(driven.pair, driven.motor.speeds).tolist()
 
 
 def has_unknown_intervals(values: Array) -> bool:

@@ -89,7 +89,8 @@ class SeriesPiece(NamedTuple):
         return np.concatenate([[self.low], flat, [self.high]])
 
     def _local(self, x: Array) -> Array:
-        return np.clip((2.0 * np.asarray(x) - self.low - self.high) / (self.high - self.low), -1.0, 1.0)
+        local: Array = np.clip((2.0 * np.asarray(x) - self.low - self.high) / (self.high - self.low), -1.0, 1.0)
+        return local
 
 
 class PiecewiseSeries(NamedTuple):
@@ -183,7 +184,7 @@ class PiecewiseSeries(NamedTuple):
         first = int(np.argmax(signed >= signed.max() - TIE_TOLERANCE * self.scale[column]))
         return SeriesExtreme(float(places[first]), float(sign * signed.max()), values[first])
 
-    def least(self, column: int = 0) -> SeriesExtreme:
+    def smallest(self, column: int = 0) -> SeriesExtreme:
         """The least value of a column, and the first of its places."""
         return self.greatest(column, -1.0)
 
@@ -285,13 +286,13 @@ class _Fit:
         """
         opened: list[_OpenPiece] = []
         removed: set[int] = set()
-        for k, (left, right) in enumerate(pairwise(self.pieces)):
-            place, reach = left.high, JOINT_RATIO * min(left.high - left.low, right.high - right.low)
-            if right.low != place or place in known or reach < self.shortest or removed & {k, k + 1}:
+        for k, (before, after) in enumerate(pairwise(self.pieces)):
+            place, reach = before.high, JOINT_RATIO * min(before.high - before.low, after.high - after.low)
+            if after.low != place or place in known or reach < self.shortest or removed & {k, k + 1}:
                 continue
-            step = np.abs(left.evaluate(np.array([place])) - right.evaluate(np.array([place])))[0]
+            step = np.abs(before.evaluate(np.array([place])) - after.evaluate(np.array([place])))[0]
             if (step > JOINT_TOLERANCE * self.scale).any():
-                places = left.low, place - reach, place + reach, right.high
+                places = before.low, place - reach, place + reach, after.high
                 opened += [_OpenPiece(*part, np.inf) for part in pairwise(places)]
                 removed |= {k, k + 1}
         self.pieces = [piece for k, piece in enumerate(self.pieces) if k not in removed]

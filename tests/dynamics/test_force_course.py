@@ -120,10 +120,10 @@ def test_a_follower_lifts_off_where_its_closed_form_says(steps, tmp_path):
     contact = planar.contact_forces(planar.forces(planar.cycle(planar.from_dict(document), steps)))["lift"]
     speed = 500.0 * 2.0 * pi / 60.0
     amplitude = 0.9 * 0.015 * speed**2 - 15.0
-    ((first, last),) = contact.lift_off
+    ((first, last),) = contact.lift_off_intervals
     angle = acos(-17.5 / amplitude)
     assert (first, last) == pytest.approx((angle, 2.0 * pi - angle), rel=1e-9)
-    assert contact.least == pytest.approx(17.5 - amplitude, rel=1e-9)
+    assert contact.smallest == pytest.approx(17.5 - amplitude, rel=1e-9)
 
 
 def test_a_run_between_its_rows_is_the_run_of_other_rows():

@@ -18,7 +18,7 @@ def test_a_named_step_costs_nothing_and_is_exact():
     series = fit_series(step, [0.0, 1.3, TURN])
     assert sum(calls) < 200
     assert series.integral() == pytest.approx(2.6 + 0.845 + np.cos(1.3) - 1.0, abs=1e-13)
-    greatest, least = series.greatest(), series.least()
+    greatest, least = series.greatest(), series.smallest()
     assert (greatest.place, greatest.value) == (1.3, pytest.approx(3.3, abs=1e-13))  # the value before the step
     assert (least.place, least.value) == pytest.approx((1.5 * np.pi, -1.0))
 

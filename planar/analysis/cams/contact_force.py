@@ -28,9 +28,9 @@ class ContactForce(NamedTuple):
     said of such positions is not what happens. `lifts_off` (n,) says where; NaN where the force is not determined.
     `stress` (n,) is the greatest pressure between the two (Pa), where the file says what they are made of: Hertz's
     sqrt(F E* / (pi b R)) of two cylinders of width b, 1/R the sum of their curvatures (K. L. Johnson, Contact
-    Mechanics, Cambridge University Press 1985, ch. 4); none where they do not press. `lift_off` are the intervals
-    (from, to) of the running input, or of the time of a run in time, in which the follower lifts off, and `least` the
-    least force. Over a motion both are solved for between its positions (`is_solved`), unless the motion is known at
+    Mechanics, Cambridge University Press 1985, ch. 4); none where they do not press. `lift_off_intervals` are those
+    (from, to) of the running input, or of the time of a run in time, in which the follower lifts off; `smallest` is the
+    smallest force. Over a motion both are solved for between its positions (`is_solved`), unless the motion is known at
     these alone.
     """
 
@@ -38,8 +38,8 @@ class ContactForce(NamedTuple):
     grooved: bool
     lifts_off: Array
     stress: Array | None = None
-    lift_off: tuple[tuple[float, float], ...] = ()
-    least: float = np.nan
+    lift_off_intervals: tuple[tuple[float, float], ...] = ()
+    smallest: float = np.nan
     is_solved: bool = True
 
     def __repr__(self) -> str:
@@ -73,20 +73,20 @@ def contact_columns(forces: Forces) -> Array:
 def _contact_force(forces: Forces, pair: ProfiledPair) -> ContactForce:
     contact = _contact_at_rows(forces, pair)
     if not isinstance(forces.moving, Motion):
-        return contact._replace(least=float(contact.force[0]))
+        return contact._replace(smallest=float(contact.force[0]))
     course = force_course(forces)
     series = None
     if course is not None and not has_unknown_intervals(contact.force):
-        series = course.series(lambda found: _contact_at_rows(found, pair).force, course.least_scales[1])
+        series = course.series(lambda at_places: _contact_at_rows(at_places, pair).force, course.least_scales[1])
     if course is None or series is None:
         return contact._replace(
-            lift_off=_row_intervals(forces.moving, contact.lifts_off),
-            least=float(np.nanmin(contact.force)) if np.isfinite(contact.force).any() else np.nan,
+            lift_off_intervals=_row_intervals(forces.moving, contact.lifts_off),
+            smallest=float(np.nanmin(contact.force)) if np.isfinite(contact.force).any() else np.nan,
             is_solved=False,
         )
-    intervals = () if contact.grooved else (course.positions(each) for each in series.intervals_below(0.0))
+    intervals = () if contact.grooved else (course.positions(interval) for interval in series.intervals_below(0.0))
     lift_off = tuple((float(start), float(stop)) for start, stop in intervals)
-    return contact._replace(lift_off=lift_off, least=series.least().value)
+    return contact._replace(lift_off_intervals=lift_off, smallest=series.smallest().value)
 
 
 def _row_intervals(motion: Motion, chosen: Array) -> tuple[tuple[float, float], ...]:

@@ -73,16 +73,16 @@ def motor_duty(forces: Forces, of: str | None = None) -> MotorDuty:
     margin, power = measure(forces).T
     greatest, best_speed = motor.greatest_power
     if isinstance(moving, State):
-        position, left = float(moving.inputs[of].position), float(margin[0])
-        numbers = float(available), float(needed), left, float(power[0]), left, position
-        weak = ((position, position),) if left < 0.0 else ()
+        position, remaining = float(moving.inputs[of].position), float(margin[0])
+        numbers = float(available), float(needed), remaining, float(power[0]), remaining, position
+        weak = ((position, position),) if remaining < 0.0 else ()
         return MotorDuty(of, motor, *numbers, weak, greatest, best_speed, float(power[0]))
     rows = available, needed, margin, power
     solved = _solved_margin(forces, of, measure)
     if solved is not None:
         return MotorDuty(of, motor, *rows, *solved[:3], greatest, best_speed, solved[3])
-    least, least_at, weak, most = _margin_at_rows(moving, margin, power)
-    return MotorDuty(of, motor, *rows, least, least_at, weak, greatest, best_speed, most, is_solved=False)
+    *margins, greatest_power = _margin_at_rows(moving, margin, power)
+    return MotorDuty(of, motor, *rows, *margins, greatest, best_speed, greatest_power, is_solved=False)
 
 
 Margins = tuple[float, float, tuple[tuple[float, float], ...], float]
@@ -106,15 +106,15 @@ def _solved_margin(forces: Forces, name: str, measure: _MarginMeasure) -> Margin
     course = force_course(forces)
     if course is None:
         return None
-    least = course.effort_scale(name)
+    scale = course.effort_scale(name)
     speed = float(np.abs(np.asarray(forces.moving.inputs[name].velocity)).max())
-    series = course.series(measure, np.array([least, least * speed]))
+    series = course.series(measure, np.array([scale, scale * speed]))
     if series is None:
         return None
-    smallest, most = series.least(0), series.greatest(1)
+    smallest, highest = series.smallest(0), series.greatest(1)
     ends = [course.positions(interval) for interval in series.intervals_below(0.0, 0)]
     weak = tuple((float(start), float(stop)) for start, stop in ends)
-    return smallest.value, float(course.positions([smallest.place])[0]), weak, most.value
+    return smallest.value, float(course.positions([smallest.place])[0]), weak, highest.value
 
 
 def _margin_at_rows(motion: Motion, margin: Array, power: Array) -> Margins:

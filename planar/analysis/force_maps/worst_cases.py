@@ -28,7 +28,7 @@ from planar.solving.grids.input_grid import Border, InputGrid
 
 STENCIL = (-1.0, -0.5, 0.0, 0.5, 1.0)
 """Parts of its width at which the neighbourhood of a greatest force is looked at, along each input."""
-REFINEMENTS = 18
+REFINEMENTS = 26
 """Halvings of that neighbourhood: its greatest, flat as it is there, is known to rounding long before."""
 SAME_TOP = 0.3
 """Of the width: searches so near to one another, in a neighbourhood that is smaller than a step by as much, go on to

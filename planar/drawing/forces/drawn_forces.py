@@ -91,13 +91,13 @@ class ForceRun(NamedTuple):
         series = None if course is None else course.series(measure, least_scale)
         if course is None or series is None:
             return None
-        found = []
-        for extreme in (series.greatest(), series.least()):
+        extremes = []
+        for extreme in (series.greatest(), series.smallest()):
             value = float(course.positions([extreme.place])[0])
             if self.unit != "s":
                 value = parse_unit(self.unit).from_si(value)
-            found.append((float(np.mod(value, self.period)) if self.period else value, extreme.value))
-        return tuple(found)
+            extremes.append((float(np.mod(value, self.period)) if self.period else value, extreme.value))
+        return tuple(extremes)
 
 
 def forces_over_cycle(source: Forces | Motion | Mechanism, with_steps: bool = True) -> ForceRun:

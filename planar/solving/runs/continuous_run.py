@@ -47,8 +47,8 @@ class ContinuousRun:
         )
         self.turning_rows: IntArray = np.flatnonzero(steps[1:] * steps[:-1] < 0.0) + 1
         course = motion.course
-        kept = None if course is None else course.unknowns
-        self.z = run_unknowns(self.solver, motion) if kept is None else kept[: len(motion)]
+        unknowns = None if course is None else course.unknowns
+        self.z = run_unknowns(self.solver, motion) if unknowns is None else unknowns[: len(motion)]
         singular = [] if course is None else [row for row in course.singular_rows if row < len(motion)]
         self._is_sound: BoolArray = rows_with_rates(motion)
         self._is_sound[singular] = False
@@ -84,9 +84,9 @@ class ContinuousRun:
         samples = [part.fast_samples for part in parts]
         fast = (
             FastSamples(
-                np.concatenate([each.coordinate_rates for each in samples if each]),
-                np.concatenate([each.is_sure for each in samples if each]),
-                max(each.residual for each in samples if each),
+                np.concatenate([part.coordinate_rates for part in samples if part]),
+                np.concatenate([part.is_sure for part in samples if part]),
+                max(part.residual for part in samples if part),
             )
             if all(samples)
             else None
@@ -110,8 +110,8 @@ class ContinuousRun:
         """Places inside the run at which the file says that something may bend or jump, and forks of the path."""
         places = [*self.forks.tolist(), *self.rows[self.turning_rows].tolist()]
         if self.motion.time is not None:
-            for given in self.motion.mechanism.inputs:
-                places += [] if given.law is None else given.law.joint_times
+            for driven in self.motion.mechanism.inputs:
+                places += [] if driven.law is None else driven.law.joint_times
         for pair in self.motion.mechanism.pairs:
             ends = pair.piece_ends(self.motion.shapes)
             if ends is not None:
@@ -128,7 +128,9 @@ class ContinuousRun:
         """The places at which an input passes one of its positions, or one whole periods (rad) away."""
         if self.motion.time is None and name == self.name:
             low, high = np.min(self.motion.inputs[name].position), np.max(self.motion.inputs[name].position)
-            return self._places_of_positions([each for level in levels for each in _repeated(level, period, low, high)])
+            return self._places_of_positions(
+                [target for level in levels for target in _repeated(level, period, low, high)]
+            )
         return self.crossings(lambda motion: motion.inputs[name].position, levels, period)
 
     def speed_crossings(self, name: str, speeds: Iterable[float]) -> Array:
@@ -162,7 +164,7 @@ class ContinuousRun:
         self, signal: Callable[[Motion], Array], ends: tuple[Array, Array], values: tuple[Array, Array], target: Array
     ) -> Array:
         """Roots in brackets, all at once: false position with the weights of Anderson and Bjorck, else bisection."""
-        a, b, fa, fb = (each.copy() for each in (*ends, *values))
+        a, b, fa, fb = (part.copy() for part in (*ends, *values))
         room = 1e-15 * max(abs(self.low), abs(self.high))
         for step in range(MAX_ROOT_STEPS):
             is_open = (np.abs(b - a) > room) & (fa != 0.0) & (fb != 0.0)
@@ -190,25 +192,27 @@ class ContinuousRun:
     def _places_of_positions(self, positions: Iterable[float]) -> Array:
         """The places at which the running input of a range has positions, each as often as it comes there."""
         row_positions = self.motion.inputs[self.name].position
-        found = []
+        places: list[float] = []
         for position in positions:
             gap = row_positions - position
             k = np.flatnonzero(gap[1:] * gap[:-1] <= 0.0)
-            found += (self.rows[k] + np.abs(gap[k])).tolist()
-        return self.distinct(found)
+            places += (self.rows[k] + np.abs(gap[k])).tolist()
+        return self.distinct(places)
 
     def _input_rates(self, places: Array) -> InputRates:
         motion = self.motion
         if motion.time is not None:
-            parts = np.array([input_law_rates(each, places) for each in motion.mechanism.inputs])
+            parts = np.array([input_law_rates(driven, places) for driven in motion.mechanism.inputs])
             return InputRates(*(part.T / self.scale for part in parts.transpose(1, 0, 2)))
         k = np.clip(np.searchsorted(self.rows, places, side="right") - 1, 0, len(self.rows) - 2)
         along = np.where(np.isin(k, self.turning_rows), k + 1, k)  # a turning row has the rates of the way before it
-        given = motion.inputs.values()
-        u = np.array([each.position[k] for each in given])
+        inputs = motion.inputs.values()
+        u = np.array([driven.position[k] for driven in inputs])
         running = motion.inputs[self.name].position
         u[self._running] = running[k] + (places - self.rows[k]) * np.sign(running[k + 1] - running[k])
-        u1, u2 = (np.array([getattr(each, rate)[along] for each in given]) for rate in ("velocity", "acceleration"))
+        u1, u2 = (
+            np.array([getattr(driven, rate)[along] for driven in inputs]) for rate in ("velocity", "acceleration")
+        )
         return InputRates(*(part.T / self.scale for part in (u, u1, u2, np.zeros_like(u1))))
 
     def _divided(self, targets: Array) -> list[Array]:
@@ -228,18 +232,18 @@ class ContinuousRun:
         base = int(np.argmin(np.where(usable, np.abs(self.rows - targets[0]), np.inf)))
         between = self.rows[(self.rows > targets[0]) & (self.rows < targets[-1])]
         places = np.sort(np.concatenate([targets, between]))
-        given = self._input_rates(np.concatenate([[self.rows[base]], places]))
-        found = follow_samples(self.solver, self.solver.inputs.p, self.z[base], given.u, rates=(given.u1, given.u2))
-        if found.stopped is not None:
-            raise found.stopped
-        wanted = 1 + np.searchsorted(places, targets)
-        where = {int(row): k for k, row in enumerate(wanted)}
-        local = {where[row]: rates for row, rates in found.branch_rates.items() if row in where}
-        fast = found.fast_samples
+        rates = self._input_rates(np.concatenate([[self.rows[base]], places]))
+        path = follow_samples(self.solver, self.solver.inputs.p, self.z[base], rates.u, rates=(rates.u1, rates.u2))
+        if path.stopped is not None:
+            raise path.stopped
+        chosen = 1 + np.searchsorted(places, targets)
+        index = {int(row): k for k, row in enumerate(chosen)}
+        branch_rates = {index[row]: part for row, part in path.branch_rates.items() if row in index}
+        fast = path.fast_samples
         if fast is not None:
-            fast = FastSamples(fast.coordinate_rates[wanted], fast.is_sure[wanted], fast.residual)
-        rates = InputRates(*(part[wanted] for part in given))
-        return RunSamples(found.z[wanted], rates, branch_rates=local, fast_samples=fast)
+            fast = FastSamples(fast.coordinate_rates[chosen], fast.is_sure[chosen], fast.residual)
+        target_rates = InputRates(*(part[chosen] for part in rates))
+        return RunSamples(path.z[chosen], target_rates, branch_rates=branch_rates, fast_samples=fast)
 
 
 class _PathAtPlaces(NamedTuple):
@@ -273,8 +277,8 @@ def _repeated(level: float, period: float, low: float, high: float) -> list[floa
 
 def rows_with_rates(motion: Motion) -> BoolArray:
     """Which rows have velocities and accelerations (n,)."""
-    jets = [each for f in motion.frames.values() if not f.fixed for each in (f.x, f.y, f.angle)]
-    jets += [jet for own in motion.own.values() for jet in own]
+    jets = [jet for f in motion.frames.values() if not f.fixed for jet in (f.x, f.y, f.angle)]
+    jets += [jet for coordinates in motion.own.values() for jet in coordinates]
     parts = [np.broadcast_to(part, len(motion)) for jet in jets for part in jet.parts]
     return np.isfinite(parts).all(axis=0) if parts else np.ones(len(motion), dtype=bool)
 
@@ -286,9 +290,9 @@ def run_unknowns(solver: PositionSolver, motion: Motion) -> Array:
     for link, frame in motion.frames.items():
         if not frame.fixed:
             values |= {(link, part): getattr(frame, part).parts[0] for part in ("x", "y", "angle")}
-    for name, own in motion.own.items():
+    for name, jets in motion.own.items():
         kinds = solver.pairs[name].coordinate_kinds
-        values |= {(name, part): jet.parts[0] for (part, _), jet in zip(kinds, own, strict=True)}
+        values |= {(name, part): jet.parts[0] for (part, _), jet in zip(kinds, jets, strict=True)}
     coordinates = solver.equations.coordinates
     w = np.array([np.broadcast_to(values[c.owner, c.part], count) for c in coordinates]).reshape(-1, count)
     return (w / solver.scale[:, None])[list(solver.equations.unknowns)].T

@@ -60,19 +60,21 @@ def _cells(forces: Forces, extremes: RunExtremes | None, column: int, values: Ar
     if extremes is None:
         value = float(values[0])
         return (format_quantity(value, kind, forces.mechanism.units) if np.isfinite(value) else "-",)
-    most = extremes.greatest(column)
-    size = float(np.sqrt(most.value)) if kind == "stress" else most.value
-    return (format_quantity(size, kind, forces.mechanism.units), most.place)
+    extreme = extremes.greatest(column)
+    size = float(np.sqrt(extreme.value)) if kind == "stress" else extreme.value
+    return (format_quantity(size, kind, forces.mechanism.units), extreme.place)
 
 
 def lift_off_remarks(forces: Forces) -> list[str]:
     """A sentence for each cam whose follower lifts off somewhere: where, and how hard the cam would have to pull."""
     remarks = []
     for name, contact in contact_forces(forces).items():
-        is_lifted = bool(contact.lift_off) if isinstance(forces.moving, Motion) else bool(contact.lifts_off.any())
+        is_lifted = (
+            bool(contact.lift_off_intervals) if isinstance(forces.moving, Motion) else bool(contact.lifts_off.any())
+        )
         if not is_lifted:
             continue
-        pull = amount(-contact.least, "force", forces.mechanism.units)
+        pull = amount(-contact.smallest, "force", forces.mechanism.units)
         among = "" if contact.is_solved else AMONG_POSITIONS
         remarks.append(
             f"the follower of {name!r} lifts off {_places(forces, contact)}{among}: the cam would have to pull it by "
@@ -87,7 +89,7 @@ def _places(forces: Forces, contact: ContactForce) -> str:
     if not isinstance(motion, Motion):
         return "here"
     name, unit = position_heading(motion).rsplit(", ", 1)
-    intervals = [[place_cell(motion, end) for end in interval] for interval in contact.lift_off]
+    intervals = [[place_cell(motion, end) for end in interval] for interval in contact.lift_off_intervals]
     texts = [first if first == last else f"{first} to {last}" for first, last in intervals]
     return f"{name} = {join_all_names(texts)} {unit}"
 
@@ -120,5 +122,9 @@ def record(forces: Forces) -> dict[str, Any]:
 def _contact_record(forces: Forces, contact: ContactForce, greatest: list[float]) -> dict[str, Any]:
     names = ["force"] + ([] if contact.stress is None else ["stress"])
     values = dict(zip(names, (each if np.isfinite(each) else None for each in greatest), strict=True))
-    over = {"lift_off": [list(interval) for interval in contact.lift_off]} if isinstance(forces.moving, Motion) else {}
+    over = (
+        {"lift_off": [list(interval) for interval in contact.lift_off_intervals]}
+        if isinstance(forces.moving, Motion)
+        else {}
+    )
     return {**values, **over}

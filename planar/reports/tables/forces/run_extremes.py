@@ -43,7 +43,7 @@ class RunExtremes:
         if self.course is not None and is_finite.any():
             scales = np.broadcast_to(least_scale, is_finite.shape)[is_finite]
             self.series = self.course.series(
-                lambda found: np.asarray(measure(found)).reshape(-1, len(is_finite))[:, is_finite], scales
+                lambda at_places: np.asarray(measure(at_places)).reshape(-1, len(is_finite))[:, is_finite], scales
             )
         self.is_solved = not known.any() or (self.series is not None and bool((known == is_finite).all()))
 
@@ -55,11 +55,11 @@ class RunExtremes:
     def greatest(self, column: int, sign: float = 1.0) -> RunExtreme:
         """The greatest value of a column, or the least (`sign` -1); NaN where it is unknown."""
         if self.is_solved and self.series is not None and self.course is not None and column in self._solved_columns:
-            found = self.series.greatest(self._solved_columns.index(column), sign)
+            extreme = self.series.greatest(self._solved_columns.index(column), sign)
             columns = np.full(self.rows.shape[1], np.nan)
-            columns[self._solved_columns] = found.columns
-            position = float(self.course.positions([found.place])[0])
-            return RunExtreme(found.value, place_cell(self.motion, position), columns)
+            columns[self._solved_columns] = extreme.columns
+            position = float(self.course.positions([extreme.place])[0])
+            return RunExtreme(extreme.value, place_cell(self.motion, position), columns)
         values = sign * self.rows[:, column]
         if not np.isfinite(values).any():
             return RunExtreme(np.nan, "", np.full(self.rows.shape[1], np.nan))
