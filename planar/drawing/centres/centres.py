@@ -124,15 +124,11 @@ class _CentresDrawing:
         if scale is None:
             room = DRAWING_SIZE[0] - 2.0 * circle_radius(len(found.numbers)), DRAWING_SIZE[1]
             close = _centres_in_view(shown, low, high, min(reach, CLOSE_REACH))
-            candidates = [
-                round_scale(
-                    "length",
-                    whole.unit,
-                    *map(float, np.ptp(np.array([low, high, *places.values()]), axis=0)),
-                    (growth * room[0], growth * room[1]),
-                )
-                for places, growth in ((close, 1.0), (near, SHEET_GROWTH))
-            ]
+            candidates = []
+            for places, growth in ((close, 1.0), (near, SHEET_GROWTH)):
+                width, height = map(float, np.ptp(np.array([low, high, *places.values()]), axis=0))
+                limits = growth * room[0], growth * room[1]
+                candidates.append(round_scale("length", whole.unit, width, height, limits))
             scale = max(candidates, key=lambda candidate: candidate.per_mm)
         self.scale = scale
         self.scheme_picture = scheme(self.state, scale, len(shown) <= CROWDED_CENTRES)

@@ -130,16 +130,13 @@ def diagram_subject(run: DrawnRun, of: str) -> DiagramSubject:
     size = size_of(run.motion.shapes)
     whole, pace = 1.0 if found.is_angle else size, abs(run.rate) / (size if run.is_sliding_input else 1.0)
     least = [ZERO_TOLERANCE * whole * pace**order for order in range(3)]
-    cleaned = (
-        (_zero_if_still(values, none) for values, none in zip(curve.derivatives, least, strict=True))
-        for curve in found.curves
-    )
-    return found._replace(
-        curves=tuple(
-            MotionCurve(curve.name, *values, from_top=curve.from_top)
-            for curve, values in zip(found.curves, cleaned, strict=True)
+    curves = []
+    for curve in found.curves:
+        value, rate, second = (
+            _zero_if_still(values, limit) for values, limit in zip(curve.derivatives, least, strict=True)
         )
-    )
+        curves.append(curve._replace(value=value, rate=rate, second=second))
+    return found._replace(curves=tuple(curves))
 
 
 def _zero_if_still(values: Array, least: float) -> Array:
@@ -157,15 +154,18 @@ def _raw_subject(run: DrawnRun, of: str) -> DiagramSubject:
     if of in points:
         found = run.point(of)
         parts = (part.T for part in (found.position - found.position[0], found.velocity, found.acceleration))
-        rows = zip(*parts, strict=True)
-        return DiagramSubject(
-            f"point {of}", False, tuple(MotionCurve(name, *row) for name, row in zip("xy", rows, strict=True))
+        curves = (
+            MotionCurve(name, value, rate, second)
+            for name, (value, rate, second) in zip("xy", zip(*parts, strict=True), strict=True)
         )
+        return DiagramSubject(f"point {of}", False, tuple(curves))
     if any(link.name == of for link in motion.mechanism.links):
-        return DiagramSubject(f"link {of}", True, (MotionCurve("", *(part[order] for part in motion.link(of))),))
+        value, rate, second = (part[order] for part in motion.link(of))
+        return DiagramSubject(f"link {of}", True, (MotionCurve("", value, rate, second),))
     named = relative_motions(motion.mechanism)
     if of in named:
-        return DiagramSubject(f"pair {of}", True, (MotionCurve("", *_pair_rates(run, of)),))
+        value, rate, second = _pair_rates(run, of)
+        return DiagramSubject(f"pair {of}", True, (MotionCurve("", value, rate, second),))
     raise BadInput(of, f"there is no pair, point or link of this name; {available_names(motion.mechanism)}")
 
 
