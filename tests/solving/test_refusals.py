@@ -663,3 +663,8 @@ def test_the_search_for_an_assembly_stops_after_a_number_of_blocks(monkeypatch):
     monkeypatch.setattr(refusals, "_remedy", lambda *_: "change it")
     with pytest.raises(NoAnswer, match="the search stopped after 60 blocks"):
         planar.solve(MODELS["chain-42"].with_values({"frame.A15.y": 1e13}))
+
+
+def test_where_a_text_is_no_json_is_said_once():
+    with pytest.raises(planar.BadInput, match="Invalid control character at line 1, column 9"):
+        planar.loads('{"a": "b\n')

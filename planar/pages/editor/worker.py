@@ -20,7 +20,7 @@ from planar.foundation.errors import PlanarError
 COMPUTATION_LIMIT = 60.0
 """s that one computation may take."""
 GRACE = 1.5
-"""s that a computation may take although nobody needs its result any more: about what a restart of the process takes."""
+"""s that a computation may take although nobody needs its result any more; a restart of the process takes as long."""
 POLL_INTERVAL = 0.05
 """s between two checks of whether a result is still needed."""
 
