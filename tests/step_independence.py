@@ -117,7 +117,7 @@ def _facts(text: str, row_count: int) -> str:
 def _json_lines(place: str, value: object, row_count: int) -> Iterator[str]:
     if isinstance(value, dict):
         for key, part in value.items():
-            if key not in ("proof", "residual", "remarks", "rows"):
+            if key not in ("proof", "residual", "remarks", "undetermined"):
                 yield from _json_lines(f"{place}.{key}", part, row_count)
     elif isinstance(value, list):
         if len(value) < row_count:

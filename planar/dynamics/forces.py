@@ -232,7 +232,8 @@ def forces(moving: State | Motion, inertia: bool = True, friction: bool = True) 
 def greatest_moment_and_force(forces: Forces) -> tuple[float, float]:
     """The greatest moment (N m) and force (N) of all that acts and all pairs; smaller values are judged beside them."""
     reactions = forces.reactions.values()
-    exerted = [(each.force, each.couple) for each in (*forces.acting, *reactions)]
+    exerted = [(action.force, action.couple) for action in forces.acting]
+    exerted += [(reaction.force, reaction.couple) for reaction in reactions]
     couples = [couple for _, couple in exerted]
     couples += [couple for reaction in reactions for couple in reaction.couples.values()]
     force = _greatest_size(force for force, _ in exerted)

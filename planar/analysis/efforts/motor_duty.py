@@ -70,7 +70,7 @@ def motor_duty(forces: Forces, of: str | None = None) -> MotorDuty:
     motor, needed = motors[of], np.asarray(forces.inputs[of])
     measure = _MarginMeasure(of, motor)
     available = motor.effort_at(moving.inputs[of].velocity)
-    margin, power = measure(forces).T
+    margin, power = measure.of_forces(forces).T
     greatest, best_speed = motor.greatest_power
     if isinstance(moving, State):
         position, remaining = float(moving.inputs[of].position), float(margin[0])
@@ -81,8 +81,8 @@ def motor_duty(forces: Forces, of: str | None = None) -> MotorDuty:
     solved = _solved_margin(forces, of, measure)
     if solved is not None:
         return MotorDuty(of, motor, *rows, *solved[:3], greatest, best_speed, solved[3])
-    *margins, greatest_power = _margin_at_rows(moving, margin, power)
-    return MotorDuty(of, motor, *rows, *margins, greatest, best_speed, greatest_power, is_solved=False)
+    smallest, place, weak, highest = _margin_at_rows(moving, margin, power)
+    return MotorDuty(of, motor, *rows, smallest, place, weak, greatest, best_speed, highest, is_solved=False)
 
 
 Margins = tuple[float, float, tuple[tuple[float, float], ...], float]
@@ -95,7 +95,8 @@ class _MarginMeasure(NamedTuple):
     input: str
     motor: Motor
 
-    def __call__(self, forces: Forces) -> Array:
+    def of_forces(self, forces: Forces) -> Array:
+        """Margin and power needed (n, 2)."""
         needed, velocity = np.asarray(forces.inputs[self.input]), np.asarray(forces.moving.inputs[self.input].velocity)
         margin = self.motor.sense * (self.motor.effort_at(velocity) - needed)
         return np.stack(np.broadcast_arrays(margin, needed * velocity), axis=-1).reshape(-1, 2)
@@ -108,7 +109,7 @@ def _solved_margin(forces: Forces, name: str, measure: _MarginMeasure) -> Margin
         return None
     scale = course.effort_scale(name)
     speed = float(np.abs(np.asarray(forces.moving.inputs[name].velocity)).max())
-    series = course.series(measure, np.array([scale, scale * speed]))
+    series = course.series(measure.of_forces, np.array([scale, scale * speed]))
     if series is None:
         return None
     smallest, highest = series.smallest(0), series.greatest(1)

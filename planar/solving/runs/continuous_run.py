@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from typing import NamedTuple
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from planar.results.motion import Motion
 from planar.results.records import Limit
 from planar.solving.continuation.fast_path import FastSamples
 from planar.solving.continuation.path import follow_samples
+from planar.solving.continuation.path_pieces import BranchRates
 from planar.solving.position import PositionSolver, solved_mechanism
 from planar.solving.rates.sample_rates import InputRates
 from planar.solving.runs.samples import RunSamples, build_motion
@@ -94,13 +95,15 @@ class ContinuousRun:
         z = np.vstack([part.z for part in parts])[back]
         if fast is not None:
             fast = FastSamples(fast.coordinate_rates[back], fast.is_sure[back], fast.residual)
-        local, first = {}, 0
+        local: dict[int, BranchRates] = {}
+        first = 0
         for part in parts:
             local |= {int(back[first + row]): rates for row, rates in part.branch_rates.items()}
             first += len(part.z)
         run = RunSamples(z, self._input_rates(places), branch_rates=local, fast_samples=fast)
         time = None if self.motion.time is None else places
-        path = _PathAtPlaces(frozenset(local), z, self.motion)
+        forks = () if self.motion.course is None else self.motion.course.fork_positions
+        path = _PathAtPlaces(frozenset(local), forks, z, self.motion)
         motion = build_motion(self.solver, self.assembly, run, False, path, time)
         if len(motion) < len(places):  # a pair that may stay open does so by too much
             raise NoAnswer(motion.outcome, motion.reason)
@@ -127,7 +130,8 @@ class ContinuousRun:
     def input_crossings(self, name: str, levels: Iterable[float], period: float = 0.0) -> Array:
         """The places at which an input passes one of its positions, or one whole periods (rad) away."""
         if self.motion.time is None and name == self.name:
-            low, high = np.min(self.motion.inputs[name].position), np.max(self.motion.inputs[name].position)
+            position = self.motion.inputs[name].position
+            low, high = float(np.min(position)), float(np.max(position))
             return self._places_of_positions(
                 [target for level in levels for target in _repeated(level, period, low, high)]
             )
@@ -246,17 +250,14 @@ class ContinuousRun:
         return RunSamples(path.z[chosen], target_rates, branch_rates=branch_rates, fast_samples=fast)
 
 
-class _PathAtPlaces(NamedTuple):
+@dataclass(frozen=True)
+class _PathAtPlaces:
     """The path of a motion at chosen places of another one; see `FollowedPath`."""
 
     singular_rows: frozenset[int]
+    fork_positions: tuple[float, ...]
     unknowns: Array
     source: Motion
-
-    @property
-    def fork_positions(self) -> tuple[float, ...]:
-        """See `FollowedPath.fork_positions`."""
-        return () if self.source.course is None else self.source.course.fork_positions
 
     def limits(self, motion: Motion) -> tuple[Limit, ...]:
         """See `Motion.limits`."""
@@ -280,7 +281,10 @@ def rows_with_rates(motion: Motion) -> BoolArray:
     jets = [jet for f in motion.frames.values() if not f.fixed for jet in (f.x, f.y, f.angle)]
     jets += [jet for coordinates in motion.own.values() for jet in coordinates]
     parts = [np.broadcast_to(part, len(motion)) for jet in jets for part in jet.parts]
-    return np.isfinite(parts).all(axis=0) if parts else np.ones(len(motion), dtype=bool)
+    if not parts:
+        return np.ones(len(motion), dtype=bool)
+    is_known: BoolArray = np.asarray(np.isfinite(parts).all(axis=0), dtype=bool)
+    return is_known
 
 
 def run_unknowns(solver: PositionSolver, motion: Motion) -> Array:
