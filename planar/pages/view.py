@@ -87,7 +87,8 @@ def page_of(shown: Mechanism | State | Motion, task: SynthesisTask | None = None
             subject = subject._replace(window=PageRange(running))
     if task is None:
         return page(*subject)
-    mechanism, wanted = apply_task(subject.mechanism, task)
+    # a task is refused of a mechanism without inputs, which the page shows with some
+    mechanism, wanted = apply_task(shown if isinstance(shown, Mechanism) else subject.mechanism, task)
     return page(mechanism, subject.z, subject.window, wanted=wanted)
 
 

@@ -206,8 +206,8 @@ WAYS: dict[str, tuple[dict[str, Any], Outcome, str, dict[str, str]]] = {
 
 
 FEW_COMMANDS = {
-    "bars in a line that only just close": ("inspect", "scheme", "cycle", "circuits", "simulate", "view", "animate"),
-    "a four-bar whose bars in a line only just close": ("solve", "cycle"),
+    "bars in a line that only just close": ("scheme", "cycle", "circuits", "simulate", "view", "animate"),
+    "a four-bar whose bars in a line only just close": ("cycle",),
     "a dead point at the start": ("solve", "scheme", "modes", "cycle", "simulate", "parts"),
     "a change point at the start": ("solve", "scheme", "cycle", "simulate", "parts", "diagrams", "animate", "balance"),
 }
