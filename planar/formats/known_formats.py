@@ -19,9 +19,9 @@ def file_formats() -> dict[str, FileFormat]:
     from planar.formats import kinds
 
     modules = [
-        import_module(f"{kinds.__name__}.{each.name}") for each in iter_modules(kinds.__path__) if not each.ispkg
+        import_module(f"{kinds.__name__}.{item.name}") for item in iter_modules(kinds.__path__) if not item.ispkg
     ]
-    return {each.name: each for each in (module.FORMAT for module in modules)}
+    return {item.name: item for item in (module.FORMAT for module in modules)}
 
 
 def named_format(name: str | None, own: str) -> FileFormat:
@@ -35,12 +35,12 @@ def named_format(name: str | None, own: str) -> FileFormat:
 def format_by_ending(name: str) -> FileFormat | None:
     """The format that is written to files with this name's ending; None where it is planar's own, or nobody's."""
     suffix = PurePath(name).suffix.lower()
-    return next((each for each in file_formats().values() if each.write and suffix in each.suffixes), None)
+    return next((item for item in file_formats().values() if item.write and suffix in item.suffixes), None)
 
 
 def writable_endings() -> list[str]:
     """The endings of files by which a format is chosen that can be written."""
-    return sorted({suffix for each in file_formats().values() if each.write for suffix in each.suffixes})
+    return sorted({suffix for item in file_formats().values() if item.write for suffix in item.suffixes})
 
 
 def known_links() -> str:
@@ -80,4 +80,4 @@ def _decoded(content: bytes, place: str) -> str:
 
 def recognised_format(source: ForeignText) -> FileFormat | None:
     """The format that a text is of, if any."""
-    return next((each for each in file_formats().values() if each.recognise(source)), None)
+    return next((item for item in file_formats().values() if item.recognise(source)), None)

@@ -18,7 +18,7 @@ def slots_for_blocks(linkage: DrawnLinkage) -> DrawnLinkage:
         assert isinstance(slide, SlideJoint)
         pin = _pin_of_block(replace(linkage, joints=joints), slide)
         if pin is not None:
-            joints = tuple(made for each in joints for made in _replaced(each, slide, pin))
+            joints = tuple(made for item in joints for made in _replaced(item, slide, pin))
             renamed = _slot_name(slide, pin)
             stops = (
                 s._replace(joint=renamed, links=(slide.guide, _riders(slide, pin)[0])) if s.joint == slide.name else s
@@ -30,11 +30,11 @@ def slots_for_blocks(linkage: DrawnLinkage) -> DrawnLinkage:
 
 def _pin_of_block(linkage: DrawnLinkage, slide: SlideJoint) -> PinJoint | None:
     """The one pin of what slides, where there is nothing else to it."""
-    others = [each for each in linkage.joints if slide.slider in joined_links(each) and each != slide]
-    own = [each.link for each in linkage.tracers]
-    own += [each.link for each in linkage.masses] + [each.link for each in linkage.forces]
-    driven = {each.joint for each in linkage.inputs}
-    stopped = {each.joint for each in linkage.stops}
+    others = [item for item in linkage.joints if slide.slider in joined_links(item) and item != slide]
+    own = [item.link for item in linkage.tracers]
+    own += [item.link for item in linkage.masses] + [item.link for item in linkage.forces]
+    driven = {item.joint for item in linkage.inputs}
+    stopped = {item.joint for item in linkage.stops}
     if len(others) != 1 or slide.slider in own:
         return None
     pin = others[0]

@@ -35,17 +35,17 @@ def drawn_document(linkage: DrawnLinkage, place: str) -> ReadDocument:
     A link's angle is the direction from its first point to its second in the drawing; that of one with a single point
     is 0 as drawn, as is the frame's. What the linkage has to say of what was left out stands in the file's notes.
     """
-    whole = without_rigid_motions(_with_links_held(linkage), place)
-    if not whole.joints:
+    merged = without_rigid_motions(_with_links_held(linkage), place)
+    if not merged.joints:
         raise BadInput(place, "there is no joint in this file, so nothing moves")
-    return _Writer(whole).write()
+    return _Writer(merged).write()
 
 
 def _with_links_held(linkage: DrawnLinkage) -> DrawnLinkage:
     """The linkage without pins of one link, which are points of it."""
-    single = [each for each in linkage.joints if isinstance(each, PinJoint) and len(each.links) < 2]
-    tracers = (*linkage.tracers, *(Tracer(each.name, each.links[0], each.at) for each in single if each.links))
-    return replace(linkage, joints=tuple(each for each in linkage.joints if each not in single), tracers=tracers)
+    single = [item for item in linkage.joints if isinstance(item, PinJoint) and len(item.links) < 2]
+    tracers = (*linkage.tracers, *(Tracer(item.name, item.links[0], item.at) for item in single if item.links))
+    return replace(linkage, joints=tuple(item for item in linkage.joints if item not in single), tracers=tracers)
 
 
 class _Writer:
@@ -61,7 +61,7 @@ class _Writer:
         points = self.points[link]
         if link == self.linkage.frame or not points:
             return None
-        places = [at for each in self.points.values() for at in each.values()]
+        places = [at for item in self.points.values() for at in item.values()]
         size = max(hypot(x - places[0][0], y - places[0][1]) for x, y in places)
         (first, start), *others = points.items()
         apart = (name for name, (x, y) in others if hypot(x - start[0], y - start[1]) > COINCIDENT * size)
@@ -84,14 +84,14 @@ class _Writer:
         value["links"] = {link: self._link(link) for link in self.points}
         value["pairs"] = [self._pair(joint) for joint in linkage.joints]
         if linkage.inputs:
-            value["inputs"] = [self._input(each) for each in linkage.inputs]
+            value["inputs"] = [self._input(item) for item in linkage.inputs]
         value |= self._acting()
         value["sketch"] = self._sketch()
         return ReadDocument(value, linkage.notes)
 
     def _link(self, link: str) -> dict[str, Any]:
-        found: dict[str, Any] = {"points": {name: list(at) for name, at in self.points[link].items()}}
-        return found | ({"axis": list(self.axes[link])} if link in self.axes else {})
+        result: dict[str, Any] = {"points": {name: list(at) for name, at in self.points[link].items()}}
+        return result | ({"axis": list(self.axes[link])} if link in self.axes else {})
 
     def _pair(self, joint: Joint) -> dict[str, Any]:
         if isinstance(joint, PinJoint):
@@ -150,7 +150,7 @@ class _Writer:
         return entry | ({"restitution": restitution} if restitution else {})
 
     def _input(self, given: DrawnInput) -> dict[str, Any]:
-        joint = next(each for each in self.linkage.joints if each.name == given.joint)
+        joint = next(item for item in self.linkage.joints if item.name == given.joint)
         if isinstance(joint, PinJoint):
             return self._pin_input(given, joint)
         entry: dict[str, Any] = {"pair": joint.name, "position": 0}
@@ -178,18 +178,18 @@ class _Writer:
 
     def _acting(self) -> dict[str, Any]:
         """Masses, loads and gravity, each in SI."""
-        linkage, found = self.linkage, dict[str, Any]()
+        linkage, result = self.linkage, dict[str, Any]()
         if linkage.masses:
-            found["masses"] = [
-                {"link": each.link, "mass": f"{each.mass!r} kg", "at": list(each.at)}
-                | ({"inertia": f"{each.inertia!r} kg m^2"} if each.inertia else {})
-                for each in linkage.masses
+            result["masses"] = [
+                {"link": item.link, "mass": f"{item.mass!r} kg", "at": list(item.at)}
+                | ({"inertia": f"{item.inertia!r} kg m^2"} if item.inertia else {})
+                for item in linkage.masses
             ]
         if linkage.forces:
-            found["loads"] = [self._force(index) for index in range(len(linkage.forces))]
+            result["loads"] = [self._force(index) for index in range(len(linkage.forces))]
         if any(linkage.gravity):
-            found["gravity"] = [f"{each!r} m/s^2" for each in linkage.gravity]
-        return found
+            result["gravity"] = [f"{item!r} m/s^2" for item in linkage.gravity]
+        return result
 
     def _force(self, index: int) -> dict[str, Any]:
         given = self.linkage.forces[index]
@@ -223,12 +223,12 @@ def _law(given: DrawnInput, position: float, unit: Callable[[float], float] = fl
     if given.table is None:
         return {}
     times, moved = given.table
-    positions = [position + unit(each) for each in moved]
+    positions = [position + unit(item) for item in moved]
     return {"law": [{"motion": "table", "times": list(times), "positions": positions}]}
 
 
 def _reversed(given: DrawnInput) -> tuple[tuple[float, ...], tuple[float, ...]] | None:
-    return None if given.table is None else (given.table[0], tuple(-each for each in given.table[1]))
+    return None if given.table is None else (given.table[0], tuple(-item for item in given.table[1]))
 
 
 def _points_of_links(linkage: DrawnLinkage) -> dict[str, dict[str, Place]]:
@@ -247,7 +247,7 @@ def _points_of_links(linkage: DrawnLinkage) -> dict[str, dict[str, Place]]:
     for tracer in linkage.tracers:
         if tracer.link in points:
             points[tracer.link][tracer.name] = tracer.at
-    taken = {name for each in points.values() for name in each}
+    taken = {name for item in points.values() for name in item}
     for number, force in enumerate(linkage.forces, 1):
         if force.link in points and force.at not in points[force.link].values():
             name = next(n for n in (f"F{number}", f"F{number}_", f"F{number}__") if n not in taken)

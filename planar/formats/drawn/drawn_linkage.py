@@ -176,16 +176,16 @@ class DrawnLinkage:
 
     def without_frame_points(self) -> DrawnLinkage:
         """The same without the frame's points where nothing is joined, and a note of them."""
-        found = [each.name for each in self.tracers if each.link == self.frame]
-        if not found:
+        result = [item.name for item in self.tracers if item.link == self.frame]
+        if not result:
             return self
-        kept = tuple(each for each in self.tracers if each.link != self.frame)
-        told = f"points of the frame where nothing is joined are left out: {join_names(found)}"
-        return replace(self, tracers=kept).with_notes(told)
+        kept = tuple(item for item in self.tracers if item.link != self.frame)
+        message = f"points of the frame where nothing is joined are left out: {join_names(result)}"
+        return replace(self, tracers=kept).with_notes(message)
 
     def joints_of(self, kind: type[Joint]) -> tuple[Joint, ...]:
         """Its joints of one kind."""
-        return tuple(each for each in self.joints if isinstance(each, kind))
+        return tuple(item for item in self.joints if isinstance(item, kind))
 
 
 def joined_links(joint: Joint) -> tuple[str, ...]:

@@ -96,7 +96,7 @@ class _Drawing:
     def _joint(self, group: Sequence[Pair]) -> Joint:
         pair = group[0]
         if isinstance(pair, TurningPair):
-            links = (pair.links[0], *(each.links[1] for each in group))
+            links = (pair.links[0], *(item.links[1] for item in group))
             return PinJoint(pair.entry_name(), links, self._world(pair.links[0], pair.points[0]))
         if isinstance(pair, SlidingPair | SlotPair):
             guide, rider = pair.links
@@ -110,7 +110,7 @@ class _Drawing:
             if isinstance(pair, known):
                 sizes = pair.sizes
                 if pair.size_kind == "radii":
-                    sizes = tuple(float(self.unit.from_si(each)) for each in sizes)
+                    sizes = tuple(float(self.unit.from_si(item)) for item in sizes)
                 crossed = bool(getattr(pair, "crossed", False))
                 return WheelJoint(pair.name, kind_name, pair.links, pair.carrier, pair.size_kind, sizes, crossed)
         if isinstance(pair, RackPair):
@@ -126,18 +126,18 @@ class _Drawing:
     def _tracers(self, joints: Sequence[Joint]) -> list[Tracer]:
         """Points of links where nothing is joined, by the names that results give them."""
         ridden = {ride[0] for pair in self.mechanism.pairs if (ride := pair.point_on_line())}
-        found = []
-        for each in named_points(self.mechanism):
-            link, point = each.members[0]
+        result = []
+        for item in named_points(self.mechanism):
+            link, point = item.members[0]
             pinned = any((link, point) in pair.coincident_points() for pair in self.mechanism.pairs)
             if not pinned and (link, point) not in ridden:
-                found.append(Tracer(each.name.replace(".", "_"), link, self._world(link, point)))
+                result.append(Tracer(item.name.replace(".", "_"), link, self._world(link, point)))
         taken = {joint.name for joint in joints}
-        return [each._replace(name=f"{each.name}_point") if each.name in taken else each for each in found]
+        return [item._replace(name=f"{item.name}_point") if item.name in taken else item for item in result]
 
     def _inputs(self) -> list[DrawnInput]:
         motions = relative_motions(self.mechanism)
-        found = []
+        result = []
         for given in self.mechanism.inputs:
             pair = motions[given.pair]
             links = self._motion_links(pair)
@@ -145,8 +145,8 @@ class _Drawing:
                 raise cannot_say(self.title, f"the input at {given.pair!r}", "its inputs are at pins and slides")
             length = pair.input_kind is MeasureKind.LENGTH
             velocity = float(self.unit.from_si(given.velocity)) if length else float(given.velocity)
-            found.append(DrawnInput(pair.entry_name(), links, velocity))
-        return found
+            result.append(DrawnInput(pair.entry_name(), links, velocity))
+        return result
 
     def _motion_links(self, pair: Pair) -> tuple[str, str]:
         """The links of a relative motion, so that it is the motion of the second against the first."""
@@ -178,15 +178,15 @@ class _Drawing:
         return stops
 
     def _masses(self) -> list[DrawnMass]:
-        found = []
-        for each in self.mechanism.masses:
-            at = self._place(self.frames[each.link].to_world(self.shapes[each.link].position(each.at)))
-            found.append(DrawnMass(each.link, float(each.mass), at, float(each.inertia)))
-        return found
+        result = []
+        for item in self.mechanism.masses:
+            at = self._place(self.frames[item.link].to_world(self.shapes[item.link].position(item.at)))
+            result.append(DrawnMass(item.link, float(item.mass), at, float(item.inertia)))
+        return result
 
     def _forces(self) -> list[DrawnForce]:
-        named = {each.name: each.members[0] for each in named_points(self.mechanism)}
-        found = []
+        named = {item.name: item.members[0] for item in named_points(self.mechanism)}
+        result = []
         for load in self.mechanism.loads:
             if load.point is None or load.force is None or load.varies is not None:
                 continue
@@ -196,10 +196,10 @@ class _Drawing:
                 continue
             force = Vector(*load.force)
             turned = self.frames[load.axes].rotate_to_world(force) if load.axes else force
-            found.append(
+            result.append(
                 DrawnForce(member[0], self._world(*member), (float(turned.x), float(turned.y)), bool(load.axes))
             )
-        return found
+        return result
 
     def _notes(self, joints: Sequence[Joint]) -> list[str]:
         """What of the mechanism no drawn linkage says."""

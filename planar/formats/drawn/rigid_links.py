@@ -59,10 +59,10 @@ def merge_links(linkage: DrawnLinkage, groups: Iterable[Sequence[str]]) -> Drawn
         frame=names.get(linkage.frame, linkage.frame),
         joints=tuple(joints),
         tracers=(*(t._replace(link=names.get(t.link, t.link)) for t in linkage.tracers), *tracers),
-        inputs=tuple(each._replace(links=renamed_pair(each.links)) for each in linkage.inputs),
-        stops=tuple(each._replace(links=renamed_pair(each.links)) for each in linkage.stops),
-        masses=tuple(each._replace(link=names.get(each.link, each.link)) for each in linkage.masses),
-        forces=tuple(each._replace(link=names.get(each.link, each.link)) for each in linkage.forces),
+        inputs=tuple(item._replace(links=renamed_pair(item.links)) for item in linkage.inputs),
+        stops=tuple(item._replace(links=renamed_pair(item.links)) for item in linkage.stops),
+        masses=tuple(item._replace(link=names.get(item.link, item.link)) for item in linkage.masses),
+        forces=tuple(item._replace(link=names.get(item.link, item.link)) for item in linkage.forces),
         links=tuple(dict.fromkeys(names.get(link, link) for link in linkage.links)),
     )
 
@@ -78,14 +78,14 @@ def merge_links_of_two_pins(linkage: DrawnLinkage) -> DrawnLinkage:
         rigid = [two for two, pins in shared.items() if _apart(pins)]
         if not rigid:
             return linkage
-        told = tuple(f"links {a!r} and {b!r} share two pins and are one link here" for a, b in rigid)
-        linkage = merge_links(linkage, rigid).with_notes(*told)
+        message = tuple(f"links {a!r} and {b!r} share two pins and are one link here" for a, b in rigid)
+        linkage = merge_links(linkage, rigid).with_notes(*message)
 
 
 def without_loose_links(linkage: DrawnLinkage) -> DrawnLinkage:
     """The linkage without what is joined to the frame by nothing, with a note of each such link."""
     reached, joints = {linkage.frame}, [set(joined_links(joint)) for joint in linkage.joints]
-    while grown := [each for each in joints if each & reached and not each <= reached]:
+    while grown := [item for item in joints if item & reached and not item <= reached]:
         reached = reached.union(*grown)
     held = dict.fromkeys((*linkage.links, *(link for joint in linkage.joints for link in joined_links(joint))))
     loose = [link for link in held if link not in reached]
@@ -94,11 +94,11 @@ def without_loose_links(linkage: DrawnLinkage) -> DrawnLinkage:
     return replace(
         linkage,
         joints=tuple(joint for joint in linkage.joints if set(joined_links(joint)) <= reached),
-        tracers=tuple(each for each in linkage.tracers if each.link in reached),
-        inputs=tuple(each for each in linkage.inputs if set(each.links) <= reached),
-        stops=tuple(each for each in linkage.stops if set(each.links) <= reached),
-        masses=tuple(each for each in linkage.masses if each.link in reached),
-        forces=tuple(each for each in linkage.forces if each.link in reached),
+        tracers=tuple(item for item in linkage.tracers if item.link in reached),
+        inputs=tuple(item for item in linkage.inputs if set(item.links) <= reached),
+        stops=tuple(item for item in linkage.stops if set(item.links) <= reached),
+        masses=tuple(item for item in linkage.masses if item.link in reached),
+        forces=tuple(item for item in linkage.forces if item.link in reached),
         links=tuple(link for link in linkage.links if link in reached),
         notes=(*linkage.notes, *(f"link {link!r} is joined to nothing that is held and is left out" for link in loose)),
     )
@@ -112,7 +112,7 @@ def without_rigid_motions(linkage: DrawnLinkage, place: str) -> DrawnLinkage:
         first, second = motion.links
         return first != second and {first, second} <= set(links_of.get(motion.joint, ()))
 
-    rigid = next((each for each in linkage.inputs if not moves(each)), None)
+    rigid = next((item for item in linkage.inputs if not moves(item)), None)
     if rigid is not None:
         message = f"the input at {rigid.joint!r} cannot move: the two links that it drives share two pins or are fixed"
         raise BadInput(place, f"{message} to each other; drive another joint, or part these links")

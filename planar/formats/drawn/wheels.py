@@ -14,13 +14,13 @@ OFF_LINE = 1e-6
 
 def wheel_centre(joints: Iterable[Joint], wheel: str, carrier: str) -> Place | None:
     """Where a wheel turns on its carrier; None where no pin holds it there."""
-    pins = (each for each in joints if isinstance(each, PinJoint))
-    return next((each.at for each in pins if {wheel, carrier} <= set(each.links)), None)
+    pins = (item for item in joints if isinstance(item, PinJoint))
+    return next((item.at for item in pins if {wheel, carrier} <= set(item.links)), None)
 
 
 def common_carrier(joints: Iterable[Joint], first: str, second: str) -> str | None:
     """The link on which both wheels turn."""
-    held = [each.links for each in joints if isinstance(each, PinJoint)]
+    held = [item.links for item in joints if isinstance(item, PinJoint)]
     with_first = dict.fromkeys(link for links in held if first in links for link in links)
     both = [link for link in with_first for links in held if second in links and link in links]
     return next((link for link in both if link not in (first, second)), None)

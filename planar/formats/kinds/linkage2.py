@@ -68,27 +68,27 @@ class _Reader:
         self.stops: list[DrawnStop] = []
         self.tracers: list[Tracer] = []
         self.welds: list[tuple[str, ...]] = []
-        self.connectors = {self._id(each): each for each in root.iter() if each in [*root] and each.tag == "connector"}
-        elements = [each for each in root if each.tag in ("Link", "element") and self._moves(each, "a link")]
+        self.connectors = {self._id(item): item for item in root.iter() if item in [*root] and item.tag == "connector"}
+        elements = [item for item in root if item.tag in ("Link", "element") and self._moves(item, "a link")]
         if not self.connectors:
             raise BadInput(source.place, "there is no connector in this file")
-        self.anchors = {key for key, each in self.connectors.items() if each.get("anchor") == "true"}
+        self.anchors = {key for key, item in self.connectors.items() if item.get("anchor") == "true"}
         self.elements = self._with_extent(elements)
         self.names = {key: self._connector_name(key) for key in self.connectors}
         self.places = {key: self._place(key) for key in self.connectors}
         self.links: dict[str, list[str]] = {}
         self.named: dict[str, str] = {}
         self.still: set[str] = set()
-        for each in self.elements:
-            self._add_link(each)
+        for item in self.elements:
+            self._add_link(item)
 
     def read(self) -> tuple[DrawnLinkage, list[tuple[str, ...]]]:
         for key, element in self.connectors.items():
             if not self._moves(element, ""):
                 continue
             self._join(key, element)
-        for each in self.elements:
-            self._fasten(each)
+        for item in self.elements:
+            self._fasten(item)
         self._wheels()
         linkage = DrawnLinkage(
             self.source.title,
@@ -122,13 +122,13 @@ class _Reader:
         return self.book.fresh(wanted, "point")
 
     def _place(self, key: str) -> tuple[float, float]:
-        told = f"{self.source.place}, connector {key}"
-        x, y = (number_attribute(self.connectors[key], name, told) for name in ("x", "y"))
+        message = f"{self.source.place}, connector {key}"
+        x, y = (number_attribute(self.connectors[key], name, message) for name in ("x", "y"))
         return x / PIXELS_PER_MILLIMETRE, y / PIXELS_PER_MILLIMETRE
 
     def _with_extent(self, elements: list[Element]) -> list[Element]:
         """Without the Links that stand for a connector alone: one that is on other Links as well, or an anchor."""
-        held = [{self._id(each) for each in element if each.tag == "connector"} for element in elements]
+        held = [{self._id(item) for item in element if item.tag == "connector"} for element in elements]
 
         def is_alone(number: int) -> bool:
             own = held[number]
@@ -141,10 +141,10 @@ class _Reader:
     def _add_link(self, element: Element) -> None:
         key = self._id(element)
         name = self.book.fresh(element.get("name", "").strip() or f"L{key}", "link")
-        keys = [self._id(each) for each in element if each.tag == "connector"]
-        for each in keys:
-            if each not in self.connectors:
-                raise BadInput(f"{self.source.place}, Link {key}", f"there is no connector {each!r} in this file")
+        keys = [self._id(item) for item in element if item.tag == "connector"]
+        for item in keys:
+            if item not in self.connectors:
+                raise BadInput(f"{self.source.place}, Link {key}", f"there is no connector {item!r} in this file")
         keys = list(dict.fromkeys(keys))
         if key not in self.named:
             self.named[key] = name
@@ -165,10 +165,10 @@ class _Reader:
         self.joints.append(
             SlideJoint(joint, name, rod, (u, v), degrees(atan2(v - y, u - x)), through=(x, y)),
         )
-        told = f"{self.source.place}, Link {element.get('id')}"
-        throw = number_attribute(element, "throw", told, 0.0) / PIXELS_PER_MILLIMETRE
-        cpm = number_attribute(element, "cpm", told, DEFAULT_RATE)
-        offset = number_attribute(element, "startoffset", told, 0.0) / PIXELS_PER_MILLIMETRE
+        message = f"{self.source.place}, Link {element.get('id')}"
+        throw = number_attribute(element, "throw", message, 0.0) / PIXELS_PER_MILLIMETRE
+        cpm = number_attribute(element, "cpm", message, DEFAULT_RATE)
+        offset = number_attribute(element, "startoffset", message, 0.0) / PIXELS_PER_MILLIMETRE
         begun, way = swing_phase(throw, offset) if throw > 0.0 else (0.0, 1)
         self.inputs.append(DrawnInput(joint, (name, rod), way * 2.0 * throw * cpm / 60.0))
         if throw > 0.0:
@@ -189,7 +189,7 @@ class _Reader:
         holders = [name for name, keys in self.links.items() if key in keys]
         anchored = key in self.anchors
         at, name = self.places[key], self.names[key]
-        limits = [self._id(each) for each in element if each.tag == "slidelimit"]
+        limits = [self._id(item) for item in element if item.tag == "slidelimit"]
         slides = element.get("slider") == "true" and len(limits) >= 2
         if slides and self._slide(key, holders, anchored, limits[0], limits[1]):
             return
@@ -207,19 +207,19 @@ class _Reader:
 
     def _slide(self, key: str, holders: list[str], anchored: bool, start: str, end: str) -> bool:
         """A pin in the slot between two connectors; whether there is one link, or the frame, that has this slot."""
-        for each in (start, end):
-            if each not in self.places:
+        for item in (start, end):
+            if item not in self.places:
                 raise BadInput(
-                    f"{self.source.place}, connector {key}", f"there is no connector {each!r} that limits its slide"
+                    f"{self.source.place}, connector {key}", f"there is no connector {item!r} that limits its slide"
                 )
         carriers = [n for n, keys in self.links.items() if start in keys and end in keys and key not in keys]
-        fixed = all(each in self.anchors for each in (start, end))
+        fixed = all(item in self.anchors for item in (start, end))
         guide = FRAME if fixed else next(iter(carriers), None)
         riders = [FRAME, *holders] if anchored else holders
-        riders = [each for each in riders if each != guide]
+        riders = [item for item in riders if item != guide]
         if guide is None or not riders:
-            told = "no one link carries both ends of its slot" if guide is None else "no link slides there"
-            self.notes.append(f"connector {self.names[key]!r} does not slide here: {told}")
+            message = "no one link carries both ends of its slot" if guide is None else "no link slides there"
+            self.notes.append(f"connector {self.names[key]!r} does not slide here: {message}")
             return False
         (x, y), (u, v) = self.places[start], self.places[end]
         if (x, y) == (u, v):
@@ -274,11 +274,11 @@ class _Reader:
         if len(turning) > 1:
             self.notes.append(f"the links that the input at {name!r} turns are one here: {join_names(turning)}")
             self.welds.append(tuple(turning))
-        told = f"{self.source.place}, connector {key}"
-        rate = -number_attribute(element, "rpm", told, DEFAULT_RATE)
-        limit = number_attribute(element, "limitangle", told, 0.0)
+        message = f"{self.source.place}, connector {key}"
+        rate = -number_attribute(element, "rpm", message, DEFAULT_RATE)
+        limit = number_attribute(element, "limitangle", message, 0.0)
         if limit > 0.0:
-            begun, way = swing_phase(limit, number_attribute(element, "startoffset", told, 0.0))
+            begun, way = swing_phase(limit, number_attribute(element, "startoffset", message, 0.0))
             after = f", {begun:g} of them done as drawn" if begun else ""
             self.notes.append(
                 f"the input at {name!r} goes to and fro by {limit:g} degrees{after}; here it turns at its speed "
@@ -307,25 +307,27 @@ class _Reader:
                 self.welds += [(own, name) for name, keys in self.links.items() if key in keys and name != own]
 
     def _wheels(self) -> None:
-        for ratio in (each for group in self.root.iter("ratios") for each in group if each.tag == "ratio"):
-            parts = [each for each in ratio if each.tag == "link"]
-            told = f"{self.source.place}, ratios"
+        for ratio in (item for group in self.root.iter("ratios") for item in group if item.tag == "ratio"):
+            parts = [item for item in ratio if item.tag == "link"]
+            message = f"{self.source.place}, ratios"
             if len(parts) != 2:
-                raise BadInput(told, f"a ratio is of two links, not of {len(parts)}")
-            keys = [self._id(each) for each in parts]
+                raise BadInput(message, f"a ratio is of two links, not of {len(parts)}")
+            keys = [self._id(item) for item in parts]
             if not all(key in self.named for key in keys):
-                raise BadInput(told, f"there is no Link {next(k for k in keys if k not in self.named)!r} in this file")
-            sizes = [number_attribute(each, "size", told) for each in parts]
+                raise BadInput(
+                    message, f"there is no Link {next(k for k in keys if k not in self.named)!r} in this file"
+                )
+            sizes = [number_attribute(item, "size", message) for item in parts]
             if min(sizes) <= 0.0:
-                raise BadInput(told, "the sizes of wheels are above zero")
+                raise BadInput(message, "the sizes of wheels are above zero")
             self._wheel_joint(ratio, (self.named[keys[0]], self.named[keys[1]]), (sizes[0], sizes[1]))
 
     def _wheel_joint(self, ratio: Element, wheels: tuple[str, str], sizes: tuple[float, float]) -> None:
         centres = [self._centre(wheel) for wheel in wheels]
-        (x, y), (u, v) = (self.places[each] for each in centres)
+        (x, y), (u, v) = (self.places[item] for item in centres)
         apart = hypot(u - x, v - y)
         carriers = [n for n, keys in self.links.items() if set(centres) <= set(keys)]
-        fixed = all(each in self.anchors for each in centres)
+        fixed = all(item in self.anchors for item in centres)
         if not fixed and not carriers:
             raise BadInput(
                 f"{self.source.place}, ratios", f"the wheels {wheels[0]!r} and {wheels[1]!r} have no common carrier"

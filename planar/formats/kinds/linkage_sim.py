@@ -51,26 +51,26 @@ class _Reader:
         for group in ("attachment_points", "coupler_points"):
             if body.has(group):
                 for name, place in body.members(group):
-                    told = points.name("point", name)
-                    self.points[key][name] = told
-                    self.places[key][told] = ForeignValue({"at": place.value}, place.path).pair("at")
+                    message = points.name("point", name)
+                    self.points[key][name] = message
+                    self.places[key][message] = ForeignValue({"at": place.value}, place.path).pair("at")
 
     def read(self) -> ReadDocument:
         book = NameBook()
-        joints = [(book.fresh(name, "joint"), each) for name, each in self.top.members("joints")]
-        moved = self._welds([each for _, each in joints if each.text("type") == "fixed"])
+        joints = [(book.fresh(name, "joint"), item) for name, item in self.top.members("joints")]
+        moved = self._welds([item for _, item in joints if item.text("type") == "fixed"])
         pairs = []
         pins: list[tuple[str, list[tuple[str, str]]]] = []
-        for name, each in joints:
-            kind = each.text("type")
+        for name, item in joints:
+            kind = item.text("type")
             if kind in ("revolute_driver", "prismatic_driver"):
                 self.notes.append(f"the driver {name!r} is left out: its function is not in the file")
             elif kind not in JOINTS:
-                raise each.at("type").error(f"joints are of type {', '.join(JOINTS)}, not {kind!r:.40}")
+                raise item.at("type").error(f"joints are of type {', '.join(JOINTS)}, not {kind!r:.40}")
             elif kind == "revolute":
-                pins = _with_pin(pins, name, [self._end(each, side) for side in "ij"])
+                pins = _with_pin(pins, name, [self._end(item, side) for side in "ij"])
             elif kind == "prismatic":
-                pairs.append(self._slide(name, each, moved))
+                pairs.append(self._slide(name, item, moved))
         pairs = [self._pin(name, members, moved) for name, members in pins] + pairs
         links = {self.links[key]: {"points": self._link_points(key)} for key in self.bodies if key not in moved}
         value: dict[str, Any] = {"planar": 1, "name": self.title, "notes": self.notes, "frame": self.links[FRAME]}
@@ -94,11 +94,11 @@ class _Reader:
     def _welds(self, joints: list[ForeignValue]) -> Moved:
         """The bodies that fixed joints hold; their points go over to the other body."""
         moved: Moved = {}
-        for each in joints:
-            (one, p), (two, q) = self._end(each, "i"), self._end(each, "j")
-            turn = each.number("delta_theta_0", 0.0)
+        for item in joints:
+            (one, p), (two, q) = self._end(item, "i"), self._end(item, "j")
+            turn = item.number("delta_theta_0", 0.0)
             if one in moved or two in moved or one == two:
-                raise each.error("chains of fixed joints are not read; fix all bodies to one")
+                raise item.error("chains of fixed joints are not read; fix all bodies to one")
             if two == FRAME:
                 one, two, p, q, turn = two, one, q, p, -turn
             c, s = cos(turn), sin(turn)
@@ -120,7 +120,7 @@ class _Reader:
 
     def _slide(self, name: str, joint: ForeignValue, moved: Moved) -> dict[str, Any]:
         (one, p), (two, q) = self._end(joint, "i"), self._end(joint, "j")
-        first, second = (moved.get(each, (each, 0.0, 0.0, 0.0)) for each in (one, two))
+        first, second = (moved.get(item, (item, 0.0, 0.0, 0.0)) for item in (one, two))
         links = [self.links[first[0]], self.links[second[0]]]
         if links[0] == links[1]:
             raise joint.error("both its bodies are fixed to each other")
@@ -150,8 +150,8 @@ def _with_pin(
     """The pins with one more joint: pins that share a point of a body are one, by that point's name if all have it."""
     joined = [(name, ends)]
     apart: list[tuple[str, list[tuple[str, str]]]] = []
-    for each in pins:
-        (joined if set(each[1]) & set(ends) else apart).append(each)
+    for item in pins:
+        (joined if set(item[1]) & set(ends) else apart).append(item)
     members = list(dict.fromkeys(member for _, some in sorted(joined[1:]) + joined[:1] for member in some))
     points = {point for _, point in members}
     taken = {other for other, _ in apart}

@@ -45,8 +45,8 @@ def read(source: ForeignText) -> ReadDocument:
     top = ForeignValue(source.value)
     body = top.at("mechanism") if top.has("mechanism") else top
     linkage, welds = _Reader(body, source.title).read()
-    whole = without_loose_links(merge_links_of_two_pins(merge_links(linkage, welds)))
-    return drawn_document(whole, source.place)
+    merged = without_loose_links(merge_links_of_two_pins(merge_links(linkage, welds)))
+    return drawn_document(merged, source.place)
 
 
 class _Reader:
@@ -62,23 +62,23 @@ class _Reader:
         self.places: dict[str, Place] = {}
         self.names: dict[str, str] = {}
         self.welded: set[str] = set()
-        for number, each in enumerate(body.items("joints")):
-            key = each.text("id")
+        for number, item in enumerate(body.items("joints")):
+            key = item.text("id")
             if key in self.places:
-                raise each.at("id").error(f"there are two joints {key!r:.60}")
-            self.places[key] = each.number("x"), each.number("y")
+                raise item.at("id").error(f"there are two joints {key!r:.60}")
+            self.places[key] = item.number("x"), item.number("y")
             short = key if len(key) < 12 else _letters(number)
-            self.names[key] = self.book.fresh(each.text("name", "") or short, "joint")
-            if each.flag("isWelded"):
+            self.names[key] = self.book.fresh(item.text("name", "") or short, "joint")
+            if item.flag("isWelded"):
                 self.welded.add(key)
         self.links: dict[str, list[str]] = {}
         self.slotted: dict[str, str] = {}
         self.frames: list[str] = []
-        for each in body.items("links"):
-            self._add_link(each)
+        for item in body.items("links"):
+            self._add_link(item)
 
     def _add_link(self, given: ForeignValue) -> None:
-        keys = [each.text() for each in given.items("jointIds" if given.has("jointIds") else "joints")]
+        keys = [item.text() for item in given.items("jointIds" if given.has("jointIds") else "joints")]
         for index, key in enumerate(keys):
             if key not in self.places:
                 raise given.error(f"link joint {index + 1} is {key!r:.60}, which is no joint of this file")
@@ -99,14 +99,14 @@ class _Reader:
             members = tuple(name for name, keys in self.links.items() if key in keys)
             if key in self.welded and len(members) > 1:
                 welds.append(members)
-            held = tuple(each for each in members if each != riders.get(key))
+            held = tuple(item for item in members if item != riders.get(key))
             if len(held) > 1:
                 self.found.append(PinJoint(self.names[key], held, at))
             elif len(held) == 1 and key not in riders:
                 tracers.append(Tracer(self.names[key], held[0], at))
         self._cylinders()
-        for each in self.body.items("actuators", optional=True):
-            self._actuator(each)
+        for item in self.body.items("actuators", optional=True):
+            self._actuator(item)
         for key in ("measurements", "forces", "torques"):
             if self.body.has(key) and self.body.value[key]:
                 self.notes.append(f"{key} of the file are left out")
@@ -125,19 +125,19 @@ class _Reader:
 
     def _slots(self) -> dict[str, str]:
         """Joints that ride in slots, by the bar of the slot; each is a pin in the slot of that bar."""
-        found = {}
+        result = {}
         for slot in self.body.items("slots", optional=True):
-            ends = [each.text() for each in slot.items("ends" if slot.has("ends") else "jointIds")][:2]
+            ends = [item.text() for item in slot.items("ends" if slot.has("ends") else "jointIds")][:2]
             bar = self.slotted.get(slot.text("id"))
-            if bar is None or len(ends) < 2 or any(each not in self.places for each in ends):
+            if bar is None or len(ends) < 2 or any(item not in self.places for item in ends):
                 raise slot.error("the slot is on no link, or not between two joints of this file")
             (x, y), (u, v) = self.places[ends[0]], self.places[ends[1]]
             if (x, y) == (u, v):
                 raise slot.error("the ends of the slot coincide, so it has no direction")
-            for each in slot.items("riders" if slot.has("riders") else "riderIds", optional=True):
-                key = each.text()
+            for item in slot.items("riders" if slot.has("riders") else "riderIds", optional=True):
+                key = item.text()
                 if key not in self.places:
-                    raise each.error(f"{key!r:.60} is no joint of this file")
+                    raise item.error(f"{key!r:.60} is no joint of this file")
                 holders = [name for name, keys in self.links.items() if key in keys and name != bar]
                 if not holders:
                     self.notes.append(f"joint {self.names[key]!r} rides in a slot but is on no link, and is left out")
@@ -148,19 +148,19 @@ class _Reader:
                 stop, note = slot_end_stop(rail, hypot(u - x, v - y), "in")
                 self.stops += stop
                 self.notes += note
-                found[key] = bar
-        return found
+                result[key] = bar
+        return result
 
     def _cylinders(self) -> None:
-        """A barrel and a rod for each, which slide on the line of its two joints."""
+        """A barrel and a rod for each cylinder, which slide on the line of its two joints."""
         self.strokes: dict[frozenset[str], SlideJoint] = {}
-        for each in self.body.items("cylinders", optional=True):
-            keys = [item.text() for item in each.items("joints" if each.has("joints") else "jointIds")]
+        for cylinder in self.body.items("cylinders", optional=True):
+            keys = [item.text() for item in cylinder.items("joints" if cylinder.has("joints") else "jointIds")]
             if len(keys) != 2 or any(key not in self.places for key in keys):
-                raise each.error("a cylinder is between two joints of this file")
+                raise cylinder.error("a cylinder is between two joints of this file")
             (x, y), (u, v) = self.places[keys[0]], self.places[keys[1]]
             if hypot(u - x, v - y) == 0.0:
-                raise each.error("the joints of the cylinder coincide, so it has no direction")
+                raise cylinder.error("the joints of the cylinder coincide, so it has no direction")
             halves = [self.book.fresh("barrel"), self.book.fresh("rod")]
             name = self.book.fresh(f"{self.names[keys[0]]}{self.names[keys[1]]}_stroke")
             slide = SlideJoint(name, halves[0], halves[1], (u, v), degrees(atan2(v - y, u - x)), (x, y))
@@ -168,20 +168,20 @@ class _Reader:
             self.strokes[frozenset(keys)] = slide
             for key, half in zip(keys, halves, strict=True):
                 self._attach(key, half)
-            if each.has("stroke"):
-                self._add_stroke(slide, hypot(u - x, v - y), each)
-        for keys, slide in self.strokes.items():  # a half may be one with a link by now
-            halves_of = slide.guide, slide.slider
-            self.stops = [s._replace(links=halves_of) if s.joint == slide.name else s for s in self.stops]
+            if cylinder.has("stroke"):
+                self._add_stroke(slide, hypot(u - x, v - y), cylinder)
+        for ends, slide in self.strokes.items():  # a half may be one with a link by now
+            current_halves = slide.guide, slide.slider
+            self.stops = [s._replace(links=current_halves) if s.joint == slide.name else s for s in self.stops]
             if not any(stop.joint == slide.name for stop in self.stops):
-                phrase = " and ".join(sorted(self.names[key] for key in keys))
+                phrase = " and ".join(sorted(self.names[key] for key in ends))
                 self.notes.append(f"the cylinder between {phrase} has no stroke in the file, and no stops here")
 
-    def _add_stroke(self, slide: SlideJoint, length: float, given: ForeignValue) -> None:
+    def _add_stroke(self, slide: SlideJoint, length: float, cylinder: ForeignValue) -> None:
         """The stops of a cylinder, whose file says how long its stroke is, and not where in it the cylinder stands."""
-        stroke = given.number("stroke")
+        stroke = cylinder.number("stroke")
         if not stroke > 0.0:
-            raise given.at("stroke").error(f"a stroke is above zero, not {stroke:.6g}")
+            raise cylinder.at("stroke").error(f"a stroke is above zero, not {stroke:.6g}")
         low = max(-stroke, -length)
         self.stops.append(DrawnStop(slide.name, (slide.guide, slide.slider), low, stroke))
         self.notes.append(
@@ -192,7 +192,7 @@ class _Reader:
 
     def _attach(self, key: str, half: str) -> None:
         """Join a half of a cylinder at a joint: to its pin, or rigidly to its link where the joint is welded."""
-        pin = next((each for each in self.found if isinstance(each, PinJoint) and each.name == self.names[key]), None)
+        pin = next((item for item in self.found if isinstance(item, PinJoint) and item.name == self.names[key]), None)
         holders = tuple(name for name, keys in self.links.items() if key in keys)
         if pin is not None:
             self.found[self.found.index(pin)] = pin._replace(links=(*pin.links, half))
@@ -236,7 +236,7 @@ class _Reader:
             for other in (start, to)
         )
         pin = next(
-            (each for each in self.found if isinstance(each, PinJoint) and each.name == self.names.get(at)), None
+            (item for item in self.found if isinstance(item, PinJoint) and item.name == self.names.get(at)), None
         )
         if pin is None or against is None or turned is None or not {against, turned} <= set(pin.links):
             raise given.error("a rotary actuator turns one link against another at a joint that both have")

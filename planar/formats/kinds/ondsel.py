@@ -81,8 +81,8 @@ def read(source: ForeignText) -> ReadDocument:
     if assembly is None:
         raise BadInput(source.place, "there is no assembly in this file")
     linkage, welds = _Reader(assembly, source).read()
-    whole = without_loose_links(merge_links_of_two_pins(merge_links(linkage, welds)))
-    return drawn_document(whole, source.place)
+    merged = without_loose_links(merge_links_of_two_pins(merge_links(linkage, welds)))
+    return drawn_document(merged, source.place)
 
 
 class _Reader:
@@ -100,12 +100,12 @@ class _Reader:
         self.notes: list[str] = []
         self.markers: dict[str, Held] = {}
         base = f"/{assembly.value('Name') or ''}"
-        whole = read_pose(assembly, self.place) if assembly.find("Position3D") else IDENTITY
-        for name, pose in markers(assembly, whole, self.place):
+        merged = read_pose(assembly, self.place) if assembly.find("Position3D") else IDENTITY
+        for name, pose in markers(assembly, merged, self.place):
             self.markers[f"{base}/{name}"] = Held(FRAME, pose)
         self.parts: dict[str, tuple[Node, Pose]] = {}
         for part in assembly.walk("Parts"):
-            pose = whole.place(read_pose(part, self.place))
+            pose = merged.place(read_pose(part, self.place))
             name = self.book.fresh(part.value("Name") or "part")
             self.parts[name] = part, pose
             for marker, at in markers(part, pose, self.place):
@@ -123,32 +123,32 @@ class _Reader:
 
     def _extent(self, node: Node) -> float:
         """The largest distance from the axes of a node at which something of it lies."""
-        found = 0.0
+        extent = 0.0
         for child in node.children:
             if child.text == "Position3D" and len(child.children) == 1:
-                found = max(found, hypot(*numbers(child.children[0], 3, self.place)))
+                extent = max(extent, hypot(*numbers(child.children[0], 3, self.place)))
             elif child.text not in ("ConstraintSets", "ForceTorques"):
-                found = max(found, self._extent(child))
-        return found
+                extent = max(extent, self._extent(child))
+        return extent
 
     def _ends(self, joint: Node) -> tuple[Held, Held]:
-        found = [self.markers.get(joint.value(key) or "") for key in ("MarkerI", "MarkerJ")]
-        if found[0] is None or found[1] is None:
+        result = [self.markers.get(joint.value(key) or "") for key in ("MarkerI", "MarkerJ")]
+        if result[0] is None or result[1] is None:
             raise BadInput(self._place_of(joint), "it names a marker that is not there")
-        return found[0], found[1]
+        return result[0], result[1]
 
     def _place_of(self, joint: Node) -> str:
         return f"{self.place}, line {joint.line}, joint {joint.value('Name') or ''}"
 
     def _normal(self) -> Triple:
         """The common direction of all axes about which parts turn."""
-        turning = [each for each in self.given if each.text == "RevoluteJoint"]
+        turning = [item for item in self.given if item.text == "RevoluteJoint"]
         if not turning:
             raise BadInput(self.place, "there is no revolute joint, so no plane in which the parts move")
         normal = self._ends(turning[0])[0].pose.column(2)
-        for each in turning:
-            if abs(abs(dot(normal, self._ends(each)[0].pose.column(2))) - 1.0) > PARALLEL:
-                raise BadInput(self._place_of(each), "its axis is not parallel to the others: the parts move in space")
+        for item in turning:
+            if abs(abs(dot(normal, self._ends(item)[0].pose.column(2))) - 1.0) > PARALLEL:
+                raise BadInput(self._place_of(item), "its axis is not parallel to the others: the parts move in space")
         return normal
 
     def flat(self, at: Triple) -> Place:
@@ -156,24 +156,24 @@ class _Reader:
         return dot(self.first, at), dot(self.second, at)
 
     def read(self) -> tuple[DrawnLinkage, list[tuple[str, ...]]]:
-        found: list[Joint] = []
+        result: list[Joint] = []
         welds: list[tuple[str, ...]] = []
         named: dict[str, tuple[Joint, Node]] = {}
-        gears = [each for each in self.given if each.text == "GearJoint"]
-        for each in (*(joint for joint in self.given if joint not in gears), *gears):
-            if each.text not in KNOWN:
-                raise self._no_pair(each)
-            one, other = self._ends(each)
-            if each.text == "FixedJoint":
+        gears = [item for item in self.given if item.text == "GearJoint"]
+        for item in (*(joint for joint in self.given if joint not in gears), *gears):
+            if item.text not in KNOWN:
+                raise self._no_pair(item)
+            one, other = self._ends(item)
+            if item.text == "FixedJoint":
                 welds.append((one.part, other.part))
                 continue
-            if each.text == "RackPinionJoint":
-                found.append(self._rack(each, one, other))
+            if item.text == "RackPinionJoint":
+                result.append(self._rack(item, one, other))
                 continue
-            joint = self._gear(each, found) if each in gears else self._joint(each, one, other)
-            found.append(joint)
-            named[(each.value("Name") or "").rpartition("/")[2]] = joint, each
-        used = {each.value(key) for each in self.given for key in ("MarkerI", "MarkerJ")}
+            joint = self._gear(item, result) if item in gears else self._joint(item, one, other)
+            result.append(joint)
+            named[(item.value("Name") or "").rpartition("/")[2]] = joint, item
+        used = {item.value(key) for item in self.given for key in ("MarkerI", "MarkerJ")}
         tracers = [
             Tracer(self.book.fresh(name.rpartition("/")[2]), held.part, self.flat(held.pose.at))
             for name, held in self.markers.items()
@@ -186,7 +186,7 @@ class _Reader:
         linkage = DrawnLinkage(
             self.title,
             FRAME,
-            tuple(found),
+            tuple(result),
             tuple(tracers),
             tuple(inputs),
             masses=tuple(self._masses(welds)),
@@ -206,7 +206,7 @@ class _Reader:
             if marker is not None and marker.find("Position3D") is not None:
                 places.append(self.flat(pose.place(read_pose(marker, self.place)).at))
         width, height = (max(values) - min(values) for values in zip(*places, strict=True))
-        size = f"{height:.3g} {self.length} high and {width:.3g} {self.length} wide"
+        size = f"{_rounded(height)} {self.length} high and {_rounded(width)} {self.length} wide"
         self.notes.append(f"{unit_note(self.length)}: the assembly is {size}")
 
     def _plane_gravity(self) -> Place:
@@ -224,46 +224,49 @@ class _Reader:
         bounds: dict[tuple[str, tuple[str, str]], dict[str, float]] = {}
         for limit in self.limits:
             name, text = limit.value("Name") or "", limit.value("Limit") or ""
-            joint, given = self._limited_joint(limit, named)
-            if joint is None or given is None:
+            joint, node = self._limited_joint(limit, named)
+            if joint is None or node is None:
                 self.notes.append(f"the limit {name!r} of {text} is at no pin or slide and is left out")
                 continue
             value = motion_formula(text, self._place_of(limit))(0.0)
-            held = [self.markers.get(limit.value(key) or "") for key in ("MarkerI", "MarkerJ")]
-            one, other = (held[0], held[1]) if held[0] and held[1] else self._ends(given)
+            markers = [self.markers.get(limit.value(key) or "") for key in ("MarkerI", "MarkerJ")]
+            one, other = (markers[0], markers[1]) if markers[0] and markers[1] else self._ends(node)
             if isinstance(joint, PinJoint):
                 sense = 1.0 if dot(one.pose.column(2), self.normal) > 0.0 else -1.0
                 position, links = _turn_about_z(one.pose, other.pose), (one.part, other.part)
             else:
-                guide, axis = self._ends(given)[0], one.pose.column(2)
+                guide, axis = self._ends(node)[0], one.pose.column(2)
                 sense = 1.0 if dot(axis, guide.pose.column(2)) > 0.0 else -1.0
                 sense *= 1.0 if one.part == joint.guide else -1.0
                 position = sum(axis[i] * (other.pose.at[i] - one.pose.at[i]) for i in range(3))
                 links = (joint.guide, joint.slider)
             is_upper = (limit.value("Type") == "=<") == (sense > 0.0)
             bounds.setdefault((joint.name, links), {})["high" if is_upper else "low"] = sense * (value - position)
-        return [stop for (name, links), found in bounds.items() if (stop := self._stop(name, links, found, named))]
+        return [
+            stop for (name, links), distances in bounds.items() if (stop := self._stop(name, links, distances, named))
+        ]
 
     def _limited_joint(
         self, limit: Node, named: dict[str, tuple[Joint, Node]]
     ) -> tuple[PinJoint | SlideJoint | None, Node | None]:
         """The pin or slide of a limit: the one that it names, else that of its markers."""
-        joint, given = named.get((limit.value("MotionJoint") or "").rpartition("/")[2], (None, None))
-        if given is None:
+        joint, node = named.get((limit.value("MotionJoint") or "").rpartition("/")[2], (None, None))
+        if node is None:
             ends = {limit.value("MarkerI"), limit.value("MarkerJ")}
             at_markers = (
-                each for each in named.values() if {each[1].value("MarkerI"), each[1].value("MarkerJ")} == ends
+                item for item in named.values() if {item[1].value("MarkerI"), item[1].value("MarkerJ")} == ends
             )
-            joint, given = next(at_markers, (None, None))
-        wanted = {"RotationLimit": PinJoint, "TranslationLimit": SlideJoint}.get(limit.text)
-        return (joint, given) if wanted is not None and isinstance(joint, wanted) else (None, None)
+            joint, node = next(at_markers, (None, None))
+        if isinstance(joint, PinJoint) and limit.text == "RotationLimit":
+            return joint, node
+        return (joint, node) if isinstance(joint, SlideJoint) and limit.text == "TranslationLimit" else (None, None)
 
     def _stop(
-        self, name: str, links: tuple[str, str], found: dict[str, float], named: dict[str, tuple[Joint, Node]]
+        self, name: str, links: tuple[str, str], distances: dict[str, float], named: dict[str, tuple[Joint, Node]]
     ) -> DrawnStop | None:
         """The stop of these distances from the drawn position; None, with a note, where that is beyond it."""
         joint = next(joint for joint, _ in named.values() if joint.name == name)
-        low, high = found.get("low"), found.get("high")
+        low, high = distances.get("low"), distances.get("high")
         if isinstance(joint, PinJoint) and low is not None and high is not None:
             turns = next((turn for turn in (0.0, -2.0 * pi, 2.0 * pi) if low + turn <= 0.0 <= high + turn), 0.0)
             low, high = low + turns, high + turns
@@ -374,7 +377,7 @@ class _Reader:
             )
             return []
         still = {FRAME, *(part for two in welds if FRAME in two for part in two)}
-        found = []
+        result = []
         for name, (part, pose) in self.parts.items():
             marker = part.find("PrincipalMassMarker")
             if marker is None or name in still:
@@ -385,8 +388,8 @@ class _Reader:
             where = pose.place(read_pose(marker, self.place))
             about = sum(moments[i] * dot(where.column(i), self.normal) ** 2 for i in range(3))
             if mass > 0.0:
-                found.append(DrawnMass(name, mass, self.flat(where.at), max(about, 0.0) * self.metres**2))
-        return found
+                result.append(DrawnMass(name, mass, self.flat(where.at), max(about, 0.0) * self.metres**2))
+        return result
 
 
 def _has_placeholder_masses(assembly: Node) -> bool:
@@ -397,7 +400,12 @@ def _has_placeholder_masses(assembly: Node) -> bool:
         for marker in markers_of_mass
         if marker is not None
     ]
-    return bool(values) and all(len(each) == 4 and set(map(_number, each)) == {1.0} for each in values)
+    return bool(values) and all(len(item) == 4 and set(map(_number, item)) == {1.0} for item in values)
+
+
+def _rounded(size: float) -> str:
+    """A size to three digits, whole from 100 on."""
+    return f"{size:.0f}" if size >= 100.0 else f"{size:.3g}"
 
 
 def _number(text: str) -> float | None:

@@ -12,7 +12,7 @@ KINDS = ("R", "P", "RP", "G")
 def recognise(source: ForeignText) -> bool:
     """Whether it is an object with joints that have a `TypeOfJoint`."""
     joints = source.value.get("Joints") if isinstance(source.value, dict) else None
-    return isinstance(joints, list) and any(isinstance(each, dict) and "TypeOfJoint" in each for each in joints)
+    return isinstance(joints, list) and any(isinstance(item, dict) and "TypeOfJoint" in item for item in joints)
 
 
 def read(source: ForeignText) -> ReadDocument:
@@ -20,14 +20,14 @@ def read(source: ForeignText) -> ReadDocument:
     top = ForeignValue(source.value)
     driving = top.number("DrivingIndex", -1.0)
     joints = []
-    for index, each in enumerate(top.items("Joints")):
-        kind = each.text("TypeOfJoint").strip().upper()
+    for index, item in enumerate(top.items("Joints")):
+        kind = item.text("TypeOfJoint").strip().upper()
         if kind not in KINDS:
-            raise each.at("TypeOfJoint").error(f"a joint is of type R, P, RP or G, not {kind!r:.40}")
-        links = tuple(link.text() for link in each.items("Links"))
+            raise item.at("TypeOfJoint").error(f"a joint is of type R, P, RP or G, not {kind!r:.40}")
+        links = tuple(link.text() for link in item.items("Links"))
         if not links:
-            raise each.at("Links").error("a joint is of one link at least")
-        x, y, angle = each.number("X"), each.number("Y"), each.number("Angle", 0.0)
+            raise item.at("Links").error("a joint is of one link at least")
+        x, y, angle = item.number("X"), item.number("Y"), item.number("Angle", 0.0)
         joints.append(PmksJoint(links, kind, x, y, angle, index == driving))
     title = top.text("Name", "") or source.title
     notes = ("the speed of the input is taken as rad/s",) if top.number("InputSpeed", 0.0) else ()

@@ -57,8 +57,8 @@ def read(source: ForeignText) -> ReadDocument:
     for number, line in enumerate(lines, 1):
         joint = _parsed(line)
         if joint is None:
-            told = f"{line.strip()!r:.80} is no joint: links, then R, P, RP or G, then x and y"
-            raise BadInput(f"{source.place}, joint {number}", told)
+            message = f"{line.strip()!r:.80} is no joint: links, then R, P, RP or G, then x and y"
+            raise BadInput(f"{source.place}, joint {number}", message)
         if joint not in joints:
             joints.append(joint)
     return pmks_document(source, joints, tuple(notes))
@@ -76,10 +76,10 @@ def _parsed(line: str) -> PmksJoint | None:
     else:
         return None
     rest = words[index + 1 :]
-    told: list[str] = []
+    message: list[str] = []
     while len(rest) > 2 and rest[-1].lower() in ("true", "false"):
-        told.insert(0, rest.pop()[0])
-    flags = rest.pop() if len(rest) > 2 and FLAGS.fullmatch(rest[-1]) else "".join(told)
+        message.insert(0, rest.pop()[0])
+    flags = rest.pop() if len(rest) > 2 and FLAGS.fullmatch(rest[-1]) else "".join(message)
     if not 2 <= len(rest) <= 3 or not all(NUMBER.fullmatch(word) for word in rest):
         return None
     x, y, angle = (*map(float, rest), 0.0)[:3]
@@ -93,7 +93,7 @@ def write(linkage: DrawnLinkage) -> WrittenText:
     """A line for each joint, in the linkage's unit of length. Raises BadInput for what the text cannot say."""
     if len(linkage.inputs) > 1:
         raise cannot_say(FORMAT.title, f"the input at {linkage.inputs[1].joint!r}", "it has one input alone")
-    names, driven = _link_names(linkage), {each.joint: each for each in linkage.inputs}
+    names, driven = _link_names(linkage), {item.joint: item for item in linkage.inputs}
     lines = []
     for joint in linkage.joints:
         links, kind, at, angle = _written_joint(joint, linkage)
@@ -101,12 +101,12 @@ def write(linkage: DrawnLinkage) -> WrittenText:
             if kind not in ("R", "P"):
                 raise cannot_say(FORMAT.title, f"the input at {joint_phrase(joint)}", "its inputs are pins and slides")
             first = driven[joint.name].links if kind == "R" else links
-            links = (*first, *(each for each in links if each not in first))
-        told = ",".join(names[link] for link in links)
-        lines.append(f"{told},{kind},{at[0]!r},{at[1]!r},{angle!r},tff{'t' if joint.name in driven else 'f'}")
-    lines += [f"{names[each.link]},R,{each.at[0]!r},{each.at[1]!r},0.0,tfff" for each in linkage.tracers]
+            links = (*first, *(item for item in links if item not in first))
+        message = ",".join(names[link] for link in links)
+        lines.append(f"{message},{kind},{at[0]!r},{at[1]!r},{angle!r},tff{'t' if joint.name in driven else 'f'}")
+    lines += [f"{names[item.link]},R,{item.at[0]!r},{item.at[1]!r},0.0,tfff" for item in linkage.tracers]
     notes = [f"lengths are in {linkage.length}, which the format does not say; names of joints are not said either"]
-    if any(each.velocity for each in linkage.inputs):
+    if any(item.velocity for item in linkage.inputs):
         notes.append("the velocity of the input is not said")
     return WrittenText("mech=\n" + "\n".join(lines) + "\n", tuple(notes))
 
@@ -128,10 +128,10 @@ def _written_joint(joint: Joint, linkage: DrawnLinkage) -> tuple[tuple[str, ...]
 
 def _link_names(linkage: DrawnLinkage) -> dict[str, str]:
     """The names of links as words that are no type of joint; numbers stay, as PMKS has them."""
-    book = NameBook({"ground", "gnd", *TYPES, *(each.upper() for each in TYPES)})
+    book = NameBook({"ground", "gnd", *TYPES, *(item.upper() for item in TYPES)})
     links = dict.fromkeys((*linkage.links, *(link for joint in linkage.joints for link in joined_links(joint))))
-    found = {link: book.fresh("_".join(link.split()), "link") for link in links}
-    return found | {linkage.frame: "ground"}
+    result = {link: book.fresh("_".join(link.split()), "link") for link in links}
+    return result | {linkage.frame: "ground"}
 
 
 FORMAT = FileFormat(

@@ -51,8 +51,8 @@ def recognise(source: ForeignText) -> bool:
     text = unquote(source.text.strip())
     if QUERY.fullmatch(text):
         return True
-    found = CODE.fullmatch(text)
-    return found is not None and found[1].count(",") > 4
+    result = CODE.fullmatch(text)
+    return result is not None and result[1].count(",") > 4
 
 
 def read(source: ForeignText) -> ReadDocument:
@@ -82,9 +82,9 @@ class _Reader:
         "the prismatic joint of each pin that a block carries"
         self.ids: dict[str, str] = {}
         for key, link in mechanism.links.items():
-            for each in link.joints:
-                if each not in mechanism.joints:
-                    raise BadInput(self.place, f"the link {key!r:.40} names a joint {each!r:.40} that is not there")
+            for item in link.joints:
+                if item not in mechanism.joints:
+                    raise BadInput(self.place, f"the link {key!r:.40} names a joint {item!r:.40} that is not there")
             if link.is_block:
                 pin, rail = self._block(link.joints)
                 self.blocks[pin] = rail
@@ -150,8 +150,8 @@ class _Reader:
 
     def _block(self, joints: tuple[str, ...]) -> tuple[str, str]:
         """The pin and the prismatic joint that a block connects."""
-        rails = [each for each in joints if self.flags(each) & PRISMATIC]
-        pins = [each for each in joints if each not in rails]
+        rails = [item for item in joints if self.flags(item) & PRISMATIC]
+        pins = [item for item in joints if item not in rails]
         if len(rails) != 1 or len(pins) != 1:
             raise BadInput(self.place, f"a block joins one pin and one slide, not {', '.join(joints)!r:.60}")
         return pins[0], rails[0]
@@ -167,7 +167,7 @@ class _Reader:
         else:
             guide, start, end = self._slot(rail, slot)
             angle, through = degrees(atan2(end.at[1] - start.at[1], end.at[0] - start.at[0])), start.at
-        riders = [each for each in members if each != guide]
+        riders = [item for item in members if item != guide]
         if not riders:
             raise BadInput(self._place_of(rail), "it slides on the link that carries it")
         name = names[pin]
@@ -200,9 +200,9 @@ class _Reader:
         """
         joints = self.mechanism.joints
         rod = next((m for m in self.links.values() if pin in m and len(m) == 2), None)
-        mounts = [joints[each].at for each in slot[1:]]
+        mounts = [joints[item].at for item in slot[1:]]
         if rod is not None:
-            far = joints[next(each for each in rod if each != pin)].at
+            far = joints[next(item for item in rod if item != pin)].at
             mounts.sort(key=lambda at: -hypot(at[0] - far[0], at[1] - far[1]))
         (x, y), (u, v) = mounts
         barrel = hypot(u - x, v - y)
@@ -223,9 +223,9 @@ class _Reader:
         given = degrees(angle)
         nearest = 15.0 * round(given / 15.0)
         if given != nearest and abs(given - nearest) <= degrees(SNAP):
-            told = "angles that are rounded in the link are taken as the multiples of 15 degrees that they round"
-            if told not in self.notes:
-                self.notes.append(told)
+            message = "angles that are rounded in the link are taken as the multiples of 15 degrees that they round"
+            if message not in self.notes:
+                self.notes.append(message)
             return nearest
         return given
 

@@ -37,8 +37,8 @@ def recognise(source: ForeignText) -> bool:
 def read(source: ForeignText) -> ReadDocument:
     """The mechanism of a file. Raises BadInput at a JSON path."""
     linkage, welds = _Reader(ForeignValue(source.value), source).read()
-    whole = without_loose_links(merge_links_of_two_pins(merge_links(linkage, welds)))
-    return drawn_document(whole, source.place)
+    merged = without_loose_links(merge_links_of_two_pins(merge_links(linkage, welds)))
+    return drawn_document(merged, source.place)
 
 
 class _Reader:
@@ -51,28 +51,28 @@ class _Reader:
         self.stops: list[DrawnStop] = []
         self.notes: list[str] = []
         self.joints: dict[str, ForeignValue] = {}
-        for each in top.items("joints"):
-            key = each.text("id")
+        for item in top.items("joints"):
+            key = item.text("id")
             if key in self.joints:
-                raise each.at("id").error(f"there are two joints {key!r:.60}")
-            self.joints[key] = each
-        self.names = {key: self.book.fresh(each.text("name", key), "joint") for key, each in self.joints.items()}
+                raise item.at("id").error(f"there are two joints {key!r:.60}")
+            self.joints[key] = item
+        self.names = {key: self.book.fresh(item.text("name", key), "joint") for key, item in self.joints.items()}
         self.links: dict[str, list[str]] = {}
         self.drivers: list[tuple[str, ForeignValue]] = []
-        for each in top.items("links"):
-            self._add_link(each)
-        self.anchored = {key for key, each in self.joints.items() if each.text("type", "revolute") == "ground"}
-        self.anchored |= {each.text("motor_joint") for _, each in self.drivers if each.has("motor_joint")}
+        for item in top.items("links"):
+            self._add_link(item)
+        self.anchored = {key for key, item in self.joints.items() if item.text("type", "revolute") == "ground"}
+        self.anchored |= {item.text("motor_joint") for _, item in self.drivers if item.has("motor_joint")}
         self.anchored |= set(self.links.get(FRAME, ()))
 
     def _add_link(self, given: ForeignValue) -> None:
         kind, key = given.text("type", "link"), given.text("id")
         if kind not in LINKS:
             raise given.at("type").error(f"links are of type {', '.join(LINKS)}, not {kind!r:.40}")
-        keys = [each.text() for each in given.items("joints")]
-        for each in keys:
-            if each not in self.joints:
-                raise given.at("joints").error(f"{each!r:.60} is no joint of this file")
+        keys = [item.text() for item in given.items("joints")]
+        for item in keys:
+            if item not in self.joints:
+                raise given.at("joints").error(f"{item!r:.60} is no joint of this file")
         if kind == "ground":
             self.links[FRAME] = [*self.links.get(FRAME, ()), *keys]
             return
@@ -89,7 +89,7 @@ class _Reader:
         return given.pair("position")
 
     def read(self) -> tuple[DrawnLinkage, list[tuple[str, ...]]]:
-        found: list[Joint] = []
+        result: list[Joint] = []
         tracers: list[Tracer] = []
         for key, name in self.names.items():
             kind = self.joints[key].text("type", "revolute")
@@ -97,24 +97,24 @@ class _Reader:
             if kind == "tracker":
                 tracers += self._tracker(key, holders)
             elif kind == "prismatic":
-                found += self._prismatic(key, holders)
+                result += self._prismatic(key, holders)
             elif kind not in JOINTS:
                 raise self.joints[key].at("type").error(f"joints are of type {', '.join(JOINTS)}, not {kind!r:.40}")
             else:
                 members = (*((FRAME,) if key in self.anchored else ()), *holders)
                 if len(members) > 1:
-                    found.append(PinJoint(name, members, self.at(key)))
+                    result.append(PinJoint(name, members, self.at(key)))
                 elif holders:
                     tracers.append(Tracer(name, holders[0], self.at(key)))
-        inputs = self._inputs(found)
+        inputs = self._inputs(result)
         linkage = DrawnLinkage(
             self.title,
             FRAME,
-            tuple(found),
+            tuple(result),
             tuple(tracers),
             tuple(inputs),
             stops=tuple(self.stops),
-            links=(FRAME, *(each for each in self.links if each != FRAME)),
+            links=(FRAME, *(item for item in self.links if item != FRAME)),
             length=self.length,
             notes=(*self.notes, unit_note(self.length)),
         )
@@ -139,9 +139,9 @@ class _Reader:
         """A point by its distance and angle from the line of two joints of one link."""
         given = self.joints[key]
         first, second = given.text("ref_joint1_id"), given.text("ref_joint2_id")
-        for each in (first, second):
-            if each not in self.joints:
-                raise given.error(f"{each!r:.60} is no joint of this file")
+        for item in (first, second):
+            if item not in self.joints:
+                raise given.error(f"{item!r:.60} is no joint of this file")
         link = next((name for name, keys in self.links.items() if first in keys and second in keys), None)
         if link is None:
             self.notes.append(f"the point {self.names[key]!r} is on no one link and is left out")
@@ -153,12 +153,12 @@ class _Reader:
 
     def _inputs(self, found: list[Joint]) -> list[DrawnInput]:
         """The drivers: links that turn about a joint of the ground, so far in each step."""
-        pins = {each.name: each for each in found if isinstance(each, PinJoint) and FRAME in each.links}
+        pins = {item.name: item for item in found if isinstance(item, PinJoint) and FRAME in item.links}
         inputs = []
         for link, given in self.drivers:
             motor = given.text("motor_joint", "")
             named = [self.names[motor]] if motor in self.names else [self.names[key] for key in self.links[link]]
-            pin = next((each for each in named if each in pins and link in pins[each].links), None)
+            pin = next((item for item in named if item in pins and link in pins[item].links), None)
             if pin is None:
                 raise given.error(f"the driver {link!r} turns about no joint of the ground")
             rate = given.number("angular_velocity", 0.0)

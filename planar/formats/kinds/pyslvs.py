@@ -50,21 +50,21 @@ def _linkage(source: ForeignText, given: list[PyslvsJoint], pairs: list[tuple[in
     tracers: list[Tracer] = []
     blocks: list[tuple[str, ...]] = []
     names = [book.fresh(f"P{number}") for number in range(len(given))]
-    links = [tuple(dict.fromkeys(_link(each, book) for each in joint.links)) for joint in given]
-    for name, own, each in zip(names, links, given, strict=True):
-        at = (each.x, each.y)
+    links = [tuple(dict.fromkeys(_link(item, book) for item in joint.links)) for joint in given]
+    for name, own, item in zip(names, links, given, strict=True):
+        at = (item.x, item.y)
         if len(own) == 1:
             tracers.append(Tracer(name, own[0], at))
-        elif each.kind == "R" and own:
+        elif item.kind == "R" and own:
             joints.append(PinJoint(name, own, at))
         elif own:
             guide, first, *others = own
-            if others and each.kind == "RP":
+            if others and item.kind == "RP":
                 joints.append(PinJoint(book.fresh(f"{name}_pin"), own[1:], at))
             elif others:
                 blocks.append(own[1:])
-            kind = SlotJoint if each.kind == "RP" else SlideJoint
-            joints.append(kind(name, guide, first, at, each.angle))
+            kind = SlotJoint if item.kind == "RP" else SlideJoint
+            joints.append(kind(name, guide, first, at, item.angle))
     linkage = DrawnLinkage(source.title, FRAME, tuple(joints), tuple(tracers), length=source.length_unit or "mm")
     linkage = _with_inputs(linkage, names, links, pairs).with_notes(unit_note(linkage.length))
     return without_loose_links(merge_links_of_two_pins(merge_links(linkage, blocks)))
@@ -80,8 +80,8 @@ def _with_inputs(
     """The linkage driven as the project says: the link that both joints share turns, or a slide moves."""
     from dataclasses import replace
 
-    held = {each.name: each for each in linkage.joints}
-    found: list[DrawnInput] = []
+    held = {item.name: item for item in linkage.joints}
+    result: list[DrawnInput] = []
     notes: list[str] = []
     for base, driven in pairs:
         if max(base, driven) >= len(names):
@@ -89,18 +89,18 @@ def _with_inputs(
             continue
         joint = held.get(names[base])
         if base == driven and isinstance(joint, SlideJoint | SlotJoint):
-            found.append(DrawnInput(joint.name, (joint.guide, joined_links(joint)[1])))
+            result.append(DrawnInput(joint.name, (joint.guide, joined_links(joint)[1])))
             continue
-        shared = [each for each in links[base] if each in links[driven] and each != FRAME]
+        shared = [item for item in links[base] if item in links[driven] and item != FRAME]
         if isinstance(joint, PinJoint) and FRAME in joint.links and shared:
-            found.append(DrawnInput(joint.name, (FRAME, shared[0])))
+            result.append(DrawnInput(joint.name, (FRAME, shared[0])))
         else:
             notes.append(f"the input ({base}, {driven}) turns no link that is pinned to the ground and is left out")
-    pins = [each for each in linkage.joints if isinstance(each, PinJoint) and FRAME in each.links]
+    pins = [item for item in linkage.joints if isinstance(item, PinJoint) and FRAME in item.links]
     if not pairs and pins:
-        found = [DrawnInput(pins[0].name, (FRAME, next(each for each in pins[0].links if each != FRAME)))]
+        result = [DrawnInput(pins[0].name, (FRAME, next(item for item in pins[0].links if item != FRAME)))]
         notes.append("an expression names no input; the first pin on the ground is driven")
-    return replace(linkage, inputs=tuple(found)).with_notes(*notes)
+    return replace(linkage, inputs=tuple(result)).with_notes(*notes)
 
 
 def write(linkage: DrawnLinkage) -> WrittenText:
@@ -116,13 +116,13 @@ def write(linkage: DrawnLinkage) -> WrittenText:
         kind = {PinJoint: "R", SlideJoint: "P", SlotJoint: "RP"}[type(joint)]
         angle = 0.0 if isinstance(joint, PinJoint) else joint.angle
         indices[joint.name] = len(joints)
-        joints.append(PyslvsJoint(kind, tuple(names[each] for each in joined_links(joint)), *joint.at, angle))
-    joints += [PyslvsJoint("R", (names[each.link],), *each.at, 0.0) for each in linkage.tracers]
+        joints.append(PyslvsJoint(kind, tuple(names[item] for item in joined_links(joint)), *joint.at, angle))
+    joints += [PyslvsJoint("R", (names[item.link],), *item.at, 0.0) for item in linkage.tracers]
     pairs = [_input_pair(given, linkage, joints, indices, names) for given in linkage.inputs]
     lines = [f'mechanism: "{write_expression(joints)}"', *(["input:"] if pairs else [])]
     lines += [f"- - {base}\n  - {driven}" for base, driven in pairs]
     notes = [f"lengths are in {linkage.length}, which the format does not say; names of joints are not said either"]
-    if any(each.velocity for each in linkage.inputs):
+    if any(item.velocity for item in linkage.inputs):
         notes.append("the velocity of the input is not said")
     return WrittenText("\n".join(lines) + "\n", tuple(notes))
 
@@ -145,10 +145,10 @@ def _input_pair(
     if joints[base].kind != "R":
         return base, base
     if linkage.frame not in given.links:
-        told = f"the input of {given.links[1]!r} against {given.links[0]!r}"
-        raise cannot_say(TITLE, told, "its inputs turn a link on the ground")
-    link = next(names[each] for each in given.links if each != linkage.frame)
-    others = (n for n, each in enumerate(joints) if n != base and link in each.links and each[2:4] != joints[base][2:4])
+        message = f"the input of {given.links[1]!r} against {given.links[0]!r}"
+        raise cannot_say(TITLE, message, "its inputs turn a link on the ground")
+    link = next(names[item] for item in given.links if item != linkage.frame)
+    others = (n for n, item in enumerate(joints) if n != base and link in item.links and item[2:4] != joints[base][2:4])
     driven = next(others, None)
     if driven is None:
         raise cannot_say(TITLE, f"the input at {given.joint!r}", f"the link {link!r} has no second joint")

@@ -42,14 +42,14 @@ class ForeignValue(NamedTuple):
             return
         if not isinstance(self.value, list):
             raise self.error(f"a list is wanted here, not {_described(self.value)}")
-        yield from (ForeignValue(each, f"{self.path}[{index}]") for index, each in enumerate(self.value))
+        yield from (ForeignValue(item, f"{self.path}[{index}]") for index, item in enumerate(self.value))
 
     def members(self, key: str) -> Iterator[tuple[str, ForeignValue]]:
         """The members of the object under a key."""
-        found = self.at(key)
-        if not isinstance(found.value, dict):
-            raise found.error(f"an object is wanted here, not {_described(found.value)}")
-        yield from ((name, ForeignValue(each, f"{found.path}.{name}")) for name, each in found.value.items())
+        result = self.at(key)
+        if not isinstance(result.value, dict):
+            raise result.error(f"an object is wanted here, not {_described(result.value)}")
+        yield from ((name, ForeignValue(item, f"{result.path}.{name}")) for name, item in result.value.items())
 
     def number(self, key: str | None = None, default: float = MISSING) -> float:
         """The finite number under a key, or this one; the default where there is none."""
@@ -64,10 +64,10 @@ class ForeignValue(NamedTuple):
 
     def pair(self, key: str) -> tuple[float, float]:
         """Two numbers under a key."""
-        found = self.at(key)
-        numbers = [each.number() for each in found.items()]
+        result = self.at(key)
+        numbers = [item.number() for item in result.items()]
         if len(numbers) != 2:
-            raise found.error(f"two numbers are wanted here, not {len(numbers)}")
+            raise result.error(f"two numbers are wanted here, not {len(numbers)}")
         return numbers[0], numbers[1]
 
     def text(self, key: str | None = None, default: str = MISSING) -> str:

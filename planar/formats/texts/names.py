@@ -25,11 +25,11 @@ class NameBook:
 
     def fresh(self, wanted: str, instead: str = "part") -> str:
         """A name near to the one wanted that nothing has yet."""
-        printable = "".join(each for each in wanted if each.isprintable() or each.isspace())
+        printable = "".join(item for item in wanted if item.isprintable() or item.isspace())
         base = MARKS.sub("_", printable.strip()).strip("_") or instead
-        found, count = base, 1
-        while found in self._taken:
+        result, count = base, 1
+        while result in self._taken:
             count += 1
-            found = f"{base}_{count}"
-        self._taken.add(found)
-        return found
+            result = f"{base}_{count}"
+        self._taken.add(result)
+        return result

@@ -29,8 +29,8 @@ class Conversion:
     notes: tuple[str, ...]
 
     def __repr__(self) -> str:
-        told = f", {len(self.notes)} notes" if self.notes else ""
-        return f"<Conversion of {self.mechanism.name!r} from {self.source_format} to {self.target_format}{told}>"
+        message = f", {len(self.notes)} notes" if self.notes else ""
+        return f"<Conversion of {self.mechanism.name!r} from {self.source_format} to {self.target_format}{message}>"
 
 
 def convert(
@@ -77,10 +77,10 @@ def _format_of(target: str | os.PathLike[str] | None) -> str:
     """The name of the format that a file's ending chooses."""
     if target is None or Path(target).suffix.lower() in ("", ".json"):
         return OWN_FORMAT
-    found = format_by_ending(os.fsdecode(target))
-    if found is None:
+    result = format_by_ending(os.fsdecode(target))
+    if result is None:
         raise unknown_format_error(Path(target).suffix, "a mechanism", [".json", *writable_endings()])
-    return found.name
+    return result.name
 
 
 def written_text(mechanism: Mechanism, name: str) -> WrittenText:
@@ -90,12 +90,12 @@ def written_text(mechanism: Mechanism, name: str) -> WrittenText:
 
     kind = named_format(name, OWN_FORMAT)
     if kind.write is None:
-        writable = [each.name for each in file_formats().values() if each.write]
+        writable = [item.name for item in file_formats().values() if item.write]
         raise unknown_format_error("", f"a mechanism ({kind.title} is only read)", [*writable])
     drawn = drawn_mechanism(mechanism, rest_position(mechanism).frames, kind.title)
-    found = kind.write(drawn)
-    notes = (*drawn.notes, *_omissions(drawn, name, found.says_stops), *found.notes)
-    return found._replace(notes=tuple(dict.fromkeys(notes)))
+    result = kind.write(drawn)
+    notes = (*drawn.notes, *_omissions(drawn, name, result.says_stops), *result.notes)
+    return result._replace(notes=tuple(dict.fromkeys(notes)))
 
 
 def _omissions(drawn: DrawnLinkage, name: str, says_stops: bool) -> list[str]:

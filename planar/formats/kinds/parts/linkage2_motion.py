@@ -16,7 +16,7 @@ def turned_links(
     Each whose only held connector is the input is turned, with all others that are, unless one of its connectors is on
     another link that is held elsewhere: by an anchor, or by one that was turned before.
     """
-    moved, found = set(anchors), list[str]()
+    moved, result = set(anchors), list[str]()
     for link in members:
         own = set(connectors[link]) - {at}
         if own & moved:
@@ -24,9 +24,9 @@ def turned_links(
         neighbours = (set(keys) - {at} - own for name, keys in connectors.items() if name != link and own & set(keys))
         if any(keys & moved for keys in neighbours):
             continue
-        found.append(link)
+        result.append(link)
         moved |= own
-    return found
+    return result
 
 
 def swing_phase(stroke: float, offset: float) -> tuple[float, int]:

@@ -62,16 +62,16 @@ class _Writer:
         "the attributes of links that are actuators"
         self.written_stops: list[DrawnStop] = []
         self.notes: list[str] = []
-        places = [each.at for each in (*linkage.joints, *linkage.tracers) if not isinstance(each, WheelJoint)]
+        places = [item.at for item in (*linkage.joints, *linkage.tracers) if not isinstance(item, WheelJoint)]
         self.reach = max((hypot(x - places[0][0], y - places[0][1]) for x, y in places), default=1.0) or 1.0
 
     def write(self) -> WrittenText:
         linkage = self.linkage
-        inputs = {each.joint: each for each in linkage.inputs}
+        inputs = {item.joint: item for item in linkage.inputs}
         cylinders: list[tuple[SlideJoint, Cylinder]] = []
         for joint in linkage.joints:
             if isinstance(joint, PinJoint):
-                self._pin(joint, [each for each in linkage.inputs if each.joint == joint.name])
+                self._pin(joint, [item for item in linkage.inputs if item.joint == joint.name])
             elif isinstance(joint, SlideJoint | SlotJoint):
                 cylinder = self._cylinder(joint) if joint.name in inputs else None
                 if cylinder is not None and isinstance(joint, SlideJoint):
@@ -89,8 +89,8 @@ class _Writer:
         for slide, cylinder in cylinders:
             self._write_cylinder(slide, cylinder, inputs[slide.name])
         ids = {link: number for number, link in enumerate(self.members)}
-        ratios = [self._ratio(each, ids) for each in self.gears]
-        wheels = {wheel for each in self.gears for wheel in each.wheels}
+        ratios = [self._ratio(item, ids) for item in self.gears]
+        wheels = {wheel for item in self.gears for wheel in item.wheels}
         lines = ["<linkage2>", '\t<program zoom="1" units="Millimeters"/>', *self.connectors]
         for link, numbers in self.members.items():
             gear = ' gear="true"' if link in wheels else ""
@@ -108,7 +108,7 @@ class _Writer:
         x, y = at[0] * self.scale, at[1] * self.scale
         head = f'\t<connector id="{number}" name={quoteattr(name)} layer="16" x="{x!r}" y="{y!r}"'
         head += f" {more}" if more else ""
-        limits = "".join(f'<slidelimit id="{each}"/>' for each in inside)
+        limits = "".join(f'<slidelimit id="{item}"/>' for item in inside)
         self.connectors.append(f"{head}>{limits}</connector>" if limits else f"{head}/>")
         for link in links:
             if link != self.linkage.frame:
@@ -121,9 +121,9 @@ class _Writer:
         anchor = 'anchor="true"' if frame in joint.links else ""
         for number, given in enumerate(driven):
             if frame not in given.links:
-                told = f"the input of {given.links[1]!r} against {given.links[0]!r}"
-                raise cannot_say(TITLE, told, "its inputs turn a link on the frame")
-            other = next(each for each in given.links if each != frame)
+                message = f"the input of {given.links[1]!r} against {given.links[0]!r}"
+                raise cannot_say(TITLE, message, "its inputs turn a link on the frame")
+            other = next(item for item in given.links if item != frame)
             rate = given.velocity * 30.0 / pi * (-1.0 if given.links[1] == other else 1.0)
             name = f"{joint.name}_{number}" if number else joint.name
             swing = self._swing(given, other)
@@ -134,36 +134,36 @@ class _Writer:
         elif set(rest) - {frame}:
             self._connector(f"{joint.name}_fixed", joint.at, rest, anchor)
 
-    def _swing(self, given: DrawnInput, link: str) -> str:
+    def _swing(self, drive: DrawnInput, link: str) -> str:
         """The attributes of an input that turns its link to and fro between two stops; none where it has none."""
         stop = next(
-            (s for s in self.linkage.stops if s.joint == given.joint and set(s.links) == set(given.links)), None
+            (s for s in self.linkage.stops if s.joint == drive.joint and set(s.links) == set(drive.links)), None
         )
         if stop is None or stop.low is None or stop.high is None:
             return ""
         self.written_stops.append(stop)
-        is_forward = given.links[1] == link
-        rate = given.velocity if is_forward else -given.velocity
+        is_forward = drive.links[1] == link
+        rate = drive.velocity if is_forward else -drive.velocity
         low, high = (stop.low, stop.high) if stop.links[1] == link else (-stop.high, -stop.low)
         limit = high - low
         begun = min(-low if rate >= 0.0 else high, limit * (1.0 - BEFORE_END))
         return f' limitangle="{degrees(limit)!r}" startoffset="{degrees(begun)!r}"'
 
     def _stop(self, joint: SlideJoint | SlotJoint) -> DrawnStop | None:
-        return next((each for each in self.linkage.stops if each.joint == joint.name), None)
+        return next((item for item in self.linkage.stops if item.joint == joint.name), None)
 
     def _cylinder(self, joint: SlideJoint | SlotJoint) -> Cylinder | None:
         """A driven slide between two pins on its line, of which one is alone on its link."""
         if isinstance(joint, SlotJoint) or self.linkage.frame in joined_links(joint):
             return None
         for body, rod in ((joint.guide, joint.slider), (joint.slider, joint.guide)):
-            held = [each for each in self.linkage.joints if rod in joined_links(each) and each != joint]
-            if len(held) != 1 or rod in {each.link for each in self.linkage.tracers}:
+            joints_of_rod = [item for item in self.linkage.joints if rod in joined_links(item) and item != joint]
+            if len(joints_of_rod) != 1 or rod in {item.link for item in self.linkage.tracers}:
                 continue
-            end = held[0]
+            end = joints_of_rod[0]
             if not isinstance(end, PinJoint) or not self._on_line(end.at, joint):
                 continue
-            pins = [each for each in self.linkage.joints if isinstance(each, PinJoint) and body in each.links]
+            pins = [item for item in self.linkage.joints if isinstance(item, PinJoint) and body in item.links]
             on_line = (pin for pin in pins if self._on_line(pin.at, joint) and not near(pin.at, end.at))
             mount = next(on_line, None)
             if mount is not None:
@@ -174,19 +174,19 @@ class _Writer:
         x, y = at[0] - joint.at[0], at[1] - joint.at[1]
         return abs(cos(radians(joint.angle)) * y - sin(radians(joint.angle)) * x) <= ON_LINE * self.reach
 
-    def _write_cylinder(self, slide: SlideJoint, cylinder: Cylinder, given: DrawnInput) -> None:
+    def _write_cylinder(self, slide: SlideJoint, cylinder: Cylinder, drive: DrawnInput) -> None:
         """An actuator from the pin of the body to that of the rod; the rod is no Link of its own."""
         body, rod, mount, end = cylinder
         (x, y), (u, v) = mount.at, end.at
-        way = (u - x) * cos(radians(slide.angle)) + (v - y) * sin(radians(slide.angle))
-        is_outward = (way > 0.0) == (body == slide.guide)
+        advance = (u - x) * cos(radians(slide.angle)) + (v - y) * sin(radians(slide.angle))
+        is_outward = (advance > 0.0) == (body == slide.guide)
         first = next(number for number in self.members[body] if near(self.at[number], mount.at))
         (second,) = self.members.pop(rod)
-        self.members[body] = [first, second, *(each for each in self.members[body] if each != first)]
-        self.actuators[body] = self._strokes(slide, given, hypot(u - x, v - y), is_outward)
+        self.members[body] = [first, second, *(item for item in self.members[body] if item != first)]
+        self.actuators[body] = self._strokes(slide, drive, hypot(u - x, v - y), is_outward)
         self.notes.append(f"the link {rod!r} is the rod of the actuator {body!r}, which has no name there")
 
-    def _drive(self, joint: SlideJoint | SlotJoint, given: DrawnInput, rider: int) -> None:
+    def _drive(self, joint: SlideJoint | SlotJoint, drive: DrawnInput, rider: int) -> None:
         """An actuator beside a slide, from a connector of its guide behind the slide's to that."""
         stop = self._stop(joint)
         begun = -stop.low if stop is not None and stop.low is not None else 0.0
@@ -197,13 +197,13 @@ class _Writer:
         mount = self._connector(f"{joint.name}_mount", place, [joint.guide], anchor)
         name = NameBook((*self.members, *self.linkage.links)).fresh(f"{joint.name}_drive")
         self.members[name] = [mount, rider]
-        self.actuators[name] = self._strokes(joint, given, length, True)
+        self.actuators[name] = self._strokes(joint, drive, length, True)
 
-    def _strokes(self, joint: SlideJoint | SlotJoint, given: DrawnInput, length: float, is_outward: bool) -> str:
+    def _strokes(self, joint: SlideJoint | SlotJoint, drive: DrawnInput, length: float, is_outward: bool) -> str:
         """The attributes of an actuator of this length: its stroke, where in it it is, and its strokes in a minute."""
         stop = self._stop(joint)
         rider = joined_links(joint)[1]
-        velocity = given.velocity if given.links[1] == rider else -given.velocity
+        velocity = drive.velocity if drive.links[1] == rider else -drive.velocity
         low, high = (None, None) if stop is None else (stop.low, stop.high)
         if not is_outward:
             velocity, low, high = -velocity, None if high is None else -high, None if low is None else -low

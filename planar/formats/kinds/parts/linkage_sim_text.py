@@ -42,8 +42,8 @@ class _Writer:
             else:
                 raise cannot_say(TITLE, joint_phrase(joint), "it has pins and slides alone")
         tracers: dict[str, dict[str, Place]] = {link: {} for link in self.points}
-        for each in self.linkage.tracers:
-            tracers[each.link][each.name] = each.at
+        for item in self.linkage.tracers:
+            tracers[item.link][item.name] = item.at
         origins = {
             link: (0.0, 0.0)
             if link == self.linkage.frame
@@ -82,14 +82,14 @@ class _Writer:
         def local(at: Place) -> list[float]:
             return [self._metres(at[0] - origin[0]), self._metres(at[1] - origin[1])]
 
-        masses = [each for each in self.linkage.masses if each.link == link]
-        total = sum(each.mass for each in masses)
-        centre, inertia = origin, sum(each.inertia for each in masses)
+        masses = [item for item in self.linkage.masses if item.link == link]
+        total = sum(item.mass for item in masses)
+        centre, inertia = origin, sum(item.inertia for item in masses)
         if total:
             centre = tuple(sum(e.mass * e.at[axis] for e in masses) / total for axis in (0, 1))  # type: ignore[assignment]
-            for each in masses:
-                x, y = (self._metres(each.at[axis] - centre[axis]) for axis in (0, 1))
-                inertia += each.mass * (x * x + y * y)
+            for item in masses:
+                x, y = (self._metres(item.at[axis] - centre[axis]) for axis in (0, 1))
+                inertia += item.mass * (x * x + y * y)
         body: dict[str, Any] = {"attachment_points": {name: local(at) for name, at in self.points[link].items()}}
         body |= {"mass": total, "cg_local": local(centre), "Izz_cg": inertia}
         return body | ({"coupler_points": {name: local(at) for name, at in tracers.items()}} if tracers else {})

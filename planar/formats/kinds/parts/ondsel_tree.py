@@ -23,17 +23,17 @@ class Node:
 
     def find(self, key: str) -> Node | None:
         """The first child with this text."""
-        return next((each for each in self.children if each.text == key), None)
+        return next((item for item in self.children if item.text == key), None)
 
     def value(self, key: str) -> str | None:
         """The first line under a child."""
-        found = self.find(key)
-        return found.children[0].text if found is not None and found.children else None
+        result = self.find(key)
+        return result.children[0].text if result is not None and result.children else None
 
     def walk(self, key: str) -> list[Node]:
         """The children of a child; none where that is not there."""
-        found = self.find(key)
-        return [] if found is None else found.children
+        result = self.find(key)
+        return [] if result is None else result.children
 
 
 class Pose(NamedTuple):
@@ -91,12 +91,12 @@ def read_pose(node: Node, place: str) -> Pose:
 def numbers(node: Node, count: int, place: str) -> Triple:
     """The numbers of a line. Raises BadInput at it."""
     try:
-        found = [float(word) for word in node.text.split()]
+        result = [float(word) for word in node.text.split()]
     except ValueError:
-        found = []
-    if len(found) != count or not all(isfinite(each) and abs(each) < 1e100 for each in found):
+        result = []
+    if len(result) != count or not all(isfinite(item) and abs(item) < 1e100 for item in result):
         raise BadInput(f"{place}, line {node.line}", f"{count} numbers are wanted here, not {node.text!r:.60}")
-    return tuple(found)  # type: ignore[return-value]
+    return tuple(result)  # type: ignore[return-value]
 
 
 def markers(node: Node, pose: Pose, place: str) -> Iterator[tuple[str, Pose]]:

@@ -43,26 +43,26 @@ def pmks_document(
     joints: list[Joint] = []
     tracers: list[Tracer] = []
     drives: list[DrawnInput] = []
-    pins = _merged_pins([each._replace(links=_link_names(each.links, book)) for each in given])
+    pins = _merged_pins([item._replace(links=_link_names(item.links, book)) for item in given])
     letters = iter(_letters())
-    for number, each in enumerate(pins, 1):
-        place, at = f"{source.place}, joint {number}", (each.x, each.y)
+    for number, item in enumerate(pins, 1):
+        place, at = f"{source.place}, joint {number}", (item.x, item.y)
         name = book.fresh(next(letters))
-        if len(each.links) == 1:
-            if each.kind != "R":
-                raise BadInput(place, f"a joint of type {each.kind} joins two links, not {each.links[0]!r} alone")
-            tracers.append(Tracer(name, each.links[0], at))
+        if len(item.links) == 1:
+            if item.kind != "R":
+                raise BadInput(place, f"a joint of type {item.kind} joins two links, not {item.links[0]!r} alone")
+            tracers.append(Tracer(name, item.links[0], at))
             continue
-        if each.kind == "R":
-            joints.append(PinJoint(name, each.links, at))
-        elif each.kind == "G":
-            joints.append(meshing_gears(name, (each.links[0], each.links[1]), at, _pin_joints(pins), place))
+        if item.kind == "R":
+            joints.append(PinJoint(name, item.links, at))
+        elif item.kind == "G":
+            joints.append(meshing_gears(name, (item.links[0], item.links[1]), at, _pin_joints(pins), place))
         else:
-            joints += _sliding(name, each, book)
-        if each.driven and each.kind in ("R", "P"):
-            drives.append(_drive(name, each, velocity))
-        elif each.driven:
-            raise BadInput(place, f"a joint of type {each.kind} cannot be driven; that is one of type R or P")
+            joints += _sliding(name, item, book)
+        if item.driven and item.kind in ("R", "P"):
+            drives.append(_drive(name, item, velocity))
+        elif item.driven:
+            raise BadInput(place, f"a joint of type {item.kind} cannot be driven; that is one of type R or P")
     if not drives:
         drives = _first_drive(joints, velocity)
     length = source.length_unit or "mm"
@@ -71,39 +71,39 @@ def pmks_document(
     )
     if len(drives) > 1:
         linkage = linkage.with_notes(f"the input at {drives[1].joint!r} is left out: the first drives alone")
-    whole = without_loose_links(merge_links_of_two_pins(linkage.with_notes(unit_note(length))))
-    return drawn_document(whole, source.place)
+    merged = without_loose_links(merge_links_of_two_pins(linkage.with_notes(unit_note(length))))
+    return drawn_document(merged, source.place)
 
 
 def _link_names(links: tuple[str, ...], book: NameBook) -> tuple[str, ...]:
     """The links of a joint, each once; what is called ground stands still."""
-    found = (FRAME if each.lower() in ("ground", "gnd") else book.name("link", each) for each in links)
-    return tuple(dict.fromkeys(found))
+    result = (FRAME if item.lower() in ("ground", "gnd") else book.name("link", item) for item in links)
+    return tuple(dict.fromkeys(result))
 
 
 def _merged_pins(given: list[PmksJoint]) -> list[PmksJoint]:
     """The joints, those pins as one that lie on one another and share a link."""
-    found: list[PmksJoint] = []
-    for each in given:
+    result: list[PmksJoint] = []
+    for item in given:
         same = [
             index
-            for index, other in enumerate(found)
-            if each.kind == other.kind == "R"
-            and (each.x, each.y) == (other.x, other.y)
-            and set(each.links) & set(other.links)
-            and min(len(each.links), len(other.links)) > 1
+            for index, other in enumerate(result)
+            if item.kind == other.kind == "R"
+            and (item.x, item.y) == (other.x, other.y)
+            and set(item.links) & set(other.links)
+            and min(len(item.links), len(other.links)) > 1
         ]
         if same:
-            other = found[same[0]]
-            links = tuple(dict.fromkeys((*other.links, *each.links)))
-            found[same[0]] = other._replace(links=links, driven=other.driven or each.driven)
+            other = result[same[0]]
+            links = tuple(dict.fromkeys((*other.links, *item.links)))
+            result[same[0]] = other._replace(links=links, driven=other.driven or item.driven)
         else:
-            found.append(each)
-    return found
+            result.append(item)
+    return result
 
 
 def _pin_joints(given: list[PmksJoint]) -> list[Joint]:
-    return [PinJoint("", each.links, (each.x, each.y)) for each in given if each.kind == "R" and len(each.links) > 1]
+    return [PinJoint("", item.links, (item.x, item.y)) for item in given if item.kind == "R" and len(item.links) > 1]
 
 
 def _sliding(name: str, given: PmksJoint, book: NameBook) -> list[Joint]:
@@ -111,7 +111,7 @@ def _sliding(name: str, given: PmksJoint, book: NameBook) -> list[Joint]:
     guide, first, *others = given.links
     at = (given.x, given.y)
     if given.kind == "P":
-        more = [SlideJoint(book.fresh(f"{name}_{each}"), guide, each, at, given.angle) for each in others]
+        more = [SlideJoint(book.fresh(f"{name}_{item}"), guide, item, at, given.angle) for item in others]
         return [SlideJoint(name, guide, first, at, given.angle), *more]
     pin = [PinJoint(book.fresh(f"{name}_pin"), (first, *others), at)] if others else []
     return [*pin, SlotJoint(name, guide, first, at, given.angle)]
@@ -120,17 +120,17 @@ def _sliding(name: str, given: PmksJoint, book: NameBook) -> list[Joint]:
 def _drive(name: str, given: PmksJoint, velocity: float) -> DrawnInput:
     """What a driven joint turns or moves: against the ground where that is there, else the second link."""
     if FRAME in given.links and given.kind == "R":
-        other = next(each for each in given.links if each != FRAME)
+        other = next(item for item in given.links if item != FRAME)
         return DrawnInput(name, (FRAME, other), velocity)
     return DrawnInput(name, (given.links[0], given.links[1]), velocity)
 
 
 def _first_drive(joints: list[Joint], velocity: float) -> list[DrawnInput]:
     """The first pin on the ground, which drives where no joint says that it does."""
-    pins = [each for each in joints if isinstance(each, PinJoint) and FRAME in each.links]
+    pins = [item for item in joints if isinstance(item, PinJoint) and FRAME in item.links]
     return [
-        DrawnInput(each.name, (FRAME, next(link for link in each.links if link != FRAME)), velocity)
-        for each in pins[:1]
+        DrawnInput(item.name, (FRAME, next(link for link in item.links if link != FRAME)), velocity)
+        for item in pins[:1]
     ]
 
 

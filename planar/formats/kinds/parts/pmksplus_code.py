@@ -84,11 +84,11 @@ class CodedLink(NamedTuple):
 
 def encode_integer(value: int) -> str:
     """A whole number in base 64; a negative one begins with 0."""
-    rest, found = abs(value), ""
-    while rest or not found:
+    rest, result = abs(value), ""
+    while rest or not result:
         rest, digit = divmod(rest, 64)
-        found = DIGITS[digit] + found
-    return ("0" if value < 0 else "") + found
+        result = DIGITS[digit] + result
+    return ("0" if value < 0 else "") + result
 
 
 def encode_decimal(value: float) -> str:
@@ -102,8 +102,8 @@ def decode_integer(text: str, place: str) -> int:
     value = 0
     if not text or len(text) > 40:
         raise BadInput(place, f"{text!r:.40} is no number of PMKS+")
-    for each in text:
-        digit = DIGITS.find(each)
+    for item in text:
+        digit = DIGITS.find(item)
         if digit < 0:
             raise BadInput(place, f"{text!r:.40} is no number of PMKS+")
         value = 64 * value + digit
@@ -135,9 +135,9 @@ def take_apart(text: str, place: str) -> CodedLink:
         raise BadInput(place, "this is no link of PMKS+: it has too few parts")
     head, rest = parts[:4], parts[4:]
     sections: list[list[list[str]]] = [[]]
-    for each in rest:
-        if each:
-            sections[-1].append(each.split(","))
+    for item in rest:
+        if item:
+            sections[-1].append(item.split(","))
         else:
             sections.append([])
     sections += [[], [], []]
@@ -155,13 +155,13 @@ def decode_mechanism(text: str, place: str) -> PlusMechanism:
         if key in joints:
             raise BadInput(where, "there are two joints of this name")
         flags = decode_flags(fields[0][:1], where)
-        x, y, angle = (decode_decimal(each, where) for each in fields[2:5])
+        x, y, angle = (decode_decimal(item, where) for item in fields[2:5])
         slot = (fields[5], fields[6], fields[7]) if len(fields) >= 8 and fields[5] else None
         speed = decode_decimal(fields[8], where) if len(fields) >= 9 and fields[8] else 0.0
         joints[key] = PlusJoint(fields[1] or key, (x, y), flags, angle, slot, speed)
     links = dict(_decode_link(fields, place) for fields in coded.links if fields[0][:1] not in PARTS_OF_LINKS)
     sense = -1.0 if decode_flags(coded.flags or "0", place) & 1 else 1.0
-    decimals = [decode_decimal(each, place) for each in coded.decimals if each]
+    decimals = [decode_decimal(item, place) for item in coded.decimals if item]
     linear_speed = sense * (decimals[1] if len(decimals) > 1 and decimals[1] else DEFAULT_LINEAR_SPEED)
     return PlusMechanism(
         joints,
@@ -185,7 +185,7 @@ def _decode_link(fields: list[str], place: str) -> tuple[str, PlusLink]:
         raise BadInput(place, f"a part of the link is no link: {','.join(fields)!r:.60}")
     listed = fields[7:]
     end = listed.index("") if "" in listed else len(listed)
-    parts = tuple(each for each in listed[end:] if each)
+    parts = tuple(item for item in listed[end:] if item)
     mass = decode_decimal(fields[2], place) if fields[2] else 0.0
     return head[2:], PlusLink(fields[1] or head[2:], tuple(listed[:end]), head[1] == "P", mass, parts)
 
@@ -194,7 +194,7 @@ def _decode_force(fields: list[str], place: str) -> PlusForce:
     if len(fields) < 8 or not fields[0]:
         raise BadInput(place, f"a force of the link is none: {','.join(fields)!r:.60}")
     flags = decode_flags(fields[0][:1], place)
-    x, y, u, v, size = (decode_decimal(each, place) for each in fields[3:8])
+    x, y, u, v, size = (decode_decimal(item, place) for item in fields[3:8])
     return PlusForce(fields[2], fields[1], (x, y), (u, v), size, bool(flags & 1), bool(flags & 2))
 
 
@@ -202,7 +202,7 @@ def put_together(coded: CodedLink) -> str:
     """The code of a link from its parts."""
     head = f"{coded.flags}.{','.join(coded.decimals)}.{','.join(coded.integers)}.{coded.units}"
     joints, links, forces = (
-        "".join(",".join(each) + "." for each in part) for part in (coded.joints, coded.links, coded.forces)
+        "".join(",".join(item) + "." for item in part) for part in (coded.joints, coded.links, coded.forces)
     )
     body = f"{head}.{joints}.{links}.{forces}.N_"
     return body + check_digit(body)

@@ -33,7 +33,7 @@ def decode_query(text: str, place: str) -> PlusMechanism:
         joints[key] = joint
     links = dict(_link(fields, place) for fields in _rows(sections.get("l", "")))
     forces = tuple(_force(fields, place) for fields in _rows(sections.get("f", "")))
-    settings = [each.strip() for each in sections.get("s", "").split(",")]
+    settings = [item.strip() for item in sections.get("s", "").split(",")]
     notes = []
     length = UNITS.get(settings[3].lower() if len(settings) > 3 else "")
     if length is None:
@@ -78,7 +78,7 @@ def _link(fields: list[str], place: str) -> tuple[str, PlusLink]:
     values = fields[2:] if is_typed else fields[1:]
     if len(values) < 5 or not fields[0]:
         raise BadInput(where, f"this is no link of PMKS+: {','.join(fields)!r:.60}")
-    joints = tuple(each for each in values[4].split("|") if each)
+    joints = tuple(item for item in values[4].split("|") if item)
     mass = 0.0 if values[0].lower() in ("", "null") else _number(values[0], where)
     return fields[0], PlusLink(fields[0], joints, is_typed and fields[1] == "P", mass)
 
@@ -88,7 +88,7 @@ def _force(fields: list[str], place: str) -> PlusForce:
     where = f"{place}, force {fields[0]:.40}"
     if len(fields) < 9:
         raise BadInput(where, f"this is no force of PMKS+: {','.join(fields)!r:.60}")
-    x, y, u, v = (_number(each, where) for each in fields[2:6])
+    x, y, u, v = (_number(item, where) for item in fields[2:6])
     is_local, is_outward = not _flag(fields[6], where), _flag(fields[7], where)
     return PlusForce(fields[0], fields[1], (x, y), (u, v), _number(fields[8], where), is_local, is_outward)
 

@@ -86,11 +86,11 @@ class _Writer:
         self.blocks: list[tuple[str, str]] = []
         self.driven = linkage.inputs[0].joint if linkage.inputs else None
         self.keys: dict[str, str] = {}
-        slides = [each for each in linkage.joints if isinstance(each, SlideJoint)]
-        self.cylinders = {slide.name: found for slide in slides if (found := self._cylinder(slide)) is not None}
-        spare = [(each.retracted - each.stroke) * self.scale for each in self.cylinders.values()]
+        slides = [item for item in linkage.joints if isinstance(item, SlideJoint)]
+        self.cylinders = {slide.name: result for slide in slides if (result := self._cylinder(slide)) is not None}
+        spare = [(item.retracted - item.stroke) * self.scale for item in self.cylinders.values()]
         drawn_size = 2.0 * RADIUS * (CLEARANCE + HEAD_MAX)
-        self.object_scale = max(min([1.0, *(each / drawn_size for each in spare)]), 1e-3)
+        self.object_scale = max(min([1.0, *(item / drawn_size for item in spare)]), 1e-3)
 
     def write(self) -> WrittenText:
         linkage = self.linkage
@@ -112,7 +112,7 @@ class _Writer:
 
     def _joint(self, name: str, at: Place, flags: int, links: list[str], more: tuple[str, ...] = ()) -> str:
         key = self._name(name)
-        x, y = (encode_decimal(each * self.scale) for each in at)
+        x, y = (encode_decimal(item * self.scale) for item in at)
         fields = [encode_integer(flags) + key, key, x, y, *(more or ("0",))]
         self.joints.append(fields)
         self.places[key] = at
@@ -151,15 +151,15 @@ class _Writer:
 
     def _cylinder(self, slide: SlideJoint) -> Cylinder | None:
         """The slide as a cylinder: two bars with one pin each, on the line of the slide, between two stops."""
-        stop = next((each for each in self.linkage.stops if each.joint == slide.name), None)
+        stop = next((item for item in self.linkage.stops if item.joint == slide.name), None)
         if stop is None or stop.low is None or stop.high is None or self.linkage.frame in joined_links(slide):
             return None
         pins = []
         for link in (slide.guide, slide.slider):
-            held = [each for each in self.linkage.joints if link in joined_links(each) and each != slide]
-            if len(held) != 1 or not isinstance(held[0], PinJoint) or self._carries_more(link):
+            joints_of_link = [item for item in self.linkage.joints if link in joined_links(item) and item != slide]
+            if len(joints_of_link) != 1 or not isinstance(joints_of_link[0], PinJoint) or self._carries_more(link):
                 return None
-            pins.append(held[0])
+            pins.append(joints_of_link[0])
         (x, y), (u, v) = pins[0].at, pins[1].at
         span = hypot(u - x, v - y)
         direction = cos(radians(slide.angle)), sin(radians(slide.angle))
@@ -176,7 +176,8 @@ class _Writer:
     def _carries_more(self, link: str) -> bool:
         """Whether a link has points, masses or forces of its own."""
         linkage = self.linkage
-        return link in {each.link for each in (*linkage.tracers, *linkage.masses, *linkage.forces)}
+        carriers = [tracer.link for tracer in linkage.tracers] + [mass.link for mass in linkage.masses]
+        return link in carriers or link in [force.link for force in linkage.forces]
 
     def _write_cylinder(self, slide: SlideJoint | SlotJoint, cylinder: Cylinder) -> None:
         """A barrel from its mount to its inner end, and a rod from the seal to its own mount."""
@@ -222,7 +223,7 @@ class _Writer:
         return CodedLink(flags, decimals, [encode_integer(abs(round(rate))), "0"], "1011", self.joints, links, [])
 
     def _drives_pin(self) -> bool:
-        joint = next((each for each in self.linkage.joints if each.name == self.driven), None)
+        joint = next((item for item in self.linkage.joints if item.name == self.driven), None)
         return isinstance(joint, PinJoint)
 
     def _rpm(self) -> float:
@@ -237,16 +238,16 @@ class _Writer:
 
     def _notes(self) -> list[str]:
         linkage, rate = self.linkage, self._rpm()
-        written = [each for each in linkage.stops if each.joint in self.cylinders]
-        found = [
+        written = [item for item in linkage.stops if item.joint in self.cylinders]
+        result = [
             *linkage.notes,
             *lost_stop_notes(linkage, written),
             "lengths are rounded to a thousandth of a cm, angles of rails to a thousandth of a radian",
         ]
         if abs(rate - round(rate)) > 1e-9:
-            found.append(f"the velocity of the input is rounded to {round(rate)} rpm")
+            result.append(f"the velocity of the input is rounded to {round(rate)} rpm")
         if linkage.inputs and not self._drives_pin() and not linkage.inputs[0].velocity:
-            found.append(
+            result.append(
                 f"the input rests, which the link does not say; there it moves at {DEFAULT_LINEAR_SPEED:g} cm/s"
             )
-        return found
+        return result

@@ -94,11 +94,11 @@ class _Parser:
         self.expect("[")
 
     def take(self) -> tuple[str, str]:
-        found = TOKEN.match(self.text, self.at)
-        if found is None or found.lastgroup is None:
+        result = TOKEN.match(self.text, self.at)
+        if result is None or result.lastgroup is None:
             raise self.error("the expression ends here, or goes on with what is no part of it")
-        self.at = found.end()
-        return found.lastgroup, found[found.lastgroup]
+        self.at = result.end()
+        return result.lastgroup, result[result.lastgroup]
 
     def word(self) -> str:
         kind, text = self.take()
@@ -113,10 +113,10 @@ class _Parser:
         return float(text)
 
     def skip(self, mark: str) -> bool:
-        found = TOKEN.match(self.text, self.at)
-        if found is None or found["mark"] != mark:
+        result = TOKEN.match(self.text, self.at)
+        if result is None or result["mark"] != mark:
             return False
-        self.at = found.end()
+        self.at = result.end()
         return True
 
     def closes(self) -> bool:
@@ -134,7 +134,7 @@ class _Parser:
 def write_expression(joints: list[PyslvsJoint]) -> str:
     """The expression of these joints."""
     parts = []
-    for each in joints:
-        angle = "" if each.kind == "R" else f", A[{each.angle!r}]"
-        parts.append(f"J[{each.kind}{angle}, P[{each.x!r}, {each.y!r}], L[{', '.join(each.links)}]]")
+    for item in joints:
+        angle = "" if item.kind == "R" else f", A[{item.angle!r}]"
+        parts.append(f"J[{item.kind}{angle}, P[{item.x!r}, {item.y!r}], L[{', '.join(item.links)}]]")
     return f"M[{', '.join(parts)}]"

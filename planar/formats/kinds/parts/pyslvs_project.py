@@ -22,8 +22,8 @@ def project_entries(text: str, place: str) -> tuple[str, list[tuple[int, int]]]:
         raise BadInput(place, "the project has no entry 'mechanism'")
     expression = mechanism.strip().strip("'\"").replace("\\\n", "").replace("\\", "")
     pairs = _entry(text, "input", flow) or ""
-    found = BLOCK_PAIR.findall(pairs.strip("\n")) or PAIR.findall(pairs)
-    return expression, [(int(base), int(driven)) for base, driven in found if len(base) + len(driven) < 12]
+    result = BLOCK_PAIR.findall(pairs.strip("\n")) or PAIR.findall(pairs)
+    return expression, [(int(base), int(driven)) for base, driven in result if len(base) + len(driven) < 12]
 
 
 def _entry(text: str, key: str, flow: bool) -> str | None:
@@ -43,19 +43,19 @@ def _flow_entry(text: str, key: str) -> str | None:
     depth, start, quote = 0, None, ""
     at = 0
     while at < len(text):
-        each = text[at]
+        item = text[at]
         if quote:
-            quote = "" if each == quote else quote
-        elif each in "'\"":
-            quote = each
-        elif each in "[{":
+            quote = "" if item == quote else quote
+        elif item in "'\"":
+            quote = item
+        elif item in "[{":
             depth += 1
-        elif each in "]}":
+        elif item in "]}":
             depth -= 1
-        if start is not None and ((each == "," and depth == 1 and not quote) or depth == 0):
+        if start is not None and ((item == "," and depth == 1 and not quote) or depth == 0):
             return text[start:at]
-        if start is None and depth == 1 and each in "{," and (found := re.compile(rf"\s*{key}:").match(text, at + 1)):
-            start = at = found.end()
+        if start is None and depth == 1 and item in "{," and (result := re.compile(rf"\s*{key}:").match(text, at + 1)):
+            start = at = result.end()
             continue
         at += 1
     return None
