@@ -257,8 +257,9 @@ class _Reader:
                 item for item in named.values() if {item[1].value("MarkerI"), item[1].value("MarkerJ")} == ends
             )
             joint, node = next(at_markers, (None, None))
-        kind = {"RotationLimit": PinJoint, "TranslationLimit": SlideJoint}.get(limit.text)
-        return (joint, node) if kind is not None and isinstance(joint, kind) else (None, None)
+        if isinstance(joint, PinJoint) and limit.text == "RotationLimit":
+            return joint, node
+        return (joint, node) if isinstance(joint, SlideJoint) and limit.text == "TranslationLimit" else (None, None)
 
     def _stop(
         self, name: str, links: tuple[str, str], distances: dict[str, float], named: dict[str, tuple[Joint, Node]]
