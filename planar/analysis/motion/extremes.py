@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
 from math import inf, nan, sqrt
 from typing import NamedTuple
@@ -129,13 +130,14 @@ def find_swing(output: Output) -> Swing | None:
 
 
 @takes_result("Motion")
-def extremes(motion: Motion, name: str, axis: Axis | None = None) -> Extremes:
+def extremes(motion: Motion, name: str = "", axis: Axis | None = None, *, point: str | None = None) -> Extremes:
     """The extremes of a point along an axis, of the angle of a link or a pair, or of a slide, solved for to round-off.
 
     `axis` of a point is "x" (by default), "y" or a direction (rad). "angle" is the angle of the pair, else of the link,
     of this name, "displacement" that of a slide; they may be left out where no point has this name. Extremes may be at
     the ends of the input's range, which `turning` says; those of a link that rotates fully are. Of places that are
-    alike the first in the range is returned. Raises Unknown for another name, BadInput for another axis.
+    alike the first in the range is returned. `point` is the former word for `name`. Raises Unknown for another name,
+    BadInput for another axis.
 
     >>> import planar
     >>> motion = planar.cycle(planar.load("slider-crank"), 12)
@@ -144,6 +146,9 @@ def extremes(motion: Motion, name: str, axis: Axis | None = None) -> Extremes:
     >>> round(planar.extremes(motion, "rod").greatest.value, 6)
     0.304693
     """
+    if point is not None:
+        warnings.warn("extremes: the argument 'point' is called 'name' now", DeprecationWarning, stacklevel=3)
+        name = point
     if axis is None and (name in motion.point_names or name in motion._point_names):
         axis = "x"
     if axis is not None and axis not in PAIR_AXES:

@@ -6,6 +6,7 @@ What finds causes and remedies is loaded only when something is refused.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import permutations
 
 import numpy as np
 
@@ -50,9 +51,22 @@ def free_links(setup: PreparedMechanism) -> NoAnswer:
         Outcome.TOO_FEW_INPUTS,
         f"with {count_phrase(inputs, 'input')} {_links(links)} can still move in {count_phrase(ways, 'way')}; "
         f"{f'{forgotten}, or ' if forgotten else ''}give an input at "
-        f"{_offered_pairs(setup, links, 6)}{_surplus_inputs(setup)}",
+        f"{_offered_pairs(setup, links, 6)}{_surplus_inputs(setup)}{_block_note(setup, links)}",
         **_all_links(links),
     )
+
+
+def _block_note(setup: PreparedMechanism, links: Sequence[str]) -> str:
+    """What a block is, where a free one is pinned to a single link, which may be meant to slide itself."""
+    for pair in setup.mechanism.pairs:
+        for (block, point), (link, _) in permutations(pair.coincident_points(), 2):
+            pinned = [other for other in setup.mechanism.pairs if (block, point) in other.coincident_points()]
+            if block in links and block == f"block {point}" and len(pinned) == 1 and link != setup.mechanism.frame:
+                return (
+                    f"; {block!r} is a link of its own, pinned at {point!r} to link {link!r}: if that link itself is to "
+                    f"slide, name it in 'links' with \"point\": {point!r}"
+                )
+    return ""
 
 
 def _missing_pairs(setup: PreparedMechanism, links: Sequence[str]) -> str:
