@@ -81,8 +81,8 @@ def motor_duty(forces: Forces, of: str | None = None) -> MotorDuty:
     solved = _solved_margin(forces, of, measure)
     if solved is not None:
         return MotorDuty(of, motor, *rows, *solved[:3], greatest, best_speed, solved[3])
-    smallest, place, weak, highest = _margin_at_rows(moving, margin, power)
-    return MotorDuty(of, motor, *rows, smallest, place, weak, greatest, best_speed, highest, is_solved=False)
+    smallest, place, intervals, highest = _margin_at_rows(moving, margin, power)
+    return MotorDuty(of, motor, *rows, smallest, place, intervals, greatest, best_speed, highest, is_solved=False)
 
 
 Margins = tuple[float, float, tuple[tuple[float, float], ...], float]

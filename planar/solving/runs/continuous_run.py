@@ -250,7 +250,7 @@ class ContinuousRun:
         return RunSamples(path.z[chosen], target_rates, branch_rates=branch_rates, fast_samples=fast)
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False)
 class _PathAtPlaces:
     """The path of a motion at chosen places of another one; see `FollowedPath`."""
 
