@@ -266,7 +266,7 @@ class _SimulationRun:
                 self._add_rows_until(rows, at, inner)
                 y = self._project(at, inner(at))
                 self._hold_pieces(at, y)
-                self.oscillations.follow(before, (at, y), lambda inner=inner: inner)
+                self.oscillations.follow(before, (at, y), lambda: inner)  # noqa: B023 - it is called at once
                 solver, good, tiny = self._integrator(at, y), [], 0
                 continue
             at = solver.t if kink is None else kink[0]
