@@ -63,8 +63,8 @@ def _block_note(setup: PreparedMechanism, links: Sequence[str]) -> str:
             pinned = [other for other in setup.mechanism.pairs if (block, point) in other.coincident_points()]
             if block in links and block == f"block {point}" and len(pinned) == 1 and link != setup.mechanism.frame:
                 return (
-                    f"; {block!r} is a link of its own, pinned at {point!r} to link {link!r}: if that link itself is to "
-                    f"slide, name it in 'links' with \"point\": {point!r}"
+                    f"; {block!r} is a link of its own, pinned at {point!r} to link {link!r}: if that link itself "
+                    f"slides, name it in 'links' with \"point\": {point!r}"
                 )
     return ""
 
