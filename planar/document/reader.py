@@ -43,6 +43,7 @@ from planar.model.mechanism import (
     FRAME_NUMBERS,
     Input,
     Mechanism,
+    find_slot_problem,
     pair_entries,
     pair_misfits,
     relative_motions,
@@ -84,6 +85,9 @@ def read_mechanism(value: Any) -> Mechanism:
         closes_within=full["closes_within"].as_positive("length") if full.has("closes_within") else None,
         frame_number=full.choice("frame_number", FRAME_NUMBERS) or "last",
     )
+    slot_problem = find_slot_problem(bare)
+    if slot_problem:
+        raise full["links"][slot_problem[0]].error_at("slot", slot_problem[1])
     inputs = _read_inputs(full, relative_motions(bare))
     entries = tuple(zip(full["pairs"].items(), pair_entries(bare), strict=True))
     driven = replace(bare, inputs=inputs, **_read_common_keys(entries))
@@ -224,9 +228,8 @@ def _read_link(name: str, cursor: Cursor) -> Link:
         points.append(Point(point, _read_point_definition(place)))
     if ends is None and not points:
         raise cursor.error_at(None, "a link needs points: 'ends' with a 'length', or 'points'")
-    link = Link(
-        name, tuple(points), ends, length, _read_axis(cursor, (*(ends or ()), *(point.name for point in points)))
-    )
+    axis = _read_axis(cursor, (*(ends or ()), *(point.name for point in points)))
+    link = Link(name, tuple(points), ends, length, axis, cursor.flag("slot"))
     try:
         link_shape(link)
     except PointPlacementError as problem:
