@@ -194,7 +194,7 @@ def parts(  # many: sizes of what is cut
     """
     for slot in curved_slots(mechanism):
         message = f"it stands for a curved slot of {slot.carrier!r}, and curved slots are not cut"
-        raise BadInput(slot.link, f"{message}; leave out its 'slot' to cut a bar in its place")
+        raise BadInput(slot.link, f"{message}; leave out its 'curved_slot' to cut a bar in its place")
     unit = cut_unit(mechanism.units)
     thickness = unit.thickness if thickness is None else thickness
     play, gap = unit.play if play is None else play, unit.gap if gap is None else gap

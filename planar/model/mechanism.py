@@ -31,6 +31,7 @@ __all__ = [
     "Along",
     "At",
     "Course",
+    "CurvedSlot",
     "Distances",
     "Drive",
     "Input",
@@ -46,7 +47,9 @@ __all__ = [
     "Spring",
     "Stops",
     "check_mechanism",
+    "curved_slots",
     "find_law_problem",
+    "find_slot_problem",
     "has_input_rates",
     "links_counting_turns",
     "named_points",
@@ -55,6 +58,7 @@ __all__ = [
     "relative_motions",
     "replace_inputs",
     "running_input_index",
+    "slot_centres",
     "unit_input_rate",
     "unit_rate_note",
     "with_unit_rate",
@@ -388,15 +392,19 @@ def relative_motions(mechanism: Mechanism) -> Mapping[str, Pair]:
 
 
 def curved_slots(mechanism: Mechanism) -> tuple[CurvedSlot, ...]:
-    """The curved slots for which links stand; mechanisms that are read or checked have no others."""
+    """The curved slots for which links stand; links of which `find_slot_problem` tells a problem are left out."""
     result = []
     for link in mechanism.links:
-        if not link.slot or link.ends is None:
-            continue
-        (pair,) = _pins_at(mechanism, link.name, link.ends[0])
-        carrier = next(name for name in pair.links if name != link.name)
-        result.append(CurvedSlot(link.name, carrier, pair, link.ends[1]))
+        pairs = _pins_at(mechanism, link.name, link.ends[0]) if link.curved_slot and link.ends else ()
+        if len(pairs) == 1 and link.ends:
+            carrier = next(name for name in pairs[0].links if name != link.name)
+            result.append(CurvedSlot(link.name, carrier, pairs[0], link.ends[1]))
     return tuple(result)
+
+
+def slot_centres(mechanism: Mechanism) -> frozenset[tuple[str, str]]:
+    """The points (link, point) at the centres of curved slots."""
+    return frozenset(member for slot in curved_slots(mechanism) for member in slot.pair.coincident_points())
 
 
 def _pins_at(mechanism: Mechanism, link: str, point: str) -> tuple[Pair, ...]:
@@ -408,7 +416,7 @@ def _pins_at(mechanism: Mechanism, link: str, point: str) -> tuple[Pair, ...]:
 def find_slot_problem(mechanism: Mechanism) -> tuple[str, str] | None:
     """The first link that cannot stand for a curved slot, and a sentence why."""
     for link in mechanism.links:
-        if not link.slot:
+        if not link.curved_slot:
             continue
         if link.ends is None or link.points:
             message = "a link that stands for a curved slot has two 'ends' (the centre of the slot, and the pin that"

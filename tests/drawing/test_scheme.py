@@ -866,3 +866,61 @@ def test_a_link_with_one_pin_and_a_mass_has_a_line_to_its_mass_centre():
 
 def parts_of(mechanism):
     return {link.name: link_shape(link) for link in mechanism.links}
+
+
+def curved(carrier, stops):
+    """A pin of a rocker in a curved slot of radius 50, of the frame or of a swinging plate."""
+    plate = {"points": {"E": [40, 110], "M": [100, 60]}}
+    return {
+        "frame": "f",
+        "links": {
+            "f": {"points": {"A": [0, 0], "E": [40, 110]} | ({"M": [100, 60]} if carrier == "f" else {})},
+            "crank": {"ends": ["A", "B"], "length": 30},
+            "rod": {"ends": ["B", "C"], "length": 80},
+            "arc": {"ends": ["M", "C"], "length": 50, "curved_slot": True},
+        }
+        | ({"plate": plate} if carrier == "plate" else {}),
+        "pairs": [
+            *({"turning": name} for name in "ABC"),
+            {"turning": "M", "links": [carrier, "arc"], "stops": stops},
+            *([{"turning": "E"}] if carrier == "plate" else []),
+        ],
+        "inputs": [{"pair": "A", "position": 40}, *([{"pair": "E", "position": 10}] if carrier == "plate" else [])],
+        "sketch": {"C": [100, 10]},
+    }
+
+
+@pytest.mark.parametrize("carrier", ["f", "plate"])
+@pytest.mark.parametrize("stops", [[-150, -20], None, [-150, None]])
+def test_a_link_that_stands_for_a_curved_slot_is_drawn_as_an_arc_about_its_centre(carrier, stops):
+    value = curved(carrier, stops)
+    if stops is None:
+        del value["pairs"][3]["stops"]
+    state = made(value)
+    frame, half = plain_frames(state.frames)[carrier], symbol_table.SLOT_SIZE[1] / 2.0
+    centre = 1000.0 * np.array(state.point("M").position)
+    picture = scheme(state, UNIT)
+    about = "guide M" if carrier == "f" else "link plate"
+    edges = [mark for mark in picture.marks if isinstance(mark, Polyline) and mark.about == about and mark.closed]
+    distances = np.concatenate([np.hypot(*(np.array(edge.points) - centre).T) for edge in edges])
+    assert distances.min() == pytest.approx(50.0 - half) and distances.max() == pytest.approx(50.0 + half)
+    full = stops is not None and None not in stops
+    assert len(edges) == (1 if full else 2)
+    if full:  # the middles of the round ends lie beyond the stops by half the width of the slot
+        turned = np.degrees(np.arctan2(*(np.array(edges[0].points) - centre).T[::-1]) - frame.angle)
+        turned = (turned + 265.0) % 360.0 - 265.0
+        beyond = np.degrees(half / 50.0)
+        assert turned.min() == pytest.approx(-150.0 - beyond, abs=0.1)
+        assert turned.max() == pytest.approx(-20.0 + beyond, abs=0.1)
+    blocks = [mark for mark in picture.marks if mark.about == "stop of M"]
+    assert len(blocks) == (stops == [-150, None])
+    spots = [mark.about for mark in picture.marks]
+    assert "pin C" in spots and not {"pin M", "ground M", "link arc", "point M"} & set(spots)
+    assert "number of arc" in spots
+
+
+def test_a_drawing_with_a_curved_slot_has_room_for_the_slot_and_not_for_its_centre():
+    value = curved("f", [-100, -80])
+    value["links"]["arc"]["length"], value["links"]["f"]["points"]["M"] = 5000, [100, 5010]
+    low, high = (np.array(corner) for corner in extent(scheme(made(value)).marks))
+    assert (high - low).max() < 1000.0

@@ -10,7 +10,7 @@ from typing import NamedTuple
 from planar.drawing.scheme.springs_masses import Coil, MassCentreMark, Spiral, SpringMassMark, spring_mass_marks
 from planar.foundation.geometry import Vector, direction
 from planar.model.link_shapes import LinkShape
-from planar.model.mechanism import CurvedSlot, Mechanism, curved_slots, named_points
+from planar.model.mechanism import CurvedSlot, Mechanism, curved_slots, named_points, slot_centres
 from planar.model.pairs.symbols import (
     CamMark,
     CurvedSlotMark,
@@ -31,7 +31,7 @@ MIN_OUTLINE_POINTS = 6
 MAX_ORDERED_CORNERS = 200
 """Of more points the outline is their convex hull: whether their order crosses itself takes too long to find."""
 
-ARC_STEP, MIN_ARC_STEPS = pi / 36.0, 8
+ARC_STEP, MIN_ARC_STEPS = pi / 60.0, 8
 """rad between corners of the line that is drawn for a curved slot, and the least number of its parts."""
 
 Segment = tuple[Vector, Vector]
@@ -102,7 +102,7 @@ def body_points(
 ) -> dict[str, list[Vector]]:
     """The places of the points of each moving link, but for those of its outline and centres of curved slots."""
     outlines = link_outlines(mechanism, shapes)
-    centres = {member for slot in curved_slots(mechanism) for member in slot.pair.coincident_points()}
+    centres = slot_centres(mechanism)
     return {
         link.name: [
             place

@@ -274,7 +274,7 @@ def spring_strokes(scene: Scene) -> Iterator[PlacedSpring | PlacedTorsionSpring]
             yield PlacedTorsionSpring(mark.name, mark.links, symbol, mark.pin, mark.at, mark.ways, mark.free)
 
 
-def _slider_strokes(scene: Scene, pen: Pen) -> Iterator[PlacedSymbol]:
+def _slider_strokes(scene: Scene, pen: Pen) -> Iterator[PlacedLine | PlacedSymbol]:
     """Straight and curved slots, blocks and centres of mass."""
     frame = scene.mechanism.frame
     spare = 0.0 if scene.is_moving else (symbol_table.SLOT_SIZE[0] - symbol_table.SLOT_SIZE[1]) / 2.0 * scene.per_mm
