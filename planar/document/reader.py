@@ -43,6 +43,7 @@ from planar.model.mechanism import (
     FRAME_NUMBERS,
     Input,
     Mechanism,
+    find_slot_problem,
     pair_entries,
     pair_misfits,
     relative_motions,
@@ -87,11 +88,9 @@ def read_mechanism(value: Any) -> Mechanism:
     inputs = _read_inputs(full, relative_motions(bare))
     entries = tuple(zip(full["pairs"].items(), pair_entries(bare), strict=True))
     driven = replace(bare, inputs=inputs, **_read_common_keys(entries))
-    _check_frame_number(full, driven)
+    _check_links(full, driven)
     shapes = {link.name: link_shape(link) for link in bare.links}
-    told = tuple(sentence for pair in bare.pairs for sentence in pair.remarks(shapes))
-    if told:
-        driven = replace(driven, remarks=(*driven.remarks, *told))
+    driven = replace(driven, remarks=(*driven.remarks, *(text for pair in bare.pairs for text in pair.remarks(shapes))))
     if any(given.law is not None for given in inputs):
         from planar.document.input_laws import speed_jump_remarks
 
@@ -137,8 +136,11 @@ def _completed_by_sketch(
     return replace(mechanism, pairs=tuple(pairs), remarks=tuple(remarks))
 
 
-def _check_frame_number(top: Cursor, mechanism: Mechanism) -> None:
-    """Refuse a frame that is to be the first link but cannot be. Raises BadInput."""
+def _check_links(top: Cursor, mechanism: Mechanism) -> None:
+    """Refuse a link that cannot stand for a curved slot, and a frame that cannot be the first link. Raises BadInput."""
+    slot_problem = find_slot_problem(mechanism)
+    if slot_problem:
+        raise top["links"][slot_problem[0]].error_at("curved_slot", slot_problem[1])
     if not top.has("frame_number"):
         return
     from planar.model.link_graph import frame_number_problem  # few files have the key
@@ -224,9 +226,8 @@ def _read_link(name: str, cursor: Cursor) -> Link:
         points.append(Point(point, _read_point_definition(place)))
     if ends is None and not points:
         raise cursor.error_at(None, "a link needs points: 'ends' with a 'length', or 'points'")
-    link = Link(
-        name, tuple(points), ends, length, _read_axis(cursor, (*(ends or ()), *(point.name for point in points)))
-    )
+    axis = _read_axis(cursor, (*(ends or ()), *(point.name for point in points)))
+    link = Link(name, tuple(points), ends, length, axis, cursor.flag("curved_slot"))
     try:
         link_shape(link)
     except PointPlacementError as problem:

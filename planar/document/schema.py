@@ -114,6 +114,11 @@ LINK_SCHEMA: Schema = {
         list_schema("name", 2, 2) | {"uniqueItems": True},
         "two points whose direction is the link's angle, where coordinates were read off a drawing",
     ),
+    "curved_slot": described(
+        {"type": "boolean"},
+        "true where the link stands for a curved slot: its first end is the centre of the slot, in the link that is "
+        "pinned there, its second end the pin that slides in it; stops at the first end are the ends of the slot",
+    ),
 }
 MOTOR_SCHEMA: Schema = {
     "stall": described(schema_reference("quantity"), "what it supplies at rest: a torque, at a slide a force"),

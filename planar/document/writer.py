@@ -105,6 +105,7 @@ def write_link(link: Link, quantity: QuantityWriter) -> dict[str, Any]:
         length=None if link.length is None else quantity(link.length, "length"),
         axis=_list_or_none(link.axis),
         points={point.name: _write_point_definition(point.place, quantity) for point in link.points},
+        curved_slot=link.curved_slot or None,
     )
 
 

@@ -63,7 +63,7 @@ planar schema --task > planar-task-schema.json
 SHOWN_KEYS = {
     "file": ("frame_number", "sketch"),
     "misfit": ("closes_within", "pairs"),
-    "link": ("links",),
+    "link": ("links", "pairs"),
     "input": ("inputs",),
     "law": ("inputs",),
     "load": ("loads",),

@@ -38,7 +38,7 @@ from planar.manufacture.nesting import nested
 from planar.manufacture.plate_making import Pin, Sizes, Travel, make_plates
 from planar.manufacture.plates import Plate
 from planar.manufacture.stacking import Spacer, find_spacers, joined_plates, layer_rules
-from planar.model.mechanism import Mechanism, named_points
+from planar.model.mechanism import Mechanism, curved_slots, named_points
 from planar.model.pairs.cams.profiled import ProfiledPair
 from planar.results.motion import Motion
 from planar.solving.cycle import cycle
@@ -192,6 +192,9 @@ def parts(  # many: sizes of what is cut
     >>> planar.parts("four-bar", thickness=0.003)
     <Parts of 'Four-bar chain': 4 plates in 3 layers, sheets: 1>
     """
+    for slot in curved_slots(mechanism):
+        message = f"it stands for a curved slot of {slot.carrier!r}, and curved slots are not cut"
+        raise BadInput(slot.link, f"{message}; leave out its 'curved_slot' to cut a bar in its place")
     unit = cut_unit(mechanism.units)
     thickness = unit.thickness if thickness is None else thickness
     play, gap = unit.play if play is None else play, unit.gap if gap is None else gap

@@ -69,7 +69,8 @@ class Link:
     """A rigid link: its named points, and how its own axes lie.
 
     `ends` with `length` (m) put the first end at the origin and the second on the x-axis;
-    `axis` (p, q) puts the x-axis along p to q of points drawn by coordinates.
+    `axis` (p, q) puts the x-axis along p to q of points drawn by coordinates. `curved_slot` says that the link stands
+    for one: the first end is its centre, in the link that is pinned there, the second the pin that slides in it.
     """
 
     name: str
@@ -77,6 +78,7 @@ class Link:
     ends: tuple[str, str] | None = None
     length: Scalar | None = None
     axis: tuple[str, str] | None = None
+    curved_slot: bool = False
 
     def __post_init__(self) -> None:
         check_field_types(self)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
-from math import isfinite
+from math import isfinite, pi
 from numbers import Real
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -31,6 +31,7 @@ __all__ = [
     "Along",
     "At",
     "Course",
+    "CurvedSlot",
     "Distances",
     "Drive",
     "Input",
@@ -46,7 +47,9 @@ __all__ = [
     "Spring",
     "Stops",
     "check_mechanism",
+    "curved_slots",
     "find_law_problem",
+    "find_slot_problem",
     "has_input_rates",
     "links_counting_turns",
     "named_points",
@@ -55,6 +58,7 @@ __all__ = [
     "relative_motions",
     "replace_inputs",
     "running_input_index",
+    "slot_centres",
     "unit_input_rate",
     "unit_rate_note",
     "with_unit_rate",
@@ -202,6 +206,28 @@ class NamedPoint(NamedTuple):
     members: tuple[tuple[str, str], ...]
 
 
+class CurvedSlot(NamedTuple):
+    """A curved slot for which a link stands: the pair at its centre joins that link with the one that has the slot."""
+
+    link: str
+    carrier: str
+    pair: Pair
+    pin: str
+    "the point of the link that slides in the slot"
+
+    def angles(self, mechanism: Mechanism) -> tuple[float, float] | None:
+        """The directions (rad) of the ends of the slot from its centre in the axes of its carrier, by the stops.
+
+        None without two stops less than a turn apart: the slot is a whole ring.
+        """
+        low, high = next(((s.low, s.high) for s in mechanism.stops if s.pair == self.pair.name), (None, None))
+        if low is None or high is None or high - low >= 2.0 * pi:
+            return None
+        first, second = self.pair.links
+        moving = first if second == mechanism.frame else second
+        return (low, high) if moving == self.link else (-high, -low)
+
+
 def replace_inputs(mechanism: Mechanism, drives: tuple[Drive, ...]) -> Mechanism:
     """The same mechanism with some of its inputs changed; their laws start from there.
 
@@ -308,7 +334,7 @@ def check_mechanism(mechanism: Mechanism) -> None:
         if given.pair not in named:
             raise BadInput(given.pair, f"there is no pair {given.pair!r} to be driven; pairs are {join_names(named)}")
     _check_stops_and_motors(mechanism, named)
-    wrong = find_law_problem(mechanism)
+    wrong = find_slot_problem(mechanism) or find_law_problem(mechanism)
     if wrong:
         raise BadInput(*wrong)
 
@@ -363,6 +389,48 @@ def pair_entries(mechanism: Mechanism) -> tuple[tuple[Pair, ...], ...]:
 def relative_motions(mechanism: Mechanism) -> Mapping[str, Pair]:
     """Every relative motion that has a name: each pair, and at a pin of n links each two of them."""
     return {pair.name: pair for group in pair_entries(mechanism) for pair in type(group[0]).relative_motions(group)}
+
+
+def curved_slots(mechanism: Mechanism) -> tuple[CurvedSlot, ...]:
+    """The curved slots for which links stand; links of which `find_slot_problem` tells a problem are left out."""
+    result = []
+    for link in mechanism.links:
+        pairs = _pins_at(mechanism, link.name, link.ends[0]) if link.curved_slot and link.ends else ()
+        if len(pairs) == 1 and link.ends:
+            carrier = next(name for name in pairs[0].links if name != link.name)
+            result.append(CurvedSlot(link.name, carrier, pairs[0], link.ends[1]))
+    return tuple(result)
+
+
+def slot_centres(mechanism: Mechanism) -> frozenset[tuple[str, str]]:
+    """The points (link, point) at the centres of curved slots."""
+    return frozenset(member for slot in curved_slots(mechanism) for member in slot.pair.coincident_points())
+
+
+def _pins_at(mechanism: Mechanism, link: str, point: str) -> tuple[Pair, ...]:
+    """The pairs of the pin at a point of a link."""
+    groups = (group for group in pair_entries(mechanism) if group[0].has_pin())
+    return next((g for g in groups if any((link, point) in pair.coincident_points() for pair in g)), ())
+
+
+def find_slot_problem(mechanism: Mechanism) -> tuple[str, str] | None:
+    """The first link that cannot stand for a curved slot, and a sentence why."""
+    for link in mechanism.links:
+        if not link.curved_slot:
+            continue
+        if link.ends is None or link.points:
+            message = "a link that stands for a curved slot has two 'ends' (the centre of the slot, and the pin that"
+            return link.name, f"{message} slides in it), a 'length' and no other points"
+        if link.name == mechanism.frame:
+            return link.name, "the frame cannot stand for a curved slot; name another link as the frame"
+        centre, pin = link.ends
+        if len(_pins_at(mechanism, link.name, centre)) != 1:
+            message = f"its first end {centre!r} is the centre of the slot; it needs a turning pair that joins"
+            return link.name, f"{message} this link with the link that has the slot, and no other link"
+        if not _pins_at(mechanism, link.name, pin):
+            message = f"its second end {pin!r} is the pin that slides in the slot; it needs a turning pair"
+            return link.name, f"{message} that joins this link with the link that has this pin"
+    return None
 
 
 def named_points(mechanism: Mechanism) -> tuple[NamedPoint, ...]:

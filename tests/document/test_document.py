@@ -19,7 +19,7 @@ from planar.foundation.geometry import GROUND, frame_at
 from planar.model.file_units import FileUnits
 from planar.model.link_shapes import Along, At, Distances, Link, Point, link_shape
 from planar.model.loads import Course, Load, Mass, Spring
-from planar.model.mechanism import Input, Mechanism, PublishedValue, named_points, relative_motions
+from planar.model.mechanism import Input, Mechanism, PublishedValue, check_mechanism, named_points, relative_motions
 from planar.model.pairs.guide_line import LinkLine
 from tests.command import run
 from tests.documents import EXAMPLES, FOUR_BAR, LOADED, MISTAKES, SLIDER_CRANK, base, mistaken, put, read, refused
@@ -665,3 +665,54 @@ def test_a_frame_that_cannot_be_the_first_link_is_refused(tmp_path: Path) -> Non
         planar.loads(text.replace('"frame": "AD"', '"frame": "AD", "frame_number": "first"'))
     with pytest.raises(BadInput, match="none of first, last"):
         planar.loads(text.replace('"frame": "AD"', '"frame": "AD", "frame_number": "frist"'))
+
+
+CURVED = {
+    "planar": 1,
+    "units": {"length": "mm", "angle": "deg"},
+    "frame": "f",
+    "links": {
+        "f": {"points": {"A": [0, 0], "M": [100, 60]}},
+        "crank": {"ends": ["A", "B"], "length": 30},
+        "rod": {"ends": ["B", "C"], "length": 80},
+        "arc": {"ends": ["M", "C"], "length": 50, "curved_slot": True},
+    },
+    "pairs": [*({"turning": name} for name in "ABC"), {"turning": "M", "stops": [-150, -20]}],
+    "inputs": [{"pair": "A", "position": 40}],
+    "sketch": {"C": [100, 10]},
+}
+"""A pin in a curved slot of the frame."""
+
+
+def test_a_curved_slot_comes_back_and_moves_as_its_link() -> None:
+    mechanism = planar.from_dict(CURVED)
+    assert [link.name for link in mechanism.links if link.curved_slot] == ["arc"]
+    assert planar.to_dict(mechanism)["links"]["arc"] == CURVED["links"]["arc"]
+    bar = CURVED | {"links": CURVED["links"] | {"arc": {"ends": ["M", "C"], "length": 50}}}
+    here, there = (planar.solve(planar.from_dict(value)).point("C").position for value in (CURVED, bar))
+    np.testing.assert_array_equal(here, there)
+
+
+@pytest.mark.parametrize(
+    ("links", "pairs", "sentence"),
+    [
+        ({"arc": {"points": {"M": [0, 0], "C": [50, 0]}, "curved_slot": True}}, {}, "has two 'ends'"),
+        ({"arc": CURVED["links"]["arc"] | {"points": {"T": [5, 5]}}}, {}, "no other points"),
+        ({"arc": CURVED["links"]["arc"] | {"curved_slot": 1}}, {}, "true or false"),
+        ({"arc": CURVED["links"]["arc"] | {"ends": ["N", "C"]}}, {3: None}, "its first end 'N' is the centre"),
+        ({"other": {"ends": ["M", "T"], "length": 9}}, {3: {"turning": "M"}}, "and no other link"),
+        ({"arc": CURVED["links"]["arc"] | {"ends": ["M", "T"]}}, {2: None}, "its second end 'T' is the pin"),
+    ],
+)
+def test_a_link_that_cannot_stand_for_a_curved_slot_is_refused(links: Any, pairs: Any, sentence: str) -> None:
+    kept = [pair for index, item in enumerate(CURVED["pairs"]) if (pair := pairs.get(index, item))]
+    with pytest.raises(BadInput, match=sentence) as problem:
+        planar.from_dict(CURVED | {"links": CURVED["links"] | links, "pairs": kept})
+    assert problem.value.place == "$.links.arc.curved_slot"
+
+
+def test_a_link_made_in_python_that_cannot_stand_for_a_curved_slot_is_refused() -> None:
+    mechanism = planar.from_dict(CURVED)
+    links = tuple(replace(link, curved_slot=link.name == "f") for link in mechanism.links)
+    with pytest.raises(BadInput, match="f: a link that stands for a curved slot has two 'ends'"):
+        check_mechanism(replace(mechanism, links=links))

@@ -820,7 +820,7 @@ def test_points_of_a_link_that_nothing_uses_are_its_outline_without_letters():
     assert len(lines) == 2
 
 
-@pytest.mark.parametrize("count", [1, 2, 3])
+@pytest.mark.parametrize("count", [1, 3, 5])
 def test_few_points_that_nothing_uses_are_tracers_with_letters(count):
     points = dict(list(ring(9).items())[:count])
     mechanism = outlined(points)
@@ -830,25 +830,25 @@ def test_few_points_that_nothing_uses_are_tracers_with_letters(count):
 
 
 def test_a_point_that_a_load_a_mass_a_spring_or_a_published_value_uses_is_on_no_outline():
-    value = planar.to_dict(outlined(ring(9)))
+    value = planar.to_dict(outlined(ring(10)))
     value["loads"] = [{"point": "b0", "force": [0, -10]}]
     value["masses"] = [{"link": "BC", "mass": 2, "at": "b1"}]
     value["springs"] = [{"points": ["b2", "A"], "stiffness": "10 N/mm", "free_length": 10}]
     value["published"] = [{"symbol": "v", "quantity": "velocity", "of": "b3"}]
     mechanism = planar.from_dict(value)
     (outline,) = link_outlines(mechanism, parts_of(mechanism)).values()
-    assert outline.points == ("b4", "b5", "b6", "b7", "b8")
+    assert outline.points == ("b4", "b5", "b6", "b7", "b8", "b9")
 
 
 def test_an_outline_keeps_the_order_of_its_points_unless_they_cross():
-    corners = {"p": [20, 20], "q": [60, 20], "r": [60, 60], "s": [40, 30], "t": [20, 60]}  # s is a notch
+    corners = {"p": [20, 20], "q": [60, 20], "r": [60, 60], "s": [40, 30], "t": [20, 60], "u": [10, 40]}  # s is a notch
     mechanism = outlined(corners)
     (outline,) = link_outlines(mechanism, parts_of(mechanism)).values()
-    assert outline.corners == tuple("pqrst")
-    mechanism = outlined({name: corners[name] for name in "prqst"})  # these sides cross: the hull is taken
+    assert outline.corners == tuple("pqrstu")
+    mechanism = outlined({name: corners[name] for name in "prqstu"})  # these sides cross: the hull is taken
     (outline,) = link_outlines(mechanism, parts_of(mechanism)).values()
-    assert sorted(outline.corners) == ["p", "q", "r", "t"]
-    assert sorted(outline.points) == sorted("pqrst")
+    assert sorted(outline.corners) == ["p", "q", "r", "t", "u"]
+    assert sorted(outline.points) == sorted("pqrstu")
 
 
 def test_a_link_with_one_pin_and_a_mass_has_a_line_to_its_mass_centre():
@@ -866,3 +866,61 @@ def test_a_link_with_one_pin_and_a_mass_has_a_line_to_its_mass_centre():
 
 def parts_of(mechanism):
     return {link.name: link_shape(link) for link in mechanism.links}
+
+
+def curved(carrier, stops):
+    """A pin of a rocker in a curved slot of radius 50, of the frame or of a swinging plate."""
+    plate = {"points": {"E": [40, 110], "M": [100, 60]}}
+    return {
+        "frame": "f",
+        "links": {
+            "f": {"points": {"A": [0, 0], "E": [40, 110]} | ({"M": [100, 60]} if carrier == "f" else {})},
+            "crank": {"ends": ["A", "B"], "length": 30},
+            "rod": {"ends": ["B", "C"], "length": 80},
+            "arc": {"ends": ["M", "C"], "length": 50, "curved_slot": True},
+        }
+        | ({"plate": plate} if carrier == "plate" else {}),
+        "pairs": [
+            *({"turning": name} for name in "ABC"),
+            {"turning": "M", "links": [carrier, "arc"], "stops": stops},
+            *([{"turning": "E"}] if carrier == "plate" else []),
+        ],
+        "inputs": [{"pair": "A", "position": 40}, *([{"pair": "E", "position": 10}] if carrier == "plate" else [])],
+        "sketch": {"C": [100, 10]},
+    }
+
+
+@pytest.mark.parametrize("carrier", ["f", "plate"])
+@pytest.mark.parametrize("stops", [[-150, -20], None, [-150, None]])
+def test_a_link_that_stands_for_a_curved_slot_is_drawn_as_an_arc_about_its_centre(carrier, stops):
+    value = curved(carrier, stops)
+    if stops is None:
+        del value["pairs"][3]["stops"]
+    state = made(value)
+    frame, half = plain_frames(state.frames)[carrier], symbol_table.SLOT_SIZE[1] / 2.0
+    centre = 1000.0 * np.array(state.point("M").position)
+    picture = scheme(state, UNIT)
+    about = "guide M" if carrier == "f" else "link plate"
+    edges = [mark for mark in picture.marks if isinstance(mark, Polyline) and mark.about == about and mark.closed]
+    distances = np.concatenate([np.hypot(*(np.array(edge.points) - centre).T) for edge in edges])
+    assert distances.min() == pytest.approx(50.0 - half) and distances.max() == pytest.approx(50.0 + half)
+    full = stops is not None and None not in stops
+    assert len(edges) == (1 if full else 2)
+    if full:  # the middles of the round ends lie beyond the stops by half the width of the slot
+        turned = np.degrees(np.arctan2(*(np.array(edges[0].points) - centre).T[::-1]) - frame.angle)
+        turned = (turned + 265.0) % 360.0 - 265.0
+        beyond = np.degrees(half / 50.0)
+        assert turned.min() == pytest.approx(-150.0 - beyond, abs=0.1)
+        assert turned.max() == pytest.approx(-20.0 + beyond, abs=0.1)
+    blocks = [mark for mark in picture.marks if mark.about == "stop of M"]
+    assert len(blocks) == (stops == [-150, None])
+    spots = [mark.about for mark in picture.marks]
+    assert "pin C" in spots and not {"pin M", "ground M", "link arc", "point M"} & set(spots)
+    assert "number of arc" in spots
+
+
+def test_a_drawing_with_a_curved_slot_has_room_for_the_slot_and_not_for_its_centre():
+    value = curved("f", [-100, -80])
+    value["links"]["arc"]["length"], value["links"]["f"]["points"]["M"] = 5000, [100, 5010]
+    low, high = (np.array(corner) for corner in extent(scheme(made(value)).marks))
+    assert (high - low).max() < 1000.0

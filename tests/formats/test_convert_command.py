@@ -83,4 +83,4 @@ def test_python_gives_the_mechanism_and_what_is_left_out(folder):
     sim = folder / "slider.json"
     sim.write_text(json.dumps(LINKAGE_SIM))
     with pytest.raises(planar.NoAnswer, match="too few inputs"):
-        planar.solve(sim)
+        planar.cycle(sim)

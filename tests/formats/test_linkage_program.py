@@ -6,6 +6,7 @@ from math import asin, degrees, hypot, pi
 import pytest
 
 import planar
+from planar.model.mechanism import curved_slots
 from planar.reports.files.converted import written_text
 from planar.solving.rest_position import rest_position
 from tests.foreign_samples import linkage2
@@ -27,9 +28,60 @@ def test_a_pin_in_a_curved_slot_keeps_its_distance_from_the_centre(radius, centr
     ends = 'P 60 0 anchor="true"\nQ 140 0 anchor="true"'
     text = linkage2(f'{CRANK}\n{ends}\n{place} slider="true" slideradius="{radius / PIXEL}" ~P ~Q', "A B\nB C\nP Q")
     assert "curved slot of 'C'" in notes(text) and "stops where the slot ends" in notes(text)
+    assert read_document(text)["links"]["C_arc"] == {
+        "ends": ["C_centre", "C"],
+        "length": pytest.approx(size),
+        "curved_slot": True,
+    }
     motion = planar.cycle(read_text(text), steps=24)
     for x, y in 1000.0 * motion.point("C").position:
         assert hypot(x - centre[0], y - centre[1]) == pytest.approx(size)
+
+
+MOVING_SLOT = linkage2(
+    f"""A 0 0 anchor="true" input="true"\nB 20 22\nD 10 75 anchor="true"\nP 60 30\nQ 140 30\nE 40 110 anchor="true"
+    C 100 10 slider="true" slideradius="{50 / PIXEL}" ~P ~Q""",
+    "A B\nB C\nP Q E\nD C",
+)
+"""A pin of two links in a curved slot of a third that moves."""
+
+
+def slot_ends(mechanism):
+    """The positions of the link that stands for a slot at its two stops."""
+    (stops,), (slot,) = mechanism.stops, curved_slots(mechanism)
+    return stops.pair == slot.pair.name, slot.carrier, slot.angles(mechanism)
+
+
+def test_a_curved_slot_comes_back_from_both_files():
+    mechanism = read_text(MOVING_SLOT)
+    is_centre, carrier, angles = slot_ends(mechanism)
+    assert is_centre and carrier == "L2"
+    assert angles[1] - angles[0] == pytest.approx(2.0 * asin(40 / 50))
+    assert planar.from_dict(planar.to_dict(mechanism)).links == mechanism.links
+    conversion = written_text(mechanism, "linkage2")
+    assert "C_arc" not in " ".join(conversion.notes) and "slideradius" in conversion.text
+    back = read_text(conversion.text)
+    assert slot_ends(back)[:2] == (True, "L2")
+    assert slot_ends(back)[2] == pytest.approx(angles)
+    assert [link.length for link in back.links if link.curved_slot] == [pytest.approx(0.05)]
+    assert "the curved slot 'C_arc' is written as a link" in " ".join(written_text(mechanism, "pyslvs").notes)
+
+
+@pytest.mark.parametrize("stops", [None, [-40, None], [-100, 100]])
+def test_a_slot_that_linkage_cannot_say_is_written_as_a_link(stops):
+    value = read_document(MOVING_SLOT)
+    (centre,) = (pair for pair in value["pairs"] if pair.get("turning") == "C_centre")
+    del centre["stops"]
+    centre |= {"stops": stops} if stops else {}
+    conversion = written_text(planar.from_dict(value), "linkage2")
+    assert "the curved slot 'C_arc' is written as a link" in " ".join(conversion.notes)
+    assert "slideradius" not in conversion.text
+    assert "C_centre" in {pair["turning"] for pair in read_document(conversion.text)["pairs"]}
+
+
+def test_parts_refuse_a_curved_slot_by_name():
+    with pytest.raises(planar.BadInput, match="C_arc: it stands for a curved slot of 'L2'"):
+        planar.parts(read_text(MOVING_SLOT))
 
 
 def test_a_positive_rpm_turns_clockwise_and_a_swinging_input_starts_as_its_offset_says():

@@ -24,6 +24,24 @@ from tests.known import MODELS, some_models
 from tests.page_scripts import in_node, needs_node
 
 PER_MM = 1e-3
+CURVED_SLOT = planar.from_dict(
+    {
+        "planar": 1,
+        "units": {"length": "mm", "angle": "deg"},
+        "frame": "f",
+        "links": {
+            "f": {"points": {"A": [0, 0], "E": [40, 110]}},
+            "crank": {"ends": ["A", "B"], "length": 30},
+            "rod": {"ends": ["B", "C"], "length": 80},
+            "plate": {"points": {"E": [40, 110], "M": [100, 60]}},
+            "arc": {"ends": ["M", "C"], "length": 50, "curved_slot": True},
+        },
+        "pairs": [*({"turning": name} for name in "ABCE"), {"turning": "M", "stops": [-150, -20]}],
+        "inputs": [{"pair": "A", "position": 40}, {"pair": "E", "position": 10}],
+        "sketch": {"C": [100, 10]},
+    }
+)
+"""A crank and a rod whose pin slides in the curved slot of a swinging plate."""
 EVALUATED = """
 globalThis.document = { createElementNS: () => ({ setAttribute() {}, append() {} }) };
 const strokes = new Strokes(page.data.scheme);
@@ -51,12 +69,14 @@ def evaluated(carried, numbers, sizes, frames):
     return values(travel)
 
 
-@pytest.mark.parametrize("name", ["watt-1-six-bar", "oscillating-cylinder", "crank-and-slotted-lever", "jansen-leg"])
+@pytest.mark.parametrize(
+    "name", ["watt-1-six-bar", "oscillating-cylinder", "crank-and-slotted-lever", "jansen-leg", "curved"]
+)
 def test_strokes_on_a_page_are_those_of_a_drawing_for_other_dimensions_too(name):
-    mechanism = MODELS[name]
+    mechanism = MODELS.get(name, CURVED_SLOT)
     dimensions = DimensionNumbers(mechanism)
     carried, numbers = scheme_data(mechanism, dimensions, [plain_frames(planar.solve(mechanism).frames)])
-    first = dimensions.dimensions[0]
+    first = dimensions.dimensions[0 if name in MODELS else -1]  # the radius of the curved slot
     for by in (1.0, 1.01):
         other = change_dimension(mechanism, first, by * first.value)
         shapes, frames = shapes_of_links(other), plain_frames(planar.solve(other).frames)
@@ -79,6 +99,7 @@ def test_strokes_on_a_page_are_those_of_a_drawing_for_other_dimensions_too(name)
 def test_scripts_evaluate_strokes_as_python_does():
     names = [*some_models(3)[:12], "belt-arm", "planetary-gear-set", "rack-steering"]
     models = {name: MODELS[name] for name in names if all(pair.measures_symbols for pair in MODELS[name].pairs)}
+    models["curved"] = CURVED_SLOT
     table = symbol_script().replace("const ", "globalThis.")
     told = in_node(models, table + EVALUATED, "stage/plane.js", "stage/symbols.js", "stage/strokes.js")
     for name, mechanism in models.items():

@@ -19,7 +19,15 @@ from planar.drawing.scheme.link_strokes import body_marks
 from planar.drawing.scheme.scheme import scheme
 from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput
-from planar.model.mechanism import Drive, Mechanism, NamedPoint, named_points, relative_motions, replace_inputs
+from planar.model.mechanism import (
+    Drive,
+    Mechanism,
+    NamedPoint,
+    named_points,
+    relative_motions,
+    replace_inputs,
+    slot_centres,
+)
 from planar.model.pairs import MeasureKind
 from planar.model.wording import amount
 from planar.results.motion import Motion
@@ -163,7 +171,12 @@ def _moving_points(run: DrawnRun) -> list[NamedPoint]:
     spans = {name: np.ptp(run.motion.point(name).position, axis=0).max() for name in run.motion.point_names}
     least = 1e-9 * max(spans.values(), default=0.0)
     outlines = outline_point_names(run.motion.mechanism, run.motion.shapes)
-    moving = [point for point in named_points(run.motion.mechanism) if spans[point.name] > least]
+    centres = slot_centres(run.motion.mechanism)
+    moving = [
+        point
+        for point in named_points(run.motion.mechanism)
+        if spans[point.name] > least and centres.isdisjoint(point.members)
+    ]
     return [point for point in moving if point.name not in outlines] or moving
 
 
@@ -240,9 +253,9 @@ def _position_labels(run: DrawnRun, chosen: Sequence[str], rows: Sequence[int], 
             yield Label(
                 text, paper_point(spots[group[0]]), f"{name} {group[0]}", 9.0 if strong else 7.0, away, math=math
             )
-    frame = run.motion.mechanism.frame
+    frame, centres = run.motion.mechanism.frame, slot_centres(run.motion.mechanism)
     for point in named_points(run.motion.mechanism):
-        if any(link == frame for link, _ in point.members):
+        if any(link == frame for link, _ in point.members) and centres.isdisjoint(point.members):
             at = run.motion.point(point.name).position[0] / scale.per_mm
             yield Label(point.name, paper_point(at), f"point {point.name}", 9.0, 1.8)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from itertools import chain
-from math import ceil, pi
+from math import atan2, ceil, pi
 
 from planar.drawing.paper.picture import Mark, Outline, Pen
 from planar.drawing.paper.scales import Scale
@@ -13,6 +13,7 @@ from planar.drawing.scheme.clearance import Clearance
 from planar.drawing.scheme.link_bodies import LinkBody, distance_between
 from planar.drawing.scheme.link_strokes import (
     bar_strokes,
+    curved_slot_strokes,
     cylinder_strokes,
     rack_half_length,
     rack_side,
@@ -27,7 +28,16 @@ from planar.foundation.geometry import Frame, Vector, direction
 from planar.foundation.jets import Scalar
 from planar.model.link_shapes import LinkShape
 from planar.model.mechanism import Mechanism, named_points
-from planar.model.pairs.symbols import BeltMark, GuideMark, PinMark, PitchLineMark, SliderMark, SlotMark, WheelMark
+from planar.model.pairs.symbols import (
+    BeltMark,
+    CurvedSlotMark,
+    GuideMark,
+    PinMark,
+    PitchLineMark,
+    SliderMark,
+    SlotMark,
+    WheelMark,
+)
 
 FIXED_GUIDE_OVERHANG = symbol_table.BLOCK_SIZE[0] / 2.0 + 2.0
 """mm: how far a fixed guide goes on beyond the middle of a block at the end of its travel."""
@@ -91,6 +101,9 @@ def fixed_strokes(scene: Scene, clear: Clearance) -> list[PlacedStroke]:
     for mark in scene.marks:
         if isinstance(mark, GuideOfFrame) and mark.link == frame:
             add(_fixed_guide_strokes(scene, mark, clear, middle))
+    for slot in scene.curved_slots.values():
+        if slot.link == frame:
+            add(_fixed_curved_slot(scene, slot))
     drawn: set[str] = set()
     for pin in fixed_pins(scene):
         if pin.about not in drawn:
@@ -107,7 +120,7 @@ def fixed_point_strokes(scene: Scene) -> Iterator[PlacedSymbol]:
     pinned = {mark.name for mark in scene.marks if isinstance(mark, PinMark)}
     for each in named_points(scene.mechanism):
         point = dict(each.members).get(frame)
-        if point is not None and each.name not in pinned and not scene.is_on_outline(frame, point):
+        if point is not None and each.name not in pinned and not scene.is_unmarked(frame, point):
             yield PlacedSymbol(f"point {each.name}", frame, "fixed dot", scene.place(frame, point))
 
 
@@ -158,10 +171,28 @@ def _rim_hatching(scene: Scene, mark: WheelMark, about: str) -> Iterator[PlacedS
     arc = min(pi / 5.0, 12.0 / length)
     count = max(2, ceil(arc * length / symbol_table.HATCH_LENGTH))
     for middle in (pi / 2.0, pi * 7.0 / 6.0, pi * 11.0 / 6.0):
-        for k in range(count + 1):
-            out = direction(middle + arc * (k / count - 0.5))
-            way = symbols.quarter_turn(out) * -1.0
-            yield PlacedSymbol(about, mark.link, "hatch", mark.centre + out * rim, way, side=-1.0 if inside else 1.0)
+        outs = (direction(middle + arc * (k / count - 0.5)) for k in range(count + 1))
+        yield from _arc_hatching(about, mark.link, mark.centre, rim, outs, -1.0 if inside else 1.0)
+
+
+def _arc_hatching(
+    about: str, link: str, centre: Vector, rim: Scalar, outs: Iterable[Vector], side: float
+) -> Iterator[PlacedSymbol]:
+    """Hatching of a circle in directions from its centre, outside (`side` 1) or inside (-1) of it."""
+    for out in outs:
+        yield PlacedSymbol(about, link, "hatch", centre + out * rim, symbols.quarter_turn(out) * -1.0, side=side)
+
+
+def _fixed_curved_slot(scene: Scene, slot: CurvedSlotMark) -> Iterator[PlacedStroke]:
+    """A curved slot of the frame, hatched outside."""
+    about = f"guide {slot.name}"
+    yield from curved_slot_strokes(scene, slot, about, Pen.GROUND)
+    rim = slot.radius + symbol_table.SLOT_SIZE[1] / 2.0 * scene.per_mm
+    first, last = (atan2(float(out.y), float(out.x)) for out in (slot.directions[0], slot.directions[-1]))
+    sweep = 2.0 * pi if slot.closed else (last - first) % (2.0 * pi)
+    count = max(2, round(sweep * float(rim) / float(scene.per_mm) / symbol_table.HATCH_LENGTH))
+    outs = (direction(first + sweep * k / count) for k in range(count + (not slot.closed)))
+    yield from _arc_hatching(about, slot.link, slot.centre, rim, outs, 1.0)
 
 
 def _guide_extent(scene: Scene, name: str, through: Vector, way: Vector, half: Scalar) -> tuple[Scalar, Scalar]:

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from itertools import combinations
-from math import hypot
+from itertools import chain, combinations
+from math import ceil, hypot, pi
 from typing import NamedTuple
 
 from planar.drawing.scheme.springs_masses import Coil, MassCentreMark, Spiral, SpringMassMark, spring_mass_marks
-from planar.foundation.geometry import Vector
+from planar.foundation.geometry import Vector, direction
 from planar.model.link_shapes import LinkShape
-from planar.model.mechanism import Mechanism, named_points
+from planar.model.mechanism import CurvedSlot, Mechanism, curved_slots, named_points, slot_centres
 from planar.model.pairs.symbols import (
     CamMark,
+    CurvedSlotMark,
     DrawingMark,
     GuideMark,
     PinMark,
@@ -29,6 +30,9 @@ MIN_OUTLINE_POINTS = 6
 """The least number of points that make an outline, where nothing uses them; fewer are tracers, which are lettered."""
 MAX_ORDERED_CORNERS = 200
 """Of more points the outline is their convex hull: whether their order crosses itself takes too long to find."""
+
+ARC_STEP, MIN_ARC_STEPS = pi / 60.0, 8
+"""rad between corners of the line that is drawn for a curved slot, and the least number of its parts."""
 
 Segment = tuple[Vector, Vector]
 
@@ -67,8 +71,24 @@ class LinkOutline(NamedTuple):
 
 def all_marks(mechanism: Mechanism, shapes: Mapping[str, LinkShape]) -> tuple[DrawingMark | SpringMassMark, ...]:
     """What all pairs say of how they are drawn, and springs and masses."""
-    of_pairs = (mark for pair in mechanism.pairs for mark in pair.drawing_marks(shapes, mechanism.pairs))
-    return (*of_pairs, *spring_mass_marks(mechanism, shapes))
+    slots = {slot.pair.name: _curved_slot_mark(slot, mechanism, shapes) for slot in curved_slots(mechanism)}
+    marks = (
+        (slots[pair.name],) if pair.name in slots else pair.drawing_marks(shapes, mechanism.pairs)
+        for pair in mechanism.pairs
+    )
+    return (*chain.from_iterable(marks), *spring_mass_marks(mechanism, shapes))
+
+
+def _curved_slot_mark(slot: CurvedSlot, mechanism: Mechanism, shapes: Mapping[str, LinkShape]) -> CurvedSlotMark:
+    """How a curved slot is drawn in the link that has it."""
+    centre_points = slot.pair.coincident_points()
+    centre = shapes[slot.carrier].position(dict(centre_points)[slot.carrier])
+    angles = slot.angles(mechanism)
+    low, high = angles or (0.0, 2.0 * pi)
+    count = max(MIN_ARC_STEPS, ceil((high - low) / ARC_STEP))
+    directions = tuple(direction(low + (high - low) * k / count) for k in range(count + (angles is not None)))
+    radius = shapes[slot.link].position(slot.pin).x
+    return CurvedSlotMark(slot.pair.name, slot.carrier, centre, radius, directions, angles is None, centre_points)
 
 
 def link_bodies(mechanism: Mechanism, shapes: Mapping[str, LinkShape]) -> dict[str, LinkBody]:
@@ -80,13 +100,15 @@ def link_bodies(mechanism: Mechanism, shapes: Mapping[str, LinkShape]) -> dict[s
 def body_points(
     mechanism: Mechanism, places: Mapping[str, Mapping[str, Vector]], shapes: Mapping[str, LinkShape]
 ) -> dict[str, list[Vector]]:
-    """The places of the points of each moving link, those of its outline left out."""
+    """The places of the points of each moving link, but for those of its outline and centres of curved slots."""
     outlines = link_outlines(mechanism, shapes)
+    centres = slot_centres(mechanism)
     return {
         link.name: [
             place
             for point, place in places[link.name].items()
-            if link.name not in outlines or point not in outlines[link.name].points
+            if (link.name not in outlines or point not in outlines[link.name].points)
+            and (link.name, point) not in centres
         ]
         for link in mechanism.links
         if link.name != mechanism.frame

@@ -30,6 +30,7 @@ from planar.model.mechanism import Mechanism
 from planar.model.pairs.symbols import (
     BeltMark,
     CamMark,
+    CurvedSlotMark,
     GuideMark,
     OutlineMark,
     PinMark,
@@ -41,6 +42,8 @@ from planar.model.pairs.symbols import (
 
 ROLLER_POINTS = 48
 """Corners of the line that is drawn for the rim of a roller."""
+SLOT_END_STEPS = 8
+"""Parts of the line that is drawn for the round end of a curved slot."""
 
 
 # many: what a scene is made of, and how it is drawn
@@ -110,6 +113,10 @@ def bar_strokes(scene: Scene, pen: Pen = Pen.LINK) -> Iterator[PlacedLine]:
         if support is not None:
             yield PlacedLine(about, link, thin if body.sides else pen, support)
         yield from _guide_strokes(scene, link, body, pen)
+        for slot in scene.curved_slots.values():
+            if slot.link == link and (supports := [*body.joints, *(guide.foot for guide in body.guides)]):
+                nearest = min(product(supports, slot.places()), key=lambda ends: float(distance_between(*ends)))
+                yield PlacedLine(about, link, pen, nearest)
 
 
 def _outline_support(scene: Scene, body: LinkBody) -> tuple[Vector, Vector] | None:
@@ -267,8 +274,8 @@ def spring_strokes(scene: Scene) -> Iterator[PlacedSpring | PlacedTorsionSpring]
             yield PlacedTorsionSpring(mark.name, mark.links, symbol, mark.pin, mark.at, mark.ways, mark.free)
 
 
-def _slider_strokes(scene: Scene, pen: Pen) -> Iterator[PlacedSymbol]:
-    """Slots, blocks and centres of mass."""
+def _slider_strokes(scene: Scene, pen: Pen) -> Iterator[PlacedLine | PlacedSymbol]:
+    """Straight and curved slots, blocks and centres of mass."""
     frame = scene.mechanism.frame
     spare = 0.0 if scene.is_moving else (symbol_table.SLOT_SIZE[0] - symbol_table.SLOT_SIZE[1]) / 2.0 * scene.per_mm
     for mark in scene.marks:
@@ -277,6 +284,9 @@ def _slider_strokes(scene: Scene, pen: Pen) -> Iterator[PlacedSymbol]:
             low, high = scene.shown_range(mark.name, mark.link, at, way)
             start, stop = at + way * (low - spare), at + way * (high + spare)
             yield PlacedSymbol(f"link {mark.link}", mark.link, "slot opening", start, way, stop, pen=pen)
+    for curved in scene.curved_slots.values():
+        if curved.link != frame:
+            yield from curved_slot_strokes(scene, curved, f"link {curved.link}", pen)
     for mark in scene.marks:
         if isinstance(mark, SliderMark) and mark.name not in scene.cylinders:
             about = f"block {scene.running_point_name(mark.name)}"
@@ -284,6 +294,26 @@ def _slider_strokes(scene: Scene, pen: Pen) -> Iterator[PlacedSymbol]:
     for mark in scene.marks:
         if isinstance(mark, MassCentreMark):
             yield PlacedSymbol(mark.name, mark.link, "mass centre", mark.at, symbols.EAST if scene.is_moving else None)
+
+
+def curved_slot_strokes(scene: Scene, slot: CurvedSlotMark, about: str, pen: Pen) -> Iterator[PlacedLine]:
+    """The edge of a curved slot, as wide as a straight one: round ends where its pin stops, two circles without."""
+    half = symbol_table.SLOT_SIZE[1] / 2.0 * scene.per_mm
+    outside, inside = slot.places(half), slot.places(-least(half, slot.radius))
+    if slot.closed:
+        for edge in (outside, inside):
+            yield PlacedLine(about, slot.link, pen, edge, True)
+        return
+    first, last = slot.directions[0], slot.directions[-1]
+
+    def end(out: Vector, start: float) -> Iterator[Vector]:
+        middle, along = slot.centre + out * slot.radius, symbols.quarter_turn(out)
+        for k in range(1, SLOT_END_STEPS):
+            turn = direction(start + pi * k / SLOT_END_STEPS)
+            yield middle + (out * turn.x + along * turn.y) * half
+
+    edge = (*outside, *end(last, 0.0), *reversed(inside), *end(first, pi))
+    yield PlacedLine(about, slot.link, pen, edge, True, Fill.PAPER)
 
 
 def pin_strokes(scene: Scene) -> Iterator[PlacedSymbol]:

@@ -27,7 +27,7 @@ from planar.foundation.jets import Jet, Scalar
 from planar.model.link_shapes import LinkShape
 from planar.model.mechanism import Mechanism, named_points
 from planar.model.pairs import Pair
-from planar.model.pairs.symbols import DrawingMark, GuideMark, SliderMark
+from planar.model.pairs.symbols import CurvedSlotMark, DrawingMark, GuideMark, SliderMark
 
 TravelRanges = Mapping[str, tuple[float, float]]
 """From where to where the displacement of a slide goes (m), by its pair."""
@@ -128,9 +128,15 @@ class Scene:
         """The outlines of links made of points that nothing uses."""
         return link_outlines(self.mechanism, self.shapes)
 
-    def is_on_outline(self, link: str, point: str) -> bool:
-        """Whether a point belongs to its link's outline, and has no letter and no dot."""
-        return link in self.outlines and point in self.outlines[link].points
+    def is_unmarked(self, link: str, point: str) -> bool:
+        """Whether a point has no letter and no dot: one of an outline, or the centre of a curved slot."""
+        is_on_outline = link in self.outlines and point in self.outlines[link].points
+        return is_on_outline or any((link, point) in slot.centre_points for slot in self.curved_slots.values())
+
+    @cached_property
+    def curved_slots(self) -> Mapping[str, CurvedSlotMark]:
+        """The curved slots by the pairs at their centres."""
+        return {mark.name: mark for mark in self.marks if isinstance(mark, CurvedSlotMark)}
 
     def outline_corners(self, link: str) -> tuple[Vector, ...]:
         """The corners of a link's outline in its axes; none where it has no outline."""

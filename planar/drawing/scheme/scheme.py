@@ -29,7 +29,7 @@ from planar.foundation.jets import Scalar
 from planar.model.link_graph import link_numbers
 from planar.model.link_shapes import LinkShape
 from planar.model.mechanism import Mechanism, named_points
-from planar.model.pairs.symbols import CamMark, DrawingMark, OutlineMark, PinMark, SliderMark, WheelMark
+from planar.model.pairs.symbols import CamMark, CurvedSlotMark, DrawingMark, OutlineMark, PinMark, SliderMark, WheelMark
 from planar.results.motion import State
 from planar.solving.position import rest_remarks
 
@@ -109,10 +109,18 @@ class ExtentPlace(NamedTuple):
 def extent_places(
     points: Mapping[str, Mapping[str, Vector]],
     bodies: Mapping[str, LinkBody],
-    marks: Iterable[DrawingMark | SpringMassMark],
+    marks: Sequence[DrawingMark | SpringMassMark],
 ) -> list[ExtentPlace]:
-    """What of a mechanism has to be seen: all points, bodies, wheels and masses."""
-    places = [ExtentPlace(link, point) for link, own in points.items() for point in own.values()]
+    """What of a mechanism has to be seen: all points, bodies, curved slots, wheels and masses."""
+    slots = [mark for mark in marks if isinstance(mark, CurvedSlotMark)]
+    unseen = {member for slot in slots for member in slot.centre_points}
+    places = [
+        ExtentPlace(link, place)
+        for link, link_points in points.items()
+        for point, place in link_points.items()
+        if (link, point) not in unseen
+    ]
+    places += [ExtentPlace(slot.link, place) for slot in slots for place in slot.places()]
     for link, body in bodies.items():
         corners = [*(end for side in body.sides for end in side), *(guide.foot for guide in body.guides)]
         places += [ExtentPlace(link, corner) for corner in corners]
@@ -177,7 +185,7 @@ def point_names(scene: Scene) -> Iterator[NamedPlace]:
     pinned = {mark.name for mark in scene.marks if isinstance(mark, PinMark)}
     for each in named_points(scene.mechanism):
         link, point = each.members[0]
-        if scene.is_on_outline(link, point):
+        if scene.is_unmarked(link, point):
             continue
         away = symbol_table.PIN_RADIUS + 0.6 if each.name in pinned else 0.9
         if each.name in on_blocks:

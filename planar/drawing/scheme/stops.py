@@ -9,7 +9,8 @@ from planar.drawing.scheme.link_bodies import unit_vector
 from planar.drawing.scheme.placed_strokes import PlacedSymbol
 from planar.drawing.scheme.scene import Scene
 from planar.drawing.scheme.springs_masses import SpringMassMark
-from planar.foundation.geometry import Vector
+from planar.drawing.scheme.symbols import quarter_turn
+from planar.foundation.geometry import Vector, direction
 from planar.model.mechanism import Mechanism, relative_motions
 from planar.model.pairs import MeasureKind, Pair
 from planar.model.pairs.symbols import DrawingMark, GuideMark, SlotMark
@@ -22,6 +23,9 @@ def stop_strokes(scene: Scene) -> Iterator[PlacedSymbol]:
     guides = {mark.name: mark for mark in scene.marks if isinstance(mark, GuideMark | SlotMark)}
     for stops in scene.mechanism.stops:
         pair = motions[stops.pair]
+        if stops.pair in scene.curved_slots:
+            yield from _ring_stops(scene, stops, pair)
+            continue
         if stops.pair in guides:
             yield from _slide_stops(scene, stops, guides[stops.pair])
         elif pair.input_kind is MeasureKind.ANGLE and pair.coincident_points():
@@ -70,6 +74,16 @@ def _pin_stops(scene: Scene, stops: Stops, pair: Pair) -> Iterator[PlacedSymbol]
         yield PlacedSymbol(
             f"stop of {stops.pair}", base, "bar stop", scene.place(base, points[base]), turned, side=sense
         )
+
+
+def _ring_stops(scene: Scene, stops: Stops, pair: Pair) -> Iterator[PlacedSymbol]:
+    """A block in a curved slot that is a whole ring; the ends of any other slot are its stops."""
+    slot = scene.curved_slots[stops.pair]
+    turn = 1.0 if pair.effort_action(scene.frames, scene.shapes).reaction_link == slot.link else -1.0
+    for position, sense in _ends(stops) if slot.closed else ():
+        out = direction(turn * position)
+        along = quarter_turn(out) * (turn * sense)
+        yield PlacedSymbol(f"stop of {stops.pair}", slot.link, "pin stop", slot.centre + out * slot.radius, along)
 
 
 def _bar_direction(scene: Scene, link: str, pin: str) -> Vector:

@@ -90,6 +90,9 @@ class _Writer:
         return ReadDocument(value, linkage.notes)
 
     def _link(self, link: str) -> dict[str, Any]:
+        if link in self.linkage.curved_slots and link in self.axes and len(self.points[link]) == 2:
+            (x, y), (u, v) = self.points[link].values()
+            return {"ends": list(self.points[link]), "length": hypot(u - x, v - y), "curved_slot": True}
         result: dict[str, Any] = {"points": {name: list(at) for name, at in self.points[link].items()}}
         return result | ({"axis": list(self.axes[link])} if link in self.axes else {})
 

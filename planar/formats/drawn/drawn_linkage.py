@@ -168,6 +168,8 @@ class DrawnLinkage:
     length: str = "mm"
     links: tuple[str, ...] = ()
     """In the order in which they are to stand; those that no joint holds are left out."""
+    curved_slots: tuple[str, ...] = ()
+    """Links that stand for curved slots: their first pin is the centre, their second the pin in the slot."""
     notes: tuple[str, ...] = field(default=())
 
     def with_notes(self, *notes: str) -> DrawnLinkage:
@@ -238,6 +240,12 @@ def lost_stop_notes(linkage: DrawnLinkage, written: Container[DrawnStop] = ()) -
         elif stop.restitution:
             notes.append(f"{phrase} lose their restitution of {stop.restitution:g}: the format has none")
     return notes
+
+
+def curved_slot_notes(linkage: DrawnLinkage, written: Container[str] = ()) -> list[str]:
+    """The notes of the curved slots that a format does not say."""
+    lost = [link for link in linkage.curved_slots if link not in written]
+    return [f"the curved slot {link!r} is written as a link from its centre to its pin" for link in lost]
 
 
 def unit_note(length: str) -> str:

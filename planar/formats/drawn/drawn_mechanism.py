@@ -25,7 +25,7 @@ from planar.formats.drawn.file_format import cannot_say
 from planar.foundation.geometry import Frame, Vector
 from planar.foundation.units import parse_unit
 from planar.model.link_shapes import LinkShape
-from planar.model.mechanism import Mechanism, named_points, pair_entries, relative_motions
+from planar.model.mechanism import Mechanism, curved_slots, named_points, pair_entries, relative_motions
 from planar.model.pairs.base import MeasureKind, Pair
 from planar.model.pairs.belt import BeltPair, ChainPair
 from planar.model.pairs.gear import GearPair
@@ -84,6 +84,7 @@ class _Drawing:
             mechanism.gravity,
             self.length,
             tuple(link.name for link in mechanism.links),
+            tuple(slot.link for slot in curved_slots(mechanism)),
             tuple(self._notes(joints)),
         )
 

@@ -34,6 +34,8 @@ class WrittenText(NamedTuple):
     notes: tuple[str, ...]
     says_stops: bool = False
     """Whether the text says stops, so that its notes name those that it does not say."""
+    says_curved_slots: bool = False
+    """The same of curved slots."""
 
 
 class FileFormat(NamedTuple):

@@ -64,6 +64,7 @@ def merge_links(linkage: DrawnLinkage, groups: Iterable[Sequence[str]]) -> Drawn
         masses=tuple(item._replace(link=names.get(item.link, item.link)) for item in linkage.masses),
         forces=tuple(item._replace(link=names.get(item.link, item.link)) for item in linkage.forces),
         links=tuple(dict.fromkeys(names.get(link, link) for link in linkage.links)),
+        curved_slots=tuple(link for link in linkage.curved_slots if link not in (*names, *names.values())),
     )
 
 

@@ -67,6 +67,7 @@ class _Reader:
         self.inputs: list[DrawnInput] = []
         self.stops: list[DrawnStop] = []
         self.tracers: list[Tracer] = []
+        self.curved_slots: list[str] = []
         self.welds: list[tuple[str, ...]] = []
         self.connectors = {self._id(item): item for item in root.iter() if item in [*root] and item.tag == "connector"}
         elements = [item for item in root if item.tag in ("Link", "element") and self._moves(item, "a link")]
@@ -99,6 +100,7 @@ class _Reader:
             stops=tuple(self.stops),
             length="mm",
             links=(FRAME, *self.links),
+            curved_slots=tuple(self.curved_slots),
             notes=tuple(dict.fromkeys(self.notes)),
         )
         return linkage, self.welds
@@ -247,6 +249,7 @@ class _Reader:
         name, at = self.names[key], self.places[key]
         arc, pin = self.book.fresh(f"{name}_arc"), self.book.fresh(f"{name}_centre")
         self.links[arc] = []
+        self.curved_slots.append(arc)
         self.joints.append(PinJoint(pin, (guide, arc), centre))
         self.joints.append(PinJoint(name, (*riders, arc), at))
         radius = hypot(at[0] - centre[0], at[1] - centre[1])

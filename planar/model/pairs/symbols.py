@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from planar.foundation.geometry import Vector
+from planar.foundation.jets import Scalar
 
 
 class PinMark(NamedTuple):
@@ -100,4 +101,35 @@ class OutlineMark(NamedTuple):
     closed: bool
 
 
-DrawingMark = PinMark | GuideMark | SliderMark | SlotMark | WheelMark | PitchLineMark | BeltMark | CamMark | OutlineMark
+class CurvedSlotMark(NamedTuple):
+    """A curved slot of a link, in place of the pin at its centre.
+
+    `directions` are unit vectors from the centre along the slot, anticlockwise; `closed` says that it is a ring.
+    `centre_points` are the points (link, point) at the centre, which are not drawn.
+    """
+
+    name: str
+    link: str
+    centre: Vector
+    radius: Scalar
+    directions: tuple[Vector, ...]
+    closed: bool
+    centre_points: tuple[tuple[str, str], ...]
+
+    def places(self, offset: Scalar = 0.0) -> tuple[Vector, ...]:
+        """Places along the slot in the link's axes, `offset` (m) outside its middle line."""
+        return tuple(self.centre + out * (self.radius + offset) for out in self.directions)
+
+
+DrawingMark = (
+    PinMark
+    | GuideMark
+    | SliderMark
+    | SlotMark
+    | CurvedSlotMark
+    | WheelMark
+    | PitchLineMark
+    | BeltMark
+    | CamMark
+    | OutlineMark
+)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from planar.document.files import OWN_FORMAT, as_mechanism, dumps, read_source
-from planar.formats.drawn.drawn_linkage import DrawnLinkage, lost_stop_notes
+from planar.formats.drawn.drawn_linkage import DrawnLinkage, curved_slot_notes, lost_stop_notes
 from planar.formats.drawn.file_format import WrittenText
 from planar.formats.known_formats import file_formats, format_by_ending, named_format, writable_endings
 from planar.foundation.errors import unknown_format_error
@@ -94,13 +94,14 @@ def written_text(mechanism: Mechanism, name: str) -> WrittenText:
         raise unknown_format_error("", f"a mechanism ({kind.title} is only read)", [*writable])
     drawn = drawn_mechanism(mechanism, rest_position(mechanism).frames, kind.title)
     result = kind.write(drawn)
-    notes = (*drawn.notes, *_omissions(drawn, name, result.says_stops), *result.notes)
+    notes = (*drawn.notes, *_omissions(drawn, name, result), *result.notes)
     return result._replace(notes=tuple(dict.fromkeys(notes)))
 
 
-def _omissions(drawn: DrawnLinkage, name: str, says_stops: bool) -> list[str]:
-    """What the text does not say of stops, masses, forces and gravity, as notes."""
-    notes = [] if says_stops else lost_stop_notes(drawn)
+def _omissions(drawn: DrawnLinkage, name: str, text: WrittenText) -> list[str]:
+    """What the text does not say of stops, curved slots, masses, forces and gravity, as notes."""
+    notes = [] if text.says_stops else lost_stop_notes(drawn)
+    notes += [] if text.says_curved_slots else curved_slot_notes(drawn)
     if drawn.masses and name != "linkage_sim":
         notes.append("masses are left out: the format has none, or no unit for them")
     if drawn.forces:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from math import cos, degrees, hypot, pi, radians, sin
+from collections.abc import Iterator
+from math import atan2, cos, degrees, hypot, pi, radians, sin
 from typing import NamedTuple
 from xml.sax.saxutils import quoteattr
 
@@ -16,6 +17,7 @@ from planar.formats.drawn.drawn_linkage import (
     SlideJoint,
     SlotJoint,
     WheelJoint,
+    curved_slot_notes,
     joined_links,
     joint_phrase,
     lost_stop_notes,
@@ -41,6 +43,16 @@ class Cylinder(NamedTuple):
     rod: str
     mount: PinJoint
     end: PinJoint
+
+
+class CurvedSlot(NamedTuple):
+    """A curved slot of at most a half circle: its link, its carrier, its radius, its ends anticlockwise, its stop."""
+
+    link: str
+    carrier: str
+    radius: float
+    ends: tuple[Place, Place]
+    stop: DrawnStop
 
 
 def write(linkage: DrawnLinkage) -> WrittenText:
@@ -69,8 +81,14 @@ class _Writer:
         linkage = self.linkage
         inputs = {item.joint: item for item in linkage.inputs}
         cylinders: list[tuple[SlideJoint, Cylinder]] = []
+        slots = dict(self._curved_slots())
+        centres = {slot.stop.joint for slot in slots.values()}
         for joint in linkage.joints:
-            if isinstance(joint, PinJoint):
+            if isinstance(joint, PinJoint) and joint.name in slots:
+                self._write_curved_slot(joint, slots[joint.name])
+            elif joint.name in centres:
+                continue
+            elif isinstance(joint, PinJoint):
                 self._pin(joint, [item for item in linkage.inputs if item.joint == joint.name])
             elif isinstance(joint, SlideJoint | SlotJoint):
                 cylinder = self._cylinder(joint) if joint.name in inputs else None
@@ -99,8 +117,9 @@ class _Writer:
             lines += [f'\t\t<connector id="{number}"/>' for number in numbers] + ["\t</Link>"]
         lines += ["\t<ratios>", *ratios, "\t</ratios>"] if ratios else []
         lines.append("</linkage2>")
-        notes = (*linkage.notes, *lost_stop_notes(linkage, self.written_stops), *self.notes)
-        return WrittenText("\n".join(lines) + "\n", notes, says_stops=True)
+        lost_slots = curved_slot_notes(linkage, [slot.link for slot in slots.values()])
+        notes = (*linkage.notes, *lost_stop_notes(linkage, self.written_stops), *lost_slots, *self.notes)
+        return WrittenText("\n".join(lines) + "\n", notes, says_stops=True, says_curved_slots=True)
 
     def _connector(self, name: str, at: Place, links: list[str], more: str = "", inside: tuple[int, ...] = ()) -> int:
         number = len(self.connectors)
@@ -133,6 +152,36 @@ class _Writer:
             self._connector(joint.name, joint.at, rest, anchor)
         elif set(rest) - {frame}:
             self._connector(f"{joint.name}_fixed", joint.at, rest, anchor)
+
+    def _curved_slots(self) -> Iterator[tuple[str, CurvedSlot]]:
+        """The curved slots that the format says, by the pins in them: between two stops, of at most a half circle."""
+        pins = [joint for joint in self.linkage.joints if isinstance(joint, PinJoint)]
+        driven = {item.joint for item in self.linkage.inputs}
+        in_slots: set[str] = set()
+        for link in self.linkage.curved_slots:
+            centre, pin = (joint for joint in pins if link in joint.links)
+            stop = next((item for item in self.linkage.stops if item.joint == centre.name), None)
+            if stop is None or stop.low is None or stop.high is None or {centre.name, pin.name} & (driven | in_slots):
+                continue
+            (x, y), (u, v) = centre.at, pin.at
+            drawn, radius = atan2(v - y, u - x), hypot(u - x, v - y)
+            low, high = (stop.low, stop.high) if stop.links[1] == link else (-stop.high, -stop.low)
+            if not 0.0 < high - low <= pi * (1.0 + ON_LINE):
+                continue
+            first, last = ((x + radius * cos(drawn + turn), y + radius * sin(drawn + turn)) for turn in (low, high))
+            carrier = next(name for name in centre.links if name != link)
+            in_slots.add(pin.name)
+            yield pin.name, CurvedSlot(link, carrier, radius, (first, last), stop)
+
+    def _write_curved_slot(self, joint: PinJoint, slot: CurvedSlot) -> None:
+        """A connector in the curved slot between two connectors of its carrier."""
+        frame = self.linkage.frame
+        anchor = 'anchor="true"' if slot.carrier == frame else ""
+        limits = tuple(self._connector(f"{joint.name}_end", at, [slot.carrier], anchor) for at in slot.ends)
+        more = f'slider="true" slideradius="{slot.radius * self.scale!r}"'
+        riders = [link for link in joint.links if link != slot.link]
+        self._connector(joint.name, joint.at, riders, more + (' anchor="true"' if frame in riders else ""), limits)
+        self.written_stops.append(slot.stop)
 
     def _swing(self, drive: DrawnInput, link: str) -> str:
         """The attributes of an input that turns its link to and fro between two stops; none where it has none."""
