@@ -104,7 +104,7 @@ def conflict(mechanism: Mechanism, drives: Mapping[str, float] | Sequence[Drive]
     True
     """
     if isinstance(drives, Mapping):
-        drives = [Drive(pair, position) for pair, position in drives.items()]
+        drives = [Drive(pair)._replace(position=position) for pair, position in drives.items()]
     mechanism = replace_inputs(mechanism, tuple(drives))
     if modes(mechanism, certify=False):
         return None

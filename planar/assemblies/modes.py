@@ -52,7 +52,7 @@ def modes(mechanism: Mechanism, drives: Mapping[str, float] | Sequence[Drive] = 
     2
     """
     if isinstance(drives, Mapping):
-        drives = [Drive(pair, position) for pair, position in drives.items()]
+        drives = [Drive(pair)._replace(position=position) for pair, position in drives.items()]
     solver = solved_mechanism(mechanism).solver
     if any(stage.is_free for stage in solver.equations.blocks):
         raise refusals.free_links(solver)
@@ -256,7 +256,7 @@ class Modes(Displayable, Sequence["Mode"]):
         try:
             self._solver.state(self._solver.find_assembly().z)
         except NoAnswer as problem:
-            return problem
+            return solved_mechanism(self._solver.mechanism).structure_refusal(problem) or problem
         return NoAnswer(Outcome.CANNOT_BE_ASSEMBLED, f"{self._solver.describe_position()} no assembly was found")
 
     @cached_property

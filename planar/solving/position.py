@@ -58,7 +58,7 @@ def solve(mechanism: Mechanism, drives: Mapping[str, float] | Sequence[Drive] = 
     <State of 'Four-bar chain' at A = 60 deg>
     """
     if isinstance(drives, Mapping):
-        drives = [Drive(pair, position) for pair, position in drives.items()]
+        drives = [Drive(pair)._replace(position=position) for pair, position in drives.items()]
     known = solved_mechanism(mechanism)
     if not mechanism.inputs:
         known = solved_mechanism(known.completed_mechanism)

@@ -325,7 +325,7 @@ RARE_UNITS = {
 def rare_keys():
     """Files with the keys that no example and no model has."""
     four_bar = document.base()
-    yield four_bar | {"units": four_bar["units"] | RARE_UNITS, "tolerances": {"lengths": "0.1 mm"}}
+    yield four_bar | {"units": four_bar["units"] | RARE_UNITS, "tolerances": {"lengths": ["-0.1 mm", "0.1 mm"]}}
     for piece in schema()["$defs"]["lift"]["oneOf"]:
         motion = {"motion": piece["properties"]["motion"]["const"]}
         law = [{**motion, "by": 20, "in": 120}, {**motion, "by": -20, "in": 120}, {"motion": "dwell", "in": 120}]

@@ -244,7 +244,9 @@ def _loop_names(chain: KinematicScheme, mechanism: Mechanism) -> Iterator[str]:
 
 
 def _parallelogram_name(loop: KinematicLoop, mechanism: Mechanism) -> str:
-    """Which of the two ways of a four-bar of equal opposite links it is, from its position."""
+    """Which of the two ways of a four-bar of equal opposite links it is, from its position where the file gives one."""
+    if not (mechanism.inputs or mechanism.sketch):
+        return EITHER_PARALLELOGRAM
     from planar.solving.position import solve  # casadi is slow to load, and only needed here
 
     try:
