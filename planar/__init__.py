@@ -140,7 +140,7 @@ if TYPE_CHECKING:
     from planar.synthesis.task.task_schema import task_schema
     from planar.synthesis.task.task_writer import write_task
 
-__version__ = "0.17.0"
+__version__ = "0.18.0"
 
 __all__ = [
     "Advantage",
