@@ -479,9 +479,17 @@ def solved_mechanism(mechanism: Mechanism) -> SolvedMechanism:
 
 
 def state_at_unit_rate(state: State) -> State:
-    """The same position at the unit rate of the first input where no input has a rate, else the state itself."""
+    """The same position at the unit rate of the first input where no input has a rate, else the state itself.
+
+    Raises NoAnswer where nothing can move.
+    """
     moving = with_unit_rate(state.mechanism)
-    return state if moving is state.mechanism else PositionSolver(moving).state_with_rates(state)
+    if moving is state.mechanism:
+        return state
+    try:
+        return PositionSolver(moving).state_with_rates(state)
+    except NoAnswer as problem:
+        raise solved_mechanism(moving).structure_refusal(problem) or problem from None
 
 
 def rest_remarks(mechanism: Mechanism) -> tuple[str, ...]:

@@ -10,6 +10,7 @@ import pytest
 
 import planar
 from planar.foundation.errors import BadInput, NoAnswer, Outcome
+from planar.pages.data.page_data import page_data
 from planar.pages.editor.answer import edit_answer
 from tests import command
 
@@ -89,6 +90,8 @@ COMMANDS = {
     "tolerance": ("plot", "M", "sensitivity", "-o", "out.svg"),
     "forces": ("forces", "M", "--cycle", "--steps", "4"),
     "force map": ("plot", "M", "force-map", "-o", "out.svg"),
+    "explain": ("explain", "M"),
+    "polygon": ("plot", "M", "velocity", "-o", "out.svg"),
 }
 """Every command that needs a position or a motion, as words of a command line about the model M."""
 
@@ -140,13 +143,14 @@ WAYS: dict[str, tuple[dict[str, Any], Outcome, str, dict[str, str]]] = {
         structure(
             "links 'a' and 'b'", " as drawn; remove link 'a' with its pairs 'O' and 'A' to let it move, and give"
         ),
-        STILL | {"simulate": DONE},
+        STILL | {"simulate": DONE, "explain": DONE, "polygon": DONE},
     ),
     "no input": (
         four_bar(),
         Outcome.TOO_FEW_INPUTS,
         NO_INPUT,
-        {"inspect": "it has 0 driving links", "solve": DONE, "scheme": DONE, "simulate": DONE},
+        {"inspect": "it has 0 driving links"}
+        | dict.fromkeys(("solve", "scheme", "simulate", "explain", "polygon"), DONE),
     ),
     "too few inputs": (
         document(FIVE, "OABDC", {"A": [0, 2], "B": [2, 4], "D": [4, 2]}, O=1.5),
@@ -291,6 +295,10 @@ def test_pages_are_drawn_and_say_that_nothing_moves(way, tmp_path):
     text = planar.view(planar.from_dict(value), tmp_path / "page.html").read_text(encoding="utf-8")
     assert sentence.replace("'", "&#x27;") in text
     assert '<svg id="drawing"' in text
+    if value["inputs"]:
+        data, _ = page_data(planar.from_dict(value))
+        assert data["fixed"]
+        assert data["unit_rates"] is None
     assert sentence in edit_answer(value)["problem"]
 
 

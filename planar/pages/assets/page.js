@@ -44,8 +44,9 @@ class Page {
     return told[this.state.why] ?? "";
   }
 
-  /** Velocity and acceleration of every input, SI: as written, or the unit rate of the input that runs. */
+  /** Velocity and acceleration of every input, SI: as written, or the unit rate of the input that runs; 0 where nothing moves. */
   inputRates() {
+    if (this.data.fixed) return this.given.map(() => [0, 0]);
     const { unitRate } = this;
     return unitRate === null ? this.given : this.given.map((_, k) => [k === this.running ? unitRate.velocity : 0, 0]);
   }

@@ -185,11 +185,12 @@ def _starting_input(mechanism: Mechanism) -> int:
 
 
 def _unit_rates(mechanism: Mechanism) -> list[dict[str, Any]] | None:
-    """The unit rate (SI) of every input with the sentence on it; None where inputs move by laws.
+    """The unit rate (SI) of every input with the sentence on it; None where inputs move by laws, or nothing moves.
 
     A page uses that of the input that runs while all rates of the inputs are zero.
     """
-    if any(driven.law is not None for driven in mechanism.inputs):
+    has_laws = any(driven.law is not None for driven in mechanism.inputs)
+    if has_laws or solved_mechanism(mechanism).motion_refusal() is not None:
         return None
     return [
         {"velocity": unit_input_rate(mechanism, driven.pair), "note": sentence(unit_rate_note(mechanism, driven.pair))}
