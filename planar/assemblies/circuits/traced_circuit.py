@@ -24,7 +24,7 @@ class Branch(NamedTuple):
     """A part of a circuit on which the input goes one way.
 
     `number`: within its circuit, from 1; `low`, `high`: where the input turns back (rad or m), of an angle with the
-    whole turns with which `Circuits` writes intervals, 0 and 2 pi turns where it goes all round; `turns`: turns of the
+    whole turns with which `Circuits` writes intervals, 0 and 2 pi turns where it rotates fully; `turns`: turns of the
     input after which the linkage is back, 0 where the branch has ends; `ends`: what stands at low and at high, "dead
     point", "stop of D", "without end" or "lost".
     """
