@@ -45,7 +45,7 @@ class Cylinder(NamedTuple):
     end: PinJoint
 
 
-class CurvedSlot(NamedTuple):
+class WrittenArcSlot(NamedTuple):
     """A curved slot of at most a half circle: its link, its carrier, its radius, its ends anticlockwise, its stop."""
 
     link: str
@@ -153,7 +153,7 @@ class _Writer:
         elif set(rest) - {frame}:
             self._connector(f"{joint.name}_fixed", joint.at, rest, anchor)
 
-    def _curved_slots(self) -> Iterator[tuple[str, CurvedSlot]]:
+    def _curved_slots(self) -> Iterator[tuple[str, WrittenArcSlot]]:
         """The curved slots that the format says, by the pins in them: between two stops, of at most a half circle."""
         pins = [joint for joint in self.linkage.joints if isinstance(joint, PinJoint)]
         driven = {item.joint for item in self.linkage.inputs}
@@ -171,9 +171,9 @@ class _Writer:
             first, last = ((x + radius * cos(drawn + turn), y + radius * sin(drawn + turn)) for turn in (low, high))
             carrier = next(name for name in centre.links if name != link)
             in_slots.add(pin.name)
-            yield pin.name, CurvedSlot(link, carrier, radius, (first, last), stop)
+            yield pin.name, WrittenArcSlot(link, carrier, radius, (first, last), stop)
 
-    def _write_curved_slot(self, joint: PinJoint, slot: CurvedSlot) -> None:
+    def _write_curved_slot(self, joint: PinJoint, slot: WrittenArcSlot) -> None:
         """A connector in the curved slot between two connectors of its carrier."""
         frame = self.linkage.frame
         anchor = 'anchor="true"' if slot.carrier == frame else ""
