@@ -18,6 +18,7 @@ from planar import __version__
 from planar.cli.exit_status import NO_ANSWER, CommandGroup
 from planar.cli.streams import print_json
 from planar.foundation.errors import BadInput, Outcome
+from planar.foundation.safe_files import is_existing
 
 if TYPE_CHECKING:
     from planar.model.mechanism import Drive, Mechanism
@@ -230,8 +231,8 @@ def refuse_overwriting(model: str, output: Path | None, what: str = "the mechani
     """Refuse to write over a file that is read."""
     from planar.document import LINK_PREFIX
 
-    is_file = not model.startswith(LINK_PREFIX) and Path(model).exists()
-    if output is not None and is_file and output.exists() and output.samefile(model):
+    is_file = not model.startswith(LINK_PREFIX) and is_existing(model)
+    if output is not None and is_file and is_existing(output) and output.samefile(model):
         raise BadInput("-o", f"this is {what}, which would be lost; name another")
 
 

@@ -14,6 +14,7 @@ from typing import Any, BinaryIO
 
 from planar.document import LINK_PREFIX, read_mechanism
 from planar.foundation.errors import BadInput
+from planar.foundation.safe_files import is_existing
 from planar.model.mechanism import Mechanism
 
 OWN_FORMAT = "planar"
@@ -100,7 +101,7 @@ def read_source(
         from planar.document.texts.mechanism_link import read_link
 
         return loads(read_link(place), "link"), None, ()
-    elif WEB_ADDRESS.match(place) and not Path(place).is_file():
+    elif WEB_ADDRESS.match(place) and not is_existing(place):
         content = place.encode()  # the mechanism is in the address, which is not opened
         place = f"link {place}" if len(place) <= 60 else f"link {place[:57]}..."
     else:

@@ -43,6 +43,14 @@ def save_file(path: Path, content: str | bytes) -> None:
         raise write_error(str(path), "the file", problem) from None
 
 
+def is_existing(path: str | Path) -> bool:
+    """Whether there is something at a path; of what can be no path, as a name that is too long, there is nothing."""
+    try:
+        return Path(path).exists()
+    except OSError:
+        return False
+
+
 def make_folder(path: Path) -> None:
     """Make sure that a folder is there. Raises BadInput where there can be none."""
     try:

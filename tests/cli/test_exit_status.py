@@ -151,3 +151,24 @@ def test_choices_are_listed_on_one_line():
     assert status == 2
     assert "\\" not in said
     assert "scheme, velocity, acceleration" in said
+
+
+LONG_NAME = "x" * 5000
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["solve", LONG_NAME],
+        ["solve", f"https://{LONG_NAME}"],
+        ["convert", f"mech={LONG_NAME}"],
+        ["convert", "four-bar", "-o", f"{LONG_NAME}.json"],
+        ["chains", "4", "-o", f"{LONG_NAME}.png"],
+    ],
+    ids=lambda words: " ".join(words)[:20],
+)
+def test_a_name_that_no_file_can_have_is_one_sentence(words):
+    status, said = ended(*words, stdout=io.StringIO())
+    assert status in (2, 3)
+    assert said.startswith("planar: ")
+    assert len(said.splitlines()) == 1

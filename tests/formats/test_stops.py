@@ -106,6 +106,22 @@ def test_the_stroke_of_a_cylinder_of_pmksplus_follows_from_its_barrel_and_the_sc
     assert read_text(beyond).stops == () and "beyond it; it has no stops here" in notes(beyond)
 
 
+def test_a_cylinder_that_was_read_of_pmksplus_is_written_as_one_again():
+    first = read_text(pmksplus_cylinder(1.0, 4.0, 2.0, 5.0))
+    written = written_text(first, "pmksplus")
+    assert not [note for note in written.notes if "left out" in note]
+    (stop,), (again,) = first.stops, read_text(written.text).stops
+    assert (again.low, again.high) == (pytest.approx(stop.low, abs=2e-5), pytest.approx(stop.high, abs=2e-5))
+
+
+def test_a_point_on_the_bar_of_a_cylinder_that_pmksplus_cannot_have_is_a_note():
+    with_point = boom()
+    with_point["links"]["tube"]["points"]["M"] = [70, 0]
+    written = written_text(planar.from_dict(with_point), "pmksplus")
+    assert "the point 'M' of 'tube' is left out" in " ".join(written.notes)
+    assert len(read_text(written.text).stops) == 1
+
+
 def test_stops_that_a_format_has_not_are_named_with_their_values():
     mechanism = planar.from_dict(boom())
     for name in ("pmks", "pyslvs"):

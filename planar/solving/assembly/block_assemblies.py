@@ -91,10 +91,14 @@ class BlockAssemblies:
         The second is all unknowns at the end of the best start, whether it closes the block or not.
         """
         both = self._closed_form(stage, z)
-        if both is not None:
+        if both:
             return both, both[0].z
         closing = self.residual_function(stage, z, self.p)
         near, shown = self._starts_near_sketch(stage, z)
+        if both is not None:
+            # nothing closes the block: one start shows where it is nearest to that
+            ended = damped_newton(closing, self._with_lengths(stage, closing, near[:1]))
+            return [], self._best_end(stage, z, ended)
         tolerance = self._tolerance(stage)
         ended = damped_newton(closing, self._with_lengths(stage, closing, near), tolerance)
         found = self._from_converged(stage, z, closing, ended.unknowns[ended.converged])
@@ -116,9 +120,13 @@ class BlockAssemblies:
                 if not sketched and np.any(more.converged):
                     break
             found = self._from_converged(stage, z, closing, ended.unknowns[ended.converged])
+        return found, self._best_end(stage, z, ended)
+
+    @staticmethod
+    def _best_end(stage: Block, z: Array, ended: NewtonResult) -> Array:
         nearest = z.copy()
         nearest[stage.unknowns] = ended.unknowns[int(np.argmin(ended.residual))]
-        return found, nearest
+        return nearest
 
     def _tolerance(self, stage: Block) -> float:
         """What closes a block."""
@@ -126,11 +134,13 @@ class BlockAssemblies:
         return max(CLOSED_TOLERANCE, self.misfit if surplus else 0.0)
 
     def _closed_form(self, stage: Block, z: Array) -> list[BlockAssembly] | None:
-        """The two assemblies of a block in closed form; None where it has none, or where they all but meet."""
+        """The two assemblies of a block in closed form, none where it is out of reach; None where the form fails."""
         function = None if self.counts_turns else self.functions.block_assemblies(stage)
         if function is None:
             return None
         found, left, bend = function(z, self.u, self.p)
+        if bend > 2.0 - MEETING_COSINE_SQUARED:
+            return []
         # what is not a number is not below anything
         if not (bend < MEETING_COSINE_SQUARED and left <= CLOSED_TOLERANCE):
             return None

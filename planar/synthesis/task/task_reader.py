@@ -15,6 +15,7 @@ from planar.document.reader import read_mechanism, read_units
 from planar.document.schema import FORMAT_VERSION
 from planar.document.writer import write_mechanism
 from planar.foundation.errors import BadInput, suggest_name
+from planar.foundation.safe_files import is_existing
 from planar.model.mechanism import Mechanism
 from planar.synthesis.task.demands_reader import read_demands
 from planar.synthesis.task.synthesis_task import ChainStart, SynthesisTask, Wanted
@@ -113,10 +114,7 @@ class _TaskReader:
         else:
             name = cursor.as_text()
             beside = self.folder / name
-            try:
-                is_beside = beside.is_file()
-            except OSError:
-                is_beside = False
+            is_beside = is_existing(beside) and beside.is_file()
             try:
                 found = load(beside if is_beside else find_model_file(name))
             except BadInput as problem:

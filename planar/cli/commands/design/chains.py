@@ -11,6 +11,7 @@ import click
 from planar.cli.options import json_option, main, print_or_write, show_progress, show_status
 from planar.cli.streams import print_json
 from planar.foundation.errors import BadInput
+from planar.foundation.safe_files import is_existing
 
 if TYPE_CHECKING:
     from planar.structures.enumeration.pin_chains import Chains
@@ -94,7 +95,7 @@ def _draw(found: Chains, limit: int, mechanisms: bool, output: Path) -> None:
         told = joint_kinds_phrase(found.slides, found.multiple_pins)
         raise BadInput("command line", f"of the chains of {found.links} links none{told} moves")
     with show_progress(f"{len(shown)} chains") as progress:
-        if output.suffix.lower() in PICTURES and not output.is_dir():
+        if output.suffix.lower() in PICTURES and not (is_existing(output) and output.is_dir()):
             plot.save(plot.chains(shown, mechanisms), output)
         else:
             write_atlas(shown, output, mechanisms, count, progress)

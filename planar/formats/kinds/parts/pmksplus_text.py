@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from math import cos, hypot, pi, radians, sin
+from math import cos, dist, hypot, pi, radians, sin
 from typing import NamedTuple
 
 from planar.formats.drawn.blocks import slots_for_blocks
@@ -43,6 +43,8 @@ REACH = 100.0
 RADIUS, CLEARANCE, HEAD_MIN, HEAD_MAX = 0.15, 1.4, 1.525, 3.84
 """Of a cylinder's drawing: the radius of a joint by the scale of the drawn parts; by this radius, how far the head
 stays from the barrel's mount, and half its length."""
+ROUNDING = 2e-3
+"""Places (cm) that the link's rounding does not tell apart."""
 ON_LINE = 1e-6
 """Of a cylinder's length: how far its mounts may lie beside its line."""
 
@@ -88,6 +90,8 @@ class _Writer:
         self.keys: dict[str, str] = {}
         slides = [item for item in linkage.joints if isinstance(item, SlideJoint)]
         self.cylinders = {slide.name: result for slide in slides if (result := self._cylinder(slide)) is not None}
+        self.bars = {link for slide in slides if slide.name in self.cylinders for link in joined_links(slide)}
+        "the barrels and rods of cylinders"
         spare = [(item.retracted - item.stroke) * self.scale for item in self.cylinders.values()]
         drawn_size = 2.0 * RADIUS * (CLEARANCE + HEAD_MAX)
         self.object_scale = max(min([1.0, *(item / drawn_size for item in spare)]), 1e-3)
@@ -98,6 +102,8 @@ class _Writer:
             if isinstance(joint, PinJoint):
                 self._pin(joint)
         for tracer in linkage.tracers:
+            if tracer.link in self.bars:
+                continue
             self._joint(tracer.name, tracer.at, 0, [tracer.link])
         for joint in linkage.joints:
             if isinstance(joint, SlideJoint | SlotJoint):
@@ -157,15 +163,16 @@ class _Writer:
         pins = []
         for link in (slide.guide, slide.slider):
             joints_of_link = [item for item in self.linkage.joints if link in joined_links(item) and item != slide]
-            if len(joints_of_link) != 1 or not isinstance(joints_of_link[0], PinJoint) or self._carries_more(link):
+            if len(joints_of_link) != 1 or not isinstance(joints_of_link[0], PinJoint) or self._carries_loads(link):
                 return None
             pins.append(joints_of_link[0])
         (x, y), (u, v) = pins[0].at, pins[1].at
         span = hypot(u - x, v - y)
         direction = cos(radians(slide.angle)), sin(radians(slide.angle))
         along, across = (u - x) * direction[0] + (v - y) * direction[1], direction[0] * (v - y) - direction[1] * (u - x)
-        off = direction[0] * (slide.at[1] - y) - direction[1] * (slide.at[0] - x)
-        if not span or max(abs(across), abs(off)) > ON_LINE * span:
+        tracers = [tracer.at for tracer in self.linkage.tracers if tracer.link in joined_links(slide)]
+        offsets = [direction[0] * (at[1] - y) - direction[1] * (at[0] - x) for at in (slide.at, *tracers)]
+        if not span or max(abs(offset) for offset in (across, *offsets)) > ON_LINE * span:
             return None
         stroke, retracted = stop.high - stop.low, span + (stop.low if along > 0.0 else -stop.high)
         smallest = 2.0 * RADIUS * (CLEARANCE + HEAD_MAX) * 1e-3 / self.scale
@@ -173,11 +180,9 @@ class _Writer:
             return None
         return Cylinder(pins[0], pins[1], stroke, retracted)
 
-    def _carries_more(self, link: str) -> bool:
-        """Whether a link has points, masses or forces of its own."""
-        linkage = self.linkage
-        carriers = [tracer.link for tracer in linkage.tracers] + [mass.link for mass in linkage.masses]
-        return link in carriers or link in [force.link for force in linkage.forces]
+    def _carries_loads(self, link: str) -> bool:
+        """Whether a link has masses or forces of its own."""
+        return link in {item.link for item in (*self.linkage.masses, *self.linkage.forces)}
 
     def _write_cylinder(self, slide: SlideJoint | SlotJoint, cylinder: Cylinder) -> None:
         """A barrel from its mount to its inner end, and a rod from the seal to its own mount."""
@@ -236,12 +241,22 @@ class _Writer:
             return 0.0
         return self.linkage.inputs[0].velocity * self.scale
 
+    def _lost_point_notes(self) -> list[str]:
+        """The notes of points of barrels and rods where no joint of the cylinder lies."""
+        return [
+            f"the point {tracer.name!r} of {tracer.link!r} is left out: the bars of a cylinder have no further points"
+            for tracer in self.linkage.tracers
+            if tracer.link in self.bars
+            and not any(dist(tracer.at, at) * self.scale <= ROUNDING for at in self.places.values())
+        ]
+
     def _notes(self) -> list[str]:
         linkage, rate = self.linkage, self._rpm()
         written = [item for item in linkage.stops if item.joint in self.cylinders]
         result = [
             *linkage.notes,
             *lost_stop_notes(linkage, written),
+            *self._lost_point_notes(),
             "lengths are rounded to a thousandth of a cm, angles of rails to a thousandth of a radian",
         ]
         if abs(rate - round(rate)) > 1e-9:
