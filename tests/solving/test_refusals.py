@@ -683,3 +683,20 @@ def test_a_dyad_out_of_reach_is_told_by_its_closed_form_not_by_all_starts(monkey
 def test_where_a_text_is_no_json_is_said_once():
     with pytest.raises(planar.BadInput, match="Invalid control character at line 1, column 9"):
         planar.loads('{"a": "b\n')
+
+
+@pytest.mark.parametrize("rod_ends", [["B", "S"], ["B", "Q"]])
+def test_a_block_beside_a_link_that_was_to_slide_is_told_apart_from_it(rod_ends):
+    """The sleeve hangs at the block's pin alone, together with the rod or without it."""
+    links = {
+        "frame": {"points": {"A": [0, 0]}},
+        "AB": {"ends": ["A", "B"], "length": 30},
+        "rod": {"ends": rod_ends, "length": 80},
+        "sleeve": {"points": {"S": [0, 0], "T": [10, 0]}},
+    }
+    block = {"sliding": "slide", "on": "frame", "block": "S", "line": {"through": "A", "angle": 0}}
+    given = {"planar": 1, "units": {"length": "mm", "angle": "deg"}, "frame": "frame", "links": links}
+    given |= {"pairs": [{"turning": "A"}, {"turning": "B"}, block], "inputs": [{"pair": "A", "position": 50}]}
+    reason = refused(given).reason
+    assert "'block S' is a link of its own, pinned at 'S' to link 'sleeve'" in reason
+    assert "name it in 'links' with \"point\": 'S'" in reason

@@ -5,7 +5,7 @@ What finds causes and remedies is loaded only when something is refused.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from itertools import permutations
 
 import numpy as np
@@ -57,16 +57,34 @@ def free_links(setup: PreparedMechanism) -> NoAnswer:
 
 
 def _block_note(setup: PreparedMechanism, links: Sequence[str]) -> str:
-    """What a block is, where a free one is pinned to a single link, which may be meant to slide itself."""
+    """What a block is, where a free link hangs at the pin of one alone, or a free block at one link."""
+    for block, point, link in (*_lone_blocks(setup, links), *_links_at_blocks(setup, links)):
+        if link != setup.mechanism.frame:
+            return (
+                f"; {block!r} is a link of its own, pinned at {point!r} to link {link!r}: if that link itself "
+                f"slides, name it in 'links' with \"point\": {point!r}"
+            )
+    return ""
+
+
+def _lone_blocks(setup: PreparedMechanism, links: Sequence[str]) -> Iterator[tuple[str, str, str]]:
+    """Free blocks that are pinned to one link alone: block, point, link."""
     for pair in setup.mechanism.pairs:
         for (block, point), (link, _) in permutations(pair.coincident_points(), 2):
             pinned = [other for other in setup.mechanism.pairs if (block, point) in other.coincident_points()]
-            if block in links and block == f"block {point}" and len(pinned) == 1 and link != setup.mechanism.frame:
-                return (
-                    f"; {block!r} is a link of its own, pinned at {point!r} to link {link!r}: if that link itself "
-                    f"slides, name it in 'links' with \"point\": {point!r}"
-                )
-    return ""
+            if block in links and block == f"block {point}" and len(pinned) == 1:
+                yield block, point, link
+
+
+def _links_at_blocks(setup: PreparedMechanism, links: Sequence[str]) -> Iterator[tuple[str, str, str]]:
+    """Free links that hang at the pin of a block alone: block, point, link."""
+    names = {link.name for link in setup.mechanism.links}
+    for link in links:
+        pairs = [pair for pair in setup.mechanism.pairs if link in pair.bodies]
+        points = {point for pair in pairs for owner, point in pair.coincident_points() if owner == link}
+        block = f"block {min(points, default='')}"
+        if len(points) == 1 and block in names and all(pair.coincident_points() for pair in pairs):
+            yield block, points.pop(), link
 
 
 def _missing_pairs(setup: PreparedMechanism, links: Sequence[str]) -> str:

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 @click.option("--pin", metavar="LENGTH", help="The diameter of the pins; left out, one that suits the links.")
 @click.option("--wall", metavar="LENGTH", help="What is left round a hole; left out, as wide as a pin.")
 @click.option("--play", metavar="LENGTH", help="What holes are wider than pins; by default 0.1 mm or 0.005 in.")
-@click.option("--hole", "holes", multiple=True, metavar="POINT", help="A hole at this point, too; may be repeated.")
+@click.option("--hole", "holes", multiple=True, metavar="POINT", help="A hole at this point, too.")
 @click.option(
     "--sheet", metavar="WxH", help="Its width and height; by default 600x400 (mm), 24x16 for a file in inches."
 )
