@@ -182,7 +182,8 @@ class _Writer:
 
     def _carries_loads(self, link: str) -> bool:
         """Whether a link has masses or forces of its own."""
-        return link in {item.link for item in (*self.linkage.masses, *self.linkage.forces)}
+        masses = {mass.link for mass in self.linkage.masses}
+        return link in masses or link in {force.link for force in self.linkage.forces}
 
     def _write_cylinder(self, slide: SlideJoint | SlotJoint, cylinder: Cylinder) -> None:
         """A barrel from its mount to its inner end, and a rod from the seal to its own mount."""
