@@ -435,9 +435,13 @@ def test_springs_forces_and_masses_are_drawn_in_the_files_kind_of_units(length, 
     hand.drag(places["A"], places["B0"])
     hand.tool("Force")
     hand.drag(places["B"], places["B"] + np.array([0, -0.2 * places["B"][1]]))
+    hand.tool("Opposed forces")
+    hand.drag(places["A"], places["B0"])
     hand.tool("Mass")
     hand.click((places["A"] + places["B"]) / 2)
     file = hand.file()
+    assert file["loads"][1]["points"] == ["A", "B0"]
+    assert file["loads"][1]["force"].split(" ", 1)[1] == units[1]
     found = file["springs"][0]["stiffness"], file["loads"][0]["force"][1], file["masses"][0]["mass"]
     assert tuple(each.split(" ", 1)[1] for each in found) == units
     drawn = hand.mechanism()

@@ -91,6 +91,9 @@ def alike(found: dict[str, Any], mechanism: Mechanism) -> None:
         assert pair["name"] == name and pair["links"] == list(wanted.links)
         assert (np.abs(np.array([*pair["force"], pair["couple"]]) - [*wanted.force, wanted.couple]) <= least).all()
         assert pair["at"] == pytest.approx(wanted.at, abs=1e-9 * size)
+    for shown, (name, wheel) in zip(found["wheels"], forces.fixed_wheels.items(), strict=True):
+        assert shown["about"] == name and shown["pairs"] == [*wheel.shares]
+        assert abs(shown["torque"] - wheel.torque) <= least[2]
     # what acts, link by link, as a force and a moment about the world's origin
     for link in state.shapes.keys() - {mechanism.frame}:
         shown = [(*each["at"], *each["force"], each["couple"]) for each in found["acting"] if each["link"] == link]
@@ -114,7 +117,7 @@ def test_the_forces_of_a_page_are_those_of_python(name):
     alike(on_page(planar.load(name)), planar.load(name))
 
 
-@pytest.mark.parametrize("name", ["four-bar", "000-P2", "rolling-wheel", "gear-reducer", "scissor-lift", "002-E3.1"])
+@pytest.mark.parametrize("name", ["four-bar", "000-P2", "rolling-wheel", "gear-reducer", "planetary-gear-set", "hypocycloid-dwell", "scissor-lift", "002-E3.1"])
 def test_masses_loads_and_springs_of_every_kind_act_on_a_page_as_in_python(name):
     mechanism = acted_on(planar.load(name))
     alike(on_page(mechanism), mechanism)

@@ -68,6 +68,7 @@ def force_data(
         "acting": list(_action_data(rows)),
         "contacts": list(contact_data(rows, state)),
         "springs": [_spring_angle_data(work, spring) for spring in mechanism.springs],
+        "wheels": list(_fixed_wheel_data(rows)),
         "massive": bool(mechanism.masses),
         "timed": any(load.varies is not None and load.varies.input is None for load in mechanism.loads),
         "untold": _undetermined_sentences(state),
@@ -126,6 +127,17 @@ def _pair_data(pair: Pair, rows: BalanceRows, held: list[int]) -> dict[str, Any]
         # only couples are known, not what forces they come from
         "unshared": pair.ties_angles and contact is None,
     }
+
+
+def _fixed_wheel_data(rows: BalanceRows) -> Iterator[dict[str, Any]]:
+    """The pairs of wheels that belong to the frame, with the centre of each wheel, as in `reactions.fixed_wheels`."""
+    mechanism = rows.mechanism
+    for pair in mechanism.pairs:
+        centres = pair.wheel_centres(mechanism.pairs)
+        if mechanism.frame in centres:
+            point = centres[mechanism.frame]
+            at = None if point is None else rows.add_place(rows.point_in_world(mechanism.frame, point))
+            yield {"frame": mechanism.frame, "centre": point, "at": at, "pair": pair.name}
 
 
 def _input_data(name: str, rows: BalanceRows, row: int, slide: bool) -> dict[str, Any]:

@@ -147,9 +147,15 @@ const Draw = {
     return draft.usual[kind];
   },
 
+  /** The two pins between which a part acts. */
+  pinPair(spots, part) {
+    const pins = spots.map((spot) => spot.pin);
+    if (pins.includes(null) || pins[0] === pins[1]) throw new Error(`${part} from one pin to another`);
+    return pins;
+  },
+
   spring(draft, spots) {
-    const { file } = draft, pins = spots.map((spot) => spot.pin);
-    if (pins.includes(null) || pins[0] === pins[1]) throw new Error("a spring goes from one pin to another");
+    const { file } = draft, pins = Draw.pinPair(spots, "a spring goes");
     const far = Plane.apart(...pins.map((pin) => draft.at.get(pin)));
     (file.springs ??= []).push({ points: pins, stiffness: Draw.usual(draft, "stiffness").join(" "), free_length: Draw.length(draft, far) });
     return `Spring between ${pins.join(" and ")}, ${draft.usual.stiffness.join(" ")}`;
@@ -162,6 +168,13 @@ const Draw = {
     const force = way.map((each) => `${Number((most * each).toPrecision(6)) || 0} ${unit}`);
     (draft.file.loads ??= []).push({ point: pin, force });
     return `Force on ${pin}, ${most} ${unit}`;
+  },
+
+  /** Equal and opposite forces on two pins, which push these apart. */
+  opposedForces(draft, spots) {
+    const pins = Draw.pinPair(spots, "opposed forces act"), force = Draw.usual(draft, "force").join(" ");
+    (draft.file.loads ??= []).push({ points: pins, force });
+    return `Opposed forces on ${pins.join(" and ")}, ${force}`;
   },
 
   /** A mass of a link, in the middle of its points. */

@@ -25,6 +25,7 @@ const TOOLS = {
   cam: { name: "Cam", told: "From a link that is the cam to the pin of its follower, which slides or swings; lift, roller and law stand beside; lift and roller left empty are chosen." },
   spring: { name: "Spring", told: "From one pin to another." },
   load: { name: "Force", told: "From a pin in the force's direction." },
+  opposed: { name: "Opposed forces", told: "From one pin to another: a force on each along the line that joins them, equal and opposite." },
   mass: { name: "Mass", told: "A click on a link." },
   wish: { name: "Wanted path", told: "Where a point is to come: drawn freehand, or place after place; a click on the first closes it." },
   picture: { name: "Picture", told: "Two places of the picture underneath, whose distance is then typed beside the drawing." },
@@ -142,7 +143,7 @@ class Hand {
       if (spot.pin !== null) this.dragged = editing.leading.take(spot.pin);
       return;
     }
-    if (["bar", "spring", "load", "slide", "slot", "point", "gear", "belt", "rack", "cam", "picture"].includes(tool)) {
+    if (["bar", "spring", "load", "opposed", "slide", "slot", "point", "gear", "belt", "rack", "cam", "picture"].includes(tool)) {
       if (this.pending.length) this.finish(spot);
       else this.begin(spot);
     } else if (tool === "plate") this.corner(spot);
@@ -168,7 +169,7 @@ class Hand {
   }
 
   begin(spot) {
-    const { tool } = this.editing, wanted = { spring: ["pin", "a spring begins at a pin"], load: ["pin", "a force acts on a pin"], point: ["link", "click a link first"], rack: ["link", "a pinion is a link"], cam: ["link", "a cam is a link"], slot: ["pin", "a pin runs in a slot: begin at one"] }[tool];
+    const { tool } = this.editing, wanted = { spring: ["pin", "a spring begins at a pin"], load: ["pin", "a force acts on a pin"], opposed: ["pin", "a force acts on a pin"], point: ["link", "click a link first"], rack: ["link", "a pinion is a link"], cam: ["link", "a cam is a link"], slot: ["pin", "a pin runs in a slot: begin at one"] }[tool];
     if (wanted && spot[wanted[0]] === null) { this.editing.say(`${wanted[1]}.`); return; }
     this.pending = [spot];
     this.editing.sketch.draw();
@@ -180,6 +181,7 @@ class Hand {
       bar: (draft) => Draw.link(draft, [first, spot]),
       spring: (draft) => Draw.spring(draft, [first, spot]),
       load: (draft) => Draw.load(draft, first.pin, spot.at),
+      opposed: (draft) => Draw.opposedForces(draft, [first, spot]),
       slide: (draft) => Draw.slide(draft, first, this.guide(first, spot) ?? file.frame, spot.at),
       point: (draft) => Draw.point(draft, first.link, spot),
       slot: (draft) => Couplings.slot(draft, first, this.guide(first, spot) ?? file.frame, spot.at),

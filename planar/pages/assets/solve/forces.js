@@ -225,7 +225,22 @@ class Forces {
       return { kind: each.kind, name: each.name, link, at: place, ...this.wrench(pushes[k], link, place) };
     }));
     const why = shared.length ? `not determined in the pairs: what ${shared.join(", ")} ${shared.length > 1 ? "put" : "puts"} on them is not known` : "";
-    return { why, efforts, inputs, pairs, acting };
+    return { why, efforts, inputs, pairs, acting, wheels: this.wheels(pairs) };
+  }
+
+  /** The torque that holds each wheel of the frame, anticlockwise, about its centre: [{about, pairs, torque}]. */
+  wheels(pairs) {
+    const held = new Map();
+    for (const { frame, centre, at, pair: name } of this.data.wheels) {
+      const { links, at: place, force: [fx, fy], couple, couples } = pairs.find((each) => each.name === name);
+      if (place !== null && at === null) continue;
+      const [x, y] = at === null ? [0, 0] : this.place(at);
+      const onSecond = place === null ? 0 : (place[0] - x) * fy - (place[1] - y) * fx + couple;
+      const moment = place === null ? couples[frame] : links[1] === frame ? onSecond : -onSecond;
+      const wheel = held.get(centre ?? name) ?? { about: centre ?? "-", pairs: [], torque: 0 };
+      held.set(centre ?? name, { ...wheel, pairs: [...wheel.pairs, name], torque: wheel.torque - moment });
+    }
+    return [...held.values()];
   }
 }
 
