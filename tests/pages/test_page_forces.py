@@ -117,7 +117,19 @@ def test_the_forces_of_a_page_are_those_of_python(name):
     alike(on_page(planar.load(name)), planar.load(name))
 
 
-@pytest.mark.parametrize("name", ["four-bar", "000-P2", "rolling-wheel", "gear-reducer", "planetary-gear-set", "hypocycloid-dwell", "scissor-lift", "002-E3.1"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "four-bar",
+        "000-P2",
+        "rolling-wheel",
+        "gear-reducer",
+        "planetary-gear-set",
+        "hypocycloid-dwell",
+        "scissor-lift",
+        "002-E3.1",
+    ],
+)
 def test_masses_loads_and_springs_of_every_kind_act_on_a_page_as_in_python(name):
     mechanism = acted_on(planar.load(name))
     alike(on_page(mechanism), mechanism)
