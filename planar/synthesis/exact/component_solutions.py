@@ -16,6 +16,7 @@ from planar.synthesis.exact.relations.family import Member
 from planar.synthesis.exact.tracking.ball_paths import MOST_PATHS
 from planar.synthesis.exact.tracking.bilinear_roots import bilinear_roots
 from planar.synthesis.exact.tracking.exact_certificates import certify_member
+from planar.synthesis.exact.tracking.family_names import FamilyName
 from planar.synthesis.exact.tracking.generic_store import FamilyRecord, family_record
 from planar.synthesis.exact.tracking.member_homotopy import affine_solutions, homogeneous_solutions
 from planar.synthesis.exact.tracking.member_solutions import (
@@ -26,7 +27,7 @@ from planar.synthesis.exact.tracking.member_solutions import (
     solve_member,
 )
 from planar.synthesis.exact.tracking.other_ways import UNKNOWN
-from planar.synthesis.exact.tracking.symmetry import FamilyName, exchange_images
+from planar.synthesis.exact.tracking.symmetry import exchange_images
 
 REAL = 1e-7
 """Of a solution's size: one that differs from its own conjugate by less is real."""
@@ -56,12 +57,20 @@ def solve_components(components: Sequence[Component], say: Progress) -> list[Com
     for each in components:
         record = family_record(each.family, lambda many: say(f"{many} solutions of a random task"))
         key = _member_key(record.name, each.member)
-        found = known.get(key)
-        if found is None or found.record.name != record.name:
-            found = _solve(each, record, say)
-            known[key] = found
-        solved.append(found._replace(component=each))
+        if key not in known:
+            known[key] = _solve(each, record, say)
+        solved.append(_in_order(known[key], record)._replace(component=each))
     return solved
+
+
+def _in_order(solved: ComponentSolutions, record: FamilyRecord) -> ComponentSolutions:
+    """Solutions of a member with their unknowns in the order of a family of the same name."""
+    half = len(record.name.unknowns)
+    order = np.empty(2 * half, dtype=int)
+    for k, own in zip(record.name.unknowns, solved.record.name.unknowns, strict=True):
+        order[[k, half + k]] = own, half + own
+    whole = solved.whole._replace(x=solved.whole.x[:, order], doubtful=solved.whole.doubtful[:, order])
+    return solved._replace(record=record, whole=whole, x=solved.x[:, order])
 
 
 def _solve(component: Component, record: FamilyRecord, say: Progress) -> ComponentSolutions:
@@ -145,4 +154,5 @@ def alike_components(solved: Sequence[ComponentSolutions]) -> list[list[int]]:
 
 
 def _member_key(name: FamilyName, member: Member) -> tuple[str, bytes]:
-    return name.text, b"".join(np.round(part, 12).tobytes() for part in member.parts)
+    first = member.parts[0][:, list(name.given)]
+    return name.text, b"".join((np.round(part, 12) + 0.0).tobytes() for part in (first, *member.parts[1:]))

@@ -17,18 +17,20 @@ from planar.synthesis.exact.relations.family import Family, FamilyPart, Member
 from planar.synthesis.exact.relations.given_numbers import KnownAxes, add_given_numbers
 from planar.synthesis.exact.relations.polynomials import Polynomial, Symbol
 from planar.synthesis.exact.relations.reference_pose import ReferencePose
-from planar.synthesis.exact.relations.unknowns import NumberKind, refuse
+from planar.synthesis.exact.relations.unknowns import GivenNumber, NumberKind, refuse
 from planar.synthesis.fitting.wanted_rows import wanted_size
 from planar.synthesis.task.starts import free_numbers
 from planar.synthesis.task.synthesis_task import SynthesisTask, Wanted, WantedFunction, WantedPath, WantedPoses
 
 
 class Component(NamedTuple):
-    """A part of a structure with rows of its own, as a member of its family; `unknowns` are its symbols."""
+    """A part of a structure with rows of its own, as a member of its family; `unknowns` are its symbols, `given` the
+    numbers that stand in its rows."""
 
     family: Family
     member: Member
     unknowns: tuple[Symbol, ...]
+    given: tuple[GivenNumber, ...]
 
     @property
     def freedom(self) -> int:
@@ -139,30 +141,27 @@ class ExactProblem:
         return value, value.conjugate()
 
     def _components(self) -> tuple[Component, ...]:
-        table = self.pose.table
-        given = [number for each in table.given for number in each.symbol]
-        kinds = tuple(each.kind for each in table.given)
-        first = np.array([self.scaled(each.kind, each.value) for each in table.given], dtype=complex).reshape(1, -1, 2)
-        found = []
-        for unknowns in _groups(self.pose, self.relations):
-            symbols = [each.own for each in unknowns] + [each.conjugate for each in unknowns]
-            own = set(symbols)
-            conditions = EntryRows(tuple(row for row in self.pose.conditions if own & row.symbols), (), None, ())
-            parts = [FamilyPart(CompiledRows(conditions, symbols, given), kinds, 1)]
-            values = [first]
-            for k, (each, wanted) in enumerate(zip(self.relations, self.items, strict=True)):
-                rows = each.rows
-                if rows.turn is None:
-                    rows = rows._replace(rows=tuple(row for row in rows.rows if own & row.symbols))
-                elif not any(own & part.symbols for row in rows.linear for part in row):
-                    continue
-                numbers = self.entry_numbers(wanted, each.numbers, k > 0)
-                entry = [number for one in each.numbers for number in one.symbol]
-                compiled = CompiledRows(rows, symbols, [*given, *entry])
-                parts.append(FamilyPart(compiled, tuple(one.kind for one in each.numbers), len(numbers)))
-                values.append(numbers)
-            found.append(Component(Family(len(unknowns), tuple(parts)), Member(tuple(values)), unknowns))
-        return tuple(found)
+        return tuple(map(self._component, _groups(self.pose, self.relations)))
+
+    def _component(self, unknowns: tuple[Symbol, ...]) -> Component:
+        symbols = [each.own for each in unknowns] + [each.conjugate for each in unknowns]
+        own = set(symbols)
+        rows = [EntryRows(tuple(row for row in self.pose.conditions if own & row.symbols), (), None, ())]
+        rows += [_rows_with(own, each.rows) for each in self.relations]
+        used = frozenset[int]().union(*(each.symbols for each in rows))
+        given = [each for each in self.pose.table.given if used & {*each.symbol}]
+        numbers = [number for each in given for number in each.symbol]
+        first = [self.scaled(each.kind, each.value) for each in given]
+        parts = [FamilyPart(CompiledRows(rows[0], symbols, numbers), tuple(each.kind for each in given), 1)]
+        values = [np.array(first, dtype=complex).reshape(1, -1, 2)]
+        for k, (each, wanted) in enumerate(zip(self.relations, self.items, strict=True)):
+            if not rows[k + 1].symbols:
+                continue
+            values.append(self.entry_numbers(wanted, each.numbers, k > 0))
+            entry = [number for one in each.numbers for number in one.symbol]
+            compiled = CompiledRows(rows[k + 1], symbols, [*numbers, *entry])
+            parts.append(FamilyPart(compiled, tuple(one.kind for one in each.numbers), len(values[-1])))
+        return Component(Family(len(unknowns), tuple(parts)), Member(tuple(values)), unknowns, tuple(given))
 
     def entry_numbers(self, wanted: Wanted, numbers: tuple[EntryNumber, ...], has_own_first: bool) -> ComplexArray:
         """The numbers (entries, numbers, 2) of a wanted item, from those of the first entry of all."""
@@ -190,6 +189,13 @@ class ExactProblem:
                 value, other = exp(1j * value), exp(-1j * value)
             found |= {each.symbol.own: value, each.symbol.conjugate: other}
         return found
+
+
+def _rows_with(own: set[int], rows: EntryRows) -> EntryRows:
+    """Those rows of an entry in which some of these symbols stand."""
+    if rows.turn is None:
+        return rows._replace(rows=tuple(row for row in rows.rows if own & row.symbols))
+    return rows if own & rows.symbols else EntryRows((), (), None, ())
 
 
 def _ordered_items(task: SynthesisTask, mechanism: Mechanism) -> tuple[Wanted, ...]:

@@ -14,8 +14,9 @@ import numpy as np
 from planar.foundation.arrays import ComplexArray, IntArray
 from planar.foundation.private_cache import PrivateCache
 from planar.synthesis.exact.relations.family import Family, Member
+from planar.synthesis.exact.tracking.family_names import FamilyName, name_family
 from planar.synthesis.exact.tracking.monodromy import GenericSolutions, find_generic_solutions
-from planar.synthesis.exact.tracking.symmetry import FamilyName, exchange_images, name_family
+from planar.synthesis.exact.tracking.symmetry import exchange_images
 from planar.synthesis.exact.tracking.trace_test import trace_test
 
 CACHE = PrivateCache("exact", ".npz", b"planar exact 1\n", 256 * 2**20)
