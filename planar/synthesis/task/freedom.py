@@ -125,6 +125,12 @@ def count_freedom(task: SynthesisTask, mechanism: Mechanism, wanted: Sequence[Wa
     return FreedomCount(every, sum(each.condition_count for each in items), own)
 
 
+def number_slopes(task: SynthesisTask, mechanism: Mechanism, free: FreeNumbers) -> Array:
+    """The derivatives (rows, numbers and zeros of scales) of all that is wanted by the free numbers, over the motion of
+    a mechanism near a start. Raises NoAnswer where the start cannot move."""
+    return _stack(_result_rows(generic_start(mechanism, free), task.wanted, free))
+
+
 def exactness_in_excess(task: SynthesisTask, mechanism: Mechanism) -> str | None:
     """What forbids that a start meets all that is to be met exactly, in words; None where nothing does."""
     if not task.exact:
