@@ -16,6 +16,7 @@ from planar.synthesis.exact.component_solutions import ComponentSolutions, alike
 from planar.synthesis.exact.dyad_curves import dyad_curve, is_dyad
 from planar.synthesis.exact.exact_linkage import ExactLinkage, exact_linkage
 from planar.synthesis.exact.list_words import completeness, counted_class, list_remarks, solution_count
+from planar.synthesis.exact.relations.condition_count import count_parts
 from planar.synthesis.exact.relations.exact_problem import Component, ExactProblem
 from planar.synthesis.exact.tracking.member_homotopy import affine_solutions, homogeneous_solutions
 from planar.synthesis.exact.tracking.member_solutions import Progress
@@ -74,17 +75,17 @@ def _single_start(task: SynthesisTask) -> Mechanism:
 
 
 def _check_freedom(problem: ExactProblem) -> None:
-    least = min((each.freedom for each in problem.components), default=0)
-    if least < 0:
-        told = f"{count_phrase(-least, 'condition')} more than {problem.mechanism.name!r} can meet exactly"
-        raise BadInput("$.wanted", f"what is wanted sets {told} with the numbers that are free")
+    """Refuse a task of which a part cannot meet what is wanted, or has numbers that stay open."""
+    unbalanced = [each for each in count_parts(problem) if each.excess or each.open]
+    told = ", ".join(each.sentence for each in unbalanced)
+    if any(each.excess for each in unbalanced):
+        raise BadInput("$.wanted", f"what is wanted cannot be met exactly with the numbers that are free: {told}")
     left = [each for each in problem.components if each.freedom > 0]
     is_for_poses = len(problem.items) == 1 and isinstance(problem.items[0], WantedPoses)
-    if left and not (is_for_poses and all(is_dyad(problem, each) for each in left)):
-        most = max(each.freedom for each in left)
+    if unbalanced and not (is_for_poses and left and all(is_dyad(problem, each) for each in left)):
         raise BadInput(
             "$.wanted",
-            f"{count_phrase(most, 'number')} of {problem.mechanism.name!r} would stay open, so that there is no list; "
+            f"there is no list, as numbers stay open: {told} than what is wanted determines; "
             "want more, or give some of the numbers by leaving them out of 'free'",
         )
 
@@ -168,6 +169,7 @@ def _judged(problem: ExactProblem, judge: DesignJudge, linkage: ExactLinkage, ce
         problem.mechanism.name,
         linkage.numbers,
         certified=certified,
+        opposite=linkage.opposite,
     )
 
 

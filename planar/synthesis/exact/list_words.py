@@ -86,6 +86,12 @@ def list_remarks(solved: Sequence[ComponentSolutions], designs: Sequence[ExactDe
             )
         if each.record.source:
             found.append(each.record.source)
+    for link in dict.fromkeys(name for each in designs for name in each.opposite):
+        count = sum(link in each.opposite for each in designs)
+        found.append(
+            f"{link!r} is drawn the opposite way, as its length is negative, in {count} of "
+            f"{count_phrase(len(designs), 'real linkage')}: points stand for it"
+        )
     marked = sum(bool(each.defects) for each in designs)
     if marked:
         found.append(f"with a defect: {marked} of {count_phrase(len(designs), 'real linkage')}")
