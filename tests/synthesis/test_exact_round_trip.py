@@ -240,7 +240,7 @@ def worst_miss(wanted, misses, is_slider):
             differences = []
             for each in results:
                 step = np.array(each) - (zero if "pairs" in wanted else 0.0) - told
-                if ("pairs" in wanted and not is_slider):
+                if "pairs" in wanted and not is_slider:
                     step = np.angle(np.exp(1j * step))
                 elif len(step) == 3:
                     step[2] = np.angle(np.exp(1j * step[2]))

@@ -109,7 +109,9 @@ class _LinkageWriter:
             self._note_line(slide)
         missing = [each for each in self.problem.free if each not in self.numbers and self.problem.task.free]
         if missing:
-            raise BadInput("$.free", f"{missing[0]!r} of {self.mechanism.name!r} cannot be sought exactly; leave it out")
+            raise BadInput(
+                "$.free", f"{missing[0]!r} of {self.mechanism.name!r} cannot be sought exactly; leave it out"
+            )
         running = self.mechanism.inputs[0].pair
         start = self.displacements.get(running)
         if start is None:

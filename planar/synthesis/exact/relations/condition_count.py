@@ -101,9 +101,7 @@ def part_links(problem: ExactProblem, part: Component) -> tuple[str, ...]:
         return tuple(name for name in moving if name not in others)
     own = {number for each in part.unknowns for number in each}
     used = {
-        link
-        for (link, _), place in problem.pose.places.items()
-        if own & place.substitute(problem.pose.values).symbols
+        link for (link, _), place in problem.pose.places.items() if own & place.substitute(problem.pose.values).symbols
     }
     for link, axes in problem.pose.axes.items():
         if any(each is not None and own & each.substitute(problem.pose.values).symbols for each in axes):

@@ -18,9 +18,9 @@ from planar.synthesis.exact.relations.family import Family, FamilyPart, Member
 from planar.synthesis.exact.relations.given_numbers import add_given_numbers
 from planar.synthesis.exact.relations.polynomials import Polynomial, Symbol
 from planar.synthesis.exact.relations.reference_pose import LinkAxes, ReferencePose
+from planar.synthesis.exact.relations.sought_numbers import sought_numbers
 from planar.synthesis.exact.relations.unknowns import GivenNumber, NumberKind, refuse
 from planar.synthesis.fitting.wanted_rows import wanted_size
-from planar.synthesis.exact.relations.sought_numbers import sought_numbers
 from planar.synthesis.task.synthesis_task import SynthesisTask, Wanted, WantedFunction, WantedPath, WantedPoses
 
 

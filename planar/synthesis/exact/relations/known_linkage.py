@@ -91,14 +91,18 @@ def sample_linkage(problem: ExactProblem) -> KnownLinkage:
     items, first = [], 0
     for wanted, count in zip(problem.items, counts, strict=True):
         rows = order[first : first + count]
-        values = ca.Function("values", [design.z, design.t], [wanted_expression(design, wanted)])(z[0][rows].T, t[rows].T)
+        values = ca.Function("values", [design.z, design.t], [wanted_expression(design, wanted)])(
+            z[0][rows].T, t[rows].T
+        )
         items.append(_met(wanted, np.array(values).T, t[rows]))
         first += count
     axes = {}
     for link in mechanism.links:
         if link.name != mechanism.frame:
             frame = motion.frames[link.name]
-            x, y, angle = (float(np.asarray(value_and_rates(each)[0])[order[0]]) for each in (frame.x, frame.y, frame.angle))
+            x, y, angle = (
+                float(np.asarray(value_and_rates(each)[0])[order[0]]) for each in (frame.x, frame.y, frame.angle)
+            )
             axes[link.name] = complex(x, y), complex(np.exp(1j * angle))
     return KnownLinkage(mechanism, tuple(items), axes)
 

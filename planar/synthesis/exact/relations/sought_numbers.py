@@ -37,12 +37,15 @@ def sought_numbers(task: SynthesisTask, mechanism: Mechanism) -> tuple[str, ...]
     except PlanarError:  # where the start does not move its slopes are not known
         return tuple(name for name in free.names if name not in standing)
     sizes = np.linalg.norm(slopes, axis=0)
-    for name, size in zip(free.names, sizes.tolist(), strict=False):
-        if size <= NO_INFLUENCE * sizes.max():
+    columns = slopes / np.where(sizes > 0.0, sizes, 1.0)
+    zeros = _basis(columns[:, len(free.names) :])
+    for k, name in enumerate(free.names):
+        rest = columns[:, k] - zeros @ (zeros.T @ columns[:, k])
+        if sizes[k] <= NO_INFLUENCE * sizes.max() or np.linalg.norm(rest) <= DEPENDENT:
             raise BadInput(
                 "$.free", f"nothing that is wanted depends on {name!r} of {mechanism.name!r} alone; leave it out"
             )
-    return _independent(free.names, slopes / np.where(sizes > 0.0, sizes, 1.0), standing)
+    return _independent(free.names, columns, standing)
 
 
 def _frame_numbers(mechanism: Mechanism) -> frozenset[str]:
@@ -62,8 +65,7 @@ def _independent(names: tuple[str, ...], columns: Array, last: Sequence[str]) ->
     """The names of numbers, without those of the last that the columns before them make up; columns more, which have
     no names, are before all."""
     is_last = np.array([*(name in last for name in names), *[False] * (columns.shape[1] - len(names))])
-    u, values, _ = np.linalg.svd(columns[:, ~is_last], full_matrices=False)
-    basis, given = u[:, values > DEPENDENT * values.max(initial=0.0)], set[str]()
+    basis, given = _basis(columns[:, ~is_last]), set[str]()
     for k in np.flatnonzero(is_last).tolist():
         rest = columns[:, k] - basis @ (basis.T @ columns[:, k])
         size = np.linalg.norm(rest)
@@ -72,3 +74,10 @@ def _independent(names: tuple[str, ...], columns: Array, last: Sequence[str]) ->
         else:
             given.add(names[k])
     return tuple(name for name in names if name not in given)
+
+
+def _basis(columns: Array) -> Array:
+    """Orthonormal columns that span the same."""
+    u, values, _ = np.linalg.svd(columns, full_matrices=False)
+    found: Array = u[:, values > DEPENDENT * values.max(initial=0.0)]
+    return found
