@@ -134,7 +134,7 @@ class _LinkageWriter:
         """The numbers of a point that are sought, of where it lies in its link."""
         for name, value, start in ((at.x, own.real, at.value.real), (at.y, own.imag, at.value.imag)):
             if name is not None:
-                self.numbers[name] = float(self.pose.numbers[name].value) + value - start
+                self.numbers[name] = float(self.pose.numbers[name].value + value - start)
 
     def _link_axes(self, link: Link) -> tuple[complex, complex]:
         """Where the origin of a link is, and its x-axis as a unit vector, at the first entry."""
@@ -241,7 +241,7 @@ class _AxesRows:
         self.writer, self.pose, self.name = writer, writer.pose, link.name
         self.is_open = np.array([way is None, *[origin is None] * 2])
         self.points = [(place, self.pose.coordinates(link.name, name)) for name, place in writer._places(link).items()]
-        self.lines = []
+        self.lines: list[tuple[complex, complex, complex | None, complex | None]] = []
         for slide in self.pose.slides:
             if slide.pair.bodies[0] == link.name:
                 self._add_line(slide)

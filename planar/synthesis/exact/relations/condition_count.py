@@ -79,9 +79,9 @@ def _ranks(part: Component, member: Member, x: ComplexArray) -> tuple[int, int]:
         columns.append(part.family.rows_at(x[:, None], member, change, np.zeros(1))[2][:, 0])
     both = np.concatenate([slope, np.array(columns).T.reshape(len(slope), -1)], axis=1)
     sizes = np.linalg.norm(both, axis=1, keepdims=True)
-    sizes = np.where(sizes > 0.0, sizes, 1.0)
-    rank = _rank(slope / sizes)
-    return len(x) - rank, _rank(both / sizes) - rank
+    both = both / np.where(sizes > 0.0, sizes, 1.0)
+    rank = _rank(both[:, : len(x)])
+    return len(x) - rank, _rank(both) - rank
 
 
 def _rank(matrix: ComplexArray) -> int:

@@ -60,7 +60,7 @@ def _order(colours: Colours) -> tuple[int, ...]:
 
 
 def _ranks(keys: Sequence[tuple[object, ...]]) -> Colours:
-    places = {key: k for k, key in enumerate(sorted({*keys}))}  # type: ignore[type-var]
+    places = {key: k for k, key in enumerate(sorted({*keys}))}
     return tuple(places[key] for key in keys)
 
 
@@ -81,8 +81,8 @@ class _Namer:
         known = {colour: _places(colour) for colour in np.unique(colours).tolist()}
         values = []
         for place in range(2):
-            x = np.array([[known[one][place] for one in row] for row in colours.tolist()]).reshape(*colours.shape, 2)
-            x = np.moveaxis(x, 0, 2).swapaxes(0, 1).reshape(-1, len(colours))
+            own = np.array([[known[one][place] for one in row] for row in colours.tolist()]).reshape(*colours.shape, 2)
+            x = np.moveaxis(own, 0, 2).swapaxes(0, 1).reshape(-1, len(colours))
             f, slope, _ = self.family.rows_at(x, member, still, np.zeros(len(colours)))
             f[np.abs(f) < VANISHES * np.abs(slope * x).sum(axis=1)] = 0.0
             values.append(f)
@@ -151,7 +151,8 @@ def _places(colour: int) -> Array:
 def _number(kind: NumberKind, colour: int) -> ComplexArray:
     part = FamilyPart(None, (kind,), 1)  # type: ignore[arg-type]
     rng = np.random.default_rng([19, colour])
-    return Family(0, (part,)).random_member(rng).parts[0][0, 0]
+    found: ComplexArray = Family(0, (part,)).random_member(rng).parts[0][0, 0]
+    return found
 
 
 def _signature(ratios: ComplexArray) -> tuple[float, ...]:
