@@ -185,12 +185,8 @@ class ExactProblem:
 
     def given_values(self, items: Sequence[Wanted]) -> dict[int, complex]:
         """The given numbers by their symbols (m, rad), those of the first entry from wanted items."""
-        return {
-            each.symbol.own: self.first_entry[each.symbol.own](items[0])
-            if each.symbol.own in self.first_entry
-            else each.value
-            for each in self.pose.table.given
-        }
+        found = {each.symbol.own: each.value - each.start for each in self.pose.table.given}
+        return found | {symbol: value(items[0]) for symbol, value in self.first_entry.items()}
 
     def entry_numbers(
         self, wanted: Wanted, numbers: tuple[EntryNumber, ...], has_own_first: bool, main: Wanted | None = None

@@ -200,8 +200,8 @@ class _LinkConditions:
         if name in self.ends and (not anchor.name or anchor.name in self.ends):
             if value == anchor.value:
                 return Polynomial({})
-            return self.pose.table.add_given(NumberKind.LENGTH, (value - anchor.value).real).value
-        return self.pose.table.add_given(NumberKind.VECTOR, value - anchor.value).value
+            return self.pose.table.add_given(NumberKind.LENGTH, value.real, anchor.value.real).value
+        return self.pose.table.add_given(NumberKind.VECTOR, value, anchor.value).value
 
     def _add_distance(self, point: _Point) -> None:
         anchor = self.anchors[0]
@@ -223,7 +223,7 @@ class _LinkConditions:
         if axis and point.name in self.ends and (not anchor.name or anchor.name in self.ends):
             self.pose.conditions.append(turned - turned.conjugate)
             return
-        turned = turned - self.pose.table.add_given(NumberKind.VECTOR, point.at.value - anchor.value).value
+        turned = turned - self.pose.table.add_given(NumberKind.VECTOR, point.at.value, anchor.value).value
         self.pose.conditions.append(turned - turned.conjugate if axis else turned + turned.conjugate)
 
     def _offset(self, line: _Line, way: Polynomial) -> Polynomial:
@@ -231,10 +231,10 @@ class _LinkConditions:
         x, y = self.anchors
         assert x is not None and y is not None
         if x.name == y.name:
-            step = self.pose.table.add_given(NumberKind.VECTOR, line.at.value - x.value).value
+            step = self.pose.table.add_given(NumberKind.VECTOR, line.at.value, x.value).value
             return line.slide.slider - x.place - step * way
-        number = complex(line.at.value.real - x.value.real, line.at.value.imag - y.value.imag)
-        step = self.pose.table.add_given(NumberKind.VECTOR, number).value
+        start = complex(x.value.real, y.value.imag)
+        step = self.pose.table.add_given(NumberKind.VECTOR, line.at.value, start).value
         across, along = ((line.slide.slider - each.place) * way.conjugate for each in (y, x))
         own = (along + along.conjugate + across - across.conjugate) * 0.5
         return (own - step) * way
