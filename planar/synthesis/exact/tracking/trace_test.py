@@ -24,7 +24,8 @@ from planar.synthesis.exact.relations.family import Family, Member
 from planar.synthesis.exact.relations.unknowns import NumberKind
 from planar.synthesis.exact.tracking.exact_certificates import certify_member
 from planar.synthesis.exact.tracking.member_homotopy import affine_solutions
-from planar.synthesis.exact.tracking.monodromy import CLOSER_STEPS, CORRECTION, GenericSolutions
+from planar.synthesis.exact.tracking.monodromy import CLOSER_STEPS, GenericSolutions
+from planar.synthesis.exact.tracking.solution_graph import CORRECTION
 from planar.synthesis.exact.tracking.same_solutions import first_of_same
 from planar.synthesis.exact.tracking.symmetry import exchange_images
 
