@@ -38,6 +38,8 @@ class SolutionGraph(Generic[Node]):
         self.solutions: list[ComplexArray] = []
         self.followed: dict[tuple[int, int], BoolArray] = {}
         "which solutions of the first node have been followed to the second, or met from there"
+        self.leaves: set[int] = set()
+        "nodes that edges do not go to unless asked for"
 
     @property
     def most(self) -> int:
@@ -60,15 +62,16 @@ class SolutionGraph(Generic[Node]):
         rows: IntArray = (np.cumsum(is_kept) - 1)[first[known:]]
         return rows
 
-    def follow(self, i: int, j: int, rows: IntArray) -> bool:
-        """Follow solutions of a node to another; whether all came there."""
-        return self._follow([(i, j, rows)])
+    def follow_edge(self, i: int, j: int) -> bool:
+        """Follow those solutions of a node to another that have not been; whether all came there."""
+        rows = self._open(i, j)
+        return not len(rows) or self._follow([(i, j, rows)])
 
     def follow_open_edges(self) -> bool:
         """Follow what has not been followed along all edges, each in the direction with the more of it; False where
         there is none."""
         batch, room = [], BLOCK
-        for pair in combinations(range(len(self.nodes)), 2):
+        for pair in combinations([k for k in range(len(self.nodes)) if k not in self.leaves], 2):
             i, j = max((pair, pair[::-1]), key=lambda edge: len(self._open(*edge)))
             rows = self._open(i, j)[:room]
             if len(rows):
