@@ -7,12 +7,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.foundation.arrays import ComplexArray
+from planar.foundation.arrays import Array, ComplexArray
+from planar.foundation.units import parse_unit
 from planar.model.mechanism import Mechanism, named_points, relative_motions
 from planar.model.pairs import MeasureKind
 from planar.synthesis.exact.relations.compiled_rows import CompiledRows
 from planar.synthesis.exact.relations.elimination import EntryRows
 from planar.synthesis.exact.relations.entry_relations import EntryNumber, EntryRelations, entry_relations, turned_link
+from planar.synthesis.exact.relations.exact_numbers import ExactNumber, ExactScale
 from planar.synthesis.exact.relations.family import Family, FamilyPart, Member
 from planar.synthesis.exact.relations.given_numbers import KnownAxes, add_given_numbers
 from planar.synthesis.exact.relations.polynomials import Polynomial, Symbol
@@ -55,6 +57,7 @@ class ExactProblem:
         self.relations: tuple[EntryRelations, ...] = tuple(map(self._settled, relations))
         self.size = wanted_size(task, _extent(self.pose))
         self.origin = self._origin()
+        self.exact_scale = self._exact_scale()
         self.components = self._components()
 
     # what is known at the first entry
@@ -129,6 +132,11 @@ class ExactProblem:
         places = [each.value for each in self.pose.table.given if each.kind is NumberKind.PLACE]
         return complex(places[0]) if places else 0.0
 
+    def _exact_scale(self) -> ExactScale:
+        files = self.task.units, self.mechanism.units
+        lengths, angles = (tuple(map(parse_unit, names)) for names in zip(*((f.length, f.angle) for f in files)))
+        return ExactScale(lengths, angles, self.origin, self.size)
+
     def scaled(self, kind: NumberKind, value: complex) -> tuple[complex, complex]:
         """A number as members have it."""
         if kind is NumberKind.TURN:
@@ -143,43 +151,58 @@ class ExactProblem:
         given = [number for each in table.given for number in each.symbol]
         kinds = tuple(each.kind for each in table.given)
         first = np.array([self.scaled(each.kind, each.value) for each in table.given], dtype=complex).reshape(1, -1, 2)
+        exact_first = [[self.exact_scale.scaled(each.kind, each.value) for each in table.given]]
         found = []
         for unknowns in _groups(self.pose, self.relations):
             symbols = [each.own for each in unknowns] + [each.conjugate for each in unknowns]
             own = set(symbols)
             conditions = EntryRows(tuple(row for row in self.pose.conditions if own & row.symbols), (), None, ())
             parts = [FamilyPart(CompiledRows(conditions, symbols, given), kinds, 1)]
-            values = [first]
+            values, exact = [first], [exact_first]
             for k, (each, wanted) in enumerate(zip(self.relations, self.items, strict=True)):
                 rows = each.rows
                 if rows.turn is None:
                     rows = rows._replace(rows=tuple(row for row in rows.rows if own & row.symbols))
                 elif not any(own & part.symbols for row in rows.linear for part in row):
                     continue
-                numbers = self.entry_numbers(wanted, each.numbers, k > 0)
+                numbers, exact_numbers = self.entry_numbers(wanted, each.numbers, k > 0)
                 entry = [number for one in each.numbers for number in one.symbol]
                 compiled = CompiledRows(rows, symbols, [*given, *entry])
                 parts.append(FamilyPart(compiled, tuple(one.kind for one in each.numbers), len(numbers)))
                 values.append(numbers)
-            found.append(Component(Family(len(unknowns), tuple(parts)), Member(tuple(values)), unknowns))
+                exact.append(exact_numbers)
+            member = Member(tuple(values), tuple(exact))
+            found.append(Component(Family(len(unknowns), tuple(parts)), member, unknowns))
         return tuple(found)
 
-    def entry_numbers(self, wanted: Wanted, numbers: tuple[EntryNumber, ...], has_own_first: bool) -> ComplexArray:
-        """The numbers (entries, numbers, 2) of a wanted item, from those of the first entry of all."""
-        columns: list[ComplexArray] = []
+    def entry_numbers(
+        self, wanted: Wanted, numbers: tuple[EntryNumber, ...], has_own_first: bool
+    ) -> tuple[ComplexArray, list[list[ExactNumber]]]:
+        """The numbers (entries, numbers, 2) of a wanted item, from those of the first entry of all, and as its file has
+        them."""
+        columns: list[tuple[Array | ComplexArray, float]] = []
         if isinstance(wanted, WantedFunction):
-            columns += [wanted.inputs - wanted.inputs[0], wanted.values - wanted.values[0]]
+            columns += [(wanted.inputs, wanted.inputs[0]), (wanted.values, wanted.values[0])]
         else:
-            columns.append(wanted.places[:, 0] + 1j * wanted.places[:, 1])
+            columns.append((wanted.places[:, 0] + 1j * wanted.places[:, 1], 0.0))
             if isinstance(wanted, WantedPoses):
-                columns.append(wanted.angles - self.items[0].angles[0])  # type: ignore[union-attr]
+                columns.append((wanted.angles, self.items[0].angles[0]))  # type: ignore[union-attr]
             if wanted.inputs is not None:
-                columns.append(wanted.inputs - wanted.inputs[0])
+                columns.append((wanted.inputs, wanted.inputs[0]))
+        entries = range(0 if has_own_first else 1, len(wanted.weights))
+        kinds = [one.kind for one in numbers]
         rows = [
-            [self.scaled(one.kind, complex(column[k])) for one, column in zip(numbers, columns, strict=True)]
-            for k in range(0 if has_own_first else 1, len(wanted.weights))
+            [self.scaled(kind, complex(column[k] - first)) for kind, (column, first) in zip(kinds, columns, strict=True)]
+            for k in entries
         ]
-        return np.array(rows, dtype=complex).reshape(-1, len(numbers), 2)
+        exact = [
+            [
+                self.exact_scale.scaled(kind, complex(column[k]), complex(first))
+                for kind, (column, first) in zip(kinds, columns, strict=True)
+            ]
+            for k in entries
+        ]
+        return np.array(rows, dtype=complex).reshape(-1, len(numbers), 2), exact
 
     def first_values(self) -> dict[int, complex]:
         """The given numbers by their symbols."""

@@ -9,14 +9,16 @@ import numpy as np
 
 from planar.foundation.arrays import Array, ComplexArray
 from planar.synthesis.exact.relations.compiled_rows import CompiledRows
+from planar.synthesis.exact.relations.exact_numbers import ExactNumber
 from planar.synthesis.exact.relations.unknowns import NumberKind
 
 
 class Member(NamedTuple):
     """The numbers of one member: of each part (entries, numbers, 2), a number beside its conjugate; of a turn the angle
-    (rad, complex) stands first."""
+    (rad, complex) stands first. `exact` are those of a task, entry by entry, as its file has them."""
 
     parts: tuple[ComplexArray, ...]
+    exact: tuple[list[list[ExactNumber]], ...] | None = None
 
     def towards(self, other: Member, way: float) -> Member:
         """A member on the straight way to another."""
