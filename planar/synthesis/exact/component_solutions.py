@@ -15,7 +15,7 @@ from planar.synthesis.exact.relations.exact_problem import Component
 from planar.synthesis.exact.relations.family import Member
 from planar.synthesis.exact.tracking.ball_paths import MOST_PATHS
 from planar.synthesis.exact.tracking.bilinear_roots import bilinear_roots
-from planar.synthesis.exact.tracking.exact_certificates import certify_member
+from planar.synthesis.exact.tracking.exact_certificates import ExactCertificates, certify_member
 from planar.synthesis.exact.tracking.family_names import FamilyName
 from planar.synthesis.exact.tracking.generic_store import FamilyRecord, family_record
 from planar.synthesis.exact.tracking.member_homotopy import affine_solutions, homogeneous_solutions
@@ -31,6 +31,8 @@ from planar.synthesis.exact.tracking.symmetry import exchange_images
 
 REAL = 1e-7
 """Of a solution's size: one that differs from its own conjugate by less is real."""
+FAR = 1e4
+"""Sizes of the task: what is farther out is nearly at infinity."""
 FARTHEST = 1e11
 """What is farther out than this is at infinity."""
 
@@ -83,7 +85,13 @@ def _solve(component: Component, record: FamilyRecord, say: Progress) -> Compone
     if is_available() and len(x):
         say(f"{count_phrase(len(x), 'solution')} to be certified")
         proof = certify_member(component.family, component.member, x)
-        x, proved, all_proved = proof.x, proof.proved & proof.is_real, int(proof.proved.sum())
+        # far ones that the file's own numbers do not have are at infinity: doubles are other numbers
+        goes = ~proof.proved & (np.abs(x).max(axis=1) > FAR)
+        whole = _with_infinite(whole, x[goes], whole.classes[goes])
+        whole = whole._replace(x=x[~goes], classes=whole.classes[~goes])
+        proof = ExactCertificates(*(each[~goes] for each in proof))
+        x, is_real = proof.x, is_real[~goes]
+        proved, all_proved = proof.proved & proof.is_real, int(proof.proved.sum())
         is_real = np.where(proof.proved, proof.is_real, is_real)
     wanted = whole.members * len({*whole.classes[is_real].tolist()} - {UNKNOWN})
     missing = max(0, wanted - int(is_real.sum()))
@@ -122,8 +130,19 @@ def with_ball_paths(
     rows = np.setdiff1d(record.classes[open_classes], whole.ball_rows)
     if (whole.members == 1 and whole.found >= many) or not 0 < len(rows) <= MOST_PATHS:
         return whole
-    own, x = proved_in_balls(component.family, record, rows, component.member, say)
+    own, x, infinite = proved_in_balls(component.family, record, rows, component.member, say)
+    infinite_classes = np.array([class_of[k] for k in infinite.tolist()], dtype=int)
+    whole = _with_infinite(whole, np.full((len(infinite), whole.x.shape[1]), np.inf, dtype=complex), infinite_classes)
     return _with_new(record, whole, x, np.array([class_of[k] for k in own.tolist()], dtype=int))
+
+
+def _with_infinite(whole: MemberSolutions, x: ComplexArray, classes: IntArray) -> MemberSolutions:
+    """With ends of paths (solutions, unknowns) that are at infinity."""
+    return whole._replace(
+        doubtful=np.concatenate([whole.doubtful, x]),
+        doubtful_classes=np.append(whole.doubtful_classes, classes),
+        is_doubtful_infinite=np.append(whole.is_doubtful_infinite, np.ones(len(x), dtype=bool)),
+    )
 
 
 def _with_new(record: FamilyRecord, whole: MemberSolutions, more: ComplexArray, of_class: IntArray) -> MemberSolutions:

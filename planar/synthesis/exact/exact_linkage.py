@@ -217,7 +217,7 @@ class _LinkageWriter:
         """Where the input is at every entry of the task's items, in the task's order."""
         by_item: dict[int, Array] = {}
         for k, (relations, wanted) in enumerate(zip(self.problem.relations, self.problem.items, strict=True)):
-            given = self.problem.entry_numbers(wanted, relations.numbers, k > 0)
+            given, _ = self.problem.entry_numbers(wanted, relations.numbers, k > 0)
             positions: list[float] = [] if k else [start]
             for numbers in given:
                 here = entry_values(relations, numbers, self.values)

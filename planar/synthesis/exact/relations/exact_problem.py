@@ -8,12 +8,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from planar.foundation.arrays import ComplexArray
+from planar.foundation.arrays import Array, ComplexArray
+from planar.foundation.units import parse_unit
 from planar.model.mechanism import Mechanism, named_points, relative_motions
 from planar.model.pairs import MeasureKind
 from planar.synthesis.exact.relations.compiled_rows import CompiledRows
 from planar.synthesis.exact.relations.elimination import EntryRows
 from planar.synthesis.exact.relations.entry_relations import EntryNumber, EntryRelations, entry_relations, turned_link
+from planar.synthesis.exact.relations.exact_numbers import ExactNumber, ExactScale
 from planar.synthesis.exact.relations.family import Family, FamilyPart, Member
 from planar.synthesis.exact.relations.given_numbers import add_given_numbers
 from planar.synthesis.exact.relations.polynomials import Polynomial, Symbol
@@ -61,6 +63,7 @@ class ExactProblem:
         self.relations: tuple[EntryRelations, ...] = tuple(map(self._settled, relations))
         self.size = wanted_size(task, _extent(self.pose))
         self.origin = self._origin()
+        self.exact_scale = self._exact_scale()
         self.components = tuple(map(self._component, _groups(self.pose, self.relations)))
         self.fixed = self._component(())
 
@@ -140,6 +143,11 @@ class ExactProblem:
         places = [each.value for each in self.pose.table.given if each.kind is NumberKind.PLACE]
         return complex(places[0]) if places else 0.0
 
+    def _exact_scale(self) -> ExactScale:
+        files = self.task.units, self.mechanism.units
+        lengths, angles = (tuple(map(parse_unit, names)) for names in zip(*((f.length, f.angle) for f in files)))
+        return ExactScale(lengths, angles, self.origin, self.size)
+
     def scaled(self, kind: NumberKind, value: complex) -> tuple[complex, complex]:
         """A number as members have it."""
         if kind is NumberKind.TURN:
@@ -168,7 +176,7 @@ class ExactProblem:
             if rows[k + 1].equation_count:
                 entry = [number for one in each.numbers for number in one.symbol]
                 compiled = CompiledRows(rows[k + 1], symbols, [*numbers, *entry])
-                count = len(self.entry_numbers(self.items[k], each.numbers, k > 0))
+                count = len(self.entry_numbers(self.items[k], each.numbers, k > 0)[0])
                 parts.append(FamilyPart(compiled, tuple(one.kind for one in each.numbers), count))
                 items.append(k)
         found = Component(Family(len(unknowns), tuple(parts)), Member(()), unknowns, given, tuple(items))
@@ -179,9 +187,17 @@ class ExactProblem:
         known = self.given_values(items)
         first = [self.scaled(each.kind, known[each.symbol.own]) for each in component.given]
         parts = [np.array(first, dtype=complex).reshape(1, -1, 2)]
+        exact: list[list[list[ExactNumber]]] = [[[self._exact_given(each, items) for each in component.given]]]
         for k in component.items:
-            parts.append(self.entry_numbers(items[k], self.relations[k].numbers, k > 0, items[0]))
-        return Member(tuple(parts))
+            numbers, exact_numbers = self.entry_numbers(items[k], self.relations[k].numbers, k > 0, items[0])
+            parts.append(numbers)
+            exact.append(exact_numbers)
+        return Member(tuple(parts), tuple(exact))
+
+    def _exact_given(self, given: GivenNumber, items: Sequence[Wanted]) -> ExactNumber:
+        first = self.first_entry.get(given.symbol.own)
+        value, start = (given.value, given.start) if first is None else (first(items[0]), 0.0)
+        return self.exact_scale.scaled(given.kind, complex(value), start)
 
     def given_values(self, items: Sequence[Wanted]) -> dict[int, complex]:
         """The given numbers by their symbols (m, rad), those of the first entry from wanted items."""
@@ -190,22 +206,32 @@ class ExactProblem:
 
     def entry_numbers(
         self, wanted: Wanted, numbers: tuple[EntryNumber, ...], has_own_first: bool, main: Wanted | None = None
-    ) -> ComplexArray:
-        """The numbers (entries, numbers, 2) of a wanted item, from those of the first entry of all, in the `main`."""
-        columns: list[ComplexArray] = []
+    ) -> tuple[ComplexArray, list[list[ExactNumber]]]:
+        """The numbers (entries, numbers, 2) of a wanted item, from those of the first entry of all, in the `main`, and
+        as its file has them."""
+        columns: list[tuple[Array | ComplexArray, float]] = []
         if isinstance(wanted, WantedFunction):
-            columns += [wanted.inputs - wanted.inputs[0], wanted.values - wanted.values[0]]
+            columns += [(wanted.inputs, wanted.inputs[0]), (wanted.values, wanted.values[0])]
         else:
-            columns.append(wanted.places[:, 0] + 1j * wanted.places[:, 1])
+            columns.append((wanted.places[:, 0] + 1j * wanted.places[:, 1], 0.0))
             if isinstance(wanted, WantedPoses):
-                columns.append(wanted.angles - (main or self.items[0]).angles[0])  # type: ignore[union-attr]
+                columns.append((wanted.angles, (main or self.items[0]).angles[0]))  # type: ignore[union-attr]
             if wanted.inputs is not None:
-                columns.append(wanted.inputs - wanted.inputs[0])
+                columns.append((wanted.inputs, wanted.inputs[0]))
+        entries = range(0 if has_own_first else 1, len(wanted.weights))
+        kinds = [one.kind for one in numbers]
         rows = [
-            [self.scaled(one.kind, complex(column[k])) for one, column in zip(numbers, columns, strict=True)]
-            for k in range(0 if has_own_first else 1, len(wanted.weights))
+            [self.scaled(kind, complex(column[k] - first)) for kind, (column, first) in zip(kinds, columns, strict=True)]
+            for k in entries
         ]
-        return np.array(rows, dtype=complex).reshape(-1, len(numbers), 2)
+        exact = [
+            [
+                self.exact_scale.scaled(kind, complex(column[k]), complex(first))
+                for kind, (column, first) in zip(kinds, columns, strict=True)
+            ]
+            for k in entries
+        ]
+        return np.array(rows, dtype=complex).reshape(-1, len(numbers), 2), exact
 
     def first_values(self, items: Sequence[Wanted] | None = None) -> dict[int, complex]:
         """The given numbers by their symbols, as rows have them."""
