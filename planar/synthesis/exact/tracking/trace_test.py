@@ -1,7 +1,7 @@
 """The trace test: whether solutions that were found are all, by a line in the numbers of a family and bilinear slices.
 
-Along a line p + s v of members the solutions are a curve in unknowns and s. The slice s l(x) = 0 with a form l linear in
-the places x meets it at the solutions of the member p and where l vanishes, nowhere at infinity. Other bilinear slices
+Along a line p + s v of members the solutions are a curve in unknowns and s. The slice s l(x) = 0 with l linear in the
+places x meets it at the solutions of the member p and where l vanishes, nowhere at infinity. Other bilinear slices
 are reached from there, and where a slice is moved by a constant, the sums of x and s of all points of an irreducible
 curve move evenly, and those of some of them do not. A. Leykin, J. I. Rodriguez, F. Sottile, Trace test, Arnold Math. J.
 4, 2018, section 3. Slices have the fewer points the fewer numbers a line moves: it moves those of one entry, and those
@@ -11,7 +11,6 @@ that conditions hold, and the solutions of all other rows, a curve, are taken fo
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
 
@@ -45,7 +44,7 @@ Slice = ComplexArray
 
 
 class _SliceHomotopy:
-    """Of each path a homotopy between two slices: `edges` (paths, 2); solutions are (1, places, s; 1, conjugates, s)."""
+    """Of each path a homotopy between two slices; solutions are (1, places, s; 1, conjugates, s)."""
 
     def __init__(
         self,
@@ -140,7 +139,7 @@ class _Slices:
     def _is_even(self) -> bool:
         """Whether the sum of the points of a slice moves evenly with its level."""
         first, *others = self.levels
-        if not all([self.graph.follow_edge(first, level) for level in others]):
+        if not all(self.graph.follow_edge(first, level) for level in others):
             return False
         points = [self.graph.solutions[level] for level in self.levels]
         sums = []
