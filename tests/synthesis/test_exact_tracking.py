@@ -168,18 +168,12 @@ def test_a_multihomogeneous_start_leads_to_the_same_solutions(value, count):
     ends = track_paths(homotopy, normalize(homotopy.starts()), 1e-3, 1e-6, 400)
     V = ends.V[ends.is_single]
     x = affine_solutions(V[first_of_same(V) == np.arange(len(V))])
-    x = x[np.abs(x).max(axis=1) < 1e6]
+    x = x[np.abs(x).max(axis=1) < 1e4]
     assert len(known) == count
     assert all((np.abs(x - each).max(axis=1) < 1e-6 * np.abs(each).max()).any() for each in known)
-    degenerate = [each for each in x if np.abs(known - each).max(axis=1).min() > 1e-6 * np.abs(each).max()]
-    values = component.family.parts[1].rows.nonzero_values
-    numbers = np.concatenate(
-        [
-            np.broadcast_to(component.family.number_values(member, 0), (2 * len(component.family.parts[0].kinds), 4)),
-            component.family.number_values(member, 1),
-        ]
-    )
-    assert all(values(each, numbers).min() < 1e-6 for each in degenerate)
+    others = [each for each in x if np.abs(known - each).max(axis=1).min() > 1e-6 * np.abs(each).max()]
+    pivots = member.parts[0][0, :, :].T.ravel()  # cranks of no length do any function
+    assert len(others) == count % 2 and all(np.abs(each - pivots).max() < 1e-8 for each in others)
 
 
 def test_decimals_of_a_file_are_the_same_in_every_unit():
