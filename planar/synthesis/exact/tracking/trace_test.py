@@ -36,6 +36,8 @@ LEVELS = 1.0 + 0.3j, -0.4 + 1.1j
 """By which a slice is moved, of its greatest coefficient: the sums of its points are compared there and where it is."""
 EVEN = 1e-10
 """Of the size of the sums: by how much a trace may be off."""
+SEPARATE = 1e-9
+"""Of the greatest unknown: solutions whose places are nearer are told from each other by conjugates alone."""
 ON_SLICE = 1e-6
 """Of the size of a point: what s is less than that at the member itself."""
 
@@ -96,6 +98,8 @@ class _Slices:
 
     def __init__(self, family: Family, known: GenericSolutions, V: ComplexArray, rng: np.random.Generator):
         self.size, self.rng = family.size, rng
+        x, one = affine_solutions(V), np.ones((len(V), 1))
+        self.form_size = _form_size(x)
         line = _random_line(family, rng)
 
         def between(slices: Sequence[Slice], edges: IntArray) -> _SliceHomotopy:
@@ -103,7 +107,6 @@ class _Slices:
             return _SliceHomotopy(family, known, line, (every[edges[:, 0]], every[edges[:, 1]]))
 
         self.graph: SolutionGraph[Slice] = SolutionGraph(between, None)
-        x, one = affine_solutions(V), np.ones((len(V), 1))
         W = np.concatenate([one, x[:, : self.size], 0.0 * one, one, x[:, self.size :], 0.0 * one], axis=1)
         first = self.random_slice()
         first[0] = 0.0
@@ -118,11 +121,11 @@ class _Slices:
             self.graph.leaves.add(self.levels[-1])
 
     def random_slice(self) -> Slice:
-        """Coefficients at random; none of conjugates, which places determine."""
+        """Coefficients at random; none of conjugates where places tell solutions from each other."""
         shape = (2, 1 + 2 * self.size)
         result: Slice = self.rng.normal(size=shape) + 1j * self.rng.normal(size=shape)
         result *= np.exp(SPREAD * self.rng.normal(size=shape))
-        result[:, 1 + self.size :] = 0.0
+        result[:, 1 + self.form_size :] = 0.0
         return result
 
     def close(self, most_points: int) -> bool:
@@ -145,7 +148,7 @@ class _Slices:
         sums = []
         for V in points:
             x, s, _ = _affine(V, self.size)
-            sums.append(np.append(x[:, : self.size].sum(axis=0), s.sum()))
+            sums.append(np.append(x[:, : self.form_size].sum(axis=0), s.sum()))
         slopes = [(each - sums[0]) / level for each, level in zip(sums[1:], LEVELS, strict=True)]
         size = max(float(np.abs(each).max()) for each in sums)
         return len({*map(len, points)}) == 1 and bool(np.abs(slopes[1] - slopes[0]).max() <= EVEN * max(size, 1.0))
@@ -155,6 +158,13 @@ class _Slices:
         x, s, _ = _affine(self.graph.solutions[0], self.size)
         result: ComplexArray = x[np.abs(s) < ON_SLICE * np.maximum(1.0, np.abs(x).max(axis=1))]
         return result
+
+
+def _form_size(x: ComplexArray) -> int:
+    """How many unknowns a slice's form has for solutions x (solutions, unknowns): the places, or the conjugates too."""
+    half = x.shape[1] // 2
+    apart = np.abs(x[:, None, :half] - x[:, :half]).max(axis=2) + np.where(np.eye(len(x)), np.inf, 0.0)
+    return half if apart.min() > SEPARATE * max(1.0, float(np.abs(x).max())) else 2 * half
 
 
 def _random_line(family: Family, rng: np.random.Generator) -> tuple[ComplexArray, ...]:
