@@ -1,4 +1,4 @@
-"""An instruction list on complex numbers as machine code over many columns, with the numpy code where there is no LLVM."""
+"""An instruction list on complex numbers as machine code over many columns, and by numpy where there is no LLVM."""
 
 from __future__ import annotations
 

@@ -230,7 +230,7 @@ def test_a_search_for_all_solutions_goes_on_where_it_was(monkeypatch):
         pass
 
     class Kept:
-        content, many = None, 3
+        content, many = None, 1
 
         def read(self):
             return self.content

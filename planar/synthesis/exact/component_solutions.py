@@ -17,7 +17,7 @@ from planar.synthesis.exact.tracking.ball_paths import MOST_PATHS
 from planar.synthesis.exact.tracking.bilinear_roots import bilinear_roots
 from planar.synthesis.exact.tracking.exact_certificates import ExactCertificates, certify_member
 from planar.synthesis.exact.tracking.family_names import FamilyName
-from planar.synthesis.exact.tracking.generic_store import FamilyRecord, family_record
+from planar.synthesis.exact.tracking.generic_store import FamilyRecord, family_record, tested_record
 from planar.synthesis.exact.tracking.member_homotopy import affine_solutions, homogeneous_solutions
 from planar.synthesis.exact.tracking.member_solutions import (
     MemberSolutions,
@@ -51,6 +51,11 @@ class ComponentSolutions(NamedTuple):
     nearly_singular: int
     "how many solutions lie so near to others, or so far out, that doubles do not tell them"
 
+    @property
+    def far_count(self) -> int:
+        """How many real ones are nearly at infinity."""
+        return int((np.abs(self.x).max(axis=1, initial=0.0) > FAR).sum())
+
 
 def solve_components(components: Sequence[Component], say: Progress) -> list[ComponentSolutions]:
     """The solutions of each component; those that are the same member of a family are solved once."""
@@ -73,6 +78,22 @@ def _in_order(solved: ComponentSolutions, record: FamilyRecord) -> ComponentSolu
         order[[k, half + k]] = own, half + own
     whole = solved.whole._replace(x=solved.whole.x[:, order], doubtful=solved.whole.doubtful[:, order])
     return solved._replace(record=record, whole=whole, x=solved.x[:, order])
+
+
+def with_tested_records(solved: Sequence[ComponentSolutions], say: Progress) -> list[ComponentSolutions]:
+    """The same after the trace tests of their families; solved again where a test shows that some were missing."""
+    records: dict[str, FamilyRecord] = {}
+    tested = []
+    for each in solved:
+        record = each.record
+        if not record.is_tested:
+            if record.name.text not in records:
+                say(f"trace test of {count_phrase(len(record.solutions.V), 'solution')} of a random task")
+                records[record.name.text] = tested_record(each.component.family, record)
+            record = family_record(each.component.family)
+        has_more = len(record.solutions.V) > len(each.record.solutions.V)
+        tested.append(_solve(each.component, record, say) if has_more else each._replace(record=record))
+    return tested
 
 
 def _solve(component: Component, record: FamilyRecord, say: Progress) -> ComponentSolutions:

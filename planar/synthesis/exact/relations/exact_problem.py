@@ -145,7 +145,9 @@ class ExactProblem:
 
     def _exact_scale(self) -> ExactScale:
         files = self.task.units, self.mechanism.units
-        lengths, angles = (tuple(map(parse_unit, names)) for names in zip(*((f.length, f.angle) for f in files)))
+        lengths, angles = (
+            tuple(map(parse_unit, names)) for names in ((each.length for each in files), (each.angle for each in files))
+        )
         return ExactScale(lengths, angles, self.origin, self.size)
 
     def scaled(self, kind: NumberKind, value: complex) -> tuple[complex, complex]:
@@ -221,7 +223,10 @@ class ExactProblem:
         entries = range(0 if has_own_first else 1, len(wanted.weights))
         kinds = [one.kind for one in numbers]
         rows = [
-            [self.scaled(kind, complex(column[k] - first)) for kind, (column, first) in zip(kinds, columns, strict=True)]
+            [
+                self.scaled(kind, complex(column[k] - first))
+                for kind, (column, first) in zip(kinds, columns, strict=True)
+            ]
             for k in entries
         ]
         exact = [

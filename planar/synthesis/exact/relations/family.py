@@ -76,9 +76,9 @@ class Family(NamedTuple):
         along = np.empty_like(f)
         for k, part in enumerate(self.parts):
             q, dq = _values(part, begin.parts[k], change[k], way, turns_are_straight)
-            blocks = ([q], [dq]) if k == 0 else ([first_q, q], [first_dq, dq])
             if k == 0:
-                first_q, first_dq = q, dq
+                first = q, dq
+            blocks = ([q], [dq]) if k == 0 else ([first[0], q], [first[1], dq])
             if not part.rows.equation_count:
                 continue
             values, slopes, changes = part.rows.evaluate(x, *blocks)

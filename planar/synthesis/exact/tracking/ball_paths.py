@@ -33,8 +33,8 @@ SAFETY, FACTORS = 0.8, (0.2, 2.0)
 
 
 def follow_in_balls(family: Family, begin: Member, x: ComplexArray, end: Member) -> ComplexArray:
-    """Solutions x (paths, unknowns) of one member followed to another; infinite where a path goes there, no numbers where
-    it does not come to an end."""
+    """Solutions x (paths, unknowns) of one member followed to another; infinite where a path goes to
+    infinity, no numbers where it does not come to an end."""
     found = np.full_like(x, np.nan)
     with ball_precision():
         for k, own in enumerate(x):

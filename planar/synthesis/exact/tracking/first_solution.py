@@ -85,9 +85,7 @@ class _RandomLinkage:
         part = self.family.parts[k]
         for _ in range(STEPS):
             f, _, slope = self._linearise(k)
-            f, slope = (
-                np.moveaxis(each.reshape(-1, part.entry_count, *each.shape[1:]), 1, 0) for each in (f, slope)
-            )
+            f, slope = (np.moveaxis(each.reshape(-1, part.entry_count, *each.shape[1:]), 1, 0) for each in (f, slope))
             is_finite = np.isfinite(slope).all(axis=(1, 2)) & np.isfinite(f).all(axis=1)
             slope = np.where(is_finite[:, None, None], slope, 0.0)
             is_closed = is_finite & (np.abs(f) <= CLOSED * np.abs(slope).sum(axis=2)).all(axis=1)
@@ -96,14 +94,16 @@ class _RandomLinkage:
             step = -(np.linalg.pinv(slope) @ np.where(is_finite[:, None], f, 0.0)[..., None])[..., 0]
             self._change_numbers(k, np.array([_limited(each) for each in step]))
         first, own = (self.family.number_values(self.member, each) for each in (0, k))
-        sizes = part.rows.nonzero_values(self.x, np.concatenate([np.broadcast_to(first, (len(first), part.entry_count)), own]))
+        sizes = part.rows.nonzero_values(
+            self.x, np.concatenate([np.broadcast_to(first, (len(first), part.entry_count)), own])
+        )
         closed: BoolArray = is_closed & (sizes > DEGENERATE).all(axis=0)
         return closed
 
     def is_regular(self) -> bool:
         """Whether the member has this solution once."""
         still = [np.zeros_like(each) for each in self.member.parts]
-        f, slope, _ = self.family.rows_at(self.x[:, None], self.member, still, np.zeros(1))
+        slope = self.family.rows_at(self.x[:, None], self.member, still, np.zeros(1))[1]
         size = np.linalg.norm(slope[..., 0], axis=1, keepdims=True)
         if not np.isfinite(slope).all() or not (size > 0.0).all():
             return False

@@ -46,9 +46,7 @@ class MemberInBalls:
         return f, slope
 
 
-def _number_balls(
-    kinds: Sequence[NumberKind], numbers: ComplexArray, exact: Sequence[ExactNumber] | None
-) -> list[Any]:
+def _number_balls(kinds: Sequence[NumberKind], numbers: ComplexArray, exact: Sequence[ExactNumber] | None) -> list[Any]:
     """The numbers of an entry, each beside its conjugate."""
     if exact is None:
         return [ball(complex(each)) for pair in numbers for each in pair]

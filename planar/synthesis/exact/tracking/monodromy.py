@@ -73,7 +73,9 @@ class GenericSearch:
         store: GraphStore | None = None,
     ):
         self.family, self.seed, self.progress, self.store = family, seed, progress, store
-        self.graph: SolutionGraph[Member] = SolutionGraph(lambda nodes, edges: EdgeHomotopy(family, nodes, edges), images)
+        self.graph: SolutionGraph[Member] = SolutionGraph(
+            lambda nodes, edges: EdgeHomotopy(family, nodes, edges), images
+        )
         kept = None if store is None else store.read()
         if kept is not None:
             take_arrays(self.graph, len(family.parts), kept)
@@ -83,6 +85,12 @@ class GenericSearch:
         """The member with the most solutions that are known."""
         best = max(range(len(self.graph.nodes)), key=lambda k: len(self.graph.solutions[k]))
         return GenericSolutions(self.graph.nodes[best], self.graph.solutions[best])
+
+    def extend(self, known: GenericSolutions) -> GenericSolutions:
+        """The solutions of a member with those that members of this search lead to."""
+        self.graph.add_node(known.member, known.V)
+        self.close()
+        return GenericSolutions(self.graph.nodes[0], self.graph.solutions[0])
 
     def close(self, enough: int | None = None) -> None:
         """Go round between the members until linkages of others bring nothing new, or so many are known."""

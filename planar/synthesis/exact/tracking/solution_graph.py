@@ -27,8 +27,8 @@ Node = TypeVar("Node")
 
 
 class SolutionGraph(Generic[Node]):
-    """Nodes and solutions; of solutions that are `images` of each other one stands for all. `between` gives the homotopy
-    of paths along edges (paths, 2) between some nodes."""
+    """Nodes and solutions; of solutions that are `images` of each other one stands for all. `between` gives the
+    homotopy of paths along edges (paths, 2) between some nodes."""
 
     def __init__(
         self, between: Callable[[Sequence[Node], IntArray], Homotopy | PathwiseHomotopy], images: Images | None

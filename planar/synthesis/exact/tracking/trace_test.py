@@ -1,7 +1,7 @@
 """The trace test: whether solutions that were found are all, by a line in the numbers of a family and bilinear slices.
 
-Along a line p + s v of members the solutions are a curve in unknowns and s. The slice s l(x) = 0 with a form l linear in
-the places x meets it at the solutions of the member p and where l vanishes, nowhere at infinity. Other bilinear slices
+Along a line p + s v of members the solutions are a curve in unknowns and s. The slice s l(x) = 0 with l linear in the
+places x meets it at the solutions of the member p and where l vanishes, nowhere at infinity. Other bilinear slices
 are reached from there, and where a slice is moved by a constant, the sums of x and s of all points of an irreducible
 curve move evenly, and those of some of them do not. A. Leykin, J. I. Rodriguez, F. Sottile, Trace test, Arnold Math. J.
 4, 2018, section 3. Slices have the fewer points the fewer numbers a line moves: it moves those of one entry, and those
@@ -11,7 +11,6 @@ that conditions hold, and the solutions of all other rows, a curve, are taken fo
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
 
@@ -37,6 +36,8 @@ LEVELS = 1.0 + 0.3j, -0.4 + 1.1j
 """By which a slice is moved, of its greatest coefficient: the sums of its points are compared there and where it is."""
 EVEN = 1e-10
 """Of the size of the sums: by how much a trace may be off."""
+SEPARATE = 1e-9
+"""Of the greatest unknown: solutions whose places are nearer are told from each other by conjugates alone."""
 ON_SLICE = 1e-6
 """Of the size of a point: what s is less than that at the member itself."""
 
@@ -45,7 +46,7 @@ Slice = ComplexArray
 
 
 class _SliceHomotopy:
-    """Of each path a homotopy between two slices: `edges` (paths, 2); solutions are (1, places, s; 1, conjugates, s)."""
+    """Of each path a homotopy between two slices; solutions are (1, places, s; 1, conjugates, s)."""
 
     def __init__(
         self,
@@ -97,6 +98,8 @@ class _Slices:
 
     def __init__(self, family: Family, known: GenericSolutions, V: ComplexArray, rng: np.random.Generator):
         self.size, self.rng = family.size, rng
+        x, one = affine_solutions(V), np.ones((len(V), 1))
+        self.form_size = _form_size(x)
         line = _random_line(family, rng)
 
         def between(slices: Sequence[Slice], edges: IntArray) -> _SliceHomotopy:
@@ -104,7 +107,6 @@ class _Slices:
             return _SliceHomotopy(family, known, line, (every[edges[:, 0]], every[edges[:, 1]]))
 
         self.graph: SolutionGraph[Slice] = SolutionGraph(between, None)
-        x, one = affine_solutions(V), np.ones((len(V), 1))
         W = np.concatenate([one, x[:, : self.size], 0.0 * one, one, x[:, self.size :], 0.0 * one], axis=1)
         first = self.random_slice()
         first[0] = 0.0
@@ -119,11 +121,11 @@ class _Slices:
             self.graph.leaves.add(self.levels[-1])
 
     def random_slice(self) -> Slice:
-        """Coefficients at random; none of conjugates, which places determine."""
+        """Coefficients at random; none of conjugates where places tell solutions from each other."""
         shape = (2, 1 + 2 * self.size)
         result: Slice = self.rng.normal(size=shape) + 1j * self.rng.normal(size=shape)
         result *= np.exp(SPREAD * self.rng.normal(size=shape))
-        result[:, 1 + self.size :] = 0.0
+        result[:, 1 + self.form_size :] = 0.0
         return result
 
     def close(self, most_points: int) -> bool:
@@ -140,13 +142,13 @@ class _Slices:
     def _is_even(self) -> bool:
         """Whether the sum of the points of a slice moves evenly with its level."""
         first, *others = self.levels
-        if not all([self.graph.follow_edge(first, level) for level in others]):
+        if not all(self.graph.follow_edge(first, level) for level in others):
             return False
         points = [self.graph.solutions[level] for level in self.levels]
         sums = []
         for V in points:
             x, s, _ = _affine(V, self.size)
-            sums.append(np.append(x[:, : self.size].sum(axis=0), s.sum()))
+            sums.append(np.append(x[:, : self.form_size].sum(axis=0), s.sum()))
         slopes = [(each - sums[0]) / level for each, level in zip(sums[1:], LEVELS, strict=True)]
         size = max(float(np.abs(each).max()) for each in sums)
         return len({*map(len, points)}) == 1 and bool(np.abs(slopes[1] - slopes[0]).max() <= EVEN * max(size, 1.0))
@@ -156,6 +158,13 @@ class _Slices:
         x, s, _ = _affine(self.graph.solutions[0], self.size)
         result: ComplexArray = x[np.abs(s) < ON_SLICE * np.maximum(1.0, np.abs(x).max(axis=1))]
         return result
+
+
+def _form_size(x: ComplexArray) -> int:
+    """How many unknowns a slice's form has for solutions x (solutions, unknowns): the places, or the conjugates too."""
+    half = x.shape[1] // 2
+    apart = np.abs(x[:, None, :half] - x[:, :half]).max(axis=2) + np.where(np.eye(len(x)), np.inf, 0.0)
+    return half if apart.min() > SEPARATE * max(1.0, float(np.abs(x).max())) else 2 * half
 
 
 def _random_line(family: Family, rng: np.random.Generator) -> tuple[ComplexArray, ...]:
