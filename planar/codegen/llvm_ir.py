@@ -103,6 +103,15 @@ class IRWriter:
     def store(self, value: str, pointer: str) -> None:
         self.write_line(f"store {self.vector} {value}, ptr {pointer}, align 8")
 
+    def store_pairs(self, first: str, second: str, pointer: str) -> None:
+        """Store the first and the second numbers of as many pairs as there are lanes."""
+        both = f"<{2 * self.lanes} x double>"
+        order = ", ".join(f"i32 {k}, i32 {k + self.lanes}" for k in range(self.lanes))
+        pairs = self.add_instruction(
+            f"shufflevector {self.vector} {first}, {self.vector} {second}, <{2 * self.lanes} x i32> <{order}>"
+        )
+        self.write_line(f"store {both} {pairs}, ptr {pointer}, align 8")
+
     def store_streaming(self, value: str, pointer: str) -> None:
         """Store what is not read again soon, past the caches; where whole vectors begin."""
         self._store_streaming(self.vector, value, pointer)

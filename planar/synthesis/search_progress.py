@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from planar.model.wording import amount
 from planar.synthesis.task.synthesis_task import SynthesisTask
 from planar.synthesis.task.task_numbers import miss_kind
+
+if TYPE_CHECKING:
+    from planar.synthesis.exact.complete_synthesis import CompleteSynthesis
 
 
 class SearchProgress(NamedTuple):
@@ -15,7 +18,8 @@ class SearchProgress(NamedTuple):
     `stage` is "catalogue", "matches", "fit" or "judgement" of the `round`-th catalogue of the start.
     `best` is the least error of a sound design so far (m, or rad where functions of angles alone are wanted; infinite
     where there is none) and `best_share` the same beside the extent of the places that are wanted, where there are
-    some. Of a complete list `stage` says what is done, and the rest nothing.
+    some. Of a complete list `stage` says what is done, and the rest nothing; `result` is the list where its designs
+    are proved and what is left is the test that they are all.
     """
 
     start: str
@@ -25,11 +29,12 @@ class SearchProgress(NamedTuple):
     stage: str
     best: float
     best_share: float
+    result: CompleteSynthesis | None = None
 
 
-def progress_of_list(stage: str) -> SearchProgress:
+def progress_of_list(stage: str, result: CompleteSynthesis | None = None) -> SearchProgress:
     """How far a complete list is, in words."""
-    return SearchProgress("", 0, None, 0, stage, float("inf"), float("inf"))
+    return SearchProgress("", 0, None, 0, stage, float("inf"), float("inf"), result)
 
 
 def progress_words(done: SearchProgress, task: SynthesisTask) -> str:

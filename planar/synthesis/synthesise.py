@@ -59,7 +59,9 @@ def synthesise(
     is told what is being done.
 
     With `complete` all linkages of one start are found that meet exactly as much as it can meet, each certified where
-    python-flint is there; `many`, `seed`, `time_limit` and `folder` are not for that.
+    python-flint is there; `many`, `seed`, `time_limit` and `folder` are not for that. For a kind of task that was never
+    solved before, a test that these are all follows: `progress` gets the list before, and a KeyboardInterrupt meanwhile
+    returns it with `is_finished` False.
 
     Raises BadInput with the place in the task's file, for a folder that holds something else, and where no complete
     list can be made.
@@ -77,7 +79,14 @@ def synthesise(
 
         if (many, seed, time_limit, folder) != (10, 0, None, None):
             raise BadInput("complete", "a complete list is one, whole: leave many, seed, time_limit and folder out")
-        return synthesise_all(known, progress and (lambda said: progress(progress_of_list(said))))
+        if progress is None:
+            return synthesise_all(known)
+        report = progress
+        return synthesise_all(
+            known,
+            lambda stage: report(progress_of_list(stage)),
+            lambda result: report(progress_of_list("trace test", result)),
+        )
     check_whole_number("many", many, 1, 1000)
     check_whole_number("seed", seed, 0)
     _refuse_excess(known)

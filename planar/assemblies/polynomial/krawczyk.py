@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from fractions import Fraction
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -48,6 +49,14 @@ def ball(value: complex) -> Any:
     from flint import acb
 
     return acb(value.real, value.imag)
+
+
+def exact_ball(real: Fraction, imaginary: Fraction, pi_multiple: Fraction) -> Any:
+    """real + i imaginary + pi pi_multiple, enclosed."""
+    from flint import acb, arb, fmpq
+
+    x, y, turn = (arb(fmpq(each.numerator, each.denominator)) for each in (real, imaginary, pi_multiple))
+    return acb(x + turn * arb.pi() if pi_multiple else x, y)
 
 
 def direction_ball(angle: Any) -> Any:

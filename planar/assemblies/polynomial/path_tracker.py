@@ -1,7 +1,8 @@
 """Solutions of a block's polynomials followed from those of others of its structure, all paths side by side.
 
-Predictor by Runge and Kutta's fourth order, corrector by Newton, in homogeneous coordinates, so that what goes to
-infinity is followed like the rest; each path takes steps of its own. A. P. Morgan, A. J. Sommese,
+Predictor by the polynomial through the last points and their tangents (Hermite), corrector by Newton, in homogeneous
+coordinates, so that what goes to infinity is followed like the rest; each path takes steps of its own. Two evaluations
+a step: the second correction's Jacobian also gives the next tangent. A. P. Morgan, A. J. Sommese,
 Coefficient-parameter polynomial continuation, Appl. Math. Comput. 29, 1989; A. J. Sommese, C. W. Wampler, The Numerical
 Solution of Systems of Polynomials, 2005.
 """
@@ -10,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from itertools import combinations
-from typing import NamedTuple
+from typing import NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -28,7 +29,9 @@ END_VISIBLE_DISTANCE = 1e-6
 """Of the way: paths that come nearer to the end than this are not lost."""
 CORRECTION_TOLERANCE = 1e-9
 """What Newton's second step may still move a solution by."""
-STEP_SAFETY, STEP_FACTORS, SHRINKING_FACTORS = 0.9, (0.5, 2.5), (0.1, 0.6)
+HISTORY = 3
+"""Points of a path that the predictor goes through at most."""
+STEP_SAFETY, STEP_FACTORS, SHRINKING_FACTORS = 0.9, (0.5, 2.0), (0.1, 0.6)
 """Of the step that corrections call for; bounds of a step over the one before it, and over one that failed."""
 SINGULAR_TOLERANCE = 1e-9
 """Least singular value, of the largest, at which a solution counts as single."""
@@ -57,6 +60,14 @@ class PathEnds(NamedTuple):
 HomotopyValues = tuple[ComplexArray, ComplexArray, ComplexArray]
 Homotopy = Callable[[ComplexArray, Array], HomotopyValues]
 """Solutions (paths, 2 many), how far on the way (paths,) -> equations (paths, rows), slope, derivative along it."""
+
+
+@runtime_checkable
+class PathwiseHomotopy(Protocol):
+    """A homotopy whose beginning and end differ from path to path."""
+
+    def at_paths(self, paths: IntArray) -> Homotopy:
+        """The homotopy of some of the paths, in this order."""
 
 
 class CoefficientHomotopy:
@@ -149,28 +160,104 @@ def track_paths(
     way, step = np.zeros(len(V), V.real.dtype), np.full(len(V), FIRST_STEP, V.real.dtype)
     least_step = MIN_STEP * min(1.0, float(np.finfo(V.real.dtype).eps / np.finfo(float).eps))
     busy = np.arange(len(V))
+    current = _at_paths(homotopy, busy)
+    history = _History(V, _tangent(current, V, way) if len(V) else V)
     for _ in range(most_steps):
         if busy.size == 0:
             break
-        here, t = V[busy], way[busy]
+        t = way[busy]
         h = np.minimum(step[busy], 1.0 - t)
         ahead = np.where(h == 1.0 - t, 1.0, t + h)
         with np.errstate(all="ignore"):
-            tried, first, second = _runge_kutta_step(homotopy, here, t, h, ahead)
+            corrected, tangent, first, second = _predict_and_correct(current, history, h, ahead)
         good = (first < near) & (second < correction)
+        order = history.point_counts
         taken = busy[good]
-        V[taken], way[taken] = tried[good], ahead[good]
-        step[busy] = h * _step_factors(first / near, second / correction, good)
-        busy = busy[(way[busy] < 1.0) & (step[busy] > least_step * np.maximum(1.0 - way[busy], 1e-3))]
+        way[taken] = ahead[good]
+        step[busy] = h * _step_factors(first / near, second / correction, good, order)
+        history.add(good, corrected, tangent, t, ahead)
+        V[taken] = history.V[good]
+        goes_on = (way[busy] < 1.0) & (step[busy] > least_step * np.maximum(1.0 - way[busy], 1e-3))
+        if not goes_on.all():
+            busy = busy[goes_on]
+            history.keep(goes_on)
+            current = _at_paths(homotopy, busy)
     return refine_ends(homotopy, V, way >= 1.0)._replace(is_near_end=way > 1.0 - END_VISIBLE_DISTANCE)
 
 
-def _step_factors(first: Array, second: Array, good: BoolArray) -> Array:
-    """The next step over the last, by corrections over what they may be. The first grows with the fifth power of the
-    step, the second with the tenth, and is what most steps fail by."""
+def _at_paths(homotopy: Homotopy, paths: IntArray) -> Homotopy:
+    return homotopy.at_paths(paths) if isinstance(homotopy, PathwiseHomotopy) else homotopy
+
+
+class _History:
+    """The last points of paths with their tangents, in the patch <V, .> = 1 of the current point V, the last of them.
+
+    `points` and `tangents` are (points, paths, 2, entries of a half), the latest first; `ways` (points, paths) are how
+    far they are from there, of which `point_counts` (paths,) are in use.
+    """
+
+    def __init__(self, V: ComplexArray, tangent: ComplexArray):
+        self.V = V
+        shape = (HISTORY, len(V), 2, V.shape[1] // 2)
+        self.points: ComplexArray = np.zeros(shape, dtype=V.dtype)
+        self.tangents: ComplexArray = np.zeros(shape, dtype=V.dtype)
+        self.points[0], self.tangents[0] = V.reshape(shape[1:]), tangent.reshape(shape[1:])
+        self.ways: Array = np.zeros(shape[:2], dtype=V.real.dtype)
+        self.point_counts: IntArray = np.ones(len(V), dtype=int)
+
+    def keep(self, paths: BoolArray) -> None:
+        """Leave the other paths out."""
+        self.V, self.points, self.tangents = self.V[paths], self.points[:, paths], self.tangents[:, paths]
+        self.ways, self.point_counts = self.ways[:, paths], self.point_counts[paths]
+
+    def add(self, paths: BoolArray, V: ComplexArray, tangent: ComplexArray, way: Array, ahead: Array) -> None:
+        """Take the next point of some paths, which is made the current one."""
+        if not paths.any():
+            return
+        size = (len(self.V), 2, -1)
+        points = np.concatenate([V.reshape(size)[None], self.points[:-1]])
+        tangents = np.concatenate([tangent.reshape(size)[None], self.tangents[:-1]])
+        with np.errstate(all="ignore"):
+            normal = normalize(V)
+            patch = normal.reshape(size).conj()
+            inside = np.einsum("pbu,kpbu->kpb", patch, points)[..., None]
+            scale = 1.0 / np.where(inside == 0.0, 1.0, inside)
+            points = points * scale
+            tangents = tangents * scale
+            tangents -= points * np.einsum("pbu,kpbu->kpb", patch, tangents)[..., None]
+        chosen = paths[None, :, None, None]
+        self.points, self.tangents = np.where(chosen, points, self.points), np.where(chosen, tangents, self.tangents)
+        self.V = np.where(paths[:, None], normal, self.V)
+        ways = np.concatenate([np.zeros_like(ahead)[None], self.ways[:-1] + (way - ahead)])
+        self.ways = np.where(paths, ways, self.ways)
+        self.point_counts = np.where(paths, np.minimum(self.point_counts + 1, HISTORY), self.point_counts)
+
+    def predict(self, h: Array) -> ComplexArray:
+        """The points a step h (paths,) ahead, on the polynomials through all that is in use."""
+        used = np.arange(HISTORY)[:, None] < self.point_counts
+        value, slope = np.ones_like(self.ways), np.zeros_like(self.ways)
+        for k in range(HISTORY):
+            for other in range(HISTORY):
+                if k == other:
+                    continue
+                is_used = used[other] & used[k]
+                apart = np.where(is_used, self.ways[k] - self.ways[other], 1.0)
+                value[k] *= np.where(is_used, (h - self.ways[other]) / apart, 1.0)
+                slope[k] += np.where(is_used, 1.0 / apart, 0.0)
+        weight = np.where(used, value**2, 0.0)
+        beyond = h - self.ways
+        points = np.einsum("kp,kpbu->pbu", weight * (1.0 - 2.0 * beyond * slope), self.points)
+        result: ComplexArray = points + np.einsum("kp,kpbu->pbu", weight * beyond, self.tangents)
+        return result.reshape(len(self.V), -1)
+
+
+def _step_factors(first: Array, second: Array, good: BoolArray, points: IntArray) -> Array:
+    """The next step over the last, by corrections over what they may be. The first grows with the power of the step
+    that twice the points of the predictor make, the second with its square."""
+    order = 0.5 / points
     with np.errstate(all="ignore"):
         factors = STEP_SAFETY * np.minimum(
-            (0.25 / np.maximum(first, 1e-300)) ** 0.2, (0.1 / np.maximum(second, 1e-300)) ** 0.1
+            (0.25 / np.maximum(first, 1e-300)) ** order, (0.1 / np.maximum(second, 1e-300)) ** (0.5 * order)
         )
     factors = np.where(np.isfinite(factors), factors, 0.0)
     return np.where(good, np.clip(factors, *STEP_FACTORS), np.clip(factors, *SHRINKING_FACTORS))
@@ -194,23 +281,18 @@ def refine_ends(homotopy: Homotopy, V: ComplexArray, arrived: BoolArray) -> Path
     return PathEnds(V, regular, arrived, arrived.copy())
 
 
-def _runge_kutta_step(
-    at: Homotopy, V: ComplexArray, way: Array, h: Array, ahead: Array
-) -> tuple[ComplexArray, Array, Array]:
-    """Solutions a step on, and how far Newton's two corrections moved them."""
-    wide = h[:, None]
-    k1 = _tangent(at, V, V, way)
-    k2 = _tangent(at, V, V + 0.5 * wide * k1, way + 0.5 * h)
-    k3 = _tangent(at, V, V + 0.5 * wide * k2, way + 0.5 * h)
-    k4 = _tangent(at, V, V + wide * k3, ahead)
-    tried = V + wide / 6.0 * (k1 + 2.0 * (k2 + k3) + k4)
-    sizes = []
-    for _ in range(2):
-        moved, _ = _newton_step(at, V, tried, ahead)
-        tried = tried + moved
-        size = np.linalg.norm(moved, axis=1)
-        sizes.append(np.where(np.isfinite(size), size, np.inf))
-    return normalize(np.where(np.isfinite(sizes[1])[:, None], tried, V)), sizes[0], sizes[1]
+def _predict_and_correct(
+    at: Homotopy, history: _History, h: Array, ahead: Array
+) -> tuple[ComplexArray, ComplexArray, Array, Array]:
+    """Solutions a step on, their tangents, and how far Newton's two corrections moved them."""
+    tried = history.predict(h)
+    moved, _ = _newton_step(at, history.V, tried, ahead)
+    tried = tried + moved
+    left, slope, along = at(tried, ahead)
+    both = _solve_batch(_with_patch_rows(slope, history.V), _with_no_patch_rows(np.stack([-left, -along], axis=2)))
+    first, second = (np.linalg.norm(each, axis=1) for each in (moved, both[..., 0]))
+    first, second = (np.where(np.isfinite(each), each, np.inf) for each in (first, second))
+    return tried + both[..., 0], both[..., 1], first, second
 
 
 def _with_patch_rows(slope: ComplexArray, patch: ComplexArray) -> ComplexArray:
@@ -222,30 +304,31 @@ def _with_patch_rows(slope: ComplexArray, patch: ComplexArray) -> ComplexArray:
 
 
 def _with_no_patch_rows(right: ComplexArray) -> ComplexArray:
-    """Right sides with nothing for these two rows."""
-    found = np.zeros((len(right), right.shape[1] + 2), dtype=complex)
+    """Right sides (paths, rows, sides) with nothing for these two rows."""
+    found = np.zeros((len(right), right.shape[1] + 2, right.shape[2]), dtype=complex)
     found[:, :-2] = right
     return found
 
 
-def _tangent(at: Homotopy, patch: ComplexArray, V: ComplexArray, way: Array) -> ComplexArray:
+def _tangent(at: Homotopy, V: ComplexArray, way: Array) -> ComplexArray:
     _, slope, along = at(V, way)
-    return _solve_batch(_with_patch_rows(slope, patch), _with_no_patch_rows(-along))
+    return _solve_batch(_with_patch_rows(slope, V), _with_no_patch_rows(-along[..., None]))[..., 0]
 
 
 def _newton_step(at: Homotopy, patch: ComplexArray, V: ComplexArray, way: Array) -> tuple[ComplexArray, ComplexArray]:
     left, slope, _ = at(V, way)
     slope = _with_patch_rows(slope, patch)
-    return _solve_batch(slope, _with_no_patch_rows(-left)), slope
+    return _solve_batch(slope, _with_no_patch_rows(-left[..., None]))[..., 0], slope
 
 
 def _solve_batch(slope: ComplexArray, right: ComplexArray) -> ComplexArray:
+    """Solutions (paths, unknowns, sides) for right sides (paths, rows, sides)."""
     try:
-        return np.linalg.solve(slope, right[..., None])[..., 0]
+        return np.linalg.solve(slope, right)
     except np.linalg.LinAlgError:
         bad = np.logical_not(np.isfinite(slope).all(axis=(1, 2)))
         slope = np.where(bad[:, None, None], np.eye(slope.shape[1]), slope)
-        return _matrix_times_vector(np.linalg.pinv(slope), np.where(bad[:, None], np.nan, right))
+        return np.linalg.pinv(slope) @ np.where(bad[:, None, None], np.nan, right)
 
 
 def normalize(V: ComplexArray) -> ComplexArray:

@@ -15,9 +15,10 @@ from planar.synthesis.synthesis import Synthesis, SynthesisedDesign
 class ExactDesign(SynthesisedDesign):
     """A linkage that meets a task exactly. `certified`: a box of its own is proved to hold it and no other; defective
     ones are listed, too, and say so in `defects` and `shortages`. `numbers` are those that were sought, by name
-    (SI)."""
+    (SI); links that are `opposite` have a negative length, and points in its place."""
 
     certified: bool = False
+    opposite: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
         word = "certified" if self.certified else "not certified"

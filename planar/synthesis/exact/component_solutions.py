@@ -15,8 +15,9 @@ from planar.synthesis.exact.relations.exact_problem import Component
 from planar.synthesis.exact.relations.family import Member
 from planar.synthesis.exact.tracking.ball_paths import MOST_PATHS
 from planar.synthesis.exact.tracking.bilinear_roots import bilinear_roots
-from planar.synthesis.exact.tracking.exact_certificates import certify_member
-from planar.synthesis.exact.tracking.generic_store import FamilyRecord, family_record
+from planar.synthesis.exact.tracking.exact_certificates import ExactCertificates, certify_member
+from planar.synthesis.exact.tracking.family_names import FamilyName
+from planar.synthesis.exact.tracking.generic_store import FamilyRecord, family_record, tested_record
 from planar.synthesis.exact.tracking.member_homotopy import affine_solutions, homogeneous_solutions
 from planar.synthesis.exact.tracking.member_solutions import (
     MemberSolutions,
@@ -26,10 +27,12 @@ from planar.synthesis.exact.tracking.member_solutions import (
     solve_member,
 )
 from planar.synthesis.exact.tracking.other_ways import UNKNOWN
-from planar.synthesis.exact.tracking.symmetry import FamilyName, exchange_images
+from planar.synthesis.exact.tracking.symmetry import exchange_images
 
 REAL = 1e-7
 """Of a solution's size: one that differs from its own conjugate by less is real."""
+FAR = 1e4
+"""Sizes of the task: what is farther out is nearly at infinity."""
 FARTHEST = 1e11
 """What is farther out than this is at infinity."""
 
@@ -48,6 +51,11 @@ class ComponentSolutions(NamedTuple):
     nearly_singular: int
     "how many solutions lie so near to others, or so far out, that doubles do not tell them"
 
+    @property
+    def far_count(self) -> int:
+        """How many real ones are nearly at infinity."""
+        return int((np.abs(self.x).max(axis=1, initial=0.0) > FAR).sum())
+
 
 def solve_components(components: Sequence[Component], say: Progress) -> list[ComponentSolutions]:
     """The solutions of each component; those that are the same member of a family are solved once."""
@@ -56,12 +64,36 @@ def solve_components(components: Sequence[Component], say: Progress) -> list[Com
     for each in components:
         record = family_record(each.family, lambda many: say(f"{many} solutions of a random task"))
         key = _member_key(record.name, each.member)
-        found = known.get(key)
-        if found is None or found.record.name != record.name:
-            found = _solve(each, record, say)
-            known[key] = found
-        solved.append(found._replace(component=each))
+        if key not in known:
+            known[key] = _solve(each, record, say)
+        solved.append(_in_order(known[key], record)._replace(component=each))
     return solved
+
+
+def _in_order(solved: ComponentSolutions, record: FamilyRecord) -> ComponentSolutions:
+    """Solutions of a member with their unknowns in the order of a family of the same name."""
+    half = len(record.name.unknowns)
+    order = np.empty(2 * half, dtype=int)
+    for k, own in zip(record.name.unknowns, solved.record.name.unknowns, strict=True):
+        order[[k, half + k]] = own, half + own
+    whole = solved.whole._replace(x=solved.whole.x[:, order], doubtful=solved.whole.doubtful[:, order])
+    return solved._replace(record=record, whole=whole, x=solved.x[:, order])
+
+
+def with_tested_records(solved: Sequence[ComponentSolutions], say: Progress) -> list[ComponentSolutions]:
+    """The same after the trace tests of their families; solved again where a test shows that some were missing."""
+    records: dict[str, FamilyRecord] = {}
+    tested = []
+    for each in solved:
+        record = each.record
+        if not record.is_tested:
+            if record.name.text not in records:
+                say(f"trace test of {count_phrase(len(record.solutions.V), 'solution')} of a random task")
+                records[record.name.text] = tested_record(each.component.family, record)
+            record = family_record(each.component.family)
+        has_more = len(record.solutions.V) > len(each.record.solutions.V)
+        tested.append(_solve(each.component, record, say) if has_more else each._replace(record=record))
+    return tested
 
 
 def _solve(component: Component, record: FamilyRecord, say: Progress) -> ComponentSolutions:
@@ -74,7 +106,13 @@ def _solve(component: Component, record: FamilyRecord, say: Progress) -> Compone
     if is_available() and len(x):
         say(f"{count_phrase(len(x), 'solution')} to be certified")
         proof = certify_member(component.family, component.member, x)
-        x, proved, all_proved = proof.x, proof.proved & proof.is_real, int(proof.proved.sum())
+        # far ones that the file's own numbers do not have are at infinity: doubles are other numbers
+        goes = ~proof.proved & (np.abs(x).max(axis=1) > FAR)
+        whole = _with_infinite(whole, x[goes], whole.classes[goes])
+        whole = whole._replace(x=x[~goes], classes=whole.classes[~goes])
+        proof = ExactCertificates(*(each[~goes] for each in proof))
+        x, is_real = proof.x, is_real[~goes]
+        proved, all_proved = proof.proved & proof.is_real, int(proof.proved.sum())
         is_real = np.where(proof.proved, proof.is_real, is_real)
     wanted = whole.members * len({*whole.classes[is_real].tolist()} - {UNKNOWN})
     missing = max(0, wanted - int(is_real.sum()))
@@ -113,8 +151,19 @@ def with_ball_paths(
     rows = np.setdiff1d(record.classes[open_classes], whole.ball_rows)
     if (whole.members == 1 and whole.found >= many) or not 0 < len(rows) <= MOST_PATHS:
         return whole
-    own, x = proved_in_balls(component.family, record, rows, component.member, say)
+    own, x, infinite = proved_in_balls(component.family, record, rows, component.member, say)
+    infinite_classes = np.array([class_of[k] for k in infinite.tolist()], dtype=int)
+    whole = _with_infinite(whole, np.full((len(infinite), whole.x.shape[1]), np.inf, dtype=complex), infinite_classes)
     return _with_new(record, whole, x, np.array([class_of[k] for k in own.tolist()], dtype=int))
+
+
+def _with_infinite(whole: MemberSolutions, x: ComplexArray, classes: IntArray) -> MemberSolutions:
+    """With ends of paths (solutions, unknowns) that are at infinity."""
+    return whole._replace(
+        doubtful=np.concatenate([whole.doubtful, x]),
+        doubtful_classes=np.append(whole.doubtful_classes, classes),
+        is_doubtful_infinite=np.append(whole.is_doubtful_infinite, np.ones(len(x), dtype=bool)),
+    )
 
 
 def _with_new(record: FamilyRecord, whole: MemberSolutions, more: ComplexArray, of_class: IntArray) -> MemberSolutions:
@@ -145,4 +194,5 @@ def alike_components(solved: Sequence[ComponentSolutions]) -> list[list[int]]:
 
 
 def _member_key(name: FamilyName, member: Member) -> tuple[str, bytes]:
-    return name.text, b"".join(np.round(part, 12).tobytes() for part in member.parts)
+    first = member.parts[0][:, list(name.given)]
+    return name.text, b"".join((np.round(part, 12) + 0.0).tobytes() for part in (first, *member.parts[1:]))

@@ -9,15 +9,22 @@ from typing import NamedTuple
 
 import numpy as np
 
+from planar.document.dimensions import Dimension, file_dimensions
 from planar.document.revised.changed_numbers import with_values
 from planar.foundation.arrays import Array, ComplexArray
-from planar.model.link_shapes import Link, PointReference, link_shape
+from planar.foundation.errors import BadInput
+from planar.foundation.geometry import Vector
+from planar.model.link_shapes import At, Link, Point, link_shape
 from planar.model.mechanism import Mechanism, named_points
 from planar.synthesis.exact.relations.entry_relations import EntryRelations, turned_link
 from planar.synthesis.exact.relations.exact_problem import ExactProblem
 from planar.synthesis.exact.relations.polynomials import Polynomial
-from planar.synthesis.exact.relations.reference_pose import SlidingRow
+from planar.synthesis.exact.relations.reference_pose import Coordinates, LinkAxes, SlidingRow
 from planar.synthesis.exact.relations.unknowns import NumberKind
+
+PARALLEL = 1e-12
+"""Of a unit vector: a part that is nothing."""
+AXES_STEPS, AXES_MET = 40, 1e-13
 
 Values = dict[int, complex]
 """Of symbols, by their numbers."""
@@ -25,11 +32,12 @@ Values = dict[int, complex]
 
 class ExactLinkage(NamedTuple):
     """A mechanism, the numbers of it that were sought (SI), and where its running input is (n,) at the entries of each
-    wanted item of the task, rad or m."""
+    wanted item of the task, rad or m; `opposite` are links whose length is negative, so that points stand for it."""
 
     mechanism: Mechanism
     numbers: dict[str, float]
     inputs: tuple[Array, ...]
+    opposite: tuple[str, ...] = ()
 
 
 def exact_linkage(problem: ExactProblem, solution: Mapping[int, complex], name: str) -> ExactLinkage:
@@ -74,128 +82,124 @@ class _LinkageWriter:
     def __init__(self, problem: ExactProblem, values: Values):
         self.problem, self.pose, self.values = problem, problem.pose, values
         self.mechanism = problem.mechanism
-        self.axes: dict[str, complex] = {}
-        self.origins: dict[str, complex] = {}
-        "x-axes and origins of moving links at the first entry"
+        self.axes: dict[str, complex] = {self.mechanism.frame: 1.0 + 0.0j}
+        self.origins: dict[str, complex] = {self.mechanism.frame: 0.0j}
+        "x-axes and origins of links at the first entry"
         self.lines: dict[str, complex] = {}
         "directions of lines at the first entry, as they are written"
+        self.numbers: dict[str, float] = {}
+        self.displacements: dict[str, float] = {}
+        "of slides at the first entry (m)"
 
     def _world(self, place: Polynomial) -> complex:
         return evaluate(place.substitute(self.pose.values), self.values) * self.problem.size + self.problem.origin
 
+    def _way(self, direction: Polynomial) -> complex:
+        way = evaluate(direction.substitute(self.pose.values), self.values)
+        return way / abs(way) if abs(way) > 0.0 else 1.0 + 0.0j
+
     def write(self, name: str) -> ExactLinkage:
         """The mechanism with its numbers."""
-        numbers: dict[str, float] = {}
         for link in self.mechanism.links:
-            numbers |= self._link_numbers(link)
-        first: dict[str, float] = {}
+            if link.name != self.mechanism.frame:
+                self.origins[link.name], self.axes[link.name] = self._link_axes(link)
+            for point, place in self._places(link).items():
+                self._note(self.pose.coordinates(link.name, point), self._own(link.name, place))
         for slide in self.pose.slides:
-            numbers |= self._line_numbers(slide, numbers, first)
+            self._note_line(slide)
+        missing = [each for each in self.problem.free if each not in self.numbers and self.problem.task.free]
+        if missing:
+            raise BadInput(
+                "$.free", f"{missing[0]!r} of {self.mechanism.name!r} cannot be sought exactly; leave it out"
+            )
         running = self.mechanism.inputs[0].pair
-        start = first[running] if running in first else phase(self.axes[turned_link(self.pose, running)])
-        chosen = {key: value for key, value in numbers.items() if key in self.pose.free}
+        start = self.displacements.get(running)
+        if start is None:
+            start = phase(self.axes[turned_link(self.pose, running)])
         base = replace(self.mechanism, name=name, about=None, source=None, published=(), ids=())
-        whole = with_values(base, chosen | {f"{running}.position": start})
+        base, numbers, opposite = _with_opposite_links(base, self.numbers)
+        whole = with_values(base, numbers | {f"{running}.position": start})
         whole = replace(whole, sketch=tuple(self._sketch(whole)))
-        return ExactLinkage(whole, chosen, self._inputs(running, start))
+        chosen = {name: value for name, value in numbers.items() if name in self.pose.free or name not in self.numbers}
+        return ExactLinkage(whole, chosen, self._inputs(running, start), opposite)
 
     def _places(self, link: Link) -> dict[str, complex]:
-        return {
-            name: self._world(place)
-            for (own, name), place in self.pose.places.items()
-            if own == link.name and isinstance(name, str)
-        }
+        return {name: self._world(place) for (own, name), place in self.pose.places.items() if own == link.name}
 
-    def _link_numbers(self, link: Link) -> dict[str, float]:
-        places = self._places(link)
-        if link.name == self.mechanism.frame:
-            found: dict[str, float] = {}
-            for name, at in places.items():
-                found |= {f"{link.name}.{name}.x": at.real, f"{link.name}.{name}.y": at.imag}
-            if link.ends is not None and link.ends[1] in places:
-                found[f"{link.name}.length"] = places[link.ends[1]].real
-            return found
-        origin, way = self._link_axes(link, places)
-        self.origins[link.name], self.axes[link.name] = origin, way
-        found = {}
-        for name, at in places.items():
-            own = (at - origin) / way
-            found |= {f"{link.name}.{name}.x": own.real, f"{link.name}.{name}.y": own.imag}
-        if link.ends is not None and all(end in places for end in link.ends):
-            found[f"{link.name}.length"] = abs(places[link.ends[1]] - places[link.ends[0]])
-        return found
+    def _own(self, link: str, place: complex) -> complex:
+        """A place in the axes of a link."""
+        return (place - self.origins[link]) / self.axes[link]
 
-    def _link_axes(self, link: Link, places: Mapping[str, complex]) -> tuple[complex, complex]:
+    def _note(self, at: Coordinates, own: complex) -> None:
+        """The numbers of a point that are sought, of where it lies in its link."""
+        for name, value, start in ((at.x, own.real, at.value.real), (at.y, own.imag, at.value.imag)):
+            if name is not None:
+                self.numbers[name] = float(self.pose.numbers[name].value + value - start)
+
+    def _link_axes(self, link: Link) -> tuple[complex, complex]:
         """Where the origin of a link is, and its x-axis as a unit vector, at the first entry."""
-        known = self.problem.axes.get(link.name)
-        if known is not None and known.origin is not None:
-            return self._world(known.origin), evaluate(known.direction, self.values)
-        shape = link_shape(link)
-        drawn = {name: complex(shape.position(name).x, shape.position(name).y) for name in link.names}
-        names = [*(link.ends or ()), *(name for name in drawn if name not in (link.ends or ()))]
-        used = [name for name in names if name in places]
-        if known is not None:
-            way = evaluate(known.direction, self.values)
-        elif len(used) > 1:
-            first, *others = used
-            other = max(others[:1], key=lambda each: abs(places[each] - places[first]))
-            way = (places[other] - places[first]) * (drawn[other] - drawn[first]).conjugate()
-            way = way / abs(way) if abs(way) > 0.0 else 1.0 + 0.0j
-        else:
-            way = 1.0 + 0.0j
-        if not used:
-            return 0.0j, way
-        return places[used[0]] - drawn[used[0]] * way, way
+        direction, origin = self.pose.axes.get(link.name, LinkAxes(None, None))
+        known_way = None if direction is None else self._way(direction)
+        known_origin = None if origin is None else self._world(origin)
+        drawn_origin, drawn_way = self._drawn_axes(link, known_way)
+        if known_origin is not None and known_way is not None:
+            return known_origin, known_way
+        rows = _AxesRows(self, link, known_way, known_origin)
+        return rows.solve(drawn_origin if known_origin is None else known_origin, drawn_way)
 
-    def _line_numbers(
-        self, slide: SlidingRow, numbers: Mapping[str, float], first: dict[str, float]
-    ) -> dict[str, float]:
-        """The direction of a line, and the point that it goes through, in its link's axes; `first` gets the
-        displacement."""
-        link, name = slide.pair.bodies[0], slide.through
-        axis, origin = self.axes.get(link, 1.0), self.origins.get(link, 0.0)
-        way = evaluate(slide.direction, self.values)
-        way /= abs(way) * axis
-        slider = (self._world(slide.slider) - origin) / axis
-        at_start = link_shape(self.pose.links[link]).position(name)
-        through = complex(at_start.x, at_start.y)
-        free = self._free_coordinates(link, name)
-        angle = self.pose.line_angle(slide.pair.name)
-        found: dict[str, float] = {}
-        given = self.problem.first_slides.get(slide.pair.name)
-        if isinstance(name, str) and f"{link}.{name}.x" in numbers:
-            through = complex(numbers[f"{link}.{name}.x"], numbers[f"{link}.{name}.y"])
-        elif any(free):
-            through = self._place_on_line(slider, way, through, free, given, link)
-            found |= {f"{link}.{name}.x": through.real, f"{link}.{name}.y": through.imag}
+    def _drawn_axes(self, link: Link, way: complex | None) -> tuple[complex, complex]:
+        """The axes by which points lie as they are drawn, one of them there and another one in that direction."""
+        places, shape = self._places(link), link_shape(link)
+        drawn = {name: complex(shape.position(name).x, shape.position(name).y) for name in link.names}
+        used = [name for name in link.names if name in places]
+        if way is None:
+            way = 1.0 + 0.0j
+            if len(used) > 1:
+                first, *others = used
+                other = max(others[:1], key=lambda each: abs(places[each] - places[first]))
+                turn = (places[other] - places[first]) * (drawn[other] - drawn[first]).conjugate()
+                way = turn / abs(turn) if abs(turn) > 0.0 else way
+        return (places[used[0]] - drawn[used[0]] * way, way) if used else (0.0j, way)
+
+    def _note_line(self, slide: SlidingRow) -> None:
+        """The numbers of a line that are sought, and how far its slider is from what it goes through."""
+        link, name = slide.pair.bodies[0], slide.pair.name
+        way = self._way(slide.direction) / self.axes[link]
+        slider = self._own(link, self._world(slide.slider))
+        at = self.pose.coordinates(link, slide.through, slide.pair)
+        angle = self.pose.line_angle(name)
+        given = self.problem.first_slides.get(name)
+        if angle is not None and angle not in self.pose.free:
+            drawn = exp(1j * float(self.pose.numbers[angle].value))
+            way = way if (way * drawn.conjugate()).real > 0.0 else -way
+        if isinstance(slide.through, str) and (link, slide.through) in self.pose.places:
+            through = self._own(link, self._world(self.pose.places[link, slide.through]))
+        elif given is not None:
+            through = slider - given(self.problem.items[0]) * way
+        else:
+            through = self._place_on_line(slider, way, at, link)
         along = ((slider - through) * way.conjugate()).real
         if angle is not None and angle in self.pose.free:
-            if along < 0.0 and given is None:
+            if along < 0.0 and name in self.pose.patched:
                 way, along = -way, -along
-            found[angle] = phase(way)
-        first[slide.pair.name] = along
-        self.lines[slide.pair.name] = way * axis
-        return found
+            self.numbers[angle] = phase(way)
+        self._note(at, through)
+        self.displacements[name] = along
+        self.lines[name] = way * self.axes[link]
 
-    def _free_coordinates(self, link: str, name: PointReference) -> tuple[bool, bool]:
-        if link == self.mechanism.frame:
-            return self.pose.free_coordinates(name)
-        x, y = (f"{link}.{name}.{axis}" in self.pose.free for axis in "xy")
-        return x, y
-
-    def _place_on_line(
-        self, slider: complex, way: complex, start: complex, free: tuple[bool, bool], given: float | None, link: str
-    ) -> complex:
-        if given is not None and all(free):
-            return slider - given * way
-        if all(free):  # where it comes nearest to a fixed pin, or to the origin of a link that moves
+    def _place_on_line(self, slider: complex, way: complex, at: Coordinates, link: str) -> complex:
+        """Where a line goes through: as far as that is open where it comes nearest to a fixed pin, or to the origin of
+        a link that moves."""
+        start = at.value
+        if at.x is not None and at.y is not None:
             frame = self.mechanism.frame
             pins = [self._world(p) for (own, _), p in self.pose.places.items() if own == frame == link]
             near = pins[0] if pins else 0.0j if link != frame else start
             return slider + ((near - slider) * way.conjugate()).real * way
-        part = way.real if not free[0] else way.imag
-        off = (start - slider).real if not free[0] else (start - slider).imag
-        return slider + (off / part) * way if part else slider
+        if at.x is None and at.y is None:
+            return start
+        part, off = (way.real, (start - slider).real) if at.x is None else (way.imag, (start - slider).imag)
+        return slider + (off / part) * way if abs(part) > PARALLEL else start
 
     def _sketch(self, mechanism: Mechanism) -> Iterator[tuple[str, float, float]]:
         """Where every point stands that is not on the frame: joints alone may not tell two assemblies apart."""
@@ -213,7 +217,7 @@ class _LinkageWriter:
         """Where the input is at every entry of the task's items, in the task's order."""
         by_item: dict[int, Array] = {}
         for k, (relations, wanted) in enumerate(zip(self.problem.relations, self.problem.items, strict=True)):
-            given = self.problem.entry_numbers(wanted, relations.numbers, k > 0)
+            given, _ = self.problem.entry_numbers(wanted, relations.numbers, k > 0)
             positions: list[float] = [] if k else [start]
             for numbers in given:
                 here = entry_values(relations, numbers, self.values)
@@ -228,3 +232,80 @@ class _LinkageWriter:
             way = evaluate(written.direction, here)
             return slid * abs(way) * (1.0 if (self.lines[running] / way).real > 0.0 else -1.0)
         return phase(evaluate(relations.links[turned_link(self.pose, running)].turn, here))
+
+
+class _AxesRows:
+    """What is given of a link as equations for its axes: the direction (rad) and the origin (units of the task)."""
+
+    def __init__(self, writer: _LinkageWriter, link: Link, way: complex | None, origin: complex | None):
+        self.writer, self.pose, self.name = writer, writer.pose, link.name
+        self.is_open = np.array([way is None, *[origin is None] * 2])
+        self.points = [(place, self.pose.coordinates(link.name, name)) for name, place in writer._places(link).items()]
+        self.lines: list[tuple[complex, complex, complex | None, complex | None]] = []
+        for slide in self.pose.slides:
+            if slide.pair.bodies[0] == link.name:
+                self._add_line(slide)
+
+    def _add_line(self, slide: SlidingRow) -> None:
+        pose, writer = self.pose, self.writer
+        at = pose.coordinates(self.name, slide.through, slide.pair)
+        way, slider = writer._way(slide.direction), writer._world(slide.slider)
+        given = writer.problem.first_slides.get(slide.pair.name)
+        is_elsewhere = (self.name, slide.through) in pose.places
+        if given is not None and not is_elsewhere:
+            self.points.append((slider - given(writer.problem.items[0]) * way, at))
+        angle = pose.line_angle(slide.pair.name)
+        turn = None if angle is None or angle in pose.free else exp(1j * float(pose.numbers[angle].value))
+        has_place = given is None and not is_elsewhere and all(at.is_given)
+        self.lines.append((slider, way, turn, at.value if has_place else None))
+
+    def rows(self, unknowns: Array) -> Array:
+        """By how much what is given is missed, rad and in units of the task."""
+        size, found = self.writer.problem.size, list[float]()
+        way, origin = exp(1j * unknowns[0]), complex(unknowns[1], unknowns[2]) * size
+        for place, at in self.points:
+            off = ((place - origin) / way - at.value) / size
+            found += [off.real] * at.is_given[0] + [off.imag] * at.is_given[1]
+        for slider, line, turn, through in self.lines:
+            if turn is not None:
+                found.append((line / (way * turn)).imag)
+            if through is not None:
+                found.append(((slider - origin - through * way) / line).imag / size)
+        return np.array(found)
+
+    def solve(self, origin: complex, way: complex) -> tuple[complex, complex]:
+        """The axes that are nearest to some by which points are as they are drawn. Raises BadInput where there are
+        none."""
+        size = self.writer.problem.size
+        for turn in (0.0, 1.0, -1.0, 2.0, -2.0, 3.0, -3.0, 4.0):
+            x = np.array([phase(way) + turn * np.pi / 4 * self.is_open[0], origin.real / size, origin.imag / size])
+            for _ in range(AXES_STEPS):
+                rows = self.rows(x)
+                if np.abs(rows).max(initial=0.0) < AXES_MET:
+                    return complex(x[1], x[2]) * size, exp(1j * x[0])
+                slopes = np.array([(self.rows(x + h) - self.rows(x - h)) / 2e-6 for h in 1e-6 * np.eye(3)]).T
+                x = x - self.is_open * np.linalg.lstsq(slopes * self.is_open, rows, rcond=1e-9)[0]
+        raise BadInput("$.free", f"no axes of {self.name!r} give its points the numbers that are given")
+
+
+def _with_opposite_links(
+    mechanism: Mechanism, numbers: Mapping[str, float]
+) -> tuple[Mechanism, dict[str, float], tuple[str, ...]]:
+    """The mechanism with points for each link whose length is negative, its numbers, and the names of such links."""
+    links, values, opposite = list[Link](), dict(numbers), list[str]()
+    for link in mechanism.links:
+        name = next((name for name, each in file_dimensions(mechanism).items() if _is_length(each, link)), None)
+        if name is None or values.get(name, 0.0) >= 0.0 or link.ends is None:
+            links.append(link)
+            continue
+        shape = link_shape(link)
+        at = {point: shape.position(point) for point in link.names}
+        at[link.ends[1]] = Vector(values.pop(name), 0.0)
+        links.append(Link(link.name, tuple(Point(point, At(float(p.x), float(p.y))) for point, p in at.items())))
+        values[f"{link.name}.{link.ends[1]}.x"] = float(at[link.ends[1]].x)
+        opposite.append(link.name)
+    return replace(mechanism, links=tuple(links)) if opposite else mechanism, values, tuple(opposite)
+
+
+def _is_length(each: Dimension, link: Link) -> bool:
+    return each.path == ("links", link.name, "length")

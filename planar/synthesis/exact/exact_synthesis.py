@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from itertools import combinations, permutations, product
+from typing import Any
 
 import numpy as np
 
@@ -12,10 +14,17 @@ from planar.foundation.errors import BadInput
 from planar.model.mechanism import Mechanism
 from planar.model.wording import count_phrase
 from planar.synthesis.exact.complete_synthesis import CompleteSynthesis, DyadCurve, ExactDesign
-from planar.synthesis.exact.component_solutions import ComponentSolutions, alike_components, solve_components
+from planar.synthesis.exact.component_solutions import (
+    FAR,
+    ComponentSolutions,
+    alike_components,
+    solve_components,
+    with_tested_records,
+)
 from planar.synthesis.exact.dyad_curves import dyad_curve, is_dyad
 from planar.synthesis.exact.exact_linkage import ExactLinkage, exact_linkage
 from planar.synthesis.exact.list_words import completeness, counted_class, list_remarks, solution_count
+from planar.synthesis.exact.relations.condition_count import count_parts
 from planar.synthesis.exact.relations.exact_problem import Component, ExactProblem
 from planar.synthesis.exact.tracking.member_homotopy import affine_solutions, homogeneous_solutions
 from planar.synthesis.exact.tracking.member_solutions import Progress
@@ -38,8 +47,16 @@ MET = 1e-6
 FAMILY = "a family of linkages with parameters; its dyads stand in curves"
 
 
-def synthesise_all(task: SynthesisTask, progress: Progress | None = None) -> CompleteSynthesis:
-    """All linkages of a task's start that meet it exactly. Raises BadInput where there is no such list."""
+def synthesise_all(
+    task: SynthesisTask,
+    progress: Progress | None = None,
+    show: Callable[[CompleteSynthesis], None] | None = None,
+) -> CompleteSynthesis:
+    """All linkages of a task's start that meet it exactly. Raises BadInput where there is no such list.
+
+    Where the trace test of a family is still to be made, the list goes to `show` before, and a KeyboardInterrupt
+    meanwhile leaves it as it is.
+    """
     mechanism = _single_start(task)
     problem = ExactProblem(task, mechanism)
     _check_freedom(problem)
@@ -47,24 +64,45 @@ def synthesise_all(task: SynthesisTask, progress: Progress | None = None) -> Com
     solved = solve_components([each for each in problem.components if each.freedom == 0], say)
     if any(each.freedom for each in problem.components):
         return _with_curves(problem, solved)
-    judge = DesignJudge(task, problem.size)
+    result = _complete_list(problem, solved, say)
+    if all(each.record.is_tested for each in solved):
+        return result
+    if show is not None:
+        show(result)
+    try:
+        tested = with_tested_records(solved, say)
+    except KeyboardInterrupt:
+        return replace(result, is_finished=False)
+    if any(len(one.x) != len(other.x) for one, other in zip(tested, solved, strict=True)):
+        return _complete_list(problem, tested, say)
+    return replace(result, **_list_numbers(tested, result.designs))
+
+
+def _complete_list(problem: ExactProblem, solved: Sequence[ComponentSolutions], say: Progress) -> CompleteSynthesis:
+    """The list of all linkages, each judged."""
+    judge = DesignJudge(problem.task, problem.size)
     designs: list[ExactDesign] = []
-    for labelled, certified in _linkages(solved):
+    far: set[int] = set()
+    for labelled, certified, is_far in _linkages(solved):
         designs.append(_best_design(problem, judge, labelled, certified, len(designs) + 1))
+        if is_far:
+            far.add(id(designs[-1]))
         say(f"{count_phrase(len(designs), 'linkage')} judged")
-    told = [each for each in designs if each is not None]
-    told.sort(key=lambda each: (bool(each.defects), each.error if np.isfinite(each.error) else np.inf))
-    return CompleteSynthesis(
-        task,
-        tuple(told),
-        (),
-        problem.size,
-        list_remarks(solved, told),
-        expected=solution_count(solved, [len(each.record.classes) for each in solved]),
-        found=solution_count(solved, [each.whole.found for each in solved]),
-        complete=completeness(solved),
-        counted=counted_class(solved),
+    designs.sort(
+        key=lambda each: (id(each) in far, bool(each.defects), each.error if np.isfinite(each.error) else np.inf)
     )
+    return CompleteSynthesis(problem.task, tuple(designs), (), problem.size, **_list_numbers(solved, designs))
+
+
+def _list_numbers(solved: Sequence[ComponentSolutions], designs: Sequence[ExactDesign]) -> dict[str, Any]:
+    """What a list says of the whole."""
+    return {
+        "remarks": list_remarks(solved, designs),
+        "expected": solution_count(solved, [len(each.record.classes) for each in solved]),
+        "found": solution_count(solved, [each.whole.found for each in solved]),
+        "complete": completeness(solved),
+        "counted": counted_class(solved),
+    }
 
 
 def _single_start(task: SynthesisTask) -> Mechanism:
@@ -74,17 +112,17 @@ def _single_start(task: SynthesisTask) -> Mechanism:
 
 
 def _check_freedom(problem: ExactProblem) -> None:
-    least = min((each.freedom for each in problem.components), default=0)
-    if least < 0:
-        told = f"{count_phrase(-least, 'condition')} more than {problem.mechanism.name!r} can meet exactly"
-        raise BadInput("$.wanted", f"what is wanted sets {told} with the numbers that are free")
+    """Refuse a task of which a part cannot meet what is wanted, or has numbers that stay open."""
+    unbalanced = [each for each in count_parts(problem) if each.excess or each.open]
+    told = ", ".join(each.sentence for each in unbalanced)
+    if any(each.excess for each in unbalanced):
+        raise BadInput("$.wanted", f"what is wanted cannot be met exactly with the numbers that are free: {told}")
     left = [each for each in problem.components if each.freedom > 0]
     is_for_poses = len(problem.items) == 1 and isinstance(problem.items[0], WantedPoses)
-    if left and not (is_for_poses and all(is_dyad(problem, each) for each in left)):
-        most = max(each.freedom for each in left)
+    if unbalanced and not (is_for_poses and left and all(is_dyad(problem, each) for each in left)):
         raise BadInput(
             "$.wanted",
-            f"{count_phrase(most, 'number')} of {problem.mechanism.name!r} would stay open, so that there is no list; "
+            f"there is no list, as numbers stay open: {told} than what is wanted determines; "
             "want more, or give some of the numbers by leaving them out of 'free'",
         )
 
@@ -99,20 +137,22 @@ def _values(component: Component, x: ComplexArray) -> dict[int, complex]:
     return found
 
 
-def _linkages(solved: Sequence[ComponentSolutions]) -> Iterator[tuple[list[dict[int, complex]], bool]]:
-    """Every linkage as the values of its symbols, in all ways in which its links may bear their names."""
+def _linkages(solved: Sequence[ComponentSolutions]) -> Iterator[tuple[list[dict[int, complex]], bool, bool]]:
+    """Every linkage as the values of its symbols, in all ways in which its links may bear their names; whether it is
+    certified, and nearly at infinity."""
     groups = alike_components(solved)
     choices = [[*combinations(range(len(solved[own[0]].x)), len(own))] for own in groups]
     for chosen in product(*choices):
-        certified = True
+        certified, is_far = True, False
         ways: list[list[dict[int, complex]]] = []
         for own, rows in zip(groups, chosen, strict=True):
             certified &= all(bool(solved[k].proved[row]) for k, row in zip(own, rows, strict=True))
+            is_far |= any(float(np.abs(solved[k].x[row]).max()) > FAR for k, row in zip(own, rows, strict=True))
             ways.append([_joined(solved, own, order) for order in permutations(rows)])
         labelled = [{key: value for part in way for key, value in part.items()} for way in product(*ways)]
         if len(solved) == 1:
             labelled = _exchanged(solved[0], chosen[0][0])
-        yield labelled, certified
+        yield labelled, certified, is_far
 
 
 def _joined(solved: Sequence[ComponentSolutions], own: Sequence[int], rows: Sequence[int]) -> dict[int, complex]:
@@ -168,6 +208,7 @@ def _judged(problem: ExactProblem, judge: DesignJudge, linkage: ExactLinkage, ce
         problem.mechanism.name,
         linkage.numbers,
         certified=certified,
+        opposite=linkage.opposite,
     )
 
 

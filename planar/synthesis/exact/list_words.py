@@ -8,7 +8,7 @@ from math import comb, prod
 from planar.assemblies.polynomial.certification import is_available
 from planar.model.wording import count_phrase
 from planar.synthesis.exact.complete_synthesis import ExactDesign
-from planar.synthesis.exact.component_solutions import ComponentSolutions, alike_components
+from planar.synthesis.exact.component_solutions import FAR, ComponentSolutions, alike_components
 
 
 def solution_count(solved: Sequence[ComponentSolutions], counts: Sequence[int]) -> int:
@@ -49,7 +49,11 @@ def completeness(solved: Sequence[ComponentSolutions]) -> str:
         told += " but for singular solutions, where several meet or a curve of them passes"
     elif infinite:
         told += f" but for {infinite} at infinity"
-    return told if is_traced else f"{told}: it was found by monodromy without a trace test"
+    if is_traced:
+        return told
+    if not all(each.record.is_tested for each in solved):
+        return f"{told}: the trace test, which shows whether these are all, is not made yet"
+    return f"{told}: the trace test does not show that these are all"
 
 
 def _gap(solved: Sequence[ComponentSolutions]) -> str:
@@ -84,8 +88,17 @@ def list_remarks(solved: Sequence[ComponentSolutions], designs: Sequence[ExactDe
             found.append(
                 f"{many} told by balls of many digits alone: near others or far out, the task is nearly singular"
             )
+        if each.far_count:
+            many = count_phrase(each.far_count, "solution")
+            found.append(f"{many} of {FAR:,.0f} times the size of the task or more: nearly at infinity")
         if each.record.source:
             found.append(each.record.source)
+    for link in dict.fromkeys(name for each in designs for name in each.opposite):
+        count = sum(link in each.opposite for each in designs)
+        found.append(
+            f"{link!r} is drawn the opposite way, as its length is negative, in {count} of "
+            f"{count_phrase(len(designs), 'real linkage')}: points stand for it"
+        )
     marked = sum(bool(each.defects) for each in designs)
     if marked:
         found.append(f"with a defect: {marked} of {count_phrase(len(designs), 'real linkage')}")

@@ -34,6 +34,8 @@ SPREAD = 0.6180339887498949
 """Of the motion: how far it is from one entry to the next, so that any number of them lies well spread."""
 
 
+RANDOM_STARTS = 24
+"""Of mechanisms at random, more and more different from a start that does not move."""
 LEAST_POSITIONS = 24
 """Of a motion, at which derivatives are taken."""
 MOVES = 4
@@ -125,6 +127,12 @@ def count_freedom(task: SynthesisTask, mechanism: Mechanism, wanted: Sequence[Wa
     return FreedomCount(every, sum(each.condition_count for each in items), own)
 
 
+def number_slopes(task: SynthesisTask, mechanism: Mechanism, free: FreeNumbers) -> Array:
+    """The derivatives (rows, numbers and zeros of scales) of all that is wanted by the free numbers, over the motion of
+    a mechanism near a start. Raises NoAnswer where the start cannot move."""
+    return _stack(_result_rows(moving_start(mechanism, free), task.wanted, free))
+
+
 def exactness_in_excess(task: SynthesisTask, mechanism: Mechanism) -> str | None:
     """What forbids that a start meets all that is to be met exactly, in words; None where nothing does."""
     if not task.exact:
@@ -211,9 +219,35 @@ def _is_length(mechanism: Mechanism, wanted: Wanted, part: int) -> bool:
     return part < 2
 
 
+def moving_start(mechanism: Mechanism, free: FreeNumbers) -> Mechanism:
+    """A mechanism that moves, with other values of the free numbers than a start, as near to it as can be found. Raises
+    NoAnswer where none is found."""
+    rng, drive = np.random.default_rng(7), mechanism.inputs[0]
+    turns = np.where(np.array(free.kinds) == "length", _size(free), 1.0)
+    for spread in (None, *np.geomspace(0.02, 1.0, RANDOM_STARTS)):
+        try:
+            changed = generic_start(mechanism, free)
+            if spread is not None:
+                values = np.clip(free.values + spread * turns * rng.normal(size=len(turns)), free.lower, free.upper)
+                changed = with_values(mechanism, dict(zip(free.names, values.tolist(), strict=True)))
+                if motion_kind(mechanism, drive.pair) == "angle":
+                    changed = with_values(changed, {f"{drive.pair}.position": rng.uniform(-np.pi, np.pi)})
+            cycle(changed, LEAST_POSITIONS, pair=drive.pair)
+        except PlanarError as problem:
+            reason = problem
+        else:
+            return changed
+    raise reason
+
+
+def _size(free: FreeNumbers) -> float:
+    """The greatest of the free lengths (m), 1 where there is none."""
+    return float(np.abs(free.values[np.array(free.kinds) == "length"]).max(initial=0.0)) or 1.0
+
+
 def generic_start(mechanism: Mechanism, free: FreeNumbers) -> Mechanism:
     """A mechanism near a start, which may be a special one; the start itself, where that does not go together."""
-    size = float(np.abs(free.values[np.array(free.kinds) == "length"]).max(initial=0.0)) or 1.0
+    size = _size(free)
     way = np.cos(1.0 + np.arange(len(free.names)))
     scale = np.where(np.array(free.kinds) == "length", size, 1.0)
     values = np.clip(free.values + GENERIC_CHANGE * way * scale, free.lower, free.upper)

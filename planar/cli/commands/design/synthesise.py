@@ -26,6 +26,11 @@ SHEET_SUFFIXES = (".png", ".svg", ".pdf")
 KEPT = "what was found of a random task is kept, and the same command goes on from there"
 """Of a search for all linkages that is interrupted."""
 
+NOT_COUNTED = (
+    "interrupted: the designs are proved, but not that there are no others; the same command goes on with that test"
+)
+"""Of a list whose trace test is interrupted."""
+
 
 @main.command()
 @click.argument("task", type=click.Path(path_type=Path))
@@ -62,9 +67,13 @@ def synthesise(
     wanted = read_task(task)
     is_sheet = output is not None and output.suffix.lower() in SHEET_SUFFIXES
     folder = None if is_sheet else output
+    shown: list[Synthesis] = []
     with show_status(f"{wanted.name}: designs") as status:
 
         def show(done: SearchProgress) -> None:
+            if done.result is not None and not as_json:
+                print_or_write(table(done.result, []), None)
+                shown.append(done.result)
             if status is not None:
                 status.update(f"{wanted.name}: {done.stage if complete else progress_words(done, wanted)}")
 
@@ -75,6 +84,7 @@ def synthesise(
                 found = find_all(wanted, complete=True, progress=show)
             except KeyboardInterrupt:
                 raise KeyboardInterrupt(KEPT) from None
+            ended_by = None if found.is_finished else INTERRUPTED
         else:
             search = TaskSearch(wanted, many, seed, seconds, folder, show)
             ended_by = _run(search)
@@ -90,9 +100,14 @@ def synthesise(
         _write_sheets(found, output)
     if as_json:
         print_json(record(found, files))
+    elif shown and not files and shown[0].designs == found.designs:
+        click.echo("\n".join(found.summary))
     else:
         print_or_write(table(found, files), None)
     if ended_by is not None:
+        if complete:
+            click.echo(f"planar: {NOT_COUNTED}", err=True)
+            sys.exit(ended_by)
         goes_on = "; the same command goes on where it was" if folder is not None else "; with -o FOLDER it could go on"
         click.echo(f"planar: interrupted: what was found till then is told{goes_on}", err=True)
         sys.exit(ended_by)

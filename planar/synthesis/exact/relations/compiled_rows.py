@@ -9,9 +9,10 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from planar.codegen.complex_kernel import LANES, ComplexKernel
 from planar.codegen.instructions import InstructionList
 from planar.codegen.numpy_code import NumpyFunction, compile_numpy
-from planar.foundation.arrays import ComplexArray
+from planar.foundation.arrays import Array, ComplexArray
 from planar.synthesis.exact.relations.elimination import EntryRows
 
 
@@ -30,6 +31,7 @@ class CompiledRows:
         outputs = [ca.densify(each) for each in ca.cse(outputs)]
         self.function = ca.Function("rows", [x, q, dq], outputs)
         "f, its Jacobian in x, and its derivative where q changes by dq"
+        self._nonzero = ca.Function("nonzero", [x, q], [ca.vertcat(*_nonzero_expressions(rows, values))])
 
     @cached_property
     def _listing(self) -> tuple[InstructionList[tuple[str, int]], list[list[int]], list[list[int]]]:
@@ -42,9 +44,11 @@ class CompiledRows:
         return listing, inputs, listing.inline_function(self.function, inputs)
 
     @cached_property
-    def _with_change(self) -> NumpyFunction:
-        listing, inputs, wanted = self._listing
-        return compile_numpy(listing, [each for part in wanted for each in part], [k for part in inputs for k in part])
+    def _kernel(self) -> ComplexKernel:
+        listing, inputs, outputs = self._listing
+        return ComplexKernel(
+            listing, [number for part in outputs for number in part], [number for part in inputs for number in part]
+        )
 
     @cached_property
     def _without_change(self) -> NumpyFunction:
@@ -52,22 +56,36 @@ class CompiledRows:
         return compile_numpy(listing, [each for part in wanted[:2] for each in part], [*inputs[0], *inputs[1]])
 
     def evaluate(
-        self, x: Sequence[Any], q: Sequence[Any], dq: Sequence[Any], shape: tuple[int, ...]
+        self, x: ComplexArray, q: Sequence[ComplexArray], dq: Sequence[ComplexArray]
     ) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
-        """f (rows, *shape), its Jacobian (rows, unknowns, *shape) and its change (rows, *shape), of arrays that
-        broadcast to a shape."""
-        shapes = [self.function.size_out(k) for k in range(3)]
-        values = self._with_change(*x, *q, *dq)
-        found, at = [], 0
-        for rows, columns in shapes:
-            many = rows * columns
-            whole = np.empty((columns, rows, *shape), dtype=complex)
-            for k in range(many):
-                whole[k // rows, k % rows] = values[at + k]
-            at += many
-            found.append(whole)
-        f, slope, along = found
-        return f[0], np.swapaxes(slope, 0, 1), along[0]
+        """f (rows, *shape), its Jacobian (unknowns, rows, *shape) and its change (rows, *shape) at columns of a shape
+        (entries, paths): of unknowns x (unknowns, paths), numbers q and their changes dq, blocks (numbers, 1 or
+        entries, 1 or paths) one after the other."""
+        shape = np.broadcast_shapes(x.shape[1:], *(block.shape[1:] for block in (*q, *dq)))
+        count = int(np.prod(shape))
+        operands: ComplexArray = np.zeros((len(self._kernel.operands), -(-count // LANES) * LANES), dtype=x.dtype)
+        columns = operands[:, :count].reshape(-1, *shape)
+        row = 0
+        for block in (x[:, None], *q, *dq):
+            columns[row : row + len(block)] = block
+            row += len(block)
+        values = self._kernel(operands)[:, :count].reshape(-1, *shape)
+        m = self.equation_count
+        return values[:m], values[m:-m].reshape(len(self.unknowns), m, *shape), values[-m:]
+
+    def nonzero_values(self, x: ComplexArray, q: ComplexArray) -> Array:
+        """The sizes (values, entries) of what vanishes at no linkage, of unknowns x (unknowns,) and numbers q (numbers,
+        entries): directions of slides, vectors that turn, and what turns them."""
+        listing: InstructionList[tuple[str, int]] = InstructionList()
+        inputs = [
+            [listing.add_input((name, k)) for k in range(self._nonzero.numel_in(n))] for n, name in enumerate("xq")
+        ]
+        (outputs,) = listing.inline_function(self._nonzero, inputs)
+        values = ComplexKernel(listing, outputs, [*inputs[0], *inputs[1]]).in_numpy(
+            np.concatenate([np.broadcast_to(x[:, None], (len(x), q.shape[1])), q])
+        )
+        sizes: Array = np.abs(values)
+        return sizes
 
     def evaluate_as(self, x: Sequence[Any], q: Sequence[Any]) -> tuple[list[Any], list[list[Any]]]:
         """f and its Jacobian, row by row, in numbers of another kind that floats go with."""
@@ -85,6 +103,18 @@ def _expressions(rows: EntryRows, values: dict[int, ca.SX]) -> list[ca.SX]:
     below, own, other = a * q - b * p, b * r - c * q, c * p - a * r
     found.append(own * other - below * below)
     found += [u * own + v * other + w * below for u, v, w in others]
+    return found
+
+
+def _nonzero_expressions(rows: EntryRows, values: dict[int, ca.SX]) -> list[ca.SX]:
+    """What an isotropic direction or a link of no length makes vanish, as far as it is known without elimination."""
+    polynomials = [part for step in rows.steps for part in (step.numerator, step.denominator)]
+    found = [
+        _real(each, values) for each in polynomials if each.terms and each.symbols and each.symbols <= values.keys()
+    ]
+    if rows.turn is not None:
+        (a, b, c), (p, q, r), *_ = (tuple(part.expression(values) for part in row) for row in rows.linear)
+        found += [a * q - b * p, b * r - c * q, c * p - a * r]
     return found
 
 

@@ -50,6 +50,12 @@ class EntryRows(NamedTuple):
         """How many equations they make."""
         return len(self.rows) + (len(self.linear) - 1 if self.turn else 0)
 
+    @property
+    def symbols(self) -> frozenset[int]:
+        """The numbers of all symbols that stand in them."""
+        parts = [*self.rows, *(part for row in self.linear for part in row)]
+        return frozenset[int]().union(*(each.symbols for each in parts))
+
 
 def eliminate(
     rows: list[Polynomial], translations: list[Symbol], slides: list[Symbol], turns: list[Symbol]

@@ -1,161 +1,243 @@
-"""The numbers of links and lines that are given, as conditions between the places of the first entry."""
+"""The numbers of links and lines that are given, as conditions between the places of the first entry.
+
+The coordinates of a link's points count from anchors, points of which they are given, so that nothing is sought of its
+origin. One number more says where its x-axis goes; any further one is a condition.
+"""
 
 from __future__ import annotations
 
+from cmath import exp
+from collections.abc import Collection, Mapping
+from functools import cached_property
 from typing import NamedTuple
 
-from planar.model.link_shapes import At, Link, link_shape
+from planar.model.link_shapes import Link
 from planar.synthesis.exact.relations.polynomials import Polynomial, as_polynomial
-from planar.synthesis.exact.relations.reference_pose import ReferencePose, SlidingRow
-from planar.synthesis.exact.relations.unknowns import NumberKind, refuse
+from planar.synthesis.exact.relations.reference_pose import Coordinates, LinkAxes, ReferencePose, SlidingRow
+from planar.synthesis.exact.relations.unknowns import NumberKind
+
+PARALLEL = 1e-12
+"""Sine of the angle between a line and the direction in which a number moves it: it moves along itself."""
 
 
-class KnownAxes(NamedTuple):
-    """Of a link at the first entry: where its x-axis goes, and its origin, where that is known."""
+class _Point(NamedTuple):
+    """A place of a link with its coordinates in the link's axes."""
 
-    direction: Polynomial
-    origin: Polynomial | None
-
-
-def add_given_numbers(pose: ReferencePose, axes: dict[str, KnownAxes], slides: dict[str, float]) -> None:
-    """The conditions of all numbers that are given; `axes` of links, and displacements (m), that are known at the
-    first entry."""
-    for link in pose.mechanism.links:
-        if link.name != pose.mechanism.frame:
-            _add_link(pose, link, axes.get(link.name))
-    for each in pose.slides:
-        if each.pair.bodies[0] == pose.mechanism.frame:
-            _add_line(pose, each, slides.get(each.pair.name))
-        else:
-            _add_moving_line(pose, each, axes.get(each.pair.bodies[0]), each.pair.name in slides)
+    name: str
+    place: Polynomial
+    at: Coordinates
 
 
-def _add_link(pose: ReferencePose, link: Link, axes: KnownAxes | None) -> None:
-    used = [name for own, name in pose.places if own == link.name and isinstance(name, str)]
-    if link.axis is not None and (axes is not None or len(used) > 1):
-        raise refuse(f"the axes of {link.name!r} follow from two of its points")
-    if link.ends is not None:
-        _add_link_by_ends(pose, link, used, axes)
-    else:
-        _add_link_by_points(pose, link, used, axes)
+class _Anchor(NamedTuple):
+    """A place from which coordinates count, with its own; `name` is empty for the origin."""
+
+    name: str
+    place: Polynomial
+    value: complex
 
 
-def _is_free(pose: ReferencePose, name: str) -> bool:
-    return name in pose.free or name not in pose.numbers
-
-
-def _add_link_by_ends(pose: ReferencePose, link: Link, used: list[str], axes: KnownAxes | None) -> None:
-    assert link.ends is not None
-    table = pose.table
-    first, second = (pose.place(link.name, name) for name in link.ends)
-    others = [name for name in used if name not in link.ends]
-    given = {name: [not _is_free(pose, f"{link.name}.{name}.{axis}") for axis in "xy"] for name in others}
-    has_length = not _is_free(pose, f"{link.name}.length")
-    if axes is not None and axes.origin is not None:
-        pose.tie(first - axes.origin)
-    along = _now(pose, second - first)
-    length = None
-    if has_length:
-        length = table.add_given(NumberKind.LENGTH, float(link.length)).value  # type: ignore[arg-type]
-    if axes is None and not any(any(each) for each in given.values()):
-        if length is not None:
-            pose.conditions.append(along * along.conjugate - length * length)
-        return
-    way = axes.direction if axes is not None else _sought_direction(pose)
-    if length is not None:
-        pose.tie(along - length * way)
-    else:
-        pose.conditions.append(along * way.conjugate - along.conjugate * way)
-    for name in others:
-        _add_point(pose, link, name, given[name], _now(pose, first), way)
-
-
-def _add_link_by_points(pose: ReferencePose, link: Link, used: list[str], axes: KnownAxes | None) -> None:
-    given = {name: [not _is_free(pose, f"{link.name}.{name}.{axis}") for axis in "xy"] for name in used}
-    count = sum(sum(each) for each in given.values())
-    if axes is not None and axes.origin is not None:
-        origin, way = axes.origin, axes.direction
-    elif count > 3 or (axes is not None and count > 2):  # up to three only say where the axes are
-        origin = pose.table.add_unknown().value
-        way = axes.direction if axes is not None else _sought_direction(pose)
-    else:
-        return
-    for name in used:
-        _add_point(pose, link, name, given[name], origin, way)
-
-
-def _sought_direction(pose: ReferencePose) -> Polynomial:
-    way = pose.table.add_unknown().value
-    pose.conditions.append(way * way.conjugate - 1.0)
-    return way
-
-
-def _add_point(
-    pose: ReferencePose, link: Link, name: str, given: list[bool], origin: Polynomial, way: Polynomial
+def add_given_numbers(
+    pose: ReferencePose, displacements: Mapping[str, Polynomial], known_slides: Collection[str]
 ) -> None:
-    """The coordinates of a point along its link's axes, as far as they are given."""
-    if not any(given):
-        return
-    place = next((each.place for each in link.points if each.name == name), None)
-    if not isinstance(place, At):
-        raise refuse(f"point {name!r} of {link.name!r} is not written by its coordinates")
-    own = pose.table.add_given(NumberKind.VECTOR, complex(place.x, place.y)).value
-    off = _now(pose, pose.place(link.name, name) - origin)
-    if all(given):
-        pose.tie(off - own * way)
-        return
-    turned = off * way.conjugate - own
-    pose.conditions.append(turned + turned.conjugate if given[0] else turned - turned.conjugate)
-
-
-def _add_line(pose: ReferencePose, slide: SlidingRow, displacement: float | None) -> None:
-    """Where a line goes through a place that is given, or that has another part."""
+    """The conditions of all numbers that are given, with displacements that are known at the first entry;
+    `known_slides` are pairs of which entries say how far they slide."""
     frame = pose.mechanism.frame
-    free = pose.free_coordinates(slide.through)
-    name = slide.through
-    has_other_part = any(own == frame and other == name for own, other in pose.places)
-    if not has_other_part and (all(free) or (displacement is None and any(free))):
-        return
-    off = _now(pose, slide.slider - pose.place(frame, name))
-    if displacement is not None:
-        along = pose.table.add_given(NumberKind.LENGTH, displacement).value
-        off = off - along * slide.direction
-    if has_other_part or not any(free):
-        if displacement is not None:
-            pose.tie(off)
+    for link in pose.mechanism.links:
+        lines = [_Line(pose, each, displacements) for each in pose.slides if each.pair.bodies[0] == link.name]
+        if link.name == frame:
+            for each in lines:
+                each.add_to_frame()
         else:
-            pose.conditions.append(_now(pose, off * slide.direction.conjugate - off.conjugate * slide.direction))
-        return
-    pose.conditions.append(off + off.conjugate if not free[0] else off - off.conjugate)
+            _LinkConditions(pose, link, lines).add()
+    for slide in pose.slides:
+        pose.seek_direction(slide.pair.name, slide.pair.name in known_slides)
 
 
-def _add_moving_line(pose: ReferencePose, slide: SlidingRow, axes: KnownAxes | None, has_displacement: bool) -> None:
-    """The direction of a line of a moving link, and where it goes through, as far as they are given."""
-    link, name = slide.pair.bodies[0], slide.through
-    if has_displacement:
-        raise refuse(f"where {slide.pair.name!r} stands on a link that moves is given")
-    angle = pose.line_angle(slide.pair.name)
-    has_angle = angle is not None and not _is_free(pose, angle)
-    if not isinstance(name, str):
-        raise refuse(f"the line of {slide.pair.name!r} goes through a place without a name")
-    has_place = not any(_is_free(pose, f"{link}.{name}.{axis}") for axis in "xy")
-    is_elsewhere = any(own == link and other == name for own, other in pose.places)
-    if is_elsewhere:
-        off = _now(pose, slide.slider - pose.place(link, name))
-        pose.conditions.append(_now(pose, off * slide.direction.conjugate - off.conjugate * slide.direction))
-    if not has_angle and (is_elsewhere or not has_place):
-        return
-    if axes is None or axes.origin is None:
-        raise refuse(f"the line of {slide.pair.name!r} is given on {link!r}, and how that stands is not")
-    if has_angle:
-        assert angle is not None
-        turned = pose.table.add_given(NumberKind.TURN, float(pose.numbers[angle].value)).value
-        pose.tie(slide.direction - axes.direction * turned)
-    if has_place and not is_elsewhere:
-        at = link_shape(pose.links[link]).position(name)
-        own = pose.table.add_given(NumberKind.VECTOR, complex(at.x, at.y)).value
-        off = _now(pose, slide.slider - axes.origin - own * axes.direction)
-        pose.conditions.append(_now(pose, off * slide.direction.conjugate - off.conjugate * slide.direction))
+class _Line:
+    """The line of a pair, where it goes through in the axes of its link, and how far its slider is from there."""
+
+    def __init__(self, pose: ReferencePose, slide: SlidingRow, displacements: Mapping[str, Polynomial]):
+        self.pose, self.slide, self.link = pose, slide, slide.pair.bodies[0]
+        self.is_elsewhere = isinstance(slide.through, str) and (self.link, slide.through) in pose.places
+        "whether it goes through a place that is another's, too"
+        self.angle = pose.line_angle(slide.pair.name)
+        self.has_angle = self.angle is not None and self.angle not in pose.free
+        self.through: Polynomial | None = None
+        "the place from which displacements count, where one is known"
+        self.along: Polynomial | None = None
+        if slide.pair.name in displacements:
+            self.along = displacements[slide.pair.name] * slide.direction
+            self.through = slide.slider - self.along
+
+    @cached_property
+    def at(self) -> Coordinates:
+        """What it goes through."""
+        return self.pose.coordinates(self.link, self.slide.through, self.slide.pair)
+
+    @property
+    def has_place(self) -> bool:
+        """Whether no number that is sought moves it across itself."""
+        steps = [step for step, is_given in zip((1.0, 1.0j), self.at.is_given, strict=True) if not is_given]
+        if not self.has_angle:
+            return not steps
+        assert self.angle is not None
+        back = exp(-1j * float(self.pose.numbers[self.angle].value))
+        return all(abs((step * back).imag) < PARALLEL for step in steps)
+
+    def add_elsewhere(self) -> None:
+        """That it goes through a place that is another's, too."""
+        off = _now(self.pose, self.slide.slider - self.pose.place(self.link, str(self.slide.through)))
+        if self.along is not None:
+            self.pose.tie(off - self.along)
+        else:
+            self.add_across(off)
+
+    def add_across(self, off: Polynomial) -> None:
+        """That something is along it."""
+        across = _now(self.pose, off * self.slide.direction.conjugate)
+        self.pose.conditions.append(across - across.conjugate)
+
+    def add_to_frame(self) -> None:
+        """What is given of a line of the frame."""
+        if self.is_elsewhere:
+            self.add_elsewhere()
+            return
+        at = self.at
+        if not any(at.is_given) or (self.through is None and not self.has_place):
+            return
+        place = self.pose.table.add_given(NumberKind.PLACE, at.value).value
+        if self.through is None:
+            self.add_across(self.slide.slider - place)
+            return
+        off = _now(self.pose, self.through - place)
+        if all(at.is_given):
+            self.pose.tie(off)
+        else:
+            self.pose.conditions.append(off + off.conjugate if at.is_given[0] else off - off.conjugate)
+
+
+class _LinkConditions:
+    def __init__(self, pose: ReferencePose, link: Link, lines: list[_Line]):
+        self.pose, self.link = pose, link
+        self.ends = link.ends or ()
+        self.points = [
+            _Point(name, pose.places[own, name], pose.coordinates(own, name))
+            for own, name in ((link.name, name) for name in link.names)
+            if (own, name) in pose.places
+        ]
+        self.elsewhere = [each for each in lines if each.is_elsewhere]
+        others = [each for each in lines if not each.is_elsewhere]
+        self.points += [
+            _Point(f"through {each.slide.pair.name}", each.through, each.at)
+            for each in others
+            if each.through is not None
+        ]
+        self.offsets = [each for each in others if each.through is None and each.has_place]
+        self.angles = [each for each in lines if each.has_angle]
+        self.direction, self.origin = pose.axes.get(link.name, LinkAxes(None, None))
+        self.anchors = self._anchors()
+
+    def _anchors(self) -> list[_Anchor | None]:
+        """The places from which x and y count."""
+        if self.origin is not None:
+            return [_Anchor("", self.origin, 0.0)] * 2
+        whole = next((each for each in self.points if all(each.at.is_given)), None)
+        found: list[_Anchor | None] = []
+        for axis in range(2):
+            own = whole or next((each for each in self.points if each.at.is_given[axis]), None)
+            found.append(None if own is None else _Anchor(own.name, own.place, own.at.value))
+        return found
+
+    def _rest(self) -> list[tuple[_Point, bool, bool]]:
+        """The points of which more is given than where an anchor is: whether x, and whether y."""
+        found = []
+        for each in self.points:
+            x, y = (
+                is_given and (anchor is None or anchor.name != each.name)
+                for is_given, anchor in zip(each.at.is_given, self.anchors, strict=True)
+            )
+            if x or y:
+                found.append((each, x, y))
+        return found
+
+    def add(self) -> None:
+        """The conditions of what is given of a moving link."""
+        for line in self.elsewhere:
+            line.add_elsewhere()
+        open_anchors = sum(each is None for each in self.anchors)
+        if 0 < len(self.offsets) <= open_anchors:
+            self.offsets = []  # they only say where the origin is
+        elif open_anchors and self.offsets:
+            self.origin = self.pose.table.add_unknown().value
+            self.anchors = [_Anchor("", self.origin, 0.0)] * 2
+        rest = self._rest()
+        count = sum(x + y for _, x, y in rest) + len(self.angles) + len(self.offsets)
+        if self.direction is None:
+            if count < 2:
+                return
+            if not self.angles and not self.offsets and count == 2 and len(rest) == 1:
+                self._add_distance(rest[0][0])
+                return
+            self.direction = self._sought_direction()
+        way = self.direction
+        self.pose.axes[self.link.name] = LinkAxes(way, self.origin)
+        for line in self.angles:
+            assert line.angle is not None
+            turn = self.pose.table.add_given(NumberKind.TURN, float(self.pose.numbers[line.angle].value)).value
+            self.pose.tie(line.slide.direction - way * turn)
+        for point, x, y in rest:
+            self._add_point(point, (x, y), way)
+        for line in self.offsets:
+            line.add_across(self._offset(line, way))
+
+    def _sought_direction(self) -> Polynomial:
+        way = self.pose.table.add_unknown().value
+        self.pose.conditions.append(way * way.conjugate - 1.0)
+        return way
+
+    def _step(self, name: str, value: complex, anchor: _Anchor) -> Polynomial:
+        """The coordinates of a point from an anchor, as a number that is given; those of ends are lengths."""
+        if name in self.ends and (not anchor.name or anchor.name in self.ends):
+            if value == anchor.value:
+                return Polynomial({})
+            return self.pose.table.add_given(NumberKind.LENGTH, value.real, anchor.value.real).value
+        return self.pose.table.add_given(NumberKind.VECTOR, value, anchor.value).value
+
+    def _add_distance(self, point: _Point) -> None:
+        anchor = self.anchors[0]
+        assert anchor is not None
+        off, step = _now(self.pose, point.place - anchor.place), self._step(point.name, point.at.value, anchor)
+        self.pose.conditions.append(off * off.conjugate - step * step.conjugate)
+
+    def _add_point(self, point: _Point, is_given: tuple[bool, bool], way: Polynomial) -> None:
+        if all(is_given):
+            anchor = self.anchors[0]
+            assert anchor is not None
+            step = self._step(point.name, point.at.value, anchor)
+            self.pose.tie(_now(self.pose, point.place - anchor.place) - step * way)
+            return
+        axis = 0 if is_given[0] else 1
+        anchor = self.anchors[axis]
+        assert anchor is not None
+        turned = _now(self.pose, (point.place - anchor.place) * way.conjugate)
+        if axis and point.name in self.ends and (not anchor.name or anchor.name in self.ends):
+            self.pose.conditions.append(turned - turned.conjugate)
+            return
+        turned = turned - self.pose.table.add_given(NumberKind.VECTOR, point.at.value, anchor.value).value
+        self.pose.conditions.append(turned - turned.conjugate if axis else turned + turned.conjugate)
+
+    def _offset(self, line: _Line, way: Polynomial) -> Polynomial:
+        """From what a line goes through to its slider."""
+        x, y = self.anchors
+        assert x is not None and y is not None
+        if x.name == y.name:
+            step = self.pose.table.add_given(NumberKind.VECTOR, line.at.value, x.value).value
+            return line.slide.slider - x.place - step * way
+        start = complex(x.value.real, y.value.imag)
+        step = self.pose.table.add_given(NumberKind.VECTOR, line.at.value, start).value
+        across, along = ((line.slide.slider - each.place) * way.conjugate for each in (y, x))
+        own = (along + along.conjugate + across - across.conjugate) * 0.5
+        return (own - step) * way
 
 
 def _now(pose: ReferencePose, row: Polynomial) -> Polynomial:

@@ -6,11 +6,11 @@ later turns from there. A pin is one place then, and lengths and coordinates tha
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
-from planar.document.dimensions import Dimension, change_dimension, file_dimensions
+from planar.document.dimensions import change_dimension, file_dimensions
 from planar.foundation.geometry import Frame, Vector
 from planar.model.link_shapes import LinkShape, PointReference, link_shape
 from planar.model.mechanism import Mechanism
@@ -48,22 +48,46 @@ class SlidingRow:
     direction: Polynomial
 
 
-class ReferencePose:
-    """The places of one mechanism; `free` are the names of the numbers that are sought, `kept` whether the fixed pins
-    stay where they are all the same."""
+class LinkAxes(NamedTuple):
+    """The axes of a link at the first entry, as far as they are known: where the x-axis goes, and the origin."""
 
-    def __init__(self, mechanism: Mechanism, free: Sequence[str], pins_are_kept: bool):
-        self.mechanism, self.free, self.pins_are_kept = mechanism, frozenset(free), pins_are_kept
+    direction: Polynomial | None
+    origin: Polynomial | None
+
+
+class Coordinates(NamedTuple):
+    """A point of a link in the link's axes (m), and the names of the numbers that are sought of x and y, None where
+    they are given."""
+
+    value: complex
+    x: str | None
+    y: str | None
+
+    @property
+    def is_given(self) -> tuple[bool, bool]:
+        """Whether x and y are given."""
+        return self.x is None, self.y is None
+
+
+class ReferencePose:
+    """The places of one mechanism; `free` are the names of the numbers that are sought."""
+
+    def __init__(self, mechanism: Mechanism, free: Iterable[str]):
+        self.mechanism, self.free = mechanism, frozenset(free)
         self.table = SymbolTable()
         self.numbers = file_dimensions(mechanism)
         self.conditions: list[Polynomial] = []
-        self.places: dict[tuple[str, PointReference], Polynomial] = {}
+        self.places: dict[tuple[str, str], Polynomial] = {}
         "of links' points, before what ties them is put in"
         self.values: dict[int, Polynomial] = {}
         "what stands for symbols that are eliminated"
+        self.axes: dict[str, LinkAxes] = {}
+        "of moving links, where rows tie them"
         self.links = {each.name: each for each in mechanism.links}
         self.directions: dict[str, Direction] = {}
         "the line of a pair that has one"
+        self.patched: set[str] = set()
+        "pairs whose line's direction has a length of its own"
         self.pairs = [self._with_direction(index) for index in range(len(mechanism.pairs))]
         for pair in self.pairs:
             if tuple(pair.residual_kinds) not in KNOWN_KINDS or len(pair.coordinate_kinds) > 1:
@@ -82,45 +106,48 @@ class ReferencePose:
 
     def place(self, link: str, name: PointReference) -> Polynomial:
         """x + i y of a point, as far as it is known."""
+        if not isinstance(name, str):
+            raise refuse(f"a pin of {link!r} is a place without a name")
         if (link, name) not in self.places:
             fixed = link == self.mechanism.frame
-            if not fixed and not isinstance(name, str):
-                raise refuse(f"{link!r} moves and has a place without a name")
-            made = self._fixed_place(name) if fixed else self.table.add().value
-            self.places[link, name] = made
+            self.places[link, name] = self._fixed_place(name) if fixed else self.table.add().value
         return self.places[link, name].substitute(self.values)
 
-    def _fixed_place(self, name: PointReference) -> Polynomial:
-        at = link_shape(self.links[self.mechanism.frame]).position(name)
-        value = complex(at.x, at.y)
-        free = (False, False) if self.pins_are_kept else self.free_coordinates(name)
-        if not any(free):
-            return self.table.add_given(NumberKind.PLACE, value).value
+    def _fixed_place(self, name: str) -> Polynomial:
+        at = self.coordinates(self.mechanism.frame, name)
+        if all(at.is_given):
+            return self.table.add_given(NumberKind.PLACE, at.value).value
         found = self.table.add_unknown().value
-        if not all(free):
-            known = 1 if free[0] else 0  # which coordinate is given
-            given = self.table.add_given(NumberKind.PLACE, value).value
-            off = found - given
-            self.conditions.append(off - off.conjugate if known else off + off.conjugate)
+        if any(at.is_given):
+            off = found - self.table.add_given(NumberKind.PLACE, at.value).value
+            self.conditions.append(off + off.conjugate if at.is_given[0] else off - off.conjugate)
         return found
 
-    def free_coordinates(self, name: PointReference) -> tuple[bool, bool]:
-        """Whether x and y of a point of the frame are sought; each is a number of the file, or nothing is."""
-        frame = self.mechanism.frame
-        if not isinstance(name, str):
-            return False, False
-        index = [each.name for each in self.mechanism.links].index(frame)
-        own: list[Dimension] = [each for each in self.numbers.values() if each.address[:2] == ("links", index)]
-        here = link_shape(self.links[frame]).position(name)
-        moved = [
-            link_shape(change_dimension(self.mechanism, each, each.value + 1.0).links[index]).position(name)
-            for each in own
-            if each.name in self.free
-        ]
-        steps = [(round(each.x - here.x, 9), round(each.y - here.y, 9)) for each in moved]
-        if not {*steps} <= {(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)}:
-            raise refuse(f"point {name!r} of the frame is not written by its coordinates")
-        return (1.0, 0.0) in steps, (0.0, 1.0) in steps
+    def coordinates(self, link: str, name: PointReference, pair: Pair | None = None) -> Coordinates:
+        """A point of a link, or what the line of a pair goes through, in the link's axes. Raises BadInput where a
+        number that is sought is no coordinate of it."""
+        index = [each.name for each in self.mechanism.links].index(link)
+        places = [("links", index)]
+        if pair is not None:
+            places.append(("pairs", [each.name for each in self.mechanism.pairs].index(pair.name)))
+
+        def position(mechanism: Mechanism) -> complex:
+            spot = name
+            if pair is not None:
+                spot = self.line_through(mechanism.pairs[places[1][1]])
+            at = link_shape(mechanism.links[index]).position(spot)
+            return complex(at.x, at.y)
+
+        start, names = position(self.mechanism), dict[complex, str]()
+        for each in self.numbers.values():
+            if each.name in self.free and each.address[:2] in places:
+                step = position(change_dimension(self.mechanism, each, each.value + 1.0)) - start
+                step = complex(round(step.real, 9), round(step.imag, 9))
+                if step not in (0.0, 1.0, 1.0j) or step in names:
+                    raise refuse(f"{name!r} of {link!r} is not written by its coordinates, and {each.name!r} is free")
+                if step:
+                    names[step] = each.name
+        return Coordinates(start, names.get(1.0 + 0.0j), names.get(1.0j))
 
     # pairs
 
@@ -136,19 +163,26 @@ class ReferencePose:
             numbers = changed.measure(shapes)
             if not any(isinstance(n, Polynomial) and trial.symbol.own in n.symbols for n in numbers):
                 continue
-            moves = pair.bodies[0] != self.mechanism.frame
-            if each.name in self.free and (moves or not self.pins_are_kept):
-                way = self.table.add_unknown()
-                patch = self.table.add_given(NumberKind.TURN, PATCH_ANGLE).value
-                along = way.value * patch.conjugate
-                self.conditions.append(along + along.conjugate - 2.0)
-            elif moves:  # along its link's axes, which tie it
-                way = self.table.add()
-            else:
-                way = self.table.add_given(NumberKind.TURN, float(each.value))
+            is_given = pair.bodies[0] == self.mechanism.frame and each.name not in self.free
+            way = self.table.add_given(NumberKind.TURN, float(each.value)) if is_given else self.table.add()
             self.directions[pair.name] = Direction(way)
             return change_dimension(self.mechanism, each, self.directions[pair.name]).pairs[index]
         return pair
+
+    def seek_direction(self, pair: str, is_unit: bool) -> None:
+        """Seek the direction of a line where it is neither given nor tied: of length one, or of one length along a
+        direction, which leaves its sign open and has no second solution."""
+        way = self.directions[pair].symbol
+        known = {each.symbol.own for each in self.table.given} | {each.own for each in self.table.unknowns}
+        if way.own in known or way.own in self.values:
+            return
+        self.table.unknowns.append(way)
+        if is_unit:
+            self.conditions.append(way.value * way.value.conjugate - 1.0)
+            return
+        self.patched.add(pair)
+        along = way.value * self.table.add_given(NumberKind.TURN, PATCH_ANGLE).value.conjugate
+        self.conditions.append(along + along.conjugate - 2.0)
 
     def line_angle(self, pair: str) -> str | None:
         """The number of the file that is the direction of a pair's line."""
@@ -177,15 +211,20 @@ class ReferencePose:
         point_ = pair.point_on_line()
         if point_ is None or pair.name not in self.directions:
             raise refuse(f"the line of {pair.name!r} is not given by a direction")
+        slider = self.place(pair.bodies[1], point_[0][1])
+        return SlidingRow(pair, slider, self.line_through(pair), self.directions[pair.name].symbol.value)
+
+    @staticmethod
+    def line_through(pair: Pair) -> PointReference:
+        """What the line of a pair goes through, by name or by coordinates."""
         asked: list[PointReference] = []
 
         def note(name: PointReference) -> Polynomial:
             asked.append(name)
             return Polynomial({})
 
-        pair.measure([PlacedShape(note), self.shape(pair.bodies[1])])
-        slider = self.place(pair.bodies[1], point_[0][1])
-        return SlidingRow(pair, slider, asked[0], self.directions[pair.name].symbol.value)
+        pair.measure([PlacedShape(note) for _ in pair.bodies])
+        return asked[0]
 
     # ties
 

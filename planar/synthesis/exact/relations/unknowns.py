@@ -24,11 +24,12 @@ class NumberKind(Enum):
 
 @dataclass(frozen=True)
 class GivenNumber:
-    """A number that is given, with its value: m, or rad."""
+    """A number that is given: m, or rad, a value of the file from another one, its `start`."""
 
     symbol: Symbol
     kind: NumberKind
     value: complex
+    start: complex = 0.0
 
 
 @dataclass
@@ -50,10 +51,10 @@ class SymbolTable:
         self.unknowns.append(found)
         return found
 
-    def add_given(self, kind: NumberKind, value: complex) -> Symbol:
-        """A symbol for a number that is given."""
+    def add_given(self, kind: NumberKind, value: complex, start: complex = 0.0) -> Symbol:
+        """A symbol for a number that is given, from a start."""
         found = self.add()
-        self.given.append(GivenNumber(found, kind, value))
+        self.given.append(GivenNumber(found, kind, value, start))
         return found
 
 

@@ -21,6 +21,8 @@ FIRST_STEP, LEAST_STEP = 1e-4, 1e-9
 """Of what is left of the way."""
 SINGULAR_END = 1e-18
 """What is left of the way where a path is said to end where several solutions meet."""
+FAR = 1e5
+"""An unknown that is greater where next to nothing of the way is left goes to infinity."""
 MOST_STEPS = 10_000
 POINTS = 6
 """Through so many the predictor goes at most."""
@@ -31,36 +33,39 @@ SAFETY, FACTORS = 0.8, (0.2, 2.0)
 
 
 def follow_in_balls(family: Family, begin: Member, x: ComplexArray, end: Member) -> ComplexArray:
-    """Solutions x (paths, unknowns) of one member followed to another; no numbers where they do not come there."""
+    """Solutions x (paths, unknowns) of one member followed to another; infinite where a path goes to
+    infinity, no numbers where it does not come to an end."""
     found = np.full_like(x, np.nan)
     with ball_precision():
         for k, own in enumerate(x):
-            w = _follow_path(family, begin, [ball(complex(each)) for each in own], end)
-            if w is not None:
+            w, is_end = _follow_path(family, begin, [ball(complex(each)) for each in own], end)
+            if is_end:
                 found[k] = [complex(each) for each in w]
+            elif max((abs(complex(each)) for each in w), default=0.0) > FAR:
+                found[k] = np.inf
     return found
 
 
-def _follow_path(family: Family, begin: Member, w: list[Any], end: Member) -> list[Any] | None:
-    """Where the path from a solution comes, None where it does not."""
+def _follow_path(family: Family, begin: Member, w: list[Any], end: Member) -> tuple[list[Any], bool]:
+    """The last point of the path from a solution, and whether that is its end; none where it was lost before."""
     first = _corrected(MemberInBalls(family, end, begin, 1.0), w)[0]
     if first is None:
-        return None
+        return [], False
     points = [(1.0, first)]
     step = FIRST_STEP
     for _ in range(MOST_STEPS):
         left = points[-1][0]
         if left < SINGULAR_END or step < LEAST_STEP:
-            return None
+            return (points[-1][1] if left < SINGULAR_END else []), False
         here = left * (1.0 - step) if step < 0.5 else 0.0
         at, off = _corrected(MemberInBalls(family, end, begin, here), _predicted(points, here))
         if at is not None:
             if not here:
-                return at
+                return at, True
             points = [*points[1 - POINTS :], (here, at)]
         factor = SAFETY * (0.25 * NEAR / max(off, 1e-300)) ** (1.0 / len(points))
         step = min(1.0, step * min(max(factor, FACTORS[0]), FACTORS[1] if at is not None else 0.5))
-    return None
+    return [], False
 
 
 def _corrected(equations: MemberInBalls, w: list[Any]) -> tuple[list[Any] | None, float]:

@@ -14,25 +14,32 @@ import numpy as np
 from planar.foundation.arrays import ComplexArray, IntArray
 from planar.foundation.private_cache import PrivateCache
 from planar.synthesis.exact.relations.family import Family, Member
-from planar.synthesis.exact.tracking.monodromy import GenericSolutions, find_generic_solutions
-from planar.synthesis.exact.tracking.symmetry import FamilyName, exchange_images, name_family
+from planar.synthesis.exact.tracking.family_names import FamilyName, name_family
+from planar.synthesis.exact.tracking.monodromy import GenericSearch, GenericSolutions, find_generic_solutions
+from planar.synthesis.exact.tracking.symmetry import exchange_images
 from planar.synthesis.exact.tracking.trace_test import trace_test
 
 CACHE = PrivateCache("exact", ".npz", b"planar exact 1\n", 256 * 2**20)
+MAX_RECENT = 16
+_RECENT: dict[str, dict[str, Any]] = {}
+"""What was found in this process, by the names of families: at most so many."""
+TESTS = 3
+"""Trace tests of a family at most, each with the solutions that were missing at the last."""
 KNOWN = Path(__file__).parent / "known"
 """Where those stand that come with the package."""
 
 
 class FamilyRecord(NamedTuple):
     """What is known of a family: a random member with all solutions `V` that were found of it; `classes` (classes,
-    members) are rows of V that stand for the same motion; `is_traced`: whether the trace test says that these are all;
-    `source`: where their number is published, empty where it is not known to be."""
+    members) are rows of V that stand for the same motion; `is_traced`: whether the trace test says that these are all,
+    and `is_tested` whether it was made; `source`: where their number is published, empty where it is not known."""
 
     name: FamilyName
     solutions: GenericSolutions
     classes: IntArray
     is_traced: bool
     source: str
+    is_tested: bool = True
 
     @property
     def representatives(self) -> GenericSolutions:
@@ -43,7 +50,7 @@ class FamilyRecord(NamedTuple):
 def family_record(family: Family, progress: Callable[[int], None] | None = None) -> FamilyRecord:
     """What is known of a family, found now where nothing is, and kept."""
     name = name_family(family)
-    content = _packaged(name.text)
+    content = _packaged(name.text) or _RECENT.get(name.text)
     if content is None:
         kept = CACHE.read(name.text)
         content = _read(kept) if kept is not None else None
@@ -51,12 +58,35 @@ def family_record(family: Family, progress: Callable[[int], None] | None = None)
         found = find_generic_solutions(
             family, exchange_images(name.exchanges), progress=progress, store=_UnfinishedSearch(name)
         )
-        content = pack_record(
-            name, found, np.arange(len(found.V))[:, None], trace_test(family, found, name.exchanges), ""
-        )
-        if CACHE.is_writable():
-            CACHE.write(name.text, write_record(content))
+        content = _keep(name, found, False, False)
     return _unpack(name, content)
+
+
+def tested_record(family: Family, record: FamilyRecord) -> FamilyRecord:
+    """A record after the trace test; where this shows that solutions are missing, with those that more members lead to.
+
+    What comes of it is kept.
+    """
+    name, known = record.name, record.solutions
+    for seed in range(TESTS):
+        is_traced = trace_test(family, known, name.exchanges)
+        more = None if is_traced else GenericSearch(family, exchange_images(name.exchanges), TESTS + seed).extend(known)
+        if more is None or len(more.V) == len(known.V):
+            break
+        known = more
+    return _unpack(name, _keep(name, known, is_traced, True))
+
+
+def _keep(name: FamilyName, found: GenericSolutions, is_traced: bool, is_tested: bool) -> dict[str, Any]:
+    """A record as arrays, kept on disk where anything can be."""
+    content = pack_record(name, found, np.arange(len(found.V))[:, None], is_traced, "")
+    content["is_tested"] = np.array(is_tested)
+    if len(_RECENT) >= MAX_RECENT:
+        _RECENT.clear()
+    _RECENT[name.text] = content
+    if CACHE.is_writable():
+        CACHE.write(name.text, write_record(content))
+    return content
 
 
 class _UnfinishedSearch:
@@ -125,4 +155,5 @@ def _unpack(name: FamilyName, content: dict[str, Any]) -> FamilyRecord:
         content["classes"],
         bool(content["is_traced"]),
         str(content["source"]),
+        bool(content.get("is_tested", True)),
     )

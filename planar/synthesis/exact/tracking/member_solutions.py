@@ -171,7 +171,8 @@ def _follow_all(family: Family, record: FamilyRecord, member: Member, say: Progr
         if not 0 < again.sum() <= MOST_PATHS:
             break
         in_balls |= again
-        rows, x = proved_in_balls(family, record, np.flatnonzero(again), member, say)
+        rows, x, infinite = proved_in_balls(family, record, np.flatnonzero(again), member, say)
+        V[infinite, 0], is_near[infinite], is_single[infinite] = 0.0, True, False
         # what is proved is at a finite place, however far out
         V[rows], is_single[rows], is_near[rows] = representatives(homogeneous_solutions(x), images), True, True
     finite = is_finite_solution(V, INFINITY)
@@ -182,15 +183,15 @@ def _follow_all(family: Family, record: FamilyRecord, member: Member, say: Progr
 
 def proved_in_balls(
     family: Family, record: FamilyRecord, rows: IntArray, member: Member, say: Progress
-) -> tuple[IntArray, ComplexArray]:
+) -> tuple[IntArray, ComplexArray, IntArray]:
     """What the paths from those solutions of the random member come to in balls, where that is proved: the number of
-    each that does, and its solution of the member (solutions, unknowns)."""
+    each that does, its solution of the member (solutions, unknowns), and the numbers of those that go to infinity."""
     say(f"{count_phrase(len(rows), 'path')} in balls")
     begin = affine_solutions(record.solutions.V[rows])
     x = follow_in_balls(family, record.solutions.member, begin, member)
     came = np.flatnonzero(np.isfinite(x).all(axis=1))
     proof = certify_member(family, member, x[came])
-    return rows[came[proof.proved]], proof.x[proof.proved]
+    return rows[came[proof.proved]], proof.x[proof.proved], rows[np.isinf(x).all(axis=1)]
 
 
 def is_nearly_singular(family: Family, member: Member, x: ComplexArray) -> BoolArray:

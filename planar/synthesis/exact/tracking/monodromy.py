@@ -1,4 +1,4 @@
-"""The solutions of a random member of a family, found from one of them by going round in the family.
+"""The solutions of a random member of a family, found from those of random linkages by going round in the family.
 
 Members are the nodes of a graph; along every edge each solution is followed once. T. Duff, C. Hill, A. Jensen, K. Lee,
 A. Leykin, J. Sommars, Solving polynomial systems via homotopy continuation and monodromy, IMA J. Numer. Anal. 39, 2019.
@@ -15,17 +15,17 @@ from planar.assemblies.polynomial.path_tracker import MAX_STEPS, PathEnds, track
 from planar.foundation.arrays import ComplexArray
 from planar.synthesis.exact.relations.family import Family, Member
 from planar.synthesis.exact.tracking.first_solution import first_solution
-from planar.synthesis.exact.tracking.member_graph import BLOCK, MemberGraph
-from planar.synthesis.exact.tracking.member_homotopy import MemberHomotopy, homogeneous_solutions
+from planar.synthesis.exact.tracking.member_homotopy import EdgeHomotopy, MemberHomotopy, homogeneous_solutions
+from planar.synthesis.exact.tracking.solution_graph import BLOCK, CORRECTION, PREDICTION, SolutionGraph
 from planar.synthesis.exact.tracking.symmetry import Images
 
 FIRST_NODES, IDLE_NODES = 4, 2
-"""Members at first, and how many more must bring nothing new."""
+"""Members at first, each with a linkage of its own, and how many more must bring nothing new."""
 KEPT_FROM = 64
 """Solutions from which on every edge that was followed is kept, so that a search may go on from there."""
 CLOSER_STEPS = 20 * MAX_STEPS
 """Of a path that is followed with the digits of long doubles: near members with solutions that meet it takes many."""
-CORRECTION = 1e-7
+FOLLOWED_CORRECTION = 1e-7
 """What Newton's second step may still move a solution by: paths that leap for it are seen, as two come to one."""
 
 
@@ -56,37 +56,92 @@ def find_generic_solutions(
 ) -> GenericSolutions:
     """The solutions of a random member, one of those that are `images` of each other; no more than are `enough`. With a
     `store` the search goes on from where it was."""
-    graph = MemberGraph(family, images)
-    kept = None if store is None else store.read()
-    idle, before = 0, 0
-    if kept is not None:
-        graph.take_arrays(kept)
-        idle, before = int(kept["idle"]), int(kept["before"])
-    else:
-        member, x = first_solution(family, np.random.default_rng(seed))
-        graph.add_node(member, homogeneous_solutions(x[None]))
+    search = GenericSearch(family, images, seed, progress, store)
+    search.close(enough)
+    return search.solutions
+
+
+class GenericSearch:
+    """A search for the solutions of a random member, which can be extended."""
+
+    def __init__(
+        self,
+        family: Family,
+        images: Images | None = None,
+        seed: int = 5,
+        progress: Callable[[int], None] | None = None,
+        store: GraphStore | None = None,
+    ):
+        self.family, self.seed, self.progress, self.store = family, seed, progress, store
+        self.graph: SolutionGraph[Member] = SolutionGraph(
+            lambda nodes, edges: EdgeHomotopy(family, nodes, edges), images
+        )
+        kept = None if store is None else store.read()
+        if kept is not None:
+            take_arrays(self.graph, len(family.parts), kept)
+
+    @property
+    def solutions(self) -> GenericSolutions:
+        """The member with the most solutions that are known."""
+        best = max(range(len(self.graph.nodes)), key=lambda k: len(self.graph.solutions[k]))
+        return GenericSolutions(self.graph.nodes[best], self.graph.solutions[best])
+
+    def extend(self, known: GenericSolutions) -> GenericSolutions:
+        """The solutions of a member with those that members of this search lead to."""
+        self.graph.add_node(known.member, known.V)
+        self.close()
+        return GenericSolutions(self.graph.nodes[0], self.graph.solutions[0])
+
+    def close(self, enough: int | None = None) -> None:
+        """Go round between the members until linkages of others bring nothing new, or so many are known."""
+        graph = self.graph
         while len(graph.nodes) < FIRST_NODES:
-            _add_random_node(graph, seed)
-        before = graph.most
-    while True:
-        while graph.follow_one_edge():
-            if progress is not None:
-                progress(graph.most)
-            if enough is not None and len(graph.solutions[0]) >= enough:
-                return GenericSolutions(graph.nodes[0], graph.solutions[0])
-            if store is not None and graph.most >= KEPT_FROM:
-                store.write(graph.to_arrays() | {"idle": np.array(idle), "before": np.array(before)})
-        idle = idle + 1 if graph.most == before else 0
-        if idle > IDLE_NODES:
-            best = max(range(len(graph.nodes)), key=lambda k: len(graph.solutions[k]))
-            return GenericSolutions(graph.nodes[best], graph.solutions[best])
-        before = graph.most
-        _add_random_node(graph, seed)
+            self.add_linkage()
+        idle = 0
+        while idle < IDLE_NODES:
+            while graph.follow_open_edges():
+                if self.progress is not None:
+                    self.progress(graph.most)
+                if self.store is not None and graph.most >= KEPT_FROM:
+                    self.store.write(to_arrays(graph))
+                if enough is not None and len(graph.solutions[0]) >= enough:
+                    return
+            # a linkage more, at the first member
+            rng = np.random.default_rng([self.seed, 1, len(graph.nodes), graph.most, idle])
+            member, x = first_solution(self.family, rng)
+            ends = track_paths(
+                MemberHomotopy(self.family, member, graph.nodes[0]),
+                homogeneous_solutions(x[None]),
+                PREDICTION,
+                CORRECTION,
+            )
+            before = len(graph.solutions[0])
+            graph.add_solutions(0, ends.V[ends.is_single])
+            idle = idle + 1 if len(graph.solutions[0]) == before else 0
+
+    def add_linkage(self) -> None:
+        """A member more, with the linkage that it was made for."""
+        member, x = first_solution(self.family, np.random.default_rng([self.seed, len(self.graph.nodes)]))
+        self.graph.add_node(member, homogeneous_solutions(x[None]))
 
 
-def _add_random_node(graph: MemberGraph, seed: int) -> None:
-    rng = np.random.default_rng([seed, len(graph.nodes)])
-    graph.add_node(graph.family.random_member(rng), graph.solutions[0][:0])
+def to_arrays(graph: SolutionGraph[Member]) -> dict[str, Any]:
+    """A graph by names, to be kept."""
+    content: dict[str, Any] = {"nodes": np.array(len(graph.nodes))}
+    for k, (member, V) in enumerate(zip(graph.nodes, graph.solutions, strict=True)):
+        content |= {f"V {k}": V} | {f"part {k} {n}": part for n, part in enumerate(member.parts)}
+    return content | {f"followed {i} {j}": done for (i, j), done in graph.followed.items()}
+
+
+def take_arrays(graph: SolutionGraph[Member], part_count: int, content: dict[str, Any]) -> None:
+    """Go on from what was kept."""
+    for k in range(int(content["nodes"])):
+        graph.nodes.append(Member(tuple(content[f"part {k} {n}"] for n in range(part_count))))
+        graph.solutions.append(content[f"V {k}"])
+    for name, done in content.items():
+        if name.startswith("followed"):
+            i, j = map(int, name.split()[1:])
+            graph.followed[i, j] = done
 
 
 def follow(
@@ -97,7 +152,7 @@ def follow(
     between = MemberHomotopy(family, begin, end)
     start = V if long_steps is None else V.astype(np.clongdouble)
     blocks = [
-        track_paths(between, start[k : k + BLOCK], near, CORRECTION, long_steps or MAX_STEPS)
+        track_paths(between, start[k : k + BLOCK], near, FOLLOWED_CORRECTION, long_steps or MAX_STEPS)
         for k in range(0, max(len(V), 1), BLOCK)
     ]
     ends = PathEnds(*(np.concatenate(each) for each in zip(*blocks, strict=True)))

@@ -1,163 +1,184 @@
-"""The trace test: whether solutions that were found are all, by a line in the numbers of a family and a linear slice.
+"""The trace test: whether solutions that were found are all, by a line in the numbers of a family and bilinear slices.
 
-Along a line p + s v of members the solutions are a curve in unknowns and s. Where it meets a plane, and that plane is
-moved along itself, the sum of all points of an irreducible curve moves evenly, and that of some of them does not. The
-points on a plane are found by monodromy from those of the member; where their trace is even they are all, and the plane
-s = 0 has no more than they lead to. A. Leykin, J. I. Rodriguez, F. Sottile, Trace test, Arnold Math. J. 4, 2018.
+Along a line p + s v of members the solutions are a curve in unknowns and s. The slice s l(x) = 0 with l linear in the
+places x meets it at the solutions of the member p and where l vanishes, nowhere at infinity. Other bilinear slices
+are reached from there, and where a slice is moved by a constant, the sums of x and s of all points of an irreducible
+curve move evenly, and those of some of them do not. A. Leykin, J. I. Rodriguez, F. Sottile, Trace test, Arnold Math. J.
+4, 2018, section 3. Slices have the fewer points the fewer numbers a line moves: it moves those of one entry, and those
+that conditions hold, and the solutions of all other rows, a curve, are taken for irreducible where the family is.
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Sequence
 
 import numpy as np
 
-from planar.assemblies.polynomial.certification import is_available
-from planar.assemblies.polynomial.path_tracker import (
-    HomotopyValues,
-    is_finite_solution,
-    normalize,
-    track_paths,
-)
-from planar.foundation.arrays import Array, ComplexArray
-from planar.synthesis.exact.relations.family import Family, Member
+from planar.assemblies.polynomial.path_tracker import HomotopyValues, normalize
+from planar.foundation.arrays import Array, ComplexArray, IntArray
+from planar.synthesis.exact.relations.family import Family
 from planar.synthesis.exact.relations.unknowns import NumberKind
-from planar.synthesis.exact.tracking.exact_certificates import certify_member
-from planar.synthesis.exact.tracking.member_homotopy import affine_solutions
-from planar.synthesis.exact.tracking.monodromy import CLOSER_STEPS, CORRECTION, GenericSolutions
+from planar.synthesis.exact.tracking.member_homotopy import affine_solutions, homogeneous_slopes, scaled_rows
+from planar.synthesis.exact.tracking.monodromy import GenericSolutions
 from planar.synthesis.exact.tracking.same_solutions import first_of_same
+from planar.synthesis.exact.tracking.solution_graph import SolutionGraph
 from planar.synthesis.exact.tracking.symmetry import exchange_images
 
 MAX_POINTS = 1500
 """Of a slice, where nothing else is said; with more the test is not made."""
-ROUNDS, IDLE_ROUNDS = 200, 15
-FEW, CLOSER = 0.02, 1e-6
-"""Of paths: where no more are lost they are followed again, and how far predictions may be off then."""
-FINITE = 1e-6
-"""Of solutions of length one: what is nearer to infinity is there."""
-NEARER = 1e4
-"""No solution of a random member is at infinity that is nearer than this."""
-MOVES = 0.0, 1.0, -1.0
-"""Of a plane: levels at which the sums of its points are compared."""
-EVEN = 1e-8
+FIRST_SLICES, MORE_SLICES = (8, 5), 8
+"""Between which points are followed at first, where there are FEW solutions or more, and how many more are tried before
+the trace is said to be uneven."""
+FEW = 10
+SPREAD = 1.0
+"""Of the sizes of a slice's coefficients (logarithm)."""
+LEVELS = 1.0 + 0.3j, -0.4 + 1.1j
+"""By which a slice is moved, of its greatest coefficient: the sums of its points are compared there and where it is."""
+EVEN = 1e-10
 """Of the size of the sums: by how much a trace may be off."""
+SEPARATE = 1e-9
+"""Of the greatest unknown: solutions whose places are nearer are told from each other by conjugates alone."""
+ON_SLICE = 1e-6
+"""Of the size of a point: what s is less than that at the member itself."""
 
-
-class _Plane(NamedTuple):
-    """c . (x, s) = level."""
-
-    c: ComplexArray
-    level: complex
+Slice = ComplexArray
+"""Coefficients (2, 1 + unknowns) of 1 and the unknowns, and of s and s times these."""
 
 
 class _SliceHomotopy:
-    """From a plane to another; solutions are (1, places, s; 1, conjugates, s)."""
+    """Of each path a homotopy between two slices; solutions are (1, places, s; 1, conjugates, s)."""
 
     def __init__(
         self,
         family: Family,
         known: GenericSolutions,
         line: tuple[ComplexArray, ...],
-        planes: tuple[_Plane, _Plane],
+        slices: tuple[ComplexArray, ComplexArray],
     ):
         self.family, self.member, self.line = family, known.member, line
-        self.begin, self.end = planes
+        self.begin, self.end = slices
+
+    def at_paths(self, paths: IntArray) -> _SliceHomotopy:
+        """The homotopy of some of the paths."""
+        copy = _SliceHomotopy.__new__(_SliceHomotopy)
+        copy.family, copy.member, copy.line = self.family, self.member, self.line
+        copy.begin, copy.end = self.begin[paths], self.end[paths]
+        return copy
 
     def __call__(self, V: ComplexArray, way: Array) -> HomotopyValues:
         """The equations, their slope, and their derivative along the way."""
         n = self.family.size
-        x, s, y = _affine(V, n)
+        x, s, other = _affine(V, n)
         f, slope, by_s = self.family.rows_at(x.T.copy(), self.member, self.line, s, True)
         rows, paths = f.shape
-        c = self.begin.c + way[:, None] * (self.end.c - self.begin.c)
-        level = self.begin.level + way * (self.end.level - self.begin.level)
-        whole: ComplexArray = np.zeros((paths, rows + 2, 2 * n + 2), dtype=complex)
-        whole[:, :rows, :n], whole[:, :rows, n] = slope[:, :n].transpose(2, 0, 1), by_s.T
-        whole[:, :rows, n + 1 : 2 * n + 1] = slope[:, n:].transpose(2, 0, 1)
-        whole[:, rows, : 2 * n + 1] = c
-        whole[:, rows + 1, n], whole[:, rows + 1, 2 * n + 1] = 1.0, -1.0
-        left: ComplexArray = np.zeros((paths, rows + 2), dtype=V.dtype)
-        left[:, :rows], left[:, rows] = f.T, np.sum(c * y[:, :-1], axis=1) - level
-        left[:, rows + 1] = y[:, n] - y[:, 2 * n + 1]
-        along: ComplexArray = np.zeros_like(left)
-        along[:, rows] = y[:, :-1] @ (self.end.c - self.begin.c) - (self.end.level - self.begin.level)
-        found: ComplexArray = np.empty((paths, rows + 2, 2 * n + 4), dtype=complex)
-        for first, at in ((0, 0), (n + 1, n + 2)):
-            part, over = whole[:, :, first : first + n + 1], V[:, at][:, None]
-            found[:, :, at] = -np.einsum("pru,pu->pr", part, y[:, first : first + n + 1]) / over
-            found[:, :, at + 1 : at + n + 2] = part / over[..., None]
-        size = np.linalg.norm(found, axis=2)
-        scale: Array = 1.0 / np.where(size > 0.0, size, 1.0)
-        return left * scale, found * scale[..., None], along * scale
+        change = self.end - self.begin
+        c = self.begin + way[:, None, None] * change
+        monomials = np.concatenate([np.ones((paths, 1)), x], axis=1)
+        parts, changes = (np.einsum("pku,pu->pk", each, monomials) for each in (c, change))
+        by_x = c[:, 0, 1:] + s[:, None] * c[:, 1, 1:]
+        # unknowns in the order of V: places, s, conjugates, s
+        total: ComplexArray = np.zeros((rows + 2, 2 * n + 2, paths), dtype=complex)
+        total[:rows, :n], total[:rows, n], total[:rows, n + 1 : -1] = slope[:, :n], by_s, slope[:, n:]
+        total[rows, :n], total[rows, n], total[rows, n + 1 : -1] = by_x[:, :n].T, parts[:, 1], by_x[:, n:].T
+        total[rows + 1, n], total[rows + 1, -1] = 1.0, -1.0
+        last = np.stack([parts[:, 0] + s * parts[:, 1], s - other])
+        along = np.zeros((rows + 2, paths), dtype=complex)
+        along[rows] = changes[:, 0] + s * changes[:, 1]
+        return scaled_rows(np.concatenate([f, last]), homogeneous_slopes(total, V), along)
 
 
 def _affine(V: ComplexArray, n: int) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
-    """The unknowns, s, and all entries of both halves."""
+    """The unknowns, and s of both halves."""
     y = affine_solutions(V)
-    return np.concatenate([y[:, :n], y[:, n + 1 : -1]], axis=1), y[:, n], y
+    return np.concatenate([y[:, :n], y[:, n + 1 : -1]], axis=1), y[:, n], y[:, -1]
 
 
 class _Slices:
-    """Planes that cut the solutions along one line of members."""
+    """Slices of the solutions along one line of members, and the points of each."""
 
-    def __init__(self, family: Family, known: GenericSolutions, rng: np.random.Generator):
-        self.family, self.known, self.rng = family, known, rng
-        self.line = tuple(rng.normal(size=each.shape) + 1j * rng.normal(size=each.shape) for each in known.member.parts)
-        for part, each in zip(family.parts, self.line, strict=True):
-            real = [k for k, kind in enumerate(part.kinds) if kind is NumberKind.LENGTH]
-            each[:, real, 1] = each[:, real, 0]
-        self.start = _Plane(np.eye(1, 2 * family.size + 1, family.size)[0].astype(complex), 0.0)
+    def __init__(self, family: Family, known: GenericSolutions, V: ComplexArray, rng: np.random.Generator):
+        self.size, self.rng = family.size, rng
+        x, one = affine_solutions(V), np.ones((len(V), 1))
+        self.form_size = _form_size(x)
+        line = _random_line(family, rng)
 
-    def random_plane(self) -> _Plane:
-        """A plane."""
-        c, level = self.rng.normal(size=(2, 2 * self.family.size + 1)), self.rng.normal(size=2)
-        return _Plane(c[0] + 1j * c[1], complex(*level))
+        def between(slices: Sequence[Slice], edges: IntArray) -> _SliceHomotopy:
+            every = np.array(slices)
+            return _SliceHomotopy(family, known, line, (every[edges[:, 0]], every[edges[:, 1]]))
 
-    def follow(self, points: ComplexArray, one: _Plane, other: _Plane) -> tuple[ComplexArray, bool]:
-        """The points of one plane on another, and whether all came there."""
-        between = _SliceHomotopy(self.family, self.known, self.line, (one, other))
-        ends = track_paths(between, points)
-        again = np.flatnonzero(~ends.is_near_end)
-        if 0 < len(again) <= FEW * len(points):
-            more = points[again].astype(np.clongdouble)
-            closer = track_paths(between, more, CLOSER, CORRECTION, CLOSER_STEPS)
-            for whole, part in zip(ends, closer, strict=True):
-                whole[again] = part
-        return ends.V[ends.is_single], bool(ends.is_single.all())
+        self.graph: SolutionGraph[Slice] = SolutionGraph(between, None)
+        W = np.concatenate([one, x[:, : self.size], 0.0 * one, one, x[:, self.size :], 0.0 * one], axis=1)
+        first = self.random_slice()
+        first[0] = 0.0
+        self.graph.add_node(first, normalize(W))
+        while len(self.graph.nodes) < FIRST_SLICES[len(V) > FEW]:
+            self.graph.add_node(self.random_slice(), W[:0])
+        self.levels = [1]
+        for level in LEVELS:
+            moved = self.graph.nodes[1].copy()
+            moved[0, 0] += level * np.abs(moved).max()
+            self.levels.append(self.graph.add_node(moved, W[:0]))
+            self.graph.leaves.add(self.levels[-1])
 
-    def points_on(self, plane: _Plane, points: ComplexArray, most: int) -> ComplexArray | None:
-        """All points of a plane, found from some of them by going round; None where their trace is not even, or where
-        they are more than so many."""
-        idle = 0
-        for _ in range(ROUNDS):
-            a, b = self.random_plane(), self.random_plane()
-            gone = points
-            for first, last in ((plane, a), (a, b), (b, plane)):
-                gone, _ = self.follow(gone, first, last)
-            both = np.concatenate([points, gone])
-            new = both[first_of_same(both) == np.arange(len(both))]
-            idle = idle + 1 if len(new) == len(points) else 0
-            points = new
-            if idle and self.is_even(points, plane):
-                return points
-            if len(points) > most or idle >= IDLE_ROUNDS:
-                return None
-        return None
+    def random_slice(self) -> Slice:
+        """Coefficients at random; none of conjugates where places tell solutions from each other."""
+        shape = (2, 1 + 2 * self.size)
+        result: Slice = self.rng.normal(size=shape) + 1j * self.rng.normal(size=shape)
+        result *= np.exp(SPREAD * self.rng.normal(size=shape))
+        result[:, 1 + self.form_size :] = 0.0
+        return result
 
-    def is_even(self, points: ComplexArray, plane: _Plane) -> bool:
-        """Whether the sum of the points moves evenly with the plane's level."""
+    def close(self, most_points: int) -> bool:
+        """Find the points of all slices; whether they have an even trace and are no more than so many."""
+        for _ in range(MORE_SLICES):
+            while self.graph.follow_open_edges():
+                if self.graph.most > most_points:
+                    return False
+            if self._is_even():
+                return True
+            self.graph.add_node(self.random_slice(), self.graph.solutions[0][:0])
+        return False
+
+    def _is_even(self) -> bool:
+        """Whether the sum of the points of a slice moves evenly with its level."""
+        first, *others = self.levels
+        if not all(self.graph.follow_edge(first, level) for level in others):
+            return False
+        points = [self.graph.solutions[level] for level in self.levels]
         sums = []
-        for step in MOVES:
-            moved, is_whole = (
-                (points, True) if not step else self.follow(points, plane, plane._replace(level=plane.level + step))
-            )
-            if not is_whole:
-                return False
-            x, s, _ = _affine(moved, self.family.size)
-            sums.append(np.append(x.sum(axis=0), s.sum()))
-        off = np.abs(sums[1] + sums[2] - 2.0 * sums[0]).max()
+        for V in points:
+            x, s, _ = _affine(V, self.size)
+            sums.append(np.append(x[:, : self.form_size].sum(axis=0), s.sum()))
+        slopes = [(each - sums[0]) / level for each, level in zip(sums[1:], LEVELS, strict=True)]
         size = max(float(np.abs(each).max()) for each in sums)
-        return bool(off <= EVEN * max(size, 1.0))
+        return len({*map(len, points)}) == 1 and bool(np.abs(slopes[1] - slopes[0]).max() <= EVEN * max(size, 1.0))
+
+    def at_member(self) -> ComplexArray:
+        """The unknowns (solutions, unknowns) of the points that are the member's."""
+        x, s, _ = _affine(self.graph.solutions[0], self.size)
+        result: ComplexArray = x[np.abs(s) < ON_SLICE * np.maximum(1.0, np.abs(x).max(axis=1))]
+        return result
+
+
+def _form_size(x: ComplexArray) -> int:
+    """How many unknowns a slice's form has for solutions x (solutions, unknowns): the places, or the conjugates too."""
+    half = x.shape[1] // 2
+    apart = np.abs(x[:, None, :half] - x[:, :half]).max(axis=2) + np.where(np.eye(len(x)), np.inf, 0.0)
+    return half if apart.min() > SEPARATE * max(1.0, float(np.abs(x).max())) else 2 * half
+
+
+def _random_line(family: Family, rng: np.random.Generator) -> tuple[ComplexArray, ...]:
+    """Changes of the numbers of one entry, and of those that conditions hold."""
+    line: list[ComplexArray] = []
+    most = max(range(1, len(family.parts)), key=lambda k: family.parts[k].entry_count, default=0)
+    for k, part in enumerate(family.parts):
+        change: ComplexArray = np.zeros((part.entry_count, len(part.kinds), 2), dtype=complex)
+        entries = slice(0, int(k == most or (k == 0 and part.rows.equation_count > 0)))
+        change[entries] = rng.normal(size=change[entries].shape) + 1j * rng.normal(size=change[entries].shape)
+        real = [n for n, kind in enumerate(part.kinds) if kind is NumberKind.LENGTH]
+        change[:, real, 1] = change[:, real, 0]
+        line.append(change)
+    return tuple(line)
 
 
 def trace_test(
@@ -173,32 +194,7 @@ def trace_test(
     """
     V = np.concatenate(exchange_images(exchanges)(known.V))
     V = V[first_of_same(V) == np.arange(len(V))]
-    if len(V) * 4 > most_points:
+    if not 0 < 2 * len(V) <= most_points:
         return False
-    n, x = family.size, affine_solutions(V)
-    slices = _Slices(family, known, np.random.default_rng(seed))
-    one = np.ones((len(x), 1))
-    W = normalize(np.concatenate([one, x[:, :n], 0.0 * one, one, x[:, n:], 0.0 * one], axis=1))
-    plane = slices.random_plane()
-    points = slices.points_on(plane, slices.follow(W, slices.start, plane)[0], most_points)
-    if points is None:
-        return False
-    back, _ = slices.follow(points, plane, slices.start)
-    x = _affine(back[is_finite_solution(back, FINITE)], n)[0]
-    others = x[first_of_same(np.concatenate([V, _homogeneous(x)]))[len(V) :] >= len(V)]
-    return not len(others) or _are_at_infinity(family, known.member, V, others)
-
-
-def _are_at_infinity(family: Family, member: Member, V: ComplexArray, x: ComplexArray) -> bool:
-    """Whether ends beside those that are known only look as if they were at finite places: where several meet at
-    infinity doubles come there by and by."""
-    if not is_available() or (np.abs(x).max(axis=1) < NEARER).any():
-        return False
-    proof = certify_member(family, member, x)
-    told = first_of_same(np.concatenate([V, _homogeneous(proof.x[proof.proved])]))
-    return bool((told < len(V)).all())
-
-
-def _homogeneous(x: ComplexArray) -> ComplexArray:
-    half, one = x.shape[1] // 2, np.ones((len(x), 1))
-    return normalize(np.concatenate([one, x[:, :half], one, x[:, half:]], axis=1))
+    slices = _Slices(family, known, V, np.random.default_rng(seed))
+    return slices.close(most_points) and len(slices.at_member()) == len(V)
