@@ -6,6 +6,9 @@ import numpy as np
 import pytest
 
 import planar
+from planar.document.revised.changed_numbers import with_values
+from planar.synthesis.exact import exact_synthesis
+from planar.synthesis.judgement.file_check import check_file
 from planar.synthesis.judgement.judgement import DesignJudge
 from tests.builders import four_bar_document, slider_crank_document
 from tests.closed_forms import PARALLELOGRAM, TRIPLE, TURN, rocker
@@ -188,3 +191,52 @@ def test_a_place_that_no_assembly_meets_is_no_defect_of_circuits():
     judge = DesignJudge(task, 1.0, is_exact=True)
     defects = judge.judge(planar.from_dict(document), [np.array([0.3, 0.5])], [task.wanted[0].places]).defects
     assert defects[0].demand == "the reach" and defects[0].sentence.startswith("no assembly of it meets entry 2 of E")
+
+
+def checked(scale):
+    """The check of a triple rocker's file whose coupler is longer by a part than that which made the entries."""
+    linkage, entries = FourBar(*TRIPLE), [(0.3, 1), (0.7, -1), (-0.6, -1)]
+    a, b, c, d = TRIPLE
+    document = four_bar_document(a, b * scale, c, d, 0.3, 1, points={"E": linkage.point})
+    places = [linkage.place(*each) for each in entries]
+    through = [{"at": [at.real, at.imag], "input": theta} for at, (theta, _) in zip(places, entries, strict=True)]
+    wanted = {"point": "E", "through": through, "absolute": True}
+    task = planar.read_task({"planar": 1, "units": {"angle": "rad"}, "start": document, "wanted": [wanted]})
+    inputs = [np.array([theta for theta, _ in entries])]
+    return check_file(planar.from_dict(document), task.wanted, inputs, 1.0)
+
+
+@pytest.mark.parametrize("scale", [1.0, 1.0 + 4 * np.finfo(float).eps])
+def test_a_file_meets_entries_on_all_branches_to_condition_times_round_off(scale):
+    check = checked(scale)
+    assert check.is_met and check.misses[0].max() < 1e-13 and check.tolerances[0].max() < 1e-10
+
+
+def test_a_file_that_differs_says_by_how_much():
+    check = checked(1.0 + 1e-8)
+    assert not check.is_met and not check.is_rounded
+    assert 1e-9 < check.misses[0].max() < 1e-6
+    check = checked(0.1)
+    assert np.isinf(check.misses[0][0]) and not check.is_met
+
+
+def test_a_design_whose_file_is_wrong_is_not_called_proved_and_has_no_defect(monkeypatch):
+    """A fault of the program is told once, with its size."""
+    plain = exact_synthesis.exact_linkage
+
+    def wrong(problem, solution, name):
+        found = plain(problem, solution, name)
+        longer = planar.dimensions(found.mechanism)["DC.length"] * (2.0 if name.endswith("1") else 1.0)
+        return found._replace(mechanism=with_values(found.mechanism, {"DC.length": longer}))
+
+    pairs = [[0, 0], [25, 14], [50, 33], [70, 51], [90, 75]]
+    wanted = {"from": "A", "to": "D", "pairs": pairs}
+    value = {"planar": 1, "units": {"angle": "deg"}, "start": "four-bar", "wanted": [wanted]}
+    sound = planar.synthesise(value, complete=True)
+    monkeypatch.setattr(exact_synthesis, "exact_linkage", wrong)
+    found = planar.synthesise(value, complete=True)
+    assert all(each.certified for each in sound) and len(found) == len(sound)
+    last = found[-1]
+    assert not last.certified and not last.defects and sum(not each.certified for each in found) == 1
+    (remark,) = (each for each in found.remarks if "is not called proved" in each)
+    assert remark.startswith(f"design {len(found)} ") and "fault of planar" in remark
