@@ -10,7 +10,6 @@ import numpy as np
 
 from planar.assemblies.circuits.traced_circuit import BranchLeg, TracedCircuit, trace_circuit
 from planar.assemblies.modes import Modes
-from planar.foundation.angles import distances
 from planar.foundation.arrays import Array
 from planar.foundation.errors import NoAnswer
 from planar.foundation.jets import TURN, value_and_rates
@@ -27,8 +26,6 @@ from planar.synthesis.task.wanted_expressions import carried_name
 
 MAX_ASSEMBLIES = 64
 """Assemblies at one position of the input that are looked at."""
-SAME_ASSEMBLY_DISTANCE = 1e-5
-"""rad or sizes: unknowns of one assembly, reached along its circuit or listed, differ by less."""
 PIECE_SAMPLES, REFINEMENTS, REFINED_SAMPLES = 12, 3, 13
 """Positions on each piece of a branch at which the one nearest to an entry is looked for, how often it is looked
 at more closely, and at how many positions."""
@@ -120,18 +117,13 @@ class DesignAssemblies:
         """The number of the branch of the sketch, from 0."""
         return 0 if self.circuit is None else self.circuit.home_branch
 
-    def branch_of(self, z: Array, position: float) -> int | None:
-        """The branch of the circuit, from 0, on which an assembly z (unknowns,) lies; None where it is on none."""
-        if self.circuit is None:
-            return None
-        branches = list(self.circuit.assemblies_at(position))
-        if not branches:
-            return None
+    def along_circuit(self, position: float) -> tuple[list[int], Array]:
+        """The assemblies of the circuit with the input at a position (rad or m): the branches, from 0, on which they
+        lie, and their unknowns (assemblies, unknowns)."""
+        every = [] if self.circuit is None else list(self.circuit.assemblies_at(position))
         by = self.solver.scale[list(self.solver.equations.unknowns)]
-        along = np.array([unknowns for _, unknowns in branches]) / by
-        apart = distances(self.solver.equations.unknown_is_angle, along, z).max(axis=1, initial=0.0)
-        nearest = int(np.argmin(apart))
-        return branches[nearest][0] if apart[nearest] < SAME_ASSEMBLY_DISTANCE else None
+        z = np.array([unknowns for _, unknowns in every]).reshape(-1, len(by)) / by
+        return [branch for branch, _ in every], z
 
     def has_change_point(self, z: Array, position: float) -> bool:
         """Whether the circuit of an assembly z (unknowns,) runs through a change point."""

@@ -31,26 +31,43 @@ class EntryPlace(NamedTuple):
     dead_points: tuple[float, ...] = ()
 
 
-def entry_place(
-    design: DesignAssemblies, wanted: Wanted, entry: int, position: float, result: Array, size: float, within: float
-) -> EntryPlace:
-    """Where an assembly with the input at a position (rad or m) shows a result (parts,), to within so much."""
-    z = design.at(position)
-    shown = design.results(wanted, z, np.full(len(z), position))
-    turns = design.measures_angle(wanted)
-    rows = np.flatnonzero(result_differences(wanted, shown, result, size, turns) <= within)
-    if not len(rows):
-        return EntryPlace(entry, position, "nowhere")
-    branches = [design.branch_of(z[row], position) for row in rows]
-    if design.home_branch in branches:
-        return EntryPlace(entry, position, "branch")
-    branch = next((each for each in branches if each is not None), None)
-    if branch is not None:
-        return EntryPlace(entry, position, "circuit", tuple(design.dead_points_before(branch, position)))
-    if design.circuit is None or design.circuit.lost_reason:
-        return EntryPlace(entry, position, "unknown")
-    is_crossed = design.circuit.has_change_point and any(design.has_change_point(z[row], position) for row in rows)
-    return EntryPlace(entry, position, "crossed" if is_crossed else "another")
+class EntryLocator(NamedTuple):
+    """Finds the assemblies of a design that show given results to within a distance (m or rad); `size` (m) is the
+    extent of what is wanted. `is_proof`: what lies on no branch of the circuit is looked for in all assemblies."""
+
+    design: DesignAssemblies
+    size: float
+    within: float
+    is_proof: bool
+
+    def locate(self, wanted: Wanted, entry: int, position: float, result: Array) -> EntryPlace:
+        """Where an entry is met, with the input at a position (rad or m) and a result (parts,) of a wanted item."""
+        design = self.design
+        branches, z = design.along_circuit(position)
+        on = [branches[k] for k in self._rows(wanted, z, position, result)]
+        if design.home_branch in on:
+            return EntryPlace(entry, position, "branch")
+        if on:
+            return EntryPlace(entry, position, "circuit", tuple(design.dead_points_before(on[0], position)))
+        is_crossing = design.circuit is not None and design.circuit.has_change_point
+        if self.is_proof or is_crossing:
+            z = design.at(position)
+            rows = self._rows(wanted, z, position, result)
+            if self.is_proof and not rows:
+                return EntryPlace(entry, position, "nowhere")
+            if is_crossing and any(design.has_change_point(z[row], position) for row in rows):
+                return EntryPlace(entry, position, "crossed")
+        is_followed = design.circuit is not None and not design.circuit.lost_reason
+        return EntryPlace(entry, position, "another" if is_followed else "unknown")
+
+    def _rows(self, wanted: Wanted, z: Array, position: float, result: Array) -> list[int]:
+        """The assemblies (rows of z) that show the result."""
+        if not len(z):
+            return []
+        shown = self.design.results(wanted, z, np.full(len(z), position))
+        off = result_differences(wanted, shown, result, self.size, self.design.measures_angle(wanted))
+        rows: list[int] = np.flatnonzero(off <= self.within).tolist()
+        return rows
 
 
 class PlaceWords(NamedTuple):

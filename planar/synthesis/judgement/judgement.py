@@ -20,7 +20,7 @@ from planar.solving.grids.grid_motion import motion_over_input
 from planar.synthesis.judgement.defects import ORDER, REACH, WHOLE_TURN, Defect
 from planar.synthesis.judgement.design_assemblies import DesignAssemblies
 from planar.synthesis.judgement.entry_order import ordered_inputs
-from planar.synthesis.judgement.entry_places import EntryPlace, PlaceWords, entry_place
+from planar.synthesis.judgement.entry_places import EntryLocator, EntryPlace, PlaceWords
 from planar.synthesis.judgement.input_range import InputRange, input_range, range_motion
 from planar.synthesis.judgement.misses import (
     entry_misses,
@@ -41,6 +41,8 @@ EXACT = 1e-9
 """The same of what is to be met exactly."""
 OTHER_ASSEMBLY = 0.01
 """Of the extent of what is wanted, or rad: what misses an entry by so much more than the fit is another assembly."""
+SAME_AS_FITTED = 1e-3
+"""The same of results that are those of a fit, but for the digits of a file beside a dead point."""
 NOWHERE_NEAR = 0.5
 """Of the root mean square of what one at rest misses: a design that misses more does not do what is wanted."""
 
@@ -137,10 +139,10 @@ class DesignJudge:
                 if nearest is not None and not nearest.miss >= off[entry]:
                     places[entry], off[entry] = reach.bring(np.array([nearest.position]))[0], nearest.miss
         allowed = (SAME if self.is_exact else OTHER_ASSEMBLY) * scale
+        locator = EntryLocator(design, self.size, (SAME if self.is_exact else SAME_AS_FITTED) * scale, self.is_exact)
         elsewhere = []
         for entry in np.flatnonzero(~(off <= fit_off + allowed)).tolist():
-            position = float(inputs[entry])
-            place = entry_place(design, wanted, entry, position, fitted[entry], self.size, SAME * scale)
+            place = locator.locate(wanted, entry, float(inputs[entry]), fitted[entry])
             if place.kind == "branch":  # where rounding leaves a dead point beyond the end
                 places[entry], off[entry] = inputs[entry], fit_off[entry]
             else:
