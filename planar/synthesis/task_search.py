@@ -19,7 +19,8 @@ from planar.synthesis.catalogue.catalogue import Catalogue
 from planar.synthesis.catalogue.matches import Match
 from planar.synthesis.cognates.task_cognates import task_cognates
 from planar.synthesis.design_search import Candidate, DesignSearch
-from planar.synthesis.judgement.judgement import ONE_BRANCH, ORDER, REACH, WHOLE_TURN, DesignJudge
+from planar.synthesis.judgement.defects import ONE_BRANCH, ORDER, REACH, WHOLE_TURN
+from planar.synthesis.judgement.judgement import DesignJudge
 from planar.synthesis.judgement.refusal import refusal
 from planar.synthesis.judgement.written_design import write_design
 from planar.synthesis.search_folder import SearchFolder

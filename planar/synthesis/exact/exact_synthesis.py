@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from planar.foundation.arrays import Array, ComplexArray
+from planar.foundation.arrays import ComplexArray
 from planar.foundation.errors import BadInput
 from planar.model.mechanism import Mechanism
 from planar.model.wording import count_phrase
@@ -23,26 +23,21 @@ from planar.synthesis.exact.component_solutions import (
 )
 from planar.synthesis.exact.dyad_curves import dyad_curve, is_dyad
 from planar.synthesis.exact.exact_linkage import ExactLinkage, exact_linkage
-from planar.synthesis.exact.list_words import completeness, counted_class, list_remarks, solution_count
+from planar.synthesis.exact.list_words import completeness, counted_class, file_difference, list_remarks, solution_count
 from planar.synthesis.exact.relations.condition_count import count_parts
 from planar.synthesis.exact.relations.exact_problem import Component, ExactProblem
 from planar.synthesis.exact.tracking.member_homotopy import affine_solutions, homogeneous_solutions
 from planar.synthesis.exact.tracking.member_solutions import Progress
 from planar.synthesis.exact.tracking.symmetry import reordered
 from planar.synthesis.judgement.defects import Defect
-from planar.synthesis.judgement.judgement import DesignJudge
+from planar.synthesis.judgement.file_check import check_file
+from planar.synthesis.judgement.judgement import DesignJudge, Judgement
 from planar.synthesis.task.starts import start_mechanisms
 from planar.synthesis.task.synthesis_task import (
     ChainStart,
     SynthesisTask,
-    Wanted,
-    WantedFunction,
-    WantedPath,
     WantedPoses,
 )
-
-MET = 1e-6
-"""Of the extent of what is wanted, or rad: an exact linkage that misses more is in another assembly there."""
 
 FAMILY = "a family of linkages with parameters; its dyads stand in curves"
 
@@ -80,7 +75,7 @@ def synthesise_all(
 
 def _complete_list(problem: ExactProblem, solved: Sequence[ComponentSolutions], say: Progress) -> CompleteSynthesis:
     """The list of all linkages, each judged."""
-    judge = DesignJudge(problem.task, problem.size)
+    judge = DesignJudge(problem.task, problem.size, is_exact=True)
     designs: list[ExactDesign] = []
     far: set[int] = set()
     for labelled, certified, is_far in _linkages(solved):
@@ -88,9 +83,7 @@ def _complete_list(problem: ExactProblem, solved: Sequence[ComponentSolutions], 
         if is_far:
             far.add(id(designs[-1]))
         say(f"{count_phrase(len(designs), 'linkage')} judged")
-    designs.sort(
-        key=lambda each: (id(each) in far, bool(each.defects), each.error if np.isfinite(each.error) else np.inf)
-    )
+    designs.sort(key=lambda design: _rank(design, id(design) in far))
     return CompleteSynthesis(problem.task, tuple(designs), (), problem.size, **_list_numbers(solved, designs))
 
 
@@ -103,6 +96,12 @@ def _list_numbers(solved: Sequence[ComponentSolutions], designs: Sequence[ExactD
         "complete": completeness(solved),
         "counted": counted_class(solved),
     }
+
+
+def _rank(design: ExactDesign, is_far: bool) -> tuple[bool, bool, bool, float]:
+    """The sound ones first, then those that are nearly at infinity, and last those whose file differs."""
+    error = design.error if np.isfinite(design.error) else np.inf
+    return bool(design.file_difference), is_far, bool(design.defects), error
 
 
 def _single_start(task: SynthesisTask) -> Mechanism:
@@ -179,9 +178,9 @@ def _best_design(
             found.append(_unwritten(problem, certified, f"no file could say it: {problem_found.sentence}"))
             continue
         found.append(_judged(problem, judge, linkage, certified))
-        if not found[-1].defects:
+        if not found[-1].defects and not found[-1].file_difference:
             break
-    return min(found, key=lambda each: len(each.defects))
+    return min(found, key=lambda each: (bool(each.file_difference), len(each.defects)))
 
 
 def _unwritten(problem: ExactProblem, certified: bool, why: str) -> ExactDesign:
@@ -191,33 +190,28 @@ def _unwritten(problem: ExactProblem, certified: bool, why: str) -> ExactDesign:
 
 
 def _judged(problem: ExactProblem, judge: DesignJudge, linkage: ExactLinkage, certified: bool) -> ExactDesign:
-    values = [_wanted_values(each) for each in problem.task.wanted]
-    found = judge.judge(linkage.mechanism, linkage.inputs, values)
+    """A linkage judged by its own file; where that does not meet every entry, the fault is not the design's."""
+    check = check_file(linkage.mechanism, problem.task.wanted, linkage.inputs, problem.size)
+    found = Judgement(check.misses, linkage.inputs, ())
+    difference = ""
+    if check.is_met:
+        found = judge.judge(check.mechanism, linkage.inputs, check.results)
+    else:
+        difference = file_difference(problem.task, check)
     every = np.concatenate(found.misses)
-    defects = found.defects
-    scale = 1.0 if all(isinstance(each, WantedFunction) for each in problem.task.wanted) else problem.size
-    if not defects and float(every.max()) > MET * scale:
-        defects = (Defect("one circuit", "circuit defect: not every entry is met in the assembly of the first"),)
     return ExactDesign(
-        linkage.mechanism,
+        check.mechanism,
         float(np.sqrt(np.mean(every**2))),
         float(every.max()),
         found.misses,
         found.inputs,
-        defects,
+        found.defects,
         problem.mechanism.name,
         linkage.numbers,
-        certified=certified,
+        certified=certified and check.is_met,
+        file_difference=difference,
         opposite=linkage.opposite,
     )
-
-
-def _wanted_values(wanted: Wanted) -> Array:
-    if isinstance(wanted, WantedFunction):
-        return wanted.values[:, None]
-    if isinstance(wanted, WantedPath):
-        return wanted.places
-    return np.concatenate([wanted.places, wanted.angles[:, None]], axis=1)
 
 
 def _special(curves: Sequence[DyadCurve], solved: Sequence[ComponentSolutions]) -> Iterator[str]:

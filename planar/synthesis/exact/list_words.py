@@ -5,10 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from math import comb, prod
 
+import numpy as np
+
 from planar.assemblies.polynomial.certification import is_available
-from planar.model.wording import count_phrase
+from planar.model.wording import amount, count_phrase
 from planar.synthesis.exact.complete_synthesis import ExactDesign
 from planar.synthesis.exact.component_solutions import FAR, ComponentSolutions, alike_components
+from planar.synthesis.judgement.file_check import FileCheck
+from planar.synthesis.task.synthesis_task import SynthesisTask
+from planar.synthesis.task.task_numbers import wanted_miss_kind
 
 
 def solution_count(solved: Sequence[ComponentSolutions], counts: Sequence[int]) -> int:
@@ -99,7 +104,27 @@ def list_remarks(solved: Sequence[ComponentSolutions], designs: Sequence[ExactDe
             f"{link!r} is drawn the opposite way, as its length is negative, in {count} of "
             f"{count_phrase(len(designs), 'real linkage')}: points stand for it"
         )
+    differing = [number for number, each in enumerate(designs, start=1) if each.file_difference]
+    if differing:
+        told = f"design {differing[0]} is not called proved: {designs[differing[0] - 1].file_difference}"
+        more = f"; the files of {count_phrase(len(differing) - 1, 'other design')} differ, too"
+        found.append(told + more * (len(differing) > 1))
     marked = sum(bool(each.defects) for each in designs)
     if marked:
         found.append(f"with a defect: {marked} of {count_phrase(len(designs), 'real linkage')}")
     return tuple(found)
+
+
+def file_difference(task: SynthesisTask, check: FileCheck) -> str:
+    """How the file of a design differs from the solution of the equations."""
+    item, entry = check.worst
+    wanted, miss = task.wanted[item], float(check.misses[item][entry])
+    named = f"entry {entry + 1} of {wanted.of}"
+    if not np.isfinite(miss):
+        told = f"its file cannot be assembled at {named}, which the solution of the equations meets"
+    else:
+        off = amount(miss, wanted_miss_kind(task, wanted), task.units)
+        told = f"its file misses {named} by {off}, which the solution of the equations meets"
+    if check.is_rounded:
+        return f"{told}: the numbers of a file have too few digits for it"
+    return f"{told}; this is a fault of planar, please report it with the task"

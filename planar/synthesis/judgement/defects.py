@@ -4,6 +4,10 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+REACH, ORDER, WHOLE_TURN = "the reach", "the order", "the whole turn"
+ONE_BRANCH, ONE_CIRCUIT = "one branch", "one circuit"
+"""Names of demands."""
+
 
 class Defect(NamedTuple):
     """A sentence, and which demand it is short of: a demand's name, in the words of a file, or of a table.

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 
-from planar.foundation.arrays import Array, IntArray
+from planar.foundation.arrays import Array, BoolArray
 from planar.foundation.errors import BadInput, NoAnswer
 from planar.foundation.jets import TURN, Scalar, value_and_rates
 from planar.model.mechanism import Mechanism, relative_motions
@@ -16,10 +17,18 @@ from planar.model.wording import amount
 from planar.results.motion import Motion
 from planar.solving.cycle import cycle
 from planar.solving.grids.grid_motion import motion_over_input
-from planar.synthesis.judgement.defects import Defect
+from planar.synthesis.judgement.defects import ORDER, REACH, WHOLE_TURN, Defect
+from planar.synthesis.judgement.design_assemblies import DesignAssemblies
 from planar.synthesis.judgement.entry_order import ordered_inputs
+from planar.synthesis.judgement.entry_places import EntryLocator, EntryPlace, PlaceWords
 from planar.synthesis.judgement.input_range import InputRange, input_range, range_motion
-from planar.synthesis.judgement.misses import entry_misses, repeat_entry, resting_misses
+from planar.synthesis.judgement.misses import (
+    entry_misses,
+    function_zero,
+    repeat_entry,
+    resting_misses,
+    wanted_results,
+)
 from planar.synthesis.judgement.motion_demands import region_defects, transmission_defects
 from planar.synthesis.task.synthesis_task import SynthesisTask, Wanted, WantedFunction, WantedPath
 from planar.synthesis.task.task_numbers import task_motion_kind
@@ -28,13 +37,12 @@ from planar.synthesis.task.wanted_expressions import carried_name
 STEPS = 90
 SAME = 1e-6
 """Of the extent of what is wanted, or rad: an entry that is missed by no more beside the fit is met as fitted."""
-FEET, FOOT_POSITIONS = 4, 13
-"""How often, and at how many positions of the input, the nearest one to an entry is looked for."""
 EXACT = 1e-9
 """The same of what is to be met exactly."""
-REACH, ORDER, WHOLE_TURN, ONE_BRANCH = "the reach", "the order", "the whole turn", "one branch"
 OTHER_ASSEMBLY = 0.01
 """Of the extent of what is wanted, or rad: what misses an entry by so much more than the fit is another assembly."""
+SAME_AS_FITTED = 1e-3
+"""The same of results that are those of a fit, but for the digits of a file beside a dead point."""
 NOWHERE_NEAR = 0.5
 """Of the root mean square of what one at rest misses: a design that misses more does not do what is wanted."""
 
@@ -48,15 +56,37 @@ class Judgement:
     defects: tuple[Defect, ...]
 
 
-class DesignJudge:
-    """Judges mechanisms by one task; `size` (m) is the extent of what is wanted."""
+class JudgedItem(NamedTuple):
+    """A wanted item: where the input is (n,), how far entries are missed there and by the fit (n,), and where those are
+    met that are not met on the branch of the sketch."""
 
-    def __init__(self, task: SynthesisTask, size: float):
-        self.task, self.size = task, size
+    wanted: Wanted
+    inputs: Array
+    misses: Array
+    fit_misses: Array
+    elsewhere: tuple[EntryPlace, ...]
+
+    @property
+    def is_on_branch(self) -> BoolArray:
+        """Which entries are met on the branch of the sketch."""
+        found = np.ones(len(self.misses), bool)
+        found[[each.entry for each in self.elsewhere]] = False
+        return found
+
+
+class DesignJudge:
+    """Judges mechanisms by one task; `size` (m) is the extent of what is wanted, which designs meet as nearly as they
+    can, or to round-off where `is_exact`."""
+
+    def __init__(self, task: SynthesisTask, size: float, is_exact: bool = False):
+        self.task, self.size, self.is_exact = task, size, is_exact
 
     def fit_error(self, values: Sequence[Array]) -> float:
         """The root mean square of the misses of results `values` (n, parts) of a fit, SI."""
-        every = [entry_misses(*each, self.size) for each in zip(self.task.wanted, values, strict=True)]
+        every = [
+            entry_misses(wanted, shown, self.size, turns=self._miss_kind(wanted) == "angle")
+            for wanted, shown in zip(self.task.wanted, values, strict=True)
+        ]
         return float(np.sqrt(np.mean(np.concatenate(every) ** 2)))
 
     def judge(self, mechanism: Mechanism, inputs: Sequence[Array], values: Sequence[Array]) -> Judgement:
@@ -73,86 +103,94 @@ class DesignJudge:
         except NoAnswer as problem:
             return self._unreached(inputs, Defect(REACH, f"it cannot be solved: {problem}"))
         reach = input_range(motion, inputs)
-        defects = [*self._branch_defects(mechanism, reach, inputs)]
-        if defects:
-            return self._unreached(inputs, *defects)
-        there = [reach.bring(each) for each in inputs]
         try:
-            shown = _results(mechanism, self.task.wanted, there)
+            shown = _results_within(mechanism, self.task.wanted, inputs, reach)
         except NoAnswer as problem:
             return self._unreached(inputs, Defect(REACH, f"it does not reach what is wanted: {problem}"))
-        misses = []
-        for k, (wanted, own, fitted) in enumerate(zip(self.task.wanted, shown, values, strict=True)):
-            off, fit_off = entry_misses(wanted, own, self.size), entry_misses(wanted, fitted, self.size)
-            scale = 1.0 if isinstance(wanted, WantedFunction) else self.size
-            missed = np.flatnonzero(off > fit_off + SAME * scale)
-            if len(missed) and not isinstance(wanted, WantedFunction) and wanted.inputs is None:
-                there[k][missed], off[missed] = self._nearest_on_branch(motion, reach, wanted, missed)
-            more = off - fit_off
-            if float(more.max(initial=0.0)) > OTHER_ASSEMBLY * scale:
-                entry = int(np.argmax(more))
-                told = f"circuit defect: {wanted.of} meets entry {entry + 1} in another assembly only"
-                defects.append(Defect("one circuit", told))
-            misses.append(off)
+        design = DesignAssemblies(mechanism)
+        items = [
+            self._judge_item(design, reach, *each) for each in zip(self.task.wanted, inputs, shown, values, strict=True)
+        ]
+        defects = [*self._place_defects(reach, items)]
         if not self.task.needs_whole_turn or reach.is_whole_turn:  # else it is rejected in whatever order
-            defects += [*self._put_in_order(motion, reach, there, misses)]
-        defects += [*self._tolerance_defects(misses)]
+            defects += [*self._put_in_order(motion, reach, items)]
+        defects += [*self._tolerance_defects(items)]
         if self.task.needs_whole_turn and not reach.is_whole_turn:
             low, high = (amount(each, reach.kind, mechanism.units) for each in (reach.low, reach.high))
             told = f"no whole turn: {running} goes from {low} to {high} only"
             defects.append(Defect(WHOLE_TURN, told, reach.high - reach.low, TURN))
-        defects += [*self._motion_defects(motion, reach, there), *self._rest_defects(misses)]
-        return Judgement(tuple(misses), tuple(there), tuple(defects))
+        on_branch = np.concatenate([item.inputs[item.is_on_branch] for item in items])
+        defects += [*self._motion_defects(motion, reach, on_branch), *self._rest_defects(items)]
+        return Judgement(tuple(item.misses for item in items), tuple(item.inputs for item in items), tuple(defects))
 
-    def _nearest_on_branch(
-        self, motion: Motion, reach: InputRange, wanted: Wanted, entries: IntArray
-    ) -> tuple[Array, Array]:
-        """Where the input is nearest to entries, and how far off that is; a fit beyond a dead point tells neither."""
-        nearest, least = np.empty(len(entries)), np.empty(len(entries))
-        tried = [np.linspace(reach.low + reach.margin, reach.high - reach.margin, len(motion))] * len(entries)
-        shown = _results(motion.mechanism, [wanted], tried[:1]) * len(entries)
-        for foot in range(FEET):
-            if foot:
-                shown = _results(motion.mechanism, [wanted] * len(entries), tried)
-            for k, entry in enumerate(entries.tolist()):
-                at = tried[k]
-                off = entry_misses(repeat_entry(wanted, entry, len(at)), shown[k], self.size)
-                best = int(np.nanargmin(off))
-                nearest[k], least[k] = at[best], off[best]
-                tried[k] = np.linspace(at[max(best - 1, 0)], at[min(best + 1, len(at) - 1)], FOOT_POSITIONS)
-        return nearest, least
+    def _judge_item(  # many: what is known of an item
+        self, design: DesignAssemblies, reach: InputRange, wanted: Wanted, inputs: Array, shown: Array, fitted: Array
+    ) -> JudgedItem:
+        """How far entries are missed on the branch of the sketch, where that shows results (n, parts), not numbers
+        beyond its ends, and where those are met that it does not meet."""
+        turns, scale = design.measures_angle(wanted), self._scale(design, wanted)
+        zero = function_zero(wanted, fitted, turns) if isinstance(wanted, WantedFunction) else 0.0
+        off, fit_off = (entry_misses(wanted, each, self.size, zero, turns=turns) for each in (shown, fitted))
+        places = reach.bring(inputs)
+        missed = np.flatnonzero(~(off <= fit_off + SAME * scale))
+        if not isinstance(wanted, WantedFunction) and wanted.inputs is None:
+            for entry in missed.tolist():
+                nearest = design.nearest(wanted, entry, self.size)
+                if nearest is not None and not nearest.miss >= off[entry]:
+                    places[entry], off[entry] = reach.bring(np.array([nearest.position]))[0], nearest.miss
+        allowed = (SAME if self.is_exact else OTHER_ASSEMBLY) * scale
+        locator = EntryLocator(design, self.size, (SAME if self.is_exact else SAME_AS_FITTED) * scale, self.is_exact)
+        elsewhere = []
+        for entry in np.flatnonzero(~(off <= fit_off + allowed)).tolist():
+            place = locator.locate(wanted, entry, float(inputs[entry]), fitted[entry])
+            if place.kind == "branch":  # where rounding leaves a dead point beyond the end
+                places[entry], off[entry] = inputs[entry], fit_off[entry]
+            else:
+                elsewhere.append(place)
+        return JudgedItem(wanted, places, off, fit_off, tuple(elsewhere))
+
+    def _scale(self, design: DesignAssemblies, wanted: Wanted) -> float:
+        """What misses of an item are compared with: rad, or the extent of what is wanted (m)."""
+        return 1.0 if isinstance(wanted, WantedFunction) and design.measures_angle(wanted) else self.size
+
+    def _place_defects(self, reach: InputRange, items: Sequence[JudgedItem]) -> Iterator[Defect]:
+        """Of the entries that are met on other branches and circuits than that of the sketch."""
+        if not any(item.elsewhere for item in items):
+            return
+        first = next(((item, int(np.argmax(item.is_on_branch))) for item in items if item.is_on_branch.any()), None)
+        branch = "the branch of the sketch"
+        if first is not None:
+            of = f" of {first[0].wanted.of}" if len(items) > 1 else ""
+            branch = f"the branch of entry {first[1] + 1}{of}"
+        words = PlaceWords(
+            reach,
+            branch,
+            lambda position: amount(position, reach.kind, self.task.units),
+            lambda wanted, miss: amount(miss, self._miss_kind(wanted), self.task.units),
+        )
+        for item in items:
+            yield from words.defects(item.wanted, item.elsewhere, item.misses)
 
     def _unreached(self, inputs: Sequence[Array], *defects: Defect) -> Judgement:
         return Judgement(tuple(np.full(len(each), np.nan) for each in inputs), tuple(inputs), defects)
 
-    def _branch_defects(self, mechanism: Mechanism, reach: InputRange, inputs: Sequence[Array]) -> Iterator[Defect]:
-        for wanted, own in zip(self.task.wanted, inputs, strict=True):
-            beyond = reach.are_beyond(own)
-            if beyond.any():
-                entry = int(np.argmax(beyond))
-                ends = " to ".join(amount(each, reach.kind, mechanism.units) for each in (reach.low, reach.high))
-                yield Defect(
-                    ONE_BRANCH,
-                    f"branch defect: entry {entry + 1} of {wanted.of} lies beyond a dead point; the branch of the "
-                    f"first goes from {reach.pair} = {ends}",
-                )
-
-    def _put_in_order(
-        self, motion: Motion, reach: InputRange, inputs: list[Array], misses: list[Array]
-    ) -> Iterator[Defect]:
+    def _put_in_order(self, motion: Motion, reach: InputRange, items: Sequence[JudgedItem]) -> Iterator[Defect]:
         """Entries that are wanted in their order are met so, where that costs hardly anything; else a defect."""
-        for k, wanted in enumerate(self.task.wanted):
-            if isinstance(wanted, WantedFunction) or not wanted.in_order or reach.is_in_order(inputs[k]):
+        for item in items:
+            wanted = item.wanted
+            if isinstance(wanted, WantedFunction) or not wanted.in_order or reach.is_in_order(item.inputs):
                 continue
-            off = np.full(len(inputs[k]), np.inf)
+            if item.elsewhere:
+                continue
+            off = np.full(len(item.inputs), np.inf)
             if wanted.inputs is None:
                 ends = reach.low + reach.margin, reach.high - reach.margin
                 own = ordered_inputs(partial(self._every_miss, motion, wanted), *ends, reach.is_cyclic)
                 off = np.diag(self._every_miss(motion, wanted, own))
-            if float((off - misses[k]).max()) > OTHER_ASSEMBLY * self.size:
+            if float((off - item.misses).max()) > OTHER_ASSEMBLY * self.size:
                 yield Defect(ORDER, f"order defect: {wanted.of} does not meet its entries in their order")
             else:
-                inputs[k], misses[k] = own, off
+                item.inputs[:], item.misses[:] = own, off
 
     def _every_miss(self, motion: Motion, wanted: Wanted, inputs: Array) -> Array:
         """How far each of n entries is missed at m positions of the input (m, n)."""
@@ -162,8 +200,9 @@ class DesignJudge:
         ]
         return np.stack(every, axis=1)
 
-    def _tolerance_defects(self, misses: Sequence[Array]) -> Iterator[Defect]:
-        for wanted, own in zip(self.task.wanted, misses, strict=True):
+    def _tolerance_defects(self, items: Sequence[JudgedItem]) -> Iterator[Defect]:
+        for item in items:
+            wanted, own = item.wanted, np.where(item.is_on_branch, item.misses, 0.0)
             scale = 1.0 if isinstance(wanted, WantedFunction) else self.size
             spared = (SAME if wanted.tolerance else EXACT) * scale  # for what rounding of a file takes
             if wanted.tolerance is not None and float(own.max(initial=0.0)) > wanted.tolerance + spared:
@@ -174,9 +213,13 @@ class DesignJudge:
                 demand = f"the tolerance of {wanted.of}"
                 yield Defect(demand, told, float(own[entry]), wanted.tolerance, kind, more=False, verb="misses by")
 
-    def _rest_defects(self, misses: Sequence[Array]) -> Iterator[Defect]:
-        """What does little better than one that stands still, as where a demand leaves it no room."""
-        for wanted, own in zip(self.task.wanted, misses, strict=True):
+    def _rest_defects(self, items: Sequence[JudgedItem]) -> Iterator[Defect]:
+        """What does little better than one that stands still, as where a demand leaves it no room.
+
+        An entry that is met on another branch counts by its miss there.
+        """
+        for item in items:
+            wanted, own = item.wanted, np.where(item.is_on_branch, item.misses, item.fit_misses)
             resting, off = (float(np.sqrt(np.mean(each**2))) for each in (resting_misses(wanted, self.size), own))
             if resting > 0.0 and off > NOWHERE_NEAR * resting:
                 told = (
@@ -197,14 +240,14 @@ class DesignJudge:
     def _miss_kind(self, wanted: Wanted) -> str:
         return task_motion_kind(self.task, wanted.to_pair) if isinstance(wanted, WantedFunction) else "length"
 
-    def _motion_defects(self, motion: Motion, reach: InputRange, inputs: Sequence[Array]) -> Iterator[Defect]:
+    def _motion_defects(self, motion: Motion, reach: InputRange, inputs: Array) -> Iterator[Defect]:
+        """What is wrong with the motion over a whole turn, else between positions (n,) of the input."""
         demands = self.task.demands
-        if demands.transmission is None and demands.inside is None:
+        if (demands.transmission is None and demands.inside is None) or not len(inputs):
             return
         if not reach.is_whole_turn:
-            every = np.concatenate(inputs)
             try:
-                motion = cycle(motion.mechanism, STEPS, float(every.min()), float(every.max()), reach.pair)
+                motion = cycle(motion.mechanism, STEPS, float(inputs.min()), float(inputs.max()), reach.pair)
             except (NoAnswer, BadInput) as problem:
                 yield Defect(REACH, f"it does not run through what is wanted: {problem}")
                 return
@@ -212,6 +255,23 @@ class DesignJudge:
             yield from transmission_defects(motion, demands.transmission)
         if demands.inside is not None:
             yield from region_defects(motion, demands.inside)
+
+
+def _results_within(
+    mechanism: Mechanism, wanted: Sequence[Wanted], inputs: Sequence[Array], reach: InputRange
+) -> list[Array]:
+    """What is shown (n, parts) at positions (n,) of the input, not numbers beyond the ends of its range. Raises
+    NoAnswer."""
+    within = [~reach.are_beyond(each) for each in inputs]
+    places = [reach.bring(each[rows]) for each, rows in zip(inputs, within, strict=True)]
+    if not any(len(each) for each in places):
+        return [np.full(wanted_results(each).shape, np.nan) for each in wanted]
+    found = []
+    for each, rows, shown in zip(wanted, within, _results(mechanism, wanted, places), strict=True):
+        every = np.full(wanted_results(each).shape, np.nan)
+        every[rows] = shown
+        found.append(every)
+    return found
 
 
 def _results(mechanism: Mechanism, wanted: Sequence[Wanted], inputs: Sequence[Array]) -> list[Array]:

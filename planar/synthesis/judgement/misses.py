@@ -9,28 +9,53 @@ from planar.foundation.jets import TURN
 from planar.synthesis.task.synthesis_task import Wanted, WantedFunction, WantedPath
 
 
-def _difference(own: Array, other: Array, wanted: Wanted) -> Array:
-    """Of results (n, parts), angles by less than half a turn."""
-    apart: Array = own - other
-    if isinstance(wanted, WantedPath):
-        return apart
-    turned = apart[:, -1] - TURN * np.round(apart[:, -1] / TURN)
-    told: Array = np.concatenate([apart[:, :-1], turned[:, None]], axis=1)
-    return told
+def _wrapped(angles: Array) -> Array:
+    """Angles by less than half a turn."""
+    within: Array = angles - TURN * np.round(angles / TURN)
+    return within
 
 
-def entry_misses(wanted: Wanted, shown: Array, size: float) -> Array:
-    """How far each entry is missed (n,): m, of functions rad or m; of a pose the angle counts by the size."""
-    if isinstance(wanted, WantedPath):
-        found: Array = np.linalg.norm(shown - wanted.places, axis=1)
-        return found
+def result_differences(wanted: Wanted, shown: Array, other: Array, size: float, turns: bool = True) -> Array:
+    """How far results (n, parts) are from others (n,), m or rad: of a pose the angle counts by the size (m).
+
+    `turns` tells whether the values of a function are angles, which are the same a turn apart.
+    """
+    apart: Array = shown - other
     if isinstance(wanted, WantedFunction):
-        off = _difference(shown, wanted.values[:, None], wanted)[:, 0]
-        return np.abs(off if wanted.is_absolute else off - off.mean())
-    target = np.concatenate([wanted.places, wanted.angles[:, None]], axis=1)
-    apart = _difference(shown, target, wanted) * np.array([1.0, 1.0, size])
-    missed: Array = np.linalg.norm(apart, axis=1)
-    return missed
+        return np.abs(_wrapped(apart[:, 0]) if turns else apart[:, 0])
+    if not isinstance(wanted, WantedPath):
+        apart = np.concatenate([apart[:, :2], size * _wrapped(apart[:, 2:])], axis=1)
+    distances: Array = np.linalg.norm(apart, axis=1)
+    return distances
+
+
+def function_zero(wanted: WantedFunction, shown: Array, turns: bool = True) -> float:
+    """What results (n, 1) of a function differ by on average from its values; 0 of an absolute one."""
+    if wanted.is_absolute:
+        return 0.0
+    apart = shown[:, 0] - wanted.values
+    steps = apart - apart[0]  # the zero may be about half a turn
+    return float(apart[0] + np.mean(_wrapped(steps) if turns else steps))
+
+
+def entry_misses(wanted: Wanted, shown: Array, size: float, zero: float | None = None, *, turns: bool = True) -> Array:
+    """How far each entry is missed (n,): m, of functions rad or m; of a pose the angle counts by the size.
+
+    `zero` is where the scale of a function's values begins, that of the results where it is not given.
+    """
+    if isinstance(wanted, WantedFunction):
+        zero = function_zero(wanted, shown, turns) if zero is None else zero
+        return result_differences(wanted, shown, wanted.values[:, None] + zero, size, turns)
+    return result_differences(wanted, shown, wanted_results(wanted), size)
+
+
+def wanted_results(wanted: Wanted) -> Array:
+    """The results (n, parts) that are wanted: places, poses, or values of a function."""
+    if isinstance(wanted, WantedFunction):
+        return wanted.values[:, None]
+    if isinstance(wanted, WantedPath):
+        return wanted.places
+    return np.concatenate([wanted.places, wanted.angles[:, None]], axis=1)
 
 
 def repeat_entry(wanted: Wanted, entry: int, many: int) -> Wanted:
