@@ -1,0 +1,124 @@
+"""`python -m benchmarks.known_linkages` makes random tasks from known linkages and checks their complete lists.
+
+Every task is solved in a process of its own, which is ended after `--seconds`. Results are kept, one a line, so that a
+run goes on where it was interrupted; `--save` writes the tasks with a fault into a folder.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import multiprocessing
+from collections import Counter
+from multiprocessing.connection import Connection
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+
+from benchmarks.known_linkages.checks import check_task
+from benchmarks.known_linkages.known_tasks import draw_task
+from benchmarks.known_linkages.makers import MAKERS
+
+Record = dict[str, Any]
+TOO_LONG = "takes too long"
+
+
+def main() -> None:
+    """Check tasks that are not among the results, then print the table of faults."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.known_linkages", description=__doc__)
+    parser.add_argument("--count", type=int, default=200, help="tasks of each kind of linkage")
+    parser.add_argument("--first", type=int, default=0, help="the first seed")
+    parser.add_argument("--only", nargs="+", choices=[*MAKERS], default=[*MAKERS], help="kinds of linkages")
+    parser.add_argument("--seconds", type=float, default=20.0, help="for one task")
+    parser.add_argument("--results", type=Path, default=None, help="a file of results, one a line")
+    parser.add_argument("--save", type=Path, default=None, help="a folder for tasks with a fault")
+    arguments = parser.parse_args()
+    console = Console(width=160)
+    records: list[Record] = []
+    if arguments.results is not None and arguments.results.exists():
+        records = [json.loads(line) for line in arguments.results.read_text().splitlines()]
+    done = {(record["kind"], record["seed"]) for record in records}
+    for seed in range(arguments.first, arguments.first + arguments.count):
+        for kind in arguments.only:
+            if (kind, seed) in done:
+                continue
+            records.append(record := check_apart(kind, seed, arguments.seconds))
+            if arguments.results is not None:
+                with arguments.results.open("a") as file:
+                    file.write(json.dumps(record) + "\n")
+            if arguments.save is not None and record["faults"]:
+                save_task(arguments.save, kind, seed)
+            faults = "; ".join(f"{name}: {detail}" for name, detail in record["faults"])
+            console.print(f"{kind} {seed}: {record['task']}: {faults or 'ok'}", highlight=False, soft_wrap=True)
+    for table in tables(records):
+        console.print(table)
+
+
+def check_apart(kind: str, seed: int, seconds: float) -> Record:
+    """What came of a task, in a process of its own."""
+    method = "fork" if "fork" in multiprocessing.get_all_start_methods() else "spawn"
+    context = multiprocessing.get_context(method)
+    receiver, sender = context.Pipe(duplex=False)
+    process = context.Process(target=_check, args=(kind, seed, sender))
+    process.start()
+    sender.close()
+    task = draw_task(kind, seed)
+    record: Record = {"kind": kind, "seed": seed, "task": task.name, "verdict": task.verdict.value}
+    record |= {"answer": "", "seconds": seconds, "is_lost": False}
+    try:
+        if receiver.poll(seconds):
+            return record | receiver.recv()
+        return record | {"faults": [[TOO_LONG, f"more than {seconds:g} s"]]}
+    except EOFError:
+        return record | {"faults": [["the process ended", "without a result"]]}
+    finally:
+        process.kill()
+        process.join()
+
+
+def _check(kind: str, seed: int, sender: Connection) -> None:
+    outcome = check_task(draw_task(kind, seed))
+    sender.send(
+        {
+            "answer": outcome.answer,
+            "seconds": round(outcome.seconds, 2),
+            "is_lost": outcome.is_lost,
+            "faults": [[*fault] for fault in outcome.faults],
+        }
+    )
+
+
+def save_task(folder: Path, kind: str, seed: int) -> None:
+    """Write a task, with the numbers of the linkage that meets it in its name's place for notes."""
+    folder.mkdir(parents=True, exist_ok=True)
+    path = folder / f"{kind.replace(' ', '-')}-{seed}.json"
+    path.write_text(json.dumps(draw_task(kind, seed).value, indent=1) + "\n")
+
+
+def tables(records: list[Record]) -> list[Table]:
+    """Faults by kind, and kinds of linkages with their tasks."""
+    faults = Table("fault", "tasks", "seeds", title="Faults by kind")
+    by_fault: dict[str, list[Record]] = {}
+    for record in records:
+        for name in {name for name, _ in record["faults"]}:
+            by_fault.setdefault(name, []).append(record)
+    for name, own in sorted(by_fault.items(), key=lambda each: -len(each[1])):
+        seeds = ", ".join(f"{record['kind']} {record['seed']}" for record in own[:8])
+        faults.add_row(name, str(len(own)), seeds)
+    kinds = Table("linkage", "tasks", "right", "too long", "lost paths", "median s", title="Tasks")
+    for kind in dict.fromkeys(record["kind"] for record in records):
+        own = [record for record in records if record["kind"] == kind]
+        seconds = sorted(record["seconds"] for record in own)
+        counts = Counter(
+            "right" if not record["faults"] else "long" if record["faults"][0][0] == TOO_LONG else "" for record in own
+        )
+        lost = sum(record["is_lost"] for record in own)
+        right, long = str(counts["right"]), str(counts["long"])
+        kinds.add_row(kind, str(len(own)), right, long, str(lost), f"{seconds[len(own) // 2]:.2f}")
+    return [faults, kinds]
+
+
+if __name__ == "__main__":
+    main()
