@@ -91,7 +91,7 @@ def _list_faults(task: KnownTask, found: planar.CompleteSynthesis) -> Iterator[F
     met = []
     for k, design in enumerate(found):
         name = f"design {k + 1} of {len(found)}, {', '.join(str(each) for each in design.defects) or 'no defect'}"
-        if any(each.kind == "a file's form" for each in design.defects):
+        if any(each.demand == "a file's form" for each in design.shortages):
             yield Fault("a design has no file", name)
             continue
         numbers = planar.dimensions(design.mechanism)
