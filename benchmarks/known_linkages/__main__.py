@@ -1,7 +1,7 @@
 """`python -m benchmarks.known_linkages` makes random tasks from known linkages and checks their complete lists.
 
-Every task is solved in a process of its own, which is ended after `--seconds`. Results are kept, one a line, so that a
-run goes on where it was interrupted; `--save` writes the tasks with a fault into a folder.
+Every task is solved in a process of its own, which is ended after `--seconds` of processor time. Results are kept, one
+a line, so that a run goes on where it was interrupted; `--save` writes the tasks with a fault into a folder.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ from __future__ import annotations
 import argparse
 import json
 import multiprocessing
+import signal
 from collections import Counter
 from multiprocessing.connection import Connection
 from pathlib import Path
@@ -21,8 +22,15 @@ from benchmarks.known_linkages.checks import check_task
 from benchmarks.known_linkages.known_tasks import draw_task
 from benchmarks.known_linkages.makers import MAKERS
 
+try:
+    import resource
+except ImportError:  # Windows has no limits of processor time
+    resource = None  # type: ignore[assignment]
+
 Record = dict[str, Any]
 TOO_LONG = "takes too long"
+MAX_WAIT = 15
+"""Times the processor time: how long a task may last on a busy machine."""
 
 
 def main() -> None:
@@ -31,7 +39,7 @@ def main() -> None:
     parser.add_argument("--count", type=int, default=200, help="tasks of each kind of linkage")
     parser.add_argument("--first", type=int, default=0, help="the first seed")
     parser.add_argument("--only", nargs="+", choices=[*MAKERS], default=[*MAKERS], help="kinds of linkages")
-    parser.add_argument("--seconds", type=float, default=20.0, help="for one task")
+    parser.add_argument("--seconds", type=int, default=20, help="processor time for one task")
     parser.add_argument("--results", type=Path, default=None, help="a file of results, one a line")
     parser.add_argument("--save", type=Path, default=None, help="a folder for tasks with a fault")
     arguments = parser.parse_args()
@@ -56,29 +64,30 @@ def main() -> None:
         console.print(table)
 
 
-def check_apart(kind: str, seed: int, seconds: float) -> Record:
+def check_apart(kind: str, seed: int, seconds: int) -> Record:
     """What came of a task, in a process of its own."""
-    method = "fork" if "fork" in multiprocessing.get_all_start_methods() else "spawn"
-    context = multiprocessing.get_context(method)
-    receiver, sender = context.Pipe(duplex=False)
-    process = context.Process(target=_check, args=(kind, seed, sender))
+    receiver, sender = multiprocessing.Pipe(duplex=False)
+    process = multiprocessing.Process(target=_check, args=(kind, seed, seconds, sender))
     process.start()
     sender.close()
     task = draw_task(kind, seed)
     record: Record = {"kind": kind, "seed": seed, "task": task.name, "verdict": task.verdict.value}
     record |= {"answer": "", "seconds": seconds, "is_lost": False}
+    too_long = [[TOO_LONG, f"more than {seconds} s"]]
     try:
-        if receiver.poll(seconds):
-            return record | receiver.recv()
-        return record | {"faults": [[TOO_LONG, f"more than {seconds:g} s"]]}
+        return record | (receiver.recv() if receiver.poll(seconds * MAX_WAIT) else {"faults": too_long})
     except EOFError:
-        return record | {"faults": [["the process ended", "without a result"]]}
+        process.join()
+        is_late = resource is not None and process.exitcode == -signal.SIGXCPU
+        return record | {"faults": too_long if is_late else [["the process ended", f"status {process.exitcode}"]]}
     finally:
         process.kill()
         process.join()
 
 
-def _check(kind: str, seed: int, sender: Connection) -> None:
+def _check(kind: str, seed: int, seconds: int, sender: Connection) -> None:
+    if resource is not None:
+        resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds + 1))
     outcome = check_task(draw_task(kind, seed))
     sender.send(
         {
@@ -91,7 +100,7 @@ def _check(kind: str, seed: int, sender: Connection) -> None:
 
 
 def save_task(folder: Path, kind: str, seed: int) -> None:
-    """Write a task, with the numbers of the linkage that meets it in its name's place for notes."""
+    """Write a task's file."""
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / f"{kind.replace(' ', '-')}-{seed}.json"
     path.write_text(json.dumps(draw_task(kind, seed).value, indent=1) + "\n")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import product
-from time import monotonic
+from time import process_time
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -44,6 +44,10 @@ class Outcome(NamedTuple):
     "whether paths were lost, and the list says so"
 
 
+ItemMet = tuple[float, float, tuple[float, ...]]
+"""The greatest miss of an item, where the input is at its first entry, and the signs of the assembly there."""
+
+
 class Met(NamedTuple):
     """How well a linkage meets a task: the greatest miss, and its position at the first entry."""
 
@@ -57,18 +61,18 @@ class Met(NamedTuple):
 
 def check_task(task: KnownTask) -> Outcome:
     """Ask for the complete list of a task and check it."""
-    began = monotonic()
+    began = process_time()
     try:
         found = planar.synthesise(task.value, complete=True)
     except planar.BadInput as refusal:
         faults = (Fault("refused, though it has a list", str(refusal)),) if task.verdict is Verdict.LIST else ()
-        return Outcome(faults, str(refusal), monotonic() - began)
+        return Outcome(faults, str(refusal), process_time() - began)
     except planar.NoAnswer as problem:
-        return Outcome((Fault("no answer", str(problem)),), str(problem), monotonic() - began)
-    except Exception as problem:  # noqa: BLE001: whatever is raised is what is looked for
+        return Outcome((Fault("no answer", str(problem)),), str(problem), process_time() - began)
+    except Exception as problem:  # whatever is raised is what is looked for
         told = f"{type(problem).__name__}: {problem}"
-        return Outcome((Fault(f"raises {type(problem).__name__}", _last_place(problem)),), told, monotonic() - began)
-    seconds = monotonic() - began
+        return Outcome((Fault(f"raises {type(problem).__name__}", _last_place(problem)),), told, process_time() - began)
+    seconds = process_time() - began
     answer = " | ".join(found.summary)
     is_lost = found.complete.startswith("incomplete")
     return Outcome(tuple(_list_faults(task, found)), answer, seconds, is_lost)
@@ -90,6 +94,7 @@ def _list_faults(task: KnownTask, found: planar.CompleteSynthesis) -> Iterator[F
         yield Fault("listed, though numbers stay open", " | ".join(found.summary))
     met = []
     for k, design in enumerate(found):
+        is_proved = isinstance(design, planar.ExactDesign) and design.certified
         name = f"design {k + 1} of {len(found)}, {', '.join(str(each) for each in design.defects) or 'no defect'}"
         if any(each.demand == "a file's form" for each in design.shortages):
             yield Fault("a design has no file", name)
@@ -104,13 +109,13 @@ def _list_faults(task: KnownTask, found: planar.CompleteSynthesis) -> Iterator[F
             yield Fault("a given number is changed", f"{name}: {', '.join(changed)}")
         own = how_it_meets(task, numbers, design.inputs)
         met.append(own)
-        if own.miss > own.tolerance and design.certified:
+        if own.miss > own.tolerance and is_proved:
             elsewhere = how_it_meets(task, numbers, None)
             kind = "a proved design misses"
             if elsewhere.miss <= elsewhere.tolerance:
                 kind = "a proved design misses at the inputs that it names"
             yield Fault(kind, f"{name}: {own.miss:.3g}, elsewhere {elsewhere.miss:.3g}")
-        if own.miss <= own.tolerance and own.miss < ROUND_OFF and not design.certified:
+        if own.miss <= own.tolerance and own.miss < ROUND_OFF and not is_proved:
             yield Fault("a design that meets is not proved", name)
     if task.verdict is Verdict.LIST:
         yield from _missing(task, found, met)
@@ -211,9 +216,9 @@ def _combinations(task: KnownTask) -> list[tuple[float, ...]]:
     return [*product((1.0, -1.0), repeat=task.linkage.structure.sign_count)]
 
 
-def _meet_item(task: KnownTask, item: Item, numbers: Mapping[str, Any], said: Array) -> tuple[float, float, tuple[float, ...]]:
+def _meet_item(task: KnownTask, item: Item, numbers: Mapping[str, Any], said: Array) -> ItemMet:
     """The greatest miss of an item, each entry in its best assembly; where the first is met, and its signs."""
-    best: tuple[float, float, tuple[float, ...]] = (np.inf, float(said[0]), task.linkage.signs)
+    best: ItemMet = (np.inf, float(said[0]), task.linkage.signs)
     for first in _combinations(task) if _counts_from_first(item) else [()]:
         signs, angles = _best_signs(task, item, numbers, said, first)
         angles = _refined(task, item, numbers, angles, signs)
@@ -232,7 +237,7 @@ def _best_signs(
 ) -> tuple[tuple[Array, ...], Array]:
     """Signs of every entry, and where the input is."""
     count = len(item.targets)
-    candidates = []
+    misses, every_sign, every_angle = [], [], []
     for signs in _combinations(task):
         own = tuple(np.full(count, each) for each in signs)
         for array, value in zip(own, first, strict=False):
@@ -241,12 +246,11 @@ def _best_signs(
         rows = np.abs(_rows(task, item, numbers, angles, own)).max(axis=0)
         if _counts_from_first(item):
             rows = np.insert(rows, 0, 0.0)
-        candidates.append((np.where(np.isfinite(rows), rows, np.inf), own, angles))
-    choice = np.argmin([each[0] for each in candidates], axis=0)
-    signs = tuple(
-        np.array([candidates[c][1][part][k] for k, c in enumerate(choice)]) for part in range(len(candidates[0][1]))
-    )
-    return signs, np.array([candidates[c][2][k] for k, c in enumerate(choice)])
+        misses.append(np.where(np.isfinite(rows), rows, np.inf))
+        every_sign.append(np.stack(own))
+        every_angle.append(angles)
+    choice, entries = np.argmin(misses, axis=0), np.arange(count)
+    return tuple(np.array(every_sign)[choice, :, entries].T), np.array(every_angle)[choice, entries]
 
 
 def _rows(task: KnownTask, item: Item, numbers: Mapping[str, Any], angles: Any, signs: Any) -> Array:

@@ -132,10 +132,7 @@ def slider_crank(numbers: Numbers, angle: Any, signs: tuple[Any, ...]) -> Positi
     """Frame f with O, crank c, a rod with pin B on the line "s" of the frame."""
     made = _Builder(numbers, "f")
     made.crank("c", "O", "A", angle)
-    if "s.line.x" in numbers:
-        through = Vector(numbers["s.line.x"], numbers["s.line.y"])
-    else:
-        through = made.drawn("f", "G")
+    through = Vector(numbers["s.line.x"], numbers["s.line.y"]) if "s.line.x" in numbers else made.drawn("f", "G")
     if "f.H.x" in numbers:
         between = made.between("f", "G", "H")
         line = between.scaled(1.0 / np.sqrt(between.squared))

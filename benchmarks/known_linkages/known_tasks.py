@@ -19,6 +19,8 @@ RANK_TOLERANCE = 1e-7
 """Of the greatest singular value: what is less is zero."""
 CLEAR = 1e-4
 """Of the greatest: the least singular value of a task that is drawn for a list."""
+MIN_RANGE = 120
+"""Of the positions of the input that are tried: fewer without a dead point are too short a motion."""
 MORE_ENTRIES = 14
 """Entries by which it is told how many independent numbers there are."""
 
@@ -103,8 +105,6 @@ class KnownTask(NamedTuple):
     items: tuple[Item, ...]
     angles: tuple[Array, ...]
     free: tuple[str, ...]
-    is_default: bool
-    "whether the numbers that are free are left out of the file"
     verdict: Verdict
     condition: float
     "of the Jacobian with columns of length 1"
@@ -302,7 +302,7 @@ def draw_task(kind: str, seed: int) -> KnownTask:
 def _try_task(rng: np.random.Generator, plan: Plan, name: str) -> KnownTask | None:
     linkage = MAKERS[plan.kind](rng)
     range_ = angles_about(linkage)
-    if len(range_) < 120:
+    if len(range_) < MIN_RANGE:
         return None
     items, angles = [], []
     for what, count in plan.items:
@@ -310,28 +310,25 @@ def _try_task(rng: np.random.Generator, plan: Plan, name: str) -> KnownTask | No
         items.append(make_item(linkage, what, own, bool(plan.inputs), plan.inputs == "absolute"))
         angles.append(own)
     names = influential(linkage, items)
-    by_number, by_parameter = jacobian(linkage, items, angles, names)
-    own_rows = conditions_on_numbers(by_number, by_parameter)
     wish = str(rng.choice(["right", "few", "many", "any"], p=[0.7, 0.1, 0.1, 0.1]))
-    free = _draw_free(rng, own_rows, names, wish)
+    free = _draw_free(rng, conditions_on_numbers(*jacobian(linkage, items, angles, names)), names, wish)
     if free is None:
         return None
     verdict = judge(linkage, items, angles, free)
-    if wish == "right" and verdict is not Verdict.LIST:
-        return None
-    if wish == "any" and verdict is Verdict.LIST:
-        return None
-    own = conditions_on_numbers(*jacobian(linkage, items, angles, free))
-    values = singular_values(own)
-    if verdict is Verdict.LIST and values[-1] < CLEAR:
-        return None
-    if verdict is Verdict.TOO_MANY and 1e-10 < values[-1] < 1e-5:
-        return None
+    values = singular_values(conditions_on_numbers(*jacobian(linkage, items, angles, free)))
+    wanted = {"right": [Verdict.LIST], "any": [Verdict.TOO_MANY, Verdict.OPEN]}.get(wish, [*Verdict])
     value = _write_task(rng, plan, name, linkage, items, free)
-    if value is None:
+    if verdict not in wanted or not _is_clear(verdict, values[-1]) or value is None:
         return None
     condition = float(values[0] / values[-1]) if values[-1] > 0.0 else np.inf
-    return KnownTask(plan.name, linkage, tuple(items), tuple(angles), free, False, verdict, condition, value)
+    return KnownTask(plan.name, linkage, tuple(items), tuple(angles), free, verdict, condition, value)
+
+
+def _is_clear(verdict: Verdict, least: float) -> bool:
+    """Whether the rank is beyond doubt, by the least singular value."""
+    if verdict is Verdict.LIST:
+        return least > CLEAR
+    return verdict is Verdict.OPEN or not 1e-10 < least < 1e-5
 
 
 def _entry_angles(rng: np.random.Generator, range_: Array, count: int) -> Array:

@@ -56,9 +56,9 @@ class _Writer:
         """The frame, whose axes are the world's."""
         self._add(name, points, 0.0j, 1.0 + 0.0j, by_ends)
 
-    def link(self, name: str, points: dict[str, Place], forms: tuple[str, ...] = ("ends", "points", "general")) -> None:
+    def link(self, name: str, points: dict[str, Place]) -> None:
         """A moving link, which is written by ends, by points along its first two, or by points in axes at random."""
-        form = str(self.rng.choice(forms, p=np.array([0.5, 0.3, 0.2])[: len(forms)] / sum([0.5, 0.3, 0.2][: len(forms)])))
+        form = str(self.rng.choice(["ends", "points", "general"], p=[0.5, 0.3, 0.2]))
         first, second, *others = points.values()
         origin, way = first, (second - first) / abs(second - first)
         if form == "general":
@@ -80,7 +80,12 @@ class _Writer:
         for point, place in points.items():
             if point not in ends:
                 own = (place - origin) / way
-                self.numbers |= {f"{name}.{point}.x": float(own.real), f"{name}.{point}.y": float(own.imag)}
+                self.numbers |= {f"{name}.{point}.x": _written(own.real), f"{name}.{point}.y": _written(own.imag)}
+
+
+def _written(value: float) -> float:
+    """A coordinate, 0 where it is round-off."""
+    return float(value) if abs(value) > 1e-14 else 0.0
 
 
 def _places(rng: np.random.Generator, *centres: Place) -> list[Place]:
@@ -168,13 +173,11 @@ def _rod_with_line(made: _Writer, pin: str, place: Place, other: Place, more: di
     made.numbers["s.line.angle"] = float(np.angle(off / way * rng.choice([1.0, -1.0])))
 
 
-def _finish(
-    kind: str, made: _Writer, crank: Place, link: str, line: str = "", is_block: bool = False
-) -> KnownLinkage:
+def _finish(kind: str, made: _Writer, crank: Place, link: str, line: str = "", is_block: bool = False) -> KnownLinkage:
     """The linkage with the position of its input, and the signs of the assembly in which it was placed."""
     structure = STRUCTURES[kind]
     pins = next(form.points for form in made.forms if form.name == link)
-    drawn = [complex(made.numbers.get(f"{link}.{pin}.x", 0.0), made.numbers.get(f"{link}.{pin}.y", 0.0)) for pin in pins]
+    drawn = [complex(*(made.numbers.get(f"{link}.{pin}.{axis}", 0.0) for axis in "xy")) for pin in pins]
     if f"{link}.length" in made.numbers:
         drawn = [0.0j, complex(made.numbers[f"{link}.length"])]
     angle = float(np.angle(crank / (drawn[1] - drawn[0])))
@@ -191,6 +194,18 @@ MAKERS: dict[str, Callable[[np.random.Generator], KnownLinkage]] = {
 }
 
 
+PINS = {
+    "four-bar": "ABCD",
+    "Watt II": "ABCDEFG",
+    "slider-crank": "OA",
+    "swinging block": "OA",
+    "slotted lever": "OD",
+}
+"""The turning pairs of kinds of linkages."""
+SLIDERS = {"slider-crank": "B", "swinging block": "D", "slotted lever": "A"}
+"""The points that slide."""
+
+
 def write_mechanism(linkage: KnownLinkage, numbers: dict[str, float], position: Position, units: str) -> dict[str, Any]:
     """The mechanism file with these numbers, in "m" and rad or in "mm" and degrees; its sketch is a position."""
     length, turn = (1000.0, 180.0 / np.pi) if units == "mm" else (1.0, 1.0)
@@ -204,10 +219,9 @@ def write_mechanism(linkage: KnownLinkage, numbers: dict[str, float], position: 
         }
         links[form.name] = {"ends": [*ends], "length": numbers[f"{form.name}.length"] * length} if ends else {}
         links[form.name] |= {"points": points} if points else {}
-    pins = {"four-bar": "ABCD", "Watt II": "ABCDEFG", "slider-crank": "OA", "swinging block": "OA", "slotted lever": "OD"}
-    pairs: list[dict[str, Any]] = [{"turning": pin} for pin in pins[linkage.kind]]
+    pairs: list[dict[str, Any]] = [{"turning": pin} for pin in PINS[linkage.kind]]
     if linkage.line:
-        slide = {"four-bar": "", "slider-crank": "B", "swinging block": "D", "slotted lever": "A"}[linkage.kind]
+        slide = SLIDERS[linkage.kind]
         line: dict[str, Any] = {"through": "G"}
         if linkage.line == "coordinates":
             line = {"through": [numbers["s.line.x"] * length, numbers["s.line.y"] * length]}

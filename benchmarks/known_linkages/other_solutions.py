@@ -10,7 +10,7 @@ import numpy as np
 from benchmarks.known_linkages.known_tasks import STEP, KnownTask, item_rows
 from planar.foundation.arrays import Array
 
-STARTS, STEPS = 1500, 40
+STARTS, STEPS = 400, 40
 MET = 1e-10
 REGULAR = 1e-4
 """Of the greatest singular value of the Jacobian, its columns of length 1."""
@@ -59,9 +59,7 @@ def other_solutions(task: KnownTask, seed: int = 1) -> list[Solution]:
     """Regular solutions that Newton's method comes to, each once."""
     rng = np.random.default_rng(seed)
     signs = [
-        tuple(
-            rng.choice([-1.0, 1.0], (STARTS, len(item.targets))) for _ in range(task.linkage.structure.sign_count)
-        )
+        tuple(rng.choice([-1.0, 1.0], (STARTS, len(item.targets))) for _ in range(task.linkage.structure.sign_count))
         for item in task.items
     ]
     system = _System(task, signs)
@@ -70,7 +68,7 @@ def other_solutions(task: KnownTask, seed: int = 1) -> list[Solution]:
         for _ in range(STEPS):
             x = _newton_step(system, x)
         rows, slopes = system.with_slopes(x)
-    good = np.isfinite(rows).all(axis=1) & np.isfinite(slopes).all(axis=(1, 2))
+    good = np.asarray(np.isfinite(rows).all(axis=1) & np.isfinite(slopes).all(axis=(1, 2)))
     good &= (np.abs(np.where(np.isfinite(rows), rows, 1.0)).max(axis=1) < MET) & (np.abs(x).max(axis=1) < FAR)
     solutions: list[Solution] = []
     known: list[Array] = []
@@ -100,7 +98,7 @@ def _starts(task: KnownTask, system: _System, rng: np.random.Generator) -> Array
 def _newton_step(system: _System, x: Array) -> Array:
     """A step of Gauss and Newton with a little damping; starts that cannot be assembled stay where they are."""
     rows, slopes = system.with_slopes(x)
-    good = np.isfinite(rows).all(axis=1) & np.isfinite(slopes).all(axis=(1, 2))
+    good = np.asarray(np.isfinite(rows).all(axis=1) & np.isfinite(slopes).all(axis=(1, 2)))
     rows, slopes = np.where(good[:, None], rows, 0.0), np.where(good[:, None, None], slopes, 0.0)
     transposed = np.swapaxes(slopes, 1, 2)
     damping = 1e-10 + 1e-6 * (rows * rows).sum(axis=1)
