@@ -11,6 +11,7 @@ import json
 import multiprocessing
 import signal
 from collections import Counter
+from importlib import import_module
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
@@ -43,6 +44,7 @@ def main() -> None:
     parser.add_argument("--results", type=Path, default=None, help="a file of results, one a line")
     parser.add_argument("--save", type=Path, default=None, help="a folder for tasks with a fault")
     arguments = parser.parse_args()
+    import_module("planar.synthesis.exact.exact_synthesis")  # once, not in every process
     console = Console(width=160)
     records: list[Record] = []
     if arguments.results is not None and arguments.results.exists():
