@@ -20,7 +20,7 @@ from rich.console import Console
 from rich.table import Table
 
 from benchmarks.known_linkages.checks import check_task
-from benchmarks.known_linkages.known_tasks import draw_task
+from benchmarks.known_linkages.known_tasks import MOST_CONDITIONS, draw_task
 from benchmarks.known_linkages.makers import MAKERS
 
 try:
@@ -40,6 +40,7 @@ def main() -> None:
     parser.add_argument("--count", type=int, default=200, help="tasks of each kind of linkage")
     parser.add_argument("--first", type=int, default=0, help="the first seed")
     parser.add_argument("--only", nargs="+", choices=[*MAKERS], default=[*MAKERS], help="kinds of linkages")
+    parser.add_argument("--free", type=int, default=MOST_CONDITIONS + 1, help="the most free numbers of a task")
     parser.add_argument("--seconds", type=int, default=20, help="processor time for one task")
     parser.add_argument("--results", type=Path, default=None, help="a file of results, one a line")
     parser.add_argument("--save", type=Path, default=None, help="a folder for tasks with a fault")
@@ -52,7 +53,7 @@ def main() -> None:
     done = {(record["kind"], record["seed"]) for record in records}
     for seed in range(arguments.first, arguments.first + arguments.count):
         for kind in arguments.only:
-            if (kind, seed) in done:
+            if (kind, seed) in done or len(draw_task(kind, seed).free) > arguments.free:
                 continue
             records.append(record := check_apart(kind, seed, arguments.seconds))
             if arguments.results is not None:

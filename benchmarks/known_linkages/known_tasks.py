@@ -263,6 +263,7 @@ class Plan(NamedTuple):
 
 
 MOST_CONDITIONS = 6
+"""Of a task, on the free numbers."""
 
 
 def draw_plan(rng: np.random.Generator, kind: str) -> Plan:
