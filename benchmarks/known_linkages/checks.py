@@ -12,7 +12,7 @@ import numpy as np
 import planar
 from benchmarks.known_linkages.closed_forms import Position
 from benchmarks.known_linkages.known_tasks import STEP, Item, KnownTask, Verdict, item_rows, jacobian
-from benchmarks.known_linkages.other_solutions import other_solutions
+from benchmarks.known_linkages.other_solutions import STARTS, other_solutions
 from benchmarks.known_linkages.vectors import Vector
 from planar.foundation.arrays import Array
 
@@ -58,9 +58,14 @@ class Met(NamedTuple):
     first: Position
     numbers: Mapping[str, Any]
 
+    @property
+    def is_met(self) -> bool:
+        """Whether it misses by no more than round-off."""
+        return self.miss <= self.tolerance
 
-def check_task(task: KnownTask) -> Outcome:
-    """Ask for the complete list of a task and check it."""
+
+def check_task(task: KnownTask, starts: int = STARTS) -> Outcome:
+    """Ask for the complete list of a task and check it, also by Newton's method from so many starts."""
     began = process_time()
     try:
         found = planar.synthesise(task.value, complete=True)
@@ -75,7 +80,7 @@ def check_task(task: KnownTask) -> Outcome:
     seconds = process_time() - began
     answer = " | ".join(found.summary)
     is_lost = found.complete.startswith("incomplete")
-    return Outcome(tuple(_list_faults(task, found)), answer, seconds, is_lost)
+    return Outcome(tuple(_list_faults(task, found, starts)), answer, seconds, is_lost)
 
 
 def _last_place(problem: BaseException) -> str:
@@ -87,65 +92,67 @@ def _last_place(problem: BaseException) -> str:
     return f"{problem} (in {' > '.join(names[-3:])})"
 
 
-def _list_faults(task: KnownTask, found: planar.CompleteSynthesis) -> Iterator[Fault]:
+def _list_faults(task: KnownTask, found: planar.CompleteSynthesis, starts: int) -> Iterator[Fault]:
     if task.verdict is Verdict.TOO_MANY:
         yield Fault("listed, though conditions are too many", " | ".join(found.summary))
     elif task.verdict is Verdict.OPEN and found.expected is not None:
         yield Fault("listed, though numbers stay open", " | ".join(found.summary))
-    met = []
+    listed = []
     for k, design in enumerate(found):
-        is_proved = isinstance(design, planar.ExactDesign) and design.certified
-        name = f"design {k + 1} of {len(found)}, {', '.join(str(each) for each in design.defects) or 'no defect'}"
+        name = f"design {k + 1} of {len(found)}, {', '.join(design.defects) or 'no defect'}"
         if any(each.demand == "a file's form" for each in design.shortages):
             yield Fault("a design has no file", name)
             continue
-        numbers = planar.dimensions(design.mechanism)
-        changed = [
-            each
-            for each, value in task.linkage.numbers.items()
-            if each not in task.free and abs(numbers.get(each, value) - value) > 1e-9 * (1.0 + abs(value))
-        ]
-        if changed and task.free:
-            yield Fault("a given number is changed", f"{name}: {', '.join(changed)}")
-        own = how_it_meets(task, numbers, design.inputs)
-        met.append(own)
-        if own.miss > own.tolerance and is_proved:
-            elsewhere = how_it_meets(task, numbers, None)
-            kind = "a proved design misses"
-            if elsewhere.miss <= elsewhere.tolerance:
-                kind = "a proved design misses at the inputs that it names"
-            yield Fault(kind, f"{name}: {own.miss:.3g}, elsewhere {elsewhere.miss:.3g}")
-        if own.miss <= own.tolerance and own.miss < ROUND_OFF and not is_proved:
-            yield Fault("a design that meets is not proved", name)
+        met = how_it_meets(task, planar.dimensions(design.mechanism), design.inputs)
+        elsewhere = met if met.is_met else how_it_meets(task, met.numbers, None)
+        yield from (Fault(kind, f"{name}: {detail}") for kind, detail in _design_faults(task, design, met, elsewhere))
+        listed.append((design, elsewhere if elsewhere.is_met else met))
     if task.verdict is Verdict.LIST:
-        yield from _missing(task, found, met)
+        yield from _missing(task, found, listed, starts)
 
 
-def _missing(task: KnownTask, found: planar.CompleteSynthesis, met: Sequence[Met]) -> Iterator[Fault]:
+def _design_faults(
+    task: KnownTask, design: planar.SynthesisedDesign, met: Met, elsewhere: Met
+) -> Iterator[tuple[str, str]]:
+    """What is wrong with a design; one with a defect names inputs of its first branch, where it need not meet."""
+    is_proved = isinstance(design, planar.ExactDesign) and design.certified
+    changed = [
+        each
+        for each, value in task.linkage.numbers.items()
+        if each not in task.free and abs(met.numbers.get(each, value) - value) > ROUND_OFF * (1.0 + abs(value))
+    ]
+    if changed:
+        yield "a given number is changed", ", ".join(changed)
+    if is_proved and not elsewhere.is_met:
+        yield "a proved design misses", f"{elsewhere.miss:.3g}"
+    elif is_proved and not met.is_met and not design.defects:
+        yield "a proved design misses at the inputs that it names", f"{met.miss:.3g}"
+    if met.is_met and not is_proved:
+        yield "a design that meets is not proved", f"{met.miss:.3g}"
+
+
+def _missing(
+    task: KnownTask, found: planar.CompleteSynthesis, listed: Sequence[tuple[Any, Met]], starts: int
+) -> Iterator[Fault]:
     """The linkages that should be on a list and are not, and those that are on it twice."""
     known = how_it_meets(task, task.linkage.numbers, task.angles)
-    assert known.miss <= known.tolerance
+    assert known.is_met
     may_exchange = task.linkage.kind == "four-bar" and all(item.inputs is None for item in task.items)
-    places = [k for k, each in enumerate(met) if is_same(task, known, each, may_exchange)]
     is_lost = found.complete.startswith("incomplete")
-    if not places:
+    same = [design for design, met in listed if is_same(task, known, met, may_exchange)]
+    if not same:
         kind = "the known linkage is missing from " + ("an incomplete list" if is_lost else "a list")
         yield Fault(kind, " | ".join(found.summary))
-    for k in places[:1]:
-        if found[k].defects:
-            yield Fault("the known linkage is called defective", "; ".join(map(str, found[k].defects)))
-    for first in range(len(met)):
-        if any(is_same(task, met[first], each, may_exchange) for each in met[:first]):
-            yield Fault("a linkage is listed twice", f"design {first + 1} of {len(met)}")
-    if is_lost:
+    elif same[0].defects:
+        yield Fault("the known linkage is called defective", "; ".join(same[0].defects))
+    for k, (_, met) in enumerate(listed):
+        if any(is_same(task, met, other, may_exchange) for _, other in listed[:k]):
+            yield Fault("a linkage is listed twice", f"design {k + 1} of {len(listed)}")
+    if is_lost or not same:
         return
-    others = other_solutions(task)
-    missing = [
-        each
-        for each in others
-        if not any(is_same(task, own, listed, may_exchange) for own in [_met_by(task, *each)] for listed in met)
-    ]
-    if missing and places:
+    others = [_met_by(task, *each) for each in other_solutions(task, starts)]
+    missing = [each for each in others if not any(is_same(task, each, met, may_exchange) for _, met in listed)]
+    if missing:
         yield Fault("a linkage is missing from a list", f"{len(missing)} of {len(others)} by Newton's method")
 
 

@@ -55,15 +55,15 @@ class _System:
         return self.rows(x), np.stack(slopes, axis=2)
 
 
-def other_solutions(task: KnownTask, seed: int = 1) -> list[Solution]:
+def other_solutions(task: KnownTask, starts: int = STARTS, seed: int = 1) -> list[Solution]:
     """Regular solutions that Newton's method comes to, each once."""
     rng = np.random.default_rng(seed)
     signs = [
-        tuple(rng.choice([-1.0, 1.0], (STARTS, len(item.targets))) for _ in range(task.linkage.structure.sign_count))
+        tuple(rng.choice([-1.0, 1.0], (starts, len(item.targets))) for _ in range(task.linkage.structure.sign_count))
         for item in task.items
     ]
     system = _System(task, signs)
-    x = _starts(task, system, rng)
+    x = _starts(task, system, starts, rng)
     with np.errstate(all="ignore"):
         for _ in range(STEPS):
             x = _newton_step(system, x)
@@ -86,11 +86,11 @@ def other_solutions(task: KnownTask, seed: int = 1) -> list[Solution]:
     return solutions
 
 
-def _starts(task: KnownTask, system: _System, rng: np.random.Generator) -> Array:
+def _starts(task: KnownTask, system: _System, count: int, rng: np.random.Generator) -> Array:
     known = np.array([task.linkage.numbers[name] for name in task.free])
-    spread = rng.choice([0.2, 1.0, 3.0], (STARTS, 1))
-    numbers = known + spread * rng.normal(size=(STARTS, len(known)))
-    angles = rng.uniform(-np.pi, np.pi, (STARTS, system.size - len(known)))
+    spread = rng.choice([0.2, 1.0, 3.0], (count, 1))
+    numbers = known + spread * rng.normal(size=(count, len(known)))
+    angles = rng.uniform(-np.pi, np.pi, (count, system.size - len(known)))
     found: Array = np.concatenate([numbers, angles], axis=1)
     return found
 
