@@ -176,7 +176,7 @@ def _features(task: KnownTask, met: Met) -> dict[str, complex]:
     """Places by which linkages are told from each other: pins, P, and the direction of a line up to a half turn."""
     position = met.first
     found = {name: _complex(pin) for name, pin in position.pins.items()}
-    if task.linkage.structure.coupler is not None:
+    if task.linkage.structure.coupler is not None and any(item.what != "function" for item in task.items):
         found["P"] = _complex(position.place(met.numbers, task.linkage.structure.coupler, "P"))
     if position.line is not None:
         found["line"] = _complex(position.line) ** 2
