@@ -1,0 +1,1 @@
+"""Random tasks made from linkages that are known beforehand, to check complete lists of exact synthesis."""
