@@ -11,17 +11,15 @@ from typing import Any
 import numpy as np
 
 from planar import __version__
-from planar.document.dimensions import file_dimensions
-from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput, PlanarError
 from planar.model.mechanism import Mechanism
 from planar.synthesis.catalogue.catalogue import Catalogue
 from planar.synthesis.catalogue.matches import Match
 from planar.synthesis.cognates.task_cognates import task_cognates
 from planar.synthesis.design_search import Candidate, DesignSearch
-from planar.synthesis.judgement.judgement import ONE_BRANCH, ORDER, REACH, WHOLE_TURN, DesignJudge
+from planar.synthesis.judged_candidate import judge_candidate
+from planar.synthesis.judgement.judgement import EXACT, ONE_BRANCH, ORDER, REACH, WHOLE_TURN, DesignJudge
 from planar.synthesis.judgement.refusal import refusal
-from planar.synthesis.judgement.written_design import write_design
 from planar.synthesis.search_folder import SearchFolder
 from planar.synthesis.search_progress import SearchProgress
 from planar.synthesis.synthesis import Synthesis, SynthesisedDesign, rank_designs
@@ -175,7 +173,7 @@ class TaskSearch:
                 values = tuple(search.shown(k, each) for k in range(len(search.equations)))
                 if judge.fit_error(values) > self._worst_wanted(before):
                     continue
-                design = self._judge(search, judge, each, values)
+                design = self._judge(search, judge, each)
                 if design is not None:
                     found.append((each, {one.demand for one in design.shortages}))
                 if len(self.sound) - before >= most:
@@ -207,30 +205,12 @@ class TaskSearch:
         best = rank_designs(self.sound[before:], self.many)
         return best[-1].error if len(best) == self.many else float("inf")
 
-    def _judge(
-        self, search: DesignSearch, judge: DesignJudge, candidate: Candidate, values: Sequence[Array]
-    ) -> SynthesisedDesign | None:
-        """A candidate with the results `values` judged; None where no file could say it."""
-        design = search.equations[0].design
-        number = len(self.sound) + len(self.rejected) + 1
-        name = f"{self.task.name}: {search.mechanism.name} {number}"
-        inputs = [y[:, -1] * each.input_scale for each, y in zip(search.equations, candidate.unknowns, strict=True)]
-        y = search.most_regular(candidate)
-        try:
-            input_position = float(y[-1] * search.equations[0].input_scale)
-            mechanism = write_design(design, candidate.numbers, y, input_position, name)
-        except BadInput:
-            return None
-        found = judge.judge(mechanism, inputs, values)
-        every = np.concatenate(found.misses)
-        error, worst = float(np.sqrt(np.mean(every**2))), float(every.max())
-        written = file_dimensions(mechanism)
-        numbers = {each: float(written[each].value) for each in candidate.numbers}
-        told = SynthesisedDesign(
-            mechanism, error, worst, found.misses, found.inputs, found.defects, search.mechanism.name, numbers
-        )
-        (self.rejected if found.defects else self.sound).append(told)
-        return told
+    def _judge(self, search: DesignSearch, judge: DesignJudge, candidate: Candidate) -> SynthesisedDesign | None:
+        """A candidate judged; None where no file can describe it."""
+        design = judge_candidate(search, judge, candidate, len(self.sound) + len(self.rejected) + 1)
+        if design is not None:
+            (self.rejected if design.defects else self.sound).append(design)
+        return design
 
     def _freedom(self, start: str) -> str:
         """What of the task a start can meet exactly."""
