@@ -11,6 +11,7 @@ from planar.foundation.arrays import Array, ComplexArray
 from planar.foundation.errors import BadInput
 from planar.model.mechanism import Mechanism
 from planar.model.wording import count_phrase
+from planar.synthesis.design_search import DesignSearch
 from planar.synthesis.exact.complete_synthesis import CompleteSynthesis, DyadCurve, ExactDesign
 from planar.synthesis.exact.component_solutions import ComponentSolutions, alike_components, solve_components
 from planar.synthesis.exact.dyad_curves import dyad_curve, is_dyad
@@ -21,7 +22,10 @@ from planar.synthesis.exact.tracking.member_homotopy import affine_solutions, ho
 from planar.synthesis.exact.tracking.member_solutions import Progress
 from planar.synthesis.exact.tracking.symmetry import reordered
 from planar.synthesis.judgement.defects import Defect
+from planar.synthesis.families.family_search import FamilySearch
 from planar.synthesis.judgement.judgement import DesignJudge
+from planar.synthesis.judgement.refusal import refusal
+from planar.synthesis.task.freedom import has_open_numbers
 from planar.synthesis.task.starts import start_mechanisms
 from planar.synthesis.task.synthesis_task import (
     ChainStart,
@@ -35,18 +39,19 @@ from planar.synthesis.task.synthesis_task import (
 MET = 1e-6
 """Of the extent of what is wanted, or rad: an exact linkage that misses more is in another assembly there."""
 
-FAMILY = "a family of linkages with parameters; its dyads stand in curves"
+FAMILY_DESIGNS = 24
+"""Designs that are listed of a family."""
 
 
 def synthesise_all(task: SynthesisTask, progress: Progress | None = None) -> CompleteSynthesis:
     """All linkages of a task's start that meet it exactly. Raises BadInput where there is no such list."""
     mechanism = _single_start(task)
+    say = progress or (lambda _: None)
+    if has_open_numbers(task, mechanism):
+        return _sampled_family(task, mechanism, say)
     problem = ExactProblem(task, mechanism)
     _check_freedom(problem)
-    say = progress or (lambda _: None)
-    solved = solve_components([each for each in problem.components if each.freedom == 0], say)
-    if any(each.freedom for each in problem.components):
-        return _with_curves(problem, solved)
+    solved = solve_components(problem.components, say)
     judge = DesignJudge(task, problem.size)
     designs: list[ExactDesign] = []
     for labelled, certified in _linkages(solved):
@@ -78,15 +83,10 @@ def _check_freedom(problem: ExactProblem) -> None:
     if least < 0:
         told = f"{count_phrase(-least, 'condition')} more than {problem.mechanism.name!r} can meet exactly"
         raise BadInput("$.wanted", f"what is wanted sets {told} with the numbers that are free")
-    left = [each for each in problem.components if each.freedom > 0]
-    is_for_poses = len(problem.items) == 1 and isinstance(problem.items[0], WantedPoses)
-    if left and not (is_for_poses and all(is_dyad(problem, each) for each in left)):
-        most = max(each.freedom for each in left)
-        raise BadInput(
-            "$.wanted",
-            f"{count_phrase(most, 'number')} of {problem.mechanism.name!r} would stay open, so that there is no list; "
-            "want more, or give some of the numbers by leaving them out of 'free'",
-        )
+    most = max((each.freedom for each in problem.components), default=0)
+    if most > 0:
+        told = f"{count_phrase(most, 'number')} of {problem.mechanism.name!r} would stay open, so that there is no list"
+        raise BadInput("$.wanted", f"{told}; want more, or give some of the numbers by leaving them out of 'free'")
 
 
 def _values(component: Component, x: ComplexArray) -> dict[int, complex]:
@@ -188,20 +188,41 @@ def _special(curves: Sequence[DyadCurve], solved: Sequence[ComponentSolutions]) 
         yield "the poses are special: a dyad that others leave one of has none, or more"
 
 
-def _with_curves(problem: ExactProblem, solved: Sequence[ComponentSolutions]) -> CompleteSynthesis:
-    curves: list[DyadCurve] = [dyad_curve(problem, each) for each in problem.components if each.freedom > 0]
+def _sampled_family(task: SynthesisTask, mechanism: Mechanism, say: Progress) -> CompleteSynthesis:
+    """A sample of the linkages of a task that leaves numbers open, and the curves of dyads where poses leave them."""
+    search = DesignSearch(task, mechanism)
+    sample = FamilySearch(search, FAMILY_DESIGNS, 0, say).run()
+    curves, special = _dyad_curves(task, mechanism, say)
+    remarks = () if sample.designs else (refusal([each.shortages for each in sample.rejected], task.units),)
+    return CompleteSynthesis(
+        task,
+        sample.designs,
+        sample.rejected,
+        search.size,
+        remarks,
+        expected=None,
+        complete="; ".join([sample.sentence, *["dyads that do it stand in curves"] * bool(curves), *special]),
+        counted="",
+        curves=curves,
+        family=sample.count,
+    )
+
+
+def _dyad_curves(
+    task: SynthesisTask, mechanism: Mechanism, say: Progress
+) -> tuple[tuple[DyadCurve, ...], tuple[str, ...]]:
+    """The curves of the dyads that poses leave, and where these are special; none of other structures."""
+    if len(task.wanted) > 1 or not isinstance(task.wanted[0], WantedPoses):
+        return (), ()
+    try:
+        problem = ExactProblem(task, mechanism)
+    except BadInput:
+        return (), ()
+    open_parts = [each for each in problem.components if each.freedom > 0]
+    if not all(is_dyad(problem, each) for each in open_parts):
+        return (), ()
+    solved = solve_components([each for each in problem.components if each.freedom == 0], say)
+    curves = [dyad_curve(problem, each) for each in open_parts]
     for each in solved:
         curves += [dyad_curve(problem, each.component, x) for x in each.x]
-    return CompleteSynthesis(
-        problem.task,
-        (),
-        (),
-        problem.size,
-        (),
-        expected=None,
-        complete="; ".join(
-            ["a family of linkages with parameters; its dyads stand in curves", *_special(curves, solved)]
-        ),
-        counted="",
-        curves=tuple(curves),
-    )
+    return tuple(curves), tuple(_special(curves, solved))

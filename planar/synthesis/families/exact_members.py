@@ -11,7 +11,6 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from scipy.stats import qmc
 
 from planar.foundation.arrays import Array, BoolArray, IntArray
 from planar.synthesis.catalogue.design_samples import LEAST_LENGTH, draw_numbers, draw_places, is_positive
@@ -27,7 +26,7 @@ MAX_NUMBER_STEP, MAX_PLACE_STEP = 0.6, 0.8
 """Of a free number (of the mechanism's size), and of an entry's unknowns (rad, or of the size), in one step."""
 BOUNDED_MOBILITY = 0.05
 """How readily a number with two bounds changes, beside one without."""
-RESIDUAL_TOLERANCE = 1e-11
+RESIDUAL_TOLERANCE = 1e-13
 """Greatest residual of a member, of the size or rad."""
 REGULARISATION = 1e-10
 """Of the trace of the normal matrix of the rows, where some depend on others."""
@@ -83,7 +82,7 @@ class MemberSampler:
         self.globals = GlobalNumbers(self.equations, len(self.lower))
         self.mobility = np.ones(self.globals.size)
         self.mobility[: len(self.lower)][is_bounded] = BOUNDED_MOBILITY
-        self.sequence = qmc.Halton(len(self.bounded), rng=self.random) if len(self.bounded) else None
+        self.n_drawn = 0
 
     def draw(self, count: int) -> ExactMembers:
         """The members that so many draws lead to."""
@@ -108,9 +107,10 @@ class MemberSampler:
             middle = 0.5 * (places.min(axis=0) + places.max(axis=0))
             for pivot in self.search.moves.places:
                 numbers[:, pivot] = middle + PIVOT_RANGE * unit * self.random.uniform(-1.0, 1.0, (count, 2))
-        if self.sequence is not None:
-            lower, upper = self.lower[self.bounded], self.upper[self.bounded]
-            numbers[:, self.bounded] = lower + (upper - lower) * self.sequence.random(count)
+        lower, upper = self.lower[self.bounded], self.upper[self.bounded]
+        shares = _even_points(np.arange(self.n_drawn, self.n_drawn + count), len(self.bounded))
+        numbers[:, self.bounded] = lower + (upper - lower) * shares
+        self.n_drawn += count
         return np.clip(numbers, self.least, self.upper)
 
     def _draw_unknowns(self, equations: WantedEquations, numbers: Array) -> Array:
@@ -185,6 +185,17 @@ class MemberSampler:
             for part in (closure, rows):
                 greatest = np.maximum(greatest, np.abs(part).max(axis=(1, 2), initial=0.0))
         return greatest
+
+
+def _even_points(indices: IntArray, dimension: int) -> Array:
+    """Points (n, dimension) of a sequence that fills the unit cube evenly, by multiples of irrational steps: powers of
+    the root of x^(dimension + 1) = x + 1 (M. Roberts, The Unreasonable Effectiveness of Quasirandom Sequences, 2018).
+    """
+    root = 2.0
+    for _ in range(40):
+        root = (1.0 + root) ** (1.0 / (dimension + 1))
+    points: Array = np.mod(0.5 + (indices[:, None] + 1) * root ** -np.arange(1.0, dimension + 1.0), 1.0)
+    return points
 
 
 def _entry_squares(equations: WantedEquations, numbers: Array, y: Array) -> Array:

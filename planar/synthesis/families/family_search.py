@@ -18,9 +18,9 @@ from planar.synthesis.judged_candidate import judge_candidate
 from planar.synthesis.judgement.judgement import DesignJudge
 from planar.synthesis.synthesis import SynthesisedDesign, least_transmission
 
-DRAWS, DRAW_ROUNDS = 400, 6
+DRAWS, DRAW_ROUNDS = 250, 8
 """Random draws of one round, and how many rounds there are while too few members keep the demands."""
-RECOMBINATIONS, RECOMBINED_ROUNDS = 20_000, 12
+RECOMBINATIONS, RECOMBINED_ROUNDS = 12_000, 24
 """Members put together from independent parts of others in one round, and how many rounds at most."""
 SEARCH_ROUNDS, PARENTS, CHILDREN = 9, 48, 400
 """Rounds of members near those that lack least, where too few keep the demands."""
@@ -34,28 +34,32 @@ NEAREST = 3
 """Members that are judged where none keeps the demands, so that it is said what they lack."""
 
 
-class FamilySample(NamedTuple):
-    """Exact designs that keep the demands, the best transmission first, and those nearest to it where none does.
+class FamilyCount(NamedTuple):
+    """`dimension` parameters of a family are open; `tried` members were tried, of which `met` keep the demands."""
 
-    `dimension` parameters are open; `tried` members of the family were tried, of which `met` keep what is demanded.
-    """
-
-    designs: tuple[SynthesisedDesign, ...]
-    rejected: tuple[SynthesisedDesign, ...]
     dimension: int
     tried: int
     met: int
 
+
+class FamilySample(NamedTuple):
+    """Exact designs that keep the demands, the best transmission first, and those nearest to it where none does."""
+
+    designs: tuple[SynthesisedDesign, ...]
+    rejected: tuple[SynthesisedDesign, ...]
+    count: FamilyCount
+
     @property
     def sentence(self) -> str:
         """What was tried, in words."""
-        if not self.tried:
+        dimension, tried, met = self.count
+        if not tried:
             return "no exact linkage was reached from random draws within the bounds"
-        tried = count_phrase(self.tried, "exact linkage was tried", "exact linkages were tried")
-        met = f"{self.met} {'meets' if self.met == 1 else 'meet'} the demands"
-        kind = f"a family with {count_phrase(self.dimension, 'open parameter')}" if self.dimension else "single linkages"
-        listed = f"; {len(self.designs)}, spread over the family, are listed" if self.dimension and self.designs else ""
-        return f"{kind}: {tried}, {met}{listed}"
+        kind = f"a family with {count_phrase(dimension, 'open parameter')}" if dimension else "single linkages"
+        counts = f"{count_phrase(tried, 'exact linkage was', 'exact linkages were')} tried, {met or 'none'} "
+        counts += "meets all that is demanded" if met < 2 else "meet all that is demanded"
+        listed = f"; {len(self.designs)} of these, spread over the family, are listed" if len(self.designs) < met else ""
+        return f"{kind}: {counts}{listed}"
 
 
 class FamilySearch:
@@ -138,7 +142,7 @@ class FamilySearch:
     def _judged(self) -> FamilySample:
         """The members chosen, judged by the general path."""
         if not self.tried:
-            return FamilySample((), (), self.dimension, 0, 0)
+            return FamilySample((), (), FamilyCount(self.dimension, 0, 0))
         members, violation, transmission = self._known()
         judge = DesignJudge(self.search.task, self.search.size)
         sound: list[SynthesisedDesign] = []
@@ -155,16 +159,17 @@ class FamilySearch:
             if design is not None:
                 (rejected if design.defects else sound).append(design)
         sound.sort(key=lambda design: -least_transmission(design))
-        met = max(self.met, len(sound))
-        return FamilySample(tuple(sound), () if sound else tuple(rejected), self.dimension, self.tried, met)
+        met = max(self.met, len(sound)) if sound else 0
+        count = FamilyCount(self.dimension, self.tried, met)
+        return FamilySample(tuple(sound), () if sound else tuple(rejected), count)
 
     def _spread(self, numbers: Array, rows: IntArray, transmission: Array, count: int) -> list[int]:
-        """So many of some rows, of which each is farthest from those before; the half that transmits better is taken
-        where there are enough."""
+        """So many of some rows, each the farthest from those before; the third that transmits best is taken where
+        there are enough."""
         if not len(rows):
             return []
         rows = rows[np.argsort(-transmission[rows], kind="stable")]
-        rows = rows[: max(POOL * self.count, len(rows) // 2)]
+        rows = rows[: max(2 * count, len(rows) // 3)]
         places = numbers[rows]
         places = places / np.maximum(places.std(axis=0), 1e-9)
         chosen = [0]
