@@ -89,10 +89,11 @@ class MemberSampler:
         numbers = self._draw_numbers(count)
         unknowns = [self._draw_unknowns(equations, numbers) for equations in self.equations]
         zeros = self.search.first_zeros(numbers, unknowns)
-        return self.solve(ExactMembers(numbers, tuple(unknowns), tuple(zeros)))
+        return self.solve(ExactMembers(numbers, tuple(unknowns), tuple(zeros)))[0]
 
-    def perturb(self, members: ExactMembers, spread: float) -> ExactMembers:
-        """Members near given ones; numbers change by about the `spread` of the size, or of their bounds' range."""
+    def perturb(self, members: ExactMembers, spread: float) -> tuple[ExactMembers, IntArray]:
+        """Members near given ones, and near which each is; numbers change by about the `spread` of the size, or of
+        their bounds' range."""
         width = np.full(len(self.lower), 1.0 / self.search.ratio)
         width[self.bounded] = (self.upper - self.lower)[self.bounded]
         change = spread * width * self.random.normal(size=members.numbers.shape)
@@ -129,20 +130,22 @@ class MemberSampler:
             least = np.where(is_less, squares, least)
         return best
 
-    def solve(self, starts: ExactMembers) -> ExactMembers:
-        """The members that Newton's steps of least norm lead to; fewer than there are starts."""
+    def solve(self, starts: ExactMembers) -> tuple[ExactMembers, IntArray]:
+        """The members that Newton's steps of least norm lead to, fewer than there are starts, and the start of each."""
         members, solved = starts, []
+        rows, origins = np.arange(len(starts.numbers)), []
         ways = [tangents(np.nan_to_num(e.jacobians(starts.numbers, y))) for e, y in self._items(starts)]
         for _ in range(NEWTON_STEPS):
             members, ways = self._step(members, ways)
             residual = self.residuals(members)
             is_solved = residual < RESIDUAL_TOLERANCE
             solved.append(members.take(is_solved))
+            origins.append(rows[is_solved])
             rest = np.flatnonzero(~is_solved & np.isfinite(residual))
-            members, ways = members.take(rest), [way[rest] for way in ways]
+            members, rows, ways = members.take(rest), rows[rest], [way[rest] for way in ways]
             if not len(rest):
                 break
-        return join_members(solved)
+        return join_members(solved), np.concatenate(origins)
 
     def _items(self, members: ExactMembers) -> list[tuple[WantedEquations, Array]]:
         return list(zip(self.equations, members.unknowns, strict=True))

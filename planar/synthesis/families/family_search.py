@@ -22,10 +22,10 @@ DRAWS, DRAW_ROUNDS = 250, 8
 """Random draws of one round, and how many rounds there are while too few members keep the demands."""
 RECOMBINATIONS, RECOMBINED_ROUNDS = 12_000, 24
 """Members put together from independent parts of others in one round, and how many rounds at most."""
-SEARCH_ROUNDS, PARENTS, CHILDREN = 9, 48, 400
-"""Rounds of members near those that lack least, where too few keep the demands."""
-SPREADS = (0.2, 0.06, 0.02)
-"""Of the size or of the bounds' range: how far from their parents members are drawn, one round after the other."""
+PARENTS, CHILDREN = 40, 10
+"""Members that lack least, where too few keep the demands, and how many are drawn near each of them in a round."""
+SPREADS = (0.2, 0.1, 0.05, 0.02) * 3
+"""Of the size or of the bounds' range: how far from their parents these are drawn, one round after the other."""
 POOL = 4
 """Members that keep the demands, times the designs that are listed, at which no more are sought."""
 CANDIDATES = 1.5
@@ -87,17 +87,14 @@ class FamilySearch:
         for _ in range(DRAW_ROUNDS):
             self.say("exact members of the family")
             drawn = self.sampler.draw(DRAWS)
-            self._add(drawn)
-            basis += [drawn] * bool(len(drawn.numbers))
-            if basis:
+            if len(drawn.numbers):
+                self._add(drawn)
+                basis.append(drawn)
                 self._recombine(join_members(basis))
             if self._is_enough() or self.is_over() or (basis and not self.dimension):
                 break
-        for spread in SPREADS * (SEARCH_ROUNDS // len(SPREADS)):
-            if self._is_enough() or not (self.tried and self.dimension) or self.is_over():
-                break
-            self.say("members near those that lack least")
-            self._add(self.sampler.perturb(self._parents(), spread))
+        if self.tried and self.dimension and not self._is_enough():
+            self._improve()
         return self._judged()
 
     def _is_enough(self) -> bool:
@@ -113,12 +110,33 @@ class FamilySearch:
         for _ in range(RECOMBINED_ROUNDS // DRAW_ROUNDS):
             if self._is_enough() or self.is_over():
                 break
-            self._add(recombine(self.sampler, members, parts, RECOMBINATIONS))
+            combined = recombine(self.sampler, members, parts, RECOMBINATIONS)
+            if len(combined.numbers):
+                self._add(combined)
 
-    def _add(self, members: ExactMembers) -> None:
+    def _improve(self) -> None:
+        """Draw members near those that lack least; each of these gives way to the best drawn near it alone, so that
+        all parts of the family go on."""
+        members, violation, _ = self._known()
+        best = np.argsort(violation, kind="stable")[:PARENTS]
+        parents, violation = members.take(best), violation[best]
+        for spread in SPREADS:
+            if self._is_enough() or self.is_over():
+                break
+            self.say("members near those that lack least")
+            starts = np.repeat(np.arange(len(violation)), CHILDREN)
+            children, origins = self.sampler.perturb(parents.take(starts), spread)
+            if not len(origins):
+                continue
+            both = join_members([parents, children])
+            lacks = np.concatenate([violation, self._add(children).violation])
+            owner = np.concatenate([np.arange(len(violation)), starts[origins]])
+            order = np.lexsort([lacks, owner])
+            rows = order[np.unique(owner[order], return_index=True)[1]]
+            parents, violation = both.take(rows), lacks[rows]
+
+    def _add(self, members: ExactMembers) -> Screening:
         """Screen members, and keep those that meet the demands and the nearest of the others."""
-        if not len(members.numbers):
-            return
         screening = self.screen.screen(members)
         self.tried += len(members.numbers)
         is_met = screening.violation == 0.0
@@ -127,17 +145,12 @@ class FamilySearch:
         rows = np.union1d(np.flatnonzero(is_met), others)
         self.members.append(members.take(rows))
         self.screenings.append(Screening(screening.violation[rows], screening.transmission[rows]))
+        return screening
 
     def _known(self) -> tuple[ExactMembers, Array, Array]:
         """The members that are kept, their violations and their least transmission angles."""
         violation, transmission = (np.concatenate(parts) for parts in zip(*self.screenings, strict=True))
         return join_members(self.members), violation, transmission
-
-    def _parents(self) -> ExactMembers:
-        """The members nearest to the demands, so often that there are enough children."""
-        members, violation, _ = self._known()
-        best = np.argsort(violation, kind="stable")[:PARENTS]
-        return members.take(np.resize(best, CHILDREN))
 
     def _judged(self) -> FamilySample:
         """The members chosen, judged by the general path."""

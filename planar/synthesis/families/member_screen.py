@@ -98,9 +98,9 @@ class MemberScreen:
             given = y[:, -1] * scale
             there = reach.bring(given)
             brought.append(there)
-            off.append(reach.are_beyond(given) | self._is_elsewhere(branch, there / scale, y))
+            off.append(np.where(self._is_elsewhere(branch, there / scale, y), 1.0, np.tanh(reach.excess(given))))
             if getattr(wanted, "in_order", False) and not reach.is_in_order(there):
-                violation = NO_ORDER
+                violation = NO_ORDER + _disorder(np.diff(there), is_cyclic)
         if self.search.task.needs_whole_turn and not is_whole:
             violation += NO_WHOLE_TURN + 1.0 - (reach.high - reach.low) / TURN
         missing = float(np.concatenate(off).mean())
@@ -135,3 +135,11 @@ class MemberScreen:
         values = self.outputs.values(np.repeat(numbers, POSITIONS, axis=0), positions.reshape(-1, positions.shape[2]))
         least: Array = np.nan_to_num(values, nan=0.0).reshape(len(numbers), -1).min(axis=1)
         return least
+
+
+def _disorder(steps: Array, is_cyclic: bool) -> float:
+    """By how much steps of the input (n,) go back, as a part of all; of a cyclic one how many turns they take more."""
+    if is_cyclic:
+        return min(float(np.mod(steps, TURN).sum()), float(np.mod(-steps, TURN).sum())) / TURN - 1.0
+    back = min(float(np.maximum(steps, 0.0).sum()), float(np.maximum(-steps, 0.0).sum()))
+    return back / max(float(np.abs(steps).sum()), np.finfo(float).tiny)
