@@ -63,8 +63,11 @@ def family_task(seed: int) -> FamilyTask:
         "units": {"length": "mm", "angle": "deg"},
         "start": "four-bar",
         "wanted": [wanted | {"in_order": demands.in_order}],
-        "within": {f"AD.{name}.{axis}": list(box[k : k + 2]) for name, box in zip("AD", boxes, strict=True)
-                   for axis, k in (("x", 0), ("y", 2))},
+        "within": {
+            f"AD.{name}.{axis}": list(box[k : k + 2])
+            for name, box in zip("AD", boxes, strict=True)
+            for axis, k in (("x", 0), ("y", 2))
+        },
         "demands": keys,
     }
     if demands.transmission is not None:

@@ -99,9 +99,7 @@ def check_synthesis(found: Any) -> Synthesis:
     return found
 
 
-def rank_designs(
-    designs: Sequence[SynthesisedDesign], many: int, exact: float = 0.0
-) -> tuple[SynthesisedDesign, ...]:
+def rank_designs(designs: Sequence[SynthesisedDesign], many: int, exact: float = 0.0) -> tuple[SynthesisedDesign, ...]:
     """The best so many by their error, of those alike one; of those with no more error than `exact` the ones that
     transmit best are first."""
 

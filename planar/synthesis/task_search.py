@@ -17,8 +17,8 @@ from planar.synthesis.catalogue.catalogue import Catalogue
 from planar.synthesis.catalogue.matches import Match
 from planar.synthesis.cognates.task_cognates import task_cognates
 from planar.synthesis.design_search import Candidate, DesignSearch
-from planar.synthesis.families.family_search import RECOMBINATIONS, FamilySearch
 from planar.synthesis.families.family_search import DRAWS as DRAWS_OF_MEMBERS
+from planar.synthesis.families.family_search import RECOMBINATIONS, FamilySearch
 from planar.synthesis.judged_candidate import judge_candidate
 from planar.synthesis.judgement.judgement import EXACT, ONE_BRANCH, ORDER, REACH, WHOLE_TURN, DesignJudge
 from planar.synthesis.judgement.refusal import refusal

@@ -21,8 +21,8 @@ from planar.synthesis.exact.relations.exact_problem import Component, ExactProbl
 from planar.synthesis.exact.tracking.member_homotopy import affine_solutions, homogeneous_solutions
 from planar.synthesis.exact.tracking.member_solutions import Progress
 from planar.synthesis.exact.tracking.symmetry import reordered
-from planar.synthesis.judgement.defects import Defect
 from planar.synthesis.families.family_search import FamilySearch
+from planar.synthesis.judgement.defects import Defect
 from planar.synthesis.judgement.judgement import DesignJudge
 from planar.synthesis.judgement.refusal import refusal
 from planar.synthesis.task.freedom import has_open_numbers

@@ -58,7 +58,9 @@ class FamilySample(NamedTuple):
         kind = f"a family with {count_phrase(dimension, 'open parameter')}" if dimension else "single linkages"
         counts = f"{count_phrase(tried, 'exact linkage was', 'exact linkages were')} tried, {met or 'none'} "
         counts += "meets all that is demanded" if met < 2 else "meet all that is demanded"
-        listed = f"; {len(self.designs)} of these, spread over the family, are listed" if len(self.designs) < met else ""
+        listed = (
+            f"; {len(self.designs)} of these, spread over the family, are listed" if len(self.designs) < met else ""
+        )
         return f"{kind}: {counts}{listed}"
 
 

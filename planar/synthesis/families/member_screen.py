@@ -14,7 +14,7 @@ from planar.foundation.arrays import Array, BoolArray
 from planar.foundation.jets import TURN
 from planar.model.mechanism import links_counting_turns
 from planar.model.pairs import MeasureKind
-from planar.synthesis.catalogue.branch_tracking import follow_branches
+from planar.synthesis.catalogue.branch_tracking import MAX_TURN, follow_branches
 from planar.synthesis.design_search import DesignSearch, spread_positions
 from planar.synthesis.families.exact_members import ExactMembers
 from planar.synthesis.fitting.demanded_rows import output_rows
@@ -22,8 +22,10 @@ from planar.synthesis.judgement.input_range import InputRange
 
 MAX_FOLLOWED = 1200
 """Members that are run through their branch at once."""
-SAME_PLACE = 0.15
-"""rad, or of the size: an entry that is so far from its branch at the same input is in another assembly."""
+ON_BRANCH = 0.05
+"""rad, or of the size: an entry that is nearer to the chords of its branch is on it."""
+NEAR_END = 1.5 * MAX_TURN
+"""The same beside the end of a branch, which is followed up to one step from the dead point."""
 POSITIONS = 25
 """Of the motion, at which demands are evaluated."""
 OTHER_BRANCH, NOT_FOLLOWED, OFF_BRANCH, NO_WHOLE_TURN, NO_ORDER = 20.0, 15.0, 10.0, 6.0, 4.0
@@ -47,9 +49,11 @@ class MemberScreen:
         self.outputs = output_rows(first, search.free)
         design = first.design
         kinds = [design.equations.coordinates[k].kind for k in design.equations.unknowns]
-        self.is_angle = np.array([kind is not MeasureKind.LENGTH for kind in kinds], bool)
         self.input_turns = design.equations.input_kinds[0] is not MeasureKind.LENGTH
         self.counts_turns = bool(links_counting_turns(search.mechanism))
+        is_angle = [kind is not MeasureKind.LENGTH for kind in kinds]
+        self.is_angle = np.array([*is_angle, self.input_turns and not self.counts_turns], bool)
+        "of the unknowns and the input, those that are the same a turn apart"
 
     def screen(self, members: ExactMembers) -> Screening:
         """What members lack."""
@@ -71,7 +75,9 @@ class MemberScreen:
             determinants.append(np.linalg.det(jacobian) / np.maximum(lengths, np.finfo(float).tiny))
         values = np.concatenate(determinants, axis=1)
         wrong = np.minimum(np.maximum(values, 0.0).sum(axis=1), np.maximum(-values, 0.0).sum(axis=1))
-        return np.where(wrong > 0.0, OTHER_BRANCH + wrong / np.abs(values).sum(axis=1), 0.0)
+        return np.where(
+            wrong > 0.0, OTHER_BRANCH + wrong / np.maximum(np.abs(values).sum(axis=1), np.finfo(float).tiny), 0.0
+        )
 
     def _follow(self, members: ExactMembers) -> tuple[Array, Array]:
         """Violations and least transmission angles (n,) of members whose determinants have one sign."""
@@ -98,7 +104,10 @@ class MemberScreen:
             given = y[:, -1] * scale
             there = reach.bring(given)
             brought.append(there)
-            off.append(np.where(self._is_elsewhere(branch, there / scale, y), 1.0, np.tanh(reach.excess(given))))
+            distance = self._distances(branch, y)
+            near_end = np.minimum(*(self._distances(branch[[k]], y) for k in (0, -1))) if not is_whole else np.inf
+            is_on = (distance < ON_BRANCH) | (near_end < NEAR_END)
+            off.append(np.where(is_on, 0.0, np.tanh(distance)))
             if getattr(wanted, "in_order", False) and not reach.is_in_order(there):
                 violation = NO_ORDER + _disorder(np.diff(there), is_cyclic)
         if self.search.task.needs_whole_turn and not is_whole:
@@ -107,14 +116,15 @@ class MemberScreen:
         violation += OFF_BRANCH + missing if missing else 0.0
         return violation, spread_positions(branch, np.concatenate(brought) / scale, POSITIONS, is_whole)
 
-    def _is_elsewhere(self, branch: Array, inputs: Array, y: Array) -> BoolArray:
-        """Which entries (n,) are not where the branch is at their inputs."""
-        places = np.stack([np.interp(inputs, branch[:, -1], part) for part in branch.T[:-1]] or [0.0 * inputs], axis=1)
-        difference = places - (y[:, :-1] if y.shape[1] > 1 else 0.0)
-        turned = self.is_angle if len(self.is_angle) else np.zeros(1, bool)
-        difference[:, turned] -= TURN * np.round(difference[:, turned] / TURN)
-        elsewhere: BoolArray = np.abs(difference).max(axis=1) > SAME_PLACE
-        return elsewhere
+    def _distances(self, branch: Array, y: Array) -> Array:
+        """How far entries (n, unknowns) are from the chords of a branch (steps, unknowns)."""
+        chords = np.diff(branch, axis=0, append=branch[-1:])
+        apart = y[:, None] - branch
+        apart[..., self.is_angle] -= TURN * np.round(apart[..., self.is_angle] / TURN)
+        lengths = np.maximum(np.sum(chords**2, axis=1), np.finfo(float).tiny)
+        share = np.clip(np.sum(apart * chords, axis=2) / lengths, 0.0, 1.0)
+        distances: Array = np.linalg.norm(apart - share[..., None] * chords, axis=2).min(axis=1)
+        return distances
 
     def _demand_lacks(self, numbers: Array, positions: Array, is_whole: BoolArray) -> Array:
         """By how much (n,) demands of the motion are missed most, rad or of the size."""

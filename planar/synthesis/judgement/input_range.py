@@ -54,15 +54,9 @@ class InputRange:
         """Which positions (n,) lie beyond an end."""
         if self.is_whole_turn:
             return np.zeros(len(inputs), bool)
-        beyond: BoolArray = np.asarray(self.excess(inputs) > self.margin)
+        inputs = self._turned(inputs)
+        beyond: BoolArray = np.asarray((inputs < self.low - self.margin) | (inputs > self.high + self.margin))
         return beyond
-
-    def excess(self, inputs: Array) -> Array:
-        """How far positions (n,) lie beyond an end; 0 of those within, and where there is no end."""
-        if self.is_whole_turn:
-            return np.zeros(len(inputs))
-        turned = self._turned(inputs)
-        return np.maximum(np.maximum(self.low - turned, turned - self.high), 0.0)
 
     def bring(self, inputs: Array) -> Array:
         """Positions (n,) by whole turns, or from a hair beyond its ends, within it."""
