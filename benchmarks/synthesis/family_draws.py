@@ -1,7 +1,7 @@
 """Four-bars that meet two to four poses or three to five places exactly, from random draws, by closed forms alone.
 
-Places of the plane are complex numbers. A design is its fixed pivots a and d, and its joints b and c at every entry; the
-crank a-b is the input. Nothing of planar is used here.
+Places of the plane are complex numbers. A design is its fixed pivots a and d, and its joints b and c at every entry;
+the crank a-b is the input. Nothing of planar is used here.
 """
 
 from __future__ import annotations
@@ -55,8 +55,8 @@ def is_inside(places: Places, box: Box) -> NDArray[np.bool_]:
 def dyads(at: Places, turn: Places, box: Box, rng: np.random.Generator) -> tuple[Places, Places, NDArray[np.int64]]:
     """Fixed pivots in a box, joints at every entry, and the draw of each, for poses (draws, entries) of a link.
 
-    Two poses leave the joint on a line, three give it, and four leave the pivot on a cubic; of five the pivots are those
-    that Newton's method reaches.
+    Two poses leave the joint on a line, three give it, and four leave the pivot on a cubic; of five the pivots are
+    those that Newton's method reaches.
     """
     draws, entries = at.shape
     pivot, row = uniform(box, draws, rng), np.arange(draws)

@@ -86,8 +86,8 @@ class CompleteSynthesis(Synthesis):
     numbers stay open there is a `family` of them: `designs` are a sample, the best transmission angle first.
 
     `expected`: how many complex solutions a random task of this kind has, of the class that `counted` says; None where
-    there is a family of them. `complete`: "complete" where it is proved that there are no others, "numerically complete"
-    where all paths came to an end and a trace test says that these are all, else how far it is. `found`: how many of
+    there is a family of them. `complete`: "complete" where it is proved that there are no others, "numerically
+    complete" where all paths came to an end and a trace test says that these are all, else how far it is. `found`: how many of
     those expected there are. `curves`: families of solutions with a parameter. `seed` and `is_finished` are as of a
     search: a list is made whole, without chance.
     """

@@ -14,7 +14,7 @@ from planar.foundation.arrays import Array, BoolArray
 from planar.foundation.jets import TURN
 from planar.model.mechanism import links_counting_turns
 from planar.model.pairs import MeasureKind
-from planar.synthesis.catalogue.branch_tracking import MAX_TURN, follow_branches
+from planar.synthesis.catalogue.branch_tracking import follow_branches
 from planar.synthesis.design_search import DesignSearch, spread_positions
 from planar.synthesis.families.exact_members import ExactMembers
 from planar.synthesis.fitting.demanded_rows import output_rows
@@ -24,8 +24,8 @@ MAX_FOLLOWED = 1200
 """Members that are run through their branch at once."""
 ON_BRANCH = 0.05
 """rad, or of the size: an entry that is nearer to the chords of its branch is on it."""
-NEAR_END = 1.5 * MAX_TURN
-"""The same beside the end of a branch, which is followed up to one step from the dead point."""
+NEAR_END = 0.8
+"""The same beside the end of a branch, which is followed until the dead point is near."""
 POSITIONS = 25
 """Of the motion, at which demands are evaluated."""
 OTHER_BRANCH, NOT_FOLLOWED, OFF_BRANCH, NO_WHOLE_TURN, NO_ORDER = 20.0, 15.0, 10.0, 6.0, 4.0
