@@ -71,9 +71,9 @@ def test_the_members_of_a_family_keep_the_lengths_of_their_cranks(lid, monkeypat
     for pivot, joints in ((designs.a, designs.b), (designs.d, designs.c)):
         assert np.ptp(np.abs(joints - pivot[:, None]), axis=1).max() < 1e-10
     # what the screen passes is on one branch by the formulas of a four-bar, and the other way round
+    assert (violation[meets(designs, Demands(False, False, None))] == 0.0).mean() > 0.9
     monkeypatch.setattr("benchmarks.synthesis.family_draws.MARGIN", 0.0)
-    is_met = meets(designs, Demands(False, False, None))
-    assert (violation[is_met] == 0.0).mean() > 0.95 and is_met[violation == 0.0].mean() > 0.8
+    assert meets(designs, Demands(False, False, None))[violation == 0.0].all()
 
 
 def test_members_without_bounds_on_pivots_are_drawn_about_what_is_wanted():

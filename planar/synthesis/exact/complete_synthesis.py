@@ -87,9 +87,9 @@ class CompleteSynthesis(Synthesis):
 
     `expected`: how many complex solutions a random task of this kind has, of the class that `counted` says; None where
     there is a family of them. `complete`: "complete" where it is proved that there are no others, "numerically
-    complete" where all paths came to an end and a trace test says that these are all, else how far it is. `found`: how many of
-    those expected there are. `curves`: families of solutions with a parameter. `seed` and `is_finished` are as of a
-    search: a list is made whole, without chance.
+    complete" where all paths came to an end and a trace test says that these are all, else how far it is. `found`: how
+    many of those expected there are. `curves`: dyads with a parameter. `seed` and `is_finished` are as of a search: a
+    list is made whole, without chance.
     """
 
     expected: int | None = None

@@ -24,7 +24,7 @@ MAX_FOLLOWED = 1200
 """Members that are run through their branch at once."""
 ON_BRANCH = 0.05
 """rad, or of the size: an entry that is nearer to the chords of its branch is on it."""
-NEAR_END = 0.8
+NEAR_END = 0.5
 """The same beside the end of a branch, which is followed until the dead point is near."""
 POSITIONS = 25
 """Of the motion, at which demands are evaluated."""
