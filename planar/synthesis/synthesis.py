@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, overload
+from typing import Any, NamedTuple, overload
 
 import numpy as np
 
@@ -53,6 +53,14 @@ class SynthesisedDesign:
     def __repr__(self) -> str:
         told = f", {count_phrase(len(self.defects), 'defect')}" if self.defects else ""
         return f"<SynthesisedDesign {self.mechanism.name!r}: greatest miss {self.greatest_miss:.3g}{told}>"
+
+
+class FamilyCount(NamedTuple):
+    """`dimension` parameters of a family are open; `tried` members were tried, of which `met` keep the demands."""
+
+    dimension: int
+    tried: int
+    met: int
 
 
 @dataclass(frozen=True, eq=False)

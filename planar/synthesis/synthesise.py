@@ -61,7 +61,8 @@ def synthesise(
     Where a start can meet all that is wanted exactly, exact designs are sampled first, those that transmit best first.
 
     With `complete` all linkages of one start are found that meet exactly as much as it can meet, each certified where
-    python-flint is there; where numbers stay open, a sample of the family. `many`, `seed`, `time_limit` and `folder` are not for that.
+    python-flint is there; where numbers stay open, a sample of the family. `many`, `seed`, `time_limit` and `folder`
+    are not for that.
 
     Raises BadInput with the place in the task's file, for a folder that holds something else, and where no complete
     list can be made.

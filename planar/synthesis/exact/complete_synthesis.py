@@ -8,8 +8,7 @@ import numpy as np
 
 from planar.foundation.arrays import Array
 from planar.model.wording import count_phrase
-from planar.synthesis.families.family_search import FamilyCount
-from planar.synthesis.synthesis import Synthesis, SynthesisedDesign
+from planar.synthesis.synthesis import FamilyCount, Synthesis, SynthesisedDesign
 
 
 @dataclass(frozen=True, eq=False)

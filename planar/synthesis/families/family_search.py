@@ -16,7 +16,7 @@ from planar.synthesis.families.member_screen import MemberScreen, Screening
 from planar.synthesis.families.recombination import independent_parts, null_space, recombine
 from planar.synthesis.judged_candidate import judge_candidate
 from planar.synthesis.judgement.judgement import DesignJudge
-from planar.synthesis.synthesis import SynthesisedDesign, least_transmission
+from planar.synthesis.synthesis import FamilyCount, SynthesisedDesign, least_transmission
 
 DRAWS, DRAW_ROUNDS = 250, 8
 """Random draws of one round, and how many rounds there are while too few members keep the demands."""
@@ -32,14 +32,6 @@ CANDIDATES = 1.5
 """Members that are judged at most, times the designs that are listed."""
 NEAREST = 3
 """Members that are judged where none keeps the demands, so that it is said what they lack."""
-
-
-class FamilyCount(NamedTuple):
-    """`dimension` parameters of a family are open; `tried` members were tried, of which `met` keep the demands."""
-
-    dimension: int
-    tried: int
-    met: int
 
 
 class FamilySample(NamedTuple):

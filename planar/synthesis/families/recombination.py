@@ -6,7 +6,6 @@ it is block diagonal, each block of unknowns varies without the others, as two d
 
 from __future__ import annotations
 
-import networkx as nx
 import numpy as np
 
 from planar.foundation.arrays import Array, IntArray
@@ -53,12 +52,12 @@ def null_space(sampler: MemberSampler, member: ExactMembers) -> Array:
 def independent_parts(directions: Array) -> list[IntArray]:
     """The columns that vary with each other, in parts that vary independently."""
     projector = directions @ directions.T
-    graph = nx.Graph()
-    graph.add_nodes_from(np.flatnonzero(np.diag(projector) > TIED).tolist())
-    graph.add_edges_from(
-        (i, j) for i, j in np.argwhere(np.triu(np.abs(projector) > TIED, 1)).tolist() if i in graph and j in graph
-    )
-    return [np.array(sorted(part)) for part in nx.connected_components(graph)]
+    moving = np.flatnonzero(np.diag(projector) > TIED)
+    is_tied = np.abs(projector[np.ix_(moving, moving)]) > TIED
+    labels = np.arange(len(moving))
+    for _ in moving:  # the least label goes from column to column
+        labels = np.where(is_tied, labels, len(moving)).min(axis=1, initial=len(moving))
+    return [moving[labels == label] for label in np.unique(labels)]
 
 
 def recombine(sampler: MemberSampler, members: ExactMembers, parts: list[IntArray], count: int) -> ExactMembers:
