@@ -133,7 +133,7 @@ if TYPE_CHECKING:
     from planar.synthesis.design_motion import DesignMotion
     from planar.synthesis.exact.complete_synthesis import CompleteSynthesis, DyadCurve, ExactDesign
     from planar.synthesis.search_progress import SearchProgress
-    from planar.synthesis.synthesis import Synthesis, SynthesisedDesign
+    from planar.synthesis.synthesis import FamilyCount, Synthesis, SynthesisedDesign
     from planar.synthesis.synthesise import synthesise
     from planar.synthesis.task.synthesis_task import Demands, SynthesisTask, WantedFunction, WantedPath, WantedPoses
     from planar.synthesis.task.task_reader import read_task
@@ -199,6 +199,7 @@ __all__ = [
     "ExactDesign",
     "Extreme",
     "Extremes",
+    "FamilyCount",
     "FileUnits",
     "FixedWheel",
     "Flywheel",

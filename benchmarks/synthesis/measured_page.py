@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.synthesis.family_tasks import is_met as is_listed
 from benchmarks.synthesis.random_tasks import ALLOWED, KINDS, is_met
 from benchmarks.synthesis.six_bar_curves import STRUCTURES
 from benchmarks.versions import planar_versions
@@ -149,6 +150,17 @@ def _beside(records: Sequence[Record]) -> list[str]:
     return _table(heads, [(e["task"], e["system"], _number(e["greatest"]), _seconds(e), e["remark"]) for e in records])
 
 
+def _families(records: Sequence[Record]) -> list[str]:
+    heads = ("entries", "tasks", "draws hold a design", "listed there, too", "listed in all", "median time")
+    rows = []
+    for kind in dict.fromkeys(each["kind"] for each in records):
+        own = [each for each in records if each["kind"] == kind]
+        held = [each for each in own if each["drawn"]]
+        counts = (len(own), len(held), sum(map(is_listed, held)), sum(each["listed"] > 0 for each in own))
+        rows.append((kind, *map(str, counts), f"{np.median([each['seconds'] for each in own]):.1f} s"))
+    return _table(heads, rows)
+
+
 TABLES: dict[str, tuple[str, Callable[[Sequence[Record]], list[str]]]] = {
     "published": ("Published curves by four-bars: root mean square (greatest) in %", _published),
     "curves": ("Curves beyond four-bars: root mean square (greatest) in %", _curves),
@@ -158,5 +170,6 @@ TABLES: dict[str, tuple[str, Callable[[Sequence[Record]], list[str]]]] = {
     "dwells": ("Dwells", _dwells),
     "lines": ("Straight lines: departures in % of the line's length", _lines),
     "beside": ("Beside pylinkage: greatest miss in % of the extent", _beside),
+    "families": ("Tasks that leave numbers open, beside 20,000 random draws", _families),
 }
 """Of each part its title and its table."""

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 from benchmarks.synthesis import (
     dwells,
+    family_tasks,
     four_bar_data,
     functions,
     lifting,
@@ -83,6 +84,11 @@ def _beside() -> Iterator[Measurement]:
             yield f"{name}, pylinkage", lambda name=name: pylinkage_beside.by_pylinkage(name)._asdict()
 
 
+def _families(wish: Wish) -> Iterator[Measurement]:
+    for seed in range(wish.count):
+        yield f"family {seed}", lambda seed=seed: family_tasks.measure(seed)
+
+
 PARTS: dict[str, Callable[[], Iterator[Measurement]] | None] = {
     "published": _published,
     "curves": _shapes,
@@ -92,6 +98,7 @@ PARTS: dict[str, Callable[[], Iterator[Measurement]] | None] = {
     "dwells": _dwells,
     "lines": _lines,
     "beside": _beside,
+    "families": None,
 }
 """In the order of the page; none where what is measured depends on what is wanted."""
 
@@ -99,4 +106,6 @@ PARTS: dict[str, Callable[[], Iterator[Measurement]] | None] = {
 def measurements(part: str, wish: Wish) -> Iterator[Measurement]:
     """What is measured of a part."""
     of_part = PARTS[part]
-    return _random(wish) if of_part is None else of_part()
+    if of_part is None:
+        return _families(wish) if part == "families" else _random(wish)
+    return of_part()

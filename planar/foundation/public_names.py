@@ -57,6 +57,7 @@ MODULES = {
     "ExactDesign": "synthesis.exact.complete_synthesis",
     "Extreme": "analysis.motion.output",
     "Extremes": "analysis.motion.extremes",
+    "FamilyCount": "synthesis.synthesis",
     "FileUnits": "model.file_units",
     "FixedWheel": "dynamics.reactions",
     "Flywheel": "dynamics.flywheel",

@@ -156,19 +156,13 @@ class DesignSearch:
     def _guarded(self, branch: Array, unknowns: list[Array], over_turn: bool) -> Array:
         """The unknowns at positions of a branch (steps, unknowns) all round its turn, or between entries."""
         many = 0 if self.guards is None else self.guards[over_turn].position_count
-        if over_turn:
-            turned: Array = branch[np.linspace(0, len(branch) - 1, many).astype(int)]
-            return turned
-        ends = np.concatenate([each[:, -1] for each in unknowns])
-        wanted = np.linspace(ends.min(), ends.max(), many)
-        found: Array = np.stack([np.interp(wanted, branch[:, -1], part) for part in branch.T], axis=1)
-        return found
+        return spread_positions(branch, np.concatenate([each[:, -1] for each in unknowns]), many, over_turn)
 
     def _fit_alike(self, starts: list[_FitStart], keep: int, guard: DemandGuard | None) -> FittedDesigns:
         """Designs fitted that all turn fully, or are all seen between their entries only."""
         x = np.array([each.numbers for each in starts])
         ys = [np.array(each) for each in zip(*(each.unknowns for each in starts), strict=True)]
-        zeros = self._zeros(x, ys)
+        zeros = self.first_zeros(x, ys)
         scale = self.equations[0].scale
         fit = DesignFit(self.equations, self.free.lower / scale, self.free.upper / scale, guard)
         positions = np.array([each.guarded for each in starts])
@@ -204,7 +198,7 @@ class DesignSearch:
         values: Array = each.values(x[None], candidate.unknowns[k][None])[0] * each.rows.scales
         return values
 
-    def _zeros(self, x: Array, unknowns: list[Array]) -> list[Array]:
+    def first_zeros(self, x: Array, unknowns: list[Array]) -> list[Array]:
         """The zeros of scales that fit best at first; given inputs are brought to where they are wanted."""
         found: list[Array] = []
         for k, each in enumerate(self.equations):
@@ -230,3 +224,14 @@ class DesignSearch:
             float(found.lacks[k]),
             match,
         )
+
+
+def spread_positions(branch: Array, inputs: Array, count: int, over_turn: bool) -> Array:
+    """The unknowns (count, unknowns) at positions of a branch (steps, unknowns): all round its turn, or spread evenly
+    from the least to the greatest of some inputs (n,)."""
+    if over_turn:
+        turned: Array = branch[np.linspace(0, len(branch) - 1, count).astype(int)]
+        return turned
+    spread = np.linspace(inputs.min(), inputs.max(), count)
+    positions: Array = np.stack([np.interp(spread, branch[:, -1], part) for part in branch.T], axis=1)
+    return positions

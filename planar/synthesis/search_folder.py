@@ -62,20 +62,23 @@ class SearchFolder:
             raise BadInput(str(folder), f"{_difference(known, own)}; name another folder")
         make_folder(folder / ROUNDS_FOLDER)
 
-    def read(self, start: int, number: int) -> tuple[float, list[SynthesisedDesign]] | None:
-        """The size and the designs of a start's round (both numbers from 1), None where it is not done."""
+    def read(self, start: int, number: int) -> tuple[float, list[SynthesisedDesign], list[str]] | None:
+        """The size, the designs and the remarks of a start's round (0: exact designs), None where it is not done."""
         path = self._path(start, number)
         if not path.is_file():
             return None
         try:
             record = load_value(path, "a round's file")
-            return float(record["size"]), [read_design(each) for each in record["designs"]]
+            designs = [read_design(each) for each in record["designs"]]
+            return float(record["size"]), designs, [str(each) for each in record["remarks"]]
         except DAMAGES:
             return None
 
-    def write(self, start: int, number: int, size: float, designs: Sequence[SynthesisedDesign]) -> None:
+    def write(
+        self, start: int, number: int, size: float, designs: Sequence[SynthesisedDesign], remarks: Sequence[str]
+    ) -> None:
         """Keep a round that is done."""
-        record = {"size": size, "designs": [design_record(each) for each in designs]}
+        record = {"size": size, "designs": [design_record(each) for each in designs], "remarks": [*remarks]}
         save_file(self._path(start, number), json.dumps(record, ensure_ascii=False, allow_nan=False) + "\n")
 
     def _path(self, start: int, number: int) -> Path:

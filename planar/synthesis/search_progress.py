@@ -15,7 +15,8 @@ if TYPE_CHECKING:
 class SearchProgress(NamedTuple):
     """How far a search is: at which `start`, the `start_number`-th (from 1) of `start_count` (None: not known).
 
-    `stage` is "catalogue", "matches", "fit" or "judgement" of the `round`-th catalogue of the start.
+    `stage` is "catalogue", "matches", "fit" or "judgement" of the `round`-th catalogue of the start, or "exact" (round
+    0) where exact designs are sampled.
     `best` is the least error of a sound design so far (m, or rad where functions of angles alone are wanted; infinite
     where there is none) and `best_share` the same beside the extent of the places that are wanted, where there are
     some. Of a complete list `stage` says what is done, and the rest nothing; `result` is the list where its designs
@@ -40,7 +41,7 @@ def progress_of_list(stage: str, result: CompleteSynthesis | None = None) -> Sea
 def progress_words(done: SearchProgress, task: SynthesisTask) -> str:
     """How far a search is, in a line."""
     number = f"start {done.start_number}" + (f" of {done.start_count}" if done.start_count else "")
-    where = f"{number} ({done.start}), catalogue {done.round}: {done.stage}"
+    where = f"{number} ({done.start}), " + (f"catalogue {done.round}: {done.stage}" if done.round else "exact designs")
     if done.best == float("inf"):
         return where
     share = f"{100.0 * done.best_share:.3g} % of the size"

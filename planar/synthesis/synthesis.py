@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, overload
+from typing import Any, NamedTuple, overload
 
 import numpy as np
 
@@ -55,6 +55,14 @@ class SynthesisedDesign:
         return f"<SynthesisedDesign {self.mechanism.name!r}: greatest miss {self.greatest_miss:.3g}{told}>"
 
 
+class FamilyCount(NamedTuple):
+    """`dimension` parameters of a family are open; `tried` members were tried, of which `met` keep the demands."""
+
+    dimension: int
+    tried: int
+    met: int
+
+
 @dataclass(frozen=True, eq=False)
 class Synthesis(Sequence[SynthesisedDesign]):
     """The designs that a task leads to, the best first; `rejected` are those with a defect, `remarks` say what to know.
@@ -99,15 +107,27 @@ def check_synthesis(found: Any) -> Synthesis:
     return found
 
 
-def rank_designs(designs: Sequence[SynthesisedDesign], many: int) -> tuple[SynthesisedDesign, ...]:
-    """The best so many by their error, of those alike one."""
+def rank_designs(designs: Sequence[SynthesisedDesign], many: int, exact: float = 0.0) -> tuple[SynthesisedDesign, ...]:
+    """The best so many by their error, of those alike one; of those with no more error than `exact` the ones that
+    transmit best are first."""
+
+    def order(design: SynthesisedDesign) -> tuple[bool, float, float]:
+        is_exact = design.error <= exact
+        return not np.isfinite(design.error), *((0.0, -least_transmission(design)) if is_exact else (design.error, 0.0))
+
     found: list[SynthesisedDesign] = []
-    for each in sorted(designs, key=lambda one: (not np.isfinite(one.error), one.error)):
+    for each in sorted(designs, key=order):
         if not any(_are_alike(each, other) for other in found):
             found.append(each)
         if len(found) == many:
             break
     return tuple(found)
+
+
+def least_transmission(design: SynthesisedDesign) -> float:
+    """The least transmission angle (rad) of all outputs of a design; 0 where none is known."""
+    extreme = None if design.motion is None else design.motion.least_transmission
+    return 0.0 if extreme is None else extreme.value
 
 
 def _are_alike(one: SynthesisedDesign, other: SynthesisedDesign) -> bool:

@@ -58,10 +58,12 @@ def synthesise(
     done is kept: the same call goes on where it was interrupted, or its time was up, to the same designs. `progress`
     is told what is being done.
 
+    Where a start can meet all that is wanted exactly, exact designs are sampled first, those that transmit best first.
+
     With `complete` all linkages of one start are found that meet exactly as much as it can meet, each certified where
-    python-flint is there; `many`, `seed`, `time_limit` and `folder` are not for that. For a kind of task that was never
-    solved before, a test that these are all follows: `progress` gets the list before, and a KeyboardInterrupt meanwhile
-    returns it with `is_finished` False.
+    python-flint is there; where numbers stay open, a sample of the family. `many`, `seed`, `time_limit` and `folder`
+    are not for that. For a kind of task that was never solved before, a test that these are all follows: `progress`
+    gets the list before, and a KeyboardInterrupt meanwhile returns it with `is_finished` False.
 
     Raises BadInput with the place in the task's file, for a folder that holds something else, and where no complete
     list can be made.

@@ -11,18 +11,18 @@ from typing import Any
 import numpy as np
 
 from planar import __version__
-from planar.document.dimensions import file_dimensions
-from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput, PlanarError
 from planar.model.mechanism import Mechanism
 from planar.synthesis.catalogue.catalogue import Catalogue
 from planar.synthesis.catalogue.matches import Match
 from planar.synthesis.cognates.task_cognates import task_cognates
 from planar.synthesis.design_search import Candidate, DesignSearch
+from planar.synthesis.families.family_search import DRAWS as DRAWS_OF_MEMBERS
+from planar.synthesis.families.family_search import RECOMBINATIONS, FamilySearch
+from planar.synthesis.judged_candidate import judge_candidate
 from planar.synthesis.judgement.defects import ONE_BRANCH, ORDER, REACH, WHOLE_TURN
-from planar.synthesis.judgement.judgement import DesignJudge
+from planar.synthesis.judgement.judgement import EXACT, DesignJudge
 from planar.synthesis.judgement.refusal import refusal
-from planar.synthesis.judgement.written_design import write_design
 from planar.synthesis.search_folder import SearchFolder
 from planar.synthesis.search_progress import SearchProgress
 from planar.synthesis.synthesis import Synthesis, SynthesisedDesign, rank_designs
@@ -103,12 +103,13 @@ class TaskSearch:
         search: DesignSearch | None = None
         before = len(self.sound)
         bests: list[float] = []
-        for turn in range(ROUNDS):
-            self._at = mechanism.name, number, turn + 1
-            kept = None if self.folder is None else self.folder.read(number, turn + 1)
+        for turn in range(ROUNDS + 1):
+            self._at = mechanism.name, number, turn
+            kept = None if self.folder is None else self.folder.read(number, turn)
             if kept is not None:
-                self.size, designs = kept
+                self.size, designs, remarks = kept
                 self.starts[mechanism.name] = mechanism
+                self.remarks += remarks
                 self.sound += [each for each in designs if not each.defects]
                 self.rejected += [each for each in designs if each.defects]
             elif self.is_over():
@@ -119,9 +120,13 @@ class TaskSearch:
                     return True
                 self.size = search.size
                 self.starts[mechanism.name] = mechanism
-                self._search_round(search, turn, before)
-            bests.append(self.best_error(before))
-            if self._is_settled(before, bests):
+                if turn:
+                    self._search_round(search, turn - 1, before)
+                else:
+                    self._exact_round(search)
+            if turn:
+                bests.append(self.best_error(before))
+            if self._is_settled(before, bests) if turn else len(self.sound) - before >= self.many:
                 break
         return True
 
@@ -138,6 +143,23 @@ class TaskSearch:
             return None
         return search
 
+    def _exact_round(self, search: DesignSearch) -> None:
+        """The designs that meet all exactly, where a start has numbers enough: these need no fit."""
+        first = len(self.sound), len(self.rejected), len(self.remarks)
+        if not count_freedom(self.task, search.mechanism).excess:
+            sample = FamilySearch(search, self.many, self.seed, lambda _: self._tell("exact"), self.is_over).run()
+            self.remarks.append(f"{search.mechanism.name}: {sample.sentence}")
+            self.sound += sample.designs
+            self.rejected += sample.rejected
+        if self.folder is not None and not self.is_over():
+            self._keep_round(search, 0, first)
+
+    def _keep_round(self, search: DesignSearch, turn: int, first: tuple[int, int, int]) -> None:
+        """Keep in the folder what a round has added to so many designs and remarks."""
+        assert self.folder is not None
+        designs = [*self.sound[first[0] :], *self.rejected[first[1] :]]
+        self.folder.write(self._at[1], turn, search.size, designs, self.remarks[first[2] :])
+
     def _is_settled(self, before: int, bests: list[float]) -> bool:
         """Whether no other catalogue is looked at: the best design of a start is good; or it is fair, and several fits
         led to it or catalogues since led to none that is better. `bests` are the least errors after each."""
@@ -151,15 +173,14 @@ class TaskSearch:
 
     def _search_round(self, search: DesignSearch, turn: int, before: int) -> None:
         """The designs of one more catalogue, kept when all are judged; so many were sound `before` this start."""
-        first = len(self.sound), len(self.rejected)
+        first = len(self.sound), len(self.rejected), len(self.remarks)
         self._tell("catalogue")
         catalogue = search.catalogue(DRAWS, self.seed + 1000 * turn)
         self._tell("matches")
         matches = search.matches(catalogue, MATCHES)
         self._fit_round(search, catalogue, matches, before, turn)
         if self.folder is not None:
-            designs = [*self.sound[first[0] :], *self.rejected[first[1] :]]
-            self.folder.write(self._at[1], turn + 1, search.size, designs)
+            self._keep_round(search, turn + 1, first)
 
     def _fit_round(
         self, search: DesignSearch, catalogue: Catalogue, matches: list[Match], before: int, turn: int
@@ -176,7 +197,7 @@ class TaskSearch:
                 values = tuple(search.shown(k, each) for k in range(len(search.equations)))
                 if judge.fit_error(values) > self._worst_wanted(before):
                     continue
-                design = self._judge(search, judge, each, values)
+                design = self._judge(search, judge, each)
                 if design is not None:
                     found.append((each, {one.demand for one in design.shortages}))
                 if len(self.sound) - before >= most:
@@ -205,33 +226,19 @@ class TaskSearch:
     def _worst_wanted(self, before: int) -> float:
         """The error beyond which a design does not come among the best of its start, before which so many were sound;
         a judged one is never less than that of its fit."""
-        best = rank_designs(self.sound[before:], self.many)
+        best = self._ranked(self.sound[before:])
         return best[-1].error if len(best) == self.many else float("inf")
 
-    def _judge(
-        self, search: DesignSearch, judge: DesignJudge, candidate: Candidate, values: Sequence[Array]
-    ) -> SynthesisedDesign | None:
-        """A candidate with the results `values` judged; None where no file could say it."""
-        design = search.equations[0].design
-        number = len(self.sound) + len(self.rejected) + 1
-        name = f"{self.task.name}: {search.mechanism.name} {number}"
-        inputs = [y[:, -1] * each.input_scale for each, y in zip(search.equations, candidate.unknowns, strict=True)]
-        y = search.most_regular(candidate)
-        try:
-            input_position = float(y[-1] * search.equations[0].input_scale)
-            mechanism = write_design(design, candidate.numbers, y, input_position, name)
-        except BadInput:
-            return None
-        found = judge.judge(mechanism, inputs, values)
-        every = np.concatenate(found.misses)
-        error, worst = float(np.sqrt(np.mean(every**2))), float(every.max())
-        written = file_dimensions(mechanism)
-        numbers = {each: float(written[each].value) for each in candidate.numbers}
-        told = SynthesisedDesign(
-            mechanism, error, worst, found.misses, found.inputs, found.defects, search.mechanism.name, numbers
-        )
-        (self.rejected if found.defects else self.sound).append(told)
-        return told
+    def _judge(self, search: DesignSearch, judge: DesignJudge, candidate: Candidate) -> SynthesisedDesign | None:
+        """A candidate judged; None where no file can describe it."""
+        design = judge_candidate(search, judge, candidate, len(self.sound) + len(self.rejected) + 1)
+        if design is not None:
+            (self.rejected if design.defects else self.sound).append(design)
+        return design
+
+    def _ranked(self, designs: Sequence[SynthesisedDesign]) -> tuple[SynthesisedDesign, ...]:
+        """The best designs; round-off of what is exact does not count."""
+        return rank_designs(designs, self.many, EXACT * (self.size if self.task.wants_places else 1.0))
 
     def _freedom(self, start: str) -> str:
         """What of the task a start can meet exactly."""
@@ -242,8 +249,8 @@ class TaskSearch:
         remarks = [*self.remarks]
         if not self.is_finished:
             remarks.append(self._unfinished())
-        sound = tuple(map(self._complete, rank_designs(self.sound, self.many)))
-        rejected = rank_designs(self.rejected, self.many)
+        sound = tuple(map(self._complete, self._ranked(self.sound)))
+        rejected = self._ranked(self.rejected)
         remarks += [self._freedom(each.start) for each in (sound or rejected)[:1]]
         if not sound and (self.rejected or self.is_finished):
             remarks.append(refusal([each.shortages for each in self.rejected], self.task.units))
@@ -256,7 +263,8 @@ class TaskSearch:
     def _unfinished(self) -> str:
         """How far a search came that did not search every start."""
         start, number, turn = self._at
-        where = f"start {number}{f' of {self.count}' if self.count else ''} ({start}), catalogue {turn} of {ROUNDS}"
+        stage = f"catalogue {turn} of {ROUNDS}" if turn else "exact designs"
+        where = f"start {number}{f' of {self.count}' if self.count else ''} ({start}), {stage}"
         why = f"the time limit of {self.time_limit:g} s was up" if self.is_over() else "the search was interrupted"
         return f"{why} at {where}: what is told was found till then"
 
@@ -276,5 +284,6 @@ def _plan(many: int, seed: int) -> dict[str, Any]:
         "settled": SETTLED,
         "same": SAME,
     }
+    settings |= {"exact": [DRAWS_OF_MEMBERS, RECOMBINATIONS]}
     settings |= {"spare": ALIKE_SPARE, "kept": KEPT_SHARE}
     return {"version": __version__, "many": many, "seed": seed, "settings": settings}

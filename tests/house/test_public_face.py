@@ -140,7 +140,8 @@ def results():
     function = {"from": "A", "to": "D", "pairs": pairs}
     listed = planar.synthesise({"planar": 1, "start": "four-bar", "wanted": [function]}, complete=True)
     points = np.zeros((2, 1, 2))
-    yield from (listed, listed[0], planar.DyadCurve("A", "B", 1, *points, np.zeros(0), np.zeros((3, 3, 3))))
+    yield from (listed, listed[0], planar.FamilyCount(2, 9, 3))
+    yield planar.DyadCurve("A", "B", 1, *points, np.zeros(0), np.zeros((3, 3, 3)))
     turned = {"from": "A", "to": "D", "pairs": [["0 deg", "0 deg"], ["20 deg", "31 deg"]]}
     posed = {"link": "BC", "poses": [{"at": ["0 mm", "1 mm"], "angle": "90 deg"}]}
     yield from planar.read_task({"planar": 1, "start": "four-bar", "wanted": [turned, posed]}).wanted

@@ -35,8 +35,9 @@ def draw_designs(
     `count` of them."""
     lower, upper = free.lower / equations.scale, free.upper / equations.scale
     start = free.values / equations.scale
-    x = _draw_numbers(equations, free, count, random)
-    y = _draw_places(equations, count, random)
+    unit = equations.design.solver.unit / equations.unit
+    x = draw_numbers(equations, free, count, random, unit)
+    y = draw_places(equations, count, random, 1.0)
     near = random.random(count) < NEAR_SHARE
     x[near] = start * (1.0 + NEAR_SPREAD * random.normal(size=(int(near.sum()), len(start))))
     x = np.clip(x, lower, upper)
@@ -60,10 +61,12 @@ def is_positive(free: FreeNumbers) -> BoolArray:
     )
 
 
-def _draw_numbers(equations: WantedEquations, free: FreeNumbers, count: int, random: np.random.Generator) -> Array:
+def draw_numbers(
+    equations: WantedEquations, free: FreeNumbers, count: int, random: np.random.Generator, unit: float
+) -> Array:
+    """Random free numbers (designs, free), scaled, of designs of about the size `unit`."""
     lower, upper = free.lower / equations.scale, free.upper / equations.scale
     start = free.values / equations.scale
-    unit = equations.design.solver.unit / equations.unit
     found = np.empty((count, len(free.names)))
     for k, (positive, kind) in enumerate(zip(is_positive(free), free.kinds, strict=True)):
         if np.isfinite(lower[k]) and np.isfinite(upper[k]):
@@ -81,15 +84,15 @@ def _draw_numbers(equations: WantedEquations, free: FreeNumbers, count: int, ran
     return found
 
 
-def _draw_places(equations: WantedEquations, count: int, random: np.random.Generator) -> Array:
-    """Unknowns and the running input (designs, unknowns)."""
+def draw_places(equations: WantedEquations, count: int, random: np.random.Generator, unit: float) -> Array:
+    """Random unknowns and inputs (designs, unknowns) of designs of about the size `unit`."""
     design = equations.design
     kinds = [design.equations.coordinates[k].kind for k in design.equations.unknowns]
     kinds.append(design.equations.input_kinds[0])
     found = np.empty((count, len(kinds)))
     for k, kind in enumerate(kinds):
         if kind is MeasureKind.LENGTH:
-            found[:, k] = random.uniform(-1.2, 1.2, count)
+            found[:, k] = unit * random.uniform(-1.2, 1.2, count)
         else:
             found[:, k] = random.uniform(-pi, pi, count)
     return found

@@ -8,7 +8,7 @@ import numpy as np
 
 from planar.foundation.arrays import Array
 from planar.model.wording import count_phrase
-from planar.synthesis.synthesis import Synthesis, SynthesisedDesign
+from planar.synthesis.synthesis import FamilyCount, Synthesis, SynthesisedDesign
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,13 +85,14 @@ class DyadCurve:
 
 @dataclass(frozen=True, eq=False)
 class CompleteSynthesis(Synthesis):
-    """All real linkages that meet a task, the sound ones first; `len` counts them, each cognate on its own.
+    """All real linkages that meet a task, the sound ones first; `len` counts them, each cognate on its own. Where
+    numbers stay open there is a `family` of them: `designs` are a sample, the best transmission angle first.
 
     `expected`: how many complex solutions a random task of this kind has, of the class that `counted` says; None where
-    there are curves of them. `complete`: "complete" where it is proved that there are no others, "numerically complete"
-    where all paths came to an end and a trace test says that these are all, else how far it is. `found`: how many of
-    those expected there are. `curves`: families of solutions with a parameter. `seed` and `is_finished` are as of a
-    search: a list is made whole, without chance.
+    there is a family of them. `complete`: "complete" where it is proved that there are no others, "numerically
+    complete" where all paths came to an end and a trace test says that these are all, else how far it is. `found`: how
+    many of those expected there are. `curves`: dyads with a parameter. `seed` and `is_finished` are as of a search: a
+    list is made whole, without chance.
     """
 
     expected: int | None = None
@@ -99,6 +100,7 @@ class CompleteSynthesis(Synthesis):
     complete: str = ""
     counted: str = ""
     curves: tuple[DyadCurve, ...] = ()
+    family: FamilyCount | None = None
 
     @property
     def summary(self) -> tuple[str, ...]:

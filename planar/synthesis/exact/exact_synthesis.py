@@ -13,6 +13,7 @@ from planar.foundation.arrays import ComplexArray
 from planar.foundation.errors import BadInput
 from planar.model.mechanism import Mechanism
 from planar.model.wording import count_phrase
+from planar.synthesis.design_search import DesignSearch
 from planar.synthesis.exact.complete_synthesis import CompleteSynthesis, DyadCurve, ExactDesign
 from planar.synthesis.exact.component_solutions import (
     FAR,
@@ -29,9 +30,12 @@ from planar.synthesis.exact.relations.exact_problem import Component, ExactProbl
 from planar.synthesis.exact.tracking.member_homotopy import affine_solutions, homogeneous_solutions
 from planar.synthesis.exact.tracking.member_solutions import Progress
 from planar.synthesis.exact.tracking.symmetry import reordered
+from planar.synthesis.families.family_search import FamilySearch
 from planar.synthesis.judgement.defects import Defect
 from planar.synthesis.judgement.file_check import check_file
 from planar.synthesis.judgement.judgement import DesignJudge, Judgement
+from planar.synthesis.judgement.refusal import refusal
+from planar.synthesis.task.freedom import has_open_numbers
 from planar.synthesis.task.starts import start_mechanisms
 from planar.synthesis.task.synthesis_task import (
     ChainStart,
@@ -39,7 +43,8 @@ from planar.synthesis.task.synthesis_task import (
     WantedPoses,
 )
 
-FAMILY = "a family of linkages with parameters; its dyads stand in curves"
+FAMILY_DESIGNS = 24
+"""Designs that are listed of a family."""
 
 
 def synthesise_all(
@@ -53,12 +58,12 @@ def synthesise_all(
     meanwhile leaves it as it is.
     """
     mechanism = _single_start(task)
+    say = progress or (lambda _: None)
+    if has_open_numbers(task, mechanism):
+        return _sampled_family(task, mechanism, say)
     problem = ExactProblem(task, mechanism)
     _check_freedom(problem)
-    say = progress or (lambda _: None)
-    solved = solve_components([each for each in problem.components if each.freedom == 0], say)
-    if any(each.freedom for each in problem.components):
-        return _with_curves(problem, solved)
+    solved = solve_components(problem.components, say)
     result = _complete_list(problem, solved, say)
     if all(each.record.is_tested for each in solved):
         return result
@@ -116,9 +121,7 @@ def _check_freedom(problem: ExactProblem) -> None:
     told = ", ".join(each.sentence for each in unbalanced)
     if any(each.excess for each in unbalanced):
         raise BadInput("$.wanted", f"what is wanted cannot be met exactly with the numbers that are free: {told}")
-    left = [each for each in problem.components if each.freedom > 0]
-    is_for_poses = len(problem.items) == 1 and isinstance(problem.items[0], WantedPoses)
-    if unbalanced and not (is_for_poses and left and all(is_dyad(problem, each) for each in left)):
+    if unbalanced:
         raise BadInput(
             "$.wanted",
             f"there is no list, as numbers stay open: {told} than what is wanted determines; "
@@ -223,20 +226,41 @@ def _special(curves: Sequence[DyadCurve], solved: Sequence[ComponentSolutions]) 
         yield "the poses are special: a dyad that others leave one of has none, or more"
 
 
-def _with_curves(problem: ExactProblem, solved: Sequence[ComponentSolutions]) -> CompleteSynthesis:
-    curves: list[DyadCurve] = [dyad_curve(problem, each) for each in problem.components if each.freedom > 0]
+def _sampled_family(task: SynthesisTask, mechanism: Mechanism, say: Progress) -> CompleteSynthesis:
+    """A sample of the linkages of a task that leaves numbers open, and the curves of dyads where poses leave them."""
+    search = DesignSearch(task, mechanism)
+    sample = FamilySearch(search, FAMILY_DESIGNS, 0, say).run()
+    curves, special = _dyad_curves(task, mechanism, say)
+    remarks = () if sample.designs else (refusal([each.shortages for each in sample.rejected], task.units),)
+    return CompleteSynthesis(
+        task,
+        sample.designs,
+        sample.rejected,
+        search.size,
+        remarks,
+        expected=None,
+        complete="; ".join([sample.sentence, *["dyads that do it stand in curves"] * bool(curves), *special]),
+        counted="",
+        curves=curves,
+        family=sample.count,
+    )
+
+
+def _dyad_curves(
+    task: SynthesisTask, mechanism: Mechanism, say: Progress
+) -> tuple[tuple[DyadCurve, ...], tuple[str, ...]]:
+    """The curves of the dyads that poses leave, and where these are special; none of other structures."""
+    if len(task.wanted) > 1 or not isinstance(task.wanted[0], WantedPoses):
+        return (), ()
+    try:
+        problem = ExactProblem(task, mechanism)
+    except BadInput:
+        return (), ()
+    open_parts = [each for each in problem.components if each.freedom > 0]
+    if not all(is_dyad(problem, each) for each in open_parts):
+        return (), ()
+    solved = solve_components([each for each in problem.components if each.freedom == 0], say)
+    curves = [dyad_curve(problem, each) for each in open_parts]
     for each in solved:
         curves += [dyad_curve(problem, each.component, x) for x in each.x]
-    return CompleteSynthesis(
-        problem.task,
-        (),
-        (),
-        problem.size,
-        (),
-        expected=None,
-        complete="; ".join(
-            ["a family of linkages with parameters; its dyads stand in curves", *_special(curves, solved)]
-        ),
-        counted="",
-        curves=tuple(curves),
-    )
+    return tuple(curves), tuple(_special(curves, solved))

@@ -34,7 +34,7 @@ def demand_guards(
     demands, mechanism = task.demands, equations.design.mechanism
     kept: list[tuple[AdjointRows | RegionRows, float]] = []
     if demands.transmission is not None:
-        kept.append((_output_rows(equations, free), demands.transmission))
+        kept.append((output_rows(equations, free), demands.transmission))
     if demands.inside is not None:
         kept.append((RegionRows(mechanism, demands.inside, size, equations.free, equations.scale), 0.0))
     turns_only = not kept
@@ -51,7 +51,8 @@ def demand_guards(
     return {over_turn: DemandGuard(guarded, *told, not over_turn, turns_only) for over_turn in (True, False)}
 
 
-def _output_rows(equations: WantedEquations, free: FreeNumbers) -> AdjointRows:
+def output_rows(equations: WantedEquations, free: FreeNumbers) -> AdjointRows:
+    """The transmission angles (rad) of the outputs that one force drives."""
     mechanism = equations.design.mechanism
     try:
         motion = cycle(generic_start(mechanism, free), SAMPLES, pair=mechanism.inputs[0].pair)

@@ -89,13 +89,17 @@ def predicted_residuals(equations: WantedEquations, line: LinearRows, change: Ar
 
 
 def exact_rows(
-    equations: Sequence[WantedEquations], lines: Sequence[LinearRows], numbers: GlobalNumbers
+    equations: Sequence[WantedEquations],
+    lines: Sequence[LinearRows],
+    numbers: GlobalNumbers,
+    every_item: bool = False,
 ) -> tuple[Array, Array]:
-    """Rows (designs, k) and slopes (designs, k, globals) of what is to be met exactly, without their part along."""
+    """Rows (designs, k) and slopes (designs, k, globals) of what is to be met exactly, or of every item, without their
+    part along."""
     many = len(lines[0].residual)
     rows, slopes = [np.zeros((many, 0))], [np.zeros((many, 0, numbers.size))]
     for k, (each, line) in enumerate(zip(equations, lines, strict=True)):
-        if each.rows.wanted.tolerance != 0.0:
+        if each.rows.wanted.tolerance != 0.0 and not every_item:
             continue
         both = np.concatenate([line.residual[..., None], line.slopes], axis=-1)
         if not each.is_timed:

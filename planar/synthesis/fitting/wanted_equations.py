@@ -123,6 +123,11 @@ class WantedEquations:
         F, F_y, F_x, *_ = self._at(self.whole, x, y)
         return F, F_y, F_x
 
+    def slopes_at(self, x: Array, y: Array) -> tuple[tuple[Array, Array, bool], ...]:
+        """The Jacobians of the equations, then of the result (True), in each entry's unknowns and in the numbers."""
+        _, F_y, F_x, _, r_y, r_x = self._at(self.whole, x, y)
+        return (F_y, F_x, False), (r_y, r_x, True)
+
     def values(self, x: Array, y: Array) -> Array:
         """The result (designs, n, parts), in units of its scales; NaN where unknowns are."""
         many, entries, _ = y.shape
@@ -167,9 +172,10 @@ class WantedEquations:
     def residuals(self, x: Array, y: Array, zeros: Array) -> Array:
         """The rows (designs, n, parts) without derivatives."""
         _, _, _, r, _, _ = self._at(self.whole, x, y)
-        return (r - self._wanted(zeros)) * self.rows.weights[:, None]
+        return (r - self.wanted_values(zeros)) * self.rows.weights[:, None]
 
-    def _wanted(self, zeros: Array) -> Array:
+    def wanted_values(self, zeros: Array) -> Array:
+        """The results that are wanted (designs, n, parts), by the zeros of scales (designs, zeros)."""
         target = np.broadcast_to(self.target, (len(zeros), *self.target.shape))
         if not self.rows.value_is_free:
             return target
@@ -180,7 +186,7 @@ class WantedEquations:
         """The rows to the first order, at free numbers x (designs, free), unknowns y and zeros of scales."""
         F, F_y, F_x, r, r_y, r_x = self._at(self.whole, x, y)
         weights = self.rows.weights[:, None]
-        residual = (r - self._wanted(zeros)) * weights
+        residual = (r - self.wanted_values(zeros)) * weights
         r_y, r_x = r_y * weights[..., None], r_x * weights[..., None]
         K = self._bordered(F_y, tangent)
         many, entries, closures = F.shape

@@ -17,9 +17,10 @@ from planar.derivatives.design_equations import design_equations
 from planar.derivatives.implicit_system import ImplicitSystem, Level
 from planar.document.revised.changed_numbers import with_values
 from planar.foundation.arrays import Array
-from planar.foundation.errors import PlanarError
+from planar.foundation.errors import BadInput, NoAnswer, PlanarError
 from planar.model.mechanism import Mechanism
 from planar.model.wording import count_phrase
+from planar.results.motion import Motion
 from planar.solving.cycle import cycle
 from planar.synthesis.task.starts import FreeNumbers, free_numbers
 from planar.synthesis.task.synthesis_task import SynthesisTask, Wanted, WantedFunction, WantedPath
@@ -133,6 +134,15 @@ def number_slopes(task: SynthesisTask, mechanism: Mechanism, free: FreeNumbers) 
     return _stack(_result_rows(moving_start(mechanism, free), task.wanted, free))
 
 
+def has_open_numbers(task: SynthesisTask, mechanism: Mechanism) -> bool:
+    """Whether a start can meet all that is wanted exactly with numbers to spare; no where it cannot move."""
+    try:
+        count = count_freedom(task, mechanism)
+    except NoAnswer:
+        return False
+    return not count.excess and count.free > count.met
+
+
 def exactness_in_excess(task: SynthesisTask, mechanism: Mechanism) -> str | None:
     """What forbids that a start meets all that is to be met exactly, in words; None where nothing does."""
     if not task.exact:
@@ -186,7 +196,7 @@ def _stack(items: Sequence[_ResultRows]) -> Array:
 def _result_rows(mechanism: Mechanism, wanted: Sequence[Wanted], free: FreeNumbers) -> list[_ResultRows]:
     """What is wanted over the motion of a mechanism, where it is determined, with its derivatives."""
     design = design_equations(mechanism)
-    motion = cycle(mechanism, max(LEAST_POSITIONS, 2 * len(free.names)), pair=mechanism.inputs[0].pair)
+    motion = _motion(mechanism, max(LEAST_POSITIONS, 2 * len(free.names)))
     z, t = design.coordinates_at(motion)
     results = [wanted_expression(design, each) for each in wanted]
     system = ImplicitSystem([Level(design.z, design.F)], design.t)
@@ -211,6 +221,17 @@ def _result_rows(mechanism: Mechanism, wanted: Sequence[Wanted], free: FreeNumbe
         )
         for each, first, last in zip(wanted, ends[:-1], ends[1:], strict=True)
     ]
+
+
+def _motion(mechanism: Mechanism, steps: int) -> Motion:
+    """The motion through the range of the input; of a slide without an end so far as the mechanism is large, both ways.
+    Raises NoAnswer where it cannot move."""
+    running = mechanism.inputs[0]
+    try:
+        return cycle(mechanism, steps, pair=running.pair)
+    except BadInput:
+        room, start = design_equations(mechanism).solver.unit, float(running.position)
+        return cycle(mechanism, steps, start - room, start + room, running.pair)
 
 
 def _is_length(mechanism: Mechanism, wanted: Wanted, part: int) -> bool:
@@ -253,7 +274,7 @@ def generic_start(mechanism: Mechanism, free: FreeNumbers) -> Mechanism:
     values = np.clip(free.values + GENERIC_CHANGE * way * scale, free.lower, free.upper)
     try:
         changed = with_values(mechanism, dict(zip(free.names, values.tolist(), strict=True)))
-        cycle(changed, LEAST_POSITIONS, pair=mechanism.inputs[0].pair)
+        _motion(changed, LEAST_POSITIONS)
     except PlanarError:
         return mechanism
     return changed

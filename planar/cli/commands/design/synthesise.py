@@ -142,14 +142,14 @@ def _ended_by_signal() -> Iterator[None]:
 
 
 def _write_sheets(found: Synthesis, output: Path) -> None:
-    """Drawings of the designs, else of the curves of dyads that poses leave."""
+    """Drawings of the curves of dyads that poses leave, else of the designs."""
     from planar import plot
     from planar.drawing.diagrams.dyad_drawing import drawn_curves
     from planar.synthesis.exact.complete_synthesis import CompleteSynthesis
 
-    if len(found):
-        plot.save(plot.designs(found), output)
-    elif isinstance(found, CompleteSynthesis) and drawn_curves(found):
+    if isinstance(found, CompleteSynthesis) and drawn_curves(found):
         plot.save(plot.dyad_curves(found), output)
+    elif len(found):
+        plot.save(plot.designs(found), output)
     else:
         click.echo(f"planar: nothing was found that could be drawn; {output} is not written", err=True)

@@ -82,7 +82,10 @@ def _dimensions_text(found: Synthesis, design: SynthesisedDesign) -> str:
 def _complete_parts(found: CompleteSynthesis, files: Sequence[Path]) -> Iterator[RenderableType]:
     """How many there are and how many were to be expected, all real ones with their defects, and curves of them."""
     yield from map(Text, found.summary)
-    if len(found):
+    if found.family is not None and len(found):
+        yield Text()
+        yield _designs_table(found, files)
+    elif len(found):
         yield Text()
         file_heading = ("file",) if files else ()
         rows = plain_table("Designs", "no.", "proved", "greatest miss", "defects", *file_heading, left=(3, 4), keys=1)
@@ -91,6 +94,7 @@ def _complete_parts(found: CompleteSynthesis, files: Sequence[Path]) -> Iterator
             defects = "; ".join(design.defects) or "none"
             rows.add_row(str(number), proved, _misses(found, design)[0], defects, *_file_cells(files, number))
         yield rows
+    if len(found):
         yield Text("Dimensions")
         yield paragraphs((str(number), _dimensions_text(found, design)) for number, design in enumerate(found, start=1))
     if found.curves:
@@ -181,6 +185,7 @@ def _complete_record(found: CompleteSynthesis) -> dict[str, Any]:
         "found": found.found,
         "complete": found.complete,
         "counted": found.counted,
+        "family": None if found.family is None else found.family._asdict(),
         "curves": [
             {
                 "pivot": each.pivot,
