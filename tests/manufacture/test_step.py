@@ -59,7 +59,9 @@ def test_names_of_plates_cannot_end_a_text():
 
 
 @pytest.mark.parametrize(
-    "model", [PINION_AND_WHEEL if stem == "gear-reducer" and not is_exhaustive() else stem for stem in MODELS], ids=MODELS
+    "model",
+    [PINION_AND_WHEEL if stem == "gear-reducer" and not is_exhaustive() else stem for stem in MODELS],
+    ids=MODELS,
 )
 def test_a_library_of_solids_finds_them_valid_and_as_heavy(model, tmp_path):
     """Only where the bindings of Open CASCADE are installed, of which nothing else here has need."""
