@@ -10,7 +10,7 @@ from tempfile import TemporaryDirectory
 
 import pytest
 
-from tests.draws import load_profile
+from tests.draws import EXHAUSTIVE_OPTION, EXHAUSTIVE_VARIABLE, load_profile
 
 for _limit in ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS"):
     os.environ.setdefault(_limit, "1")  # matrices are small, and on a busy machine threads wait for one another
@@ -24,6 +24,17 @@ os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 sys.dont_write_bytecode = False
 
 load_profile()
+
+
+def pytest_addoption(parser):
+    """The option for all cases of tests of which a plain run takes some."""
+    parser.addoption(EXHAUSTIVE_OPTION, action="store_true", help="run every case, not only one of each kind")
+
+
+def pytest_configure(config):
+    """Modules of tests choose their cases when they are imported, in every worker."""
+    if config.getoption(EXHAUSTIVE_OPTION):
+        os.environ[EXHAUSTIVE_VARIABLE] = "1"
 
 
 MISSING_PROGRAM = re.compile(r"could not import '([\w.]+)'|needs ([\w.]+)")

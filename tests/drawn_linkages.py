@@ -407,3 +407,13 @@ LINKAGES = {
     "cam": (draw_cam, CAM),
     "slot": (draw_slot, SLOT),
 }
+
+
+def drawn_kinds(name: str) -> set[object]:
+    """What is drawn of a linkage: its kinds of pairs with their keys and what they are on, inputs, plates, slopes."""
+    _, written = LINKAGES[name]
+    pairs, links = written["pairs"], written["links"].values()
+    keys = {(*sorted({*pair} - {"radii"}), "frame" in (pair.get("on"), *pair.get("links", ()))) for pair in pairs}
+    sloped = [pair for pair in pairs if pair.get("line", {}).get("angle", 0) % 90]
+    plates = [link for link in links if any("distances" in place for place in link.get("points", {}).values())]
+    return {*keys, len(written["inputs"]), *(["slope"] if sloped else []), *(["plate"] if plates else [])}

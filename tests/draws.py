@@ -1,11 +1,12 @@
 """How much of a law is tried: few examples and always the same, or, where one searches, many new ones of all models."""
 
 import os
-from collections.abc import Iterable
-from typing import Any
+from collections.abc import Callable, Hashable, Iterable
+from typing import Any, TypeVar
 
 from hypothesis import settings
 
+T = TypeVar("T")
 SEARCH = os.environ.get("PLANAR_TESTS") == "search"
 TIMES = 10
 """As many more where one searches."""
@@ -14,6 +15,16 @@ SHARE = 0.1
 
 settings.register_profile("repeatable", derandomize=True, deadline=None, max_examples=10)
 settings.register_profile("search", deadline=None, max_examples=100 * TIMES)
+
+
+EXHAUSTIVE_OPTION = "--exhaustive"
+EXHAUSTIVE_VARIABLE = "PLANAR_TESTS_EXHAUSTIVE"
+"""Says so to the workers of a run, which import the tests as well."""
+
+
+def is_exhaustive() -> bool:
+    """Whether all cases of every test run, not only those that show each kind once."""
+    return SEARCH or EXHAUSTIVE_VARIABLE in os.environ
 
 
 def load_profile() -> None:
@@ -27,6 +38,20 @@ def draws(number: int) -> int:
 
 
 def part(of: Iterable[Any], one_in: int, first: int = 0) -> list[Any]:
-    """About one in so many of what a law goes through, from the first on; all of them where one searches."""
+    """About one in so many of what a law goes through, from the first on; all of them in an exhaustive run."""
     every = list(of)
-    return every if SEARCH else every[first :: max(one_in, round(one_in / SHARE))]
+    return every if is_exhaustive() else every[first :: max(one_in, round(one_in / SHARE))]
+
+
+def covering(cases: Iterable[T], kinds_of: Callable[[T], Iterable[Hashable]]) -> list[T]:
+    """The first cases that together show every kind that any case shows; all cases in an exhaustive run."""
+    every = list(cases)
+    if is_exhaustive():
+        return every
+    remaining = {kind for case in every for kind in kinds_of(case)}
+    chosen = []
+    while remaining:
+        best = max(range(len(every)), key=lambda index: len(remaining & set(kinds_of(every[index]))))
+        chosen.append(best)
+        remaining -= set(kinds_of(every[best]))
+    return [every[index] for index in sorted(chosen)]

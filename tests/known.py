@@ -39,6 +39,14 @@ def some_models(one_in: int, first: int = 0) -> list[str]:
     return chosen
 
 
+def kinds_of_model(stem: str) -> set[object]:
+    """Its types of pairs, of loads, springs and masses, of pieces of laws, and the units of its file."""
+    mechanism = MODELS[stem]
+    parts = (*mechanism.pairs, *mechanism.loads, *mechanism.springs, *mechanism.masses)
+    laws = {type(piece) for given in mechanism.inputs if given.law for piece in given.law.segments}
+    return {*map(type, parts), *laws, mechanism.units}
+
+
 def state_turned_by(model: str, pair: str, degrees: float):
     """A model at its own inputs, one of them farther by so much."""
     mechanism = MODELS[model]

@@ -71,7 +71,7 @@ class FullConstraints:
 
     def relative_jacobian(self, names: tuple[str, ...], w: Array) -> Array:
         """(names, coordinates)"""
-        return _derivatives(self._relative_positions(names, _complex_steps(w)), w.size)[1]
+        return _derivatives(self._relative_positions(names, _complex_steps(w)), w.shape)[1]
 
     def _relative_positions(self, names: tuple[str, ...], w: Array) -> list[Array]:
         frames, own = self._frames_and_own(w)
@@ -83,44 +83,55 @@ class FullConstraints:
         frames, _ = self._frames_and_own(_complex_steps(w))
         shapes, scale = self.setup.shapes, 1.0 / self.setup.unit
         places = [frames[link].to_world(shapes[link].points[point] * scale) for link, point in members]
-        return _derivatives([part for place in places for part in place], w.size)
+        return _derivatives([part for place in places for part in place], w.shape)
 
     def _frames_and_own(self, w: Array | Sequence[Scalar]) -> tuple[dict[str, Frame], dict[str, tuple[Scalar, ...]]]:
         return frames_from_coordinates(w, self.setup.column, self.setup.shapes, self.setup.pairs)
 
     def correct(self, w: Array, held: tuple[str, ...] = (), positions: Array | None = None) -> Array | None:
         """The nearest closed position by Gauss and Newton's method, some drives held; None where there is none."""
-        wanted = np.zeros(len(held)) if positions is None else positions
+        return self.correct_all(w[None], held, positions)[0]
 
-        def here(starts: Array) -> tuple[Array, Array]:
-            left, slope = zip(*(self._residuals_and_jacobian(each, held, wanted) for each in starts), strict=True)
-            return np.array(left), np.array(slope)
-
-        found = damped_newton(here, w[None], CLOSED_TOLERANCE, NEAR_DAMPING)
-        return found.unknowns[0] if found.converged[0] else None
+    def correct_all(
+        self, starts: Array, held: tuple[str, ...] = (), positions: Array | None = None
+    ) -> list[Array | None]:
+        """The same from several starts (starts, coordinates) at once."""
+        targets = np.zeros(len(held)) if positions is None else positions
+        result = damped_newton(
+            lambda w: self._residuals_and_jacobian(w, held, targets), starts, CLOSED_TOLERANCE, NEAR_DAMPING
+        )
+        return [w if converged else None for w, converged in zip(result.unknowns, result.converged, strict=True)]
 
     def _residuals_and_jacobian(self, w: Array, held: tuple[str, ...], positions: Array) -> tuple[Array, Array]:
-        """Residuals (rows,) and Jacobian (rows, coordinates) of the pairs, then of relative motions that are held."""
+        """Residuals (..., rows) and Jacobian (..., rows, coordinates) of the pairs, then of relative motions that are
+        held, at positions w (..., coordinates)."""
         frames, own = self._frames_and_own(_complex_steps(w))
         motions = [self.setup.relative_motions[name] for name in held]
         rows = list(pair_residuals(self.pairs, frames, self._numbers, own))
         reached = input_positions(motions, frames, self._numbers, own)
-        values, jacobian = _derivatives([*(value for _, value in rows), *reached], w.size)
+        values, jacobian = _derivatives([*(value for _, value in rows), *reached], w.shape)
         pairs = [wrapped_residual(value, row.kind) for (row, _), value in zip(rows, values, strict=False)]
-        return np.concatenate([pairs, values[len(rows) :] - positions]), jacobian
+        drives = [value - position for value, position in zip(values[len(rows) :], positions, strict=True)]
+        residuals = np.array([*pairs, *drives]).reshape(values.shape)
+        return np.moveaxis(residuals, 0, -1), np.moveaxis(jacobian, 0, -2)
 
 
 def _complex_steps(w: Array) -> Array:
-    """w with a step in one coordinate in each column (coordinates, coordinates)."""
-    return w[:, None] + 1j * COMPLEX_STEP * np.eye(w.size)
+    """Each coordinate of w (..., coordinates) with a step in one coordinate after the other: (coordinates, all)."""
+    stepped: Array = w[..., None] + 1j * COMPLEX_STEP * np.eye(w.shape[-1])
+    return np.moveaxis(stepped, -2, 0).reshape(w.shape[-1], w.size)
 
 
-def _derivatives(values: Sequence[Array], columns: int) -> tuple[Array, Array]:
-    """Values (rows,) and their derivatives (rows, columns), of what complex steps have made of them."""
-    stepped = np.empty((len(values), columns), dtype=complex)
+def _derivatives(values: Sequence[Array], shape: tuple[int, ...]) -> tuple[Array, Array]:
+    """Values (rows, ...) and their derivatives (rows, ..., coordinates), of what complex steps of w made of them.
+
+    `shape` is that of w (..., coordinates).
+    """
+    stepped = np.empty((len(values), int(np.prod(shape))), dtype=complex)
     for row, value in zip(stepped, values, strict=True):
         row[:] = value
-    return stepped[:, :1].real.sum(axis=1), stepped.imag / COMPLEX_STEP
+    stepped = stepped.reshape(len(values), *shape)
+    return stepped[..., :1].real.sum(axis=-1), stepped.imag / COMPLEX_STEP
 
 
 def random_step(free: Array, rng: np.random.Generator, length: float) -> Array:
@@ -165,12 +176,11 @@ def motion_dimension(constraints: FullConstraints, w: Array) -> tuple[int, Array
 
 def _spread_dimension(constraints: FullConstraints, w: Array, free: Array, rng: np.random.Generator) -> int:
     """In how many directions the closed positions next to one spread, of those that are `free` to first order."""
-    many = 2 * free.shape[1] + 2
-    moves = []
-    for _ in range(many if free.size else 0):
-        beside = constraints.correct(w + random_step(free, rng, NEIGHBOUR_DISTANCE))
-        if beside is not None:
-            moves.append((beside - w) / NEIGHBOUR_DISTANCE)
+    count = 2 * free.shape[1] + 2 if free.size else 0
+    if not count:
+        return 0
+    starts = np.array([w + random_step(free, rng, NEIGHBOUR_DISTANCE) for _ in range(count)])
+    moves = [(place - w) / NEIGHBOUR_DISTANCE for place in constraints.correct_all(starts) if place is not None]
     if not moves:
         return 0
     values = np.linalg.svd(np.array(moves), compute_uv=False)

@@ -13,7 +13,8 @@ from planar.document.files import from_dict, to_dict
 from planar.document.schema import schema
 from planar.model.pairs import pair_types
 from planar.model.pairs.turning import TurningPair
-from tests.known import MODELS
+from tests.draws import covering
+from tests.known import MODELS, kinds_of_model
 
 
 def numbers_in(value):
@@ -25,7 +26,7 @@ def numbers_in(value):
         yield value
 
 
-@pytest.mark.parametrize("name", MODELS)
+@pytest.mark.parametrize("name", covering(MODELS, kinds_of_model))
 def test_every_number_of_a_model_has_one_name_and_can_be_given_again(name):
     mechanism = MODELS[name]
     known = file_dimensions(mechanism)

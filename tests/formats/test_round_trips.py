@@ -6,14 +6,13 @@ import numpy as np
 import pytest
 
 import planar
-from planar.document.files import load_models
 from planar.formats.known_formats import file_formats
 from planar.reports.files.converted import written_text
 from tests.draws import part
+from tests.known import MODELS
 from tests.round_trips import read_back, worst_deviation
 
 WRITTEN = [name for name, each in file_formats().items() if each.write]
-MODELS = {file.stem: mechanism for file, mechanism in load_models()}
 ROUNDED = {"pmksplus": 5e-4}
 """Of the mechanism's size; its lengths are rounded to 10 um, which a small mechanism feels."""
 

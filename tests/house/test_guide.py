@@ -9,7 +9,6 @@ import re
 import shlex
 import subprocess
 import sys
-from collections.abc import Iterable
 from contextlib import chdir, redirect_stdout
 from pathlib import Path
 
@@ -28,7 +27,7 @@ from planar.guide.reference import reference_names
 from planar.guide.topics import FIRST_PAGE, find_topic, guide_topics, read_page
 from planar.model.file_units import FileUnits
 from tests import command
-from tests.draws import SEARCH, part
+from tests.draws import covering, part
 from tests.guide_pictures import PICTURES
 from tests.guide_screens import SCREENS
 
@@ -59,15 +58,14 @@ COMMANDS = {
 """Those of README's tour are tried with it."""
 
 
-def first_of_their_kind(lines: Iterable[str]) -> list[str]:
-    """Of commands with the same options for other models the first; all of them where one searches."""
-    kinds: dict[object, str] = {}
-    for line in lines:
-        words = shlex.split(line.partition(" > ")[0], comments=True)
-        drawn = words[3:4] if words[1] == "plot" else []
-        options = sorted(word for word in words if word.startswith("-"))
-        kinds.setdefault(line if SEARCH else (words[1], *drawn, *options, "# refused" in line), line)
-    return list(kinds.values())
+def kinds_of(line: str) -> set[tuple[str, ...]]:
+    """What a command shows: itself with each of its options, its drawing, the format of its file, a refusal."""
+    words = shlex.split(line.partition(" > ")[0], comments=True)
+    drawing = [("plot", words[3])] if words[1] == "plot" else []
+    files = [(words[1], Path(words[k + 1]).suffix) for k, word in enumerate(words[:-1]) if word == "-o"]
+    options = [(words[1], word) for word in words if word.startswith("-")]
+    refusals = [(words[1], "refused")] if "# refused" in line else []
+    return {(words[1],), *drawing, *files, *options, *refusals}
 
 
 SHORTER = {"--duration 5s": "--duration 1s", "chains 8 --mechanisms": "chains 6 --mechanisms"}
@@ -81,7 +79,7 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
-@pytest.mark.parametrize("line", first_of_their_kind(COMMANDS))
+@pytest.mark.parametrize("line", covering(COMMANDS, kinds_of))
 def test_a_command_of_the_guide_runs(line, folder):
     line = re.sub(r"--vary \d+", "--vary 1", line.partition(" > ")[0])  # of a class one is like another
     for written, tried in SHORTER.items():

@@ -10,7 +10,16 @@ import pytest
 
 import planar
 from planar.document.texts.mechanism_link import read_link
-from tests.drawn_linkages import CAM, LINKAGES, SLIDER_CRANK, draw_cam, draw_quick_return, draw_slider_crank
+from tests.drawn_linkages import (
+    CAM,
+    LINKAGES,
+    SLIDER_CRANK,
+    draw_cam,
+    draw_quick_return,
+    draw_slider_crank,
+    drawn_kinds,
+)
+from tests.draws import covering
 from tests.guide_screens import draw_six_bar, guide_steps
 from tests.hostile import harmful_mechanism
 from tests.page_scripts import settled
@@ -36,7 +45,7 @@ def equal(drawn, written):
             assert found.point(name).acceleration == pytest.approx(point.acceleration, abs=1e-7)
 
 
-@pytest.mark.parametrize("name", LINKAGES)
+@pytest.mark.parametrize("name", covering(LINKAGES, drawn_kinds))
 def test_a_linkage_drawn_from_nothing_is_the_written_one(name, drawing):
     draw, written = LINKAGES[name]
     hand = drawing()

@@ -34,14 +34,14 @@ from planar.solving.position import solved_mechanism
 from planar.solving.rates.regularity import regularity
 from tests import command
 from tests.builders import triangle
-from tests.draws import part
+from tests.draws import covering, part
 from tests.hostile import HARMFUL, HARMFUL_LINE, harmful_mechanism
-from tests.known import MODELS, some_models
+from tests.known import MODELS, kinds_of_model, some_models
 from tests.page_scripts import in_node, needs_node
 
 LARGEST = 1_500_000
-SOME = dict(list(MODELS.items())[::4])
-"""Models for what takes long for each."""
+SOME = {stem: MODELS[stem] for stem in covering(MODELS, kinds_of_model)}
+"""Models of every kind, for what takes long for each."""
 LIVE = {
     stem: each
     for stem, each in SOME.items()

@@ -23,6 +23,7 @@ from planar.pages.page import page
 from planar.pages.still_picture import still_svg
 from planar.pages.view import view
 from tests.builders import triangle
+from tests.draws import covering
 from tests.hostile import harmful_mechanism
 from tests.known import MODELS
 from tests.page_scripts import CLOSE, FAINT, MISNAMED, NAMELESS, PLACES, SCREENS, downloaded, opened, same, settled
@@ -421,8 +422,9 @@ def test_a_drawing_leaves_room_for_all_that_a_slide_with_two_ends_can_do(shown):
     assert all(0.0 <= x <= box["width"] and 0.0 <= y <= box["height"] for x, y in places)
 
 
-@pytest.mark.parametrize("screens", [["phone"], ["desk", "projector"]], ids=" ".join)
-@pytest.mark.parametrize("stem", ["000-P2", "excavator-arm"])
+@pytest.mark.parametrize(
+    ("stem", "screens"), covering(product(["000-P2", "excavator-arm"], [("phone",), ("desk", "projector")]), frozenset)
+)
 def test_nothing_is_wider_than_the_screen(stem, screens, shown):
     window = shown(MODELS[stem], screens[0])
     for box in window.locator("#layers").get_by_role("checkbox").all():

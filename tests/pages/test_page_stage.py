@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import json
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from PIL import Image
 import planar
 from planar.foundation.units import parse_unit
 from tests.drawn_linkages import LINKAGES
+from tests.draws import covering
 from tests.known import MODELS
 from tests.page_scripts import downloaded, same, settled
 
@@ -147,8 +149,10 @@ HIDDEN = """() => {
 """How many groups of buttons lie over the drawing, and boxes of what they hide: strokes' ends, centres, letters."""
 
 
-@pytest.mark.parametrize("name", ["quick return", "offset slider-crank", "toggle", "cam"])
-@pytest.mark.parametrize("screen", ["desk", "phone"])
+@pytest.mark.parametrize(
+    ("name", "screen"),
+    covering(product(["quick return", "offset slider-crank", "toggle", "cam"], ["desk", "phone"]), frozenset),
+)
 def test_no_button_hides_what_is_drawn_while_it_moves(name, screen, shown):
     window = shown(planar.from_dict(LINKAGES[name][1]), screen)
     window.wait_for_function("() => page.course")
