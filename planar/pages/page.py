@@ -178,7 +178,8 @@ def page(  # many: what is shown, and how
     parts = {
         "title": escape(mechanism.name),
         "back": f'<a class="back" href="{escape(back.address)}">{escape(back.words)}</a>' if back else "",
-        "about": _about(mechanism) + _rest(mechanism),
+        # on a page to draw on this is said beside the drawing, as it changes
+        "about": _about(mechanism) + ("" if edited else _rest(mechanism)),
         "still": still_svg(mechanism, z),
         "notes": _notes(mechanism),
         "styles": styles,

@@ -20,6 +20,7 @@ from planar.analysis.centres.centrodes import (
 from planar.analysis.relative_motion import quarter_turn
 from planar.drawing.centres.centrodes import DRAWING_SIZE, MAX_WINDOW_RATIO, centrodes_picture
 from planar.drawing.paper.clipping import clip_homogeneous_curve, remove_repeated_strokes
+from planar.drawing.paper.pens import pen_style
 from planar.drawing.paper.picture import Circle, Label, Pen, Polyline, extent
 from planar.drawing.paper.scales import Scale
 from planar.foundation.errors import BadInput, Unknown
@@ -426,6 +427,8 @@ def test_round_positions_of_the_input_are_marked_on_both_centrodes():
         [f"{pen.value} at {30 * k}" for k in range(12)] for pen in (Pen.FIXED_CENTRODE, Pen.MOVING_CENTRODE)
     )
     assert set(dots) == {*fixed, *moving}
+    marks = [mark for mark in picture.marks if mark.about in dots]
+    assert not any(pen_style(mark).dashes for mark in marks)  # a dashed ring as small as that would be an arc
     link, frame = usual_links(mechanism)
     for name, degrees in ((fixed[1], 30.0), (fixed[8], 240.0)):
         state = planar.solve(mechanism, {mechanism.inputs[0].pair: np.radians(degrees)})

@@ -249,7 +249,16 @@ def test_a_link_is_copied_and_mirrored(drawing):
     hand = drawing()
     hand.use("Plate", (0, 0), (60, 0), (20, 40), (20, 40))
     hand.use("Pins", (30, 0))
-    hand.button("Copy ABC")
+    # the server answers while the button is held down: the click is heard all the same
+    box = hand.window.get_by_role("button", name="Copy ABC", exact=True).bounding_box()
+    hand.wait()
+    hand.window.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+    hand.window.mouse.down()
+    with hand.window.expect_response("**/answer"):
+        hand.window.evaluate("() => { editing.ask(); }")
+    settled(hand.window)
+    hand.window.mouse.up()
+    hand.wait()
     hand.click((8, 16))
     hand.button("Mirror ABC")
     found = {name: [round(1000 * each, 6) for each in at] for name, at in hand.window.evaluate("[...editing.at]")}
@@ -263,6 +272,11 @@ def test_a_link_is_copied_and_mirrored(drawing):
     assert hand.file()["pairs"] == [{"turning": "B"}]
     mirrored = hand.file()["links"]["GBH"]
     assert mirrored == {"ends": ["G", "B"], "length": 60, "points": {"H": [20, -40]}}
+    # a tool's numbers and hint take room from the drawing, which knows so at once
+    heights = "(tool) => { editing.use(tool); return [page.view.height, svg.clientHeight]; }"
+    seen = [hand.window.evaluate(heights, tool) for tool in ("cam", "pin")]
+    assert seen[0][0] != seen[1][0]
+    assert all(view == element for view, element in seen)
 
 
 # always alive
@@ -487,6 +501,7 @@ def test_the_rest_goes_along_with_a_pin_and_keeps_its_lengths(drawing):
 def test_an_empty_sheet_greets_with_a_hint_and_says_once_what_the_tool_does(drawing):
     hand = drawing()
     assert hand.told().startswith("Draw the first bar")
+    assert "nothing moves" not in hand.window.locator("body").inner_text()  # that would be said of the sheet before
     colour = "(name) => getComputedStyle(document.querySelector(name)).color"
     greeting, hint = (
         hand.window.evaluate(colour, name) for name in ("#pencil [role=status] p:not([hidden]).hint", "#pencil-hint")

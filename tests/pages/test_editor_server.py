@@ -40,13 +40,16 @@ def asked(server, method="POST", what="answer", body=None, token=None, **headers
     if method == "POST":
         own["Origin"] = server.origin
     sent = {key: value for key, value in {**own, **headers}.items() if value is not None}
-    content = None if method == "GET" else json.dumps({"document": FOUR_BAR} if body is None else body)
+    content = None
+    if method == "POST":
+        value = {"document": FOUR_BAR} if body is None else body
+        content = value if isinstance(value, bytes) else json.dumps(value).encode()
     line.putrequest(method, f"/{token or server.token}/{what}", skip_host=True, skip_accept_encoding=True)
     for key, value in sent.items():
         line.putheader(key.replace("_", "-"), value)
     if content is not None:
         line.putheader("Content-Length", sent.get("Length", str(len(content))))
-    line.endheaders(None if content is None else content.encode())
+    line.endheaders(content)
     answer = line.getresponse()
     found = answer.status, answer.read().decode(), answer.headers
     line.close()
@@ -104,11 +107,23 @@ def test_whoever_else_asks_is_refused_in_a_sentence(server, status, changed):
     assert "Four-bar" not in text
 
 
-@pytest.mark.parametrize("body", [[], {"document": 3}, {"other": 1}, {"document": {"links": 3}}])
-def test_what_is_no_mechanism_is_told_in_a_sentence(server, body):
-    status, text, _ = asked(server, body=body)
-    assert status == 200
-    assert json.loads(text)["problem"]
+@pytest.mark.parametrize(
+    ("body", "expected"),
+    [
+        ({"document": 3}, 200),
+        ({"document": {"links": 3}}, 200),
+        ([], 400),
+        ({"other": 1}, 400),
+        (b"", 400),
+        (b"{", 400),
+        (b'{"document": {}, "name": "\xff\xfe"}', 400),
+    ],
+)
+def test_what_is_no_mechanism_is_told_in_a_sentence(server, body, expected):
+    for what in ("answer", "save"):
+        status, text, _ = asked(server, what=what, body=body)
+        assert status == expected
+        assert json.loads(text)["problem"]
 
 
 def test_it_writes_only_what_is_saved_and_only_beside(tmp_path):

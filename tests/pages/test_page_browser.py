@@ -114,6 +114,17 @@ def test_it_plays_and_stops(shown):
     assert window.evaluate("page.input(0)") == stood
 
 
+def test_a_structure_is_drawn_and_offers_no_motion(shown):
+    value = planar.to_dict(triangle(50)) | {"sketch": {"C": [25, 70]}}
+    at = np.degrees(np.arccos((70**2 + 50**2 - 80**2) / (2 * 70 * 50)))
+    window = shown(planar.from_dict(value | {"inputs": [{"pair": "A", "position": f"{float(at)!r} deg"}]}))
+    assert "nothing moves: it is a structure" in window.locator("header").inner_text()
+    assert window.locator("#drawing .drives polyline, #drawing .drives path").count() == 0
+    assert window.locator("#controls").get_by_role("button", name="Play").is_disabled()
+    assert window.get_by_label("A", exact=True).is_disabled()
+    assert "Take hold" not in window.locator("#controls").inner_text()
+
+
 def test_a_dead_point_stops_it_and_is_told(shown):
     mechanism = MODELS["000-P1"]
     (given,) = mechanism.inputs

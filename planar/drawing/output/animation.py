@@ -17,7 +17,7 @@ import numpy.typing as npt
 from planar.drawing.diagrams.drawn_run import DrawnRun, closed_run, smooth_path, steady_run
 from planar.drawing.diagrams.positions import coupler_points, resolve_points
 from planar.drawing.labels.fonts import font_families, printable_text
-from planar.drawing.paper.pens import FILL_COLOURS, PEN_STYLES, require_matplotlib
+from planar.drawing.paper.pens import FILL_COLOURS, pen_style, require_matplotlib
 from planar.drawing.paper.picture import Fill, Outline, PaperPoint, Pen, Polyline, extent
 from planar.drawing.paper.scales import Scale
 from planar.drawing.scheme.ground import ground_marks
@@ -257,7 +257,7 @@ def _add_artist(axes: Axes, mark: Outline) -> Any:
     from matplotlib.lines import Line2D
     from matplotlib.patches import Polygon
 
-    ink = PEN_STYLES[mark.pen]
+    ink = pen_style(mark)
     points = ink.width * PIXELS_PER_MM * 72.0 / DPI
     dashes = (0.0, tuple(each / ink.width for each in ink.dashes)) if ink.dashes else "-"
     corners = _outline_points(mark)

@@ -11,7 +11,7 @@ import numpy as np
 from planar.drawing.labels.fonts import printable_text
 from planar.drawing.labels.placement import PlacedLabel
 from planar.drawing.labels.text_metrics import text_size
-from planar.drawing.paper.pens import FILL_COLOURS, MM_PER_POINT, PEN_STYLES, PenStyle
+from planar.drawing.paper.pens import FILL_COLOURS, MM_PER_POINT, PEN_STYLES, PenStyle, pen_style
 from planar.drawing.paper.picture import Arrow, Circle, Mark, PaperPoint, Pen, Polyline
 from planar.drawing.paper.stroke_shapes import ArrowHead, arc_arrow_head, arrow_head, sweep_angle
 
@@ -81,7 +81,7 @@ def draw_mark(axes: Axes, mark: Mark, order: int) -> None:
     elif isinstance(mark, Arrow):
         made = arrow_head(mark.tail, mark.head, hypot(mark.head[0] - mark.tail[0], mark.head[1] - mark.tail[1]))
         if made is not None:
-            ink = PEN_STYLES[mark.pen]
+            ink = pen_style(mark)
             _add_line(axes, (mark.tail, made.line_end), ink, mark.about, order, min(ink.width, made.max_line_width))
             _add_arrow_head(axes, made, ink, mark.about, order + 0.5)
     elif isinstance(mark, Circle):
@@ -91,7 +91,7 @@ def draw_mark(axes: Axes, mark: Mark, order: int) -> None:
 def _draw_line(axes: Axes, mark: Polyline, order: int) -> None:
     from matplotlib.patches import Polygon
 
-    ink = PEN_STYLES[mark.pen]
+    ink = pen_style(mark)
     if mark.closed and len(mark.points) > 2:
         fill = FILL_COLOURS.get(mark.fill, "none")
         area = Polygon(
@@ -109,7 +109,7 @@ def _draw_circle(axes: Axes, mark: Circle, order: int) -> None:
     from matplotlib.patches import PathPatch
     from matplotlib.path import Path
 
-    ink, turn = PEN_STYLES[mark.pen], sweep_angle(mark)
+    ink, turn = pen_style(mark), sweep_angle(mark)
     fill = FILL_COLOURS.get(mark.fill, "none")
     looks = {"facecolor": fill, "edgecolor": ink.colour}
     tip = arc_arrow_head(mark)

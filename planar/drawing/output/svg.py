@@ -13,7 +13,7 @@ from math import cos, hypot, radians, sin
 import numpy as np
 
 from planar.drawing.paper.boxes import Box, lengths_inside_boxes
-from planar.drawing.paper.pens import FILL_COLOURS, MM_PER_POINT, PEN_STYLES
+from planar.drawing.paper.pens import FILL_COLOURS, MM_PER_POINT, PEN_STYLES, PenStyle, pen_style
 from planar.drawing.paper.picture import (
     Arrow,
     Circle,
@@ -21,7 +21,6 @@ from planar.drawing.paper.picture import (
     Label,
     Mark,
     PaperPoint,
-    Pen,
     Picture,
     Polyline,
     Stroke,
@@ -72,7 +71,8 @@ def svg(picture: Picture, title: str = "") -> str:
 
 
 def _mark_elements(mark: Stroke) -> Iterable[str]:
-    ink, stroke = PEN_STYLES[mark.pen], _stroke_attributes(mark.pen)
+    ink = pen_style(mark)
+    stroke = _stroke_attributes(ink)
     if isinstance(mark, Polyline):
         kind = "polygon" if mark.closed else "polyline"
         yield f'<{kind} points="{_svg_points(mark.points)}" fill="{_fill_colour(mark.fill)}" {stroke}/>'
@@ -114,8 +114,7 @@ def _head_element(made: ArrowHead, colour: str) -> str:
     return f'<polygon points="{_svg_points(made.corners)}" fill="{_css_colour(colour)}"/>'
 
 
-def _stroke_attributes(pen: Pen) -> str:
-    ink = PEN_STYLES[pen]
+def _stroke_attributes(ink: PenStyle) -> str:
     dashes = f' stroke-dasharray="{" ".join(map(_format_number, ink.dashes))}"' if ink.dashes else ""
     return f'stroke="{_css_colour(ink.colour)}" stroke-width="{_format_number(ink.width)}"{dashes}'
 

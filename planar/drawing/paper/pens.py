@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from math import pi
 from typing import NamedTuple
 
-from planar.drawing.paper.picture import Fill, Pen
+from planar.drawing.paper.picture import Arrow, Circle, Fill, Pen, Polyline
 from planar.foundation.errors import BadInput
 
 MM_PER_POINT = 25.4 / 72.0
 """mm in a typographic point."""
 ARROW_HEAD_LENGTH, ARROW_HEAD_WIDTH = 2.7, 1.0
 """mm of an arrow's head, unless the arrow is shorter than twice that."""
+
+MIN_CIRCLE_DASHES = 6
+"""A circle with room for fewer dashes is drawn unbroken: a small mark would be an arc."""
 
 
 class PenStyle(NamedTuple):
@@ -69,6 +73,13 @@ FILL_COLOURS = {
     Fill.LIKELY: "#85addc",
 }
 """Colours of areas; those that are not here are empty."""
+
+
+def pen_style(mark: Polyline | Arrow | Circle) -> PenStyle:
+    """The line by which a stroke is drawn."""
+    style = PEN_STYLES[mark.pen]
+    is_small = isinstance(mark, Circle) and 2.0 * pi * abs(mark.radius) < MIN_CIRCLE_DASHES * sum(style.dashes)
+    return style._replace(dashes=()) if is_small else style
 
 
 def require_matplotlib() -> None:

@@ -301,10 +301,7 @@ class _Handler(BaseHTTPRequestHandler):
             return
         status = HTTPStatus.OK
         try:
-            asked = parse_json(self.rfile.read(int(length)), "$")
-            if not isinstance(asked, dict):
-                raise BadInput("$", "an object is wanted")
-            answer = acts[name](asked)
+            answer = acts[name](self._read_object(int(length)))
         except BadRequest as problem:
             status, answer = HTTPStatus.BAD_REQUEST, {"problem": str(problem)}
         except PlanarError as problem:
@@ -312,8 +309,18 @@ class _Handler(BaseHTTPRequestHandler):
             if isinstance(problem, Superseded):
                 answer["is_superseded"] = True
         except KeyError as missing:
-            answer = {"problem": f"the key {missing} is missing"}
+            status, answer = HTTPStatus.BAD_REQUEST, {"problem": f"the key {missing} is missing"}
         self._send(status, json.dumps(answer, allow_nan=False), "application/json")
+
+    def _read_object(self, length: int) -> dict[str, Any]:
+        """Return the JSON object of a request of `length` bytes. Raises BadRequest."""
+        try:
+            value = parse_json(self.rfile.read(length), "$")
+        except BadInput as problem:
+            raise BadRequest(problem.place, problem.sentence) from None
+        if not isinstance(value, dict):
+            raise BadRequest("$", "an object is wanted")
+        return value
 
     def _compute(self, function: Callable[[Any], Any], asked: Any) -> Any:
         """Compute an answer on a drawing, in place of one on an older drawing of the same page."""

@@ -39,6 +39,10 @@ class Controls {
     this.rows = inputs.map((given, k) => this.row(given, k, inputs.length > 1));
     this.unitRate = control("p", { class: "hint", id: "unit-rate" });
     section.append(...this.rows.map((row) => row.row), this.unitRate);
+    if (this.page.data.fixed) { // the heading says that nothing moves, and why
+      for (const part of section.querySelectorAll("button, input")) part.disabled = true;
+      return;
+    }
     section.append(control("p", { class: "hint", id: "keys" }, "Take hold of any link and move it. Arrow keys step, space plays, Home goes back to the start."));
     this.svg.setAttribute("aria-describedby", "keys");
     this.svg.setAttribute("aria-keyshortcuts", "ArrowRight ArrowLeft Shift+ArrowRight Shift+ArrowLeft Space Home");
@@ -175,7 +179,7 @@ class Controls {
     const { page, pace } = this, given = page.data.inputs[page.running];
     if (!given) return;
     const [own] = page.inputRates()[page.running], rate = this.rate(), { name, si } = page.data.paces[given.slides ? "length" : "angle"];
-    let text = `${readable(+(rate / si).toPrecision(2))} ${name}`;
+    let text = page.data.fixed ? "" : `${readable(+(rate / si).toPrecision(2))} ${name}`;
     if (own) text += `, ${+(rate / Math.abs(own)).toPrecision(2)} times ${page.unitRate ? "the unit rate" : "the input's"}`;
     this.unitRate.textContent = page.unitRate?.note ?? "";
     this.unitRate.hidden = page.unitRate === null;
@@ -242,7 +246,7 @@ class Controls {
 
   /** Arrows step, with shift ten times as far; space plays; Home goes back to the file's position. */
   key(event, k = this.page.running) {
-    if (!this.rows || event.ctrlKey || event.metaKey || event.altKey) return;
+    if (!this.rows || this.page.data.fixed || event.ctrlKey || event.metaKey || event.altKey) return;
     const ways = { ArrowRight: 1, ArrowUp: 1, ArrowLeft: -1, ArrowDown: -1, PageUp: 10, PageDown: -10 };
     if (event.key in ways) {
       const { low, high } = this.ends(k), one = this.page.data.inputs[k].slides ? PART * (high - low) : Math.PI / 180;

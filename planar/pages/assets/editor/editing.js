@@ -114,6 +114,7 @@ class Editing {
     if (this.tool !== "hand") this.svg.style.touchAction = "none";
     this.follow();
     this.panel.show();
+    this.parts.drawing.fitWindow(); // the numbers of a tool and its hint take room from the drawing
     this.sketch.draw();
   }
 
@@ -225,7 +226,7 @@ class Editing {
     let answer;
     do answer = await EditServer.post("answer", { document: this.file });
     while (answer.is_superseded && number === this.asked); // requests may arrive in another order
-    await this.hand.rest(); // nothing is taken from under a hand that draws
+    await this.hand.rest(); // nothing is taken from under a hand that draws or presses a button
     if (number !== this.asked) return;
     this.hear(answer);
     this.settled = true;
@@ -275,9 +276,10 @@ class Editing {
     await new Promise((go) => setTimeout(go, EXPLAIN_PAUSE));
     if (number !== this.asked) return;
     const answer = await EditServer.post("conflict", { document: this.file });
+    await this.hand.rest();
     if (number !== this.asked || answer.is_superseded) return;
     Object.assign(this.answer, { problem: answer.problem || this.answer.problem, remedies: answer.remedies ?? [] });
-    if (this.hand.dragged === null) this.approach(answer.nearest ?? {});
+    this.approach(answer.nearest ?? {});
     this.panel.show();
   }
 }

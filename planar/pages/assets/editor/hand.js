@@ -34,7 +34,20 @@ const TOOLS = {
 
 class Hand {
   constructor(editing) {
-    Object.assign(this, { editing, pending: [], cursor: null, spot: null, dragged: null, from: null, waiting: [] });
+    Object.assign(this, { editing, pending: [], cursor: null, spot: null, dragged: null, from: null, isPressing: false, waiting: [] });
+    this.watchPresses();
+  }
+
+  /** Know whether a button of the pointer is down anywhere: a control that is replaced meanwhile would not hear of its click. */
+  watchPresses() {
+    const end = () => {
+      if (!this.isPressing) return;
+      this.isPressing = false;
+      this.rested();
+    };
+    document.addEventListener("pointerdown", () => { this.isPressing = true; }, true);
+    for (const name of ["pointerup", "pointercancel"]) document.addEventListener(name, () => setTimeout(end), true); // after the click
+    document.addEventListener("pointermove", ({ buttons }) => { if (!buttons) end(); }, true); // released out of the window
   }
 
   /** Hear of a stage before anything on it does. */
@@ -69,7 +82,7 @@ class Hand {
   }
 
   /** Once nothing is held. */
-  async rest() { if (this.from !== null || this.dragged !== null) await new Promise((go) => { this.waiting.push(go); }); }
+  async rest() { while (this.from !== null || this.dragged !== null || this.isPressing) await new Promise((go) => { this.waiting.push(go); }); }
   rested() { for (const go of this.waiting.splice(0)) go(); }
 
   /** The place of an event: {pin, link, at}, and the same not drawn to anything, `free`. */

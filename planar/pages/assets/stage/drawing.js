@@ -26,9 +26,13 @@ class Drawing {
     page.on("size", () => this.renew());
     page.on("move", () => { if (!this.stale) this.place(); });
     page.on("shown", () => this.place(true));
-    new ResizeObserver(() => {
-      if (svg.clientWidth !== this.width || svg.clientHeight !== this.height) this.build();
-    }).observe(svg);
+    new ResizeObserver(() => this.fitWindow()).observe(svg);
+  }
+
+  /** Draw anew where the element has another size than what is drawn, so that `page.view` is that of the present layout. */
+  fitWindow() {
+    const { svg } = this;
+    if (svg.clientWidth !== this.width || svg.clientHeight !== this.height) this.build();
   }
 
   /** Draw other dimensions at the next frame, however many are tried until then. */
@@ -206,7 +210,7 @@ class Drawing {
     for (const key of [...this.parts.keys()]) if (key.startsWith("drives ")) this.parts.delete(key);
     this.edges.length = this.lasting;
     const arrow = this.page.data.scheme.arrows[this.page.running]?.[this.sense > 0 ? 0 : 1];
-    if (arrow) this.stroke("drives", arrow);
+    if (arrow && !this.page.data.fixed) this.stroke("drives", arrow);
   }
 
   /** Show the input's arrow for another input, or the other sense. */
