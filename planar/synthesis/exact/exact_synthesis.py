@@ -59,10 +59,14 @@ def synthesise_all(
     """
     mechanism = _single_start(task)
     say = progress or (lambda _: None)
-    if has_open_numbers(task, mechanism):
+    try:
+        problem = ExactProblem(task, mechanism)
+    except BadInput:
+        if not has_open_numbers(task, mechanism):
+            raise
         return _sampled_family(task, mechanism, say)
-    problem = ExactProblem(task, mechanism)
-    _check_freedom(problem)
+    if _leaves_numbers_open(problem):
+        return _sampled_family(task, mechanism, say)
     solved = solve_components(problem.components, say)
     result = _complete_list(problem, solved, say)
     if all(each.record.is_tested for each in solved):
@@ -115,18 +119,13 @@ def _single_start(task: SynthesisTask) -> Mechanism:
     return next(iter(start_mechanisms(task)))
 
 
-def _check_freedom(problem: ExactProblem) -> None:
-    """Refuse a task of which a part cannot meet what is wanted, or has numbers that stay open."""
+def _leaves_numbers_open(problem: ExactProblem) -> bool:
+    """Whether numbers of some part stay open. Raises BadInput where a part cannot meet what is wanted."""
     unbalanced = [each for each in count_parts(problem) if each.excess or each.open]
-    told = ", ".join(each.sentence for each in unbalanced)
     if any(each.excess for each in unbalanced):
+        told = ", ".join(each.sentence for each in unbalanced)
         raise BadInput("$.wanted", f"what is wanted cannot be met exactly with the numbers that are free: {told}")
-    if unbalanced:
-        raise BadInput(
-            "$.wanted",
-            f"there is no list, as numbers stay open: {told} than what is wanted determines; "
-            "want more, or give some of the numbers by leaving them out of 'free'",
-        )
+    return bool(unbalanced)
 
 
 def _values(component: Component, x: ComplexArray) -> dict[int, complex]:
