@@ -30,23 +30,7 @@ from planar.synthesis.exact.tracking.symmetry import exchange_images, representa
 from planar.synthesis.exact.tracking.trace_test import trace_test
 from planar.synthesis.task.starts import start_mechanisms
 from tests.command import run
-
-UNITS = {"length": "mm", "angle": "deg"}
-POSES = [(0, 0, 0), (30, 20, 25), (70, 25, 60), (95, 5, 80)]
-
-
-def task(start, *wanted, **more):
-    return {"planar": 1, "units": UNITS, "start": start, "wanted": list(wanted)} | more
-
-
-def with_points_on_coupler():
-    start = planar.to_dict(planar.load("four-bar"))
-    start["links"]["BC"] = {"points": {"B": [0, 0], "C": [66, 0]}}
-    return start
-
-
-def poses(count):
-    return {"link": "BC", "poses": [{"at": [x, y], "angle": angle} for x, y, angle in POSES[:count]]}
+from tests.exact_tasks import POSES, family_of, five_poses, poses, task, with_points_on_coupler
 
 
 def carried(place, number):
@@ -55,16 +39,6 @@ def carried(place, number):
     angle = np.radians(POSES[number][2] - POSES[0][2])
     turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
     return other + (place - first) @ turn.T
-
-
-def five_poses():
-    return {"link": "BC", "poses": [*poses(4)["poses"], {"at": [110, -30], "angle": 95}]}
-
-
-def family_of(value):
-    wanted = planar.read_task(value)
-    (component, *_) = ExactProblem(wanted, next(iter(start_mechanisms(wanted)))).components
-    return component
 
 
 def frame_parts(motion, link):

@@ -27,7 +27,7 @@ from planar.synthesis.exact.tracking.monodromy import find_generic_solutions, fo
 from planar.synthesis.exact.tracking.same_solutions import first_of_same
 from planar.synthesis.task.starts import start_mechanisms
 from tests.command import run
-from tests.synthesis.test_exact import family_of, five_poses, task, with_points_on_coupler
+from tests.exact_tasks import family_of, five_poses, task, with_points_on_coupler
 
 PAIRS = {"from": "A", "to": "D", "pairs": [[0, 0], [25, 14], [50, 33], [70, 51], [90, 75]]}
 
