@@ -35,6 +35,11 @@ UNITS = {"length": "mm", "angle": "deg"}
 POSES = [(0, 0, 0), (30, 20, 25), (70, 25, 60), (95, 5, 80)]
 
 
+@pytest.fixture(autouse=True)
+def few_designs(monkeypatch):
+    monkeypatch.setattr("planar.synthesis.exact.exact_synthesis.FAMILY_DESIGNS", 1)
+
+
 def task(start, *wanted, **more):
     return {"planar": 1, "units": UNITS, "start": start, "wanted": list(wanted)} | more
 
