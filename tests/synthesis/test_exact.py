@@ -141,7 +141,7 @@ def test_three_poses_leave_every_joint_the_centre_of_its_circle():
     joint = np.array([0.012, -0.031])
     a, b, c = (carried(joint, k) for k in range(3))
     matrix, right = 2.0 * np.array([b - a, c - a]), np.array([b @ b - a @ a, c @ c - a @ a])
-    assert found.curves[0].dimension == 2 and found.expected is None and not len(found)
+    assert found.curves[0].dimension == 2 and found.expected is None and len(found) == 1
     np.testing.assert_allclose(found.curves[0].centres(joint)[0], np.linalg.solve(matrix, right), atol=1e-13)
 
 
