@@ -13,6 +13,11 @@ PLACES = 1e-3 * np.array([[x, y] for x, y, _ in POSES])
 SWING = {"sliding": "swing", "on": "rod", "block": "D", "line": {"through": "G", "angle": 10}}
 
 
+@pytest.fixture(autouse=True)
+def few_designs(monkeypatch):
+    monkeypatch.setattr("planar.synthesis.exact.exact_synthesis.FAMILY_DESIGNS", 1)
+
+
 def task(start, wanted):
     return {"planar": 1, "units": UNITS, "start": start, "wanted": [wanted]}
 

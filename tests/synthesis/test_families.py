@@ -65,7 +65,7 @@ def lid():
 
 def test_the_members_of_a_family_keep_the_lengths_of_their_cranks(lid, monkeypatch):
     search, sample = lid
-    assert sample.count.dimension == 4 and sample.count.met >= 20
+    assert sample.family.dimension == 4 and sample.family.met >= 20
     members, violation, _ = search._known()
     designs = lid_linkages(members.numbers * search.sampler.equations[0].scale)
     for pivot, joints in ((designs.a, designs.b), (designs.d, designs.c)):

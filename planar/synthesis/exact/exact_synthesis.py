@@ -241,7 +241,7 @@ def _sampled_family(task: SynthesisTask, mechanism: Mechanism, say: Progress) ->
         complete="; ".join([sample.sentence, *["dyads that do it stand in curves"] * bool(curves), *special]),
         counted="",
         curves=curves,
-        family=sample.count,
+        family=sample.family,
     )
 
 

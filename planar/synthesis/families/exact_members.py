@@ -118,7 +118,8 @@ class MemberSampler:
         """Of several random places of every entry those with the least residual (n, entries, unknowns)."""
         count, entries = len(numbers), len(equations.rows.weights)
         shift = self.random.uniform(-np.pi, np.pi, (count, 1)) if equations.rows.input_is_free else 0.0
-        best, least = np.zeros((count, entries, 0)), np.full((count, entries), np.inf)
+        best: Array = np.zeros((count, entries, 0))
+        least = np.full((count, entries), np.inf)
         for _ in range(PLACE_DRAWS):
             y = draw_places(equations, count * entries, self.random, 1.0 / self.search.ratio)
             y = y.reshape(count, entries, -1)

@@ -39,12 +39,12 @@ class FamilySample(NamedTuple):
 
     designs: tuple[SynthesisedDesign, ...]
     rejected: tuple[SynthesisedDesign, ...]
-    count: FamilyCount
+    family: FamilyCount
 
     @property
     def sentence(self) -> str:
         """What was tried, in words."""
-        dimension, tried, met = self.count
+        dimension, tried, met = self.family
         if not tried:
             return "no exact linkage was reached from random draws within the bounds"
         kind = f"a family with {count_phrase(dimension, 'open parameter')}" if dimension else "single linkages"
