@@ -427,7 +427,7 @@ def test_round_positions_of_the_input_are_marked_on_both_centrodes():
         [f"{pen.value} at {30 * k}" for k in range(12)] for pen in (Pen.FIXED_CENTRODE, Pen.MOVING_CENTRODE)
     )
     assert set(dots) == {*fixed, *moving}
-    marks = [mark for mark in picture.marks if mark.about in dots]
+    marks = [mark for mark in picture.marks if isinstance(mark, Circle) and mark.about in dots]
     assert not any(pen_style(mark).dashes for mark in marks)  # a dashed ring as small as that would be an arc
     link, frame = usual_links(mechanism)
     for name, degrees in ((fixed[1], 30.0), (fixed[8], 240.0)):

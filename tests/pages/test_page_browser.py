@@ -120,7 +120,11 @@ def test_a_structure_is_drawn_and_offers_no_motion(shown):
     window = shown(planar.from_dict(value | {"inputs": [{"pair": "A", "position": f"{float(at)!r} deg"}]}))
     assert "nothing moves: it is a structure" in window.locator("header").inner_text()
     assert window.locator("#drawing .drives polyline, #drawing .drives path").count() == 0
-    assert window.locator("#controls").get_by_role("button", name="Play").is_disabled()
+    play = window.locator("#controls").get_by_role("button", name="Play")
+    assert play.is_disabled()
+    colour = "(button) => getComputedStyle(button).backgroundColor"
+    assert play.evaluate(colour) == window.get_by_role("button", name="Undo").evaluate(colour)
+    assert window.evaluate("drawing.spans[0].names") == ["fixed at", "fixed at"]
     assert window.get_by_label("A", exact=True).is_disabled()
     assert "Take hold" not in window.locator("#controls").inner_text()
 

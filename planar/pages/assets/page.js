@@ -44,6 +44,9 @@ class Page {
     return told[this.state.why] ?? "";
   }
 
+  /** What the end of an input's range is called where no stop is met. */
+  get endName() { return this.data.fixed ? "fixed at" : "dead point"; }
+
   /** Velocity and acceleration of every input, SI: as written, or the unit rate of the input that runs; 0 where nothing moves. */
   inputRates() {
     if (this.data.fixed) return this.given.map(() => [0, 0]);

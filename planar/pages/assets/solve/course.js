@@ -199,7 +199,7 @@ class Courses {
     }
     const dead = [ends[0].stopped, ends[1].stopped], between = yield* this.refine(start, k, rows, dead);
     const made = new Course(page, k, rows, turns, dead, between);
-    made.names = ends.map((each) => (each.met ? "stop" : page.data.fixed ? "fixed at" : "dead point"));
+    made.names = ends.map((each) => (each.met ? "stop" : page.endName));
     return made;
   }
 

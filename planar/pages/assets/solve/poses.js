@@ -12,7 +12,7 @@ function motions(page) {
   const { data, linkage } = page, poses = [page.frames];
   const spans = data.inputs.map((given, k) => {
     const far = given.slides ? 1 : 2 * Math.PI, scale = linkage.scale[k], steps = given.slides ? SLIDE_SEARCH * POSES : POSES;
-    const span = { low: 0, high: 2 * Math.PI, whole: true, dead: [false, false], names: ["dead point", "dead point"] };
+    const span = { low: 0, high: 2 * Math.PI, whole: true, dead: [false, false], names: [page.endName, page.endName] };
     for (const sign of [1, -1]) {
       const made = linkage.copy(), side = sign > 0 ? 1 : 0, seen = [];
       let end = made.u[k];
