@@ -89,7 +89,8 @@ def write_complex_ir(instructions: InstructionList[Any], outputs: Sequence[int],
     names: dict[int, str] = {}
     t.write_values(listing, required_values(listing, wanted), names, inputs)
     for row, number in enumerate(outputs):
-        t.store_pairs(*(names[part] for part in pairs[number]), place("%to", row))
+        first, second = (names[part] for part in pairs[number])
+        t.store_pairs(first, second, place("%to", row))
     t.close_loop("v", "vectors", "step", "done")
     t.write_label("done")
     t.write_line("ret void")

@@ -66,6 +66,9 @@ Homotopy = Callable[[ComplexArray, Array], HomotopyValues]
 class PathwiseHomotopy(Protocol):
     """A homotopy whose beginning and end differ from path to path."""
 
+    def __call__(self, V: ComplexArray, way: Array) -> HomotopyValues:
+        """Its values for all paths."""
+
     def at_paths(self, paths: IntArray) -> Homotopy:
         """The homotopy of some of the paths, in this order."""
 

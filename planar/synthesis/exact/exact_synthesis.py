@@ -79,7 +79,8 @@ def synthesise_all(
         return replace(result, is_finished=False)
     if any(len(one.x) != len(other.x) for one, other in zip(tested, solved, strict=True)):
         return _complete_list(problem, tested, say)
-    return replace(result, **_list_numbers(tested, result.designs))
+    designs = [each for each in result.designs if isinstance(each, ExactDesign)]
+    return replace(result, **_list_numbers(tested, designs))
 
 
 def _complete_list(problem: ExactProblem, solved: Sequence[ComponentSolutions], say: Progress) -> CompleteSynthesis:

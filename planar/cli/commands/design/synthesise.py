@@ -67,7 +67,7 @@ def synthesise(
     wanted = read_task(task)
     is_sheet = output is not None and output.suffix.lower() in SHEET_SUFFIXES
     folder = None if is_sheet else output
-    shown: list[Synthesis] = []
+    shown: list[CompleteSynthesis] = []
     with show_status(f"{wanted.name}: designs") as status:
 
         def show(done: SearchProgress) -> None:
@@ -100,10 +100,8 @@ def synthesise(
         _write_sheets(found, output)
     if as_json:
         print_json(record(found, files))
-    elif shown and not files and shown[0].designs == found.designs:
-        click.echo("\n".join(found.summary))
     else:
-        print_or_write(table(found, files), None)
+        _print_designs(found, files, shown)
     if ended_by is not None:
         if complete:
             click.echo(f"planar: {NOT_COUNTED}", err=True)
@@ -111,6 +109,17 @@ def synthesise(
         goes_on = "; the same command goes on where it was" if folder is not None else "; with -o FOLDER it could go on"
         click.echo(f"planar: interrupted: what was found till then is told{goes_on}", err=True)
         sys.exit(ended_by)
+
+
+def _print_designs(found: Synthesis, files: list[Path], shown: list[CompleteSynthesis]) -> None:
+    """Print the designs; of a list that was shown before its test, and has not changed, what is known of the whole."""
+    from planar.reports.tables.design.synthesis import table
+    from planar.synthesis.exact.complete_synthesis import CompleteSynthesis
+
+    if isinstance(found, CompleteSynthesis) and not files and [each.designs for each in shown] == [found.designs]:
+        click.echo("\n".join(found.summary))
+    else:
+        print_or_write(table(found, files), None)
 
 
 def _run(search: TaskSearch) -> int | None:

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.foundation.arrays import ComplexArray
+from planar.foundation.arrays import Array, ComplexArray
 from planar.foundation.errors import PlanarError, join_names
 from planar.model.wording import count_phrase
 from planar.synthesis.exact.relations.exact_problem import Component, ExactProblem
@@ -84,7 +84,7 @@ def _ranks(part: Component, member: Member, x: ComplexArray) -> tuple[int, int]:
     return len(x) - rank, _rank(both) - rank
 
 
-def _rank(matrix: ComplexArray) -> int:
+def _rank(matrix: Array | ComplexArray) -> int:
     if not matrix.size:
         return 0
     values = np.linalg.svd(matrix, compute_uv=False)

@@ -86,7 +86,7 @@ class _RandomLinkage:
         for _ in range(STEPS):
             f, _, slope = self._linearise(k)
             f, slope = (np.moveaxis(each.reshape(-1, part.entry_count, *each.shape[1:]), 1, 0) for each in (f, slope))
-            is_finite = np.isfinite(slope).all(axis=(1, 2)) & np.isfinite(f).all(axis=1)
+            is_finite = np.asarray(np.isfinite(slope).all(axis=(1, 2)) & np.isfinite(f).all(axis=1))
             slope = np.where(is_finite[:, None, None], slope, 0.0)
             is_closed = is_finite & (np.abs(f) <= CLOSED * np.abs(slope).sum(axis=2)).all(axis=1)
             if is_closed.all():

@@ -12,7 +12,7 @@ from typing import Generic, TypeVar
 
 import numpy as np
 
-from planar.assemblies.polynomial.path_tracker import Homotopy, PathwiseHomotopy, normalize, track_paths
+from planar.assemblies.polynomial.path_tracker import Homotopy, normalize, track_paths
 from planar.foundation.arrays import BoolArray, ComplexArray, IntArray
 from planar.synthesis.exact.tracking.same_solutions import first_of_same
 from planar.synthesis.exact.tracking.symmetry import Images, representatives
@@ -31,7 +31,7 @@ class SolutionGraph(Generic[Node]):
     homotopy of paths along edges (paths, 2) between some nodes."""
 
     def __init__(
-        self, between: Callable[[Sequence[Node], IntArray], Homotopy | PathwiseHomotopy], images: Images | None
+        self, between: Callable[[Sequence[Node], IntArray], Homotopy], images: Images | None
     ):
         self.between, self.images = between, images
         self.nodes: list[Node] = []

@@ -162,7 +162,7 @@ class _Slices:
 
 def _form_size(x: ComplexArray) -> int:
     """How many unknowns a slice's form has for solutions x (solutions, unknowns): the places, or the conjugates too."""
-    half = x.shape[1] // 2
+    half = int(x.shape[1]) // 2
     apart = np.abs(x[:, None, :half] - x[:, :half]).max(axis=2) + np.where(np.eye(len(x)), np.inf, 0.0)
     return half if apart.min() > SEPARATE * max(1.0, float(np.abs(x).max())) else 2 * half
 
