@@ -16,6 +16,7 @@ from planar.cli.options import json_option, main, print_or_write, show_progress,
 from planar.cli.streams import print_json
 
 if TYPE_CHECKING:
+    from planar.synthesis.exact.complete_synthesis import CompleteSynthesis
     from planar.synthesis.search_progress import SearchProgress
     from planar.synthesis.synthesis import Synthesis
     from planar.synthesis.task_search import TaskSearch

@@ -30,9 +30,7 @@ class SolutionGraph(Generic[Node]):
     """Nodes and solutions; of solutions that are `images` of each other one stands for all. `between` gives the
     homotopy of paths along edges (paths, 2) between some nodes."""
 
-    def __init__(
-        self, between: Callable[[Sequence[Node], IntArray], Homotopy], images: Images | None
-    ):
+    def __init__(self, between: Callable[[Sequence[Node], IntArray], Homotopy], images: Images | None):
         self.between, self.images = between, images
         self.nodes: list[Node] = []
         self.solutions: list[ComplexArray] = []
