@@ -266,6 +266,8 @@ class _BlockRootSolver:
                 several[:, : self.form.entry_count], several[:, self.form.entry_count :], self.given
             )
         )
+        # of those that meet the first stands for all: the one nearest to where the Jacobian is singular
+        met.sort(key=lambda root: float(_least_singular_ratio(self.residual_function, root[None])[0]))
         kept: list[Array] = list(met)
         curves: list[Array] = []
         if len(found.multiple):

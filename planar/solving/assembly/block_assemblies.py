@@ -96,8 +96,8 @@ class BlockAssemblies:
         closing = self.residual_function(stage, z, self.p)
         near, shown = self._starts_near_sketch(stage, z)
         if both is not None:
-            # nothing closes the block: one start shows where it is nearest to that
-            ended = damped_newton(closing, self._with_lengths(stage, closing, near[:1]))
+            # nothing closes the block: the starts near the sketch show where it is nearest to that
+            ended = damped_newton(closing, self._with_lengths(stage, closing, near))
             return [], self._best_end(stage, z, ended)
         tolerance = self._tolerance(stage)
         ended = damped_newton(closing, self._with_lengths(stage, closing, near), tolerance)
