@@ -115,7 +115,8 @@ def _design_faults(
     task: KnownTask, design: planar.SynthesisedDesign, met: Met, elsewhere: Met
 ) -> Iterator[tuple[str, str]]:
     """What is wrong with a design; one with a defect names inputs of its first branch, where it need not meet."""
-    is_proved = isinstance(design, planar.ExactDesign) and design.certified
+    is_listed = isinstance(design, planar.ExactDesign)  # and not of the sample of a family
+    is_proved = is_listed and design.certified
     changed = [
         each
         for each, value in task.linkage.numbers.items()
@@ -127,7 +128,7 @@ def _design_faults(
         yield "a proved design misses", f"{elsewhere.miss:.3g}"
     elif is_proved and not met.is_met and not design.defects:
         yield "a proved design misses at the inputs that it names", f"{met.miss:.3g}"
-    if met.is_met and not is_proved:
+    if met.is_met and is_listed and not is_proved:
         yield "a design that meets is not proved", f"{met.miss:.3g}"
 
 

@@ -277,11 +277,12 @@ class _AxesRows:
         """The axes that are nearest to some by which points are as they are drawn. Raises BadInput where there are
         none."""
         size = self.writer.problem.size
+        reach = max((abs(place) / size for place, _ in self.points), default=1.0)  # what is far is rounded more
         for turn in (0.0, 1.0, -1.0, 2.0, -2.0, 3.0, -3.0, 4.0):
             x = np.array([phase(way) + turn * np.pi / 4 * self.is_open[0], origin.real / size, origin.imag / size])
             for _ in range(AXES_STEPS):
                 rows = self.rows(x)
-                if np.abs(rows).max(initial=0.0) < AXES_MET:
+                if np.abs(rows).max(initial=0.0) < AXES_MET * max(1.0, reach):
                     return complex(x[1], x[2]) * size, exp(1j * x[0])
                 slopes = np.array([(self.rows(x + h) - self.rows(x - h)) / 2e-6 for h in 1e-6 * np.eye(3)]).T
                 x = x - self.is_open * np.linalg.lstsq(slopes * self.is_open, rows, rcond=1e-9)[0]

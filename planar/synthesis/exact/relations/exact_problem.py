@@ -168,7 +168,12 @@ class ExactProblem:
             return bool(used & {*symbols}) if unknowns else not used & sought
 
         conditions = tuple(row for row in self.pose.conditions if row.symbols and belongs(row.symbols))
-        rows = [EntryRows(conditions, (), None, ()), *(_rows_of(belongs, each.rows) for each in self.relations)]
+        counts = [
+            len(self.entry_numbers(self.items[k], each.numbers, k > 0)[0]) for k, each in enumerate(self.relations)
+        ]
+        rows = [EntryRows(conditions, (), None, ())]
+        for each, count in zip(self.relations, counts, strict=True):  # what has its first entry alone has no rows
+            rows.append(_rows_of(belongs, each.rows) if count else EntryRows((), (), None, ()))
         used = frozenset[int]().union(*(each.symbols for each in rows))
         given = tuple(each for each in self.pose.table.given if used & {*each.symbol})
         numbers = [number for each in given for number in each.symbol]
@@ -178,8 +183,7 @@ class ExactProblem:
             if rows[k + 1].equation_count:
                 entry = [number for one in each.numbers for number in one.symbol]
                 compiled = CompiledRows(rows[k + 1], symbols, [*numbers, *entry])
-                count = len(self.entry_numbers(self.items[k], each.numbers, k > 0)[0])
-                parts.append(FamilyPart(compiled, tuple(one.kind for one in each.numbers), count))
+                parts.append(FamilyPart(compiled, tuple(one.kind for one in each.numbers), counts[k]))
                 items.append(k)
         found = Component(Family(len(unknowns), tuple(parts)), Member(()), unknowns, given, tuple(items))
         return found._replace(member=self.member(found, self.items))
