@@ -677,7 +677,7 @@ def test_a_dyad_out_of_reach_is_told_by_its_closed_form_not_by_all_starts(monkey
     assert "search stopped" not in reason
     assert "would go together with frame.A15.y = 0 mm" in reason
     assert len(calls) < 200
-    assert max(len(starts) for starts in calls) == 1
+    assert max(len(starts) for starts in calls) < 10  # those near the sketch alone
 
 
 def test_where_a_text_is_no_json_is_said_once():
