@@ -244,12 +244,10 @@ def test_what_is_no_solution_is_not_certified():
     [
         (task({"chains": [4]}, {"point": "P", "through": [[0, 0]]}), "that of one mechanism"),
         (task("four-bar", {"point": "E", "through": [[k, k * k] for k in range(10)]}), "can meet 1 condition less"),
-        (task("four-bar", {"point": "E", "through": [[k, k * k] for k in range(8)]}), "have 1 number more"),
         (
             task("stephenson-3-five-bar", {"point": "E", "through": [[k, k * k] for k in range(9)]}),
             "more than one unknown turn",
         ),
-        (task("four-bar", {"from": "A", "to": "D", "pairs": [[k, 2 * k] for k in range(4)]}), "have 1 number more"),
     ],
 )
 def test_what_has_no_list_is_refused_in_words(value, said):
@@ -312,7 +310,8 @@ def test_the_command_draws_curves_of_dyads_on_sheets_and_in_the_gallery(tmp_path
     assert "Dyads B about A and C about D" in (tmp_path / "curves.svg").read_text()
     run(tmp_path, "synthesise", "hatch.json", "--complete", "-o", "all").done()
     page = (tmp_path / "all" / "index.html").read_text()
-    assert "Dyads B about A and C about D" in page and page.count("<svg") == 1
+    assert "Dyads B about A and C about D" in page
+    assert page.count("<svg") == 2, "the curves, and one design of the family"
     file.write_text(json.dumps(task(with_points_on_coupler(), poses(3))))
     ended = run(tmp_path, "synthesise", "hatch.json", "--complete", "-o", "none.svg")
     assert ended.status == 0 and "nothing was found that could be drawn" in ended.err
