@@ -64,9 +64,9 @@ def synthesise_all(
     except BadInput:
         if not has_open_numbers(task, mechanism):
             raise
-        return _sampled_family(task, mechanism, say)
+        return _sampled_family(task, mechanism, None, say)
     if _leaves_numbers_open(problem):
-        return _sampled_family(task, mechanism, say)
+        return _sampled_family(task, mechanism, problem, say)
     solved = solve_components(problem.components, say)
     result = _complete_list(problem, solved, say)
     if all(each.record.is_tested for each in solved):
@@ -226,11 +226,15 @@ def _special(curves: Sequence[DyadCurve], solved: Sequence[ComponentSolutions]) 
         yield "the poses are special: a dyad that others leave one of has none, or more"
 
 
-def _sampled_family(task: SynthesisTask, mechanism: Mechanism, say: Progress) -> CompleteSynthesis:
-    """A sample of the linkages of a task that leaves numbers open, and the curves of dyads where poses leave them."""
+def _sampled_family(
+    task: SynthesisTask, mechanism: Mechanism, problem: ExactProblem | None, say: Progress
+) -> CompleteSynthesis:
+    """A sample of the linkages of a task that leaves numbers open, and the curves of dyads where poses leave them.
+
+    `problem` is None for structures that have no polynomials here."""
     search = DesignSearch(task, mechanism)
     sample = FamilySearch(search, FAMILY_DESIGNS, 0, say).run()
-    curves, special = _dyad_curves(task, mechanism, say)
+    curves, special = ((), ()) if problem is None else _dyad_curves(problem, say)
     remarks = () if sample.designs else (refusal([each.shortages for each in sample.rejected], task.units),)
     return CompleteSynthesis(
         task,
@@ -246,15 +250,9 @@ def _sampled_family(task: SynthesisTask, mechanism: Mechanism, say: Progress) ->
     )
 
 
-def _dyad_curves(
-    task: SynthesisTask, mechanism: Mechanism, say: Progress
-) -> tuple[tuple[DyadCurve, ...], tuple[str, ...]]:
+def _dyad_curves(problem: ExactProblem, say: Progress) -> tuple[tuple[DyadCurve, ...], tuple[str, ...]]:
     """The curves of the dyads that poses leave, and where these are special; none of other structures."""
-    if len(task.wanted) > 1 or not isinstance(task.wanted[0], WantedPoses):
-        return (), ()
-    try:
-        problem = ExactProblem(task, mechanism)
-    except BadInput:
+    if len(problem.items) > 1 or not isinstance(problem.items[0], WantedPoses):
         return (), ()
     open_parts = [each for each in problem.components if each.freedom > 0]
     if not all(is_dyad(problem, each) for each in open_parts):
