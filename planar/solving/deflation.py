@@ -24,6 +24,8 @@ from planar.solving.prepared_mechanism import PreparedMechanism
 
 MAX_MINOR_RANK = 12
 """Rank from which on minors would be expressions too long."""
+MAX_MINORS = 24
+"""Minors of one block; constraints that need more lack so much rank that something is free."""
 PROBE_DISTANCE = 1e-2
 """rad, or lengths of the size: how far along the motion it is looked whether the rank is as low."""
 PROBE_COUNT = 4
@@ -97,7 +99,8 @@ def _minor_block(setup: PreparedMechanism, stage: Block, z: Array, with_earlier:
     least = np.concatenate([setup.min_column_scale, np.ones(len(setup.inputs.u))])[many]
     sizes = column_norms(own, least)
     held = rank(own / sizes, MIN_REGULARITY, unit=1.0)
-    if held == min(own.shape) or held >= MAX_MINOR_RANK:
+    too_many = (len(rows) - held) * (len(many) - held) > MAX_MINORS
+    if held == min(own.shape) or held >= MAX_MINOR_RANK or too_many:
         return None
     return LowRankBlock(tuple(rows), tuple(many), setup.row_scale[rows], sizes, held)
 

@@ -370,7 +370,7 @@ def test_a_small_linkage_beside_a_large_one_is_judged_by_its_own_size(size):
 def test_a_search_that_stops_early_says_so(monkeypatch):
     from planar.solving.assembly import nearest_assembly
 
-    monkeypatch.setattr(nearest_assembly, "MAX_EXPANSIONS", 5)
+    monkeypatch.setattr(nearest_assembly, "MAX_BEST_FIRST_BLOCKS", -4)
     count = 6
     links = {"f": {"points": {f"G{k}": [100 * k, 0] for k in range(count + 1)}}}
     links["c"] = {"ends": ["G0", "B0"], "length": 60}
@@ -380,7 +380,7 @@ def test_a_search_that_stops_early_says_so(monkeypatch):
     pairs = [{"turning": f"{letter}{k}"} for k in range(count + 1) for letter in "GB"]
     inputs = [{"pair": "G0", "position": 80}]
     state = solve(changed(frame="f", links=links, pairs=pairs, inputs=inputs, sketch={f"B{count}": [100 * count, -60]}))
-    assert any("stopped after 5 groups" in remark for remark in state.remarks)
+    assert any("stopped before it had tried all combinations" in remark for remark in state.remarks)
 
 
 def test_every_group_that_the_sketch_leaves_open_is_named():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -26,6 +27,8 @@ MEETING_COSINE_SQUARED = 1.0 - 1e-6
 MAX_STARTS = 160
 LARGE_BLOCK, START_BATCH = 10, 16
 """Unknowns of a block from which on starts are tried in batches of so many."""
+STARTS_PER_BLOCK = 4
+"""Starts of Newton's method that cost about as much as one block solved in closed form, or one root polished."""
 START_ANGLE_SPREAD = 0.3
 """Radians: how far about the angles of a sketch starts are spread, so that near twins are both found."""
 CLEAR_SKETCH_DISTANCE = 0.03
@@ -63,6 +66,8 @@ class BlockAssemblies:
     def __init__(self, setup: PreparedMechanism, misfit: float = 0.0):
         """`misfit` (sizes) is what blocks with more rows than unknowns may leave open."""
         self.misfit = misfit
+        self.solved_blocks = 0.0
+        "blocks solved in closed form, and what starts and roots of others come to, counted in such blocks"
         mechanism, unit = setup.mechanism, setup.unit
         self.setup = setup
         self.functions, self.u, self.p = setup.functions, setup.inputs.u, setup.inputs.p
@@ -90,6 +95,7 @@ class BlockAssemblies:
 
         The second is all unknowns at the end of the best start, whether it closes the block or not.
         """
+        self._count_effort(1.0)
         both = self._closed_form(stage, z)
         if both:
             return both, both[0].z
@@ -97,10 +103,10 @@ class BlockAssemblies:
         near, shown = self._starts_near_sketch(stage, z)
         if both is not None:
             # nothing closes the block: the starts near the sketch show where it is nearest to that
-            ended = damped_newton(closing, self._with_lengths(stage, closing, near))
+            ended = self._solve_from(closing, self._with_lengths(stage, closing, near))
             return [], self._best_end(stage, z, ended)
         tolerance = self._tolerance(stage)
-        ended = damped_newton(closing, self._with_lengths(stage, closing, near), tolerance)
+        ended = self._solve_from(closing, self._with_lengths(stage, closing, near), tolerance)
         found = self._from_converged(stage, z, closing, ended.unknowns[ended.converged])
         sketched = len(self.sketched_by_level.get(stage.block_index, ()))
         lower = all(self.pairs[name].is_lower_pair for name in stage.pairs)
@@ -115,12 +121,28 @@ class BlockAssemblies:
         )
         if not (dyad or clear):
             for starts in self._start_batches(stage, closing):
-                more = damped_newton(closing, starts, tolerance)
+                more = self._solve_from(closing, starts, tolerance)
                 ended = NewtonResult(*(np.concatenate(both) for both in zip(ended, more, strict=True)))
                 if not sketched and np.any(more.converged):
                     break
             found = self._from_converged(stage, z, closing, ended.unknowns[ended.converged])
         return found, self._best_end(stage, z, ended)
+
+    def _count_effort(self, blocks: float) -> None:
+        """Add to `solved_blocks`."""
+        self.solved_blocks += blocks
+
+    @cached_property
+    def full_effort(self) -> float:
+        """What it costs to solve every block once from all its starts (blocks)."""
+        sizes = [slice_length(stage.unknowns) for stage in self.equations.blocks]
+        return sum(1.0 + (min(6 * size**2, MAX_STARTS) + 2 * size + 2) / STARTS_PER_BLOCK for size in sizes)
+
+    def _solve_from(
+        self, closing: ResidualFunction, starts: Array, tolerance: float = CLOSED_TOLERANCE
+    ) -> NewtonResult:
+        self._count_effort(len(starts) / STARTS_PER_BLOCK)
+        return damped_newton(closing, starts, tolerance)
 
     @staticmethod
     def _best_end(stage: Block, z: Array, ended: NewtonResult) -> Array:
@@ -167,6 +189,7 @@ class BlockAssemblies:
         for root in converged:
             if not any(self._is_same(stage, z, root, other) for other in roots):
                 roots.append(polish_root(closing, root))
+        self._count_effort(len(roots))
         return self._sorted_assemblies(stage, z, roots)
 
     def _sorted_assemblies(self, stage: Block, z: Array, roots: list[Array]) -> list[BlockAssembly]:
@@ -217,7 +240,7 @@ class BlockAssemblies:
         """All assemblies of a block that starts about the sketch and all over the circles lead to."""
         closing = self.residual_function(stage, z, self.p)
         starts = np.concatenate([self._starts_near_sketch(stage, z)[0], _spread_angles(slice_length(stage.unknowns))])
-        ended = damped_newton(closing, self._with_lengths(stage, closing, starts))
+        ended = self._solve_from(closing, self._with_lengths(stage, closing, starts))
         return self._from_converged(stage, z, closing, ended.unknowns[ended.converged])
 
     def _is_same(self, stage: Block, z: Array, a: Array, b: Array) -> bool:

@@ -24,10 +24,12 @@ EQUAL_DISTANCE_TOLERANCE = 1e-9
 """Assemblies whose sums of squared distances to the sketch (sizes squared) agree to this fit alike."""
 MAX_TIED = 64
 """Assemblies that fit alike among which one is looked for whose rates are determined."""
-MAX_EXPANSIONS = 1000
-"""Blocks solved before the search stops looking for a nearer assembly and takes the best way to an end."""
-MAX_SOLVED_BLOCKS = 2 * MAX_EXPANSIONS
-"""Blocks solved before the search stops without an assembly: combinations of earlier blocks grow exponentially."""
+MAX_BEST_FIRST_BLOCKS = 1000
+"""Blocks solved, beside every block once, before the search stops looking for a nearer assembly and takes the best
+partial one to an end."""
+MAX_SOLVED_BLOCKS = 2 * MAX_BEST_FIRST_BLOCKS
+"""Blocks solved, beside every block once, before the search stops without an assembly: combinations of earlier blocks
+grow exponentially."""
 FAR_FROM_SKETCH = 0.1
 """The part of the mechanism's size by which a point may be off its sketch without a remark."""
 TURNED_FROM_SKETCH = pi / 4
@@ -46,12 +48,13 @@ class AssemblySearchFailure(NamedTuple):
     """The block at which every way to assemble ends.
 
     `z`: the unknowns where it is nearest to closing, those of earlier blocks filled in; `solved_blocks`: how many
-    were solved in search of it; `is_cut_off`: whether the search stopped before it had tried all combinations.
+    were solved in search of it (see `BlockAssemblies.solved_blocks`); `is_cut_off`: whether the search stopped before
+    it had tried all combinations.
     """
 
     stage: Block
     z: Array
-    solved_blocks: int = 0
+    solved_blocks: float = 0.0
     is_cut_off: bool = False
 
 
@@ -108,7 +111,7 @@ def find_nearest_assembly(
 
     The cost of a partial assembly never falls as it grows, so the first whole one is the nearest. Of several that fit
     alike one is taken that `is_regular`, whose rates are determined, if there is one among the first. After
-    `MAX_EXPANSIONS` blocks the search only goes on to an end, and says so; after `MAX_SOLVED_BLOCKS` it stops.
+    `MAX_BEST_FIRST_BLOCKS` the search only goes on to an end, and says so; after `MAX_SOLVED_BLOCKS` it stops.
     """
     stages = candidates.equations.blocks
     number, groups = count(), _BlockSearch(candidates)
@@ -116,10 +119,12 @@ def find_nearest_assembly(
     chosen: _Node | None = None
     taken: _Node | None = None
     tied = 0
-    for expansions in count():
-        if not heap or expansions >= MAX_SOLVED_BLOCKS or (chosen is not None and expansions > MAX_EXPANSIONS):
+    while heap:
+        extra_blocks = candidates.solved_blocks - candidates.full_effort
+        is_best_first = extra_blocks < MAX_BEST_FIRST_BLOCKS
+        if extra_blocks >= MAX_SOLVED_BLOCKS or (chosen is not None and not is_best_first):
             break
-        if expansions < MAX_EXPANSIONS:
+        if is_best_first:
             node = heapq.heappop(heap)
         else:
             node = heap.pop(min(range(len(heap)), key=lambda index: (-len(heap[index].ranks), *heap[index][:4])))
@@ -152,8 +157,8 @@ def find_nearest_assembly(
     if chosen is None:
         assert groups.last_failure is not None
         is_cut_off = bool(heap) and not groups.is_hopeless
-        return groups.last_failure._replace(solved_blocks=expansions, is_cut_off=is_cut_off)
-    return Assembly((taken or chosen).z, (taken or chosen).ties if tied else (), expansions >= MAX_EXPANSIONS)
+        return groups.last_failure._replace(solved_blocks=candidates.solved_blocks, is_cut_off=is_cut_off)
+    return Assembly((taken or chosen).z, (taken or chosen).ties if tied else (), bool(heap))
 
 
 def sketch_distance_remarks(setup: PreparedMechanism, z: Array) -> tuple[str, ...]:

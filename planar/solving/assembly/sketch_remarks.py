@@ -8,7 +8,6 @@ from planar.foundation.arrays import Array
 from planar.foundation.units import parse_unit
 from planar.model.pairs import MeasureKind
 from planar.model.wording import count_phrase, join_all_names, quote_names
-from planar.solving.assembly import nearest_assembly
 from planar.solving.assembly.block_assemblies import BlockAssemblies
 from planar.solving.assembly.nearest_assembly import Assembly
 from planar.solving.prepared_mechanism import PreparedMechanism
@@ -35,9 +34,8 @@ def sketch_remarks(setup: PreparedMechanism, candidates: BlockAssemblies, found:
         )
     if found.is_cut_off:
         told.append(
-            "the search for the assembly nearest to the sketch stopped after "
-            f"{nearest_assembly.MAX_EXPANSIONS} groups and "
-            f"took the nearest on its way; sketch more points to be sure of the one that is meant"
+            "the search for the assembly nearest to the sketch stopped before it had tried all combinations and took "
+            "the nearest so far; sketch more points to choose the one that is meant"
         )
     if setup.is_deflated:
         told.append(_second_order_remark(setup))

@@ -20,7 +20,7 @@ from planar.foundation.units import parse_unit
 from planar.model.link_shapes import PointPlacementError
 from planar.model.mechanism import Drive, Mechanism, replace_inputs
 from planar.model.wording import amount
-from planar.solving.assembly.block_assemblies import BlockAssemblies, BlockAssembly, block_residual_function
+from planar.solving.assembly.block_assemblies import BlockAssemblies, block_residual_function
 from planar.solving.assembly.nearest_assembly import Assembly, AssemblySearchFailure, find_nearest_assembly
 from planar.solving.newton import correct_blocks, damped_newton
 from planar.solving.prepared_mechanism import PreparedMechanism
@@ -48,7 +48,7 @@ MIN_SENSITIVITY = 1e-3
 MAX_CHANGES_TRIED = 4
 """Changes, the least first, that are tried by assembling the whole."""
 PRINTED_DIGITS, ALL_DIGITS = 5, 15
-MIN_BLOCK_BUDGET, MAX_BLOCK_BUDGET = 200, 400
+MIN_BLOCK_BUDGET, MAX_BLOCK_BUDGET = 500, 2000
 """Blocks that may be solved in search of a remedy: as many as the search for an assembly took, within these bounds."""
 MOVED_BLOCK_COST = 0.1
 """What it takes to move a block on from where it was, for one of solving it from a sketch."""
@@ -78,9 +78,9 @@ class _BudgetedAssemblies(BlockAssemblies):
         super().__init__(setup)
         self._effort = effort
 
-    def near_sketch(self, stage: Block, z: Array, every: bool = False) -> tuple[list[BlockAssembly], Array]:
-        self._effort.spend(1.0)
-        return super().near_sketch(stage, z, every)
+    def _count_effort(self, blocks: float) -> None:
+        super()._count_effort(blocks)
+        self._effort.spend(blocks)
 
 
 class RemedyChange(NamedTuple):

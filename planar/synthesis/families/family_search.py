@@ -12,7 +12,7 @@ from planar.model.wording import count_phrase
 from planar.synthesis.catalogue.matches import Match
 from planar.synthesis.design_search import Candidate, DesignSearch
 from planar.synthesis.families.exact_members import ExactMembers, MemberSampler, join_members
-from planar.synthesis.families.member_screen import MemberScreen, Screening
+from planar.synthesis.families.member_screen import ENTRY_LACK, MemberScreen, Screening
 from planar.synthesis.families.recombination import independent_parts, null_space, recombine
 from planar.synthesis.judged_candidate import judge_candidate
 from planar.synthesis.judgement.judgement import DesignJudge
@@ -30,6 +30,8 @@ POOL = 4
 """Members that keep the demands, times the designs that are listed, at which no more are sought."""
 CANDIDATES = 1.5
 """Members that are judged at most, times the designs that are listed."""
+MAX_HOPELESS = 25_000
+"""Members that are tried where not even the entries of any keep the demands; after these only the nearest go on."""
 NEAREST = 3
 """Members that are judged where none keeps the demands, so that it is said what they lack."""
 
@@ -85,7 +87,7 @@ class FamilySearch:
                 self._add(drawn)
                 basis.append(drawn)
                 self._recombine(join_members(basis))
-            if self._is_enough() or self.is_over() or (basis and not self.dimension):
+            if self._is_enough() or self._is_hopeless() or self.is_over() or (basis and not self.dimension):
                 break
         if self.tried and self.dimension and not self._is_enough():
             self._improve()
@@ -93,6 +95,9 @@ class FamilySearch:
 
     def _is_enough(self) -> bool:
         return self.met >= POOL * self.count
+
+    def _is_hopeless(self) -> bool:
+        return self.tried > MAX_HOPELESS and min(part.violation.min() for part in self.screenings) >= ENTRY_LACK
 
     def _recombine(self, members: ExactMembers) -> None:
         """Exchange parts of members that vary independently, while too few keep the demands."""
@@ -102,7 +107,7 @@ class FamilySearch:
         if len(parts) < 2:
             return
         for _ in range(RECOMBINED_ROUNDS // DRAW_ROUNDS):
-            if self._is_enough() or self.is_over():
+            if self._is_enough() or self._is_hopeless() or self.is_over():
                 break
             combined = recombine(self.sampler, members, parts, RECOMBINATIONS)
             if len(combined.numbers):

@@ -28,7 +28,7 @@ NEAR_END = 0.5
 """The same beside the end of a branch, which is followed until the dead point is near."""
 POSITIONS = 25
 """Of the motion, at which demands are evaluated."""
-OTHER_BRANCH, NOT_FOLLOWED, OFF_BRANCH, NO_WHOLE_TURN, NO_ORDER = 20.0, 15.0, 10.0, 6.0, 4.0
+OTHER_BRANCH, NOT_FOLLOWED, ENTRY_LACK, OFF_BRANCH, NO_WHOLE_TURN, NO_ORDER = 20.0, 15.0, 12.0, 10.0, 6.0, 4.0
 """Violations, to which is added how far a member is from keeping the demand: any of the first is the worst."""
 
 
@@ -60,8 +60,9 @@ class MemberScreen:
         violation = self._determinant_signs(members)
         transmission = np.full(len(violation), np.inf)
         same = np.flatnonzero(violation == 0.0)
-        violation[same[MAX_FOLLOWED:]] = NOT_FOLLOWED
-        rows = same[:MAX_FOLLOWED]
+        lacks = self._entry_lacks(members.take(same))
+        violation[same] = np.where(lacks > 0.0, ENTRY_LACK + np.tanh(lacks), NOT_FOLLOWED)
+        rows = same[lacks == 0.0][:MAX_FOLLOWED]
         if len(rows):
             violation[rows], transmission[rows] = self._follow(members.take(rows))
         return Screening(violation, transmission)
@@ -78,6 +79,15 @@ class MemberScreen:
         return np.where(
             wrong > 0.0, OTHER_BRANCH + wrong / np.maximum(np.abs(values).sum(axis=1), np.finfo(float).tiny), 0.0
         )
+
+    def _entry_lacks(self, members: ExactMembers) -> Array:
+        """By how much (n,) the wanted entries themselves miss what is demanded of the whole motion."""
+        lacks = np.zeros(len(members.numbers))
+        for guard in (self.search.guards or {}).values():
+            if guard.rows and not guard.turns_only:
+                for y in members.unknowns:
+                    lacks = np.maximum(lacks, -guard.slacks(members.numbers, y).min(axis=1, initial=0.0))
+        return lacks
 
     def _follow(self, members: ExactMembers) -> tuple[Array, Array]:
         """Violations and least transmission angles (n,) of members whose determinants have one sign."""
