@@ -154,18 +154,20 @@ class LagrangianFunctions:
     def actions_on_links(self) -> ca.SX:
         """What each load, weight and spring puts on the links (coordinates, loads + masses + springs)."""
         q, q1 = self.q, self.q1
-        loads = []
-        for k, load in enumerate(self.mechanism.loads):
-            effort: ca.SX | float = 0.0
-            if load.pair is not None and load.effort is not None:
-                effort = self.unit_effort_on_links(load.pair) * load.effort
-            loads.append((self._load_forces(load)[0] + effort) * self.factors[k])
+        loads = [self.load_on_links(load) * self.factors[k] for k, load in enumerate(self.mechanism.loads)]
         weights = [-ca.gradient(self._weight_potential(mass), q) for mass in self.mechanism.masses]
         energies = [
             self._spring_energy_and_dissipation(spring, number) for number, spring in enumerate(self.mechanism.springs)
         ]
         springs = [-ca.gradient(stored, q) - ca.gradient(taken, q1) for stored, taken in energies]
         return ca.horzcat(ca.SX(q.numel(), 0), *loads, *weights, *springs)
+
+    def load_on_links(self, load: Load) -> ca.SX:
+        """What a load puts on the links (coordinates,) where its course has the factor one."""
+        effort: ca.SX | float = 0.0
+        if load.pair is not None and load.effort is not None:
+            effort = self.unit_effort_on_links(load.pair) * load.effort
+        return self._load_forces(load)[0] + effort
 
     def unit_effort_on_links(self, name: str) -> ca.SX:
         """What an effort of one at a pair puts on the links (coordinates,), the pairs' own coordinates left alone."""

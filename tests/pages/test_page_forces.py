@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import planar
+from planar.analysis.motion.mechanical_advantage import advantages
 from planar.document.dimensions import change_dimension, link_lengths
 from planar.document.files import read_asset
 from planar.dynamics.load_attachment import attachments
@@ -94,6 +95,13 @@ def alike(found: dict[str, Any], mechanism: Mechanism) -> None:
     for shown, (name, wheel) in zip(found["wheels"], forces.fixed_wheels.items(), strict=True):
         assert shown["about"] == name and shown["pairs"] == [*wheel.shares]
         assert abs(shown["torque"] - wheel.torque) <= least[2]
+    listed = [each for row in advantages(state).values() for each in row.values()] if state.mechanism.loads else []
+    for shown, wanted in zip(found["advantages"], listed, strict=True):
+        assert (shown["output"], shown["along"], shown["input"]) == (wanted.target, wanted.along, wanted.input)
+        if wanted.by_power is None:
+            assert shown["ratio"] is None
+        else:
+            assert shown["ratio"] == pytest.approx(wanted.by_power, rel=1e-6)
     # what acts, link by link, as a force and a moment about the world's origin
     for link in state.shapes.keys() - {mechanism.frame}:
         shown = [(*each["at"], *each["force"], each["couple"]) for each in found["acting"] if each["link"] == link]

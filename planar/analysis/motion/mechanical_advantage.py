@@ -77,12 +77,29 @@ def advantages(state: State, outputs: Sequence[str] | None = None) -> dict[str, 
     Of a force at a point there are both: the point's, along its path, and the load's, in its direction. Raises as
     `advantage` does.
     """
-    if outputs is None:
-        outputs = []
-        for index, load in enumerate(state.mechanism.loads):
-            outputs += [load.target, *([] if load.force is None or not any(load.force) else [f"{LOAD_PREFIX}{index}"])]
+    outputs = [*loaded_outputs(state)] if outputs is None else outputs
     ways = [_AdvantagesOverInput(state, given.pair) for given in state.mechanism.inputs] if outputs else []
     return {output: {each.input: each.advantage_of(output) for each in ways} for output in dict.fromkeys(outputs)}
+
+
+def loaded_outputs(state: State) -> dict[str, int]:
+    """What is loaded, by the names that `advantage` takes, with the index of the (first) load of each.
+
+    Of a force at a point that is the point and the load. A load on a link or pair that has the name of a point, or of a
+    link, goes by its own name alone.
+    """
+    outputs: dict[str, int] = {}
+    for index, load in enumerate(state.mechanism.loads):
+        own_name = f"{LOAD_PREFIX}{index}"
+        is_point = load.target in state._point_names
+        is_ambiguous = load.point is None and (is_point or (load.pair is not None and load.target in state.frames))
+        is_loaded = any(load.force) if load.force is not None else bool(load.torque or load.effort)
+        names = [] if is_ambiguous else [load.target]
+        if is_loaded and (is_ambiguous or load.force is not None):
+            names.append(own_name)
+        for name in names:
+            outputs.setdefault(name, index)
+    return outputs
 
 
 class _OutputRate(NamedTuple):

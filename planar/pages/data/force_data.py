@@ -8,6 +8,7 @@ from typing import Any
 
 import casadi as ca
 
+from planar.analysis.motion.mechanical_advantage import loaded_outputs
 from planar.codegen.javascript import write_javascript
 from planar.document.dimensions import change_dimension
 from planar.drawing.forces.action_arrows import ActionSymbol, action_symbols, reaction_symbols
@@ -66,6 +67,7 @@ def force_data(
             for given in mechanism.inputs
         ],
         "acting": list(_action_data(rows)),
+        "advantages": list(_advantage_data(rows, state)),
         "contacts": list(contact_data(rows, state)),
         "springs": [_spring_angle_data(work, spring) for spring in mechanism.springs],
         "wheels": list(_fixed_wheel_data(rows)),
@@ -183,6 +185,29 @@ def _action_data(rows: BalanceRows) -> Iterator[dict[str, Any]]:
             ends = [(each.link, rows.add_place(work.attachment_position(each))) for each in hung]
         yield {"kind": "spring", "name": str(number), "row": row, "on": ends}
         row += 1
+
+
+def _advantage_data(rows: BalanceRows, state: State) -> Iterator[dict[str, Any]]:
+    """What `advantages` lists: each with the rows of the unit loads whose power is the output's rate.
+
+    Of a point there are two rows, along x and y, of which the rate is the speed along its path.
+    """
+    mechanism = rows.mechanism
+    for name, index in loaded_outputs(state).items():
+        load, along = mechanism.loads[index], ""
+        if name != load.target:
+            along = name
+            force = load.force or (load.torque or load.effort, 0.0)
+            units = [load.scaled(1.0 / ca.sqrt(force[0] ** 2 + force[1] ** 2))]
+        elif load.point is not None:
+            along, units = "path", [Load(point=name, force=way) for way in ((1.0, 0.0), (0.0, 1.0))]
+        elif load.link is not None:
+            units = [Load(link=name, torque=1.0)]
+        else:
+            along, units = "line" if load.points else "", [load._replace(effort=1.0)]
+        is_length = load.link is None and (load.pair is None or has_length_motion(mechanism, load.pair))
+        first_row = rows.add(ca.horzcat(*map(rows.work.load_on_links, units)).T)
+        yield {"output": load.target, "along": along, "rows": first_row, "length": is_length}
 
 
 def _loaded_links(load: Load, rows: BalanceRows) -> Mapping[str, int]:

@@ -1,6 +1,6 @@
 "use strict";
-/* The forces as tables, while their layer is shown: what inputs supply, what holds wheels of the frame, and what pairs do
-   to the links chosen, or else to their second links. Each cell carries its exact SI value as `data-si`. */
+/* The forces as tables, while their layer is shown: what inputs supply, mechanical advantages, what holds wheels of the
+   frame, and what pairs do to the links chosen, or else to their second links. Each cell carries its exact SI value as `data-si`. */
 
 class ForceTables {
   constructor(page) {
@@ -18,7 +18,7 @@ class ForceTables {
     this.told ??= htmlPart("p", { class: "hint" }, place);
     this.told.textContent = found.efforts ? forceNotes(page, found).join("; ") : `Forces: ${found.why}`;
     this.told.hidden = this.told.textContent === "";
-    if (!found.efforts) { for (const key of ["inputs", "wheels", "pairs"]) this.rows(key, "", [], []); return; }
+    if (!found.efforts) { for (const key of ["inputs", "advantages", "wheels", "pairs"]) this.rows(key, "", [], []); return; }
     const [force, couple] = page.forces.least(found);
     const number = (value, least, by) => [value, Math.abs(value) <= least ? "0" : Number.isFinite(value) ? figures(value * by) : ""];
     const [degree, angle] = unitOf(page, "angle"), rates = page.given;
@@ -26,6 +26,12 @@ class ForceTables {
     this.rows("inputs", `What inputs supply at ${at}`, [["input"], ["torque or force"], ["unit"], ["power", powerUnit]], found.inputs.map((each, k) => {
       const rate = rates[k][0], [least, by, unit] = each.slides ? [force, byForce, forceUnit] : [couple, byTorque, torqueUnit];
       return [each.pair, number(each.effort, least, by), unit, number(each.effort * rate, least * Math.abs(rate), byPower)];
+    }));
+    this.rows("advantages", `Mechanical advantage at ${at}, without friction`, [["output"], ["along"], ["for the input"], ["by power"], ["unit"]], found.advantages.map((each) => {
+      const [over, overUnit] = each.length ? [byForce, forceUnit] : [byTorque, torqueUnit];
+      const [under, underUnit] = each.slides ? [byForce, forceUnit] : [byTorque, torqueUnit];
+      const along = { path: "its path", line: "their line" }[each.along] ?? each.along;
+      return [each.output, along, each.input, number(each.ratio, 0, over / under), overUnit === underUnit ? "" : `${overUnit} per ${underUnit}`];
     }));
     this.rows("wheels", `Holding torque on wheels of ${page.data.forces.wheels[0]?.frame}, anticlockwise, at ${at}`, [["about"], ["pair"], ["holding torque", torqueUnit]],
       found.wheels.filter((each) => Number.isFinite(each.torque)).map((each) => [each.about, each.pairs.join(", "), number(each.torque, couple, byTorque)]));

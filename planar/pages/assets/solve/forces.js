@@ -5,6 +5,7 @@
 
 const OPEN_FORCES = 1e-8;  // of the greatest: links that stay out of balance by more are not held
 const NO_COUPLE = 1e-13;   // of a pair's force at an arm of the mechanism's size: a couple below is none
+const STANDING_RATE = 1e-12;     // of the input's rate, or that times or over the size: an output that moves less is at rest
 const ILL = 1e9;           // of the norms of a matrix and its inverse: beyond it is one of a dead point
 
 /** A square matrix (column by column) taken apart once, to be solved for many right sides; null where it is singular. */
@@ -93,7 +94,8 @@ class Forces {
     });
   }
 
-  /** The forces of a state (`Linkage.state`) with the inputs and dimensions there: {why, efforts, inputs, pairs, acting}.
+  /** The forces of a state (`Linkage.state`) with the inputs and dimensions there: {why, efforts, inputs, pairs, acting,
+      advantages}.
       What is not told is NaN; where nothing is, `why` says so and there is nothing else. */
   at({ w, w1, w2, why }, inputs, d, wound, values = this.data.parameters.map((each) => each.value)) {
     const { data } = this;
@@ -144,7 +146,22 @@ class Forces {
       found = solved(left);
     }
     if (found === null) return { why: "no forces in the pairs balance the links here, or a dead point is too near to tell" };
-    return this.tell(found, drives, pushes, pushedOff);
+    return { ...this.tell(found, drives, pushes, pushedOff), advantages: this.advantages(solved) };
+  }
+
+  /** What an ideal mechanism exerts at each output for a unit of each input: [{output, along, length, input, slides, ratio}].
+      An output's rate is the power of a unit load there, which the inputs take up: the ratio is its inverse. */
+  advantages(solved) {
+    const { data: { advantages, inputs }, size } = this;
+    return advantages.flatMap(({ rows: [first, last], ...output }) => {
+      const taken = Array.from({ length: last - first }, (_, k) => solved(this.links(first + k).map((each) => -each)));
+      return inputs.map(({ pair, slides }, k) => {
+        const rates = taken.map((found) => (found === null ? NaN : -found[found.length - inputs.length + k]));
+        const rate = rates.length > 1 ? Math.hypot(...rates) : rates[0];
+        const none = STANDING_RATE * (output.length ? size : 1) / (slides ? size : 1);
+        return { ...output, input: pair, slides, ratio: Math.abs(rate) <= none ? NaN : 1 / rate };
+      });
+    });
   }
 
   row(k) { return this.table.subarray(k * this.data.coordinates, (k + 1) * this.data.coordinates); }
