@@ -42,8 +42,9 @@ from planar.foundation.errors import BadInput
 from planar.foundation.units import parse_unit
 
 FRAME = "ground"
-PARALLEL, CLOSED, EXACT = 1e-6, 1e-4, 1e-8
-"""Of unit vectors that are parallel; of the assembly's size in space, gaps of joints that are closed, and noted."""
+PARALLEL, TOUCHING, CLOSED, EXACT = 1e-6, 1e-4, 1e-5, 1e-8
+"""Of unit vectors that are parallel; of the radii of wheels that touch; of the assembly's size, gaps of
+joints that are closed (solvers save assemblies that are open by some 2e-6 of it), and noted."""
 AT_LIMIT = 1e-6
 """rad, or of the assembly's size: a joint this far beyond its limit is at it."""
 SOLVER_LINE, FREECAD_NAME = "OndselSolver", "OndselAssembly"
@@ -332,7 +333,7 @@ class _Reader:
             raise BadInput(self._place_of(given), "its wheels turn on no common part")
         apart = hypot(centres[0][0] - centres[1][0], centres[0][1] - centres[1][1])
         first, second = abs(radii[0]), abs(radii[1])
-        if abs(apart - first - second) > CLOSED * (first + second):
+        if abs(apart - first - second) > TOUCHING * (first + second):
             first, second = (-first, second) if first > second else (first, -second)
         return WheelJoint(
             self.book.fresh(given.value("Name") or "gear"), "gear", (one, other), carrier, "radii", (first, second)

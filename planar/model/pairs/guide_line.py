@@ -10,7 +10,7 @@ from planar.foundation.argument_types import checked_arguments
 from planar.foundation.geometry import Frame, Vector, direction
 from planar.foundation.jets import Scalar, atan2, hypot
 from planar.model.entry_reader import EntryReader, QuantityWriter
-from planar.model.link_shapes import LinkShape, PointReference
+from planar.model.link_shapes import LinkShape, PointPlacementError, PointReference
 from planar.model.pairs.base import EffortAction, MeasureKind, Pair, Schema, described, schema_reference
 
 LINE_SCHEMA: Schema = {
@@ -47,6 +47,8 @@ class LinkLine(NamedTuple):
         if self.to is not None:
             whole = shape.position(self.to) - shape.position(self.through)
             size = hypot(whole.x, whole.y)
+            if isinstance(size, float) and size == 0.0:
+                raise PointPlacementError(None, "the two points of a line coincide, so they give no direction")
             way = Vector(whole.x / size, whole.y / size)
         return (*shape.position(self.through), *way)
 
