@@ -8,6 +8,7 @@ from os import PathLike
 from typing import Any, Concatenate, Literal, ParamSpec, Protocol, TypeVar, overload
 
 from planar.document.files import as_mechanism
+from planar.foundation.arrays import one_blas_thread
 from planar.foundation.errors import BadInput, join_names
 from planar.model.mechanism import Mechanism
 
@@ -83,9 +84,14 @@ def _with_first(function: Any, resolve: Callable[[Any], Any]) -> Any:
     @wraps(function)
     def call(*args: Any, **named: Any) -> Any:
         if args:
-            return function(resolve(args[0]), *args[1:], **named)
-        if first in named:
-            named[first] = resolve(named[first])
-        return function(**named)
+            source = resolve(args[0])
+            args = (source, *args[1:])
+        elif first in named:
+            source = named[first] = resolve(named[first])
+        else:
+            return function(**named)
+        mechanism = getattr(source, "mechanism", source)
+        with one_blas_thread(len(getattr(mechanism, "links", ()))):
+            return function(*args, **named)
 
     return call

@@ -1,5 +1,7 @@
 """Arrays: their types, for annotations, and what is done with small ones at every step, without numpy's detours."""
 
+from contextlib import AbstractContextManager, nullcontext
+from functools import cache
 from math import sqrt
 from typing import Any, TypeAlias
 
@@ -11,6 +13,8 @@ Array: TypeAlias = NDArray[np.floating[Any]]
 IntArray: TypeAlias = NDArray[np.integer[Any]]
 BoolArray: TypeAlias = NDArray[np.bool_]
 ComplexArray: TypeAlias = NDArray[np.complexfloating[Any, Any]]
+MIN_LINKS_FOR_ONE_THREAD = 24
+"""Links of a mechanism from which on its matrices are so large that BLAS would take several threads for each."""
 
 
 def greatest_size(values: Array) -> float:
@@ -35,3 +39,18 @@ def append_number(vector: Array, number: float) -> Array:
     found = np.empty(len(vector) + 1)
     found[:-1], found[-1] = vector, number
     return found
+
+
+@cache
+def _blas_controller() -> Any:
+    from threadpoolctl import ThreadpoolController  # it looks through all libraries that are loaded
+
+    return ThreadpoolController().select(user_api="blas")
+
+
+def one_blas_thread(link_count: int) -> AbstractContextManager[Any]:
+    """A context in which BLAS works on one thread, for mechanisms of many links; one that does nothing for others."""
+    if link_count < MIN_LINKS_FOR_ONE_THREAD:
+        return nullcontext()
+    limited: AbstractContextManager[Any] = _blas_controller().limit(limits=1)
+    return limited

@@ -57,6 +57,7 @@ LIBRARIES = {
     "casadi": {"assemblies", "batch", "codegen", "derivatives", "dynamics", "equations", "pages", "synthesis"},
     "networkx": {"model", "structures"},
     "clarabel": {"dynamics"},
+    "threadpoolctl": {"foundation"},
     "flint": {"assemblies"},
     "llvmlite": {"codegen"},
     "scipy": {"analysis", "dynamics", "model"},

@@ -197,7 +197,7 @@ def _advantage_data(rows: BalanceRows, state: State) -> Iterator[dict[str, Any]]
         load, along = mechanism.loads[index], ""
         if name != load.target:
             along = name
-            force = load.force or (load.torque or load.effort, 0.0)
+            force = load.force or (load.torque or load.effort or 0.0, 0.0)
             units = [load.scaled(1.0 / ca.sqrt(force[0] ** 2 + force[1] ** 2))]
         elif load.point is not None:
             along, units = "path", [Load(point=name, force=way) for way in ((1.0, 0.0), (0.0, 1.0))]
