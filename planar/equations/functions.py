@@ -215,28 +215,18 @@ class EquationFunctions:
         return BufferedFunction(self._third_rate_function)
 
     @kept_function
-    def _second_derivative_function(self) -> ca.Function:
-        e = self.equations
-        y, way = e.y, ca.SX.sym("way", e.y.numel())
-        return ca.Function("along", [y, way, e.p], [ca.densify(ca.jacobian(ca.jtimes(e.F, y, way), y))])
-
-    @kept_function
     def _weighted_hessian_function(self) -> ca.Function:
         e = self.equations
         y, rows = e.y, ca.SX.sym("l", e.F.numel())
         return ca.Function("weighed", [y, rows, e.p], [ca.densify(ca.jacobian(ca.jtimes(e.F, y, rows, True), y))])
 
     @cached_property
-    def _second_derivative_calls(self) -> tuple[BufferedFunction, BufferedFunction]:
-        return BufferedFunction(self._second_derivative_function), BufferedFunction(self._weighted_hessian_function)
-
-    def second_derivative_along(self, y: Array, direction: Array, p: Array) -> Array:
-        """The second derivatives of F with one direction filled in (rows, y): the Jacobian of (dF/dy) direction."""
-        return self._second_derivative_calls[0](y, direction, p)[0].T
+    def _weighted_hessian_call(self) -> BufferedFunction:
+        return BufferedFunction(self._weighted_hessian_function)
 
     def weighted_hessian(self, y: Array, weights: Array, p: Array) -> Array:
         """The second derivatives (y, y) of the sum of the rows of F, each times its number."""
-        return self._second_derivative_calls[1](y, weights, p)[0].T
+        return self._weighted_hessian_call(y, weights, p)[0].T
 
     @kept_function
     def _deflated_function(self) -> ca.Function:

@@ -66,66 +66,85 @@ class Bifurcation(NamedTuple):
     rank_loss: int
 
 
-def bifurcation_candidates(curve: SolutionCurve, here: CurvePoint) -> Iterator[BifurcationCandidate]:
-    """The points next to this one at which the Jacobian has more than one null vector, those that Newton finds.
+def bifurcation_candidates(curve: SolutionCurve, here: CurvePoint, farthest: float) -> Iterator[BifurcationCandidate]:
+    """The points next to this one at which the Jacobian has more than one null vector, those that Newton finds by steps
+    no longer than `farthest`.
 
-    Gauss and Newton's method for F = 0, J A = 0 with A0^T A = 1: regular wherever branches cross at an angle, and for
-    any number of redundant constraints. Where several loops come near one at once, each is looked for.
+    Each small singular value is brought to zero; where several loops come near a change point at once, each is found.
     """
-    size = len(here.y)
-    _, values, rows = np.linalg.svd(curve.jacobian(here.y))
+    y, size = here.y + min(here.regular_distance, 0.1) * here.tangent, len(here.y)
+    start = _decompose(curve, y)
     for second in range(2, size + 1):
-        if second > 2 and values[size - second] > SMALL_SINGULAR_VALUE * max(values[0], 1.0):
+        if second > 2 and start.values[size - second] > SMALL_SINGULAR_VALUE * max(start.values[0], 1.0):
             return
-        start = rows[[size - second, size - 1]].T
-        y = here.y + min(here.regular_distance, 0.1) * here.tangent
-        found = _refine_candidate(curve, y, start)
+        found = _refine_candidate(curve, y, start.right[[size - second, size - 1]].T, start, farthest)
         if found is not None and found.null.shape[1] > 2:
             found = _refine_candidate(curve, found.y, found.null)
         if found is not None:
             yield found
 
 
-def _refine_candidate(curve: SolutionCurve, y: Array, null_start: Array) -> BifurcationCandidate | None:
-    """The point next to y at which the Jacobian has null vectors next to these (n + 1, k)."""
-    size, count = null_start.shape
+class _Decomposition(NamedTuple):
+    """The constraints at a point: F (rows,), J (rows, n + 1), and the singular values of J with their vectors, those on
+    the left as columns and those on the right as rows."""
 
-    def augmented(x: Array) -> tuple[Array, Array]:
-        y, null = x[:size], x[size:].reshape(count, size).T
-        left, slope = curve.residuals_and_jacobian(y)
-        rows = len(slope)
-        residuals = [left, *(slope @ null).T, (null_start.T @ null - np.eye(count)).ravel()]
-        system = np.zeros((rows * (1 + count) + count * count, size * (1 + count)))
-        system[:rows, :size] = slope
-        whole = curve.unknowns_and_inputs(y)
-        for k in range(count):
-            band = slice(rows * (1 + k), rows * (2 + k))
-            change = curve.functions.second_derivative_along(whole, curve.widen_direction(null[:, k]), curve.p)
-            system[band, :size] = curve.narrow_columns(change)
-            system[band, size * (1 + k) : size * (2 + k)] = slope
-            # entry (j, k) of start^T null
-            system[rows * (1 + count) + k :: count, size * (1 + k) : size * (2 + k)] = null_start.T
-        return np.concatenate(residuals), system
+    residual: Array
+    jacobian: Array
+    left: Array
+    values: Array
+    right: Array
 
-    start = np.concatenate([y, null_start.T.ravel()])
-    x, is_settled = settle(
-        augmented, lambda J, F: _solve_least_squares(J, -F), start, MAX_REFINEMENTS, (size, CONVERGED_STEP), 1.0
-    )
+
+def _decompose(curve: SolutionCurve, y: Array) -> _Decomposition:
+    residual, jacobian = curve.residuals_and_jacobian(y)
+    return _Decomposition(residual, jacobian, *np.linalg.svd(jacobian))
+
+
+def _refine_candidate(
+    curve: SolutionCurve,
+    y: Array,
+    null_start: Array,
+    start: _Decomposition | None = None,
+    longest_step: float = 1.0,
+) -> BifurcationCandidate | None:
+    """The point next to y, where the constraints are as at the `start`, at which the Jacobian has null vectors next to
+    these (n + 1, k); None where Newton's method does not settle by steps no longer than the longest.
+    """
+
+    def here(tried: Array) -> tuple[Array, Array]:
+        constraints = start if start is not None and tried is y else _decompose(curve, tried)
+        return _step_to_lower_rank(curve, tried, constraints, null_start), np.zeros((0, 0))
+
+    settled_at = (len(y), CONVERGED_STEP)
+    found, is_settled = settle(here, lambda _, step: step, y, MAX_REFINEMENTS, settled_at, longest_step)
     if not is_settled:
         return None
-    y = x[:size]
-    left, slope = curve.residuals_and_jacobian(y)
-    null = null_space(slope, SINGULAR_TOLERANCE, unit=1.0)
-    return BifurcationCandidate(y, null, float(np.max(np.abs(left), initial=0.0))) if null.shape[1] > 1 else None
+    residual, jacobian = curve.residuals_and_jacobian(found)
+    null = null_space(jacobian, SINGULAR_TOLERANCE, unit=1.0)
+    gap = float(np.max(np.abs(residual), initial=0.0))
+    return BifurcationCandidate(found, null, gap) if null.shape[1] > 1 else None
 
 
-def _solve_least_squares(system: Array, right_side: Array) -> Array:
-    """The solution in the sense of least squares; where it is not determined, the shortest."""
-    q, r = np.linalg.qr(system)
-    diagonal = np.abs(np.diag(r))
-    if len(system) >= system.shape[1] and diagonal.min() > 1e-8 * diagonal.max():
-        return np.linalg.solve(r, q.T @ right_side)
-    return np.linalg.lstsq(system, right_side, rcond=1e-12)[0]
+def _step_to_lower_rank(curve: SolutionCurve, y: Array, constraints: _Decomposition, null_start: Array) -> Array:
+    """A step of Newton's method for the rank of the Jacobian, after Lyapunov and Schmidt.
+
+    Of the singular vectors those next to the null vectors that are sought, N on the right and L on the left, are set
+    apart. The step closes F along all others, and moves along N so that L^T J N vanishes to first order. Where L^T F
+    stays open the curve only comes near a change point.
+    """
+    residual, jacobian, left, values, right = constraints
+    nearest = np.argsort(-np.linalg.norm(right @ null_start, axis=1), kind="stable")[: null_start.shape[1]]
+    others = np.setdiff1d(np.arange(len(values)), nearest)
+    closing: Array = -right[others].T @ ((left[:, others].T @ residual) / values[others])
+    null, forms, defects = right[nearest].T, [], []
+    for weights in np.delete(left, others, axis=1).T:
+        slopes = null.T @ curve.weighted_hessian(y, weights)
+        forms.append(slopes @ null)
+        defects.append(weights @ jacobian @ null + slopes @ closing)
+    if not forms:
+        return closing
+    along = np.linalg.lstsq(np.concatenate(forms), -np.concatenate(defects), rcond=1e-12)[0]
+    return closing + null @ along
 
 
 class _BranchConditions:
@@ -136,10 +155,7 @@ class _BranchConditions:
         self.u, self.s, self.vt = np.linalg.svd(curve.jacobian(y))
         self.rank = int(np.sum(self.s > EXACT_SINGULAR_TOLERANCE * max(self.s[0], 1.0)))
         self.null, self.left_null = self.vt[self.rank :].T, self.u[:, self.rank :]
-        whole, forms = curve.unknowns_and_inputs(y), []
-        for rows in self.left_null.T:
-            bends = curve.functions.weighted_hessian(whole, rows, curve.p)
-            forms.append(self.null.T @ curve.narrow_columns(curve.narrow_columns(bends).T) @ self.null)
+        forms = [self.null.T @ curve.weighted_hessian(y, rows) @ self.null for rows in self.left_null.T]
         self.forms = np.array(forms).reshape(-1, *2 * [self.null.shape[1]])
 
     def branch_along(self, c: Array) -> CurvePoint | None:

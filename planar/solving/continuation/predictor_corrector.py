@@ -281,12 +281,10 @@ class CurveTracker:
 
     def _bifurcation_ahead(self, here: CurvePoint) -> Bifurcation | None:
         """The change point that lies just ahead; those of neighbouring linkages are noted."""
-        curve = self.curve
-        for near in bifurcation_candidates(curve, here):
+        curve, farthest = self.curve, max(MAX_AHEAD_RATIO * here.regular_distance, SEARCH_DISTANCE)
+        for near in bifurcation_candidates(curve, here, farthest):
             away = float(np.linalg.norm(near.y - here.y))
-            if not float(here.tangent @ (near.y - here.y)) > 0.0 or away > max(
-                MAX_AHEAD_RATIO * here.regular_distance, SEARCH_DISTANCE
-            ):
+            if not float(here.tangent @ (near.y - here.y)) > 0.0 or away > farthest:
                 continue
             if near.residual > curve.solver.tolerance or not curve.is_closed(near.y):
                 self.nearby = [each for each in self.nearby if np.linalg.norm(each.y - near.y) > 1e-6]

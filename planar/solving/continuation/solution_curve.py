@@ -178,6 +178,11 @@ class SolutionCurve(ImplicitCurve):
         wide = self.widen_direction(direction)
         return self.functions.kinematics(self.unknowns_and_inputs(y), wide, 0.0 * wide, self.p).F2
 
+    def weighted_hessian(self, y: Array, weights: Array) -> Array:
+        """The second derivatives (n + 1, n + 1) of the sum of the rows of F, each times its weight (rows,)."""
+        hessian = self.functions.weighted_hessian(self.unknowns_and_inputs(y), weights, self.p)
+        return self.narrow_columns(self.narrow_columns(hessian).T)
+
     def is_closed(self, y: Array) -> bool:
         """Whether a point passes the residual check."""
         return self.solver.max_residual(y[:-1], self.inputs(y)) <= self.solver.tolerance
