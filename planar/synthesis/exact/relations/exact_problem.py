@@ -55,7 +55,6 @@ class ExactProblem:
         self.first_entry: dict[int, Callable[[Wanted], complex]] = {}
         "the given numbers that are those of the first entry, by their symbols"
         self._know_first_entry()
-        self.pose.tie_lines_to_axes()
         self.first_slides = self._known_slides(lambda each: each.is_absolute)
         relations = [self._relations(k, each) for k, each in enumerate(self.items)]
         displacements = {name: self._know(NumberKind.LENGTH, value) for name, value in self.first_slides.items()}

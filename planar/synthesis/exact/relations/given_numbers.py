@@ -135,10 +135,6 @@ class _LinkConditions:
         self.offsets = [each for each in others if each.through is None and each.has_place]
         self.angles = [each for each in lines if each.has_angle]
         self.direction, self.origin = pose.axes.get(link.name, LinkAxes(None, None))
-        known = next((line for line in self.angles if line.slide.direction.symbols & pose.values.keys()), None)
-        if self.direction is None and known is not None:  # by the axes of the link that slides along this one's line
-            self.angles.remove(known)
-            self.direction = _now(pose, known.slide.direction) * self._turn_of(known).conjugate
         self.anchors = self._anchors()
 
     def _anchors(self) -> list[_Anchor | None]:
@@ -186,16 +182,13 @@ class _LinkConditions:
         way = self.direction
         self.pose.axes[self.link.name] = LinkAxes(way, self.origin)
         for line in self.angles:
-            self.pose.tie(line.slide.direction - way * self._turn_of(line))
+            assert line.angle is not None
+            turn = self.pose.table.add_given(NumberKind.TURN, float(self.pose.numbers[line.angle].value)).value
+            self.pose.tie(line.slide.direction - way * turn)
         for point, x, y in rest:
             self._add_point(point, (x, y), way)
         for line in self.offsets:
             line.add_across(self._offset(line, way))
-
-    def _turn_of(self, line: _Line) -> Polynomial:
-        """The angle of a line in the link's axes, as a number that is given."""
-        assert line.angle is not None
-        return self.pose.table.add_given(NumberKind.TURN, float(self.pose.numbers[line.angle].value)).value
 
     def _sought_direction(self) -> Polynomial:
         way = self.pose.table.add_unknown().value

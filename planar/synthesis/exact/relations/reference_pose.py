@@ -184,33 +184,13 @@ class ReferencePose:
         along = way.value * self.table.add_given(NumberKind.TURN, PATCH_ANGLE).value.conjugate
         self.conditions.append(along + along.conjugate - 2.0)
 
-    def tie_lines_to_axes(self) -> None:
-        """Give the lines along which links slide whose axes are known the direction that these have."""
-        given = {each.symbol.own for each in self.table.given}
-        for slide in self.slides:
-            axes, way = self.axes.get(slide.pair.bodies[1]), self.directions[slide.pair.name].symbol
-            has_turn = MeasureKind.ANGLE in slide.pair.residual_kinds
-            if axes is None or axes.direction is None or not has_turn or way.own in given:
-                continue
-            direction, turn = axes.direction, self._pair_angle(slide.pair.name, of_line=False)
-            if turn in self.free:
-                continue
-            if turn is not None:
-                angle = float(self.numbers[turn].value)
-                direction = direction * self.table.add_given(NumberKind.TURN, angle).value.conjugate
-            self.tie(way.value - direction)
-
     def line_angle(self, pair: str) -> str | None:
         """The number of the file that is the direction of a pair's line."""
-        return self._pair_angle(pair, of_line=True)
-
-    def _pair_angle(self, pair: str, of_line: bool) -> str | None:
-        """The number of the file that is the angle of a pair's line, or the one from there to the link that slides."""
         index = [each.name for each in self.mechanism.pairs].index(pair)
         own = [
             name
             for name, each in self.numbers.items()
-            if each.address[:2] == ("pairs", index) and each.kind == "angle" and ("line" in each.address) == of_line
+            if each.address[:2] == ("pairs", index) and each.kind == "angle" and "line" in each.address
         ]
         return own[0] if own else None
 
