@@ -297,14 +297,35 @@ def test_gravity_of_an_assembly_points_downwards_in_every_view(rows):
     assert (heights[0], heights[-1]) == (pytest.approx(0.0), pytest.approx(90.0))
 
 
-def test_an_assembly_that_its_solver_left_open_is_closed_with_a_note():
-    for gap, size in ((0.63e-6, 0.3), (1e-6, 0.1)):
-        text = asmt(
-            {"": {"m1": (0, 0)}, "bar": {"a": (0, 0), "b": (size * 1000, 0)}}, "RevoluteJoint A m1 bar/a", "A 1.0*time"
-        )
-        moved = text.replace("\n\t\t\tPosition3D\n\t\t\t\t0.0 0.0 0.0", f"\n\t\t\tPosition3D\n\t\t\t\t{gap} 0.0 0.0", 1)
-        assert "is open by" in " ".join(read_document(moved)["notes"])
-        assert planar.solve(read_text(moved)).residual < 1e-12
+def open_bar(gap: float, size: float, tolerance: str = "") -> str:
+    """An assembly of one bar of a length (m) whose pin is open by a gap (m), with the solver's tolerance if any."""
+    text = asmt(
+        {"": {"m1": (0, 0)}, "bar": {"a": (0, 0), "b": (size * 1000, 0)}}, "RevoluteJoint A m1 bar/a", "A 1.0*time"
+    )
+    parameters = (
+        f"\n\tSimulationParameters\n\t\terrorTol\n\t\t\t{tolerance}\nTimeSeries" if tolerance else "\nTimeSeries"
+    )
+    moved = text.replace("\n\t\t\tPosition3D\n\t\t\t\t0.0 0.0 0.0", f"\n\t\t\tPosition3D\n\t\t\t\t{gap} 0.0 0.0", 1)
+    return moved.replace("\nTimeSeries", parameters)
+
+
+@pytest.mark.parametrize(
+    ("gap", "size", "tolerance"),
+    [(0.63e-6, 0.3, ""), (0.63e-6, 0.021, "1.0e-6"), (0.9e-6, 0.1, ""), (9e-6, 10.0, ""), (4e-6, 0.3, "5.0e-6")],
+)
+def test_an_assembly_that_its_solver_left_open_is_closed_with_a_note(gap, size, tolerance):
+    text = open_bar(gap, size, tolerance)
+    assert "is open by" in " ".join(read_document(text)["notes"])
+    assert planar.solve(read_text(text)).residual < 1e-12
+
+
+@pytest.mark.parametrize(
+    ("gap", "size", "tolerance"),
+    [(2e-6, 0.3, ""), (0.63e-6, 0.01, ""), (0.63e-6, 0.3, "1.0e-7"), (2e-5, 0.3, "1.0"), (1e-9, 0.3, "-1.0")],
+)
+def test_an_assembly_open_by_more_than_its_solver_leaves_is_refused(gap, size, tolerance):
+    with pytest.raises(planar.BadInput, match="apart; save the assembly closed"):
+        read_document(open_bar(gap, size, tolerance))
 
 
 def test_names_of_links_that_are_numbers_stay_so_in_texts_of_pmks():
