@@ -2,6 +2,7 @@
 
 import json
 import re
+from dataclasses import replace
 from itertools import pairwise
 from math import acos, asin, atan2, hypot, inf, pi, radians, sin, sqrt
 from pathlib import Path
@@ -15,6 +16,7 @@ from scipy.optimize import minimize_scalar
 import planar
 from planar.cli import main
 from planar.foundation.errors import BadInput, Unknown
+from planar.model.loads import Load
 from planar.model.mechanism import Drive, relative_motions, replace_inputs
 from planar.reports.tables.answers import record, tables
 from tests import command
@@ -373,6 +375,45 @@ def test_the_advantage_over_a_motion_is_that_of_every_position(output):
     ends = [asin(0.4) + pi, 2.0 * pi - asin(0.4)]
     assert found.infinite == pytest.approx(ends, abs=1e-11)
     assert found.least.value <= np.abs(found.values).min()
+
+
+LOADS_OF_ALL_KINDS = (
+    Load(point="E", force=(-3.0, 4.0)),
+    Load(point="E", force=(-3.0, 4.0), axes="rod"),
+    Load(link="rod", torque=-5.0),
+    Load(pair="stroke", effort=-2.0),
+    Load(points=("O", "E"), effort=3.0),
+    Load(point="B", force=(0.0, 0.0)),
+)
+
+
+@pytest.mark.parametrize("output", ["loads.0", "loads.1", "loads.2", "loads.3", "loads.4", "O,E", "B,O"])
+def test_the_advantage_over_a_motion_takes_loads_by_name(output):
+    mechanism = replace(planar.load("slider-crank"), loads=LOADS_OF_ALL_KINDS)
+    motion = planar.cycle(mechanism, 12)
+    found = planar.advantage_over(motion, output)
+    assert found.output == output
+    for row in (1, 4, 8):
+        wanted = planar.advantage(planar.solve(mechanism, {"O": motion.inputs["O"].position[row]}), output)
+        assert found.values[row] == (inf if wanted.by_power is None else pytest.approx(wanted.by_power, rel=1e-9))
+        assert found.measure == wanted.measure
+    near = planar.advantage(planar.solve(mechanism, {"O": found.least.input}), output)
+    assert found.least.value == pytest.approx(abs(near.by_power), rel=1e-9)
+    for position in found.infinite:
+        around = [
+            planar.advantage(planar.solve(mechanism, {"O": position + step}), output).by_power for step in (-1e-4, 1e-4)
+        ]
+        assert around[0] * around[1] < 0.0
+        assert min(map(abs, around)) > 100.0 * found.least.value
+    assert len(found.infinite) == 2
+
+
+def test_a_load_that_is_zero_or_not_there_has_no_advantage_over_a_motion():
+    motion = planar.cycle(replace(planar.load("slider-crank"), loads=LOADS_OF_ALL_KINDS), 12)
+    with pytest.raises(BadInput, match="the load is zero"):
+        planar.advantage_over(motion, "loads.5")
+    with pytest.raises(Unknown, match=r"no point, link, pair or load 'loads.9'"):
+        planar.advantage_over(motion, "loads.9")
 
 
 def test_an_advantage_is_infinite_at_a_sample_on_an_end_and_without_rates_not_told():

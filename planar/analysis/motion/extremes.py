@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planar.analysis.interpolated_run import CLOSED_TOLERANCE, InterpolatedRun
-from planar.analysis.motion.output import Axis, Extreme, Output
+from planar.analysis.motion.output import Axis, Extreme, MotionQuantity, Output
 from planar.analysis.motion.zeros import SERIES_TOLERANCE, bracket_maxima, bracket_zeros, find_maximum
 from planar.document.first_argument import takes_result
 from planar.foundation.arrays import Array
@@ -194,14 +194,14 @@ def greatest(motion: Motion, of: str | StateMeasure, what: str = "velocity") -> 
     return find_greatest(InterpolatedRun(motion), of, what)
 
 
-def find_greatest(steady: InterpolatedRun, of: str | Output | StateMeasure, what: str = "velocity") -> Extreme:
-    """See `greatest`; of a motion made ready for it, or of an output of it."""
+def find_greatest(steady: InterpolatedRun, of: str | MotionQuantity | StateMeasure, what: str = "velocity") -> Extreme:
+    """See `greatest`; of a motion made ready for it, or of a quantity of it."""
     if what not in ("velocity", "acceleration"):
         raise BadInput("what", f"the greatest 'velocity' or 'acceleration' is found, not {what!r:.40}")
 
     def measured(moving: State | Motion) -> Array:
         """The square of the quantity, and of a velocity what its square grows by (..., 2)."""
-        if not isinstance(of, str | Output):
+        if callable(of):
             if isinstance(moving, Motion):
                 return np.stack([_measure_or_zero(measured, steady, at) if ok else np.zeros(2) for at, ok in rows])
             return np.array([float(np.sum(np.square(of(moving)))), 0.0])
@@ -218,7 +218,7 @@ def find_greatest(steady: InterpolatedRun, of: str | Output | StateMeasure, what
     if not len(positions):
         return Extreme(steady.lowest, nan)
     squares = table[:, 0]
-    still = steady.solver.unit * max(abs(steady.rate), steady.rate**2) if isinstance(of, str | Output) else 0.0
+    still = steady.solver.unit * max(abs(steady.rate), steady.rate**2) if not callable(of) else 0.0
     if np.ptp(squares) <= max(SERIES_TOLERANCE * squares.max(), (SERIES_TOLERANCE * still) ** 2):
         return Extreme(steady.lowest, sqrt(float(squares.max())))
     for limit, _ in steady.open_limits():
@@ -228,7 +228,7 @@ def find_greatest(steady: InterpolatedRun, of: str | Output | StateMeasure, what
     worth = RIVAL_RATIO**2 * rival
     ends = () if steady.closed else (steady.lowest, steady.highest)
     found = [Extreme(end, float(squares[np.argmin(np.abs(positions - end))])) for end in ends]
-    exact = isinstance(of, str | Output) and what == "velocity"
+    exact = not callable(of) and what == "velocity"
     for low, high in (
         bracket_zeros(positions, table[:, 1], falling=True) if exact else bracket_maxima(positions, squares)
     ):
@@ -261,9 +261,9 @@ def _measure_or_zero(measured: Callable[[State], Array], steady: InterpolatedRun
         return np.zeros(2)
 
 
-def quantity_and_rates(moving: State | Motion, name: str | Output) -> tuple[Array, Array, Array]:
+def quantity_and_rates(moving: State | Motion, name: str | MotionQuantity) -> tuple[Array, Array, Array]:
     """Position, velocity and acceleration (..., axes) of a slide, else of a point, another pair or a link."""
-    if isinstance(name, Output):
+    if not isinstance(name, str):
         position, velocity, acceleration = (
             each[..., None] for each in np.broadcast_arrays(*name.value_and_rates(moving))
         )

@@ -11,10 +11,10 @@ import numpy as np
 
 from planar.analysis.centres.centres import Centres, centres, extent
 from planar.analysis.centres.velocities import LinkByCentres, links_by_centres
+from planar.analysis.motion.load_direction import LOAD_PREFIX, find_unit_load, loads_by_name
 from planar.analysis.rate_equations import Rate, RateEquations, rate_equations
 from planar.document.first_argument import takes_result
 from planar.dynamics.external_actions import KinematicArrays, action_powers, action_velocities, actions_of_load
-from planar.dynamics.load_attachment import attachments
 from planar.dynamics.virtual_velocities import has_length_motion, unit_rate_state
 from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput, NoAnswer, Unknown, suggest_name_of_kinds
@@ -25,7 +25,6 @@ from planar.results.motion import State
 
 LEAST_SEPARATION = 1e-3
 """Centres that lie closer together than this, homogeneous and of length one, tell the line through them badly."""
-LOAD_PREFIX = "loads."
 PoleOfLink = Callable[[str], Array]
 """Of a link by name: w times its pole (x, y, 1) against the frame, (3,), rad/s and m."""
 
@@ -154,13 +153,9 @@ class _AdvantagesOverInput:
             return result._replace(through=through, why=f"not by centres: by them {rate.rest} here")
         return result._replace(by_centres=1.0 / by_centres, through=through)
 
-    def _load_rate(self, load: Load, along: str) -> _OutputRate:
-        """The power of a load of one (N, N m) in its direction, at unit rate of the input."""
-        size = np.hypot(*load.force) if load.force is not None else load.torque or load.effort
-        if not size:
-            raise BadInput(along, "the load is zero, so that it has no direction; give it a size")
+    def _load_rate(self, unit_load: Load, along: str) -> _OutputRate:
+        """The power of a load of one (N, N m), at unit rate of the input."""
         field = KinematicArrays(self.state, self.state.shapes)
-        unit_load = load.scaled(1.0 / abs(float(size)))
         actions = list(actions_of_load(field, unit_load, np.ones(1)))
         value = float(action_powers(field, actions, action_velocities(field, actions)).sum())
 
@@ -175,8 +170,8 @@ class _AdvantagesOverInput:
 
         is_length = any(action.force.any() for action in actions)
         links = tuple(dict.fromkeys(action.link for action in actions))
-        rest = f"{load.target} does not move along {along}"
-        return _OutputRate(value, is_length, links, from_motions, rest, load.target, along)
+        rest = f"{unit_load.target} does not move along {along}"
+        return _OutputRate(value, is_length, links, from_motions, rest, unit_load.target, along)
 
     def _output_rate(self, name: str) -> _OutputRate:
         """An output's rate by its name. Raises Unknown."""
@@ -210,17 +205,14 @@ class _AdvantagesOverInput:
     def _named_load_rate(self, name: str) -> _OutputRate:
         """The rate of a load by its name, or of the distance between two points, `P,Q`. Raises Unknown."""
         state = self.state
-        loads = {f"{LOAD_PREFIX}{index}": load for index, load in enumerate(state.mechanism.loads)}
-        if name in loads:
-            return self._load_rate(loads[name], name)
-        first, _, second = name.partition(",")
-        if first != second and {first, second} <= attachments(state.mechanism).keys():
-            return self._load_rate(Load(points=(first, second), effort=1.0), "line")
+        unit = find_unit_load(state.mechanism, name)
+        if unit is not None:
+            return self._load_rate(*unit)
         known = {
             "points": state.point_names,
             "links": state.frames,
             "pairs": relative_motions(state.mechanism),
-            "loads": loads,
+            "loads": loads_by_name(state.mechanism),
         }
         raise Unknown(f"there is no point, link, pair or load {name!r}{suggest_name_of_kinds(name, known)}")
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from functools import cached_property
 from math import cos, isfinite, sin
 from numbers import Real
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -48,6 +48,21 @@ class RangeExtreme(NamedTuple):
     def extreme(self) -> Extreme:
         """The place and the value."""
         return Extreme(self.input, self.value)
+
+
+class MotionQuantity(Protocol):
+    """One number with rates, in a state or over a motion."""
+
+    @property
+    def name(self) -> str:
+        """What it is called."""
+
+    @property
+    def kind(self) -> str:
+        """ "length" (m) or "angle" (rad)."""
+
+    def value_and_rates(self, moving: State | Motion) -> ValueAndRates:
+        """Its value and rates in a state, or over a motion (n,)."""
 
 
 class Output:
