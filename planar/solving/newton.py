@@ -52,11 +52,20 @@ EPS = float(np.finfo(float).eps)
 
 
 class NewtonResult(NamedTuple):
-    """Where each start ended: the unknowns, the greatest part left open, and whether that closes the block."""
+    """Where each start ended: the unknowns, the greatest part left open, and whether that closes the block.
+
+    `steps` is how many steps were taken, of all starts at once.
+    """
 
     unknowns: Array
     residual: Array
     converged: Array
+    steps: int
+
+    def joined(self, other: NewtonResult) -> NewtonResult:
+        """The ends of the starts of both."""
+        unknowns, residual, converged = (np.concatenate(both) for both in zip(self[:3], other[:3], strict=True))
+        return NewtonResult(unknowns, residual, converged, self.steps + other.steps)
 
 
 @np.errstate(over="ignore", invalid="ignore", divide="ignore")  # a step that overflows is not better, and not taken
@@ -77,11 +86,13 @@ def damped_newton(
     count, unknowns = z.shape
     left, slope = residual_function(z)
     if unknowns == 0:
-        return _newton_result(z, left, tolerance)
+        return _newton_result(z, left, tolerance, 0)
     cost = np.add.reduce(left * left, axis=1)
     damping, growth = np.full(count, first_damping), np.full(count, 2.0)
     ended_at, ended_with, busy = z.copy(), left.copy(), np.arange(count)
-    for _ in range(MAX_NEWTON_STEPS):
+    steps = 0
+    while steps < MAX_NEWTON_STEPS:
+        steps += 1
         step = _damped_step(left, slope, damping)
         tried = z + step
         new_left, new_slope = residual_function(tried)
@@ -110,7 +121,7 @@ def damped_newton(
             if not busy.size:
                 break
     ended_at[busy], ended_with[busy] = z, left
-    return _newton_result(ended_at, ended_with, tolerance)
+    return _newton_result(ended_at, ended_with, tolerance, steps)
 
 
 def _damped_step(residuals: Array, jacobian: Array, damping: Array) -> Array:
@@ -269,6 +280,6 @@ def settle(
     return y, False
 
 
-def _newton_result(z: Array, residuals: Array, tolerance: float) -> NewtonResult:
+def _newton_result(z: Array, residuals: Array, tolerance: float, steps: int) -> NewtonResult:
     gap = np.max(np.abs(residuals), axis=1, initial=0.0)
-    return NewtonResult(z, gap, gap <= tolerance)
+    return NewtonResult(z, gap, gap <= tolerance, steps)

@@ -370,7 +370,7 @@ def test_a_small_linkage_beside_a_large_one_is_judged_by_its_own_size(size):
 def test_a_search_that_stops_early_says_so(monkeypatch):
     from planar.solving.assembly import nearest_assembly
 
-    monkeypatch.setattr(nearest_assembly, "MAX_BEST_FIRST_BLOCKS", -4)
+    monkeypatch.setattr(nearest_assembly, "MAX_BEST_FIRST_EFFORT", -4.0)
     count = 6
     links = {"f": {"points": {f"G{k}": [100 * k, 0] for k in range(count + 1)}}}
     links["c"] = {"ends": ["G0", "B0"], "length": 60}

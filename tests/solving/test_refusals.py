@@ -11,11 +11,9 @@ import pytest
 import planar
 from planar.document import files
 from planar.foundation.errors import NoAnswer, Outcome
+from planar.solving import newton
 from planar.solving.assembly import block_assemblies, nearest_assembly
-from planar.solving.assembly.block_assemblies import BlockAssemblies
-from planar.solving.assembly.nearest_assembly import AssemblySearchFailure, find_nearest_assembly
 from planar.solving.diagnosis import refusals, remedy
-from planar.solving.prepared_mechanism import PreparedMechanism
 from tests.builders import four_bar_document, six_bar_document, slider_crank_document
 from tests.closed_forms import between
 from tests.command import run, written
@@ -298,24 +296,25 @@ def test_where_no_single_length_helps_none_is_offered():
     assert "change the input or a dimension of" in problem.reason
 
 
-def test_a_remedy_is_looked_for_as_long_as_an_assembly_and_no_longer(monkeypatch):
-    """Groups solved are counted: those of the search, and as many again at most."""
-    given = mm_six_bar(15)
-    solved = []
-    real = BlockAssemblies.near_sketch
-    monkeypatch.setattr(BlockAssemblies, "near_sketch", lambda *each, **more: solved.append(1) or real(*each, **more))
-    assert isinstance(
-        find_nearest_assembly(BlockAssemblies(PreparedMechanism(files.from_dict(given)))), AssemblySearchFailure
-    )
-    searched = len(solved)
-    for least, words in (
-        (0, "looked for only as long as for an assembly"),
-        (remedy.MIN_BLOCK_BUDGET, "would go together"),
+def test_the_search_for_a_remedy_stops_after_its_effort(monkeypatch):
+    """The steps of Newton's method from all starts are those counted, and little else."""
+    given, steps = mm_six_bar(15), []
+    real = newton.damped_newton
+
+    def counted(*arguments, **options):
+        result = real(*arguments, **options)
+        steps.append(result.steps)
+        return result
+
+    monkeypatch.setattr(remedy, "damped_newton", counted)
+    for limit, words in (
+        (60.0, "the search for a single change that helps was cut off"),
+        (4500.0, "would go together"),
     ):
-        monkeypatch.setattr(remedy, "MIN_BLOCK_BUDGET", least)
-        solved.clear()
-        assert words in refused(given | {"name": f"least {least}"}).reason
-        assert len(solved) <= searched + max(least, searched)
+        monkeypatch.setattr(remedy, "MAX_EFFORT", limit)
+        steps.clear()
+        assert words in refused(given | {"name": f"effort {limit}"}).reason
+        assert sum(steps) <= limit + newton.MAX_NEWTON_STEPS
 
 
 # dead points and change points
@@ -658,10 +657,10 @@ def test_a_refusal_has_its_text_where_the_search_for_a_remedy_fails(monkeypatch)
     assert "change the input or a dimension of link" in reason
 
 
-def test_the_search_for_an_assembly_stops_after_a_number_of_blocks(monkeypatch):
-    monkeypatch.setattr(nearest_assembly, "MAX_SOLVED_BLOCKS", 0)
+def test_the_search_for_an_assembly_stops_after_its_effort(monkeypatch):
+    monkeypatch.setattr(nearest_assembly, "MAX_REPEATED_EFFORT", 10.0)
     monkeypatch.setattr(refusals, "_remedy", lambda *_: "change it")
-    with pytest.raises(NoAnswer, match="the search stopped after 170 blocks"):
+    with pytest.raises(NoAnswer, match=r"the search stopped after \d+ steps"):
         planar.solve(MODELS["chain-42"].with_values({"frame.A15.y": 1e13}))
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -27,8 +26,10 @@ MEETING_COSINE_SQUARED = 1.0 - 1e-6
 MAX_STARTS = 160
 LARGE_BLOCK, START_BATCH = 10, 16
 """Unknowns of a block from which on starts are tried in batches of so many."""
-STARTS_PER_BLOCK = 4
-"""Starts of Newton's method that cost about as much as one block solved in closed form, or one root polished."""
+STEPS_PER_BLOCK, STEPS_PER_ROOT = 2.0, 2.0
+"""Steps of Newton's method that cost about as much as a closed form and what surrounds it, or as polishing a root."""
+LARGE_BATCH = 128
+"""Unknowns of all starts together with which a step of Newton's method costs twice as much as one with few."""
 START_ANGLE_SPREAD = 0.3
 """Radians: how far about the angles of a sketch starts are spread, so that near twins are both found."""
 CLEAR_SKETCH_DISTANCE = 0.03
@@ -66,8 +67,12 @@ class BlockAssemblies:
     def __init__(self, setup: PreparedMechanism, misfit: float = 0.0):
         """`misfit` (sizes) is what blocks with more rows than unknowns may leave open."""
         self.misfit = misfit
-        self.solved_blocks = 0.0
-        "blocks solved in closed form, and what starts and roots of others come to, counted in such blocks"
+        self.effort = 0.0
+        "steps of Newton's method taken so far, and what else was computed, counted in such steps"
+        self.repeated_effort = 0.0
+        "the part of the effort spent on blocks that had been solved before, with earlier blocks elsewhere"
+        self._solved_blocks: set[int] = set()
+        self._is_repeated = False
         mechanism, unit = setup.mechanism, setup.unit
         self.setup = setup
         self.functions, self.u, self.p = setup.functions, setup.inputs.u, setup.inputs.p
@@ -88,17 +93,24 @@ class BlockAssemblies:
         for name in self.sketch:
             self.sketched_by_level.setdefault(self.first_link[name][0], []).append(name)
 
-    def near_sketch(self, stage: Block, z: Array, every: bool = False) -> tuple[list[BlockAssembly], Array]:
+    def near_sketch(
+        self, stage: Block, z: Array, every: bool = False, needs_nearest: bool = True
+    ) -> tuple[list[BlockAssembly], Array]:
         """All assemblies of a block that its starts lead to, the ones that an author would mean first.
 
         Where one lies clearly at the sketch others are looked for only if `every` one is wanted.
 
-        The second is all unknowns at the end of the best start, whether it closes the block or not.
+        The second is all unknowns at the end of the best start, whether it closes the block or not; z itself where
+        nothing closes it and this place is not needed.
         """
-        self._count_effort(1.0)
+        self._is_repeated = stage.block_index in self._solved_blocks
+        self._solved_blocks.add(stage.block_index)
+        self._count_effort(STEPS_PER_BLOCK)
         both = self._closed_form(stage, z)
         if both:
             return both, both[0].z
+        if both is not None and not needs_nearest:
+            return [], z
         closing = self.residual_function(stage, z, self.p)
         near, shown = self._starts_near_sketch(stage, z)
         if both is not None:
@@ -122,27 +134,24 @@ class BlockAssemblies:
         if not (dyad or clear):
             for starts in self._start_batches(stage, closing):
                 more = self._solve_from(closing, starts, tolerance)
-                ended = NewtonResult(*(np.concatenate(both) for both in zip(ended, more, strict=True)))
+                ended = ended.joined(more)
                 if not sketched and np.any(more.converged):
                     break
             found = self._from_converged(stage, z, closing, ended.unknowns[ended.converged])
         return found, self._best_end(stage, z, ended)
 
-    def _count_effort(self, blocks: float) -> None:
-        """Add to `solved_blocks`."""
-        self.solved_blocks += blocks
-
-    @cached_property
-    def full_effort(self) -> float:
-        """What it costs to solve every block once from all its starts (blocks)."""
-        sizes = [slice_length(stage.unknowns) for stage in self.equations.blocks]
-        return sum(1.0 + (min(6 * size**2, MAX_STARTS) + 2 * size + 2) / STARTS_PER_BLOCK for size in sizes)
+    def _count_effort(self, steps: float) -> None:
+        """Add to `effort`, and to `repeated_effort` where the block was solved before."""
+        self.effort += steps
+        if self._is_repeated:
+            self.repeated_effort += steps
 
     def _solve_from(
         self, closing: ResidualFunction, starts: Array, tolerance: float = CLOSED_TOLERANCE
     ) -> NewtonResult:
-        self._count_effort(len(starts) / STARTS_PER_BLOCK)
-        return damped_newton(closing, starts, tolerance)
+        result = damped_newton(closing, starts, tolerance)
+        self._count_effort(result.steps * (1.0 + starts.size / LARGE_BATCH))
+        return result
 
     @staticmethod
     def _best_end(stage: Block, z: Array, ended: NewtonResult) -> Array:
@@ -189,7 +198,7 @@ class BlockAssemblies:
         for root in converged:
             if not any(self._is_same(stage, z, root, other) for other in roots):
                 roots.append(polish_root(closing, root))
-        self._count_effort(len(roots))
+        self._count_effort(STEPS_PER_ROOT * len(roots))
         return self._sorted_assemblies(stage, z, roots)
 
     def _sorted_assemblies(self, stage: Block, z: Array, roots: list[Array]) -> list[BlockAssembly]:

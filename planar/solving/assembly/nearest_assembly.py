@@ -24,12 +24,11 @@ EQUAL_DISTANCE_TOLERANCE = 1e-9
 """Assemblies whose sums of squared distances to the sketch (sizes squared) agree to this fit alike."""
 MAX_TIED = 64
 """Assemblies that fit alike among which one is looked for whose rates are determined."""
-MAX_BEST_FIRST_BLOCKS = 1000
-"""Blocks solved, beside every block once, before the search stops looking for a nearer assembly and takes the best
-partial one to an end."""
-MAX_SOLVED_BLOCKS = 2 * MAX_BEST_FIRST_BLOCKS
-"""Blocks solved, beside every block once, before the search stops without an assembly: combinations of earlier blocks
-grow exponentially."""
+MAX_BEST_FIRST_EFFORT = 1500.0
+"""The effort (steps of Newton's method) on blocks that were solved before, with earlier blocks elsewhere, up to which
+the search looks for a nearer assembly; beyond it takes the best partial one to an end."""
+MAX_REPEATED_EFFORT = 1.2 * MAX_BEST_FIRST_EFFORT
+"""The same effort at which the search stops without an assembly: combinations of earlier blocks grow exponentially."""
 FAR_FROM_SKETCH = 0.1
 """The part of the mechanism's size by which a point may be off its sketch without a remark."""
 TURNED_FROM_SKETCH = pi / 4
@@ -47,14 +46,13 @@ class Assembly(NamedTuple):
 class AssemblySearchFailure(NamedTuple):
     """The block at which every way to assemble ends.
 
-    `z`: the unknowns where it is nearest to closing, those of earlier blocks filled in; `solved_blocks`: how many
-    were solved in search of it (see `BlockAssemblies.solved_blocks`); `is_cut_off`: whether the search stopped before
-    it had tried all combinations.
+    `z`: the unknowns where it is nearest to closing, those of earlier blocks filled in; `effort`: that of the search
+    (see `BlockAssemblies.effort`); `is_cut_off`: whether it stopped before it had tried all combinations.
     """
 
     stage: Block
     z: Array
-    solved_blocks: float = 0.0
+    effort: float = 0.0
     is_cut_off: bool = False
 
 
@@ -75,9 +73,10 @@ class _BlockSearch:
         """Those of a block, the unknowns before it in z; none as well where a later one would have none for these."""
         if self._is_dead_end(z, stage.unknowns.start):
             return []
-        found, nearest = self.candidates.near_sketch(stage, z)
+        is_farthest = self.last_failure is None or stage.block_index > self.last_failure.stage.block_index
+        found, nearest = self.candidates.near_sketch(stage, z, needs_nearest=is_farthest)
         if not found:
-            if self.last_failure is None or stage.block_index > self.last_failure.stage.block_index:
+            if is_farthest:
                 self.last_failure = AssemblySearchFailure(stage, nearest)
             self._dependencies = self._dependencies or [
                 sorted(columns) for columns in block_dependencies(self.candidates.setup)
@@ -111,7 +110,7 @@ def find_nearest_assembly(
 
     The cost of a partial assembly never falls as it grows, so the first whole one is the nearest. Of several that fit
     alike one is taken that `is_regular`, whose rates are determined, if there is one among the first. After
-    `MAX_BEST_FIRST_BLOCKS` the search only goes on to an end, and says so; after `MAX_SOLVED_BLOCKS` it stops.
+    `MAX_BEST_FIRST_EFFORT` the search only goes on to an end, and says so; after `MAX_REPEATED_EFFORT` it stops.
     """
     stages = candidates.equations.blocks
     number, groups = count(), _BlockSearch(candidates)
@@ -120,9 +119,8 @@ def find_nearest_assembly(
     taken: _Node | None = None
     tied = 0
     while heap:
-        extra_blocks = candidates.solved_blocks - candidates.full_effort
-        is_best_first = extra_blocks < MAX_BEST_FIRST_BLOCKS
-        if extra_blocks >= MAX_SOLVED_BLOCKS or (chosen is not None and not is_best_first):
+        is_best_first = candidates.repeated_effort < MAX_BEST_FIRST_EFFORT
+        if candidates.repeated_effort >= MAX_REPEATED_EFFORT or (chosen is not None and not is_best_first):
             break
         if is_best_first:
             node = heapq.heappop(heap)
@@ -157,7 +155,7 @@ def find_nearest_assembly(
     if chosen is None:
         assert groups.last_failure is not None
         is_cut_off = bool(heap) and not groups.is_hopeless
-        return groups.last_failure._replace(solved_blocks=candidates.solved_blocks, is_cut_off=is_cut_off)
+        return groups.last_failure._replace(effort=candidates.effort, is_cut_off=is_cut_off)
     return Assembly((taken or chosen).z, (taken or chosen).ties if tied else (), bool(heap))
 
 

@@ -315,7 +315,7 @@ def _open_block_sentence(setup: PreparedMechanism, failure: AssemblySearchFailur
     kind = next(row.kind for row in setup.equations.rows[stage.rows] if row.pair == pair)
     by, what = (setup.unit, "length") if kind is MeasureKind.LENGTH else (1.0, "angle")
     links = _links(stage.links or setup.pairs.get(pair, setup.relative_motions[pair]).links)
-    cut_off = f" (the search stopped after {failure.solved_blocks:.0f} blocks)" if failure.is_cut_off else ""
+    cut_off = f" (the search stopped after {failure.effort:.0f} steps)" if failure.is_cut_off else ""
     return (
         f"{setup.describe_position()} {links} cannot be joined{cut_off}: at the nearest, pair {pair!r} stays open by "
         f"{amount(gaps[pair] * by, what, setup.mechanism.units)}; {_remedy(setup, failure, links)}"

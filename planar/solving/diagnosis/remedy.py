@@ -22,7 +22,7 @@ from planar.model.mechanism import Drive, Mechanism, replace_inputs
 from planar.model.wording import amount
 from planar.solving.assembly.block_assemblies import BlockAssemblies, block_residual_function
 from planar.solving.assembly.nearest_assembly import Assembly, AssemblySearchFailure, find_nearest_assembly
-from planar.solving.newton import correct_blocks, damped_newton
+from planar.solving.newton import ResidualFunction, correct_blocks, damped_newton
 from planar.solving.prepared_mechanism import PreparedMechanism
 
 MAX_DIMENSIONS = 40
@@ -48,39 +48,39 @@ MIN_SENSITIVITY = 1e-3
 MAX_CHANGES_TRIED = 4
 """Changes, the least first, that are tried by assembling the whole."""
 PRINTED_DIGITS, ALL_DIGITS = 5, 15
-MIN_BLOCK_BUDGET, MAX_BLOCK_BUDGET = 500, 2000
-"""Blocks that may be solved in search of a remedy: as many as the search for an assembly took, within these bounds."""
-MOVED_BLOCK_COST = 0.1
-"""What it takes to move a block on from where it was, for one of solving it from a sketch."""
+MAX_EFFORT = 4500.0
+"""The effort (steps of Newton's method) in search of a remedy, about a second."""
+CHANGE_EFFORT, MOVED_BLOCK_EFFORT = 3.0, 0.5
+"""What it takes to change a number, and to move each earlier block on from where it was, in steps."""
 
 
-class BlockBudgetSpent(Exception):
-    """More blocks would have to be solved than may be."""
+class EffortSpent(Exception):
+    """A search would take more effort than it may."""
 
 
-class BlockBudget:
-    """How many blocks may yet be solved."""
+class EffortBudget:
+    """How many steps of Newton's method may still be taken."""
 
-    def __init__(self, groups: float):
-        self.blocks_left = groups
+    def __init__(self, steps: float):
+        self.steps_left = steps
 
-    def spend(self, groups: float) -> None:
-        """Count blocks. Raises BlockBudgetSpent where there are none left."""
-        self.blocks_left -= groups
-        if self.blocks_left < 0.0:
-            raise BlockBudgetSpent
+    def spend(self, steps: float) -> None:
+        """Count steps. Raises EffortSpent where none are left."""
+        self.steps_left -= steps
+        if self.steps_left < 0.0:
+            raise EffortSpent
 
 
 class _BudgetedAssemblies(BlockAssemblies):
     """Candidates for which effort is spent."""
 
-    def __init__(self, setup: PreparedMechanism, effort: BlockBudget):
+    def __init__(self, setup: PreparedMechanism, budget: EffortBudget):
         super().__init__(setup)
-        self._effort = effort
+        self._budget = budget
 
-    def _count_effort(self, blocks: float) -> None:
-        super()._count_effort(blocks)
-        self._effort.spend(blocks)
+    def _count_effort(self, steps: float) -> None:
+        super()._count_effort(steps)
+        self._budget.spend(steps)
 
 
 class RemedyChange(NamedTuple):
@@ -119,24 +119,24 @@ class _ChangeableNumber:
 def describe_remedy(setup: PreparedMechanism, failure: AssemblySearchFailure, otherwise: str) -> str:
     """A clause that says which dimension to make how long, or where to move an input; `otherwise` where there is none.
 
-    A change is offered only after the mechanism with it, rounded as it is printed, has been assembled. No more is spent
-    on it than on the search for an assembly; where that did not do it is said.
+    A change is offered only after the mechanism with it, rounded as it is printed, has been assembled. The clause says
+    where the search was cut off.
     """
-    effort = BlockBudget(min(max(MIN_BLOCK_BUDGET, failure.solved_blocks), MAX_BLOCK_BUDGET))
+    budget = EffortBudget(MAX_EFFORT)
     beside = (link for name in failure.stage.pairs for link in setup.pairs[name].bodies)
     links = frozenset((*failure.stage.links, *beside))
     told, cut = [], False
     try:
-        for change in islice(mending_inputs(setup, failure, budget=effort), 1):
+        for change in islice(mending_inputs(setup, failure, budget=budget), 1):
             told.append(f"at {change.name} = {change.shown}")
-        for change in islice(mending_dimensions(setup, failure, links, budget=effort), 1):
+        for change in islice(mending_dimensions(setup, failure, links, budget=budget), 1):
             was = amount(change.was, change.kind, setup.mechanism.units)
             told.insert(0, f"with {change.name} = {change.shown} instead of {was}")
-    except BlockBudgetSpent:
+    except EffortSpent:
         cut = True
     if told:
         return f"it would go together {', or '.join(told)}"
-    return f"{otherwise} (which, was looked for only as long as for an assembly)" if cut else otherwise
+    return f"{otherwise} (the search for a single change that helps was cut off)" if cut else otherwise
 
 
 def mending_dimensions(
@@ -144,13 +144,13 @@ def mending_dimensions(
     failure: AssemblySearchFailure,
     links: frozenset[str],
     thorough: bool = False,
-    budget: BlockBudget | None = None,
+    budget: EffortBudget | None = None,
 ) -> Iterator[RemedyChange]:
     """Changes of one dimension of these links each that let the whole go together, the least first.
 
     Each is the least with which the assembly goes together that comes nearest without it; only a `thorough` search
-    looks whether another does with less, and tries all changes on the whole. Raises BlockBudgetSpent where there is an
-    end to the `effort`.
+    looks whether another does with less, and tries all changes on the whole. Raises EffortSpent where there is an
+    end to the `budget`.
     """
     mechanism = setup.mechanism
     return _smallest_changes_first(
@@ -168,7 +168,7 @@ def mending_dimensions(
             for each in islice(link_lengths(mechanism, links), MAX_DIMENSIONS)
         ],
         thorough,
-        budget or BlockBudget(np.inf),
+        budget or EffortBudget(np.inf),
     )
 
 
@@ -177,7 +177,7 @@ def mending_inputs(
     failure: AssemblySearchFailure,
     inputs: Collection[str] | None = None,
     thorough: bool = False,
-    budget: BlockBudget | None = None,
+    budget: EffortBudget | None = None,
 ) -> Iterator[RemedyChange]:
     """Positions of one input each, of these or of all, at which the whole goes together: as `mending_dimensions`."""
     mechanism = setup.mechanism
@@ -197,7 +197,7 @@ def mending_inputs(
             if inputs is None or given.pair in inputs
         ],
         thorough,
-        budget or BlockBudget(np.inf),
+        budget or EffortBudget(np.inf),
     )
 
 
@@ -210,13 +210,13 @@ def _smallest_changes_first(
     failure: AssemblySearchFailure,
     numbers: list[_ChangeableNumber],
     thorough: bool,
-    effort: BlockBudget,
+    budget: EffortBudget,
 ) -> Iterator[RemedyChange]:
     found = []
     for number in numbers:
-        value = _closing_value(setup, failure, number, effort)
+        value = _closing_value(setup, failure, number, budget)
         if value is not None:
-            value = _smaller_value(number, value, effort) if thorough else value
+            value = _smaller_value(number, value, budget) if thorough else value
             found.append((abs(value - number.was) / number.size, number, value))
     # of changes that are as small, that of a link's length
     found.sort(key=lambda each: (round(each[0], 6), not each[1].name.endswith(".length")))
@@ -232,24 +232,24 @@ def _smallest_changes_first(
             f"{near:.{ALL_DIGITS}g}",
         ):
             there = by.to_si(float(shown))
-            if can_be_assembled(number.changed(there), effort):
+            if can_be_assembled(number.changed(there), budget):
                 yield RemedyChange(number.name, number.kind, number.was, there, f"{shown} {name}")
                 break
 
 
-def _smaller_value(number: _ChangeableNumber, value: float, effort: BlockBudget) -> float:
+def _smaller_value(number: _ChangeableNumber, value: float, budget: EffortBudget) -> float:
     """A value at which another assembly just goes together, if less of the change will do for that."""
     open_, closed = number.was, number.was + SMALLER_CHANGE_RATIO * (value - number.was)
-    if not can_be_assembled(number.changed(closed), effort):
+    if not can_be_assembled(number.changed(closed), budget):
         return value
     while abs(closed - open_) > ROUNDING_TOLERANCE * number.size:
         tried = 0.5 * (open_ + closed)
-        open_, closed = (open_, tried) if can_be_assembled(number.changed(tried), effort) else (tried, closed)
+        open_, closed = (open_, tried) if can_be_assembled(number.changed(tried), budget) else (tried, closed)
     return closed
 
 
 def _closing_value(
-    setup: PreparedMechanism, failure: AssemblySearchFailure, number: _ChangeableNumber, effort: BlockBudget
+    setup: PreparedMechanism, failure: AssemblySearchFailure, number: _ChangeableNumber, budget: EffortBudget
 ) -> float | None:
     """The value (m or rad) of a number at which what stays open just closes; None where there is none.
 
@@ -259,8 +259,8 @@ def _closing_value(
     value, z, nudge = number.was, failure.z, 1e-7 * number.size
     open_at, way, least, found, retreats = number.was, 0.0, CLOSED_TOLERANCE, None, 0
     for _ in range(MAX_NEWTON_STEPS):
-        here = _changed_block(setup, failure.stage, number.changed(value), z, effort)
-        beside = here and _changed_block(setup, failure.stage, number.changed(value + nudge), z, effort)
+        here = _changed_block(setup, failure.stage, number.changed(value), z, budget)
+        beside = here and _changed_block(setup, failure.stage, number.changed(value + nudge), z, budget)
         if here is None or beside is None:
             if retreats == MAX_HALVINGS:
                 break
@@ -292,7 +292,7 @@ def _closing_value(
         value = max(value + step, 0.5 * (value + number.least))
     if found is None or found == number.was:
         return None
-    return _closing_boundary(setup, failure.stage, number, (open_at, found), z, effort)
+    return _closing_boundary(setup, failure.stage, number, (open_at, found), z, budget)
 
 
 def _closing_boundary(
@@ -301,7 +301,7 @@ def _closing_boundary(
     number: _ChangeableNumber,
     between: tuple[float, float],
     z: Array,
-    effort: BlockBudget,
+    budget: EffortBudget,
 ) -> float:
     """Of a value at which a block is open and one at which it is closed, the one between them where that changes.
 
@@ -311,7 +311,7 @@ def _closing_boundary(
     part = OVERSHOOT_RATIO
     while abs(closed - open_) > ROUNDING_TOLERANCE * number.size:
         tried = closed + part * (open_ - closed)
-        there = _changed_block(setup, stage, number.changed(tried), z, effort)
+        there = _changed_block(setup, stage, number.changed(tried), z, budget)
         gap = np.inf if there is None else float(np.linalg.norm(there.residuals(there.nearest_unknowns())))
         if gap > CLOSED_TOLERANCE and part == OVERSHOOT_RATIO:
             break
@@ -323,16 +323,15 @@ def _closing_boundary(
 class _ChangedBlock:
     """What a block leaves open when numbers have been changed, the blocks before it standing where they then do."""
 
-    def __init__(self, setup: PreparedMechanism, stage: Block, z: Array, u: Array, p: Array):
-        self._stage, self._z = stage, z
-        self._residual_function = block_residual_function(setup.functions, stage, z, u, p)
+    def __init__(self, residual_function: ResidualFunction, stage: Block, z: Array, budget: EffortBudget):
+        self._residual_function, self._stage, self._z, self._budget = residual_function, stage, z, budget
 
     def nearest_unknowns(self) -> Array:
-        """All unknowns (unknowns,), those of the block where it is nearest to closing."""
+        """All unknowns (unknowns,), those of the block where it is nearest to closing. Raises EffortSpent."""
+        result = damped_newton(self._residual_function, self._z[None, self._stage.unknowns])
+        self._budget.spend(result.steps)
         z = self._z.copy()
-        z[self._stage.unknowns] = damped_newton(self._residual_function, self._z[None, self._stage.unknowns]).unknowns[
-            0
-        ]
+        z[self._stage.unknowns] = result.unknowns[0]
         return z
 
     def residuals(self, z: Array) -> Array:
@@ -341,10 +340,10 @@ class _ChangedBlock:
 
 
 def _changed_block(
-    setup: PreparedMechanism, stage: Block, mechanism: Mechanism | None, z: Array, effort: BlockBudget
+    setup: PreparedMechanism, stage: Block, mechanism: Mechanism | None, z: Array, budget: EffortBudget
 ) -> _ChangedBlock | None:
     """A block of a mechanism with other numbers, those before it moved on from z; None where they cannot be."""
-    effort.spend(MOVED_BLOCK_COST)
+    budget.spend(CHANGE_EFFORT + MOVED_BLOCK_EFFORT * stage.block_index)
     if mechanism is None:
         return None
     try:
@@ -354,7 +353,9 @@ def _changed_block(
     by = [setup.unit if slides else 1.0 for slides in setup.structure.input_slides]
     u = np.array([given.position / size for given, size in zip(mechanism.inputs, by, strict=True)])
     moved = correct_blocks(setup.functions, p, z, u, stage.block_index - 1)
-    return None if moved is None else _ChangedBlock(setup, stage, moved, u, p)
+    if moved is None:
+        return None
+    return _ChangedBlock(block_residual_function(setup.functions, stage, moved, u, p), stage, moved, budget)
 
 
 def _rounded_beyond(value: float, up: bool) -> float:
@@ -363,11 +364,11 @@ def _rounded_beyond(value: float, up: bool) -> float:
     return (ceil if up else floor)(value / size) * size
 
 
-def can_be_assembled(mechanism: Mechanism | None, effort: BlockBudget) -> bool:
-    """Whether there is a mechanism and it can be assembled at its inputs. Raises BlockBudgetSpent."""
+def can_be_assembled(mechanism: Mechanism | None, budget: EffortBudget) -> bool:
+    """Whether there is a mechanism and it can be assembled at its inputs. Raises EffortSpent."""
     if mechanism is None:
         return False
     try:
-        return isinstance(find_nearest_assembly(_BudgetedAssemblies(PreparedMechanism(mechanism), effort)), Assembly)
+        return isinstance(find_nearest_assembly(_BudgetedAssemblies(PreparedMechanism(mechanism), budget)), Assembly)
     except PointPlacementError:
         return False
