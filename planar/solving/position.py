@@ -339,6 +339,7 @@ class SolvedMechanism:
 
     def __init__(self, mechanism: Mechanism):
         self._plain_solver = PositionSolver(mechanism)
+        self._judgements: dict[str | None, NoAnswer | None] = {}
         self.range_ends: dict[Any, Any] = {}
         "the ends of the ranges of its inputs"
 
@@ -427,12 +428,23 @@ class SolvedMechanism:
         if self.solver.functions.is_square and mechanism.inputs and is_surely_regular(self.solver, z):
             return None  # regular positions need no judgement
         inputs = tuple(Input(given.pair, given.position) for given in mechanism.inputs)
-        at_rest = replace(mechanism, inputs=inputs, remarks=(), loads=())
-        try:
-            hash(at_rest)
-        except TypeError:  # made in Python, of lists
-            return _motion_judgement(at_rest, pair)
-        return _cached_motion_judgement(at_rest, pair)
+        # rates, loads and remarks make no difference to the judgement, nor to the assembly
+        at_rest = solved_mechanism(replace(mechanism, inputs=inputs, remarks=(), loads=()))
+        at_rest._share_start(self)
+        return at_rest._judgement(pair)
+
+    def _share_start(self, other: SolvedMechanism) -> None:
+        """Take the start of the same mechanism with other rates, where this one has none yet."""
+        if "_start" not in self.__dict__:
+            self.__dict__["_start"] = other.solver.with_inputs_of(self._plain_solver.mechanism), other._start[1]
+
+    def _judgement(self, pair: str | None) -> NoAnswer | None:
+        """Why an input of this mechanism at rest cannot run; None where one can."""
+        if pair not in self._judgements:
+            from planar.solving.diagnosis.judgement import judge_motion  # few mechanisms are judged
+
+            self._judgements[pair] = judge_motion(self.solver, self.assembly.z, pair)
+        return self._judgements[pair]
 
     def structure_refusal(self, problem: NoAnswer) -> NoAnswer | None:
         """What to say where rates are not determined since nothing can move; None where something can."""
@@ -456,17 +468,6 @@ class SolvedMechanism:
 @lru_cache(maxsize=MAX_CACHED_STRUCTURES)
 def _cached_solved_mechanism(mechanism: Mechanism) -> SolvedMechanism:
     return SolvedMechanism(mechanism)
-
-
-def _motion_judgement(mechanism: Mechanism, pair: str | None) -> NoAnswer | None:
-    """Why an input of a mechanism at rest cannot run: rates, loads and remarks make no difference to that."""
-    from planar.solving.diagnosis.judgement import judge_motion  # few mechanisms are judged
-
-    known = solved_mechanism(mechanism)
-    return judge_motion(known.solver, known.assembly.z, pair)
-
-
-_cached_motion_judgement = lru_cache(maxsize=MAX_CACHED_STRUCTURES)(_motion_judgement)
 
 
 def solved_mechanism(mechanism: Mechanism) -> SolvedMechanism:

@@ -11,7 +11,7 @@ import pytest
 import planar
 from planar.document import files
 from planar.foundation.errors import NoAnswer, Outcome
-from planar.solving import newton
+from planar.solving import newton, position
 from planar.solving.assembly import block_assemblies, nearest_assembly
 from planar.solving.diagnosis import refusals, remedy
 from tests.builders import four_bar_document, six_bar_document, slider_crank_document
@@ -646,6 +646,36 @@ def test_of_extreme_numbers_there_is_an_answer_or_a_sentence_and_no_warning(mode
         planar.solve(MODELS[model].with_values({number: size}))
     except planar.PlanarError as problem:
         assert len(str(problem).splitlines()) == 1
+
+
+@pytest.mark.parametrize(
+    ("model", "number", "size"),
+    [
+        ("scissor-lift", "frame.O.x", 2.0**53),
+        ("excavator-arm", "bucket tube.I.y", 1e15),
+        ("chain-42", "frame.A15.y", 1e16),
+        ("coupled-wheels", "frame.C0.x", 1e-15),
+    ],
+)
+def test_extreme_numbers_take_a_bounded_effort(model, number, size, monkeypatch):
+    """One search for an assembly, and a remedy within its effort."""
+    searches, steps, real = [], [], newton.damped_newton
+    search = position.find_nearest_assembly
+
+    def counted(*arguments, **options):
+        result = real(*arguments, **options)
+        steps.append(result.steps)
+        return result
+
+    for module in (block_assemblies, remedy):
+        monkeypatch.setattr(module, "damped_newton", counted)
+    monkeypatch.setattr(position, "find_nearest_assembly", lambda *given: searches.append(1) or search(*given))
+    monkeypatch.setattr(remedy, "MAX_EFFORT", 300.0)
+    with pytest.raises(NoAnswer) as problem:
+        planar.solve(MODELS[model].with_values({number: size}))
+    assert str(problem.value)
+    assert len(searches) == 1
+    assert sum(steps) < 1000
 
 
 def test_a_refusal_has_its_text_where_the_search_for_a_remedy_fails(monkeypatch):
