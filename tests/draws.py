@@ -48,10 +48,11 @@ def covering(cases: Iterable[T], kinds_of: Callable[[T], Iterable[Hashable]]) ->
     every = list(cases)
     if is_exhaustive():
         return every
-    remaining = {kind for case in every for kind in kinds_of(case)}
+    kinds = [set(kinds_of(case)) for case in every]
+    remaining = set().union(*kinds)
     chosen = []
     while remaining:
-        best = max(range(len(every)), key=lambda index: len(remaining & set(kinds_of(every[index]))))
+        best = max(range(len(every)), key=lambda index: len(remaining & kinds[index]))
         chosen.append(best)
-        remaining -= set(kinds_of(every[best]))
+        remaining -= kinds[best]
     return [every[index] for index in sorted(chosen)]

@@ -339,21 +339,23 @@ def report_motion(
     output: Path | None,
     tables: Callable[[], Iterable[Any]],
     more: Iterable[ReportedSeries] = (),
-    facts: Mapping[str, Any] | None = None,
+    facts: Callable[[], Mapping[str, Any]] = dict,
 ) -> None:
-    """A whole motion, with what `more` is told and `said` of it: as JSON, or as tables, and in a file that is named.
+    """Report a motion, its further series `more` and its `facts`, as JSON, or as tables and in a named file.
+
+    `tables` and `facts` are called only where they are reported.
 
     Ends with a sentence and a status where the motion did not come to its end.
     """
     from planar.reports.files.run_formats import encode_run, record
 
     if as_json:
-        print_json(record(motion, more, facts or {}))
+        print_json(record(motion, more, facts()))
     else:
         if output is not None:
             from planar.foundation.safe_files import save_file
 
-            save_file(output, encode_run(motion, output.suffix, more, facts or {}))
+            save_file(output, encode_run(motion, output.suffix, more, facts()))
         for each in tables():
             print_or_write(each, None)
     if motion.outcome is not Outcome.SOLVED:

@@ -5,10 +5,11 @@ from importlib import import_module
 import pytest
 
 from tests.draws import SEARCH
+from tests.small_searches import SMALL_SEARCH
 
 LESS = {
     "planar.analysis.force_maps.force_map": {"USUAL_COUNTS": (13, 5, 3)},
-    "planar.synthesis.task_search": {"DRAWS": 600, "MATCHES": 24, "ROUNDS": 1},
+    "planar.synthesis.task_search": SMALL_SEARCH,
 }
 """Numbers of modules, and what they are here."""
 

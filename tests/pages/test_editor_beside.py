@@ -12,6 +12,7 @@ from PIL import Image
 
 import planar
 from tests.page_scripts import FAINT, MISNAMED, NAMELESS, downloaded, settled
+from tests.small_searches import search_few
 
 ON_PICTURE = """(places) => {
   const image = document.querySelector("#drawing .underlay image"), to = image.getScreenCTM();
@@ -236,7 +237,8 @@ def test_designs_that_the_server_finds_are_listed_and_taken_over_in_one_step(dra
     assert json.loads(coming.value.path().read_text())["start"] == before
 
 
-def test_a_search_is_found_again_by_a_page_that_is_loaded_again_and_so_is_its_answer(drawing):
+def test_a_search_is_found_again_by_a_page_that_is_loaded_again_and_so_is_its_answer(drawing, monkeypatch):
+    monkeypatch.setattr("planar.pages.editor.search.search_for", search_few)
     hand = wished(drawing)
     server = drawing.opened[0][1]
     hand.window.on("dialog", lambda dialog: dialog.accept())

@@ -14,6 +14,8 @@ from planar.synthesis.fitting.wanted_equations import tangents
 from planar.synthesis.judgement.judgement import DesignJudge
 from planar.synthesis.judgement.misses import entry_misses, resting_misses
 from planar.synthesis.task.starts import start_mechanisms
+from tests.draws import covering
+from tests.known import MODELS
 
 UNITS = {"length": "mm", "angle": "deg"}
 STARTS = [("four-bar", "E"), ("slider-crank", "E"), ("whitworth", "D"), ("klann-leg", "foot")]
@@ -162,9 +164,18 @@ def least_transmissions(design, outputs):
     return [float(np.degrees(planar.transmission(motion, each).angle.min())) for each in outputs]
 
 
+def output_kinds(case):
+    """The kinds of pairs of a model, and whether one or several outputs are looked at."""
+    model, outputs, _ = case
+    return {*map(type, MODELS[model].pairs), *(["several"] if len(outputs) > 1 else [])}
+
+
 @pytest.mark.parametrize(
     ("model", "outputs", "least"),
-    [("four-bar", ["D"], 35), ("slider-crank", ["stroke"], 30), ("stephenson-3-five-bar", ["P", "Q"], 40)],
+    covering(
+        [("four-bar", ["D"], 35), ("slider-crank", ["stroke"], 30), ("stephenson-3-five-bar", ["P", "Q"], 40)],
+        output_kinds,
+    ),
 )
 def test_a_transmission_angle_is_kept_all_round_the_turn(few_designs, model, outputs, least):
     wanted = {"point": "E", "through": np.array(PATHS[model].split(), float).reshape(-1, 2).tolist(), "closed": True}

@@ -7,14 +7,14 @@ import pytest
 
 import planar
 from tests.command import run
+from tests.small_searches import SMALL_SEARCH
 
 
 @pytest.fixture(autouse=True)
 def few_designs(monkeypatch):
     """A small catalogue, which is enough for tasks as easy as these."""
-    monkeypatch.setattr("planar.synthesis.task_search.DRAWS", 600)
-    monkeypatch.setattr("planar.synthesis.task_search.MATCHES", 24)
-    monkeypatch.setattr("planar.synthesis.task_search.ROUNDS", 1)
+    for name, number in SMALL_SEARCH.items():
+        monkeypatch.setattr(f"planar.synthesis.task_search.{name}", number)
 
 
 UNITS = {"length": "mm", "angle": "deg"}

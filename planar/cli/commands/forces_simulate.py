@@ -228,8 +228,14 @@ def _forces_over_motion(
         length = None if radius is None else read_length(mechanism, radius, "--rim-radius")
         wheel = wanted_flywheel(found, fluctuation, length)
         unknown = None if load is None else unknown_load(motion, load, effort or 0.0, None, *taken)
-    facts = run_facts(found, wheel, unknown)
-    report_motion(motion, as_json, output, lambda: [tables(found, wheel, unknown)], force_series(found), facts)
+    report_motion(
+        motion,
+        as_json,
+        output,
+        lambda: [tables(found, wheel, unknown)],
+        force_series(found),
+        lambda: run_facts(found, wheel, unknown),
+    )
 
 
 @main.command()
@@ -294,4 +300,6 @@ def simulate(
         from planar import plot as drawn
 
         drawn.save(drawn.diagrams(found, of or None), diagrams)
-    report_motion(found.motion, as_json, output, lambda: [tables(found)], energy_series(found), simulation_facts(found))
+    report_motion(
+        found.motion, as_json, output, lambda: [tables(found)], energy_series(found), lambda: simulation_facts(found)
+    )

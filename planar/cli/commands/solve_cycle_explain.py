@@ -278,7 +278,7 @@ def cycle(
         from planar.reports.tables.answers import record
 
         said = {"answers": record(told)}
-    report_motion(motion, as_json, output, shown, facts=said)
+    report_motion(motion, as_json, output, shown, facts=lambda: said)
 
 
 def _answers(motion: Motion, name: str) -> tuple[Answers, ...]:
