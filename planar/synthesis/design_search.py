@@ -1,30 +1,92 @@
-"""Designs of one start that do what a task wants best: from a catalogue's matches, fitted by least squares."""
+"""Designs of one start that do what a task wants best: matches of a catalogue, fitted, written and judged."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import replace
+from math import ceil, log10
 from typing import NamedTuple
 
+import casadi as ca
 import numpy as np
 
-from planar.derivatives.design_equations import design_equations
+from planar.derivatives.design_equations import DesignEquations, design_equations
+from planar.document.dimensions import file_dimensions
+from planar.document.revised.changed_numbers import with_values
 from planar.document.revised.similar_mechanism import similar_mechanism
+from planar.equations.elimination import stack_expressions
 from planar.foundation.arrays import Array
-from planar.model.mechanism import Mechanism
-from planar.synthesis.catalogue.branch_tracking import follow_branches
-from planar.synthesis.catalogue.catalogue import Catalogue
-from planar.synthesis.catalogue.catalogue_store import kept_catalogue
-from planar.synthesis.catalogue.matches import Match, find_matches
-from planar.synthesis.catalogue.moved_numbers import moved_numbers
-from planar.synthesis.catalogue.step_choices import WantedItem
-from planar.synthesis.fitting.demand_guard import DemandGuard
-from planar.synthesis.fitting.demanded_rows import demand_guards
+from planar.foundation.errors import BadInput
+from planar.model.file_units import FileUnits, unit_of_kind
+from planar.model.mechanism import Mechanism, NamedPoint, named_points
+from planar.synthesis.catalogue.catalogue import Catalogue, follow_branches, kept_catalogue
+from planar.synthesis.catalogue.matches import Match, WantedItem, find_matches, moved_numbers
+from planar.synthesis.fitting.demand_rows import DemandGuard, demand_guards
 from planar.synthesis.fitting.design_fit import DesignFit, FittedDesigns
-from planar.synthesis.fitting.kept_demands import lacks
-from planar.synthesis.fitting.wanted_equations import WantedEquations, tangents
-from planar.synthesis.fitting.wanted_rows import wanted_rows, wanted_size
+from planar.synthesis.fitting.moving_designs import lacks
+from planar.synthesis.fitting.wanted_equations import WantedEquations, tangents, wanted_rows, wanted_size
+from planar.synthesis.judgement.judgement import DesignJudge
+from planar.synthesis.synthesis import SynthesisedDesign
 from planar.synthesis.task.freedom import can_move_whole
 from planar.synthesis.task.starts import FreeNumbers, free_numbers
 from planar.synthesis.task.synthesis_task import SynthesisTask
+
+DIGITS, SKETCH_DIGITS = 13, 7
+"""Of the size of a mechanism, or of a rad, to which its numbers are written, so that what is met exactly still is; and
+those of its sketch, which only chooses the assembly."""
+
+
+def write_design(
+    design: DesignEquations,
+    numbers: Mapping[str, float],
+    y: Array,
+    input_position: float,
+    name: str,
+) -> Mechanism:
+    """The mechanism with these numbers (SI, rounded to `DIGITS`), whose sketch is where it stands with
+    unknowns y (unknowns,). Raises BadInput where a file with these numbers is refused."""
+    start = design.mechanism
+    units, size = start.units, design.solver.unit
+    known = file_dimensions(start)
+    told = {key: _rounded(value, known[key].kind, units, size, DIGITS) for key, value in numbers.items()}
+    running = f"{start.inputs[0].pair}.position"
+    told[running] = _rounded(input_position, known[running].kind, units, size, DIGITS)
+    joints = [each for each in named_points(start) if len(each.members) > 1 and _moves(start, each)]
+    places = _places(design, joints, told, y)
+    sketch = []
+    for each, at in zip(joints, places, strict=True):
+        x, y_own = (_rounded(part, "length", units, size, SKETCH_DIGITS) for part in at)
+        sketch.append((each.name, x, y_own))
+    made = replace(start, sketch=tuple(sketch), name=name, about=None, source=None, published=(), ids=())
+    return with_values(made, told)
+
+
+def _moves(mechanism: Mechanism, point: NamedPoint) -> bool:
+    return all(link != mechanism.frame for link, _ in point.members)
+
+
+def _places(
+    design: DesignEquations, joints: list[NamedPoint], numbers: Mapping[str, float], y: Array
+) -> list[tuple[float, float]]:
+    frames, _ = design.placed
+    parts = []
+    for each in joints:
+        link, point = each.members[0]
+        parts += list(frames[link].to_world(design.work.shapes[link].position(point)))
+    d = [numbers.get(each.name, each.value) for each in design.dimensions]
+    u = [y[-1] * design.input_scale[0], *(each.position for each in design.mechanism.inputs[1:])]
+    at = ca.Function("places", [design.z, design.u, design.d], [stack_expressions(parts)])
+    found = at(ca.DM(y[:-1]), ca.DM(u), ca.DM(d)).full().ravel().tolist()
+    return list(zip(found[::2], found[1::2], strict=True))
+
+
+def _rounded(value: float, kind: str, units: FileUnits, size: float, digits: int) -> float:
+    """A quantity (SI) with so many digits behind that of the size, in the file's units."""
+    if kind not in ("length", "angle"):
+        return float(value)
+    of = unit_of_kind(kind, units)[1]
+    whole = abs(of.from_si(size if kind == "length" else 1.0))
+    return float(of.to_si(round(of.from_si(float(value)), digits - ceil(log10(whole)))))
 
 
 class Candidate(NamedTuple):
@@ -235,3 +297,32 @@ def spread_positions(branch: Array, inputs: Array, count: int, over_turn: bool) 
     spread = np.linspace(inputs.min(), inputs.max(), count)
     positions: Array = np.stack([np.interp(spread, branch[:, -1], part) for part in branch.T], axis=1)
     return positions
+
+
+def judge_candidate(
+    search: DesignSearch, judge: DesignJudge, candidate: Candidate, number: int
+) -> SynthesisedDesign | None:
+    """A candidate with its judgement, named by a `number`; None where no file can describe it."""
+    equations = search.equations
+    values = tuple(search.shown(k, candidate) for k in range(len(equations)))
+    inputs = [y[:, -1] * item.input_scale for item, y in zip(equations, candidate.unknowns, strict=True)]
+    y = search.most_regular(candidate)
+    name = f"{search.task.name}: {search.mechanism.name} {number}"
+    try:
+        input_position = float(y[-1] * equations[0].input_scale)
+        mechanism = write_design(equations[0].design, candidate.numbers, y, input_position, name)
+    except BadInput:
+        return None
+    judgement = judge.judge(mechanism, inputs, values)
+    misses = np.concatenate(judgement.misses)
+    written = file_dimensions(mechanism)
+    return SynthesisedDesign(
+        mechanism,
+        float(np.sqrt(np.mean(misses**2))),
+        float(misses.max()),
+        judgement.misses,
+        judgement.inputs,
+        judgement.defects,
+        search.mechanism.name,
+        {key: float(written[key].value) for key in candidate.numbers},
+    )

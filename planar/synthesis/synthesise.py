@@ -9,13 +9,12 @@ from typing import TYPE_CHECKING, Any, Literal, overload
 
 from planar.foundation.errors import BadInput, NoAnswer
 from planar.model.run_arguments import check_whole_number
-from planar.synthesis.search_progress import SearchProgress, progress_of_list
 from planar.synthesis.synthesis import Synthesis
 from planar.synthesis.task.freedom import exactness_in_excess
 from planar.synthesis.task.starts import start_mechanisms
 from planar.synthesis.task.synthesis_task import ChainStart, SynthesisTask
 from planar.synthesis.task.task_reader import read_task
-from planar.synthesis.task_search import TaskSearch
+from planar.synthesis.task_search import SearchProgress, TaskSearch, progress_of_list
 
 if TYPE_CHECKING:
     from planar.synthesis.exact.complete_synthesis import CompleteSynthesis

@@ -6,29 +6,68 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from time import monotonic
-from typing import Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from planar import __version__
 from planar.foundation.errors import BadInput, PlanarError
 from planar.model.mechanism import Mechanism
+from planar.model.wording import amount
 from planar.synthesis.catalogue.catalogue import Catalogue
 from planar.synthesis.catalogue.matches import Match
-from planar.synthesis.cognates.task_cognates import task_cognates
-from planar.synthesis.design_search import Candidate, DesignSearch
+from planar.synthesis.cognates.cognates import task_cognates
+from planar.synthesis.design_search import Candidate, DesignSearch, judge_candidate
 from planar.synthesis.families.family_search import DRAWS as DRAWS_OF_MEMBERS
 from planar.synthesis.families.family_search import RECOMBINATIONS, FamilySearch
-from planar.synthesis.judged_candidate import judge_candidate
-from planar.synthesis.judgement.defects import ONE_BRANCH, ORDER, REACH, WHOLE_TURN
+from planar.synthesis.judgement.defects import ONE_BRANCH, ORDER, REACH, WHOLE_TURN, refusal
 from planar.synthesis.judgement.judgement import EXACT, DesignJudge
-from planar.synthesis.judgement.refusal import refusal
 from planar.synthesis.search_folder import SearchFolder
-from planar.synthesis.search_progress import SearchProgress
 from planar.synthesis.synthesis import Synthesis, SynthesisedDesign, rank_designs
 from planar.synthesis.task.freedom import count_freedom, exactness_in_excess
-from planar.synthesis.task.starts import start_mechanisms
+from planar.synthesis.task.starts import miss_kind, start_mechanisms
 from planar.synthesis.task.synthesis_task import ChainStart, SynthesisTask, WantedFunction
+
+if TYPE_CHECKING:
+    from planar.synthesis.exact.complete_synthesis import CompleteSynthesis
+
+
+class SearchProgress(NamedTuple):
+    """How far a search is: at which `start`, the `start_number`-th (from 1) of `start_count` (None: not known).
+
+    `stage` is "catalogue", "matches", "fit" or "judgement" of the `round`-th catalogue of the start, or "exact" (round
+    0) where exact designs are sampled.
+    `best` is the least error of a sound design so far (m, or rad where functions of angles alone are wanted; infinite
+    where there is none) and `best_share` the same beside the extent of the places that are wanted, where there are
+    some. Of a complete list `stage` says what is done, and the rest nothing; `result` is the list where its designs
+    are proved and what is left is the test that they are all.
+    """
+
+    start: str
+    start_number: int
+    start_count: int | None
+    round: int
+    stage: str
+    best: float
+    best_share: float
+    result: CompleteSynthesis | None = None
+
+
+def progress_of_list(stage: str, result: CompleteSynthesis | None = None) -> SearchProgress:
+    """How far a complete list is, in words."""
+    return SearchProgress("", 0, None, 0, stage, float("inf"), float("inf"), result)
+
+
+def progress_words(done: SearchProgress, task: SynthesisTask) -> str:
+    """How far a search is, in a line."""
+    number = f"start {done.start_number}" + (f" of {done.start_count}" if done.start_count else "")
+    where = f"{number} ({done.start}), " + (f"catalogue {done.round}: {done.stage}" if done.round else "exact designs")
+    if done.best == float("inf"):
+        return where
+    share = f"{100.0 * done.best_share:.3g} % of the size"
+    best = share if task.wants_places else amount(done.best, miss_kind(task), task.units)
+    return f"{where}; best error so far {best}"
+
 
 DRAWS = 6000
 """Of designs at random for a catalogue."""

@@ -4,16 +4,14 @@ import numpy as np
 import pytest
 
 import planar
-from planar.synthesis.demands.output_transmissions import output_transmissions
-from planar.synthesis.demands.polygon import polygon_depths
 from planar.synthesis.design_search import DesignSearch
-from planar.synthesis.fitting.demand_polish import constrained_step
-from planar.synthesis.fitting.normal_equations import solve_symmetric
-from planar.synthesis.fitting.order_slacks import OrderSlacks
-from planar.synthesis.fitting.wanted_equations import tangents
+from planar.synthesis.fitting.design_fit import constrained_step
+from planar.synthesis.fitting.moving_designs import OrderSlacks
+from planar.synthesis.fitting.wanted_equations import solve_symmetric, tangents
 from planar.synthesis.judgement.judgement import DesignJudge
-from planar.synthesis.judgement.misses import entry_misses, resting_misses
+from planar.synthesis.judgement.motion_demands import output_transmissions, polygon_depths
 from planar.synthesis.task.starts import start_mechanisms
+from planar.synthesis.task.wanted_results import entry_misses, resting_misses
 
 UNITS = {"length": "mm", "angle": "deg"}
 STARTS = [("four-bar", "E"), ("slider-crank", "E"), ("whitworth", "D"), ("klann-leg", "foot")]

@@ -16,17 +16,18 @@ from planar.synthesis.exact.exact_linkage import evaluate
 from planar.synthesis.exact.relations.exact_problem import ExactProblem
 from planar.synthesis.exact.relations.polynomials import Polynomial
 from planar.synthesis.exact.tracking import member_solutions, monodromy
-from planar.synthesis.exact.tracking.ball_paths import follow_in_balls
-from planar.synthesis.exact.tracking.bilinear_roots import bilinear_roots
-from planar.synthesis.exact.tracking.exact_certificates import certify_member
+from planar.synthesis.exact.tracking.ball_paths import certify_member, follow_in_balls
 from planar.synthesis.exact.tracking.family_names import name_family
 from planar.synthesis.exact.tracking.generic_store import family_record
-from planar.synthesis.exact.tracking.member_homotopy import affine_solutions, homogeneous_solutions
-from planar.synthesis.exact.tracking.member_solutions import is_nearly_singular, solve_member
+from planar.synthesis.exact.tracking.member_homotopy import affine_solutions, bilinear_roots, homogeneous_solutions
+from planar.synthesis.exact.tracking.member_solutions import (
+    ClassedSolutions,
+    is_nearly_singular,
+    solve_member,
+    with_members,
+)
 from planar.synthesis.exact.tracking.monodromy import find_generic_solutions, follow
-from planar.synthesis.exact.tracking.other_ways import ClassedSolutions, with_members
-from planar.synthesis.exact.tracking.same_solutions import first_of_same
-from planar.synthesis.exact.tracking.symmetry import exchange_images, representatives
+from planar.synthesis.exact.tracking.symmetry import exchange_images, first_of_same, representatives
 from planar.synthesis.exact.tracking.trace_test import trace_test
 from planar.synthesis.task.starts import start_mechanisms
 from tests.command import run

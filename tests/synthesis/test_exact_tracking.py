@@ -13,7 +13,7 @@ from planar.codegen.complex_kernel import LANES, ComplexKernel
 from planar.synthesis.exact import component_solutions, exact_synthesis
 from planar.synthesis.exact.relations.exact_numbers import exact_number
 from planar.synthesis.exact.relations.exact_problem import ExactProblem
-from planar.synthesis.exact.tracking.exact_certificates import certify_member
+from planar.synthesis.exact.tracking.ball_paths import certify_member
 from planar.synthesis.exact.tracking.first_solution import first_solution
 from planar.synthesis.exact.tracking.generic_store import family_record
 from planar.synthesis.exact.tracking.member_homotopy import (
@@ -24,7 +24,7 @@ from planar.synthesis.exact.tracking.member_homotopy import (
 )
 from planar.synthesis.exact.tracking.member_solutions import solve_member
 from planar.synthesis.exact.tracking.monodromy import find_generic_solutions, follow
-from planar.synthesis.exact.tracking.same_solutions import first_of_same
+from planar.synthesis.exact.tracking.symmetry import first_of_same
 from planar.synthesis.task.starts import start_mechanisms
 from tests.command import run
 from tests.exact_tasks import family_of, five_poses, task, with_points_on_coupler

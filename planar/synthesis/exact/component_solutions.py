@@ -13,20 +13,18 @@ from planar.foundation.arrays import BoolArray, ComplexArray, IntArray
 from planar.model.wording import count_phrase
 from planar.synthesis.exact.relations.exact_problem import Component
 from planar.synthesis.exact.relations.family import Member
-from planar.synthesis.exact.tracking.ball_paths import MOST_PATHS
-from planar.synthesis.exact.tracking.bilinear_roots import bilinear_roots
-from planar.synthesis.exact.tracking.exact_certificates import ExactCertificates, certify_member
+from planar.synthesis.exact.tracking.ball_paths import MOST_PATHS, ExactCertificates, certify_member
 from planar.synthesis.exact.tracking.family_names import FamilyName
 from planar.synthesis.exact.tracking.generic_store import FamilyRecord, family_record, tested_record
-from planar.synthesis.exact.tracking.member_homotopy import affine_solutions, homogeneous_solutions
+from planar.synthesis.exact.tracking.member_homotopy import affine_solutions, bilinear_roots, homogeneous_solutions
 from planar.synthesis.exact.tracking.member_solutions import (
+    UNKNOWN,
     MemberSolutions,
     Progress,
     is_nearly_singular,
     proved_in_balls,
     solve_member,
 )
-from planar.synthesis.exact.tracking.other_ways import UNKNOWN
 from planar.synthesis.exact.tracking.symmetry import exchange_images
 
 REAL = 1e-7

@@ -31,10 +31,8 @@ from planar.synthesis.exact.tracking.member_homotopy import affine_solutions, ho
 from planar.synthesis.exact.tracking.member_solutions import Progress
 from planar.synthesis.exact.tracking.symmetry import reordered
 from planar.synthesis.families.family_search import FamilySearch
-from planar.synthesis.judgement.defects import Defect
-from planar.synthesis.judgement.file_check import check_file
-from planar.synthesis.judgement.judgement import DesignJudge, Judgement
-from planar.synthesis.judgement.refusal import refusal
+from planar.synthesis.judgement.defects import Defect, refusal
+from planar.synthesis.judgement.judgement import DesignJudge, Judgement, check_file
 from planar.synthesis.task.freedom import has_open_numbers
 from planar.synthesis.task.starts import start_mechanisms
 from planar.synthesis.task.synthesis_task import (

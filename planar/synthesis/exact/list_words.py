@@ -11,9 +11,9 @@ from planar.assemblies.polynomial.certification import is_available
 from planar.model.wording import amount, count_phrase
 from planar.synthesis.exact.complete_synthesis import ExactDesign
 from planar.synthesis.exact.component_solutions import FAR, ComponentSolutions, alike_components
-from planar.synthesis.judgement.file_check import FileCheck
+from planar.synthesis.judgement.judgement import FileCheck
+from planar.synthesis.task.starts import wanted_miss_kind
 from planar.synthesis.task.synthesis_task import SynthesisTask
-from planar.synthesis.task.task_numbers import wanted_miss_kind
 
 
 def solution_count(solved: Sequence[ComponentSolutions], counts: Sequence[int]) -> int:

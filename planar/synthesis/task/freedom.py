@@ -22,10 +22,9 @@ from planar.model.mechanism import Mechanism
 from planar.model.wording import count_phrase
 from planar.results.motion import Motion
 from planar.solving.cycle import cycle
-from planar.synthesis.task.starts import FreeNumbers, free_numbers
+from planar.synthesis.task.starts import FreeNumbers, free_numbers, motion_kind
 from planar.synthesis.task.synthesis_task import SynthesisTask, Wanted, WantedFunction, WantedPath
-from planar.synthesis.task.task_numbers import motion_kind
-from planar.synthesis.task.wanted_expressions import wanted_expression
+from planar.synthesis.task.wanted_results import wanted_expression
 
 MOVED = 1e-6
 """Of a move: what free numbers leave of it is none."""

@@ -19,10 +19,8 @@ from planar.foundation.arrays import Array, ComplexArray, IntArray
 from planar.synthesis.exact.relations.family import Family
 from planar.synthesis.exact.relations.unknowns import NumberKind
 from planar.synthesis.exact.tracking.member_homotopy import affine_solutions, homogeneous_slopes, scaled_rows
-from planar.synthesis.exact.tracking.monodromy import GenericSolutions
-from planar.synthesis.exact.tracking.same_solutions import first_of_same
-from planar.synthesis.exact.tracking.solution_graph import SolutionGraph
-from planar.synthesis.exact.tracking.symmetry import exchange_images
+from planar.synthesis.exact.tracking.monodromy import GenericSolutions, SolutionGraph
+from planar.synthesis.exact.tracking.symmetry import exchange_images, first_of_same
 
 MAX_POINTS = 1500
 """Of a slice, where nothing else is said; with more the test is not made."""
