@@ -8,7 +8,7 @@ continuation and monodromy, IMA J. Numer. Anal. 39, 2019.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from itertools import combinations
+from itertools import permutations
 from typing import Any, Generic, NamedTuple, Protocol, TypeVar
 
 import numpy as np
@@ -20,9 +20,9 @@ from planar.synthesis.exact.tracking.first_solution import first_solution
 from planar.synthesis.exact.tracking.member_homotopy import EdgeHomotopy, MemberHomotopy, homogeneous_solutions
 from planar.synthesis.exact.tracking.symmetry import Images, first_of_same, representatives
 
-BLOCK = 4096
-"""Paths that are followed side by side."""
-PREDICTION, CORRECTION, STEPS = 1e-2, 1e-5, 600
+BLOCK, FEW = 4096, 128
+"""Paths that are followed side by side, at most, and so few that more of them cost no more time."""
+PREDICTION, CORRECTION, STEPS = 3e-2, 1e-4, 600
 """How far predictions and first corrections may be off, and most steps: a path that is lost, or leaps to another, comes
 to a solution or to none all the same."""
 
@@ -69,12 +69,15 @@ class SolutionGraph(Generic[Node]):
         return not len(rows) or self._follow([(i, j, rows)])
 
     def follow_open_edges(self) -> bool:
-        """Follow what has not been followed along all edges, each in the direction with the more of it; False where
-        there is none."""
+        """Follow what has not been followed along all edges, each in the direction with the more of it, or in both
+        where that is few; False where there is none."""
+        edges = list(permutations([k for k in range(len(self.nodes)) if k not in self.leaves], 2))
+        open_rows = {edge: self._open(*edge) for edge in edges}
+        if sum(map(len, open_rows.values())) > FEW:
+            edges = [max(edge, edge[::-1], key=lambda one: len(open_rows[one])) for edge in edges if edge[0] < edge[1]]
         batch, room = [], BLOCK
-        for pair in combinations([k for k in range(len(self.nodes)) if k not in self.leaves], 2):
-            i, j = max((pair, pair[::-1]), key=lambda edge: len(self._open(*edge)))
-            rows = self._open(i, j)[:room]
+        for i, j in edges:
+            rows = open_rows[i, j][:room]
             if len(rows):
                 batch.append((i, j, rows))
                 room -= len(rows)
@@ -184,8 +187,8 @@ class GenericSearch:
         graph = self.graph
         while len(graph.nodes) < FIRST_NODES:
             self.add_linkage()
-        idle = 0
-        while idle < IDLE_NODES:
+        before = -1
+        while len(graph.solutions[0]) > before:
             while graph.follow_open_edges():
                 if self.progress is not None:
                     self.progress(graph.most)
@@ -193,18 +196,14 @@ class GenericSearch:
                     self.store.write(to_arrays(graph))
                 if enough is not None and len(graph.solutions[0]) >= enough:
                     return
-            # a linkage more, at the first member
-            rng = np.random.default_rng([self.seed, 1, len(graph.nodes), graph.most, idle])
-            member, x = first_solution(self.family, rng)
-            ends = track_paths(
-                MemberHomotopy(self.family, member, graph.nodes[0]),
-                homogeneous_solutions(x[None]),
-                PREDICTION,
-                CORRECTION,
-            )
             before = len(graph.solutions[0])
+            # linkages more, at the first member
+            rngs = [np.random.default_rng([self.seed, 1, len(graph.nodes), graph.most, k]) for k in range(IDLE_NODES)]
+            members, x = zip(*(first_solution(self.family, rng) for rng in rngs), strict=True)
+            edges = np.stack([1 + np.arange(IDLE_NODES), np.zeros(IDLE_NODES, dtype=int)], axis=1)
+            between = EdgeHomotopy(self.family, [graph.nodes[0], *members], edges)
+            ends = track_paths(between, homogeneous_solutions(np.array(x)), PREDICTION, CORRECTION)
             graph.add_solutions(0, ends.V[ends.is_single])
-            idle = idle + 1 if len(graph.solutions[0]) == before else 0
 
     def add_linkage(self) -> None:
         """A member more, with the linkage that it was made for."""

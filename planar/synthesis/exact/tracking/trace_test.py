@@ -4,8 +4,9 @@ Along a line p + s v of members the solutions are a curve in unknowns and s. The
 places x meets it at the solutions of the member p and where l vanishes, nowhere at infinity. Other bilinear slices
 are reached from there, and where a slice is moved by a constant, the sums of x and s of all points of an irreducible
 curve move evenly, and those of some of them do not. A. Leykin, J. I. Rodriguez, F. Sottile, Trace test, Arnold Math. J.
-4, 2018, section 3. Slices have the fewer points the fewer numbers a line moves: it moves those of one entry, and those
-that conditions hold, and the solutions of all other rows, a curve, are taken for irreducible where the family is.
+4, 2018, section 3. Slices have the fewer points the fewer numbers a line moves: it moves those of one entry, of places
+without their conjugates, and the solutions of all other rows, a curve, are taken for irreducible where the family is.
+Where they are not, all parts have as many of the solutions, and random loops in all numbers lead from one to another.
 """
 
 from __future__ import annotations
@@ -14,12 +15,17 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from planar.assemblies.polynomial.path_tracker import HomotopyValues, normalize
+from planar.assemblies.polynomial.path_tracker import HomotopyValues, normalize, track_paths
 from planar.foundation.arrays import Array, ComplexArray, IntArray
 from planar.synthesis.exact.relations.family import Family
 from planar.synthesis.exact.relations.unknowns import NumberKind
-from planar.synthesis.exact.tracking.member_homotopy import affine_solutions, homogeneous_slopes, scaled_rows
-from planar.synthesis.exact.tracking.monodromy import GenericSolutions, SolutionGraph
+from planar.synthesis.exact.tracking.member_homotopy import (
+    EdgeHomotopy,
+    affine_solutions,
+    homogeneous_slopes,
+    scaled_rows,
+)
+from planar.synthesis.exact.tracking.monodromy import CORRECTION, PREDICTION, STEPS, GenericSolutions, SolutionGraph
 from planar.synthesis.exact.tracking.symmetry import exchange_images, first_of_same
 
 MAX_POINTS = 1500
@@ -28,6 +34,8 @@ FIRST_SLICES, MORE_SLICES = (8, 5), 8
 """Between which points are followed at first, where there are FEW solutions or more, and how many more are tried before
 the trace is said to be uneven."""
 FEW = 10
+LOOPS = 6
+"""Through two random members each."""
 SPREAD = 1.0
 """Of the sizes of a slice's coefficients (logarithm)."""
 LEVELS = 1.0 + 0.3j, -0.4 + 1.1j
@@ -166,17 +174,30 @@ def _form_size(x: ComplexArray) -> int:
 
 
 def _random_line(family: Family, rng: np.random.Generator) -> tuple[ComplexArray, ...]:
-    """Changes of the numbers of one entry, and of those that conditions hold."""
+    """Changes of the numbers of one entry, or of those that conditions hold where there is none."""
+    moving = max(range(1, len(family.parts)), key=lambda k: family.parts[k].entry_count, default=0)
     line: list[ComplexArray] = []
-    most = max(range(1, len(family.parts)), key=lambda k: family.parts[k].entry_count, default=0)
     for k, part in enumerate(family.parts):
         change: ComplexArray = np.zeros((part.entry_count, len(part.kinds), 2), dtype=complex)
-        entries = slice(0, int(k == most or (k == 0 and part.rows.equation_count > 0)))
-        change[entries] = rng.normal(size=change[entries].shape) + 1j * rng.normal(size=change[entries].shape)
-        real = [n for n, kind in enumerate(part.kinds) if kind is NumberKind.LENGTH]
-        change[:, real, 1] = change[:, real, 0]
+        if k == moving:
+            change[0, :, 0] = rng.normal(size=len(part.kinds)) + 1j * rng.normal(size=len(part.kinds))
+            change[0, :, 1] = np.where([kind is NumberKind.LENGTH for kind in part.kinds], change[0, :, 0], 0.0)
         line.append(change)
     return tuple(line)
+
+
+def _is_closed(family: Family, known: GenericSolutions, V: ComplexArray, rng: np.random.Generator) -> bool:
+    """Whether random loops in all numbers lead from solutions V of the member to these alone."""
+    members = [known.member, *(family.random_member(rng) for _ in range(2 * LOOPS))]
+    first = 1 + 2 * np.repeat(np.arange(LOOPS), len(V))
+    nodes = np.zeros_like(first)
+    ends = np.tile(V, (LOOPS, 1))
+    for target in (first, first + 1, np.zeros_like(first)):
+        paths = track_paths(
+            EdgeHomotopy(family, members, np.stack([nodes, target], axis=1)), ends, PREDICTION, CORRECTION, STEPS
+        )
+        first, nodes, ends = first[paths.is_single], target[paths.is_single], paths.V[paths.is_single]
+    return bool((first_of_same(np.concatenate([V, ends])) < len(V)).all())
 
 
 def trace_test(
@@ -194,5 +215,6 @@ def trace_test(
     V = V[first_of_same(V) == np.arange(len(V))]
     if not 0 < 2 * len(V) <= most_points:
         return False
-    slices = _Slices(family, known, V, np.random.default_rng(seed))
-    return slices.close(most_points) and len(slices.at_member()) == len(V)
+    rng = np.random.default_rng(seed)
+    slices = _Slices(family, known, V, rng)
+    return slices.close(most_points) and len(slices.at_member()) == len(V) and _is_closed(family, known, V, rng)
