@@ -131,11 +131,10 @@ if TYPE_CHECKING:
     from planar.synthesis.cognates.cognates import Cognate, CognateInput, Cognates, cognates
     from planar.synthesis.exact.complete_synthesis import CompleteSynthesis, DyadCurve, ExactDesign
     from planar.synthesis.synthesis import DesignMotion, FamilyCount, Synthesis, SynthesisedDesign
-    from planar.synthesis.synthesise import synthesise
+    from planar.synthesis.synthesise import SearchProgress, synthesise
     from planar.synthesis.task.synthesis_task import Demands, SynthesisTask, WantedFunction, WantedPath, WantedPoses
     from planar.synthesis.task.task_file import task_schema, write_task
     from planar.synthesis.task.task_reader import read_task
-    from planar.synthesis.task_search import SearchProgress
 
 __version__ = "0.18.0"
 

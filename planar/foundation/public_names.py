@@ -126,7 +126,7 @@ MODULES = {
     "RelativeState": "results.records",
     "RubbingPair": "dynamics.in_time.friction_record",
     "RunGradient": "batch.gradients.run_gradient",
-    "SearchProgress": "synthesis.task_search",
+    "SearchProgress": "synthesis.synthesise",
     "Sensitivity": "analysis.sensitivity.sensitivity",
     "Shaking": "dynamics.balancing.balance",
     "Simulation": "dynamics.simulation",

@@ -19,8 +19,15 @@ from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput
 from planar.model.file_units import FileUnits, unit_of_kind
 from planar.model.mechanism import Mechanism, NamedPoint, named_points
-from planar.synthesis.catalogue.catalogue import Catalogue, follow_branches, kept_catalogue
-from planar.synthesis.catalogue.matches import Match, WantedItem, find_matches, moved_numbers
+from planar.synthesis.catalogue import (
+    Catalogue,
+    Match,
+    WantedItem,
+    find_matches,
+    follow_branches,
+    kept_catalogue,
+    moved_numbers,
+)
 from planar.synthesis.fitting.demand_rows import DemandGuard, demand_guards
 from planar.synthesis.fitting.design_fit import DesignFit, FittedDesigns
 from planar.synthesis.fitting.moving_designs import lacks

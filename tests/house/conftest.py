@@ -8,7 +8,7 @@ from tests.draws import SEARCH
 
 LESS = {
     "planar.analysis.force_maps.force_map": {"USUAL_COUNTS": (13, 5, 3)},
-    "planar.synthesis.task_search": {"DRAWS": 600, "MATCHES": 24, "ROUNDS": 1},
+    "planar.synthesis.synthesise": {"DRAWS": 600, "MATCHES": 24, "ROUNDS": 1},
 }
 """Numbers of modules, and what they are here."""
 

@@ -12,9 +12,9 @@ from tests.command import run
 @pytest.fixture(autouse=True)
 def few_designs(monkeypatch):
     """A small catalogue, which is enough for tasks as easy as these."""
-    monkeypatch.setattr("planar.synthesis.task_search.DRAWS", 600)
-    monkeypatch.setattr("planar.synthesis.task_search.MATCHES", 24)
-    monkeypatch.setattr("planar.synthesis.task_search.ROUNDS", 1)
+    monkeypatch.setattr("planar.synthesis.synthesise.DRAWS", 600)
+    monkeypatch.setattr("planar.synthesis.synthesise.MATCHES", 24)
+    monkeypatch.setattr("planar.synthesis.synthesise.ROUNDS", 1)
 
 
 UNITS = {"length": "mm", "angle": "deg"}

@@ -10,7 +10,7 @@ import numpy as np
 from planar.assemblies.polynomial.certification import is_available
 from planar.model.wording import amount, count_phrase
 from planar.synthesis.exact.complete_synthesis import ExactDesign
-from planar.synthesis.exact.component_solutions import FAR, ComponentSolutions, alike_components
+from planar.synthesis.exact.tracking.member_solutions import FAR, ComponentSolutions, alike_components
 from planar.synthesis.judgement.judgement import FileCheck
 from planar.synthesis.task.starts import wanted_miss_kind
 from planar.synthesis.task.synthesis_task import SynthesisTask

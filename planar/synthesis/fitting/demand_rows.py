@@ -21,7 +21,7 @@ from planar.model.mechanism import Mechanism, named_points
 from planar.model.output_pair import find_output_pair
 from planar.solving.cycle import cycle
 from planar.synthesis.fitting.wanted_equations import WantedEquations, WantedRows, in_entries, solve_rows
-from planar.synthesis.judgement.motion_demands import output_transmissions, polygon_depths
+from planar.synthesis.judgement.defects import output_transmissions, polygon_depths
 from planar.synthesis.task.freedom import generic_start
 from planar.synthesis.task.starts import FreeNumbers
 from planar.synthesis.task.synthesis_task import SynthesisTask

@@ -20,10 +20,9 @@ from planar.model.wording import amount
 from planar.results.motion import Motion
 from planar.solving.cycle import cycle
 from planar.solving.grids.grid_motion import motion_over_input
-from planar.synthesis.judgement.defects import ORDER, REACH, WHOLE_TURN, Defect
+from planar.synthesis.judgement.defects import ORDER, REACH, WHOLE_TURN, Defect, region_defects, transmission_defects
 from planar.synthesis.judgement.design_assemblies import DesignAssemblies, EntryLocator, EntryPlace, PlaceWords
 from planar.synthesis.judgement.input_range import InputRange, input_range, ordered_inputs, range_motion
-from planar.synthesis.judgement.motion_demands import region_defects, transmission_defects
 from planar.synthesis.task.starts import task_motion_kind
 from planar.synthesis.task.synthesis_task import SynthesisTask, Wanted, WantedFunction, WantedPath
 from planar.synthesis.task.wanted_results import (

@@ -17,8 +17,7 @@ from planar.reports.fitted_table import FittedTable, plain_table
 from planar.reports.number_format import format_or_zero, paragraphs
 from planar.reports.tables.design.cognates import cognate_record
 from planar.synthesis.exact.complete_synthesis import CompleteSynthesis, ExactDesign
-from planar.synthesis.search_folder import design_record
-from planar.synthesis.synthesis import Synthesis, SynthesisedDesign
+from planar.synthesis.synthesis import Synthesis, SynthesisedDesign, design_record
 from planar.synthesis.task.starts import miss_text, motion_kind
 
 MAX_REJECTED = 8

@@ -1,21 +1,83 @@
-"""The homotopy between members of a family, and the roots of a dyad's four rows in closed form.
+"""Solutions in homogeneous coordinates, the homotopy between members of a family, and a dyad's roots in closed form.
 
-With p = (1, z, z*) of one place and q of the other each row is p R q = 0. Along a random line of p's plane, moved by t,
-p = a + s b + t c, the four rows times 1, s and s^2 are linear in t and in q, s q, s^2 q and s^3 q, twelve by twelve
-(D. Manocha, Solving systems of polynomial equations, IEEE Computer Graphics and Applications 14 (1994) 46). Six points
-are found in the whole plane, two of them at infinity, the circular points, where turning dyads are sought.
+With p = (1, z, z*) of one place and q of the other each of a dyad's four rows is p R q = 0. Along a random line of p's
+plane, moved by t, p = a + s b + t c, the four rows times 1, s and s^2 are linear in t and in q, s q, s^2 q and s^3 q,
+twelve by twelve (D. Manocha, Solving systems of polynomial equations, IEEE Computer Graphics and Applications 14 (1994)
+46). Six points are found in the whole plane, two of them at infinity, the circular points, where turning dyads are
+sought.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from planar.assemblies.polynomial.path_tracker import HomotopyValues
 from planar.foundation.arrays import Array, ComplexArray, IntArray
 from planar.synthesis.exact.relations.family import Family, Member
-from planar.synthesis.exact.tracking.symmetry import first_of_same
+
+Images = Callable[[ComplexArray], list[ComplexArray]]
+"""Of solutions V all that stand for the same thing, themselves first."""
+
+
+def reordered(V: ComplexArray, order: tuple[int, ...]) -> ComplexArray:
+    """Solutions whose unknown at each place is that of an order."""
+    half = V.shape[1] // 2
+    own = np.array(order, dtype=int) + 1
+    return V[:, [0, *own.tolist(), half, *(own + half).tolist()]]
+
+
+def exchange_images(exchanges: tuple[tuple[int, ...], ...]) -> Images:
+    """All that exchanges make of solutions."""
+    return lambda V: [reordered(V, each) for each in exchanges]
+
+
+def representatives(V: ComplexArray, images: Images | None) -> ComplexArray:
+    """Of all that stand for the same thing always the same one."""
+    every = images(V) if images is not None else [V]
+    if len(every) == 1:
+        return V
+    keys = np.array([solution_keys(each).real for each in every])
+    chosen = np.argmin(keys, axis=0)
+    found: ComplexArray = np.array(every)[chosen, np.arange(len(V))]
+    return found
+
+
+def solution_keys(V: ComplexArray) -> ComplexArray:
+    """A number by which solutions are told from each other, whatever the length of their halves."""
+    half = V.shape[1] // 2
+    rng = np.random.default_rng(1)
+    weights = rng.normal(size=(2, 2, half)) + 1j * rng.normal(size=(2, 2, half))
+    parts = V[:, :half], V[:, half:]
+    found: ComplexArray = sum((each @ w[0]) / (each @ w[1]) for each, w in zip(parts, weights, strict=True))
+    return found
+
+
+SAME = 1e-7
+"""Of directions of length one: solutions nearer to each other are one. Two that are nearly real are no farther apart
+than their imaginary parts."""
+
+
+def first_of_same(V: ComplexArray) -> IntArray:
+    """Of each solution the first that is the same (solutions,)."""
+    found: IntArray = np.arange(len(V))
+    if len(V) < 2:
+        return found
+    half, key = V.shape[1] // 2, solution_keys(V)
+    parts = V[:, :half], V[:, half:]
+    order = np.argsort(key.real, kind="stable")
+    unit = [each / np.linalg.norm(each, axis=1, keepdims=True) for each in parts]
+    room = 1e3 * SAME * np.maximum(1.0, np.abs(key))
+    for at, k in enumerate(order.tolist()):
+        for other in order[at + 1 :].tolist():
+            if key[other].real - key[k].real > room[k]:
+                break
+            apart = max(np.linalg.norm(each[other] - np.vdot(each[k], each[other]) * each[k]) for each in unit)
+            if apart < SAME:
+                low = min(found[k], found[other])
+                found[k] = found[other] = low
+    return found
 
 
 class MemberHomotopy:
