@@ -232,21 +232,6 @@ def build_catalogue(equations: tuple[WantedEquations, ...], free: FreeNumbers, c
     return Catalogue(x, unknowns, told, is_whole)
 
 
-def catalogue_key(
-    start: Mechanism, equations: tuple[WantedEquations, ...], free: FreeNumbers, count: int, seed: int
-) -> str:
-    """What tells one catalogue from another: the file, what is wanted of it, free numbers, bounds, count and seed."""
-    told = [
-        write_mechanism(start),
-        [str(each.rows.wanted.of) for each in equations],
-        [*free.names],
-        [*map(repr, (*free.lower, *free.upper))],
-        count,
-        seed,
-    ]
-    return hashlib.sha256(json.dumps(told, sort_keys=True, default=str).encode()).hexdigest()
-
-
 CACHE = PrivateCache("catalogues", ".npz", b"planar catalogue 1\n", 2 * 2**30)
 
 
@@ -256,7 +241,15 @@ def kept_catalogue(
     """The catalogue of so many draws, from disk where it is kept there, else made and kept.
 
     The `equations` may be of a mechanism similar to the `start`: a catalogue is without a size."""
-    key = catalogue_key(start, equations, free, count, seed)
+    described = [
+        write_mechanism(start),
+        [str(item.rows.wanted.of) for item in equations],
+        [*free.names],
+        [*map(repr, (*free.lower, *free.upper))],
+        count,
+        seed,
+    ]
+    key = hashlib.sha256(json.dumps(described, sort_keys=True, default=str).encode()).hexdigest()
     content = CACHE.read(key)
     if content is not None:
         with np.load(io.BytesIO(content), allow_pickle=False) as file:
@@ -299,35 +292,29 @@ class WantedItem(NamedTuple):
         return isinstance(self.wanted, WantedPath) and self.wanted.is_closed
 
 
-class StepChoices(NamedTuple):
-    """Which entries (m,) are looked at, and steps (designs, choices, m) at which they may be met; -1 for none."""
-
-    entries: IntArray
-    steps: IntArray
-
-
 def step_choices(
     catalogue: Catalogue, item: WantedItem, values: Array, most: int, stride: int
-) -> Iterator[StepChoices]:
-    """Where the entries of an item may be met along the branches of designs that show `values` (designs, steps, parts),
-    of at most so many entries evenly, and of every so-many-th place along a branch where the first may be met."""
+) -> Iterator[tuple[IntArray, IntArray]]:
+    """Where the entries of an item may be met along the branches of designs that show `values` (designs, steps, parts):
+    at most so many entries (m,), evenly, and steps (designs, choices, m), -1 for none, of every so-many-th place along
+    a branch where the first may be met."""
     if item.inputs is not None:
         entries = _evenly(len(item.target), most)
         given = item.inputs[entries]
-        yield StepChoices(entries, _timed_steps(catalogue.unknowns[..., -1], given, item, catalogue.is_whole))
+        yield entries, _timed_steps(catalogue.unknowns[..., -1], given, item, catalogue.is_whole)
         return
     if isinstance(item.wanted, WantedPoses):
         entries = _evenly(len(item.target), most)
-        yield StepChoices(entries, _turned_steps(values[..., 2], item.target[entries, 2], stride))
+        yield entries, _turned_steps(values[..., 2], item.target[entries, 2], stride)
     along = _lengths_along(values[..., 0] + 1j * values[..., 1])
     for order in _entry_orders(item):
         few = _evenly(len(order), most)
         fractions, entries = _entry_fractions(item, order)[few], order[few]
         if item.is_closed:
-            yield StepChoices(entries, _closed_steps(along, fractions, catalogue.is_whole, stride))
+            yield entries, _closed_steps(along, fractions, catalogue.is_whole, stride)
         else:
             for steps in _arc_steps(along, fractions, catalogue.is_whole, stride):
-                yield StepChoices(entries, steps)
+                yield entries, steps
 
 
 def _evenly(count: int, most: int) -> IntArray:
@@ -552,17 +539,9 @@ CHUNK = 256
 """Designs that are compared at once."""
 
 
-class _Level(NamedTuple):
-    """A comparison by so many entries of an item, evenly, from every so-many-th of the places where the first may be
-    met; so many times as many designs as are wanted go on to the next."""
-
-    entries: int
-    stride: int
-    share: int
-
-
-LEVELS = (_Level(12, 2, 6), _Level(36, 1, 2))
-"""By which designs are compared before all entries are, from all places."""
+LEVELS = ((12, 2, 6), (36, 1, 2))
+"""Comparisons before that by all entries from all places: by so many entries of an item, evenly, from every so-many-th
+of the places where the first may be met; so many times as many designs as are wanted go on to the next."""
 SHARE_OF_ITEMS = 6
 """So many times as many designs as are wanted are compared by all items, where there are several."""
 
@@ -599,12 +578,11 @@ def find_matches(
     first = items[order[0]]
     designs = np.flatnonzero(catalogue.is_whole) if whole_only or first.is_closed else np.arange(len(catalogue))
     share = SHARE_OF_ITEMS if len(items) > 1 else 1
-    for level in LEVELS:
-        if len(first.target) > level.entries or (level.stride > 1 and first.inputs is None):
-            coarse = _nearest_choices(catalogue, designs, order[0], first, factors, level)
-            designs = designs[_best(coarse.distance, max(level.share, share) * many)]
-    whole = _Level(len(first.target), 1, share)
-    nearest = _nearest_choices(catalogue, designs, order[0], first, factors, whole)
+    for entries, stride, level_share in LEVELS:
+        if len(first.target) > entries or (stride > 1 and first.inputs is None):
+            coarse = _nearest_choices(catalogue, designs, order[0], first, factors, entries, stride)
+            designs = designs[_best(coarse.distance, max(level_share, share) * many)]
+    nearest = _nearest_choices(catalogue, designs, order[0], first, factors, len(first.target), 1)
     matches = []
     for row in _best(nearest.distance, share * many).tolist():
         steps: list[IntArray] = [np.zeros(0, int)] * len(items)
@@ -626,9 +604,9 @@ def _best(distance: Array, many: int) -> IntArray:
 
 
 def _nearest_choices(
-    catalogue: Catalogue, designs: IntArray, k: int, item: WantedItem, factors: Array | None, level: _Level
+    catalogue: Catalogue, designs: IntArray, k: int, item: WantedItem, factors: Array | None, most: int, stride: int
 ) -> _NearestChoices:
-    """The nearest choice of each design for the item k, looked at as the level says."""
+    """The nearest choice of each design for the item k, of at most so many entries and every so-many-th place."""
     many, entries = len(designs), len(item.target)
     nearest = _NearestChoices(
         np.full(many, np.inf), np.ones(many, complex), np.zeros(many, complex), np.zeros((many, entries), int)
@@ -637,8 +615,8 @@ def _nearest_choices(
         rows = slice(first, first + CHUNK)
         few = catalogue.take(designs[rows])
         own = None if factors is None else factors[designs[rows]]
-        for choices in step_choices(few, item, few.values[k], level.entries, level.stride):
-            _take_better(nearest, rows, few.values[k], choices.steps, choices.entries, item, own)
+        for chosen, steps in step_choices(few, item, few.values[k], most, stride):
+            _take_better(nearest, rows, few.values[k], steps, chosen, item, own)
     return nearest
 
 

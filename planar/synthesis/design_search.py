@@ -58,7 +58,7 @@ def write_design(
     told = {key: _rounded(value, known[key].kind, units, size, DIGITS) for key, value in numbers.items()}
     running = f"{start.inputs[0].pair}.position"
     told[running] = _rounded(input_position, known[running].kind, units, size, DIGITS)
-    joints = [each for each in named_points(start) if len(each.members) > 1 and _moves(start, each)]
+    joints = [each for each in named_points(start) if len(each.members) > 1 and start.frame not in dict(each.members)]
     places = _places(design, joints, told, y)
     sketch = []
     for each, at in zip(joints, places, strict=True):
@@ -66,10 +66,6 @@ def write_design(
         sketch.append((each.name, x, y_own))
     made = replace(start, sketch=tuple(sketch), name=name, about=None, source=None, published=(), ids=())
     return with_values(made, told)
-
-
-def _moves(mechanism: Mechanism, point: NamedPoint) -> bool:
-    return all(link != mechanism.frame for link, _ in point.members)
 
 
 def _places(

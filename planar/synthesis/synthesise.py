@@ -280,25 +280,20 @@ class TaskSearch:
         """The best designs; round-off of what is exact does not count."""
         return rank_designs(designs, self.many, EXACT * (self.size if self.task.wants_places else 1.0))
 
-    def _freedom(self, start: str) -> str:
-        """What of the task a start can meet exactly."""
-        return f"{start}: {count_freedom(self.task, self.starts[start]).sentence}"
-
     def result(self) -> Synthesis:
         """All that was found so far."""
         remarks = [*self.remarks]
         if not self.is_finished:
             remarks.append(self._unfinished())
-        sound = tuple(map(self._complete, self._ranked(self.sound)))
+        sound = tuple(
+            replace(design, cognates=task_cognates(design.mechanism, self.task)) for design in self._ranked(self.sound)
+        )
         rejected = self._ranked(self.rejected)
-        remarks += [self._freedom(each.start) for each in (sound or rejected)[:1]]
+        for design in (sound or rejected)[:1]:
+            remarks.append(f"{design.start}: {count_freedom(self.task, self.starts[design.start]).sentence}")
         if not sound and (self.rejected or self.is_finished):
             remarks.append(refusal([each.shortages for each in self.rejected], self.task.units))
         return Synthesis(self.task, sound, rejected, self.size, tuple(remarks), self.seed, self.is_finished)
-
-    def _complete(self, design: SynthesisedDesign) -> SynthesisedDesign:
-        """A sound design with its cognates."""
-        return replace(design, cognates=task_cognates(design.mechanism, self.task))
 
     def _unfinished(self) -> str:
         """How far a search came that did not search every start."""

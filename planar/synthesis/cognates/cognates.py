@@ -65,6 +65,11 @@ class PathMotion(NamedTuple):
     rates: dict[str, float]
     "of the links' angles (rad/s), where the inputs move"
 
+    def is_standing(self, posed: PosedLinkage, link: str, base: str) -> bool:
+        """Whether a link does not turn against another one over the whole motion."""
+        one, other = posed.turns[link], posed.turns[base]
+        return all(float(np.ptp(angles[one] - angles[other])) < 1e-9 for angles in self.angles.values())
+
 
 class _Joint(NamedTuple):
     """A relative motion of a cognate, with the two links as the file of the mechanism calls them."""
@@ -72,14 +77,6 @@ class _Joint(NamedTuple):
     name: str
     pair: Pair
     links: tuple[str, str]
-
-
-def keeps_timing(posed: PosedLinkage, mechanism: Mechanism) -> bool:
-    """Whether for every input some joint of a cognate moves as it does."""
-    together = [{posed.turns[link] for link in links} for pin in posed.pins for links in combinations(pin.links, 2)]
-    motions = relative_motions(mechanism)
-    pins = [{*motions[given.pair].links} for given in mechanism.inputs if motions[given.pair].coincident_points()]
-    return all(links in together for links in pins)
 
 
 class CognateInputs:
@@ -182,8 +179,10 @@ class CognateInputs:
         if not {*pair.links} & {self.written.links[link] for link in self.posed.remade} and told.scale == 1.0:
             return given
         if pair.input_kind is MeasureKind.LENGTH:
-            scaled = replace_numbers(given, told.scale)
-            return scaled if told.scale == 1.0 else scaled._replace(law=None, motor=None)
+            if told.scale == 1.0:
+                return given
+            position, velocity, acceleration = told.scale * np.array(given[1:4])
+            return Input(given.pair, float(position), float(velocity), float(acceleration))
         joint = next(each for each in self._joints() if each.name == told.driven)
         state = self.motion.state
         position = wrap_angle(self._relative(joint, {link: self.written.axes[link].angle for link in joint.links}))
@@ -197,24 +196,6 @@ class CognateInputs:
         keeps = told.is_timed and told.scale == 1.0
         law = given.law.start_at(position, velocity) if keeps and given.law is not None else None
         return Input(told.driven, position, velocity, acceleration, law, given.motor if keeps else None)
-
-
-def replace_numbers(given: Input, scale: float) -> Input:
-    """An input that goes so many times as far as fast."""
-    return given._replace(
-        position=scale * given.position, velocity=scale * given.velocity, acceleration=scale * given.acceleration
-    )
-
-
-def with_inputs(bare: Mechanism, inputs: Sequence[Input]) -> Mechanism:
-    """The mechanism with these inputs."""
-    return replace(bare, inputs=tuple(inputs))
-
-
-def is_standing(posed: PosedLinkage, motion: PathMotion, link: str, base: str) -> bool:
-    """Whether a link does not turn against another one over the whole motion."""
-    one, other = posed.turns[link], posed.turns[base]
-    return all(float(np.ptp(angles[one] - angles[other])) < 1e-9 for angles in motion.angles.values())
 
 
 PATH_STEPS = 180
@@ -315,7 +296,9 @@ def cognates(mechanism: Mechanism, point: str) -> Cognates:
     for number, other in enumerate(others, 1):
         writer = WrittenCognate(state, other, tracer, tracer_point, names.pin_names(other, number))
         written.append(_written(writer, motion, f"{mechanism.name}, cognate {number}", name))
-    return Cognates(mechanism, name, _path(mechanism, name), (Cognate(mechanism, name, own), *written))
+    path: Array = cycle(mechanism, PATH_STEPS, pair=mechanism.inputs[0].pair).point(name).position
+    path.flags.writeable = False
+    return Cognates(mechanism, name, path, (Cognate(mechanism, name, own), *written))
 
 
 def first_cognates(mechanism: Mechanism) -> Cognates:
@@ -342,18 +325,23 @@ def _search(
         changes, reasons = exchanges(one, mechanism, tracer)
         refused += reasons
         for change in changes:
-            still = next(
-                (link for link in (change.coupler, change.bar) if is_standing(one, motion, link, change.base)), None
-            )
-            if still is not None:
-                refused.append(
-                    Refusal(4, f"{still!r} does not turn, as in a parallelogram, so that the point moves on a circle")
-                )
+            still = [link for link in (change.coupler, change.bar) if motion.is_standing(one, link, change.base)]
+            if still:
+                sentence = f"{still[0]!r} does not turn, as in a parallelogram, so that the point moves on a circle"
+                refused.append(Refusal(4, sentence))
                 continue
             other = exchanged(one, change)
             if len(found) <= MAX_COGNATES and not any(other.looks_like(each) for each in found):
                 found.append(other)
-    return sorted(found[1:], key=lambda each: not keeps_timing(each, mechanism)), refused
+    motions = relative_motions(mechanism)
+    pins = [{*motions[given.pair].links} for given in mechanism.inputs if motions[given.pair].coincident_points()]
+
+    def keeps_timing(linkage: PosedLinkage) -> bool:
+        """Whether for every input some joint moves as it does."""
+        joints = [{linkage.turns[link] for link in pair} for pin in linkage.pins for pair in combinations(pin.links, 2)]
+        return all(links in joints for links in pins)
+
+    return sorted(found[1:], key=lambda linkage: not keeps_timing(linkage)), refused
 
 
 def _written(writer: WrittenCognate, motion: PathMotion, name: str, point: str) -> Cognate:
@@ -361,7 +349,7 @@ def _written(writer: WrittenCognate, motion: PathMotion, name: str, point: str) 
     source = motion.state.mechanism
     bare = writer.mechanism(name, f"Its point traces the path of {point} of {source.name!r}.")
     inputs, told = CognateInputs(writer, bare, motion).find()
-    mechanism = read_mechanism(write_mechanism(with_inputs(bare, inputs)))
+    mechanism = read_mechanism(write_mechanism(replace(bare, inputs=inputs)))
     own = writer.point_name(bare)
     off = solve(mechanism).point(own).position - motion.state.point(point).position
     if float(np.hypot(*off)) > SAME_PLACE * writer.posed.size:
@@ -394,12 +382,6 @@ def _path_motion(mechanism: Mechanism, state: State) -> PathMotion:
     moving = tuple(Drive(given.pair, velocity=1.0 / (1 + k)) for k, given in enumerate(mechanism.inputs))
     rates = solve(replace_inputs(mechanism, moving)).links
     return PathMotion(angles, state, {name: each.angular_velocity for name, each in rates.items()})
-
-
-def _path(mechanism: Mechanism, name: str) -> Array:
-    found: Array = cycle(mechanism, PATH_STEPS, pair=mechanism.inputs[0].pair).point(name).position
-    found.flags.writeable = False
-    return found
 
 
 def _input_sentence(told: CognateInput) -> str:

@@ -13,7 +13,7 @@ E. A. Dijksman, Motion Geometry of Mechanisms (Cambridge, 1976), chapters 6 and 
 from __future__ import annotations
 
 from cmath import phase, rect
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from itertools import combinations
 from typing import NamedTuple
 
@@ -212,7 +212,11 @@ def exchanges(posed: PosedLinkage, mechanism: Mechanism, tracer: Tracer) -> tupl
     """All that can be exchanged, and of what cannot the reasons."""
     found, refused = [], list[Refusal]()
     others = other_pairs(mechanism)
-    for bar, first, second in _bars(posed, mechanism):
+    bars = [link.name for link in mechanism.links if link.name != mechanism.frame and not posed.guides_of(link.name)]
+    for bar in bars:
+        if len(posed.pins_of(bar)) != 2:
+            continue
+        first, second = posed.pins_of(bar)
         if bar in tracer.links:
             refused.append(
                 Refusal(1, f"it is on {bar!r}, which has two pins alone, so that it moves on a circle of it")
@@ -232,14 +236,6 @@ def exchanges(posed: PosedLinkage, mechanism: Mechanism, tracer: Tracer) -> tupl
                 else:
                     refused.append(one)
     return found, refused
-
-
-def _bars(posed: PosedLinkage, mechanism: Mechanism) -> Iterator[tuple[str, PosedPin, PosedPin]]:
-    """Moving links with two pins and nothing else."""
-    for link in mechanism.links:
-        pins = posed.pins_of(link.name)
-        if link.name != mechanism.frame and len(pins) == 2 and not posed.guides_of(link.name):
-            yield link.name, pins[0], pins[1]
 
 
 class _Exchanging(NamedTuple):

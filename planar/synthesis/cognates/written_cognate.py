@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 from planar.foundation.angles import wrap_angle
 from planar.foundation.geometry import Vector
 from planar.model.link_shapes import At, Link, Point
-from planar.model.mechanism import Mechanism, NamedPoint, named_points, pair_entries, relative_motions
+from planar.model.mechanism import Mechanism, named_points, pair_entries, relative_motions
 from planar.model.pairs import Pair
 from planar.model.pairs.guide_line import GuidedPair, LinkLine
 from planar.model.pin_linkage import turning_pair_type
@@ -23,14 +23,6 @@ PIVOT_LETTERS = "GHKMNPQRSTUVWXYZABCDEFJLIO"
 """What new pins of links that stay are called, the first that is free."""
 
 
-class NewPivot(NamedTuple):
-    """A pin that a link, which stays, has in some of the cognates: its place on it in the first position."""
-
-    link: str
-    at: complex
-    name: str
-
-
 class CognateNames:
     """Gives names: those of the file to what stays, and one to what is at the same place in several cognates."""
 
@@ -38,7 +30,8 @@ class CognateNames:
         self.original = posed
         self.taken = {pair.entry_name() for pair in mechanism.pairs}
         self.taken |= {name for link in mechanism.links for name in (link.name, *link.names)}
-        self.pivots: list[NewPivot] = []
+        self.pivots: list[tuple[str, complex, str]] = []
+        "new pins of links that stay in some of the cognates: the link, the place in the first position, and the name"
 
     def pin_names(self, posed: PosedLinkage, number: int) -> dict[PosedPin, str]:
         """The name of every pin of a cognate of this number."""
@@ -57,11 +50,11 @@ class CognateNames:
         return found
 
     def _pivot_name(self, posed: PosedLinkage, link: str, at: complex, used: set[str]) -> str:
-        known = (each.name for each in self.pivots if each.link == link and posed.is_same(each.at, at))
-        name = next((each for each in known if each not in used), None)
-        if name is None:
-            name = self._free((*PIVOT_LETTERS, *_primed("G")), used | {each.name for each in self.pivots})
-            self.pivots.append(NewPivot(link, at, name))
+        for other, place, name in self.pivots:
+            if other == link and posed.is_same(place, at) and name not in used:
+                return name
+        name = self._free((*PIVOT_LETTERS, *_primed("G")), used | {name for _, _, name in self.pivots})
+        self.pivots.append((link, at, name))
         return name
 
     def _free(self, names: tuple[str, ...] | Iterator[str], used: set[str]) -> str:
@@ -166,12 +159,9 @@ class WrittenCognate:
             (self.links[link], spot.name)
             for link in self.tracer.links
             for spot in self._spots(link)
-            if self._is_it(spot)
+            if self.posed.is_same(spot.at, self.tracer.at)
         }
         return next(each.name for each in named_points(mechanism) if ends & {*each.members})
-
-    def _is_it(self, spot: Spot) -> bool:
-        return self.posed.is_same(spot.at, self.tracer.at)
 
     @cached_property
     def _original(self) -> PosedLinkage:
@@ -339,7 +329,7 @@ class WrittenCognate:
         found = set(kept)
         old = {each.name: {*each.members} for each in named_points(self.source)}
         for each in named_points(mechanism):
-            if self._means_the_same(each, old.get(each.name, set()), kept):
+            if any(member in old.get(each.name, ()) and member[0] in kept for member in each.members):
                 found.add(each.name)
                 found |= {f"{link}.{point}" for link, point in each.members if link in kept}
                 found |= {point for _, point in each.members}
@@ -349,9 +339,6 @@ class WrittenCognate:
             if {*pair.links} <= kept and name in motions and motions[name].links == pair.links:
                 found.add(name)
         return found
-
-    def _means_the_same(self, named: NamedPoint, before: set[tuple[str, str]], kept: set[str]) -> bool:
-        return any(member in before and member[0] in kept for member in named.members)
 
 
 def _unit(angle: float) -> tuple[float, float]:

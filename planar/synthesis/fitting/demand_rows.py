@@ -132,15 +132,9 @@ def rate_rows(mechanism: Mechanism, free: Sequence[str], scale: Array) -> Adjoin
     return AdjointRows([rate] if design.z.numel() else [], free, scale)
 
 
-def transmission_rows(
-    mechanism: Mechanism, transmissions: Sequence[Transmission], free: Sequence[str], scale: Array
-) -> AdjointRows:
-    """Angles (rad), a column for each of the transmissions."""
-    return AdjointRows(_linear_systems(mechanism, transmissions), free, scale)
-
-
-def _linear_systems(mechanism: Mechanism, transmissions: Sequence[Transmission]) -> Iterator[LinearSystem]:
-    """The balance under an effort on each output."""
+def _transmission_systems(mechanism: Mechanism, transmissions: Sequence[Transmission]) -> Iterator[LinearSystem]:
+    """The balance of each output under an effort on it alone, with its transmission angle (rad) by the forces of all
+    constraints' multipliers; see `planar.transmission`."""
     for each in transmissions:
         pair = find_output_pair(mechanism, each.pair)[1]
         system = TransmissionSystem(mechanism, each.link, pair, each.through)
@@ -347,4 +341,4 @@ def output_rows(equations: WantedEquations, free: FreeNumbers) -> AdjointRows:
         told = tuple(output_transmissions(motion))
     except PlanarError:
         told = ()  # the judge tells
-    return transmission_rows(mechanism, told, equations.free, equations.scale)
+    return AdjointRows(_transmission_systems(mechanism, told), equations.free, equations.scale)

@@ -236,7 +236,8 @@ class DesignFit:
         state.run(MAX_STEPS, rest)
         if state.demands is not None:
             state.keep_best(max(keep, FEW))
-            for _ in range(PRESSINGS if state.demands.can_lack else 0):
+            can_lack = bool(state.demands.guard.rows) or state.demands.order.count > 0
+            for _ in range(PRESSINGS if can_lack else 0):
                 if not state.press():
                     break
                 state.run(PRESSED_STEPS)

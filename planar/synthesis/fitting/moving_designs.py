@@ -128,11 +128,6 @@ class KeptDemands:
         self.weight = np.full(len(y), FIRST_WEIGHT)
         self.lack_before = self.lack
 
-    @property
-    def can_lack(self) -> bool:
-        """Whether anything is demanded but that designs go together."""
-        return bool(self.guard.rows) or self.order.count > 0
-
     def take(self, rows: IntArray) -> None:
         """Only these designs go on."""
         for name in ("shares", "y", "is_closed", "slack", "multipliers", "weight", "lack_before"):

@@ -27,8 +27,8 @@ from planar.derivatives.design_equations import DesignEquations, design_equation
 from planar.equations.casadi_call import BufferedFunction
 from planar.foundation.arrays import Array, BoolArray, IntArray
 from planar.model.mechanism import Mechanism
-from planar.synthesis.task.synthesis_task import SynthesisTask, Wanted, WantedFunction, WantedPath
-from planar.synthesis.task.wanted_results import wanted_expression
+from planar.synthesis.task.synthesis_task import SynthesisTask, Wanted, WantedFunction
+from planar.synthesis.task.wanted_results import wanted_expression, wanted_results
 
 DAMPING_ALONG = 1e-12
 """Of the squared size of the results: how much going along a path counts, where a result does not change along it."""
@@ -93,11 +93,8 @@ class WantedEquations:
         """Whether the running input is given at every entry."""
         return self.rows.inputs is not None
 
-    def _in_entries(self, outputs: list[ca.SX]) -> tuple[ca.SX, ca.SX, list[ca.SX]]:
-        return in_entries(self.design, self.free, self.scale, outputs)
-
     def _function(self, outputs: list[ca.SX]) -> BufferedFunction:
-        y, x, (F, *rest) = self._in_entries(outputs)
+        y, x, (F, *rest) = in_entries(self.design, self.free, self.scale, outputs)
         found = [F, ca.jacobian(F, y)]
         for r in rest:
             found += [ca.jacobian(F, x), r, ca.jacobian(r, y), ca.jacobian(r, x)]
@@ -138,8 +135,8 @@ class WantedEquations:
 
     @cached_property
     def _value(self) -> BufferedFunction:
-        y, x, told = self._in_entries([self.result])
-        return BufferedFunction(ca.Function("value", [y, x], [ca.densify(told[0])]))
+        y, x, (result,) = in_entries(self.design, self.free, self.scale, [self.result])
+        return BufferedFunction(ca.Function("value", [y, x], [ca.densify(result)]))
 
     def jacobians(self, x: Array, y: Array) -> Array:
         """Of the equations in each entry's unknowns (designs, n, unknowns - 1, unknowns)."""
@@ -281,24 +278,18 @@ def wanted_size(task: SynthesisTask, mechanism_size: float) -> float:
 def wanted_rows(task: SynthesisTask, size: float) -> list[WantedRows]:
     """Of each wanted item its rows: places in units of the size, angles in rad, lengths of functions in the size."""
     heavier = EXACT_WEIGHT if 0 < len(task.exact) < len(task.wanted) else 1.0
-    return [_rows(each, size, heavier if each.tolerance == 0.0 else 1.0) for each in task.wanted]
+    rows = []
+    for wanted in task.wanted:
+        values, is_function = wanted_results(wanted), isinstance(wanted, WantedFunction)
+        weights = (heavier if wanted.tolerance == 0.0 else 1.0) * np.sqrt(wanted.weights)
+        scales = np.ones(1) if is_function else np.array([size, size, 1.0])[: values.shape[1]]
+        is_free = wanted.inputs is not None and not wanted.is_absolute
+        rows.append(WantedRows(wanted, values, wanted.inputs, weights, scales, is_free, is_free and is_function))
+    return rows
 
 
 EXACT_WEIGHT = 30.0
 """Of a miss of what is to be met exactly beside others, before a fit's last steps meet it."""
-
-
-def _rows(wanted: Wanted, size: float, heavier: float) -> WantedRows:
-    weights = heavier * np.sqrt(wanted.weights)
-    if isinstance(wanted, WantedFunction):
-        scale = np.ones(1)
-        is_free = not wanted.is_absolute
-        return WantedRows(wanted, wanted.values[:, None], wanted.inputs, weights, scale, is_free, is_free)
-    is_free = wanted.inputs is not None and not wanted.is_absolute
-    if isinstance(wanted, WantedPath):
-        return WantedRows(wanted, wanted.places, wanted.inputs, weights, np.full(2, size), is_free, False)
-    values: Array = np.concatenate([wanted.places, wanted.angles[:, None]], axis=1)
-    return WantedRows(wanted, values, wanted.inputs, weights, np.array([size, size, 1.0]), is_free, False)
 
 
 class GlobalNumbers:
@@ -364,13 +355,13 @@ def half_slopes(
     return slope
 
 
-def _across(equations: WantedEquations, line: LinearRows, residual: Array) -> Array:
-    """Residuals (designs, n, parts) without their part along the path, where an entry may go along it."""
+def _across(equations: WantedEquations, line: LinearRows, rows: Array) -> Array:
+    """Rows (designs, n, parts, ...) without their part along the path, where an entry may go along it."""
     if equations.is_timed:
-        return residual
-    along = np.einsum("cnp,cnp->cn", line.along, residual) / (np.sum(line.along**2, axis=-1) + DAMPING_ALONG)
-    found: Array = residual - line.along * along[..., None]
-    return found
+        return rows
+    unit = line.along / (np.sum(line.along**2, axis=-1) + DAMPING_ALONG)[..., None]
+    across: Array = rows - np.einsum("cnp,cnq,cnq...->cnp...", line.along, unit, rows, optimize=True)
+    return across
 
 
 def predicted_residuals(equations: WantedEquations, line: LinearRows, change: Array) -> Array:
@@ -387,19 +378,13 @@ def exact_rows(
     """Rows (designs, k) and slopes (designs, k, globals) of what is to be met exactly, or of every item, without their
     part along."""
     many = len(lines[0].residual)
-    rows, slopes = [np.zeros((many, 0))], [np.zeros((many, 0, numbers.size))]
+    rows: list[Array] = [np.zeros((many, 0))]
+    slopes: list[Array] = [np.zeros((many, 0, numbers.size))]
     for k, (each, line) in enumerate(zip(equations, lines, strict=True)):
         if each.rows.wanted.tolerance != 0.0 and not every_item:
             continue
-        both = np.concatenate([line.residual[..., None], line.slopes], axis=-1)
-        if not each.is_timed:
-            size_along = np.sum(line.along**2, axis=-1) + DAMPING_ALONG
-            both = (
-                both
-                - line.along[..., None]
-                * np.einsum("cnp,cnpi,cn->cni", line.along, both, 1.0 / size_along, optimize=True)[:, :, None]
-            )
-        both = both.reshape(many, -1, both.shape[-1])
+        across = _across(each, line, np.concatenate([line.residual[..., None], line.slopes], axis=-1))
+        both = across.reshape(many, -1, across.shape[-1])
         wide = np.zeros((*both.shape[:2], numbers.size))
         wide[..., numbers.columns(k)] = both[..., 1:]
         rows.append(both[..., 0])

@@ -33,13 +33,6 @@ PIECE_SAMPLES, REFINEMENTS, REFINED_SAMPLES = 12, 3, 13
 at more closely, and at how many positions."""
 
 
-class NearestPosition(NamedTuple):
-    """Where on a branch an entry is missed least: the position of the input (rad or m), and the miss."""
-
-    position: float
-    miss: float
-
-
 class DesignAssemblies:
     """The assemblies of one design. The other inputs stand still. Raises NoAnswer where it cannot be assembled."""
 
@@ -170,9 +163,9 @@ class DesignAssemblies:
             for piece in leg.pieces
         ]
 
-    def nearest(self, wanted: Wanted, entry: int, size: float) -> NearestPosition | None:
-        """Where on the sketch's branch an entry of a path or of poses is missed least; `size` (m) is the extent of what
-        is wanted. None where the circuit cannot be followed."""
+    def nearest(self, wanted: Wanted, entry: int, size: float) -> tuple[float, float] | None:
+        """The position of the input (rad or m) on the sketch's branch where an entry of a path or of poses is missed
+        least, and that miss; `size` (m) is the extent of what is wanted. None where the circuit cannot be followed."""
         pieces = self._branch_pieces
         if not pieces:
             return None
@@ -196,7 +189,7 @@ class DesignAssemblies:
         y = piece.arc.curve_coordinates(leg.curve, x)[None]
         positions = self._positions(leg, y)
         miss = _entry_distances(wanted, entry, self.results(wanted, y[:, :-1], positions), size)
-        return NearestPosition(float(positions[0]), float(miss[0]))
+        return float(positions[0]), float(miss[0])
 
     def _positions(self, leg: BranchLeg, y: Array) -> Array:
         """The input (n,) rad or m at points of a leg's curve (n, unknowns and input)."""

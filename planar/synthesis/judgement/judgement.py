@@ -14,7 +14,7 @@ from planar.document.dimensions import file_dimensions
 from planar.document.files import from_dict, to_dict
 from planar.foundation.arrays import Array, BoolArray
 from planar.foundation.errors import BadInput, NoAnswer, PlanarError
-from planar.foundation.jets import TURN, Scalar, value_and_rates
+from planar.foundation.jets import TURN, value_and_rates
 from planar.model.mechanism import Mechanism, relative_motions
 from planar.model.wording import amount
 from planar.results.motion import Motion
@@ -137,8 +137,8 @@ class DesignJudge:
         if not isinstance(wanted, WantedFunction) and wanted.inputs is None:
             for entry in missed.tolist():
                 nearest = design.nearest(wanted, entry, self.size)
-                if nearest is not None and not nearest.miss >= off[entry]:
-                    places[entry], off[entry] = reach.bring(np.array([nearest.position]))[0], nearest.miss
+                if nearest is not None and not nearest[1] >= off[entry]:
+                    places[entry], off[entry] = reach.bring(np.array(nearest[:1]))[0], nearest[1]
         allowed = (SAME if self.is_exact else OTHER_ASSEMBLY) * scale
         locator = EntryLocator(design, self.size, (SAME if self.is_exact else SAME_AS_FITTED) * scale, self.is_exact)
         elsewhere = []
@@ -286,22 +286,13 @@ def _results(mechanism: Mechanism, wanted: Sequence[Wanted], inputs: Sequence[Ar
         if isinstance(each, WantedPath):
             found.append(motion.point(carried_name(mechanism, each.point)).position[rows])
         elif isinstance(each, WantedFunction):
-            found.append(np.asarray(motion.pair(each.to_pair)[_pair_result(mechanism, each.to_pair)])[rows, None])
+            position = next(iter(relative_motions(mechanism)[each.to_pair].result_kinds))
+            found.append(np.asarray(motion.pair(each.to_pair)[position])[rows, None])
         else:
-            frame = motion.frames[each.link]
-            parts = [_values(getattr(frame, part), len(motion)) for part in ("x", "y", "angle")]
-            found.append(np.stack(parts, axis=1)[rows])
+            parts = (getattr(motion.frames[each.link], part) for part in ("x", "y", "angle"))
+            values = [np.broadcast_to(np.asarray(value_and_rates(part)[0], float), len(motion)) for part in parts]
+            found.append(np.stack(values, axis=1)[rows])
     return found
-
-
-def _pair_result(mechanism: Mechanism, name: str) -> str:
-    """The name of the result of a pair that is its position."""
-    return next(iter(relative_motions(mechanism)[name].result_kinds))
-
-
-def _values(jet: Scalar, many: int) -> Array:
-    value = np.asarray(value_and_rates(jet)[0], float)
-    return np.broadcast_to(value, (many,))
 
 
 ROUND_OFF = 1024.0 * float(np.finfo(float).eps)

@@ -218,14 +218,20 @@ def write_task(task: SynthesisTask) -> dict[str, Any]:
     quantity = quantity_writer(task.units)
     value: dict[str, Any] = {"planar": FORMAT_VERSION, "name": task.name}
     value["units"] = {key: unit for key, unit in task.units._asdict().items() if unit}
-    value["start"] = _write_starts(task)
+    starts = () if isinstance(task.starts, ChainStart) else task.starts
+    written = [write_mechanism(start) for start in starts]
+    if isinstance(task.starts, ChainStart):
+        value["start"] = {"chains": list(task.starts.links)}
+    else:
+        value["start"] = written[0] if len(written) == 1 else written
     for k, each in enumerate(task.wanted):
         _check_shapes(each, f"$.wanted[{k}]")
     value["wanted"] = [_write_wanted(each, task, quantity) for each in task.wanted]
     if task.free:
         value["free"] = list(task.free)
     if task.within:
-        kinds = _number_kinds(task)
+        numbers = (start_numbers(start, task.wanted) for start in starts)
+        kinds = {name: dimension.kind for known in numbers for name, dimension in known.items()}
         value["within"] = {
             name: [quantity(each, kinds.get(name, "number")) if isfinite(each) else None for each in both]
             for name, both in task.within.items()
@@ -247,19 +253,6 @@ def _check_shapes(wanted: Wanted, place: str) -> None:
             raise BadInput(place, f"{name} of {many} entries have the shape {shape}, not {found}")
         if not np.isfinite(np.asarray(value, float)).all():
             raise BadInput(place, f"{name} are finite numbers")
-
-
-def _write_starts(task: SynthesisTask) -> Any:
-    if isinstance(task.starts, ChainStart):
-        return {"chains": list(task.starts.links)}
-    written = [write_mechanism(each) for each in task.starts]
-    return written[0] if len(written) == 1 else written
-
-
-def _number_kinds(task: SynthesisTask) -> dict[str, str]:
-    """What each number that starts have is."""
-    starts = () if isinstance(task.starts, ChainStart) else task.starts
-    return {name: each.kind for start in starts for name, each in start_numbers(start, task.wanted).items()}
 
 
 def _write_wanted(wanted: Wanted, task: SynthesisTask, quantity: QuantityWriter) -> dict[str, Any]:

@@ -79,25 +79,23 @@ class WantedReader:
         if not entries:
             raise cursor.error_at("through", "places are wanted here, as [[0, 25], [52, 10]]")
         places, inputs, weights = zip(*entries, strict=True)
+        is_closed = cursor.flag("closed")
+        if is_closed and len(places) < LEAST_CLOSED:
+            message = f"a closed curve takes {LEAST_CLOSED} places at least, not {len(places)}"
+            raise cursor.error_at("through", message)
+        if is_closed:
+            check_turning_input(cursor["closed"], self.starts, "a closed curve takes a whole turn of the input")
         return WantedPath(
             point,
             frozen_array(places),
             _read_timing(cursor["through"], inputs),
             frozen_array(weights),
-            (is_closed := self._read_closed(cursor, len(places))) or cursor.flag("in_order"),
+            is_closed or cursor.flag("in_order"),
             is_closed,
             cursor.flag("absolute"),
             _read_tolerance(cursor, "length"),
             link,
         )
-
-    def _read_closed(self, cursor: Cursor, count: int) -> bool:
-        is_closed = cursor.flag("closed")
-        if is_closed and count < LEAST_CLOSED:
-            raise cursor.error_at("through", f"a closed curve takes {LEAST_CLOSED} places at least, not {count}")
-        if is_closed:
-            check_turning_input(cursor["closed"], self.starts, "a closed curve takes a whole turn of the input")
-        return is_closed
 
     def _read_place(self, cursor: Cursor) -> tuple[tuple[float, float], float | None, float]:
         if isinstance(cursor.value, list):
@@ -303,17 +301,14 @@ def read_demands(items: Iterable[Cursor], starts: Sequence[Mechanism]) -> Demand
             if getattr(demands, key) is not None:
                 raise each.error_at(key, f"{key!r} is demanded already; write one of the two")
         if each.has("transmission"):
-            demands = demands._replace(transmission=_read_angle(each["transmission"]))
+            angle = each["transmission"].as_positive("angle")
+            if not angle < pi / 2:
+                message = "a least transmission angle is less than a right angle"
+                raise each["transmission"].error_at(None, message)
+            demands = demands._replace(transmission=angle)
         if each.has("inside"):
             demands = demands._replace(inside=_read_region(each["inside"]))
     return demands
-
-
-def _read_angle(cursor: Cursor) -> float:
-    found = cursor.as_positive("angle")
-    if not found < pi / 2:
-        raise cursor.error_at(None, "a least transmission angle is less than a right angle")
-    return found
 
 
 def _read_region(cursor: Cursor) -> Array:
@@ -476,7 +471,10 @@ class NumberNames:
         """The names of one number of all starts, or of both coordinates of a point."""
         if not self.starts:
             raise cursor.error_at(None, "chains have no numbers yet that could be named; leave this out")
-        every = [_own_names(name, known) for known in self.known]
+        every = [
+            (name,) if name in known else tuple(other for other in known if other.startswith(f"{name}."))
+            for known in self.known
+        ]
         for start, known, found in zip(self.starts, self.known, every, strict=True):
             if not found:
                 told = suggest_name(name, known, "numbers")
@@ -506,11 +504,6 @@ class NumberNames:
                     raise each.error_at(None, f"{other!r} has bounds already, under another name")
                 found[other] = _read_bound_pair(each, self.known[0][other].kind)
         return found
-
-
-def _own_names(name: str, known: Iterable[str]) -> tuple[str, ...]:
-    every = list(known)
-    return (name,) if name in every else tuple(each for each in every if each.startswith(f"{name}."))
 
 
 def _read_bound_pair(cursor: Cursor, kind: str) -> tuple[float, float]:

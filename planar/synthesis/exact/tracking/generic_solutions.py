@@ -22,7 +22,7 @@ from functools import lru_cache
 from hashlib import sha256
 from itertools import permutations
 from pathlib import Path
-from typing import Any, Generic, NamedTuple, Protocol, TypeVar
+from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -49,6 +49,7 @@ from planar.synthesis.exact.tracking.member_homotopy import (
     first_of_same,
     homogeneous_slopes,
     homogeneous_solutions,
+    reordered,
     representatives,
     scaled_rows,
 )
@@ -159,23 +160,13 @@ class GenericSolutions(NamedTuple):
     V: ComplexArray
 
 
-class GraphStore(Protocol):
-    """Where a search that is not at its end is kept."""
-
-    def read(self) -> dict[str, Any] | None:
-        """What was kept, None where nothing was."""
-
-    def write(self, content: dict[str, Any]) -> None:
-        """Keep it."""
-
-
 def find_generic_solutions(
     family: Family,
     images: Images | None = None,
     seed: int = 5,
     enough: int | None = None,
     progress: Callable[[int], None] | None = None,
-    store: GraphStore | None = None,
+    store: UnfinishedSearch | None = None,
 ) -> GenericSolutions:
     """The solutions of a random member, one of those that are `images` of each other; no more than are `enough`. With a
     `store` the search goes on from where it was."""
@@ -193,7 +184,7 @@ class GenericSearch:
         images: Images | None = None,
         seed: int = 5,
         progress: Callable[[int], None] | None = None,
-        store: GraphStore | None = None,
+        store: UnfinishedSearch | None = None,
     ):
         self.family, self.seed, self.progress, self.store = family, seed, progress, store
         self.graph: SolutionGraph[Member] = SolutionGraph(
@@ -307,19 +298,16 @@ class _SliceHomotopy:
     def __init__(
         self,
         family: Family,
-        known: GenericSolutions,
+        member: Member,
         line: tuple[ComplexArray, ...],
-        slices: tuple[ComplexArray, ComplexArray],
+        begin: ComplexArray,
+        end: ComplexArray,
     ):
-        self.family, self.member, self.line = family, known.member, line
-        self.begin, self.end = slices
+        self.family, self.member, self.line, self.begin, self.end = family, member, line, begin, end
 
     def at_paths(self, paths: IntArray) -> _SliceHomotopy:
         """The homotopy of some of the paths."""
-        copy = _SliceHomotopy.__new__(_SliceHomotopy)
-        copy.family, copy.member, copy.line = self.family, self.member, self.line
-        copy.begin, copy.end = self.begin[paths], self.end[paths]
-        return copy
+        return _SliceHomotopy(self.family, self.member, self.line, self.begin[paths], self.end[paths])
 
     def __call__(self, V: ComplexArray, way: Array) -> HomotopyValues:
         """The equations, their slope, and their derivative along the way."""
@@ -360,7 +348,7 @@ class _Slices:
 
         def between(slices: Sequence[Slice], edges: IntArray) -> _SliceHomotopy:
             every = np.array(slices)
-            return _SliceHomotopy(family, known, line, (every[edges[:, 0]], every[edges[:, 1]]))
+            return _SliceHomotopy(family, known.member, line, *(every[nodes] for nodes in edges.T))
 
         self.graph: SolutionGraph[Slice] = SolutionGraph(between, None)
         W = np.concatenate([one, x[:, : self.size], 0.0 * one, one, x[:, self.size :], 0.0 * one], axis=1)
@@ -504,10 +492,10 @@ def family_record(family: Family, progress: Callable[[int], None] | None = None)
     content = _packaged(name.text) or _RECENT.get(name.text)
     if content is None:
         kept = CACHE.read(name.text)
-        content = _read(kept) if kept is not None else None
+        content = _read(io.BytesIO(kept)) if kept is not None else None
     if content is None:
         found = find_generic_solutions(
-            family, exchange_images(name.exchanges), progress=progress, store=_UnfinishedSearch(name)
+            family, exchange_images(name.exchanges), progress=progress, store=UnfinishedSearch(name)
         )
         content = _keep(name, found, False, False)
     return _unpack(name, content)
@@ -540,7 +528,7 @@ def _keep(name: FamilyName, found: GenericSolutions, is_traced: bool, is_tested:
     return content
 
 
-class _UnfinishedSearch:
+class UnfinishedSearch:
     """Where the search for the solutions of a family is kept as long as it is not at its end."""
 
     def __init__(self, name: FamilyName):
@@ -549,7 +537,7 @@ class _UnfinishedSearch:
     def read(self) -> dict[str, Any] | None:
         """What was kept."""
         kept = CACHE.read(self.key)
-        return None if kept is None else _read(kept)
+        return None if kept is None else _read(io.BytesIO(kept))
 
     def write(self, content: dict[str, Any]) -> None:
         """Keep it, where anything can be kept."""
@@ -561,9 +549,7 @@ def pack_record(
     name: FamilyName, found: GenericSolutions, classes: IntArray, is_traced: bool, source: str
 ) -> dict[str, Any]:
     """A record as arrays, in the order of symbols that all families of one name share."""
-    half = found.V.shape[1] // 2
-    own = np.array(name.unknowns, dtype=int) + 1
-    V = found.V[:, [0, *own.tolist(), half, *(own + half).tolist()]]
+    V = reordered(found.V, name.unknowns)
     parts = [found.member.parts[0][:, list(name.given)], *found.member.parts[1:]]
     named = {f"part{k}": part for k, part in enumerate(parts)}
     return {"V": V, "classes": classes, "is_traced": np.array(is_traced), "source": np.array(source), **named}
@@ -576,33 +562,26 @@ def write_record(content: dict[str, Any]) -> bytes:
     return told.getvalue()
 
 
-def _read(content: bytes) -> dict[str, Any]:
-    with np.load(io.BytesIO(content), allow_pickle=False) as file:
+def _read(source: io.BytesIO | Path) -> dict[str, Any]:
+    with np.load(source, allow_pickle=False) as file:
         return {name: file[name] for name in file.files}
 
 
 @lru_cache(maxsize=8)
 def _packaged(text: str) -> dict[str, Any] | None:
     path = KNOWN / f"{text[:16]}.npz"
-    if not path.is_file():
-        return None
-    with np.load(path, allow_pickle=False) as file:
-        return {name: file[name] for name in file.files}
+    return _read(path) if path.is_file() else None
 
 
 def _unpack(name: FamilyName, content: dict[str, Any]) -> FamilyRecord:
-    V: ComplexArray = content["V"]
-    half = V.shape[1] // 2
-    own = np.array(name.unknowns, dtype=int) + 1
-    back = np.empty_like(V)
-    back[:, [0, *own.tolist(), half, *(own + half).tolist()]] = V
+    V = reordered(content["V"], tuple(np.argsort(name.unknowns).tolist()))
     first = np.empty_like(content["part0"])
     first[:, list(name.given)] = content["part0"]
     others = [content[f"part{k}"] for k in range(1, sum(key.startswith("part") for key in content))]
     member = Member((first, *others))
     return FamilyRecord(
         name,
-        GenericSolutions(member, back),
+        GenericSolutions(member, V),
         content["classes"],
         bool(content["is_traced"]),
         str(content["source"]),
