@@ -216,7 +216,7 @@ class Catalogue:
 
     def take(self, designs: IntArray) -> Catalogue:
         """Those designs (n,) of it."""
-        values = tuple(each[designs] for each in self.values)
+        values = tuple(value[designs] for value in self.values)
         return Catalogue(self.numbers[designs], self.unknowns[designs], values, self.is_whole[designs])
 
 
@@ -228,7 +228,7 @@ def build_catalogue(equations: tuple[WantedEquations, ...], free: FreeNumbers, c
     steps = np.isfinite(unknowns[..., 0] if unknowns.shape[2] else unknowns[..., -1]).sum(axis=1)
     kept = steps >= LEAST_STEPS
     x, unknowns, is_whole = x[kept], unknowns[kept], is_whole[kept]
-    told = tuple(each.values(x, unknowns) for each in equations)
+    told = tuple(item.values(x, unknowns) for item in equations)
     return Catalogue(x, unknowns, told, is_whole)
 
 
@@ -254,7 +254,7 @@ def kept_catalogue(
     if content is not None:
         with np.load(io.BytesIO(content), allow_pickle=False) as file:
             numbers, unknowns, is_whole = (file[name] for name in ("numbers", "unknowns", "is_whole"))
-        values = tuple(each.values(numbers, unknowns) for each in equations)
+        values = tuple(item.values(numbers, unknowns) for item in equations)
         return Catalogue(numbers, unknowns, values, is_whole)
     found = build_catalogue(equations, free, count, seed)
     if CACHE.is_writable():
@@ -496,7 +496,7 @@ def moved_numbers(equations: WantedEquations, free: FreeNumbers) -> MovedNumbers
     """How a mechanism's free numbers follow where it is moved as a whole."""
     design = equations.design
     mechanism, frame = design.mechanism, design.mechanism.frame
-    known = {each.name: each for each in design.dimensions}
+    known = {dimension.name: dimension for dimension in design.dimensions}
     by_place: dict[str, dict[str, int]] = {}
     lengths, angles = [], []
     for k, name in enumerate(free.names):
@@ -512,8 +512,10 @@ def moved_numbers(equations: WantedEquations, free: FreeNumbers) -> MovedNumbers
         elif dimension.kind == "angle" and dimension.path[0] == "pairs" and on_frame and "line" in name:
             angles.append(k)
     kinds = [design.equations.coordinates[k] for k in design.equations.unknowns]
-    own_lengths = [k for k, each in enumerate(kinds) if each.kind is MeasureKind.LENGTH]
-    own_angles = [k for k, each in enumerate(kinds) if each.kind is MeasureKind.ANGLE and each.of_link]
+    own_lengths = [k for k, coordinate in enumerate(kinds) if coordinate.kind is MeasureKind.LENGTH]
+    own_angles = [
+        k for k, coordinate in enumerate(kinds) if coordinate.kind is MeasureKind.ANGLE and coordinate.of_link
+    ]
     running = relative_motions(mechanism)[mechanism.inputs[0].pair]
     if running.input_kind is MeasureKind.LENGTH:
         own_lengths.append(len(kinds))
@@ -529,7 +531,7 @@ def moved_numbers(equations: WantedEquations, free: FreeNumbers) -> MovedNumbers
 
 
 def _is_guided_by_frame(mechanism: Mechanism, name: str) -> bool:
-    pair = next((each for each in mechanism.pairs if name.startswith(f"{each.name}.")), None)
+    pair = next((pair for pair in mechanism.pairs if name.startswith(f"{pair.name}.")), None)
     return pair is not None and mechanism.frame in pair.links
 
 
@@ -592,7 +594,7 @@ def find_matches(
         for k in order[1:]:
             off, steps[k] = _nearest_steps(catalogue.values[k][designs[row]], items[k], factor, offset)
             total += off
-        mean = float((total / sum(len(each.target) for each in items)) ** 0.5)
+        mean = float((total / sum(len(item.target) for item in items)) ** 0.5)
         matches.append(Match(int(designs[row]), mean, factor, offset, tuple(steps)))
     return sorted(matches, key=lambda each: each.distance)[:many]
 

@@ -58,12 +58,14 @@ def write_design(
     told = {key: _rounded(value, known[key].kind, units, size, DIGITS) for key, value in numbers.items()}
     running = f"{start.inputs[0].pair}.position"
     told[running] = _rounded(input_position, known[running].kind, units, size, DIGITS)
-    joints = [each for each in named_points(start) if len(each.members) > 1 and start.frame not in dict(each.members)]
+    joints = [
+        point for point in named_points(start) if len(point.members) > 1 and start.frame not in dict(point.members)
+    ]
     places = _places(design, joints, told, y)
     sketch = []
-    for each, at in zip(joints, places, strict=True):
+    for joint, at in zip(joints, places, strict=True):
         x, y_own = (_rounded(part, "length", units, size, SKETCH_DIGITS) for part in at)
-        sketch.append((each.name, x, y_own))
+        sketch.append((joint.name, x, y_own))
     made = replace(start, sketch=tuple(sketch), name=name, about=None, source=None, published=(), ids=())
     return with_values(made, told)
 
@@ -73,11 +75,11 @@ def _places(
 ) -> list[tuple[float, float]]:
     frames, _ = design.placed
     parts = []
-    for each in joints:
-        link, point = each.members[0]
+    for joint in joints:
+        link, point = joint.members[0]
         parts += list(frames[link].to_world(design.work.shapes[link].position(point)))
-    d = [numbers.get(each.name, each.value) for each in design.dimensions]
-    u = [y[-1] * design.input_scale[0], *(each.position for each in design.mechanism.inputs[1:])]
+    d = [numbers.get(dimension.name, dimension.value) for dimension in design.dimensions]
+    u = [y[-1] * design.input_scale[0], *(drive.position for drive in design.mechanism.inputs[1:])]
     at = ca.Function("places", [design.z, design.u, design.d], [stack_expressions(parts)])
     found = at(ca.DM(y[:-1]), ca.DM(u), ca.DM(d)).full().ravel().tolist()
     return list(zip(found[::2], found[1::2], strict=True))
@@ -135,7 +137,7 @@ class DesignSearch:
         self.mechanism = mechanism
         self.free: FreeNumbers = free_numbers(task, mechanism)
         rows = wanted_rows(task, self.size)
-        self.equations = tuple(WantedEquations(mechanism, each, self.free.names, own) for each in rows)
+        self.equations = tuple(WantedEquations(mechanism, row, self.free.names, own) for row in rows)
         self.ratio = own / self.size
         "of the scale of numbers to that of places"
         self.moves = moved_numbers(self.equations[0], self.free)
@@ -149,12 +151,12 @@ class DesignSearch:
         """The designs of the catalogue nearest to what is wanted."""
         items = [
             WantedItem(
-                each.rows.wanted,
-                each.target,
-                None if each.rows.inputs is None else each.rows.inputs / each.input_scale,
-                each.rows.input_is_free,
+                item.rows.wanted,
+                item.target,
+                None if item.rows.inputs is None else item.rows.inputs / item.input_scale,
+                item.rows.input_is_free,
             )
-            for each in self.equations
+            for item in self.equations
         ]
         factors = self._factors(catalogue) if self.can_move else None
         if self.guards is None or not self.guards[True].kept_by(False, False).rows:
@@ -168,7 +170,7 @@ class DesignSearch:
         assert self.guards is not None
         starts, found = self._fit_starts(catalogue, matches), np.zeros(len(matches))
         for over_turn, guard in self.guards.items():
-            rows = [k for k, each in enumerate(starts) if each.over_turn is over_turn]
+            rows = [k for k, start in enumerate(starts) if start.over_turn is over_turn]
             if rows:
                 x, y = (np.array([getattr(starts[k], name) for k in rows]) for name in ("numbers", "guarded"))
                 found[rows] = lacks(guard.slacks(x, y))
@@ -221,16 +223,16 @@ class DesignSearch:
     def _guarded(self, branch: Array, unknowns: list[Array], over_turn: bool) -> Array:
         """The unknowns at positions of a branch (steps, unknowns) all round its turn, or between entries."""
         many = 0 if self.guards is None else self.guards[over_turn].position_count
-        return spread_positions(branch, np.concatenate([each[:, -1] for each in unknowns]), many, over_turn)
+        return spread_positions(branch, np.concatenate([y[:, -1] for y in unknowns]), many, over_turn)
 
     def _fit_alike(self, starts: list[_FitStart], keep: int, guard: DemandGuard | None) -> FittedDesigns:
         """Designs fitted that all turn fully, or are all seen between their entries only."""
-        x = np.array([each.numbers for each in starts])
-        ys = [np.array(each) for each in zip(*(each.unknowns for each in starts), strict=True)]
+        x = np.array([start.numbers for start in starts])
+        ys = [np.array(each) for each in zip(*(start.unknowns for start in starts), strict=True)]
         zeros = self.first_zeros(x, ys)
         scale = self.equations[0].scale
         fit = DesignFit(self.equations, self.free.lower / scale, self.free.upper / scale, guard)
-        positions = np.array([each.guarded for each in starts])
+        positions = np.array([start.guarded for start in starts])
         shares = np.broadcast_to(np.linspace(0.0, 1.0, positions.shape[1]), positions.shape[:2])
         return fit.fit(x, ys, zeros, keep, (positions, shares) if guard is not None else None)
 
@@ -241,7 +243,7 @@ class DesignSearch:
         branches, is_whole = follow_branches(self.equations[0], found.numbers, found.unknowns[0][:, 0])
         told = {}
         for k in np.flatnonzero(is_whole & np.isfinite(found.squares)).tolist():
-            branch, ys = branches[k][np.isfinite(branches[k]).all(axis=1)], [each[k] for each in found.unknowns]
+            branch, ys = branches[k][np.isfinite(branches[k]).all(axis=1)], [y[k] for y in found.unknowns]
             match = starts[found.order[k]].match
             told[k] = _FitStart(found.numbers[k], ys, self._guarded(branch, ys, True), True, match)
         return told
@@ -266,15 +268,15 @@ class DesignSearch:
     def first_zeros(self, x: Array, unknowns: list[Array]) -> list[Array]:
         """The zeros of scales that fit best at first; given inputs are brought to where they are wanted."""
         found: list[Array] = []
-        for k, each in enumerate(self.equations):
-            zeros = np.zeros((len(x), each.zero_count))
-            if each.rows.inputs is not None:
-                wanted = np.broadcast_to(each.rows.inputs / each.input_scale, unknowns[k].shape[:2])
-                if each.rows.input_is_free:
+        for k, item in enumerate(self.equations):
+            zeros = np.zeros((len(x), item.zero_count))
+            if item.rows.inputs is not None:
+                wanted = np.broadcast_to(item.rows.inputs / item.input_scale, unknowns[k].shape[:2])
+                if item.rows.input_is_free:
                     wanted = wanted + np.mean(unknowns[k][..., -1] - wanted, axis=1, keepdims=True)
                 unknowns[k] = np.concatenate([unknowns[k][..., :-1], wanted[..., None]], axis=-1)
-            if each.rows.value_is_free:
-                off = each.values(x, unknowns[k])[..., 0] - each.target[:, 0]
+            if item.rows.value_is_free:
+                off = item.values(x, unknowns[k])[..., 0] - item.target[:, 0]
                 zeros[:, -1] = np.mean(off, axis=1)
             found.append(zeros)
         return found
@@ -284,7 +286,7 @@ class DesignSearch:
         return Candidate(
             self.mechanism,
             dict(zip(self.free.names, map(float, numbers), strict=True)),
-            tuple(each[k] for each in found.unknowns),
+            tuple(y[k] for y in found.unknowns),
             float(found.squares[k]),
             float(found.lacks[k]),
             match,

@@ -106,7 +106,7 @@ class SynthesisedDesign:
     @property
     def defects(self) -> tuple[str, ...]:
         """What is wrong with it, in sentences."""
-        return tuple(each.sentence for each in self.shortages)
+        return tuple(shortage.sentence for shortage in self.shortages)
 
     def __repr__(self) -> str:
         told = f", {count_phrase(len(self.defects), 'defect')}" if self.defects else ""
@@ -210,9 +210,9 @@ def design_record(design: SynthesisedDesign) -> dict[str, Any]:
         "start": design.start,
         "error": design.error if is_known else None,
         "greatest_miss": design.greatest_miss if is_known else None,
-        "misses": [_finite(each) for each in design.misses],
-        "inputs": [_finite(each) for each in design.inputs],
-        "shortages": [list(each) for each in design.shortages],
+        "misses": [_finite(miss) for miss in design.misses],
+        "inputs": [_finite(drive) for drive in design.inputs],
+        "shortages": [list(shortage) for shortage in design.shortages],
         "numbers": dict(design.numbers),
         "mechanism": to_dict(design.mechanism),
     }
@@ -234,11 +234,11 @@ def read_design(record: Mapping[str, Any]) -> SynthesisedDesign:
 
 
 def _finite(values: Array) -> list[float | None]:
-    return [float(each) if np.isfinite(each) else None for each in values]
+    return [float(value) if np.isfinite(value) else None for value in values]
 
 
 def _numbers(values: list[float | None]) -> Array:
-    return np.array([np.nan if each is None else each for each in values], float)
+    return np.array([np.nan if value is None else value for value in values], float)
 
 
 TASK_FILE, SEARCH_FILE, ROUNDS_FOLDER = "task.json", "search.json", "search"
@@ -304,7 +304,7 @@ class SearchFolder:
         self, start: int, number: int, size: float, designs: Sequence[SynthesisedDesign], remarks: Sequence[str]
     ) -> None:
         """Keep a round that is done."""
-        record = {"size": size, "designs": [design_record(each) for each in designs], "remarks": [*remarks]}
+        record = {"size": size, "designs": [design_record(design) for design in designs], "remarks": [*remarks]}
         save_file(self._path(start, number), json.dumps(record, ensure_ascii=False, allow_nan=False) + "\n")
 
     def _path(self, start: int, number: int) -> Path:

@@ -136,7 +136,7 @@ class TaskSearch:
 
     def best_error(self, before: int = 0) -> float:
         """The least error of a sound design, of those that came after so many."""
-        return min((each.error for each in self.sound[before:]), default=float("inf"))
+        return min((design.error for design in self.sound[before:]), default=float("inf"))
 
     def add_start(self, mechanism: Mechanism, number: int) -> bool:
         """Search the designs of one start; whether that was finished."""
@@ -150,8 +150,8 @@ class TaskSearch:
                 self.size, designs, remarks = kept
                 self.starts[mechanism.name] = mechanism
                 self.remarks += remarks
-                self.sound += [each for each in designs if not each.defects]
-                self.rejected += [each for each in designs if each.defects]
+                self.sound += [design for design in designs if not design.defects]
+                self.rejected += [design for design in designs if design.defects]
             elif self.is_over():
                 return False
             else:
@@ -206,8 +206,8 @@ class TaskSearch:
         best, extent = bests[-1], self.size if self.task.wants_places else FUNCTION_SHARE * _widest_range(self.task)
         if best <= GOOD * extent:
             return True
-        alike = sum(each.error <= (1.0 + SAME) * best for each in self.sound[before:])
-        idle = sum(each <= (1.0 + SAME) * best for each in bests) - 1
+        alike = sum(design.error <= (1.0 + SAME) * best for design in self.sound[before:])
+        idle = sum(error <= (1.0 + SAME) * best for error in bests) - 1
         is_fair = len(bests) >= FEWEST_ROUNDS and best <= FAIR * extent
         return is_fair and (alike >= SETTLED or idle >= IDLE_ROUNDS)
 
@@ -292,7 +292,7 @@ class TaskSearch:
         for design in (sound or rejected)[:1]:
             remarks.append(f"{design.start}: {count_freedom(self.task, self.starts[design.start]).sentence}")
         if not sound and (self.rejected or self.is_finished):
-            remarks.append(refusal([each.shortages for each in self.rejected], self.task.units))
+            remarks.append(refusal([design.shortages for design in self.rejected], self.task.units))
         return Synthesis(self.task, sound, rejected, self.size, tuple(remarks), self.seed, self.is_finished)
 
     def _unfinished(self) -> str:
@@ -306,7 +306,7 @@ class TaskSearch:
 
 def _widest_range(task: SynthesisTask) -> float:
     """Of the values of functions, rad or m."""
-    return max(float(np.ptp(each.values)) for each in task.wanted if isinstance(each, WantedFunction))
+    return max(float(np.ptp(item.values)) for item in task.wanted if isinstance(item, WantedFunction))
 
 
 def _plan(many: int, seed: int) -> dict[str, Any]:

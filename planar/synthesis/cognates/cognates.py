@@ -89,13 +89,13 @@ class CognateInputs:
     def find(self) -> tuple[tuple[Input, ...], tuple[CognateInput, ...]]:
         """The inputs, and how they belong to those of the mechanism. Raises NoAnswer."""
         told: list[CognateInput | None] = [self._timed(given) for given in self.source.inputs]
-        taken = {each.driven for each in told if each is not None}
+        taken = {part.driven for part in told if part is not None}
         for k, given in enumerate(self.source.inputs):
             if told[k] is None:
                 told[k] = self._untimed(given, taken)
                 taken.add(told[k].driven)  # type: ignore[union-attr]
-        inputs = [each for each in told if each is not None]
-        return tuple(self._input(each, given) for each, given in zip(inputs, self.source.inputs, strict=True)), tuple(
+        inputs = [part for part in told if part is not None]
+        return tuple(self._input(drive, given) for drive, given in zip(inputs, self.source.inputs, strict=True)), tuple(
             inputs
         )
 
@@ -124,7 +124,7 @@ class CognateInputs:
                 Outcome.DEAD_POINT,
                 f"where {self.source.name!r} stands no other joint of its cognates moves; move its input somewhat",
             )
-        remade = [each for each in able if self.posed.remade & {*each.links}]
+        remade = [joint for joint in able if self.posed.remade & {*joint.links}]
         best = min(
             remade or able,
             key=lambda each: (
@@ -217,13 +217,13 @@ class Cognate(NamedTuple):
 
     def __repr__(self) -> str:
         timed = "timed" if self.is_timed else "not timed"
-        driven = ", ".join(each.driven for each in self.inputs)
+        driven = ", ".join(drive.driven for drive in self.inputs)
         return f"<Cognate {self.mechanism.name!r}: driven at {driven}, {timed}>"
 
     @property
     def is_timed(self) -> bool:
         """Whether at steady speeds of its inputs the point goes through its path as with those of the mechanism."""
-        return all(each.is_timed for each in self.inputs)
+        return all(drive.is_timed for drive in self.inputs)
 
     @property
     def sentence(self) -> str:
@@ -291,7 +291,7 @@ def cognates(mechanism: Mechanism, point: str) -> Cognates:
     if not others:
         raise BadInput(point, refusal_sentence(name, refused))
     names = CognateNames(mechanism, posed)
-    own = tuple(CognateInput(each.pair, each.pair, True, 1.0, False) for each in mechanism.inputs)
+    own = tuple(CognateInput(drive.pair, drive.pair, True, 1.0, False) for drive in mechanism.inputs)
     written = []
     for number, other in enumerate(others, 1):
         writer = WrittenCognate(state, other, tracer, tracer_point, names.pin_names(other, number))
@@ -398,14 +398,14 @@ def task_cognates(mechanism: Mechanism, task: SynthesisTask) -> tuple[Cognate, .
 
     Of a path whose timing is prescribed those that keep it, else all.
     """
-    paths = [each for each in task.wanted if isinstance(each, WantedPath)]
-    points = {each.point for each in paths}
+    paths = [item for item in task.wanted if isinstance(item, WantedPath)]
+    points = {path.point for path in paths}
     if len(paths) < len(task.wanted) or len(points) != 1:
         return ()
     try:
         found = cognates(mechanism, carried_name(mechanism, points.pop()))
     except PlanarError:
         return ()  # it has none
-    if all(each.inputs is None for each in paths):
+    if all(path.inputs is None for path in paths):
         return tuple(found[1:])
     return tuple(each for each in found.timed if all(one.scale == 1.0 for one in each.inputs))

@@ -269,7 +269,7 @@ class _Exchanging(NamedTuple):
             )
         (one, held), (other, holding) = places.items()
         both = [(one, other, held, holding), (other, one, holding, held)]
-        fits = [each for each in both if self._may_scale(each[0], each[2])]
+        fits = [part for part in both if self._may_scale(part[0], part[2])]
         if not fits or held & holding:
             return Refusal(
                 2,
@@ -379,8 +379,8 @@ def _is_scaled(posed: PosedLinkage, guide: PosedGuide, change: Exchange) -> bool
 
 def refusal_sentence(name: str, refused: list[Refusal]) -> str:
     """Why the path of a point has no cognates."""
-    most = max((each.nearness for each in refused), default=0)
-    why = [*dict.fromkeys(each.sentence for each in refused if each.nearness == most)]
+    most = max((refusal.nearness for refusal in refused), default=0)
+    why = [*dict.fromkeys(refusal.sentence for refusal in refused if refusal.nearness == most)]
     least = "no moving link with two pins alone carries a coupler with this point and a third joint"
     told = join_names(why[:2], last_joiner="; ") if most > 1 else least
     return f"no cognates of the path of {name!r} are known: {told}"

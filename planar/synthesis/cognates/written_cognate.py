@@ -161,7 +161,7 @@ class WrittenCognate:
             for spot in self._spots(link)
             if self.posed.is_same(spot.at, self.tracer.at)
         }
-        return next(each.name for each in named_points(mechanism) if ends & {*each.members})
+        return next(point.name for point in named_points(mechanism) if ends & {*point.members})
 
     @cached_property
     def _original(self) -> PosedLinkage:
@@ -327,7 +327,7 @@ class WrittenCognate:
         """Names by which something that acts on the mechanism can go on to mean what it meant."""
         kept = {link for link in self.posed.axes if link not in self.posed.remade}
         found = set(kept)
-        old = {each.name: {*each.members} for each in named_points(self.source)}
+        old = {point.name: {*point.members} for point in named_points(self.source)}
         for each in named_points(mechanism):
             if any(member in old.get(each.name, ()) and member[0] in kept for member in each.members):
                 found.add(each.name)

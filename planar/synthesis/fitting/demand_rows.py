@@ -61,7 +61,7 @@ class AdjointRows:
 
     @cached_property
     def _functions(self) -> list[_SystemFunctions]:
-        return [self._functions_of(each) for each in self.systems]
+        return [self._functions_of(system) for system in self.systems]
 
     def _functions_of(self, of: LinearSystem) -> _SystemFunctions:
         y, x, (equations, value) = in_entries(of.design, self.free, self.scale, [of.equations, of.value])
@@ -165,8 +165,8 @@ class RegionRows:
         design = design_equations(self.mechanism)
         frames, _ = design.placed
         parts = []
-        for each in self.points:
-            link, at = each.members[0]
+        for point in self.points:
+            link, at = point.members[0]
             parts += list(frames[link].to_world(design.work.shapes[link].position(at)))
         y, x, (places,) = in_entries(design, self.free, self.scale, [stack_expressions(parts) / self.size])
         told = [places], [places, ca.jacobian(places, y), ca.jacobian(places, x)]
@@ -243,11 +243,11 @@ class DemandGuard:
     @property
     def row_count(self) -> int:
         """How many slacks a position has."""
-        return sum(len(each) for each in self.rows)
+        return sum(len(row) for row in self.rows)
 
     def ends(self, unknowns: Sequence[Array]) -> tuple[Array, Array]:
         """The least and the greatest input (designs,) of all entries of designs."""
-        inputs = np.concatenate([each[..., -1] for each in unknowns], axis=1)
+        inputs = np.concatenate([y[..., -1] for y in unknowns], axis=1)
         return inputs.min(axis=1), inputs.max(axis=1)
 
     def close(self, numbers: Array, before: Array, shares: Array, unknowns: Sequence[Array]) -> tuple[Array, BoolArray]:
@@ -269,7 +269,7 @@ class DemandGuard:
         if not self.rows:
             return np.zeros((many, 0))
         flat, x = y.reshape(-1, unknowns), np.repeat(numbers, positions, axis=0)
-        parts = [each.values(x, flat) - least for each, least in zip(self.rows, self.least, strict=True)]
+        parts = [row.values(x, flat) - least for row, least in zip(self.rows, self.least, strict=True)]
         found = np.concatenate(parts, axis=1).reshape(many, positions * self.row_count) - MARGIN
         return np.where(np.isfinite(found), found, UNKNOWN_SLACK)
 
@@ -278,7 +278,7 @@ class DemandGuard:
         design, position = np.nonzero(is_near.any(axis=2))
         x, at = numbers[design], y[design, position]
         values, by_y, by_x = (
-            np.concatenate(parts, axis=1) for parts in zip(*(each.linearise(x, at) for each in self.rows), strict=True)
+            np.concatenate(parts, axis=1) for parts in zip(*(row.linearise(x, at) for row in self.rows), strict=True)
         )
         _, F_y, F_x = (each[:, 0] for each in self.equations.closure_slopes_at(x, at[:, None]))
         closures = F_y.shape[1]
@@ -288,7 +288,7 @@ class DemandGuard:
         right[:, -1, 0], right[:, :-1, 1:] = 1.0, -F_x
         moves = solve_rows(K, right)
         along = np.nan_to_num(by_y @ moves)
-        least = np.concatenate([np.full(len(each), own) for each, own in zip(self.rows, self.least, strict=True)])
+        least = np.concatenate([np.full(len(row), own) for row, own in zip(self.rows, self.least, strict=True)])
         slack = values - least - MARGIN
         flat, row = np.nonzero(is_near[design, position])
         return DemandSlopes(
@@ -323,7 +323,7 @@ def demand_guards(
     if task.needs_whole_turn or kept:
         kept.append((rate_rows(mechanism, equations.free, equations.scale), LEAST_RATE))
     is_guarded = bool(kept or demands.one_branch)
-    is_bound = bool(task.exact) or any(getattr(each, "in_order", False) for each in task.wanted)
+    is_bound = bool(task.exact) or any(getattr(item, "in_order", False) for item in task.wanted)
     if not (is_guarded or is_bound):
         return None
     positions = rows._replace(inputs=np.zeros(GUARD_POSITIONS + 1 if is_guarded else 0))

@@ -41,7 +41,7 @@ def polish_demands(state: MovingDesigns) -> None:
     state.relocate_demands()
     squares = state.misses(state.numbers, state.unknowns, state.zeros)
     short = _shortage(demands.slack, state.inexactness(state.numbers, state.unknowns, state.zeros))
-    is_exact = any(each.rows.wanted.tolerance == 0.0 for each in state.fit.equations)
+    is_exact = any(item.rows.wanted.tolerance == 0.0 for item in state.fit.equations)
     damping = np.full(len(squares), FIRST_DAMPING)
     is_moving: BoolArray = np.asarray(is_exact | (demands.slack < NEAR).any(axis=1))
     for _ in range(POLISHING_STEPS):

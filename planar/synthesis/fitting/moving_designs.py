@@ -51,8 +51,8 @@ class OrderSlacks:
         self.slices: list[slice] = []
         "of each ordered item among all entries"
         at = 0
-        for each, y in zip(equations, unknowns, strict=True):
-            wanted, many = each.rows.wanted, y.shape[1]
+        for item, y in zip(equations, unknowns, strict=True):
+            wanted, many = item.rows.wanted, y.shape[1]
             if is_kept and not isinstance(wanted, WantedFunction) and wanted.in_order and many >= LEAST_ORDERED:
                 self.slices.append(slice(at, at + many))
                 self._add_item(np.diff(y[..., -1], axis=1))
@@ -150,7 +150,7 @@ class KeptDemands:
         return y, self._slacks(numbers, y, unknowns, rows), is_closed
 
     def _slacks(self, numbers: Array, y: Array, unknowns: Sequence[Array], rows: IntArray) -> Array:
-        inputs = np.concatenate([each[..., -1] for each in unknowns], axis=1)
+        inputs = np.concatenate([y[..., -1] for y in unknowns], axis=1)
         own = self.guard.slacks(numbers, y)
         return np.concatenate([own, self.order.slacks(inputs, rows)], axis=1)
 
@@ -311,8 +311,8 @@ class Trial:
 def sum_squares(residuals: Sequence[Array]) -> Array:
     """The sums (designs,) of squares of rows (designs, n, parts) of several kinds; infinite where one is not known."""
     found = np.zeros(len(residuals[0]))
-    for each in residuals:
-        found += (each**2).sum(axis=(1, 2))
+    for residual in residuals:
+        found += (residual**2).sum(axis=(1, 2))
     return np.where(np.isfinite(found), found, np.inf)
 
 
@@ -368,17 +368,17 @@ class MovingDesigns:
         self.fit = fit
         self.numbers = np.clip(numbers, fit.lower, fit.upper)
         self.zeros = zeros
-        self.tangents: list[Array] = [np.zeros_like(each) for each in unknowns]
+        self.tangents: list[Array] = [np.zeros_like(y) for y in unknowns]
         "along the path, the input rising"
-        self.headings: list[Array] = [np.zeros(each.shape[:2]) for each in unknowns]
+        self.headings: list[Array] = [np.zeros(y.shape[:2]) for y in unknowns]
         "in which sense each entry went along its path last"
         self.unknowns = unknowns
         self.order: IntArray = np.arange(len(numbers))
         is_closed: BoolArray = np.ones(len(numbers), bool)
-        for k, each in enumerate(fit.equations):
-            way = tangents(each.jacobians(self.numbers, self.unknowns[k]))
-            self.unknowns[k], own = each.close(self.numbers, self.unknowns[k], way, 2 * CLOSING_STEPS)
-            way = tangents(np.nan_to_num(each.jacobians(self.numbers, self.unknowns[k])))
+        for k, item in enumerate(fit.equations):
+            way = tangents(item.jacobians(self.numbers, self.unknowns[k]))
+            self.unknowns[k], own = item.close(self.numbers, self.unknowns[k], way, 2 * CLOSING_STEPS)
+            way = tangents(np.nan_to_num(item.jacobians(self.numbers, self.unknowns[k])))
             self.tangents[k] = np.where(way[..., -1:] < 0.0, -way, way)
             is_closed &= own
         self.demands: KeptDemands | None = None
@@ -399,9 +399,9 @@ class MovingDesigns:
     def inexactness(self, numbers: Array, unknowns: Sequence[Array], zeros: Sequence[Array]) -> Array:
         """The greatest part of a miss (designs,) of what is to be met exactly."""
         found = np.zeros(len(numbers))
-        for each, y, zero in zip(self.fit.equations, unknowns, zeros, strict=True):
-            if each.rows.wanted.tolerance == 0.0:
-                off = np.abs(each.residuals(numbers, y, zero)).max(axis=(1, 2), initial=0.0)
+        for item, y, zero in zip(self.fit.equations, unknowns, zeros, strict=True):
+            if item.rows.wanted.tolerance == 0.0:
+                off = np.abs(item.residuals(numbers, y, zero)).max(axis=(1, 2), initial=0.0)
                 found = np.maximum(found, np.where(np.isfinite(off), off, np.inf))
         return found
 
@@ -419,11 +419,11 @@ class MovingDesigns:
         for name in ("numbers", "squares", "damping", "idle", "returns", "is_moving", "order"):
             setattr(self, name, getattr(self, name)[rows])
         for many in (self.unknowns, self.zeros, self.tangents, self.headings):
-            many[:] = [each[rows] for each in many]
+            many[:] = [part[rows] for part in many]
         if self.demands is not None:
             self.demands.take(rows)
         if self.whole is not None:
-            self.whole = [each[rows] for each in self.whole]
+            self.whole = [part[rows] for part in self.whole]
 
     def keep_best(self, many: int) -> None:
         """Only the best so many go on."""
@@ -459,12 +459,12 @@ class MovingDesigns:
     def _put(self, rows: IntArray, places: Sequence[Array]) -> None:
         """Designs (rows) to where they were."""
         assert self.demands is not None
-        many, parts = len(self.unknowns), [each[rows] for each in places]
+        many, parts = len(self.unknowns), [place[rows] for place in places]
         self.numbers[rows] = parts[0]
         for own, first in ((self.unknowns, 1), (self.zeros, 1 + many), (self.tangents, 1 + 2 * many)):
             for k, each in enumerate(own):
                 each[rows] = parts[first + k]
-        self.demands.put(rows, self.numbers[rows], [each[rows] for each in self.unknowns], *parts[-2:])
+        self.demands.put(rows, self.numbers[rows], [y[rows] for y in self.unknowns], *parts[-2:])
 
     def press(self) -> bool:
         """Begin anew with multipliers by which demands are kept better; whether there is anything to be won."""
@@ -496,16 +496,16 @@ class MovingDesigns:
         """The rows of designs to the first order, and their normal equations, without what is demanded."""
         fit = self.fit
         lines = []
-        for k, each in enumerate(fit.equations):
-            line = each.linearise(
+        for k, item in enumerate(fit.equations):
+            line = item.linearise(
                 self.numbers[rows], self.unknowns[k][rows], self.zeros[k][rows], self.tangents[k][rows]
             )
-            lines.append(line if each.is_timed else self._held_at_dead_points(line, self.headings[k][rows]))
+            lines.append(line if item.is_timed else self._held_at_dead_points(line, self.headings[k][rows]))
         return lines, *normal_equations(fit.equations, lines, fit.globals)
 
     def input_changes(self, rows: IntArray, lines: Sequence[LinearRows]) -> InputChanges:
         """How the inputs of all entries change in a step."""
-        unknowns = [each[rows] for each in self.unknowns]
+        unknowns = [y[rows] for y in self.unknowns]
         return input_changes(self.fit.equations, lines, unknowns, self.fit.globals)
 
     def advance(self) -> None:
@@ -546,8 +546,8 @@ class MovingDesigns:
         Review E 83 (2011) 036701; the second order is taken from the trial itself here."""
         fit, squares = self.fit, self._merits(trial, rows)
         off = [
-            residual - predicted_residuals(each, line, change[:, fit.globals.columns(k)])
-            for k, (each, line, residual) in enumerate(zip(fit.equations, lines, trial.residuals, strict=True))
+            residual - predicted_residuals(item, line, change[:, fit.globals.columns(k)])
+            for k, (item, line, residual) in enumerate(zip(fit.equations, lines, trial.residuals, strict=True))
         ]
         is_curved = sum_squares(off) > CURVED * np.abs(self.squares[rows] - squares)
         own = np.flatnonzero(trial.is_good & ~trial.is_shortened & np.isfinite(squares) & is_curved)
@@ -567,8 +567,8 @@ class MovingDesigns:
         """Designs after a change (designs, globals) of their free numbers and zeros, shortened where it is great."""
         fit = self.fit
         moves = [
-            entry_moves(each, line, change[:, fit.globals.columns(k)])
-            for k, (each, line) in enumerate(zip(fit.equations, lines, strict=True))
+            entry_moves(item, line, change[:, fit.globals.columns(k)])
+            for k, (item, line) in enumerate(zip(fit.equations, lines, strict=True))
         ]
         shortened = self._shortening(change, moves)
         after = np.clip(self.numbers[rows] + shortened[:, None] * change[:, : fit.globals.free], fit.lower, fit.upper)
@@ -617,7 +617,7 @@ class MovingDesigns:
     def _shortening(self, change: Array, moves: Sequence[Array]) -> Array:
         """By how much steps are shortened (designs,), to stay where the first order tells something."""
         greatest = np.abs(change[:, : self.fit.globals.free]).max(axis=1, initial=0.0) / MAX_CHANGE
-        for each in moves:
-            greatest = np.maximum(greatest, np.abs(each).max(axis=(1, 2), initial=0.0) / MAX_MOVE)
+        for move in moves:
+            greatest = np.maximum(greatest, np.abs(move).max(axis=(1, 2), initial=0.0) / MAX_MOVE)
         found: Array = 1.0 / np.maximum(np.nan_to_num(greatest, nan=1.0), 1.0)
         return found

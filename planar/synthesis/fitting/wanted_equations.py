@@ -81,7 +81,7 @@ class WantedEquations:
         design = self.design
         self.result = wanted_expression(design, rows.wanted) / ca.DM(rows.scales)
         self.z_count = design.z.numel()
-        kinds = {each.name: each.kind for each in design.dimensions}
+        kinds = {dimension.name: dimension.kind for dimension in design.dimensions}
         self.scale = np.array([unit if kinds[name] == "length" else 1.0 for name in free])
         "SI of one of each free number"
         self.input_scale = float(design.input_scale[0])
@@ -216,8 +216,8 @@ class WantedEquations:
         rows = np.repeat(x, entries, axis=0)
         told = function.evaluate_batch(many * entries, y.reshape(-1, unknowns), rows)
         found = []
-        for k, each in enumerate(told):
-            shaped = each.reshape(many, entries, *each.shape[1:]).swapaxes(-1, -2)
+        for k, part in enumerate(told):
+            shaped = part.reshape(many, entries, *part.shape[1:]).swapaxes(-1, -2)
             found.append(shaped[..., 0] if k in VECTORS else shaped)
         return found
 
@@ -228,11 +228,11 @@ def in_entries(
     """Symbols of an entry's unknowns y and of the free numbers x, in units of a `scale`, and expressions in them."""
     z_count = design.z.numel()
     x, y = ca.SX.sym("x", len(free)), ca.SX.sym("y", z_count + 1)
-    names = [each.name for each in design.dimensions]
-    d = ca.SX(ca.DM([each.value for each in design.dimensions]))
+    names = [dimension.name for dimension in design.dimensions]
+    d = ca.SX(ca.DM([dimension.value for dimension in design.dimensions]))
     for k, name in enumerate(free):
         d[names.index(name)] = x[k] * scale[k]
-    u = ca.vertcat(y[-1] * float(design.input_scale[0]), *(each.position for each in design.mechanism.inputs[1:]))
+    u = ca.vertcat(y[-1] * float(design.input_scale[0]), *(drive.position for drive in design.mechanism.inputs[1:]))
     zero = ca.SX.zeros(design.u1.numel())
     given = [design.z, design.u, design.u1, design.u2, design.d]
     return y, x, ca.substitute(outputs, given, [y[:z_count], u, zero, zero, d])
@@ -270,7 +270,7 @@ def tangents(jacobians: Array) -> Array:
 
 def wanted_size(task: SynthesisTask, mechanism_size: float) -> float:
     """The extent (m) of all places that are wanted; that of the mechanism where there are none, or but one."""
-    places = [each.places for each in task.wanted if not isinstance(each, WantedFunction)]
+    places = [item.places for item in task.wanted if not isinstance(item, WantedFunction)]
     extent = float(np.ptp(np.concatenate(places), axis=0).max()) if places else 0.0
     return extent or mechanism_size
 
@@ -298,9 +298,9 @@ class GlobalNumbers:
     def __init__(self, equations: Sequence[WantedEquations], many_free: int):
         self.free = at = many_free
         self.zero_columns: list[IntArray] = []
-        for each in equations:
-            self.zero_columns.append(np.arange(at, at + each.zero_count))
-            at += each.zero_count
+        for item in equations:
+            self.zero_columns.append(np.arange(at, at + item.zero_count))
+            at += item.zero_count
         self.size = at
 
     def columns(self, k: int) -> IntArray:
@@ -331,10 +331,10 @@ def normal_equations(
 ) -> tuple[Array, Array]:
     """The matrices (designs, size, size) and the slopes (designs, size) of half the sum of squares."""
     normal = np.zeros((len(lines[0].residual), numbers.size, numbers.size))
-    for k, (each, line) in enumerate(zip(equations, lines, strict=True)):
+    for k, (item, line) in enumerate(zip(equations, lines, strict=True)):
         at = numbers.columns(k)
         own = np.einsum("cnpi,cnpj->cij", line.slopes, line.slopes, optimize=True)
-        if not each.is_timed:
+        if not item.is_timed:
             size_along = np.sum(line.along**2, axis=-1) + DAMPING_ALONG
             across = np.einsum("cnpi,cnp->cni", line.slopes, line.along)
             own -= np.einsum("cni,cnj,cn->cij", across, across, 1.0 / size_along, optimize=True)
@@ -350,8 +350,8 @@ def half_slopes(
 ) -> Array:
     """The slopes (designs, size) of half the squares of residuals (designs, n, parts) that change as lines do."""
     slope = np.zeros((len(residuals[0]), numbers.size))
-    for k, (each, line, residual) in enumerate(zip(equations, lines, residuals, strict=True)):
-        slope[:, numbers.columns(k)] += np.einsum("cnpi,cnp->ci", line.slopes, _across(each, line, residual))
+    for k, (item, line, residual) in enumerate(zip(equations, lines, residuals, strict=True)):
+        slope[:, numbers.columns(k)] += np.einsum("cnpi,cnp->ci", line.slopes, _across(item, line, residual))
     return slope
 
 
@@ -380,10 +380,10 @@ def exact_rows(
     many = len(lines[0].residual)
     rows: list[Array] = [np.zeros((many, 0))]
     slopes: list[Array] = [np.zeros((many, 0, numbers.size))]
-    for k, (each, line) in enumerate(zip(equations, lines, strict=True)):
-        if each.rows.wanted.tolerance != 0.0 and not every_item:
+    for k, (item, line) in enumerate(zip(equations, lines, strict=True)):
+        if item.rows.wanted.tolerance != 0.0 and not every_item:
             continue
-        across = _across(each, line, np.concatenate([line.residual[..., None], line.slopes], axis=-1))
+        across = _across(item, line, np.concatenate([line.residual[..., None], line.slopes], axis=-1))
         both = across.reshape(many, -1, across.shape[-1])
         wide = np.zeros((*both.shape[:2], numbers.size))
         wide[..., numbers.columns(k)] = both[..., 1:]
@@ -410,9 +410,9 @@ def input_changes(
 ) -> InputChanges:
     """How the inputs of entries change; see `entry_moves`."""
     owns, slopes = [], []
-    for k, (each, line) in enumerate(zip(equations, lines, strict=True)):
+    for k, (item, line) in enumerate(zip(equations, lines, strict=True)):
         own, slope = line.own[..., -1], line.own_slopes[..., -1, :]
-        if not each.is_timed:
+        if not item.is_timed:
             rate = line.tangent[..., -1] / (np.sum(line.along**2, axis=-1) + DAMPING_ALONG)
             own = own - rate * np.einsum("cnp,cnp->cn", line.along, line.residual)
             slope = slope - rate[..., None] * np.einsum("cnp,cnpi->cni", line.along, line.slopes)
@@ -420,7 +420,7 @@ def input_changes(
         wide[..., numbers.columns(k)] = slope
         owns.append(own)
         slopes.append(wide)
-    inputs = np.concatenate([each[..., -1] for each in unknowns], axis=1)
+    inputs = np.concatenate([y[..., -1] for y in unknowns], axis=1)
     ends = np.stack([np.argmin(inputs, axis=1), np.argmax(inputs, axis=1)], axis=1)
     return InputChanges(np.concatenate(owns, axis=1), np.concatenate(slopes, axis=1), ends)
 

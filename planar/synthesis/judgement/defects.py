@@ -81,7 +81,7 @@ def _outcome(best: Defect, units: FileUnits) -> str:
 def output_transmissions(motion: Motion) -> Iterator[Transmission]:
     """That of every pair with the frame that is no input, without those of which none is told."""
     mechanism = motion.mechanism
-    inputs = {each.pair for each in mechanism.inputs}
+    inputs = {drive.pair for drive in mechanism.inputs}
     for pair in mechanism.pairs:
         if mechanism.frame in pair.links and pair.name not in inputs:
             try:

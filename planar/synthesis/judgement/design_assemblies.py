@@ -271,9 +271,9 @@ class PlaceWords(NamedTuple):
     def defects(self, wanted: Wanted, places: Sequence[EntryPlace], misses: Array) -> Iterator[Defect]:
         """Of the entries of an item that are not met on the branch of the sketch, and are missed by (n,) there."""
         groups: dict[tuple[str, tuple[float, ...]], list[EntryPlace]] = {}
-        for each in places:
-            key = tuple(round(at, 9) for at in each.dead_points)
-            groups.setdefault((each.kind, key), []).append(each)
+        for place in places:
+            key = tuple(round(at, 9) for at in place.dead_points)
+            groups.setdefault((place.kind, key), []).append(place)
         for (kind, _), group in groups.items():
             if kind == "branch":
                 continue
@@ -318,5 +318,5 @@ class PlaceWords(NamedTuple):
 
 
 def _entries_text(places: Sequence[EntryPlace]) -> str:
-    names = [str(each.entry + 1) for each in places]
+    names = [str(place.entry + 1) for place in places]
     return f"{'entries' if len(names) > 1 else 'entry'} {join_names(names, max_names=None)}"

@@ -71,7 +71,7 @@ class JudgedItem(NamedTuple):
     def is_on_branch(self) -> BoolArray:
         """Which entries are met on the branch of the sketch."""
         found = np.ones(len(self.misses), bool)
-        found[[each.entry for each in self.elsewhere]] = False
+        found[[place.entry for place in self.elsewhere]] = False
         return found
 
 
@@ -173,7 +173,7 @@ class DesignJudge:
             yield from words.defects(item.wanted, item.elsewhere, item.misses)
 
     def _unreached(self, inputs: Sequence[Array], *defects: Defect) -> Judgement:
-        return Judgement(tuple(np.full(len(each), np.nan) for each in inputs), tuple(inputs), defects)
+        return Judgement(tuple(np.full(len(positions), np.nan) for positions in inputs), tuple(inputs), defects)
 
     def _put_in_order(self, motion: Motion, reach: InputRange, items: Sequence[JudgedItem]) -> Iterator[Defect]:
         """Entries that are wanted in their order are met so, where that costs hardly anything; else a defect."""
@@ -263,10 +263,10 @@ def _results_within(
 ) -> list[Array]:
     """What is shown (n, parts) at positions (n,) of the input, not numbers beyond the ends of its range. Raises
     NoAnswer."""
-    within = [~reach.are_beyond(each) for each in inputs]
-    places = [reach.bring(each[rows]) for each, rows in zip(inputs, within, strict=True)]
-    if not any(len(each) for each in places):
-        return [np.full(wanted_results(each).shape, np.nan) for each in wanted]
+    within = [~reach.are_beyond(positions) for positions in inputs]
+    places = [reach.bring(positions[rows]) for positions, rows in zip(inputs, within, strict=True)]
+    if not any(len(place) for place in places):
+        return [np.full(wanted_results(item).shape, np.nan) for item in wanted]
     found = []
     for each, rows, shown in zip(wanted, within, _results(mechanism, wanted, places), strict=True):
         every = np.full(wanted_results(each).shape, np.nan)
@@ -277,19 +277,19 @@ def _results_within(
 
 def _results(mechanism: Mechanism, wanted: Sequence[Wanted], inputs: Sequence[Array]) -> list[Array]:
     """What is shown (n, parts) at positions of the input. Raises NoAnswer."""
-    sizes = [len(each) for each in inputs]
+    sizes = [len(positions) for positions in inputs]
     motion = motion_over_input(mechanism, np.concatenate(inputs))
     found, first = [], 0
-    for each, size in zip(wanted, sizes, strict=True):
+    for item, size in zip(wanted, sizes, strict=True):
         rows = slice(first, first + size)
         first += size
-        if isinstance(each, WantedPath):
-            found.append(motion.point(carried_name(mechanism, each.point)).position[rows])
-        elif isinstance(each, WantedFunction):
-            position = next(iter(relative_motions(mechanism)[each.to_pair].result_kinds))
-            found.append(np.asarray(motion.pair(each.to_pair)[position])[rows, None])
+        if isinstance(item, WantedPath):
+            found.append(motion.point(carried_name(mechanism, item.point)).position[rows])
+        elif isinstance(item, WantedFunction):
+            position = next(iter(relative_motions(mechanism)[item.to_pair].result_kinds))
+            found.append(np.asarray(motion.pair(item.to_pair)[position])[rows, None])
         else:
-            parts = (getattr(motion.frames[each.link], part) for part in ("x", "y", "angle"))
+            parts = (getattr(motion.frames[item.link], part) for part in ("x", "y", "angle"))
             values = [np.broadcast_to(np.asarray(value_and_rates(part)[0], float), len(motion)) for part in parts]
             found.append(np.stack(values, axis=1)[rows])
     return found
@@ -352,17 +352,17 @@ def check_file(mechanism: Mechanism, wanted: Sequence[Wanted], inputs: Sequence[
     except PlanarError:
         design = None
     results, misses, tolerances, scales = [], [], [], []
-    for each, positions in zip(wanted, inputs, strict=True):
-        result, is_angle = wanted_results(each), design is None or design.measures_angle(each)
-        scale = 1.0 if isinstance(each, WantedFunction) and is_angle else size
+    for item, positions in zip(wanted, inputs, strict=True):
+        result, is_angle = wanted_results(item), design is None or design.measures_angle(item)
+        scale = 1.0 if isinstance(item, WantedFunction) and is_angle else size
         if design is None:
             none = np.full(len(result), np.inf)
             off, within = none, 0.0 * result[:, 0]
         else:
-            if isinstance(each, WantedFunction) and not each.is_absolute:  # counted from the first entry
-                first = design.results(each, design.home[None], positions[:1])
+            if isinstance(item, WantedFunction) and not item.is_absolute:  # counted from the first entry
+                first = design.results(item, design.home[None], positions[:1])
                 result = result - result[:1] + first
-            off, within = _entries(design, each, result, positions, size)
+            off, within = _entries(design, item, result, positions, size)
         results.append(result)
         misses.append(off)
         tolerances.append(within * ROUND_OFF * scale * max(1.0, *(length / size for length in lengths)))

@@ -226,14 +226,14 @@ def write_task(task: SynthesisTask) -> dict[str, Any]:
         value["start"] = written[0] if len(written) == 1 else written
     for k, each in enumerate(task.wanted):
         _check_shapes(each, f"$.wanted[{k}]")
-    value["wanted"] = [_write_wanted(each, task, quantity) for each in task.wanted]
+    value["wanted"] = [_write_wanted(item, task, quantity) for item in task.wanted]
     if task.free:
         value["free"] = list(task.free)
     if task.within:
         numbers = (start_numbers(start, task.wanted) for start in starts)
         kinds = {name: dimension.kind for known in numbers for name, dimension in known.items()}
         value["within"] = {
-            name: [quantity(each, kinds.get(name, "number")) if isfinite(each) else None for each in both]
+            name: [quantity(part, kinds.get(name, "number")) if isfinite(part) else None for part in both]
             for name, both in task.within.items()
         }
     demands = list(_write_demands(task.demands, quantity))

@@ -225,7 +225,7 @@ def _find_own_point(cursor: Cursor, start: Mechanism) -> str:
         near = suggest_name(name, dict.fromkeys(aliases.values()), "points")
         raise cursor.error_at(None, f"{start.name!r} has no point {name!r}{near}; 'on' names the link for a new one")
     found = find_point(cursor, name, aliases)
-    members = next(each.members for each in named_points(start) if each.name == found)
+    members = next(point.members for point in named_points(start) if point.name == found)
     if start.frame in (link for link, _ in members):
         raise cursor.error_at(None, f"{found!r} is a point of the frame and does not move; another one is wanted here")
     return found
@@ -247,7 +247,7 @@ def _find_carried_point(cursor: Cursor, start: Mechanism, link: str) -> str:
 
 def _find_link(cursor: Cursor, name: str, start: Mechanism) -> None:
     """See that a start has a link of this name, and that it moves."""
-    known = [each.name for each in start.links]
+    known = [link.name for link in start.links]
     if name not in known:
         raise cursor.error_at(None, f"{start.name!r} has no link {name!r}{suggest_name(name, known, 'links')}")
     if name == start.frame:
@@ -255,7 +255,7 @@ def _find_link(cursor: Cursor, name: str, start: Mechanism) -> None:
 
 
 def _read_timing(cursor: Cursor, inputs: Sequence[float | None]) -> Array | None:
-    given = [each is not None for each in inputs]
+    given = [drive is not None for drive in inputs]
     if not any(given):
         return None
     if not all(given):
@@ -286,28 +286,28 @@ FLAT = 1e-12
 def read_demands(items: Iterable[Cursor], starts: Sequence[Mechanism]) -> Demands:
     """The demands of a list. Raises BadInput with the place."""
     demands = Demands()
-    for each in items:
-        if isinstance(each.value, str):
-            if each.as_choice(DEMAND_WORDS) == WHOLE_TURN:
-                check_turning_input(each, starts, "only an input that turns can make a whole turn")
+    for item in items:
+        if isinstance(item.value, str):
+            if item.as_choice(DEMAND_WORDS) == WHOLE_TURN:
+                check_turning_input(item, starts, "only an input that turns can make a whole turn")
                 demands = demands._replace(whole_turn=True)
             else:
                 demands = demands._replace(one_branch=True)
             continue
-        each.check_keys(*DEMAND_SCHEMA)
-        if not each.fields():
-            raise each.error_at(None, "a demand is wanted here: 'whole turn', 'transmission' or 'inside'")
-        for key in each.fields():
+        item.check_keys(*DEMAND_SCHEMA)
+        if not item.fields():
+            raise item.error_at(None, "a demand is wanted here: 'whole turn', 'transmission' or 'inside'")
+        for key in item.fields():
             if getattr(demands, key) is not None:
-                raise each.error_at(key, f"{key!r} is demanded already; write one of the two")
-        if each.has("transmission"):
-            angle = each["transmission"].as_positive("angle")
+                raise item.error_at(key, f"{key!r} is demanded already; write one of the two")
+        if item.has("transmission"):
+            angle = item["transmission"].as_positive("angle")
             if not angle < pi / 2:
                 message = "a least transmission angle is less than a right angle"
-                raise each["transmission"].error_at(None, message)
+                raise item["transmission"].error_at(None, message)
             demands = demands._replace(transmission=angle)
-        if each.has("inside"):
-            demands = demands._replace(inside=_read_region(each["inside"]))
+        if item.has("inside"):
+            demands = demands._replace(inside=_read_region(item["inside"]))
     return demands
 
 
@@ -316,7 +316,7 @@ def _read_region(cursor: Cursor) -> Array:
     given = tuple(cursor.items())
     if len(given) > MAX_CORNERS:
         raise cursor.error_at(None, f"a polygon has {MAX_CORNERS} corners at most, not {len(given)}")
-    corners = np.array([each.as_vector("length") for each in given])
+    corners = np.array([value.as_vector("length") for value in given])
     if len(corners) < 2:
         raise cursor.error_at(None, "two opposite corners of a rectangle are wanted here, or a polygon's corners")
     if len(corners) == 2:

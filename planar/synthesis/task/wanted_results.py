@@ -21,7 +21,7 @@ def wanted_expression(design: DesignEquations, wanted: Wanted) -> ca.SX:
     frames, _ = design.placed
     if isinstance(wanted, WantedPath):
         name = carried_name(design.mechanism, wanted.point)
-        point = next((each for each in named_points(design.mechanism) if each.name == name), None)
+        point = next((point for point in named_points(design.mechanism) if point.name == name), None)
         if point is None:
             raise BadInput("$.wanted", f"{design.mechanism.name!r} has no point {wanted.point!r}")
         link, at = point.members[0]
@@ -44,18 +44,18 @@ def set_apart(point: str) -> str:
 def carried_name(mechanism: Mechanism, point: str) -> str:
     """The name of a wanted point in a mechanism, which may be one of a chain where it is set apart from a joint."""
     apart = set_apart(point)
-    return apart if any(each.name == apart for each in named_points(mechanism)) else point
+    return apart if any(point.name == apart for point in named_points(mechanism)) else point
 
 
 def depended_numbers(mechanism: Mechanism, wanted: tuple[Wanted, ...]) -> tuple[str, ...]:
     """The numbers of links and pairs that what is wanted, or how the mechanism closes, depends on."""
     design = design_equations(mechanism)
-    depends = ca.vertcat(design.F, *(wanted_expression(design, each) for each in wanted))
+    depends = ca.vertcat(design.F, *(wanted_expression(design, item) for item in wanted))
     used = ca.which_depends(depends, design.d, 1, False)
     return tuple(
-        each.name
-        for each, is_used in zip(design.dimensions, used, strict=True)
-        if is_used and each.path[0] in ("links", "pairs")
+        dimension.name
+        for dimension, is_used in zip(design.dimensions, used, strict=True)
+        if is_used and dimension.path[0] in ("links", "pairs")
     )
 
 
@@ -63,9 +63,9 @@ def influential_numbers(mechanism: Mechanism, wanted: tuple[Wanted, ...]) -> tup
     """The lengths and angles among them that can change alone."""
     used, tied = {*depended_numbers(mechanism, wanted)}, {*tied_dimensions(mechanism)}
     return tuple(
-        each.name
-        for each in design_equations(mechanism).dimensions
-        if each.name in used - tied and each.kind in ("length", "angle")
+        dimension.name
+        for dimension in design_equations(mechanism).dimensions
+        if dimension.name in used - tied and dimension.kind in ("length", "angle")
     )
 
 

@@ -109,8 +109,8 @@ def follow_in_balls(family: Family, begin: Member, x: ComplexArray, end: Member)
         for k, own in enumerate(x):
             w, is_end = _follow_path(family, begin, [ball(complex(each)) for each in own], end)
             if is_end:
-                found[k] = [complex(each) for each in w]
-            elif max((abs(complex(each)) for each in w), default=0.0) > FAR:
+                found[k] = [complex(value) for value in w]
+            elif max((abs(complex(value)) for value in w), default=0.0) > FAR:
                 found[k] = np.inf
     return found
 
@@ -177,8 +177,8 @@ def certify_member(family: Family, member: Member, x: ComplexArray) -> ExactCert
         half = np.full(len(x), np.inf)
         exact = x.copy()
         boxes: list[ProvedBox | None] = []
-        for k, each in enumerate(x):
-            middle = polished_balls(equations, each)
+        for k, value in enumerate(x):
+            middle = polished_balls(equations, value)
             box = prove_box(equations, middle) if middle is not None else None
             boxes.append(box)
             if box is not None:

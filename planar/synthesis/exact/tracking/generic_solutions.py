@@ -393,8 +393,8 @@ class _Slices:
         for V in points:
             x, s, _ = _affine(V, self.size)
             sums.append(np.append(x[:, : self.form_size].sum(axis=0), s.sum()))
-        slopes = [(each - sums[0]) / level for each, level in zip(sums[1:], LEVELS, strict=True)]
-        size = max(float(np.abs(each).max()) for each in sums)
+        slopes = [(total - sums[0]) / level for total, level in zip(sums[1:], LEVELS, strict=True)]
+        size = max(float(np.abs(total).max()) for total in sums)
         return len({*map(len, points)}) == 1 and bool(np.abs(slopes[1] - slopes[0]).max() <= EVEN * max(size, 1.0))
 
     def at_member(self) -> ComplexArray:

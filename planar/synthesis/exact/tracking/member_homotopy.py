@@ -50,7 +50,7 @@ def solution_keys(V: ComplexArray) -> ComplexArray:
     rng = np.random.default_rng(1)
     weights = rng.normal(size=(2, 2, half)) + 1j * rng.normal(size=(2, 2, half))
     parts = V[:, :half], V[:, half:]
-    found: ComplexArray = sum((each @ w[0]) / (each @ w[1]) for each, w in zip(parts, weights, strict=True))
+    found: ComplexArray = sum((part @ w[0]) / (part @ w[1]) for part, w in zip(parts, weights, strict=True))
     return found
 
 
@@ -67,7 +67,7 @@ def first_of_same(V: ComplexArray) -> IntArray:
     half, key = V.shape[1] // 2, solution_keys(V)
     parts = V[:, :half], V[:, half:]
     order = np.argsort(key.real, kind="stable")
-    unit = [each / np.linalg.norm(each, axis=1, keepdims=True) for each in parts]
+    unit = [part / np.linalg.norm(part, axis=1, keepdims=True) for part in parts]
     room = 1e3 * SAME * np.maximum(1.0, np.abs(key))
     for at, k in enumerate(order.tolist()):
         for other in order[at + 1 :].tolist():
@@ -99,7 +99,7 @@ class EdgeHomotopy:
 
     def __init__(self, family: Family, members: Sequence[Member], edges: IntArray):
         self.family, self.edges = family, edges
-        self.numbers = [np.stack(parts, axis=-1) for parts in zip(*(each.parts for each in members), strict=True)]
+        self.numbers = [np.stack(parts, axis=-1) for parts in zip(*(member.parts for member in members), strict=True)]
 
     def at_paths(self, paths: IntArray) -> MemberHomotopy:
         """The homotopy of some of the paths."""
@@ -181,7 +181,7 @@ def bilinear_roots(family: Family, member: Member, count: int) -> ComplexArray |
 
 def _rows_at(family: Family, member: Member, x: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
     """Rows (n, rows) and their Jacobians at places (n, 4)."""
-    still = [np.zeros_like(each) for each in member.parts]
+    still = [np.zeros_like(part) for part in member.parts]
     f, slope, _ = family.rows_at(np.ascontiguousarray(x.T), member, still, np.zeros(len(x)))
     return f.T, slope.transpose(2, 0, 1)
 

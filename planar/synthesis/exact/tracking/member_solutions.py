@@ -343,12 +343,12 @@ def solve_components(components: Sequence[Component], say: Progress) -> list[Com
     """The solutions of each component; those that are the same member of a family are solved once."""
     known: dict[tuple[str, bytes], ComponentSolutions] = {}
     solved = []
-    for each in components:
-        record = family_record(each.family, lambda many: say(f"{many} solutions of a random task"))
-        key = _member_key(record.name, each.member)
+    for component in components:
+        record = family_record(component.family, lambda many: say(f"{many} solutions of a random task"))
+        key = _member_key(record.name, component.member)
         if key not in known:
-            known[key] = _solve(each, record, say)
-        solved.append(_in_order(known[key], record)._replace(component=each))
+            known[key] = _solve(component, record, say)
+        solved.append(_in_order(known[key], record)._replace(component=component))
     return solved
 
 
@@ -366,15 +366,15 @@ def with_tested_records(solved: Sequence[ComponentSolutions], say: Progress) -> 
     """The same after the trace tests of their families; solved again where a test shows that some were missing."""
     records: dict[str, FamilyRecord] = {}
     tested = []
-    for each in solved:
-        record = each.record
+    for solution in solved:
+        record = solution.record
         if not record.is_tested:
             if record.name.text not in records:
                 say(f"trace test of {count_phrase(len(record.solutions.V), 'solution')} of a random task")
-                records[record.name.text] = tested_record(each.component.family, record)
-            record = family_record(each.component.family)
-        has_more = len(record.solutions.V) > len(each.record.solutions.V)
-        tested.append(_solve(each.component, record, say) if has_more else each._replace(record=record))
+                records[record.name.text] = tested_record(solution.component.family, record)
+            record = family_record(solution.component.family)
+        has_more = len(record.solutions.V) > len(solution.record.solutions.V)
+        tested.append(_solve(solution.component, record, say) if has_more else solution._replace(record=record))
     return tested
 
 
@@ -392,7 +392,7 @@ def _solve(component: Component, record: FamilyRecord, say: Progress) -> Compone
         goes = ~proof.proved & (np.abs(x).max(axis=1) > FAR)
         whole = _with_infinite(whole, x[goes], whole.classes[goes])
         whole = whole._replace(x=x[~goes], classes=whole.classes[~goes])
-        proof = ExactCertificates(*(each[~goes] for each in proof))
+        proof = ExactCertificates(*(part[~goes] for part in proof))
         x, is_real = proof.x, is_real[~goes]
         proved, all_proved = proof.proved & proof.is_real, int(proof.proved.sum())
         is_real = np.where(proof.proved, proof.is_real, is_real)
@@ -451,7 +451,7 @@ def _with_infinite(whole: MemberSolutions, x: ComplexArray, classes: IntArray) -
 def _with_new(record: FamilyRecord, whole: MemberSolutions, more: ComplexArray, of_class: IntArray) -> MemberSolutions:
     """With those solutions more (solutions, unknowns) that are new whatever the names of links."""
     images = exchange_images(record.name.exchanges)(homogeneous_solutions(more))
-    alike = np.stack([affine_solutions(each) for each in images], axis=1)
+    alike = np.stack([affine_solutions(image) for image in images], axis=1)
     x, classes = whole.x, whole.classes
     for k in range(len(more)):
         off = np.abs(x[:, None] - alike[k]) / np.maximum(1.0, np.abs(alike[k]))
@@ -470,8 +470,8 @@ def _is_real(x: ComplexArray) -> BoolArray:
 def alike_components(solved: Sequence[ComponentSolutions]) -> list[list[int]]:
     """Components that are the same member of one family, together."""
     groups: dict[tuple[str, bytes], list[int]] = {}
-    for k, each in enumerate(solved):
-        groups.setdefault(_member_key(each.record.name, each.component.member), []).append(k)
+    for k, solution in enumerate(solved):
+        groups.setdefault(_member_key(solution.record.name, solution.component.member), []).append(k)
     return [*groups.values()]
 
 
