@@ -15,8 +15,8 @@ from rich.console import Console
 
 import planar
 from benchmarks.exact_makers import KINDS, UNITS
-from planar.synthesis.exact.component_solutions import solve_components
 from planar.synthesis.exact.relations.exact_problem import ExactProblem
+from planar.synthesis.exact.tracking.member_solutions import solve_components
 from planar.synthesis.task.starts import start_mechanisms
 
 NINE_POINTS = (

@@ -16,11 +16,22 @@ from planar.foundation.safe_files import save_file
 from planar.synthesis.exact.relations.exact_problem import ExactProblem
 from planar.synthesis.exact.relations.family import Family, Member
 from planar.synthesis.exact.tracking.family_names import name_family
-from planar.synthesis.exact.tracking.generic_store import KNOWN, pack_record, write_record
-from planar.synthesis.exact.tracking.member_homotopy import affine_solutions, homogeneous_solutions
-from planar.synthesis.exact.tracking.monodromy import GenericSolutions, find_generic_solutions
-from planar.synthesis.exact.tracking.symmetry import Images, exchange_images, representatives
-from planar.synthesis.exact.tracking.trace_test import MAX_POINTS, trace_test
+from planar.synthesis.exact.tracking.generic_solutions import (
+    KNOWN,
+    MAX_POINTS,
+    GenericSolutions,
+    find_generic_solutions,
+    pack_record,
+    trace_test,
+    write_record,
+)
+from planar.synthesis.exact.tracking.member_homotopy import (
+    Images,
+    affine_solutions,
+    exchange_images,
+    homogeneous_solutions,
+    representatives,
+)
 from planar.synthesis.task.starts import start_mechanisms
 
 PLACE = 0.3 + 0.2j, -0.1 + 0.4j

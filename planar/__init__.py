@@ -128,17 +128,13 @@ if TYPE_CHECKING:
     from planar.structures.linkage_store import LinkageSet, generate
     from planar.structures.recognition import MechanismStructure, chain_of
     from planar.structures.symmetry import ChainSymmetry
-    from planar.synthesis.cognates.cognate_inputs import CognateInput
-    from planar.synthesis.cognates.cognates import Cognate, Cognates, cognates
-    from planar.synthesis.design_motion import DesignMotion
+    from planar.synthesis.cognates.cognates import Cognate, CognateInput, Cognates, cognates
     from planar.synthesis.exact.complete_synthesis import CompleteSynthesis, DyadCurve, ExactDesign
-    from planar.synthesis.search_progress import SearchProgress
-    from planar.synthesis.synthesis import FamilyCount, Synthesis, SynthesisedDesign
-    from planar.synthesis.synthesise import synthesise
+    from planar.synthesis.synthesis import DesignMotion, FamilyCount, Synthesis, SynthesisedDesign
+    from planar.synthesis.synthesise import SearchProgress, synthesise
     from planar.synthesis.task.synthesis_task import Demands, SynthesisTask, WantedFunction, WantedPath, WantedPoses
+    from planar.synthesis.task.task_file import task_schema, write_task
     from planar.synthesis.task.task_reader import read_task
-    from planar.synthesis.task.task_schema import task_schema
-    from planar.synthesis.task.task_writer import write_task
 
 __version__ = "0.18.0"
 

@@ -120,7 +120,7 @@ def keys_page() -> str:
 
 def task_keys_page() -> str:
     """The page of the keys of a task, in Markdown."""
-    from planar.synthesis.task.task_schema import task_schema  # a terminal shows other pages more often
+    from planar.synthesis.task.task_file import task_schema  # a terminal shows other pages more often
 
     whole = task_schema()["properties"]
     starts = tuple(each for each in whole["start"]["anyOf"] if "properties" in each)

@@ -24,8 +24,8 @@ from planar.reports.tables.design.design_columns import DesignColumn
 from planar.reports.tables.design.synthesis import input_text
 from planar.synthesis.exact.complete_synthesis import CompleteSynthesis, ExactDesign
 from planar.synthesis.synthesis import Synthesis, SynthesisedDesign
+from planar.synthesis.task.starts import miss_text
 from planar.synthesis.task.synthesis_task import WantedFunction
-from planar.synthesis.task.task_numbers import miss_text
 
 STYLES = ("page.css", "designs/designs.css", "print.css")
 LEGEND = '<span><i class="wanted"></i>wanted</span><span><i class="path"></i>made by the design</span>'

@@ -14,8 +14,7 @@ from planar.pages.data.wanted_data import apply_task
 from planar.pages.design_cards import GalleryCard, gallery_page
 from planar.pages.page import PageLink, page
 from planar.reports.tables.design.design_columns import design_columns, design_csv
-from planar.synthesis.search_folder import claim_folder
-from planar.synthesis.synthesis import Synthesis, check_synthesis
+from planar.synthesis.synthesis import Synthesis, check_synthesis, claim_folder
 from planar.synthesis.task.synthesis_task import SynthesisTask
 
 INDEX, TABLE = "index.html", "designs.csv"

@@ -1,30 +1,97 @@
-"""Designs of one start that do what a task wants best: from a catalogue's matches, fitted by least squares."""
+"""Designs of one start that do what a task wants best: matches of a catalogue, fitted, written and judged."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import replace
+from math import ceil, log10
 from typing import NamedTuple
 
+import casadi as ca
 import numpy as np
 
-from planar.derivatives.design_equations import design_equations
+from planar.derivatives.design_equations import DesignEquations, design_equations
+from planar.document.dimensions import file_dimensions
+from planar.document.revised.changed_numbers import with_values
 from planar.document.revised.similar_mechanism import similar_mechanism
+from planar.equations.elimination import stack_expressions
 from planar.foundation.arrays import Array
-from planar.model.mechanism import Mechanism
-from planar.synthesis.catalogue.branch_tracking import follow_branches
-from planar.synthesis.catalogue.catalogue import Catalogue
-from planar.synthesis.catalogue.catalogue_store import kept_catalogue
-from planar.synthesis.catalogue.matches import Match, find_matches
-from planar.synthesis.catalogue.moved_numbers import moved_numbers
-from planar.synthesis.catalogue.step_choices import WantedItem
-from planar.synthesis.fitting.demand_guard import DemandGuard
-from planar.synthesis.fitting.demanded_rows import demand_guards
+from planar.foundation.errors import BadInput
+from planar.model.file_units import FileUnits, unit_of_kind
+from planar.model.mechanism import Mechanism, NamedPoint, named_points
+from planar.synthesis.catalogue import (
+    Catalogue,
+    Match,
+    WantedItem,
+    find_matches,
+    follow_branches,
+    kept_catalogue,
+    moved_numbers,
+)
+from planar.synthesis.fitting.demand_rows import DemandGuard, demand_guards
 from planar.synthesis.fitting.design_fit import DesignFit, FittedDesigns
-from planar.synthesis.fitting.kept_demands import lacks
-from planar.synthesis.fitting.wanted_equations import WantedEquations, tangents
-from planar.synthesis.fitting.wanted_rows import wanted_rows, wanted_size
+from planar.synthesis.fitting.moving_designs import lacks
+from planar.synthesis.fitting.wanted_equations import WantedEquations, tangents, wanted_rows, wanted_size
+from planar.synthesis.judgement.judgement import DesignJudge
+from planar.synthesis.synthesis import SynthesisedDesign
 from planar.synthesis.task.freedom import can_move_whole
 from planar.synthesis.task.starts import FreeNumbers, free_numbers
 from planar.synthesis.task.synthesis_task import SynthesisTask
+
+DIGITS, SKETCH_DIGITS = 13, 7
+"""Of the size of a mechanism, or of a rad, to which its numbers are written, so that what is met exactly still is; and
+those of its sketch, which only chooses the assembly."""
+
+
+def write_design(
+    design: DesignEquations,
+    numbers: Mapping[str, float],
+    y: Array,
+    input_position: float,
+    name: str,
+) -> Mechanism:
+    """The mechanism with these numbers (SI, rounded to `DIGITS`), whose sketch is where it stands with
+    unknowns y (unknowns,). Raises BadInput where a file with these numbers is refused."""
+    start = design.mechanism
+    units, size = start.units, design.solver.unit
+    known = file_dimensions(start)
+    told = {key: _rounded(value, known[key].kind, units, size, DIGITS) for key, value in numbers.items()}
+    running = f"{start.inputs[0].pair}.position"
+    told[running] = _rounded(input_position, known[running].kind, units, size, DIGITS)
+    joints = [
+        point for point in named_points(start) if len(point.members) > 1 and start.frame not in dict(point.members)
+    ]
+    places = _places(design, joints, told, y)
+    sketch = []
+    for joint, at in zip(joints, places, strict=True):
+        x, y_own = (_rounded(part, "length", units, size, SKETCH_DIGITS) for part in at)
+        sketch.append((joint.name, x, y_own))
+    made = replace(start, sketch=tuple(sketch), name=name, about=None, source=None, published=(), ids=())
+    return with_values(made, told)
+
+
+def _places(
+    design: DesignEquations, joints: list[NamedPoint], numbers: Mapping[str, float], y: Array
+) -> list[tuple[float, float]]:
+    frames, _ = design.placed
+    parts = []
+    for joint in joints:
+        link, point = joint.members[0]
+        parts += list(frames[link].to_world(design.work.shapes[link].position(point)))
+    d = [numbers.get(dimension.name, dimension.value) for dimension in design.dimensions]
+    u = [y[-1] * design.input_scale[0], *(drive.position for drive in design.mechanism.inputs[1:])]
+    at = ca.Function("places", [design.z, design.u, design.d], [stack_expressions(parts)])
+    found = at(ca.DM(y[:-1]), ca.DM(u), ca.DM(d)).full().ravel().tolist()
+    return list(zip(found[::2], found[1::2], strict=True))
+
+
+def _rounded(value: float, kind: str, units: FileUnits, size: float, digits: int) -> float:
+    """A quantity (SI) with so many digits behind that of the size, in the file's units."""
+    if kind not in ("length", "angle"):
+        return float(value)
+    of = unit_of_kind(kind, units)[1]
+    whole = abs(of.from_si(size if kind == "length" else 1.0))
+    return float(of.to_si(round(of.from_si(float(value)), digits - ceil(log10(whole)))))
 
 
 class Candidate(NamedTuple):
@@ -70,7 +137,7 @@ class DesignSearch:
         self.mechanism = mechanism
         self.free: FreeNumbers = free_numbers(task, mechanism)
         rows = wanted_rows(task, self.size)
-        self.equations = tuple(WantedEquations(mechanism, each, self.free.names, own) for each in rows)
+        self.equations = tuple(WantedEquations(mechanism, row, self.free.names, own) for row in rows)
         self.ratio = own / self.size
         "of the scale of numbers to that of places"
         self.moves = moved_numbers(self.equations[0], self.free)
@@ -84,12 +151,12 @@ class DesignSearch:
         """The designs of the catalogue nearest to what is wanted."""
         items = [
             WantedItem(
-                each.rows.wanted,
-                each.target,
-                None if each.rows.inputs is None else each.rows.inputs / each.input_scale,
-                each.rows.input_is_free,
+                item.rows.wanted,
+                item.target,
+                None if item.rows.inputs is None else item.rows.inputs / item.input_scale,
+                item.rows.input_is_free,
             )
-            for each in self.equations
+            for item in self.equations
         ]
         factors = self._factors(catalogue) if self.can_move else None
         if self.guards is None or not self.guards[True].kept_by(False, False).rows:
@@ -103,7 +170,7 @@ class DesignSearch:
         assert self.guards is not None
         starts, found = self._fit_starts(catalogue, matches), np.zeros(len(matches))
         for over_turn, guard in self.guards.items():
-            rows = [k for k, each in enumerate(starts) if each.over_turn is over_turn]
+            rows = [k for k, start in enumerate(starts) if start.over_turn is over_turn]
             if rows:
                 x, y = (np.array([getattr(starts[k], name) for k in rows]) for name in ("numbers", "guarded"))
                 found[rows] = lacks(guard.slacks(x, y))
@@ -156,16 +223,16 @@ class DesignSearch:
     def _guarded(self, branch: Array, unknowns: list[Array], over_turn: bool) -> Array:
         """The unknowns at positions of a branch (steps, unknowns) all round its turn, or between entries."""
         many = 0 if self.guards is None else self.guards[over_turn].position_count
-        return spread_positions(branch, np.concatenate([each[:, -1] for each in unknowns]), many, over_turn)
+        return spread_positions(branch, np.concatenate([y[:, -1] for y in unknowns]), many, over_turn)
 
     def _fit_alike(self, starts: list[_FitStart], keep: int, guard: DemandGuard | None) -> FittedDesigns:
         """Designs fitted that all turn fully, or are all seen between their entries only."""
-        x = np.array([each.numbers for each in starts])
-        ys = [np.array(each) for each in zip(*(each.unknowns for each in starts), strict=True)]
+        x = np.array([start.numbers for start in starts])
+        ys = [np.array(each) for each in zip(*(start.unknowns for start in starts), strict=True)]
         zeros = self.first_zeros(x, ys)
         scale = self.equations[0].scale
         fit = DesignFit(self.equations, self.free.lower / scale, self.free.upper / scale, guard)
-        positions = np.array([each.guarded for each in starts])
+        positions = np.array([start.guarded for start in starts])
         shares = np.broadcast_to(np.linspace(0.0, 1.0, positions.shape[1]), positions.shape[:2])
         return fit.fit(x, ys, zeros, keep, (positions, shares) if guard is not None else None)
 
@@ -176,7 +243,7 @@ class DesignSearch:
         branches, is_whole = follow_branches(self.equations[0], found.numbers, found.unknowns[0][:, 0])
         told = {}
         for k in np.flatnonzero(is_whole & np.isfinite(found.squares)).tolist():
-            branch, ys = branches[k][np.isfinite(branches[k]).all(axis=1)], [each[k] for each in found.unknowns]
+            branch, ys = branches[k][np.isfinite(branches[k]).all(axis=1)], [y[k] for y in found.unknowns]
             match = starts[found.order[k]].match
             told[k] = _FitStart(found.numbers[k], ys, self._guarded(branch, ys, True), True, match)
         return told
@@ -201,15 +268,15 @@ class DesignSearch:
     def first_zeros(self, x: Array, unknowns: list[Array]) -> list[Array]:
         """The zeros of scales that fit best at first; given inputs are brought to where they are wanted."""
         found: list[Array] = []
-        for k, each in enumerate(self.equations):
-            zeros = np.zeros((len(x), each.zero_count))
-            if each.rows.inputs is not None:
-                wanted = np.broadcast_to(each.rows.inputs / each.input_scale, unknowns[k].shape[:2])
-                if each.rows.input_is_free:
+        for k, item in enumerate(self.equations):
+            zeros = np.zeros((len(x), item.zero_count))
+            if item.rows.inputs is not None:
+                wanted = np.broadcast_to(item.rows.inputs / item.input_scale, unknowns[k].shape[:2])
+                if item.rows.input_is_free:
                     wanted = wanted + np.mean(unknowns[k][..., -1] - wanted, axis=1, keepdims=True)
                 unknowns[k] = np.concatenate([unknowns[k][..., :-1], wanted[..., None]], axis=-1)
-            if each.rows.value_is_free:
-                off = each.values(x, unknowns[k])[..., 0] - each.target[:, 0]
+            if item.rows.value_is_free:
+                off = item.values(x, unknowns[k])[..., 0] - item.target[:, 0]
                 zeros[:, -1] = np.mean(off, axis=1)
             found.append(zeros)
         return found
@@ -219,7 +286,7 @@ class DesignSearch:
         return Candidate(
             self.mechanism,
             dict(zip(self.free.names, map(float, numbers), strict=True)),
-            tuple(each[k] for each in found.unknowns),
+            tuple(y[k] for y in found.unknowns),
             float(found.squares[k]),
             float(found.lacks[k]),
             match,
@@ -235,3 +302,32 @@ def spread_positions(branch: Array, inputs: Array, count: int, over_turn: bool) 
     spread = np.linspace(inputs.min(), inputs.max(), count)
     positions: Array = np.stack([np.interp(spread, branch[:, -1], part) for part in branch.T], axis=1)
     return positions
+
+
+def judge_candidate(
+    search: DesignSearch, judge: DesignJudge, candidate: Candidate, number: int
+) -> SynthesisedDesign | None:
+    """A candidate with its judgement, named by a `number`; None where no file can describe it."""
+    equations = search.equations
+    values = tuple(search.shown(k, candidate) for k in range(len(equations)))
+    inputs = [y[:, -1] * item.input_scale for item, y in zip(equations, candidate.unknowns, strict=True)]
+    y = search.most_regular(candidate)
+    name = f"{search.task.name}: {search.mechanism.name} {number}"
+    try:
+        input_position = float(y[-1] * equations[0].input_scale)
+        mechanism = write_design(equations[0].design, candidate.numbers, y, input_position, name)
+    except BadInput:
+        return None
+    judgement = judge.judge(mechanism, inputs, values)
+    misses = np.concatenate(judgement.misses)
+    written = file_dimensions(mechanism)
+    return SynthesisedDesign(
+        mechanism,
+        float(np.sqrt(np.mean(misses**2))),
+        float(misses.max()),
+        judgement.misses,
+        judgement.inputs,
+        judgement.defects,
+        search.mechanism.name,
+        {key: float(written[key].value) for key in candidate.numbers},
+    )

@@ -1,22 +1,80 @@
-"""What synthesis finds: designs, the best first, and those that were rejected."""
+"""The result of a synthesis: its designs, how each moves, which is better, and the folder of a search."""
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from pathlib import Path
 from typing import Any, NamedTuple, overload
 
 import numpy as np
 
+from planar.analysis.motion.output import Extreme
+from planar.document.files import from_dict, load_value, to_dict
 from planar.foundation.arrays import Array
-from planar.foundation.errors import BadInput
+from planar.foundation.errors import BadInput, NoAnswer
+from planar.foundation.safe_files import PARTIAL_FILE_NAME, make_folder, save_file, write_error
+from planar.foundation.short_repr import short_repr
 from planar.model.mechanism import Mechanism
 from planar.model.wording import count_phrase
+from planar.results.motion import Motion
+from planar.solving.cycle import cycle
 from planar.synthesis.cognates.cognates import Cognate
-from planar.synthesis.design_motion import DesignMotion, design_motion
-from planar.synthesis.judgement.defects import Defect
+from planar.synthesis.judgement.defects import Defect, output_transmissions
+from planar.synthesis.judgement.input_range import input_range, range_motion
 from planar.synthesis.task.synthesis_task import SynthesisTask
+from planar.synthesis.task.task_file import write_task
+
+STEPS = 90
+
+
+class DesignMotion(NamedTuple):
+    """How a design moves: its input `pair` goes from `low` to `high` (rad or m), `is_whole_turn`: it turns fully.
+
+    `transmission` has the least transmission angle (rad) of every output that has one, by its pair, with the input
+    there: over the whole turn, else between the first and the last entry of what is wanted.
+    """
+
+    pair: str
+    low: float
+    high: float
+    is_whole_turn: bool
+    transmission: Mapping[str, Extreme]
+
+    @property
+    def least_transmission(self) -> Extreme | None:
+        """The least transmission angle of all outputs, None where there is none."""
+        return min(self.transmission.values(), key=lambda each: each.value, default=None)
+
+    def __repr__(self) -> str:
+        return short_repr(self)
+
+
+def design_motion(mechanism: Mechanism, inputs: Sequence[Array]) -> DesignMotion | None:
+    """How a design moves that is to come to positions (n,) of its input; None where it cannot be solved."""
+    running = mechanism.inputs[0].pair
+    try:
+        motion = range_motion(mechanism, inputs, STEPS)
+    except (NoAnswer, BadInput):
+        return None
+    reach = input_range(motion, inputs)
+    used: Motion | None = motion
+    if not reach.is_whole_turn:
+        every = reach.bring(np.concatenate(inputs))
+        try:
+            used = cycle(mechanism, STEPS, float(every.min()), float(every.max()), running)
+        except (NoAnswer, BadInput):
+            used = None  # what is wanted lies at one place, or beyond what it runs through
+    return DesignMotion(
+        running, reach.low, reach.high, reach.is_whole_turn, {} if used is None else least_transmissions(used)
+    )
+
+
+def least_transmissions(motion: Motion) -> dict[str, Extreme]:
+    """The least transmission angle (rad) over a motion at every output that has one, by its pair."""
+    return {each.pair: each.least for each in output_transmissions(motion) if each.least is not None}
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +106,7 @@ class SynthesisedDesign:
     @property
     def defects(self) -> tuple[str, ...]:
         """What is wrong with it, in sentences."""
-        return tuple(each.sentence for each in self.shortages)
+        return tuple(shortage.sentence for shortage in self.shortages)
 
     def __repr__(self) -> str:
         told = f", {count_phrase(len(self.defects), 'defect')}" if self.defects else ""
@@ -143,3 +201,123 @@ def _are_alike(one: SynthesisedDesign, other: SynthesisedDesign) -> bool:
 
 ALIKE = 2e-3
 """Of a mechanism's extent: designs whose joints are nearer to each other are one."""
+
+
+def design_record(design: SynthesisedDesign) -> dict[str, Any]:
+    """A design as JSON values, SI: null where a miss is not known. What is told of it beside is not among them."""
+    is_known = bool(np.isfinite(design.error))
+    return {
+        "start": design.start,
+        "error": design.error if is_known else None,
+        "greatest_miss": design.greatest_miss if is_known else None,
+        "misses": [_finite(miss) for miss in design.misses],
+        "inputs": [_finite(drive) for drive in design.inputs],
+        "shortages": [list(shortage) for shortage in design.shortages],
+        "numbers": dict(design.numbers),
+        "mechanism": to_dict(design.mechanism),
+    }
+
+
+def read_design(record: Mapping[str, Any]) -> SynthesisedDesign:
+    """The design of a record. Raises BadInput, KeyError, TypeError or ValueError where it is none."""
+    error, worst = (np.nan if record[key] is None else float(record[key]) for key in ("error", "greatest_miss"))
+    return SynthesisedDesign(
+        from_dict(record["mechanism"]),
+        error,
+        worst,
+        tuple(_numbers(each) for each in record["misses"]),
+        tuple(_numbers(each) for each in record["inputs"]),
+        tuple(Defect(*each) for each in record["shortages"]),
+        str(record["start"]),
+        {str(name): float(value) for name, value in record["numbers"].items()},
+    )
+
+
+def _finite(values: Array) -> list[float | None]:
+    return [float(value) if np.isfinite(value) else None for value in values]
+
+
+def _numbers(values: list[float | None]) -> Array:
+    return np.array([np.nan if value is None else value for value in values], float)
+
+
+TASK_FILE, SEARCH_FILE, ROUNDS_FOLDER = "task.json", "search.json", "search"
+DAMAGES = (BadInput, KeyError, TypeError, ValueError, AttributeError)
+"""What comes of reading a file that somebody changed: its round is made once more."""
+
+
+def claim_folder(folder: Path, task: SynthesisTask) -> None:
+    """Make sure that a folder is there for the designs of a task, and for nothing else; its file is written there.
+
+    Raises BadInput where it holds the designs of another task, or other things, and where it cannot be written.
+    """
+    own = json.loads(json.dumps(write_task(task)))
+    make_folder(folder)
+    try:
+        held = sorted(each.name for each in folder.iterdir() if not PARTIAL_FILE_NAME.fullmatch(each.name))
+    except OSError as problem:
+        raise write_error(str(folder), "the folder", problem, "read") from None
+    if TASK_FILE in held:
+        other = load_value(folder / TASK_FILE, "a task's file")
+        if other != own:
+            name = other.get("name") if isinstance(other, dict) else None
+            named = f", {name!r:.60}" if isinstance(name, str) and name != task.name else ""
+            told = f"this folder holds the designs of another task{named} ({TASK_FILE}); name another folder"
+            raise BadInput(str(folder), told)
+    elif held:
+        told = f"this folder holds {held[0]!r:.60} and no designs of a task ({TASK_FILE})"
+        raise BadInput(str(folder), f"{told}; name an empty or a new folder")
+    else:
+        save_file(folder / TASK_FILE, json.dumps(own, indent=2, ensure_ascii=False) + "\n")
+
+
+class SearchFolder:
+    """The rounds of a search that are done, in files of their own; each is written whole or not at all.
+
+    `plan` is what makes a search what it is beside its task: another one in the folder is refused (BadInput).
+    """
+
+    def __init__(self, folder: Path, task: SynthesisTask, plan: Mapping[str, Any]):
+        self.folder = folder
+        claim_folder(folder, task)
+        own = json.loads(json.dumps(plan))
+        if not (folder / SEARCH_FILE).exists():
+            save_file(folder / SEARCH_FILE, json.dumps(own, indent=2) + "\n")
+        known = load_value(folder / SEARCH_FILE, "a search's file")
+        if known != own:
+            raise BadInput(str(folder), f"{_difference(known, own)}; name another folder")
+        make_folder(folder / ROUNDS_FOLDER)
+
+    def read(self, start: int, number: int) -> tuple[float, list[SynthesisedDesign], list[str]] | None:
+        """The size, the designs and the remarks of a start's round (0: exact designs), None where it is not done."""
+        path = self._path(start, number)
+        if not path.is_file():
+            return None
+        try:
+            record = load_value(path, "a round's file")
+            designs = [read_design(each) for each in record["designs"]]
+            return float(record["size"]), designs, [str(each) for each in record["remarks"]]
+        except DAMAGES:
+            return None
+
+    def write(
+        self, start: int, number: int, size: float, designs: Sequence[SynthesisedDesign], remarks: Sequence[str]
+    ) -> None:
+        """Keep a round that is done."""
+        record = {"size": size, "designs": [design_record(design) for design in designs], "remarks": [*remarks]}
+        save_file(self._path(start, number), json.dumps(record, ensure_ascii=False, allow_nan=False) + "\n")
+
+    def _path(self, start: int, number: int) -> Path:
+        return self.folder / ROUNDS_FOLDER / f"{start:05d}-{number}.json"
+
+
+def _difference(known: Any, own: Mapping[str, Any]) -> str:
+    """What of a search in the folder is another."""
+    if not isinstance(known, dict):
+        return f"{SEARCH_FILE} there is of no search"
+    for name, value in own.items():
+        if known.get(name) != value:
+            if isinstance(value, dict):
+                return "the search in this folder has other settings"
+            return f"the search in this folder has {name} = {known.get(name)!r:.40}, and not {value!r:.40}"
+    return "the search in this folder has other settings"

@@ -1,24 +1,327 @@
-"""From what a linkage must do to the linkages that do it best."""
+"""Synthesis of linkages for a task: the search, start after start, catalogue after catalogue, or a complete list."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, overload
+from time import monotonic
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, overload
 
-from planar.foundation.errors import BadInput, NoAnswer
+import numpy as np
+
+from planar import __version__
+from planar.foundation.errors import BadInput, NoAnswer, PlanarError
+from planar.model.mechanism import Mechanism
 from planar.model.run_arguments import check_whole_number
-from planar.synthesis.search_progress import SearchProgress, progress_of_list
-from planar.synthesis.synthesis import Synthesis
-from planar.synthesis.task.freedom import exactness_in_excess
-from planar.synthesis.task.starts import start_mechanisms
-from planar.synthesis.task.synthesis_task import ChainStart, SynthesisTask
+from planar.model.wording import amount
+from planar.synthesis.catalogue import Catalogue, Match
+from planar.synthesis.cognates.cognates import task_cognates
+from planar.synthesis.design_search import Candidate, DesignSearch, judge_candidate
+from planar.synthesis.families import DRAWS as DRAWS_OF_MEMBERS
+from planar.synthesis.families import RECOMBINATIONS, FamilySearch
+from planar.synthesis.judgement.defects import ONE_BRANCH, ORDER, REACH, WHOLE_TURN, refusal
+from planar.synthesis.judgement.judgement import EXACT, DesignJudge
+from planar.synthesis.synthesis import SearchFolder, Synthesis, SynthesisedDesign, rank_designs
+from planar.synthesis.task.freedom import count_freedom, exactness_in_excess
+from planar.synthesis.task.starts import miss_kind, start_mechanisms
+from planar.synthesis.task.synthesis_task import ChainStart, SynthesisTask, WantedFunction
 from planar.synthesis.task.task_reader import read_task
-from planar.synthesis.task_search import TaskSearch
 
 if TYPE_CHECKING:
     from planar.synthesis.exact.complete_synthesis import CompleteSynthesis
+
+
+class SearchProgress(NamedTuple):
+    """How far a search is: at which `start`, the `start_number`-th (from 1) of `start_count` (None: not known).
+
+    `stage` is "catalogue", "matches", "fit" or "judgement" of the `round`-th catalogue of the start, or "exact" (round
+    0) where exact designs are sampled.
+    `best` is the least error of a sound design so far (m, or rad where functions of angles alone are wanted; infinite
+    where there is none) and `best_share` the same beside the extent of the places that are wanted, where there are
+    some. Of a complete list `stage` says what is done, and the rest nothing; `result` is the list where its designs
+    are proved and what is left is the test that they are all.
+    """
+
+    start: str
+    start_number: int
+    start_count: int | None
+    round: int
+    stage: str
+    best: float
+    best_share: float
+    result: CompleteSynthesis | None = None
+
+
+def progress_of_list(stage: str, result: CompleteSynthesis | None = None) -> SearchProgress:
+    """How far a complete list is, in words."""
+    return SearchProgress("", 0, None, 0, stage, float("inf"), float("inf"), result)
+
+
+def progress_words(done: SearchProgress, task: SynthesisTask) -> str:
+    """How far a search is, in a line."""
+    number = f"start {done.start_number}" + (f" of {done.start_count}" if done.start_count else "")
+    where = f"{number} ({done.start}), " + (f"catalogue {done.round}: {done.stage}" if done.round else "exact designs")
+    if done.best == float("inf"):
+        return where
+    share = f"{100.0 * done.best_share:.3g} % of the size"
+    best = share if task.wants_places else amount(done.best, miss_kind(task), task.units)
+    return f"{where}; best error so far {best}"
+
+
+DRAWS = 6000
+"""Of designs at random for a catalogue."""
+MATCHES = 96
+"""Of a catalogue that are fitted."""
+FEWEST_ROUNDS, ROUNDS = 2, 4
+"""Catalogues, each of other designs, where those before led to nothing good: so many at least, and at most."""
+GOOD = 2e-3
+"""Root mean square of the misses beside the extent of what is wanted, at which no other catalogue is looked at."""
+FAIR, IDLE_ROUNDS = 1e-2, 2
+"""The same of a fair design, at which no other one is looked at after so many that led to nothing better."""
+FUNCTION_SHARE = 0.1
+"""Of the widest range of values, that counts as extent where functions alone are wanted: they are met more closely."""
+SETTLED, SAME = 3, 1e-3
+"""Fits that lead to a fair best design, to this part of its error, at which no other is looked at: where several
+of many starts at random lead to the best of their optima, a better one is not likely to have been missed (C. G. E.
+Boender, A. H. G. Rinnooy Kan, Bayesian stopping rules for multistart global optimization methods, Mathematical
+Programming 37 (1987) 59)."""
+ALIKE_SPARE = 4
+"""Sound designs beyond those wanted after which no more are judged: some turn out to be alike."""
+KEPT_SHARE = 4
+"""Of each start so many times as many designs as are wanted are judged."""
+
+
+class TaskSearch:
+    """The search for designs for a task, start after start; `result` may be asked for at any time.
+
+    `folder` keeps each round that is done, and gives those done before. Raises BadInput where it holds something else.
+    """
+
+    def __init__(  # many: what a search is made of
+        self,
+        task: SynthesisTask,
+        many: int,
+        seed: int,
+        time_limit: float | None = None,
+        folder: Path | None = None,
+        progress: Callable[[SearchProgress], None] | None = None,
+    ):
+        self.task, self.many, self.seed, self.time_limit = task, many, seed, time_limit
+        self.end = None if time_limit is None else monotonic() + time_limit
+        self.folder = None if folder is None else SearchFolder(folder, task, _plan(many, seed))
+        self.progress = progress
+        self.count = None if isinstance(task.starts, ChainStart) else len(task.starts)
+        self.sound: list[SynthesisedDesign] = []
+        self.rejected: list[SynthesisedDesign] = []
+        self.starts: dict[str, Mechanism] = {}
+        "those that designs were made from"
+        self.remarks: list[str] = []
+        self.size = 1.0
+        self.is_finished = False
+        self._at = "", 0, 0
+        "the start, its number, and the round"
+
+    def run(self) -> None:
+        """Search every start, as far as the time goes."""
+        for number, start in enumerate(start_mechanisms(self.task), start=1):
+            if not self.add_start(start, number):
+                return
+        self.is_finished = True
+
+    def is_over(self) -> bool:
+        """Whether the time is up."""
+        return self.end is not None and monotonic() > self.end
+
+    def best_error(self, before: int = 0) -> float:
+        """The least error of a sound design, of those that came after so many."""
+        return min((design.error for design in self.sound[before:]), default=float("inf"))
+
+    def add_start(self, mechanism: Mechanism, number: int) -> bool:
+        """Search the designs of one start; whether that was finished."""
+        search: DesignSearch | None = None
+        before = len(self.sound)
+        bests: list[float] = []
+        for turn in range(ROUNDS + 1):
+            self._at = mechanism.name, number, turn
+            kept = None if self.folder is None else self.folder.read(number, turn)
+            if kept is not None:
+                self.size, designs, remarks = kept
+                self.starts[mechanism.name] = mechanism
+                self.remarks += remarks
+                self.sound += [design for design in designs if not design.defects]
+                self.rejected += [design for design in designs if design.defects]
+            elif self.is_over():
+                return False
+            else:
+                search = self._begin(mechanism) if search is None else search
+                if search is None:
+                    return True
+                self.size = search.size
+                self.starts[mechanism.name] = mechanism
+                if turn:
+                    self._search_round(search, turn - 1, before)
+                else:
+                    self._exact_round(search)
+            if turn:
+                bests.append(self.best_error(before))
+            if self._is_settled(before, bests) if turn else len(self.sound) - before >= self.many:
+                break
+        return True
+
+    def _begin(self, mechanism: Mechanism) -> DesignSearch | None:
+        """The search of a start; None where it is none, which a remark says."""
+        try:
+            search, excess = DesignSearch(self.task, mechanism), exactness_in_excess(self.task, mechanism)
+        except BadInput:
+            raise
+        except PlanarError as problem:
+            excess = str(problem)
+        if excess is not None:
+            self.remarks.append(f"{mechanism.name} is no start: {excess}")
+            return None
+        return search
+
+    def _exact_round(self, search: DesignSearch) -> None:
+        """The designs that meet all exactly, where a start has numbers enough: these need no fit."""
+        first = len(self.sound), len(self.rejected), len(self.remarks)
+        if not count_freedom(self.task, search.mechanism).excess:
+            sample = FamilySearch(search, self.many, self.seed, lambda _: self._tell("exact"), self.is_over).run()
+            self.remarks.append(f"{search.mechanism.name}: {sample.sentence}")
+            self.sound += sample.designs
+            self.rejected += sample.rejected
+        if self.folder is not None and not self.is_over():
+            self._keep_round(search, 0, first)
+
+    def _keep_round(self, search: DesignSearch, turn: int, first: tuple[int, int, int]) -> None:
+        """Keep in the folder what a round has added to so many designs and remarks."""
+        assert self.folder is not None
+        designs = [*self.sound[first[0] :], *self.rejected[first[1] :]]
+        self.folder.write(self._at[1], turn, search.size, designs, self.remarks[first[2] :])
+
+    def _is_settled(self, before: int, bests: list[float]) -> bool:
+        """Whether no other catalogue is looked at: the best design of a start is good; or it is fair, and several fits
+        led to it or catalogues since led to none that is better. `bests` are the least errors after each."""
+        best, extent = bests[-1], self.size if self.task.wants_places else FUNCTION_SHARE * _widest_range(self.task)
+        if best <= GOOD * extent:
+            return True
+        alike = sum(design.error <= (1.0 + SAME) * best for design in self.sound[before:])
+        idle = sum(error <= (1.0 + SAME) * best for error in bests) - 1
+        is_fair = len(bests) >= FEWEST_ROUNDS and best <= FAIR * extent
+        return is_fair and (alike >= SETTLED or idle >= IDLE_ROUNDS)
+
+    def _search_round(self, search: DesignSearch, turn: int, before: int) -> None:
+        """The designs of one more catalogue, kept when all are judged; so many were sound `before` this start."""
+        first = len(self.sound), len(self.rejected), len(self.remarks)
+        self._tell("catalogue")
+        catalogue = search.catalogue(DRAWS, self.seed + 1000 * turn)
+        self._tell("matches")
+        matches = search.matches(catalogue, MATCHES)
+        self._fit_round(search, catalogue, matches, before, turn)
+        if self.folder is not None:
+            self._keep_round(search, turn + 1, first)
+
+    def _fit_round(
+        self, search: DesignSearch, catalogue: Catalogue, matches: list[Match], before: int, turn: int
+    ) -> None:
+        """The matches fitted and judged: a whole turn, and an order, are kept all the way only where a fit without
+        leads to what lacks them, as a better optimum may lie beyond designs that do."""
+        judge, most = DesignJudge(self.task, search.size), (self.many + ALIKE_SPARE) * (turn + 1)
+
+        def judged(wanted: list[Match], keeps_turn: bool, keeps_order: bool) -> list[tuple[Candidate, set[str]]]:
+            self._tell("fit")
+            found = []
+            for each in search.fit(catalogue, wanted, KEPT_SHARE * self.many, keeps_turn, keeps_order):
+                self._tell("judgement")
+                values = tuple(search.shown(k, each) for k in range(len(search.equations)))
+                if judge.fit_error(values) > self._worst_wanted(before):
+                    continue
+                design = self._judge(search, judge, each)
+                if design is not None:
+                    found.append((each, {one.demand for one in design.shortages}))
+                if len(self.sound) - before >= most:
+                    break
+            return found
+
+        found = judged(matches, keeps_turn=False, keeps_order=False)
+        if self.task.needs_whole_turn:
+            best = min((each.squares for each, short in found if not short), default=np.inf)
+            short_of_turn = [
+                each.match for each, short in found if short & {WHOLE_TURN, ONE_BRANCH, REACH} and each.squares < best
+            ]
+            if short_of_turn:
+                found += judged(short_of_turn, keeps_turn=True, keeps_order=False)
+        if all(short for _, short in found) and any(ORDER in short for _, short in found):
+            judged(matches, keeps_turn=True, keeps_order=True)
+
+    def _tell(self, stage: str) -> None:
+        """Say what is being done."""
+        if self.progress is not None:
+            start, number, turn = self._at
+            best = self.best_error()
+            share = best / self.size if self.task.wants_places else best
+            self.progress(SearchProgress(start, number, self.count, turn, stage, best, share))
+
+    def _worst_wanted(self, before: int) -> float:
+        """The error beyond which a design does not come among the best of its start, before which so many were sound;
+        a judged one is never less than that of its fit."""
+        best = self._ranked(self.sound[before:])
+        return best[-1].error if len(best) == self.many else float("inf")
+
+    def _judge(self, search: DesignSearch, judge: DesignJudge, candidate: Candidate) -> SynthesisedDesign | None:
+        """A candidate judged; None where no file can describe it."""
+        design = judge_candidate(search, judge, candidate, len(self.sound) + len(self.rejected) + 1)
+        if design is not None:
+            (self.rejected if design.defects else self.sound).append(design)
+        return design
+
+    def _ranked(self, designs: Sequence[SynthesisedDesign]) -> tuple[SynthesisedDesign, ...]:
+        """The best designs; round-off of what is exact does not count."""
+        return rank_designs(designs, self.many, EXACT * (self.size if self.task.wants_places else 1.0))
+
+    def result(self) -> Synthesis:
+        """All that was found so far."""
+        remarks = [*self.remarks]
+        if not self.is_finished:
+            remarks.append(self._unfinished())
+        sound = tuple(
+            replace(design, cognates=task_cognates(design.mechanism, self.task)) for design in self._ranked(self.sound)
+        )
+        rejected = self._ranked(self.rejected)
+        for design in (sound or rejected)[:1]:
+            remarks.append(f"{design.start}: {count_freedom(self.task, self.starts[design.start]).sentence}")
+        if not sound and (self.rejected or self.is_finished):
+            remarks.append(refusal([design.shortages for design in self.rejected], self.task.units))
+        return Synthesis(self.task, sound, rejected, self.size, tuple(remarks), self.seed, self.is_finished)
+
+    def _unfinished(self) -> str:
+        """How far a search came that did not search every start."""
+        start, number, turn = self._at
+        stage = f"catalogue {turn} of {ROUNDS}" if turn else "exact designs"
+        where = f"start {number}{f' of {self.count}' if self.count else ''} ({start}), {stage}"
+        why = f"the time limit of {self.time_limit:g} s was up" if self.is_over() else "the search was interrupted"
+        return f"{why} at {where}: what is told was found till then"
+
+
+def _widest_range(task: SynthesisTask) -> float:
+    """Of the values of functions, rad or m."""
+    return max(float(np.ptp(item.values)) for item in task.wanted if isinstance(item, WantedFunction))
+
+
+def _plan(many: int, seed: int) -> dict[str, Any]:
+    """What makes a search what it is, beside its task."""
+    settings = {
+        "draws": DRAWS,
+        "matches": MATCHES,
+        "rounds": [FEWEST_ROUNDS, ROUNDS],
+        "good": [GOOD, FAIR, IDLE_ROUNDS, FUNCTION_SHARE],
+        "settled": SETTLED,
+        "same": SAME,
+    }
+    settings |= {"exact": [DRAWS_OF_MEMBERS, RECOMBINATIONS]}
+    settings |= {"spare": ALIKE_SPARE, "kept": KEPT_SHARE}
+    return {"version": __version__, "many": many, "seed": seed, "settings": settings}
 
 
 @overload

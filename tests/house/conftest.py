@@ -9,7 +9,7 @@ from tests.small_searches import SMALL_SEARCH
 
 LESS = {
     "planar.analysis.force_maps.force_map": {"USUAL_COUNTS": (13, 5, 3)},
-    "planar.synthesis.task_search": SMALL_SEARCH,
+    "planar.synthesis.synthesise": SMALL_SEARCH,
 }
 """Numbers of modules, and what they are here."""
 

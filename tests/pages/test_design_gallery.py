@@ -19,7 +19,7 @@ from planar.drawing.paper.picture import Circle, Label, Pen, Polyline
 from planar.synthesis.judgement.defects import Defect
 from planar.synthesis.judgement.judgement import DesignJudge
 from planar.synthesis.synthesis import Synthesis, SynthesisedDesign
-from planar.synthesis.task.task_numbers import miss_kind
+from planar.synthesis.task.starts import miss_kind
 from tests.page_scripts import watched_window
 
 HOSTILE = "<script>alert(1)</script> & \"Lid\" 'x'"

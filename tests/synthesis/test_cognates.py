@@ -12,8 +12,7 @@ from hypothesis import strategies as st
 import planar
 from planar.drawing.diagrams.cognate_drawing import cognate_pictures
 from planar.model.mechanism import Drive
-from planar.synthesis.cognates.cognates import first_cognates
-from planar.synthesis.cognates.task_cognates import task_cognates
+from planar.synthesis.cognates.cognates import first_cognates, task_cognates
 from tests.command import run
 from tests.draws import draws
 

@@ -4,16 +4,14 @@ import numpy as np
 import pytest
 
 import planar
-from planar.synthesis.demands.output_transmissions import output_transmissions
-from planar.synthesis.demands.polygon import polygon_depths
 from planar.synthesis.design_search import DesignSearch
-from planar.synthesis.fitting.demand_polish import constrained_step
-from planar.synthesis.fitting.normal_equations import solve_symmetric
-from planar.synthesis.fitting.order_slacks import OrderSlacks
-from planar.synthesis.fitting.wanted_equations import tangents
+from planar.synthesis.fitting.design_fit import constrained_step
+from planar.synthesis.fitting.moving_designs import OrderSlacks
+from planar.synthesis.fitting.wanted_equations import solve_symmetric, tangents
+from planar.synthesis.judgement.defects import output_transmissions, polygon_depths
 from planar.synthesis.judgement.judgement import DesignJudge
-from planar.synthesis.judgement.misses import entry_misses, resting_misses
 from planar.synthesis.task.starts import start_mechanisms
+from planar.synthesis.task.wanted_results import entry_misses, resting_misses
 from tests.draws import covering
 from tests.known import MODELS
 
@@ -27,9 +25,9 @@ CUT_SQUARE = [[-1, -2], [3, -2], [3, 3], [1, 0.5], [-1, 3]]
 @pytest.fixture
 def few_designs(monkeypatch):
     """A small catalogue, which is enough for tasks as easy as these."""
-    monkeypatch.setattr("planar.synthesis.task_search.DRAWS", 1000)
-    monkeypatch.setattr("planar.synthesis.task_search.MATCHES", 20)
-    monkeypatch.setattr("planar.synthesis.task_search.ROUNDS", 1)
+    monkeypatch.setattr("planar.synthesis.synthesise.DRAWS", 1000)
+    monkeypatch.setattr("planar.synthesis.synthesise.MATCHES", 20)
+    monkeypatch.setattr("planar.synthesis.synthesise.ROUNDS", 1)
 
 
 def task(start, *wanted, **more):

@@ -5,7 +5,7 @@ from itertools import combinations_with_replacement
 import numpy as np
 import pytest
 
-from planar.synthesis.judgement.entry_order import _least_rising, ordered_inputs
+from planar.synthesis.judgement.input_range import _least_rising, ordered_inputs
 
 
 @pytest.mark.parametrize("seed", range(5))

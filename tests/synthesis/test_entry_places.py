@@ -8,8 +8,7 @@ import pytest
 import planar
 from planar.document.revised.changed_numbers import with_values
 from planar.synthesis.exact import exact_synthesis
-from planar.synthesis.judgement.file_check import check_file
-from planar.synthesis.judgement.judgement import DesignJudge
+from planar.synthesis.judgement.judgement import DesignJudge, check_file
 from tests.builders import four_bar_document, slider_crank_document
 from tests.closed_forms import PARALLELOGRAM, TRIPLE, TURN, rocker
 

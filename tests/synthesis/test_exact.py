@@ -11,23 +11,29 @@ import planar
 from benchmarks.exact_makers import KINDS
 from planar.foundation.jets import value_and_rates
 from planar.reports.tables.design.synthesis import table
-from planar.synthesis.exact.component_solutions import with_ball_paths, with_doubtful
 from planar.synthesis.exact.exact_linkage import evaluate
 from planar.synthesis.exact.relations.exact_problem import ExactProblem
 from planar.synthesis.exact.relations.polynomials import Polynomial
-from planar.synthesis.exact.tracking import member_solutions, monodromy
-from planar.synthesis.exact.tracking.ball_paths import follow_in_balls
-from planar.synthesis.exact.tracking.bilinear_roots import bilinear_roots
-from planar.synthesis.exact.tracking.exact_certificates import certify_member
+from planar.synthesis.exact.tracking import generic_solutions, member_solutions
+from planar.synthesis.exact.tracking.ball_paths import certify_member, follow_in_balls
 from planar.synthesis.exact.tracking.family_names import name_family
-from planar.synthesis.exact.tracking.generic_store import family_record
-from planar.synthesis.exact.tracking.member_homotopy import affine_solutions, homogeneous_solutions
-from planar.synthesis.exact.tracking.member_solutions import is_nearly_singular, solve_member
-from planar.synthesis.exact.tracking.monodromy import find_generic_solutions, follow
-from planar.synthesis.exact.tracking.other_ways import ClassedSolutions, with_members
-from planar.synthesis.exact.tracking.same_solutions import first_of_same
-from planar.synthesis.exact.tracking.symmetry import exchange_images, representatives
-from planar.synthesis.exact.tracking.trace_test import trace_test
+from planar.synthesis.exact.tracking.generic_solutions import family_record, find_generic_solutions, follow, trace_test
+from planar.synthesis.exact.tracking.member_homotopy import (
+    affine_solutions,
+    bilinear_roots,
+    exchange_images,
+    first_of_same,
+    homogeneous_solutions,
+    representatives,
+)
+from planar.synthesis.exact.tracking.member_solutions import (
+    ClassedSolutions,
+    is_nearly_singular,
+    solve_member,
+    with_ball_paths,
+    with_doubtful,
+    with_members,
+)
 from planar.synthesis.task.starts import start_mechanisms
 from tests.command import run
 from tests.exact_tasks import POSES, family_of, five_poses, poses, task, with_points_on_coupler
@@ -219,7 +225,7 @@ def test_a_search_for_all_solutions_goes_on_where_it_was(monkeypatch):
             if self.many == 0:
                 raise Interrupted
 
-    monkeypatch.setattr(monodromy, "KEPT_FROM", 1)
+    monkeypatch.setattr(generic_solutions, "KEPT_FROM", 1)
     family = family_of(task(with_points_on_coupler(), five_poses())).family
     whole = find_generic_solutions(family, enough=3)
     store = Kept()
@@ -289,7 +295,7 @@ def test_an_interrupted_list_says_that_its_search_is_kept(tmp_path, monkeypatch)
     def interrupted(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("planar.synthesis.exact.component_solutions.family_record", interrupted)
+    monkeypatch.setattr("planar.synthesis.exact.tracking.member_solutions.family_record", interrupted)
     (tmp_path / "five.json").write_text(json.dumps(task(with_points_on_coupler(), five_poses())))
     told = run(tmp_path, "synthesise", "five.json", "--complete").refused(130)
     assert told.startswith("interrupted: ") and told.endswith("the same command goes on from there")

@@ -10,21 +10,21 @@ import pytest
 import planar
 from planar.assemblies.polynomial.path_tracker import normalize, track_paths
 from planar.codegen.complex_kernel import LANES, ComplexKernel
-from planar.synthesis.exact import component_solutions, exact_synthesis
+from planar.synthesis.exact import exact_synthesis
 from planar.synthesis.exact.relations.exact_numbers import exact_number
 from planar.synthesis.exact.relations.exact_problem import ExactProblem
-from planar.synthesis.exact.tracking.exact_certificates import certify_member
+from planar.synthesis.exact.tracking import member_solutions
+from planar.synthesis.exact.tracking.ball_paths import certify_member
 from planar.synthesis.exact.tracking.first_solution import first_solution
-from planar.synthesis.exact.tracking.generic_store import family_record
+from planar.synthesis.exact.tracking.generic_solutions import family_record, find_generic_solutions, follow
 from planar.synthesis.exact.tracking.member_homotopy import (
     EdgeHomotopy,
     affine_solutions,
+    first_of_same,
     homogeneous_slopes,
     scaled_rows,
 )
 from planar.synthesis.exact.tracking.member_solutions import solve_member
-from planar.synthesis.exact.tracking.monodromy import find_generic_solutions, follow
-from planar.synthesis.exact.tracking.same_solutions import first_of_same
 from planar.synthesis.task.starts import start_mechanisms
 from tests.command import run
 from tests.exact_tasks import family_of, five_poses, task, with_points_on_coupler
@@ -207,18 +207,18 @@ def test_certificates_are_of_the_numbers_of_the_file():
 
 
 def with_untested_record(monkeypatch, tested):
-    known = component_solutions.family_record
+    known = member_solutions.family_record
     monkeypatch.setattr(
-        component_solutions, "family_record", lambda *given: known(*given)._replace(is_traced=False, is_tested=False)
+        member_solutions, "family_record", lambda *given: known(*given)._replace(is_traced=False, is_tested=False)
     )
-    monkeypatch.setattr(component_solutions, "tested_record", tested)
+    monkeypatch.setattr(member_solutions, "tested_record", tested)
 
 
 def test_designs_come_before_the_test_that_they_are_all(monkeypatch):
     def traced(_, record):
         reported.append("trace test")
         monkeypatch.setattr(
-            component_solutions, "family_record", lambda *_: record._replace(is_traced=True, is_tested=True)
+            member_solutions, "family_record", lambda *_: record._replace(is_traced=True, is_tested=True)
         )
         return record
 
@@ -247,7 +247,7 @@ def test_an_interrupted_test_leaves_the_designs_and_says_so(tmp_path, monkeypatc
 
 def test_what_is_nearly_at_infinity_stands_last(monkeypatch):
     def far(components, say):
-        (one,) = component_solutions.solve_components(components, say)
+        (one,) = member_solutions.solve_components(components, say)
         x = one.x.copy()
         x[0] *= 2e4
         return [one._replace(x=x)]

@@ -11,9 +11,7 @@ from benchmarks.synthesis.family_draws import Demands, FourBars, meets
 from benchmarks.synthesis.family_tasks import family_task, is_met, measure
 from planar.reports.tables.design.synthesis import record, table
 from planar.synthesis.design_search import DesignSearch
-from planar.synthesis.families.exact_members import MemberSampler
-from planar.synthesis.families.family_search import FamilySearch
-from planar.synthesis.families.recombination import independent_parts, null_space, recombine
+from planar.synthesis.families import FamilySearch, MemberSampler, independent_parts, null_space, recombine
 from planar.synthesis.synthesis import least_transmission
 from planar.synthesis.task.starts import start_mechanisms
 

@@ -5,9 +5,7 @@ import pytest
 
 import planar
 from planar.derivatives.design_equations import design_equations
-from planar.synthesis.catalogue.branch_tracking import follow_branches
-from planar.synthesis.catalogue.catalogue import build_catalogue
-from planar.synthesis.catalogue.design_samples import draw_designs
+from planar.synthesis.catalogue import build_catalogue, draw_designs, follow_branches
 from planar.synthesis.design_search import DesignSearch
 from planar.synthesis.fitting import moving_designs
 from planar.synthesis.fitting.design_fit import DesignFit

@@ -10,7 +10,7 @@ from benchmarks.known_linkages.known_tasks import Verdict, conditions_on_numbers
 from benchmarks.known_linkages.makers import MAKERS, write_mechanism
 from benchmarks.known_linkages.other_solutions import other_solutions
 from planar.foundation.private_cache import disable_cache
-from planar.synthesis.exact.tracking import generic_store
+from planar.synthesis.exact.tracking import generic_solutions
 
 LISTS = {"four-bar": (2,), "slider-crank": (3,), "slotted lever": (0,), "swinging block": (2,), "Watt II": (10,)}
 REFUSALS = {
@@ -30,7 +30,7 @@ def pairs(seeds):
 @pytest.fixture(autouse=True)
 def no_trace_test(monkeypatch):
     """Most of the time of a kind that was never seen is its trace test, which other tests are about."""
-    monkeypatch.setattr(generic_store, "trace_test", lambda *_, **__: False)
+    monkeypatch.setattr(generic_solutions, "trace_test", lambda *_, **__: False)
     with disable_cache():
         yield
 

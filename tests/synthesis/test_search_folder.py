@@ -30,7 +30,7 @@ TASK = {
 @pytest.fixture(autouse=True)
 def few_designs(monkeypatch):
     for name, value in SETTINGS.items():
-        monkeypatch.setattr(f"planar.synthesis.task_search.{name}", value)
+        monkeypatch.setattr(f"planar.synthesis.synthesise.{name}", value)
 
 
 @pytest.fixture(scope="module")
@@ -39,7 +39,7 @@ def whole(tmp_path_factory):
     folder, judged = tmp_path_factory.mktemp("whole") / "designs", []
     with pytest.MonkeyPatch.context() as patch:
         for name, value in SETTINGS.items():
-            patch.setattr(f"planar.synthesis.task_search.{name}", value)
+            patch.setattr(f"planar.synthesis.synthesise.{name}", value)
         stop_at(patch, None, judged)
         found = planar.synthesise(TASK, many=2, seed=5, folder=folder)
     return found, folder, len(judged)
@@ -130,7 +130,7 @@ def test_a_process_that_is_killed_leaves_nothing_broken(whole, tmp_path):
     found, folder, _ = whole
     copied(folder, tmp_path / "designs", leave_out=("00002-2.json",))
     killed = (
-        "import json, os, signal, sys; import planar; import planar.synthesis.task_search as search\n"
+        "import json, os, signal, sys; import planar; import planar.synthesis.synthesise as search\n"
         "from planar.synthesis.judgement.judgement import DesignJudge\n"
         f"for name, value in {SETTINGS!r}.items(): setattr(search, name, value)\n"
         "judge, left = DesignJudge.judge, [1]\n"

@@ -14,7 +14,7 @@ from tests.small_searches import SMALL_SEARCH
 def few_designs(monkeypatch):
     """A small catalogue, which is enough for tasks as easy as these."""
     for name, number in SMALL_SEARCH.items():
-        monkeypatch.setattr(f"planar.synthesis.task_search.{name}", number)
+        monkeypatch.setattr(f"planar.synthesis.synthesise.{name}", number)
 
 
 UNITS = {"length": "mm", "angle": "deg"}

@@ -15,7 +15,7 @@ from jsonschema.exceptions import best_match
 
 import planar
 from planar.foundation.errors import BadInput
-from planar.synthesis.task.task_schema import task_schema
+from planar.synthesis.task.task_file import task_schema
 from tests.command import run
 from tests.documents import GONE
 from tests.draws import draws

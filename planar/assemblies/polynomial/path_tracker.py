@@ -238,15 +238,10 @@ class _History:
     def predict(self, h: Array) -> ComplexArray:
         """The points a step h (paths,) ahead, on the polynomials through all that is in use."""
         used = np.arange(HISTORY)[:, None] < self.point_counts
-        value, slope = np.ones_like(self.ways), np.zeros_like(self.ways)
-        for k in range(HISTORY):
-            for other in range(HISTORY):
-                if k == other:
-                    continue
-                is_used = used[other] & used[k]
-                apart = np.where(is_used, self.ways[k] - self.ways[other], 1.0)
-                value[k] *= np.where(is_used, (h - self.ways[other]) / apart, 1.0)
-                slope[k] += np.where(is_used, 1.0 / apart, 0.0)
+        is_pair = used & used[:, None] & ~np.eye(HISTORY, dtype=bool)[:, :, None]
+        apart = np.where(is_pair, self.ways[:, None] - self.ways, 1.0)
+        value = np.where(is_pair, (h - self.ways) / apart, 1.0).prod(axis=1)
+        slope = np.where(is_pair, 1.0 / apart, 0.0).sum(axis=1)
         weight = np.where(used, value**2, 0.0)
         beyond = h - self.ways
         points = np.einsum("kp,kpbu->pbu", weight * (1.0 - 2.0 * beyond * slope), self.points)

@@ -43,7 +43,7 @@ def inspect(model: str, as_json: bool) -> None:
 def schema(task: bool) -> None:
     """The JSON schema of mechanism files, which editors can use."""
     if task:
-        from planar.synthesis.task.task_schema import task_schema as published
+        from planar.synthesis.task.task_file import task_schema as published
     else:
         from planar.document.schema import schema as published
 

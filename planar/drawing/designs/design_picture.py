@@ -30,7 +30,7 @@ from planar.solving.grids.grid_motion import motion_over_input
 from planar.solving.position import solve
 from planar.synthesis.synthesis import SynthesisedDesign
 from planar.synthesis.task.synthesis_task import SynthesisTask, Wanted, WantedFunction, WantedPath
-from planar.synthesis.task.wanted_expressions import carried_name
+from planar.synthesis.task.wanted_results import carried_name
 
 ROOM = (84.0, 66.0)
 """mm that the strokes of one among many take at the most."""

@@ -10,8 +10,8 @@ from planar.drawing.output.matplotlib_figure import draw_on_sheets
 from planar.drawing.paper.picture import Picture
 from planar.foundation.errors import BadInput
 from planar.synthesis.synthesis import check_synthesis
+from planar.synthesis.task.starts import miss_text
 from planar.synthesis.task.synthesis_task import WantedFunction
-from planar.synthesis.task.task_numbers import miss_text
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

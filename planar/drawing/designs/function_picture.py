@@ -17,8 +17,8 @@ from planar.model.file_units import display_unit
 from planar.model.mechanism import Mechanism, relative_motions
 from planar.solving.grids.grid_motion import motion_over_input
 from planar.synthesis.synthesis import SynthesisedDesign
+from planar.synthesis.task.starts import motion_kind
 from planar.synthesis.task.synthesis_task import SynthesisTask, WantedFunction
-from planar.synthesis.task.task_numbers import motion_kind
 
 ROOM = (84.0, 66.0)
 """mm that both diagrams take."""

@@ -14,7 +14,7 @@ from planar.model.mechanism import Mechanism, named_points, relative_motions
 from planar.model.pairs import MeasureKind
 from planar.synthesis.task.starts import free_numbers, with_wanted_points
 from planar.synthesis.task.synthesis_task import SynthesisTask, Wanted, WantedFunction, WantedPoses
-from planar.synthesis.task.wanted_expressions import carried_name
+from planar.synthesis.task.wanted_results import carried_name
 
 LEAST_LENGTH = 1e-3
 """Of the mechanism's size: a length that follows gets no shorter."""

@@ -15,11 +15,10 @@ from planar.document.files import from_dict, to_dict
 from planar.foundation.errors import BadInput, PlanarError
 from planar.model.wording import amount
 from planar.pages.editor.authors_file import carry_over
-from planar.synthesis.search_progress import SearchProgress, progress_words
 from planar.synthesis.synthesis import Synthesis, SynthesisedDesign
-from planar.synthesis.task.task_numbers import miss_text
+from planar.synthesis.synthesise import SearchProgress, TaskSearch, progress_words
+from planar.synthesis.task.starts import miss_text
 from planar.synthesis.task.task_reader import read_task
-from planar.synthesis.task_search import TaskSearch
 
 DESIGNS = 6
 """That are listed."""

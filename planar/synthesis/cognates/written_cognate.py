@@ -1,4 +1,4 @@
-"""A linkage in a position back to a mechanism of the file's form: what stays as it was, what is other made anew."""
+"""A linkage in a position as a mechanism of the file's form; links and points that are unchanged are kept."""
 
 from __future__ import annotations
 
@@ -12,14 +12,74 @@ from typing import Any, NamedTuple
 from planar.foundation.angles import wrap_angle
 from planar.foundation.geometry import Vector
 from planar.model.link_shapes import At, Link, Point
-from planar.model.mechanism import Mechanism, NamedPoint, named_points, pair_entries, relative_motions
+from planar.model.mechanism import Mechanism, named_points, pair_entries, relative_motions
 from planar.model.pairs import Pair
 from planar.model.pairs.guide_line import GuidedPair, LinkLine
 from planar.model.pin_linkage import turning_pair_type
 from planar.results.motion import State
-from planar.synthesis.cognates.cognate_names import link_name
-from planar.synthesis.cognates.exchanges import Tracer
-from planar.synthesis.cognates.posed_linkage import LinkAxes, PosedGuide, PosedLinkage, PosedPin, pose_linkage
+from planar.synthesis.cognates.posed_linkage import LinkAxes, PosedGuide, PosedLinkage, PosedPin, Tracer, pose_linkage
+
+PIVOT_LETTERS = "GHKMNPQRSTUVWXYZABCDEFJLIO"
+"""What new pins of links that stay are called, the first that is free."""
+
+
+class CognateNames:
+    """Gives names: those of the file to what stays, and one to what is at the same place in several cognates."""
+
+    def __init__(self, mechanism: Mechanism, posed: PosedLinkage):
+        self.original = posed
+        self.taken = {pair.entry_name() for pair in mechanism.pairs}
+        self.taken |= {name for link in mechanism.links for name in (link.name, *link.names)}
+        self.pivots: list[tuple[str, complex, str]] = []
+        "new pins of links that stay in some of the cognates: the link, the place in the first position, and the name"
+
+    def pin_names(self, posed: PosedLinkage, number: int) -> dict[PosedPin, str]:
+        """The name of every pin of a cognate of this number."""
+        places = {pin.name: pin.at for pin in self.original.pins}
+        used, found = set[str](), {}
+        for pin in posed.pins:
+            stays = [link for link in pin.links if link not in posed.remade]
+            if posed.is_same(pin.at, places[pin.name]) and pin.name not in used:
+                name = pin.name
+            elif stays:
+                name = self._pivot_name(posed, stays[0], pin.at, used)
+            else:
+                name = self._free((_numbered(pin.name, number), *_primed(_numbered(pin.name, number))), used)
+            used.add(name)
+            found[pin] = name
+        return found
+
+    def _pivot_name(self, posed: PosedLinkage, link: str, at: complex, used: set[str]) -> str:
+        for other, place, name in self.pivots:
+            if other == link and posed.is_same(place, at) and name not in used:
+                return name
+        name = self._free((*PIVOT_LETTERS, *_primed("G")), used | {name for _, _, name in self.pivots})
+        self.pivots.append((link, at, name))
+        return name
+
+    def _free(self, names: tuple[str, ...] | Iterator[str], used: set[str]) -> str:
+        return next(name for name in names if name not in self.taken and name not in used)
+
+
+def link_name(old: str, renamed: dict[str, str], taken: set[str]) -> str:
+    """The name of a link whose pins have other names: it follows them where it is made of them, as AB, or block B."""
+    ends = [(one, other) for one in renamed for other in renamed if one != other and one + other == old]
+    head, _, last = old.rpartition(" ")
+    if ends:
+        found = "".join(renamed[each] for each in ends[0])
+    elif head and last in renamed:
+        found = f"{head} {renamed[last]}"
+    else:
+        return old
+    return found if found not in taken else old
+
+
+def _numbered(name: str, number: int) -> str:
+    return f"{name}-{number}" if name[-1:].isdigit() else f"{name}{number}"
+
+
+def _primed(name: str) -> tuple[str, ...]:
+    return tuple(f"{name}-{k}" for k in range(2, 100))
 
 
 class Spot(NamedTuple):
@@ -99,12 +159,9 @@ class WrittenCognate:
             (self.links[link], spot.name)
             for link in self.tracer.links
             for spot in self._spots(link)
-            if self._is_it(spot)
+            if self.posed.is_same(spot.at, self.tracer.at)
         }
-        return next(each.name for each in named_points(mechanism) if ends & {*each.members})
-
-    def _is_it(self, spot: Spot) -> bool:
-        return self.posed.is_same(spot.at, self.tracer.at)
+        return next(point.name for point in named_points(mechanism) if ends & {*point.members})
 
     @cached_property
     def _original(self) -> PosedLinkage:
@@ -270,9 +327,9 @@ class WrittenCognate:
         """Names by which something that acts on the mechanism can go on to mean what it meant."""
         kept = {link for link in self.posed.axes if link not in self.posed.remade}
         found = set(kept)
-        old = {each.name: {*each.members} for each in named_points(self.source)}
+        old = {point.name: {*point.members} for point in named_points(self.source)}
         for each in named_points(mechanism):
-            if self._means_the_same(each, old.get(each.name, set()), kept):
+            if any(member in old.get(each.name, ()) and member[0] in kept for member in each.members):
                 found.add(each.name)
                 found |= {f"{link}.{point}" for link, point in each.members if link in kept}
                 found |= {point for _, point in each.members}
@@ -282,9 +339,6 @@ class WrittenCognate:
             if {*pair.links} <= kept and name in motions and motions[name].links == pair.links:
                 found.add(name)
         return found
-
-    def _means_the_same(self, named: NamedPoint, before: set[tuple[str, str]], kept: set[str]) -> bool:
-        return any(member in before and member[0] in kept for member in named.members)
 
 
 def _unit(angle: float) -> tuple[float, float]:

@@ -58,7 +58,7 @@ class _Dyad:
 
     def __init__(self, problem: ExactProblem, component: Component):
         self.problem, self.component = problem, component
-        own = {each.own: k for k, each in enumerate(component.unknowns)}
+        own = {y.own: k for k, y in enumerate(component.unknowns)}
         frame = problem.mechanism.frame
         pivot, joint, self.has_slide = -1, -1, False
         self.pivot_name, self.joint_name = "", ""
@@ -99,7 +99,7 @@ class _Dyad:
         x[self.pin], x[self.other] = np.repeat(pins, len(others)), np.tile(others, 3)
         x[self.pin + 2], x[self.other + 2] = x[self.pin].conj(), x[self.other].conj()
         member = self.component.member
-        still = [np.zeros_like(each) for each in member.parts]
+        still = [np.zeros_like(part) for part in member.parts]
         given = self.component.family.parts[0].rows.equation_count
         values = self.component.family.rows_at(x, member, still, np.zeros(x.shape[1]))[0][given:]
         back = np.array([[1.0, 0.0, 0.0], [-1.0, 1.0, 0.0], [-1.0, 0.0, 1.0]])
@@ -156,7 +156,7 @@ class _Dyad:
             spread = c1 * c1 - 4.0 * c2 * c0
             root = np.sqrt(spread)
             both = [(-c1 + sign * root) / (2.0 * c2) for sign in (-1.0, 1.0)]
-        near, far = (start + each[:, None] * way for each in both)
+        near, far = (start + part[:, None] * way for part in both)
         # after half a turn both are again where they were
         real = np.isfinite(near).all(axis=1)
         none = np.full((1, 2), np.nan)

@@ -15,26 +15,23 @@ from planar.model.mechanism import Mechanism
 from planar.model.wording import count_phrase
 from planar.synthesis.design_search import DesignSearch
 from planar.synthesis.exact.complete_synthesis import CompleteSynthesis, DyadCurve, ExactDesign
-from planar.synthesis.exact.component_solutions import (
-    FAR,
-    ComponentSolutions,
-    alike_components,
-    solve_components,
-    with_tested_records,
-)
 from planar.synthesis.exact.dyad_curves import dyad_curve, is_dyad
 from planar.synthesis.exact.exact_linkage import ExactLinkage, exact_linkage
 from planar.synthesis.exact.list_words import completeness, counted_class, file_difference, list_remarks, solution_count
 from planar.synthesis.exact.relations.condition_count import count_parts
 from planar.synthesis.exact.relations.exact_problem import Component, ExactProblem
-from planar.synthesis.exact.tracking.member_homotopy import affine_solutions, homogeneous_solutions
-from planar.synthesis.exact.tracking.member_solutions import Progress
-from planar.synthesis.exact.tracking.symmetry import reordered
-from planar.synthesis.families.family_search import FamilySearch
-from planar.synthesis.judgement.defects import Defect
-from planar.synthesis.judgement.file_check import check_file
-from planar.synthesis.judgement.judgement import DesignJudge, Judgement
-from planar.synthesis.judgement.refusal import refusal
+from planar.synthesis.exact.tracking.member_homotopy import affine_solutions, homogeneous_solutions, reordered
+from planar.synthesis.exact.tracking.member_solutions import (
+    FAR,
+    ComponentSolutions,
+    Progress,
+    alike_components,
+    solve_components,
+    with_tested_records,
+)
+from planar.synthesis.families import FamilySearch
+from planar.synthesis.judgement.defects import Defect, refusal
+from planar.synthesis.judgement.judgement import DesignJudge, Judgement, check_file
 from planar.synthesis.task.freedom import has_open_numbers
 from planar.synthesis.task.starts import start_mechanisms
 from planar.synthesis.task.synthesis_task import (

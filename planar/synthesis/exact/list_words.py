@@ -10,10 +10,10 @@ import numpy as np
 from planar.assemblies.polynomial.certification import is_available
 from planar.model.wording import amount, count_phrase
 from planar.synthesis.exact.complete_synthesis import ExactDesign
-from planar.synthesis.exact.component_solutions import FAR, ComponentSolutions, alike_components
-from planar.synthesis.judgement.file_check import FileCheck
+from planar.synthesis.exact.tracking.member_solutions import FAR, ComponentSolutions, alike_components
+from planar.synthesis.judgement.judgement import FileCheck
+from planar.synthesis.task.starts import wanted_miss_kind
 from planar.synthesis.task.synthesis_task import SynthesisTask
-from planar.synthesis.task.task_numbers import wanted_miss_kind
 
 
 def solution_count(solved: Sequence[ComponentSolutions], counts: Sequence[int]) -> int:
@@ -47,28 +47,28 @@ def completeness(solved: Sequence[ComponentSolutions]) -> str:
     gap = _gap(solved)
     if gap:
         return f"incomplete: {gap}"
-    is_traced = all(each.record.is_traced for each in solved)
+    is_traced = all(component.record.is_traced for component in solved)
     told = "numerically complete" if is_traced else "all of a number that is a lower bound"
-    infinite = sum(each.whole.at_infinity for each in solved)
-    if any(each.whole.singular for each in solved):
+    infinite = sum(component.whole.at_infinity for component in solved)
+    if any(component.whole.singular for component in solved):
         told += " but for singular solutions, where several meet or a curve of them passes"
     elif infinite:
         told += f" but for {infinite} at infinity"
     if is_traced:
         return told
-    if not all(each.record.is_tested for each in solved):
+    if not all(component.record.is_tested for component in solved):
         return f"{told}: the trace test, which shows whether these are all, is not made yet"
     return f"{told}: the trace test does not show that these are all"
 
 
 def _gap(solved: Sequence[ComponentSolutions]) -> str:
     """What is known to be wrong with the list as a whole."""
-    if any(len(each.whole.x) > each.record.classes.size for each in solved):
+    if any(len(component.whole.x) > component.record.classes.size for component in solved):
         return "there are more solutions than a random task was known to have"
-    lost = sum(each.whole.lost for each in solved)
+    lost = sum(component.whole.lost for component in solved)
     if lost:
         return f"paths to {lost} of {sum(each.whole.class_count for each in solved)} were lost"
-    missing = sum(each.missing for each in solved)
+    missing = sum(component.missing for component in solved)
     return f"{count_phrase(missing, 'cognate')} of real linkages were not reached" if missing else ""
 
 
@@ -98,18 +98,18 @@ def list_remarks(solved: Sequence[ComponentSolutions], designs: Sequence[ExactDe
             found.append(f"{many} of {FAR:,.0f} times the size of the task or more: nearly at infinity")
         if each.record.source:
             found.append(each.record.source)
-    for link in dict.fromkeys(name for each in designs for name in each.opposite):
-        count = sum(link in each.opposite for each in designs)
+    for link in dict.fromkeys(name for design in designs for name in design.opposite):
+        count = sum(link in design.opposite for design in designs)
         found.append(
             f"{link!r} is drawn the opposite way, as its length is negative, in {count} of "
             f"{count_phrase(len(designs), 'real linkage')}: points stand for it"
         )
-    differing = [number for number, each in enumerate(designs, start=1) if each.file_difference]
+    differing = [number for number, design in enumerate(designs, start=1) if design.file_difference]
     if differing:
         told = f"design {differing[0]} is not called proved: {designs[differing[0] - 1].file_difference}"
         more = f"; the files of {count_phrase(len(differing) - 1, 'other design')} differ, too"
         found.append(told + more * (len(differing) > 1))
-    marked = sum(bool(each.defects) for each in designs)
+    marked = sum(bool(design.defects) for design in designs)
     if marked:
         found.append(f"with a defect: {marked} of {count_phrase(len(designs), 'real linkage')}")
     return tuple(found)

@@ -25,10 +25,10 @@ import numpy as np
 
 from planar.derivatives.design_equations import DesignEquations, design_equations
 from planar.equations.casadi_call import BufferedFunction
-from planar.foundation.arrays import Array, BoolArray
+from planar.foundation.arrays import Array, BoolArray, IntArray
 from planar.model.mechanism import Mechanism
-from planar.synthesis.task.synthesis_task import Wanted
-from planar.synthesis.task.wanted_expressions import wanted_expression
+from planar.synthesis.task.synthesis_task import SynthesisTask, Wanted, WantedFunction
+from planar.synthesis.task.wanted_results import wanted_expression, wanted_results
 
 DAMPING_ALONG = 1e-12
 """Of the squared size of the results: how much going along a path counts, where a result does not change along it."""
@@ -81,7 +81,7 @@ class WantedEquations:
         design = self.design
         self.result = wanted_expression(design, rows.wanted) / ca.DM(rows.scales)
         self.z_count = design.z.numel()
-        kinds = {each.name: each.kind for each in design.dimensions}
+        kinds = {dimension.name: dimension.kind for dimension in design.dimensions}
         self.scale = np.array([unit if kinds[name] == "length" else 1.0 for name in free])
         "SI of one of each free number"
         self.input_scale = float(design.input_scale[0])
@@ -93,11 +93,8 @@ class WantedEquations:
         """Whether the running input is given at every entry."""
         return self.rows.inputs is not None
 
-    def _in_entries(self, outputs: list[ca.SX]) -> tuple[ca.SX, ca.SX, list[ca.SX]]:
-        return in_entries(self.design, self.free, self.scale, outputs)
-
     def _function(self, outputs: list[ca.SX]) -> BufferedFunction:
-        y, x, (F, *rest) = self._in_entries(outputs)
+        y, x, (F, *rest) = in_entries(self.design, self.free, self.scale, outputs)
         found = [F, ca.jacobian(F, y)]
         for r in rest:
             found += [ca.jacobian(F, x), r, ca.jacobian(r, y), ca.jacobian(r, x)]
@@ -138,8 +135,8 @@ class WantedEquations:
 
     @cached_property
     def _value(self) -> BufferedFunction:
-        y, x, told = self._in_entries([self.result])
-        return BufferedFunction(ca.Function("value", [y, x], [ca.densify(told[0])]))
+        y, x, (result,) = in_entries(self.design, self.free, self.scale, [self.result])
+        return BufferedFunction(ca.Function("value", [y, x], [ca.densify(result)]))
 
     def jacobians(self, x: Array, y: Array) -> Array:
         """Of the equations in each entry's unknowns (designs, n, unknowns - 1, unknowns)."""
@@ -219,8 +216,8 @@ class WantedEquations:
         rows = np.repeat(x, entries, axis=0)
         told = function.evaluate_batch(many * entries, y.reshape(-1, unknowns), rows)
         found = []
-        for k, each in enumerate(told):
-            shaped = each.reshape(many, entries, *each.shape[1:]).swapaxes(-1, -2)
+        for k, part in enumerate(told):
+            shaped = part.reshape(many, entries, *part.shape[1:]).swapaxes(-1, -2)
             found.append(shaped[..., 0] if k in VECTORS else shaped)
         return found
 
@@ -231,11 +228,11 @@ def in_entries(
     """Symbols of an entry's unknowns y and of the free numbers x, in units of a `scale`, and expressions in them."""
     z_count = design.z.numel()
     x, y = ca.SX.sym("x", len(free)), ca.SX.sym("y", z_count + 1)
-    names = [each.name for each in design.dimensions]
-    d = ca.SX(ca.DM([each.value for each in design.dimensions]))
+    names = [dimension.name for dimension in design.dimensions]
+    d = ca.SX(ca.DM([dimension.value for dimension in design.dimensions]))
     for k, name in enumerate(free):
         d[names.index(name)] = x[k] * scale[k]
-    u = ca.vertcat(y[-1] * float(design.input_scale[0]), *(each.position for each in design.mechanism.inputs[1:]))
+    u = ca.vertcat(y[-1] * float(design.input_scale[0]), *(drive.position for drive in design.mechanism.inputs[1:]))
     zero = ca.SX.zeros(design.u1.numel())
     given = [design.z, design.u, design.u1, design.u2, design.d]
     return y, x, ca.substitute(outputs, given, [y[:z_count], u, zero, zero, d])
@@ -268,4 +265,202 @@ def solve_rows(matrices: Array, right: Array) -> Array:
 def tangents(jacobians: Array) -> Array:
     """The unit vectors (..., unknowns) that Jacobians (..., unknowns - 1, unknowns) do not see: along the path."""
     found: Array = np.linalg.svd(jacobians)[2][..., -1, :]
+    return found
+
+
+def wanted_size(task: SynthesisTask, mechanism_size: float) -> float:
+    """The extent (m) of all places that are wanted; that of the mechanism where there are none, or but one."""
+    places = [item.places for item in task.wanted if not isinstance(item, WantedFunction)]
+    extent = float(np.ptp(np.concatenate(places), axis=0).max()) if places else 0.0
+    return extent or mechanism_size
+
+
+def wanted_rows(task: SynthesisTask, size: float) -> list[WantedRows]:
+    """Of each wanted item its rows: places in units of the size, angles in rad, lengths of functions in the size."""
+    heavier = EXACT_WEIGHT if 0 < len(task.exact) < len(task.wanted) else 1.0
+    rows = []
+    for wanted in task.wanted:
+        values, is_function = wanted_results(wanted), isinstance(wanted, WantedFunction)
+        weights = (heavier if wanted.tolerance == 0.0 else 1.0) * np.sqrt(wanted.weights)
+        scales = np.ones(1) if is_function else np.array([size, size, 1.0])[: values.shape[1]]
+        is_free = wanted.inputs is not None and not wanted.is_absolute
+        rows.append(WantedRows(wanted, values, wanted.inputs, weights, scales, is_free, is_free and is_function))
+    return rows
+
+
+EXACT_WEIGHT = 30.0
+"""Of a miss of what is to be met exactly beside others, before a fit's last steps meet it."""
+
+
+class GlobalNumbers:
+    """The free numbers, then the zeros of scales that each kind of rows seeks."""
+
+    def __init__(self, equations: Sequence[WantedEquations], many_free: int):
+        self.free = at = many_free
+        self.zero_columns: list[IntArray] = []
+        for item in equations:
+            self.zero_columns.append(np.arange(at, at + item.zero_count))
+            at += item.zero_count
+        self.size = at
+
+    def columns(self, k: int) -> IntArray:
+        """Those that rows of the kind k depend on."""
+        return np.concatenate([np.arange(self.free), self.zero_columns[k]])
+
+
+class InputChanges(NamedTuple):
+    """How the inputs of all entries, one kind of rows after the other, change in a step: by themselves, and with the
+    globals; and which are the least and the greatest."""
+
+    own: Array
+    "(designs, n)"
+    slopes: Array
+    "(designs, n, globals)"
+    ends: IntArray
+    "(designs, 2)"
+
+    def between(self, design: IntArray, share: Array) -> tuple[Array, Array]:
+        """The same (k,) and (k, globals) at shares (k,) of the range of designs (k,)."""
+        parts, at = np.stack([1.0 - share, share], axis=1), self.ends[design]
+        own, slopes = self.own[design[:, None], at], self.slopes[design[:, None], at]
+        return np.sum(parts * own, axis=1), np.einsum("ke,kei->ki", parts, slopes)
+
+
+def normal_equations(
+    equations: Sequence[WantedEquations], lines: Sequence[LinearRows], numbers: GlobalNumbers
+) -> tuple[Array, Array]:
+    """The matrices (designs, size, size) and the slopes (designs, size) of half the sum of squares."""
+    normal = np.zeros((len(lines[0].residual), numbers.size, numbers.size))
+    for k, (item, line) in enumerate(zip(equations, lines, strict=True)):
+        at = numbers.columns(k)
+        own = np.einsum("cnpi,cnpj->cij", line.slopes, line.slopes, optimize=True)
+        if not item.is_timed:
+            size_along = np.sum(line.along**2, axis=-1) + DAMPING_ALONG
+            across = np.einsum("cnpi,cnp->cni", line.slopes, line.along)
+            own -= np.einsum("cni,cnj,cn->cij", across, across, 1.0 / size_along, optimize=True)
+        normal[:, at[:, None], at] += own
+    return normal, half_slopes(equations, lines, [line.residual for line in lines], numbers)
+
+
+def half_slopes(
+    equations: Sequence[WantedEquations],
+    lines: Sequence[LinearRows],
+    residuals: Sequence[Array],
+    numbers: GlobalNumbers,
+) -> Array:
+    """The slopes (designs, size) of half the squares of residuals (designs, n, parts) that change as lines do."""
+    slope = np.zeros((len(residuals[0]), numbers.size))
+    for k, (item, line, residual) in enumerate(zip(equations, lines, residuals, strict=True)):
+        slope[:, numbers.columns(k)] += np.einsum("cnpi,cnp->ci", line.slopes, _across(item, line, residual))
+    return slope
+
+
+def _across(equations: WantedEquations, line: LinearRows, rows: Array) -> Array:
+    """Rows (designs, n, parts, ...) without their part along the path, where an entry may go along it."""
+    if equations.is_timed:
+        return rows
+    unit = line.along / (np.sum(line.along**2, axis=-1) + DAMPING_ALONG)[..., None]
+    across: Array = rows - np.einsum("cnp,cnq,cnq...->cnp...", line.along, unit, rows, optimize=True)
+    return across
+
+
+def predicted_residuals(equations: WantedEquations, line: LinearRows, change: Array) -> Array:
+    """What a change of the globals of its rows (designs, own) leaves of the residuals, to the first order."""
+    return _across(equations, line, line.residual + np.einsum("cnpi,ci->cnp", line.slopes, change))
+
+
+def exact_rows(
+    equations: Sequence[WantedEquations],
+    lines: Sequence[LinearRows],
+    numbers: GlobalNumbers,
+    every_item: bool = False,
+) -> tuple[Array, Array]:
+    """Rows (designs, k) and slopes (designs, k, globals) of what is to be met exactly, or of every item, without their
+    part along."""
+    many = len(lines[0].residual)
+    rows: list[Array] = [np.zeros((many, 0))]
+    slopes: list[Array] = [np.zeros((many, 0, numbers.size))]
+    for k, (item, line) in enumerate(zip(equations, lines, strict=True)):
+        if item.rows.wanted.tolerance != 0.0 and not every_item:
+            continue
+        across = _across(item, line, np.concatenate([line.residual[..., None], line.slopes], axis=-1))
+        both = across.reshape(many, -1, across.shape[-1])
+        wide = np.zeros((*both.shape[:2], numbers.size))
+        wide[..., numbers.columns(k)] = both[..., 1:]
+        rows.append(both[..., 0])
+        slopes.append(wide)
+    return np.concatenate(rows, axis=1), np.concatenate(slopes, axis=1)
+
+
+def entry_moves(equations: WantedEquations, line: LinearRows, change: Array) -> Array:
+    """How each entry's unknowns change (designs, n, unknowns) with the globals of its rows (designs, own)."""
+    moves: Array = line.own + np.einsum("cnyi,ci->cny", line.own_slopes, change)
+    if not equations.is_timed:
+        left = line.residual + np.einsum("cnpi,ci->cnp", line.slopes, change)
+        along = -np.einsum("cnp,cnp->cn", line.along, left) / (np.sum(line.along**2, axis=-1) + DAMPING_ALONG)
+        moves = moves + line.tangent * along[..., None]
+    return moves
+
+
+def input_changes(
+    equations: Sequence[WantedEquations],
+    lines: Sequence[LinearRows],
+    unknowns: Sequence[Array],
+    numbers: GlobalNumbers,
+) -> InputChanges:
+    """How the inputs of entries change; see `entry_moves`."""
+    owns, slopes = [], []
+    for k, (item, line) in enumerate(zip(equations, lines, strict=True)):
+        own, slope = line.own[..., -1], line.own_slopes[..., -1, :]
+        if not item.is_timed:
+            rate = line.tangent[..., -1] / (np.sum(line.along**2, axis=-1) + DAMPING_ALONG)
+            own = own - rate * np.einsum("cnp,cnp->cn", line.along, line.residual)
+            slope = slope - rate[..., None] * np.einsum("cnp,cnpi->cni", line.along, line.slopes)
+        wide = np.zeros((*own.shape, numbers.size))
+        wide[..., numbers.columns(k)] = slope
+        owns.append(own)
+        slopes.append(wide)
+    inputs = np.concatenate([y[..., -1] for y in unknowns], axis=1)
+    ends = np.stack([np.argmin(inputs, axis=1), np.argmax(inputs, axis=1)], axis=1)
+    return InputChanges(np.concatenate(owns, axis=1), np.concatenate(slopes, axis=1), ends)
+
+
+def solve_damped(normal: Array, slope: Array, damping: Array, numbers: Array, lower: Array, upper: Array) -> Array:
+    """The change of the globals; a number on its bound that would leave it stays. NaN where nothing is known."""
+    free, size = numbers.shape[1], slope.shape[1]
+    held = np.zeros(slope.shape, bool)
+    bad: BoolArray = np.asarray(~(np.isfinite(normal).all(axis=(1, 2)) & np.isfinite(slope).all(axis=1)))
+    normal, slope = np.where(bad[:, None, None], np.eye(size), normal), np.where(bad[:, None], 0.0, slope)
+    damped = damped_matrices(normal, damping)
+    for _ in range(2):
+        matrix = np.where(held[:, :, None] | held[:, None, :], 0.0, damped) + held[:, :, None] * np.eye(size)
+        change = solve_symmetric(matrix, np.where(held, 0.0, -slope))
+        wanted = numbers + change[:, :free]
+        out = ((wanted < lower) & (numbers <= lower)) | ((wanted > upper) & (numbers >= upper))
+        if not (out & ~held[:, :free]).any():
+            break
+        held[:, :free] |= out
+    change[bad] = np.nan
+    return change
+
+
+def damped_matrices(normal: Array, damping: Array) -> Array:
+    """Normal matrices with so much of their diagonal more."""
+    diagonal = np.einsum("cii->ci", normal)
+    floor = 1e-9 * diagonal.max(axis=1, keepdims=True) + np.finfo(float).tiny
+    found: Array = normal + (damping[:, None] * np.maximum(diagonal, floor))[:, :, None] * np.eye(normal.shape[1])
+    return found
+
+
+def solve_symmetric(matrices: Array, right: Array) -> Array:
+    """The solutions (n, size) of symmetric systems; that of least size of one which is singular to the last digit."""
+    try:
+        found: Array = np.linalg.solve(matrices, right[..., None])[..., 0]
+    except np.linalg.LinAlgError:
+        found = np.empty_like(right)
+        for k, (matrix, side) in enumerate(zip(matrices, right, strict=True)):
+            try:
+                found[k] = np.linalg.solve(matrix, side)
+            except np.linalg.LinAlgError:
+                found[k] = np.linalg.pinv(matrix, rcond=1e-14, hermitian=True) @ side
     return found

@@ -1,7 +1,8 @@
-"""The assemblies of a design at positions of its running input, and the circuit on which its sketch lies."""
+"""A design's assemblies at positions of its input, the circuit of its sketch, and a task's entries on them."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator, Sequence
 from functools import cached_property
 from itertools import islice
 from typing import NamedTuple
@@ -11,7 +12,7 @@ import numpy as np
 from planar.assemblies.circuits.traced_circuit import BranchLeg, TracedCircuit, trace_circuit
 from planar.assemblies.modes import Modes
 from planar.foundation.arrays import Array
-from planar.foundation.errors import NoAnswer
+from planar.foundation.errors import NoAnswer, join_names
 from planar.foundation.jets import TURN, value_and_rates
 from planar.model.mechanism import Drive, Mechanism, named_points, relative_motions, replace_inputs
 from planar.model.pairs import MeasureKind
@@ -20,22 +21,16 @@ from planar.solving.continuation.solution_curve import Arc
 from planar.solving.lazy_frames import LazyFrames
 from planar.solving.position import PositionSolver, solved_mechanism
 from planar.solving.rates.regularity import jacobian_at, regularity
-from planar.synthesis.judgement.misses import result_differences, wanted_results
+from planar.synthesis.judgement.defects import ONE_BRANCH, ONE_CIRCUIT, REACH, Defect
+from planar.synthesis.judgement.input_range import InputRange
 from planar.synthesis.task.synthesis_task import Wanted, WantedFunction, WantedPath
-from planar.synthesis.task.wanted_expressions import carried_name
+from planar.synthesis.task.wanted_results import carried_name, result_differences, wanted_results
 
 MAX_ASSEMBLIES = 64
 """Assemblies at one position of the input that are looked at."""
 PIECE_SAMPLES, REFINEMENTS, REFINED_SAMPLES = 12, 3, 13
 """Positions on each piece of a branch at which the one nearest to an entry is looked for, how often it is looked
 at more closely, and at how many positions."""
-
-
-class NearestPosition(NamedTuple):
-    """Where on a branch an entry is missed least: the position of the input (rad or m), and the miss."""
-
-    position: float
-    miss: float
 
 
 class DesignAssemblies:
@@ -168,9 +163,9 @@ class DesignAssemblies:
             for piece in leg.pieces
         ]
 
-    def nearest(self, wanted: Wanted, entry: int, size: float) -> NearestPosition | None:
-        """Where on the sketch's branch an entry of a path or of poses is missed least; `size` (m) is the extent of what
-        is wanted. None where the circuit cannot be followed."""
+    def nearest(self, wanted: Wanted, entry: int, size: float) -> tuple[float, float] | None:
+        """The position of the input (rad or m) on the sketch's branch where an entry of a path or of poses is missed
+        least, and that miss; `size` (m) is the extent of what is wanted. None where the circuit cannot be followed."""
         pieces = self._branch_pieces
         if not pieces:
             return None
@@ -194,7 +189,7 @@ class DesignAssemblies:
         y = piece.arc.curve_coordinates(leg.curve, x)[None]
         positions = self._positions(leg, y)
         miss = _entry_distances(wanted, entry, self.results(wanted, y[:, :-1], positions), size)
-        return NearestPosition(float(positions[0]), float(miss[0]))
+        return float(positions[0]), float(miss[0])
 
     def _positions(self, leg: BranchLeg, y: Array) -> Array:
         """The input (n,) rad or m at points of a leg's curve (n, unknowns and input)."""
@@ -210,3 +205,118 @@ def _on_arc(arc: Arc, places: Array) -> Array:
     """Points (n, unknowns and input) of an arc's polynomial at places (n,) along its axis."""
     points: Array = ((places / arc.unit_length)[:, None] ** np.arange(len(arc.coefficients))) @ arc.coefficients
     return points
+
+
+class EntryPlace(NamedTuple):
+    """Where an entry is met.
+
+    `entry` counts from 0, `position` (rad or m) is that of the input; `kind` says on what it lies: the "branch" of the
+    sketch, its "circuit", a branch that is "crossed" at a change point, "another" circuit, a circuit that is "unknown",
+    or "nowhere" where no assembly meets it. `dead_points` (rad or m) lie between it and the branch of the sketch.
+    """
+
+    entry: int
+    position: float
+    kind: str
+    dead_points: tuple[float, ...] = ()
+
+
+class EntryLocator(NamedTuple):
+    """Finds the assemblies of a design that show given results to within a distance (m or rad); `size` (m) is the
+    extent of what is wanted. `is_proof`: what lies on no branch of the circuit is looked for in all assemblies."""
+
+    design: DesignAssemblies
+    size: float
+    within: float
+    is_proof: bool
+
+    def locate(self, wanted: Wanted, entry: int, position: float, result: Array) -> EntryPlace:
+        """Where an entry is met, with the input at a position (rad or m) and a result (parts,) of a wanted item."""
+        design = self.design
+        branches, z = design.along_circuit(position)
+        on = [branches[k] for k in self._rows(wanted, z, position, result)]
+        if design.home_branch in on:
+            return EntryPlace(entry, position, "branch")
+        if on:
+            return EntryPlace(entry, position, "circuit", tuple(design.dead_points_before(on[0], position)))
+        is_crossing = design.circuit is not None and design.circuit.has_change_point
+        if self.is_proof or is_crossing:
+            z = design.at(position)
+            rows = self._rows(wanted, z, position, result)
+            if self.is_proof and not rows:
+                return EntryPlace(entry, position, "nowhere")
+            if is_crossing and any(design.has_change_point(z[row], position) for row in rows):
+                return EntryPlace(entry, position, "crossed")
+        is_followed = design.circuit is not None and not design.circuit.lost_reason
+        return EntryPlace(entry, position, "another" if is_followed else "unknown")
+
+    def _rows(self, wanted: Wanted, z: Array, position: float, result: Array) -> list[int]:
+        """The assemblies (rows of z) that show the result."""
+        if not len(z):
+            return []
+        shown = self.design.results(wanted, z, np.full(len(z), position))
+        off = result_differences(wanted, shown, result, self.size, self.design.measures_angle(wanted))
+        rows: list[int] = np.flatnonzero(off <= self.within).tolist()
+        return rows
+
+
+class PlaceWords(NamedTuple):
+    """How positions and misses are written: the range of the input, the entry whose branch is the sketch's, misses."""
+
+    reach: InputRange
+    branch: str
+    input_text: Callable[[float], str]
+    miss_text: Callable[[Wanted, float], str]
+
+    def defects(self, wanted: Wanted, places: Sequence[EntryPlace], misses: Array) -> Iterator[Defect]:
+        """Of the entries of an item that are not met on the branch of the sketch, and are missed by (n,) there."""
+        groups: dict[tuple[str, tuple[float, ...]], list[EntryPlace]] = {}
+        for place in places:
+            key = tuple(round(at, 9) for at in place.dead_points)
+            groups.setdefault((place.kind, key), []).append(place)
+        for (kind, _), group in groups.items():
+            if kind == "branch":
+                continue
+            rest = self._branch_sentence(wanted, group, misses)
+            entries = _entries_text(group)
+            if kind == "nowhere":
+                yield Defect(REACH, f"no assembly of it meets {entries} of {wanted.of}; {rest}")
+                continue
+            at = join_names([self.input_text(self._brought(each.position)) for each in group], max_names=None)
+            met = f"{wanted.of} meets {entries} at {self.reach.pair} = {at}, {self._where(kind, group[0])}; {rest}"
+            is_branch = kind in ("circuit", "crossed")
+            yield Defect(
+                ONE_BRANCH if is_branch else ONE_CIRCUIT, f"{'branch' if is_branch else 'circuit'} defect: {met}"
+            )
+
+    def _where(self, kind: str, place: EntryPlace) -> str:
+        if kind == "circuit":
+            at = join_names([self.input_text(self._brought(each)) for each in place.dead_points], max_names=None)
+            points = "dead points" if len(place.dead_points) > 1 else "dead point"
+            return f"on the same circuit beyond the {points} at {self.reach.pair} = {at}"
+        return {
+            "crossed": "on a branch that crosses this one at a change point",
+            "another": "on another circuit",
+            "unknown": "in another assembly, whose circuit could not be followed",
+        }[kind]
+
+    def _branch_sentence(self, wanted: Wanted, group: Sequence[EntryPlace], misses: Array) -> str:
+        """What is missed on the branch of the sketch, or that it does not reach so far."""
+        own = misses[[each.entry for each in group]]
+        if not np.isfinite(own).all():
+            low, high = (self.input_text(each) for each in (self.reach.low, self.reach.high))
+            return f"{self.branch} goes from {self.reach.pair} = {low} to {high}"
+        miss = self.miss_text(wanted, float(own.max()))
+        return f"on {self.branch} the miss is {miss}{' at most' if len(group) > 1 else ''}"
+
+    def _brought(self, position: float) -> float:
+        """An angle by whole turns next to the range of the input."""
+        if not self.reach.turns or self.reach.counts_turns:
+            return position
+        middle = 0.5 * (self.reach.low + self.reach.high)
+        return position - TURN * round((position - middle) / TURN)
+
+
+def _entries_text(places: Sequence[EntryPlace]) -> str:
+    names = [str(place.entry + 1) for place in places]
+    return f"{'entries' if len(names) > 1 else 'entry'} {join_names(names, max_names=None)}"

@@ -1,7 +1,8 @@
-"""A design judged by the general path: what it misses, and what is wrong with it."""
+"""Whether a design does what a task wants, by its own file and the general path."""
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -9,30 +10,30 @@ from typing import NamedTuple
 
 import numpy as np
 
+from planar.document.dimensions import file_dimensions
+from planar.document.files import from_dict, to_dict
 from planar.foundation.arrays import Array, BoolArray
-from planar.foundation.errors import BadInput, NoAnswer
-from planar.foundation.jets import TURN, Scalar, value_and_rates
+from planar.foundation.errors import BadInput, NoAnswer, PlanarError
+from planar.foundation.jets import TURN, value_and_rates
 from planar.model.mechanism import Mechanism, relative_motions
 from planar.model.wording import amount
 from planar.results.motion import Motion
 from planar.solving.cycle import cycle
 from planar.solving.grids.grid_motion import motion_over_input
-from planar.synthesis.judgement.defects import ORDER, REACH, WHOLE_TURN, Defect
-from planar.synthesis.judgement.design_assemblies import DesignAssemblies
-from planar.synthesis.judgement.entry_order import ordered_inputs
-from planar.synthesis.judgement.entry_places import EntryLocator, EntryPlace, PlaceWords
-from planar.synthesis.judgement.input_range import InputRange, input_range, range_motion
-from planar.synthesis.judgement.misses import (
+from planar.synthesis.judgement.defects import ORDER, REACH, WHOLE_TURN, Defect, region_defects, transmission_defects
+from planar.synthesis.judgement.design_assemblies import DesignAssemblies, EntryLocator, EntryPlace, PlaceWords
+from planar.synthesis.judgement.input_range import InputRange, input_range, ordered_inputs, range_motion
+from planar.synthesis.task.starts import task_motion_kind
+from planar.synthesis.task.synthesis_task import SynthesisTask, Wanted, WantedFunction, WantedPath
+from planar.synthesis.task.wanted_results import (
+    carried_name,
     entry_misses,
     function_zero,
     repeat_entry,
     resting_misses,
+    result_differences,
     wanted_results,
 )
-from planar.synthesis.judgement.motion_demands import region_defects, transmission_defects
-from planar.synthesis.task.synthesis_task import SynthesisTask, Wanted, WantedFunction, WantedPath
-from planar.synthesis.task.task_numbers import task_motion_kind
-from planar.synthesis.task.wanted_expressions import carried_name
 
 STEPS = 90
 SAME = 1e-6
@@ -70,7 +71,7 @@ class JudgedItem(NamedTuple):
     def is_on_branch(self) -> BoolArray:
         """Which entries are met on the branch of the sketch."""
         found = np.ones(len(self.misses), bool)
-        found[[each.entry for each in self.elsewhere]] = False
+        found[[place.entry for place in self.elsewhere]] = False
         return found
 
 
@@ -136,8 +137,8 @@ class DesignJudge:
         if not isinstance(wanted, WantedFunction) and wanted.inputs is None:
             for entry in missed.tolist():
                 nearest = design.nearest(wanted, entry, self.size)
-                if nearest is not None and not nearest.miss >= off[entry]:
-                    places[entry], off[entry] = reach.bring(np.array([nearest.position]))[0], nearest.miss
+                if nearest is not None and not nearest[1] >= off[entry]:
+                    places[entry], off[entry] = reach.bring(np.array(nearest[:1]))[0], nearest[1]
         allowed = (SAME if self.is_exact else OTHER_ASSEMBLY) * scale
         locator = EntryLocator(design, self.size, (SAME if self.is_exact else SAME_AS_FITTED) * scale, self.is_exact)
         elsewhere = []
@@ -172,7 +173,7 @@ class DesignJudge:
             yield from words.defects(item.wanted, item.elsewhere, item.misses)
 
     def _unreached(self, inputs: Sequence[Array], *defects: Defect) -> Judgement:
-        return Judgement(tuple(np.full(len(each), np.nan) for each in inputs), tuple(inputs), defects)
+        return Judgement(tuple(np.full(len(positions), np.nan) for positions in inputs), tuple(inputs), defects)
 
     def _put_in_order(self, motion: Motion, reach: InputRange, items: Sequence[JudgedItem]) -> Iterator[Defect]:
         """Entries that are wanted in their order are met so, where that costs hardly anything; else a defect."""
@@ -262,10 +263,10 @@ def _results_within(
 ) -> list[Array]:
     """What is shown (n, parts) at positions (n,) of the input, not numbers beyond the ends of its range. Raises
     NoAnswer."""
-    within = [~reach.are_beyond(each) for each in inputs]
-    places = [reach.bring(each[rows]) for each, rows in zip(inputs, within, strict=True)]
-    if not any(len(each) for each in places):
-        return [np.full(wanted_results(each).shape, np.nan) for each in wanted]
+    within = [~reach.are_beyond(positions) for positions in inputs]
+    places = [reach.bring(positions[rows]) for positions, rows in zip(inputs, within, strict=True)]
+    if not any(len(place) for place in places):
+        return [np.full(wanted_results(item).shape, np.nan) for item in wanted]
     found = []
     for each, rows, shown in zip(wanted, within, _results(mechanism, wanted, places), strict=True):
         every = np.full(wanted_results(each).shape, np.nan)
@@ -276,28 +277,111 @@ def _results_within(
 
 def _results(mechanism: Mechanism, wanted: Sequence[Wanted], inputs: Sequence[Array]) -> list[Array]:
     """What is shown (n, parts) at positions of the input. Raises NoAnswer."""
-    sizes = [len(each) for each in inputs]
+    sizes = [len(positions) for positions in inputs]
     motion = motion_over_input(mechanism, np.concatenate(inputs))
     found, first = [], 0
-    for each, size in zip(wanted, sizes, strict=True):
+    for item, size in zip(wanted, sizes, strict=True):
         rows = slice(first, first + size)
         first += size
-        if isinstance(each, WantedPath):
-            found.append(motion.point(carried_name(mechanism, each.point)).position[rows])
-        elif isinstance(each, WantedFunction):
-            found.append(np.asarray(motion.pair(each.to_pair)[_pair_result(mechanism, each.to_pair)])[rows, None])
+        if isinstance(item, WantedPath):
+            found.append(motion.point(carried_name(mechanism, item.point)).position[rows])
+        elif isinstance(item, WantedFunction):
+            position = next(iter(relative_motions(mechanism)[item.to_pair].result_kinds))
+            found.append(np.asarray(motion.pair(item.to_pair)[position])[rows, None])
         else:
-            frame = motion.frames[each.link]
-            parts = [_values(getattr(frame, part), len(motion)) for part in ("x", "y", "angle")]
-            found.append(np.stack(parts, axis=1)[rows])
+            parts = (getattr(motion.frames[item.link], part) for part in ("x", "y", "angle"))
+            values = [np.broadcast_to(np.asarray(value_and_rates(part)[0], float), len(motion)) for part in parts]
+            found.append(np.stack(values, axis=1)[rows])
     return found
 
 
-def _pair_result(mechanism: Mechanism, name: str) -> str:
-    """The name of the result of a pair that is its position."""
-    return next(iter(relative_motions(mechanism)[name].result_kinds))
+ROUND_OFF = 1024.0 * float(np.finfo(float).eps)
+"""Of the greatest length: what the numbers of a file and the positions of its input are out by; results are out by as
+much times the condition of the position."""
+ENTRY_TOLERANCE = 1e-6
+"""Of the extent of what is wanted, or rad: a file that misses more meets nothing, however ill-conditioned it is."""
 
 
-def _values(jet: Scalar, many: int) -> Array:
-    value = np.asarray(value_and_rates(jet)[0], float)
-    return np.broadcast_to(value, (many,))
+class FileCheck(NamedTuple):
+    """A mechanism read from its own file, and how it meets entries there.
+
+    `results` (n, parts) of each item are what it is to show, `misses` (n,) how far it is from that (m or rad) in the
+    assembly that comes nearest, infinite where it cannot be assembled; `tolerances` (n,) are what round-off explains.
+    """
+
+    mechanism: Mechanism
+    results: tuple[Array, ...]
+    misses: tuple[Array, ...]
+    tolerances: tuple[Array, ...]
+    scales: tuple[float, ...]
+    "what misses of each item are compared with: rad, or the extent of what is wanted (m)"
+
+    @property
+    def is_met(self) -> bool:
+        """Whether every entry is met to round-off."""
+        limits = [
+            np.minimum(own, ENTRY_TOLERANCE * scale) for own, scale in zip(self.tolerances, self.scales, strict=True)
+        ]
+        return all(bool((off <= limit).all()) for off, limit in zip(self.misses, limits, strict=True))
+
+    @property
+    def is_rounded(self) -> bool:
+        """Whether round-off explains all misses."""
+        return all(bool((off <= limit).all()) for off, limit in zip(self.misses, self.tolerances, strict=True))
+
+    @property
+    def worst(self) -> tuple[int, int]:
+        """The item and the entry that are missed most, of what each is compared with."""
+        every = [float(off.max()) / scale for off, scale in zip(self.misses, self.scales, strict=True)]
+        item = int(np.argmax(every))
+        return item, int(np.argmax(self.misses[item]))
+
+
+def read_back(mechanism: Mechanism) -> Mechanism:
+    """A mechanism from the text of its own file. Raises BadInput."""
+    return from_dict(json.loads(json.dumps(to_dict(mechanism))))
+
+
+def check_file(mechanism: Mechanism, wanted: Sequence[Wanted], inputs: Sequence[Array], size: float) -> FileCheck:
+    """How the file of a mechanism meets wanted items at positions (n,) of its running input, the first of which is that
+    of its sketch; `size` (m) is the extent of what is wanted. Raises BadInput where the file cannot be read."""
+    again = read_back(mechanism)
+    lengths = [abs(each.value) for each in file_dimensions(again).values() if each.kind == "length"]
+    try:
+        design = DesignAssemblies(again)
+    except PlanarError:
+        design = None
+    results, misses, tolerances, scales = [], [], [], []
+    for item, positions in zip(wanted, inputs, strict=True):
+        result, is_angle = wanted_results(item), design is None or design.measures_angle(item)
+        scale = 1.0 if isinstance(item, WantedFunction) and is_angle else size
+        if design is None:
+            none = np.full(len(result), np.inf)
+            off, within = none, 0.0 * result[:, 0]
+        else:
+            if isinstance(item, WantedFunction) and not item.is_absolute:  # counted from the first entry
+                first = design.results(item, design.home[None], positions[:1])
+                result = result - result[:1] + first
+            off, within = _entries(design, item, result, positions, size)
+        results.append(result)
+        misses.append(off)
+        tolerances.append(within * ROUND_OFF * scale * max(1.0, *(length / size for length in lengths)))
+        scales.append(scale)
+    return FileCheck(again, tuple(results), tuple(misses), tuple(tolerances), tuple(scales))
+
+
+def _entries(
+    design: DesignAssemblies, wanted: Wanted, results: Array, positions: Array, size: float
+) -> tuple[Array, Array]:
+    """How far entries are from results (n, parts) at positions (n,) in the assembly that comes nearest (n,), and the
+    condition of that (n,)."""
+    misses, conditions = np.full(len(positions), np.inf), np.ones(len(positions))
+    for k, position in enumerate(positions.tolist()):
+        z = design.at(position)
+        if not len(z):
+            continue
+        shown = design.results(wanted, z, np.full(len(z), position))
+        off = result_differences(wanted, shown, results[k], size, design.measures_angle(wanted))
+        nearest = int(np.argmin(off))
+        misses[k], conditions[k] = off[nearest], design.condition(z[nearest], position)
+    return misses, conditions

@@ -22,10 +22,9 @@ from planar.model.mechanism import Mechanism
 from planar.model.wording import count_phrase
 from planar.results.motion import Motion
 from planar.solving.cycle import cycle
-from planar.synthesis.task.starts import FreeNumbers, free_numbers
+from planar.synthesis.task.starts import FreeNumbers, free_numbers, motion_kind
 from planar.synthesis.task.synthesis_task import SynthesisTask, Wanted, WantedFunction, WantedPath
-from planar.synthesis.task.task_numbers import motion_kind
-from planar.synthesis.task.wanted_expressions import wanted_expression
+from planar.synthesis.task.wanted_results import wanted_expression
 
 MOVED = 1e-6
 """Of a move: what free numbers leave of it is none."""
@@ -122,10 +121,10 @@ def count_freedom(task: SynthesisTask, mechanism: Mechanism, wanted: Sequence[Wa
     conditions = task.wanted if wanted is None else wanted
     items = _result_rows(generic_start(mechanism, free), conditions, free)
     every, own = (
-        unseen_changes(_stack([each.spread(count) for each, count in zip(items, counts, strict=True)]))[2]
-        for counts in ([len(each.values) for each in items], [len(each.weights) for each in conditions])
+        unseen_changes(_stack([item.spread(count) for item, count in zip(items, counts, strict=True)]))[2]
+        for counts in ([len(item.values) for item in items], [len(condition.weights) for condition in conditions])
     )
-    return FreedomCount(every, sum(each.condition_count for each in items), own)
+    return FreedomCount(every, sum(item.condition_count for item in items), own)
 
 
 def number_slopes(task: SynthesisTask, mechanism: Mechanism, free: FreeNumbers) -> Array:
@@ -158,11 +157,11 @@ def exactness_in_excess(task: SynthesisTask, mechanism: Mechanism) -> str | None
 
 def can_move_whole(task: SynthesisTask, mechanism: Mechanism, free: FreeNumbers) -> bool:
     """Whether free numbers, but for their bounds, bring what is wanted of the mechanism to any place, size and turn."""
-    if any(isinstance(each, WantedFunction) for each in task.wanted):
+    if any(isinstance(item, WantedFunction) for item in task.wanted):
         return False
     items = _result_rows(mechanism, task.wanted, free)
     matrix = _stack(items)
-    right = np.concatenate([each.project(_moves(each)).reshape(-1, MOVES) for each in items])
+    right = np.concatenate([item.project(_moves(item)).reshape(-1, MOVES) for item in items])
     left = right - matrix @ np.linalg.lstsq(matrix, right, rcond=None)[0]
     return bool((np.linalg.norm(left, axis=0) <= MOVED * np.linalg.norm(right, axis=0)).all())
 
@@ -181,8 +180,8 @@ def _moves(item: _ResultRows) -> Array:
 
 def _stack(items: Sequence[_ResultRows]) -> Array:
     """The derivatives (rows, unknowns) of all results by the free numbers and by each item's own zeros."""
-    zeros = [each.zeros() for each in items]
-    total = sum(each.shape[2] for each in zeros)
+    zeros = [item.zeros() for item in items]
+    total = sum(zero.shape[2] for zero in zeros)
     rows, first = [], 0
     for item, own in zip(items, zeros, strict=True):
         wide = np.zeros((*own.shape[:2], total))
@@ -198,28 +197,28 @@ def _result_rows(mechanism: Mechanism, wanted: Sequence[Wanted], free: FreeNumbe
     design = design_equations(mechanism)
     motion = _motion(mechanism, max(LEAST_POSITIONS, 2 * len(free.names)))
     z, t = design.coordinates_at(motion)
-    results = [wanted_expression(design, each) for each in wanted]
+    results = [wanted_expression(design, item) for item in wanted]
     system = ImplicitSystem([Level(design.z, design.F)], design.t)
     whole = ca.vertcat(*results)
     found = system.slopes(system.result_jacobians(whole), [z[0]], t)
     regular = ~found.is_singular
     values = np.array(ca.Function("values", [design.z, design.t], [whole])(z[0][regular].T, t[regular].T)).T
     units = [
-        design.solver.unit if _is_length(mechanism, each, part) else 1.0
-        for each, own in zip(wanted, results, strict=True)
+        design.solver.unit if _is_length(mechanism, item, part) else 1.0
+        for item, own in zip(wanted, results, strict=True)
         for part in range(own.numel())
     ]
     slopes = found.slopes[regular] * design.scale / np.array(units)[:, None]
     columns = [design.names.index(name) for name in free.names]
-    ends = np.cumsum([0, *(each.numel() for each in results)])
+    ends = np.cumsum([0, *(result.numel() for result in results)])
     return [
         _ResultRows(
-            each,
+            item,
             (values / units)[:, first:last],
             slopes[:, first:last][..., columns],
             slopes[:, first:last, 0],
         )
-        for each, first, last in zip(wanted, ends[:-1], ends[1:], strict=True)
+        for item, first, last in zip(wanted, ends[:-1], ends[1:], strict=True)
     ]
 
 

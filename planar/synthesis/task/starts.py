@@ -1,8 +1,8 @@
-"""The mechanisms that a task starts from, with the points that are wanted, and which numbers are sought."""
+"""The mechanisms that a task starts from, their free numbers, and the units of what is wanted of them."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -16,10 +16,18 @@ from planar.document.dimensions import Dimension
 from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput
 from planar.model.link_shapes import At, Distances, Link, Point, link_shape
-from planar.model.mechanism import Mechanism, named_points
+from planar.model.mechanism import Mechanism, named_points, relative_motions
+from planar.model.wording import amount
 from planar.solving.cycle import cycle
-from planar.synthesis.task.synthesis_task import ChainStart, SynthesisTask, WantedPath, WantedPoses
-from planar.synthesis.task.wanted_expressions import (
+from planar.synthesis.task.synthesis_task import (
+    ChainStart,
+    SynthesisTask,
+    Wanted,
+    WantedFunction,
+    WantedPath,
+    WantedPoses,
+)
+from planar.synthesis.task.wanted_results import (
     carried_name,
     depended_numbers,
     influential_numbers,
@@ -49,19 +57,19 @@ def start_mechanisms(task: SynthesisTask) -> Iterator[Mechanism]:
     if isinstance(task.starts, ChainStart):
         yield from _chain_starts(task, task.starts)
         return
-    for each in task.starts:
-        yield with_wanted_points(each, task, {})
+    for start in task.starts:
+        yield with_wanted_points(start, task, {})
 
 
 def _chain_starts(task: SynthesisTask, start: ChainStart) -> Iterator[Mechanism]:
     from planar.structures.enumeration.chains import chains
 
-    paths = [each.point for each in task.wanted if isinstance(each, WantedPath)]
+    paths = [item.point for item in task.wanted if isinstance(item, WantedPath)]
     for links in start.links:
         for chain in chains(links):
             for mechanism in chain.mechanisms():
                 found = chain.mechanism(mechanism.frame, mechanism.drives)
-                known = {each.name for each in named_points(found)}
+                known = {point.name for point in named_points(found)}
                 names = {point: set_apart(point) if point in known else point for point in paths}
                 for link in _carriers(found):
                     carried = {point: (link, names[point]) for point in paths}
@@ -74,15 +82,15 @@ def _all_links_matter(mechanism: Mechanism, task: SynthesisTask) -> bool:
     """Whether what is wanted depends on every link; else a simpler chain does as well."""
     design = design_equations(mechanism)
     z, t = design.coordinates_at(cycle(mechanism, 8, pair=mechanism.inputs[0].pair))
-    results = ca.vertcat(*(wanted_expression(design, each) for each in task.wanted))
+    results = ca.vertcat(*(wanted_expression(design, item) for item in task.wanted))
     system = ImplicitSystem([Level(design.z, design.F)], design.t)
     found = system.slopes(system.result_jacobians(results), [z[0]], t)
     strength = np.abs(found.slopes[~found.is_singular] * design.scale).max(axis=(0, 1), initial=0.0)
     first = len(design.names) - len(design.dimensions)
-    by_link = {each.name: 0.0 for each in mechanism.links}
-    for each, own in zip(design.dimensions, strength[first:], strict=True):
-        if each.link in by_link:
-            by_link[each.link] = max(by_link[each.link], float(own))
+    by_link = {link.name: 0.0 for link in mechanism.links}
+    for dimension, own in zip(design.dimensions, strength[first:], strict=True):
+        if dimension.link in by_link:
+            by_link[dimension.link] = max(by_link[dimension.link], float(own))
     return min(by_link.values()) > NO_INFLUENCE * max(by_link.values())
 
 
@@ -105,8 +113,8 @@ def with_wanted_points(mechanism: Mechanism, task: SynthesisTask, carried: dict[
 
     Links that are to take poses have coordinates throughout, so that their origin is not held to a pin.
     """
-    links = {each.name: each for each in mechanism.links}
-    known = {each.name: each for each in named_points(mechanism)}
+    links = {link.name: link for link in mechanism.links}
+    known = {point.name: point for point in named_points(mechanism)}
     named = (*task.free, *task.within)
     for each in mechanism.links:  # by distances a point is no longer there where lengths change
         for own in each.points:
@@ -159,15 +167,15 @@ def _with_free_axes(link: Link) -> Link:
 def _with_new_point(link: Link, point: str, size: float) -> Link:
     """The link with a point more, beside the middle of its others; `size` is that of the greatest link."""
     shape = link_shape(link)
-    places = [shape.position(each) for each in link.names]
-    x, y = (float(np.mean([getattr(each, part) for each in places])) for part in "xy")
+    places = [shape.position(name) for name in link.names]
+    x, y = (float(np.mean([getattr(place, part) for place in places])) for part in "xy")
     return replace(link, points=(*link.points, Point(point, At(x, y + 0.5 * (_reach(link) or size or 1.0)))))
 
 
 def _reach(link: Link) -> float:
     """The greatest distance between points of a link."""
     shape = link_shape(link)
-    x, y = (np.array([getattr(shape.position(each), part) for each in link.names]) for part in "xy")
+    x, y = (np.array([getattr(shape.position(name), part) for name in link.names]) for part in "xy")
     return float(np.hypot(x[:, None] - x, y[:, None] - y).max())
 
 
@@ -178,7 +186,11 @@ def free_numbers(task: SynthesisTask, mechanism: Mechanism) -> FreeNumbers:
     those that cannot change alone. Values beyond bounds are the bounds. Raises BadInput for what is no number of it,
     cannot change alone, or changes nothing that is wanted, and NoAnswer where the mechanism cannot move.
     """
-    known = {each.name: each for each in design_dimensions(mechanism) if each.path[0] in ("links", "pairs")}
+    known = {
+        dimension.name: dimension
+        for dimension in design_dimensions(mechanism)
+        if dimension.path[0] in ("links", "pairs")
+    }
     _check_free_names(task, mechanism, known)
     names = tuple(dict.fromkeys(task.free)) or influential_numbers(mechanism, task.wanted)
     chosen = [known[name] for name in names]
@@ -200,3 +212,49 @@ def _check_free_names(task: SynthesisTask, mechanism: Mechanism, known: Mapping[
             raise BadInput("$.free", told)
         if name not in used:
             raise BadInput("$.free", f"nothing that is wanted depends on {name!r} of {mechanism.name!r}; leave it out")
+
+
+def start_numbers(mechanism: Mechanism, wanted: Sequence[Wanted]) -> dict[str, Dimension]:
+    """The numbers of a start's links and pairs by name; those of wanted points are coordinates, however it wrote
+    them."""
+    paths = tuple(item for item in wanted if isinstance(item, WantedPath))
+    ready = with_wanted_points(mechanism, SynthesisTask("", paths, (mechanism,)), {})
+    points = {path.point for path in paths}
+    members = {point.name: point.members for point in named_points(ready)}
+    own = tuple(f"{link}.{point}." for name in points for link, point in members.get(name, ()))
+    found = {
+        dimension.name: dimension for dimension in design_dimensions(mechanism) if not dimension.name.startswith(own)
+    }
+    found |= {dimension.name: dimension for dimension in design_dimensions(ready) if dimension.name.startswith(own)}
+    return {name: each for name, each in found.items() if each.path[0] in ("links", "pairs")}
+
+
+def motion_kind(mechanism: Mechanism, pair: str) -> str:
+    """Whether the position of a relative motion is a "length" or an "angle"."""
+    return relative_motions(mechanism)[pair].input_quantity_kinds()[0]
+
+
+def task_motion_kind(task: SynthesisTask, pair: str | None = None) -> str:
+    """That of a pair of a task's starts, or of the running input; angles are those of chains, and of what is not
+    there."""
+    if isinstance(task.starts, ChainStart) or not task.starts:
+        return "angle"
+    first = task.starts[0]
+    name = pair or first.inputs[0].pair
+    return motion_kind(first, name) if name in relative_motions(first) else "angle"
+
+
+def wanted_miss_kind(task: SynthesisTask, wanted: Wanted) -> str:
+    """What a miss of a wanted item is: a "length", or an "angle" where it is a function whose values are angles."""
+    return task_motion_kind(task, wanted.to_pair) if isinstance(wanted, WantedFunction) else "length"
+
+
+def miss_kind(task: SynthesisTask) -> str:
+    """What misses of a task are together: an "angle" where all of them are."""
+    return "angle" if all(wanted_miss_kind(task, item) == "angle" for item in task.wanted) else "length"
+
+
+def miss_text(task: SynthesisTask, miss: float, size: float) -> str:
+    """A miss of a task with its unit: 0 where it is round-off of the size (m) of what is wanted, or of a radian."""
+    kind = miss_kind(task)
+    return amount(miss, kind, task.units, size if kind == "length" else 1.0)

@@ -137,20 +137,20 @@ class SynthesisTask:
     @property
     def wants_places(self) -> bool:
         """Whether places are wanted, so that a miss may be seen beside their extent."""
-        return any(not isinstance(each, WantedFunction) for each in self.wanted)
+        return any(not isinstance(item, WantedFunction) for item in self.wanted)
 
     @property
     def needs_whole_turn(self) -> bool:
         """Whether the running input is to turn fully: where that is demanded, and round closed curves."""
-        closed = any(isinstance(each, WantedPath) and each.is_closed for each in self.wanted)
+        closed = any(isinstance(item, WantedPath) and item.is_closed for item in self.wanted)
         return closed or self.demands.whole_turn
 
     @property
     def exact(self) -> tuple[Wanted, ...]:
         """What is to be met exactly: items with no tolerance for a miss."""
-        return tuple(each for each in self.wanted if each.tolerance == 0.0)
+        return tuple(item for item in self.wanted if item.tolerance == 0.0)
 
     @property
     def entry_count(self) -> int:
         """How many places, poses and pairs are wanted together."""
-        return sum(len(each.weights) for each in self.wanted)
+        return sum(len(item.weights) for item in self.wanted)

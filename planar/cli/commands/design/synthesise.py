@@ -17,9 +17,8 @@ from planar.cli.streams import print_json
 
 if TYPE_CHECKING:
     from planar.synthesis.exact.complete_synthesis import CompleteSynthesis
-    from planar.synthesis.search_progress import SearchProgress
     from planar.synthesis.synthesis import Synthesis
-    from planar.synthesis.task_search import TaskSearch
+    from planar.synthesis.synthesise import SearchProgress, TaskSearch
 
 SHEET_SUFFIXES = (".png", ".svg", ".pdf")
 """What `-o` names where it is no folder: sheets of drawings."""
@@ -60,10 +59,9 @@ def synthesise(
 ) -> None:
     """The linkages that do best what a TASK wants: paths, poses or functions, of any structure."""
     from planar.reports.tables.design.synthesis import record, table
-    from planar.synthesis.search_progress import progress_words
+    from planar.synthesis.synthesise import TaskSearch, progress_words
     from planar.synthesis.synthesise import synthesise as find_all
     from planar.synthesis.task.task_reader import read_task
-    from planar.synthesis.task_search import TaskSearch
 
     wanted = read_task(task)
     is_sheet = output is not None and output.suffix.lower() in SHEET_SUFFIXES

@@ -11,7 +11,7 @@ from planar.document.dimensions import file_dimensions
 from planar.model.file_units import display_unit
 from planar.reports.files.csv import csv_cell
 from planar.synthesis.synthesis import Synthesis, SynthesisedDesign
-from planar.synthesis.task.task_numbers import miss_kind, motion_kind, wanted_miss_kind
+from planar.synthesis.task.starts import miss_kind, motion_kind, wanted_miss_kind
 
 UNITLESS = "number"
 """The kind of what has no unit."""

@@ -16,10 +16,9 @@ from planar.model.wording import amount, count_phrase
 from planar.reports.fitted_table import FittedTable, plain_table
 from planar.reports.number_format import format_or_zero, paragraphs
 from planar.reports.tables.design.cognates import cognate_record
-from planar.synthesis.design_record import design_record
 from planar.synthesis.exact.complete_synthesis import CompleteSynthesis, ExactDesign
-from planar.synthesis.synthesis import Synthesis, SynthesisedDesign
-from planar.synthesis.task.task_numbers import miss_text, motion_kind
+from planar.synthesis.synthesis import Synthesis, SynthesisedDesign, design_record
+from planar.synthesis.task.starts import miss_text, motion_kind
 
 MAX_REJECTED = 8
 """Rejected designs whose defects are listed."""

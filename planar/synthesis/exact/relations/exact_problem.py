@@ -22,7 +22,7 @@ from planar.synthesis.exact.relations.polynomials import Polynomial, Symbol
 from planar.synthesis.exact.relations.reference_pose import LinkAxes, ReferencePose
 from planar.synthesis.exact.relations.sought_numbers import sought_numbers
 from planar.synthesis.exact.relations.unknowns import GivenNumber, NumberKind, refuse
-from planar.synthesis.fitting.wanted_rows import wanted_size
+from planar.synthesis.fitting.wanted_equations import wanted_size
 from planar.synthesis.task.synthesis_task import SynthesisTask, Wanted, WantedFunction, WantedPath, WantedPoses
 
 

@@ -23,7 +23,7 @@ from planar.synthesis.exact.relations.unknowns import NumberKind
 from planar.synthesis.task.freedom import moving_start
 from planar.synthesis.task.starts import free_numbers
 from planar.synthesis.task.synthesis_task import Wanted, WantedFunction, WantedPath
-from planar.synthesis.task.wanted_expressions import wanted_expression
+from planar.synthesis.task.wanted_results import wanted_expression
 
 POSITIONS = 48
 """Of the motion of a linkage, of which entries are some."""

@@ -1,19 +1,88 @@
-"""Paths from one member of a family to another in the digits of balls: slow, for those that doubles lose.
+"""A member of a family in the digits of balls: paths that doubles lose, and proofs of solutions.
 
-Predictor by the polynomial through the last points, corrector by Newton's method.
+Slow. Predictor by the polynomial through the last points, corrector by Newton's method.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from planar.assemblies.polynomial.krawczyk import ball, ball_precision, newton_step, relative_size
-from planar.foundation.arrays import ComplexArray
+from planar.assemblies.polynomial.krawczyk import (
+    ProvedBox,
+    apart_boxes,
+    ball,
+    ball_precision,
+    direction_ball,
+    exact_ball,
+    is_own_image,
+    newton_step,
+    polished_balls,
+    prove_box,
+    relative_size,
+)
+from planar.foundation.arrays import BoolArray, ComplexArray
+from planar.synthesis.exact.relations.exact_numbers import ExactNumber
 from planar.synthesis.exact.relations.family import Family, Member
-from planar.synthesis.exact.tracking.member_in_balls import MemberInBalls
+from planar.synthesis.exact.relations.unknowns import NumberKind
+
+
+class MemberInBalls:
+    """The equations of a member, or of one a part `back` of the way from it to another; of a task's numbers as its file
+    has them."""
+
+    def __init__(self, family: Family, member: Member, other: Member | None = None, back: float = 0.0):
+        self.parts: list[tuple[Any, list[list[Any]]]] = []
+        given: list[Any] = []
+        for k, (part, numbers) in enumerate(zip(family.parts, member.parts, strict=True)):
+            exact = None if member.exact is None else member.exact[k]
+            rows = []
+            for entry in range(part.entry_count):
+                here = _number_balls(part.kinds, numbers[entry], None if exact is None else exact[entry])
+                if other is not None and back:
+                    there = _number_balls(part.kinds, other.parts[k][entry], None)
+                    here = [a + back * (b - a) for a, b in zip(here, there, strict=True)]
+                rows.append(_symbol_values(part.kinds, here))
+            if k == 0:
+                given = rows[0]
+            self.parts.append((part.rows, [given] if k == 0 else [[*given, *own] for own in rows]))
+
+    def __call__(self, w: Sequence[Any]) -> tuple[list[Any], list[list[Any]]]:
+        """The rows and their Jacobian at a box of balls."""
+        f: list[Any] = []
+        slope: list[list[Any]] = []
+        for rows, entries in self.parts:
+            if not rows.equation_count:
+                continue
+            for numbers in entries:
+                own, own_slope = rows.evaluate_as(w, numbers)
+                f += own
+                slope += own_slope
+        return f, slope
+
+
+def _number_balls(kinds: Sequence[NumberKind], numbers: ComplexArray, exact: Sequence[ExactNumber] | None) -> list[Any]:
+    """The numbers of an entry, each beside its conjugate."""
+    if exact is None:
+        return [ball(complex(each)) for pair in numbers for each in pair]
+    values = [exact_ball(*each) for each in exact]
+    pairs = [
+        (value, value if kind in (NumberKind.TURN, NumberKind.LENGTH) else value.conjugate())
+        for kind, value in zip(kinds, values, strict=True)
+    ]
+    return [each for pair in pairs for each in pair]
+
+
+def _symbol_values(kinds: Sequence[NumberKind], numbers: Sequence[Any]) -> list[Any]:
+    """What stands for the symbols of an entry."""
+    values: list[Any] = []
+    for k, kind in enumerate(kinds):
+        own, conjugate = numbers[2 * k : 2 * k + 2]
+        values += [direction_ball(own), direction_ball(-own)] if kind is NumberKind.TURN else [own, conjugate]
+    return values
+
 
 MOST_PATHS = 30
 """That are worth following: they take seconds each."""
@@ -40,8 +109,8 @@ def follow_in_balls(family: Family, begin: Member, x: ComplexArray, end: Member)
         for k, own in enumerate(x):
             w, is_end = _follow_path(family, begin, [ball(complex(each)) for each in own], end)
             if is_end:
-                found[k] = [complex(each) for each in w]
-            elif max((abs(complex(each)) for each in w), default=0.0) > FAR:
+                found[k] = [complex(value) for value in w]
+            elif max((abs(complex(value)) for value in w), default=0.0) > FAR:
                 found[k] = np.inf
     return found
 
@@ -90,3 +159,32 @@ def _predicted(points: Sequence[tuple[float, list[Any]]], here: float) -> list[A
         weights.append(float(np.prod([(here - other) / (one - other) for other in others])))
     entries = zip(*(w for _, w in points), strict=True)
     return [sum((weight * each for weight, each in zip(weights, own, strict=True)), ball(0.0)).mid() for own in entries]
+
+
+class ExactCertificates(NamedTuple):
+    """Of every solution: whether it is proved, and proved to be real; `x` are the solutions to the last digit."""
+
+    proved: BoolArray
+    is_real: BoolArray
+    x: ComplexArray
+
+
+def certify_member(family: Family, member: Member, x: ComplexArray) -> ExactCertificates:
+    """What is proved of solutions x (solutions, unknowns) of a real member, whose numbers are the floats they are."""
+    with ball_precision():
+        equations = MemberInBalls(family, member)
+        proved, real = np.zeros(len(x), dtype=bool), np.zeros(len(x), dtype=bool)
+        half = np.full(len(x), np.inf)
+        exact = x.copy()
+        boxes: list[ProvedBox | None] = []
+        for k, value in enumerate(x):
+            middle = polished_balls(equations, value)
+            box = prove_box(equations, middle) if middle is not None else None
+            boxes.append(box)
+            if box is not None:
+                proved[k], half[k] = True, box.half
+                exact[k] = [complex(one) for one in box.middle]
+        proved = apart_boxes(exact, half, proved)
+        for k, box in enumerate(boxes):
+            real[k] = box is not None and proved[k] and is_own_image(box)
+        return ExactCertificates(proved, real, exact)

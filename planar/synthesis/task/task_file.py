@@ -1,11 +1,15 @@
-"""The JSON Schema of task files, and the keys that the reader knows from it.
+"""The JSON Schema of task files, and a task written as one.
 
-As of mechanism files, the reader says what a schema cannot: that a link exists, or that bounds are the right way round.
+As for mechanism files, the reader checks what a schema cannot: that a link exists, or that bounds are in order.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from math import isfinite
 from typing import Any
+
+import numpy as np
 
 from planar.document.schema import (
     ABOVE_ZERO,
@@ -17,7 +21,21 @@ from planar.document.schema import (
     schema,
     vector_schema,
 )
+from planar.document.writer import quantity_writer, write_mechanism
+from planar.foundation.arrays import Array
+from planar.foundation.errors import BadInput
+from planar.model.entry_reader import QuantityWriter
 from planar.model.pairs.base import Schema, described, list_schema, schema_reference
+from planar.synthesis.task.starts import start_numbers, task_motion_kind
+from planar.synthesis.task.synthesis_task import (
+    ChainStart,
+    Demands,
+    SynthesisTask,
+    Wanted,
+    WantedFunction,
+    WantedPath,
+    WantedPoses,
+)
 
 WHOLE_TURN, ONE_BRANCH = "whole turn", "one branch"
 DEMAND_WORDS = (WHOLE_TURN, ONE_BRANCH)
@@ -184,3 +202,110 @@ def task_schema() -> dict[str, Any]:
         **object_schema(TASK_SCHEMA, "planar", "start", "wanted"),
         "$defs": {**kinds, "mechanism": whole, "positive": positive},
     }
+
+
+def write_task(task: SynthesisTask) -> dict[str, Any]:
+    """The JSON value of a task, in its own units; `read_task` gives the same task back, to the last bit.
+
+    Raises BadInput for a task made in Python whose arrays do not fit one another.
+
+    >>> import json, planar
+    >>> wanted = [{"point": "E", "through": [["0 mm", "0 mm"], ["20 mm", "12 mm"]]}]
+    >>> task = planar.read_task({"planar": 1, "name": "Lid", "start": "four-bar", "wanted": wanted})
+    >>> planar.read_task(json.loads(json.dumps(planar.write_task(task))))
+    <SynthesisTask 'Lid': 2 wanted entries>
+    """
+    quantity = quantity_writer(task.units)
+    value: dict[str, Any] = {"planar": FORMAT_VERSION, "name": task.name}
+    value["units"] = {key: unit for key, unit in task.units._asdict().items() if unit}
+    starts = () if isinstance(task.starts, ChainStart) else task.starts
+    written = [write_mechanism(start) for start in starts]
+    if isinstance(task.starts, ChainStart):
+        value["start"] = {"chains": list(task.starts.links)}
+    else:
+        value["start"] = written[0] if len(written) == 1 else written
+    for k, each in enumerate(task.wanted):
+        _check_shapes(each, f"$.wanted[{k}]")
+    value["wanted"] = [_write_wanted(item, task, quantity) for item in task.wanted]
+    if task.free:
+        value["free"] = list(task.free)
+    if task.within:
+        numbers = (start_numbers(start, task.wanted) for start in starts)
+        kinds = {name: dimension.kind for known in numbers for name, dimension in known.items()}
+        value["within"] = {
+            name: [quantity(part, kinds.get(name, "number")) if isfinite(part) else None for part in both]
+            for name, both in task.within.items()
+        }
+    demands = list(_write_demands(task.demands, quantity))
+    return value | ({"demands": demands} if demands else {})
+
+
+def _check_shapes(wanted: Wanted, place: str) -> None:
+    """Refuse arrays that are not of so many entries, or hold no numbers."""
+    many = len(wanted.weights)
+    shapes = {"places": (many, 2), "angles": (many,), "inputs": (many,), "values": (many,), "weights": (many,)}
+    for name, shape in shapes.items():
+        value = getattr(wanted, name, None)
+        if value is None:
+            continue
+        found = np.shape(value)
+        if found != shape:
+            raise BadInput(place, f"{name} of {many} entries have the shape {shape}, not {found}")
+        if not np.isfinite(np.asarray(value, float)).all():
+            raise BadInput(place, f"{name} are finite numbers")
+
+
+def _write_wanted(wanted: Wanted, task: SynthesisTask, quantity: QuantityWriter) -> dict[str, Any]:
+    if isinstance(wanted, WantedFunction):
+        return _write_function(wanted, task, quantity)
+    flags = {"in_order": wanted.in_order, "absolute": wanted.is_absolute}
+    told: dict[str, Any] = {key: True for key, is_set in flags.items() if is_set}
+    if wanted.tolerance is not None:
+        told["tolerance"] = quantity(wanted.tolerance, "length")
+    entries: list[dict[str, Any]] = [{"at": [quantity(each, "length") for each in place]} for place in wanted.places]
+    if isinstance(wanted, WantedPoses):
+        for entry, angle in zip(entries, wanted.angles, strict=True):
+            entry["angle"] = quantity(angle, "angle")
+    _add_timing(entries, wanted, task_motion_kind(task), quantity)
+    if isinstance(wanted, WantedPoses):
+        return {"link": wanted.link, "poses": entries, **told}
+    own: dict[str, Any] = {"point": wanted.point} | ({} if wanted.link is None else {"on": wanted.link})
+    own["through"] = [each["at"] if len(each) == 1 else each for each in entries]
+    return own | told | ({"closed": True} if wanted.is_closed else {})
+
+
+def _add_timing(
+    entries: list[dict[str, Any]], wanted: WantedPath | WantedPoses, kind: str, quantity: QuantityWriter
+) -> None:
+    """Add the input and the weight of each entry, where they are not left out."""
+    inputs: Array | list[None] = [None] * len(entries) if wanted.inputs is None else wanted.inputs
+    for entry, given, weight in zip(entries, inputs, wanted.weights, strict=True):
+        if given is not None:
+            entry["input"] = quantity(given, kind)
+        if weight != 1.0:
+            entry["weight"] = float(weight)
+
+
+def _write_function(wanted: WantedFunction, task: SynthesisTask, quantity: QuantityWriter) -> dict[str, Any]:
+    kinds = task_motion_kind(task, wanted.from_pair), task_motion_kind(task, wanted.to_pair)
+    pairs: list[Any] = []
+    for given, value, weight in zip(wanted.inputs, wanted.values, wanted.weights, strict=True):
+        both = [quantity(given, kinds[0]), quantity(value, kinds[1])]
+        pairs.append(both if weight == 1.0 else {"at": both, "weight": float(weight)})
+    told: dict[str, Any] = {"from": wanted.from_pair, "to": wanted.to_pair, "pairs": pairs}
+    if wanted.is_absolute:
+        told["absolute"] = True
+    if wanted.tolerance is not None:
+        told["tolerance"] = quantity(wanted.tolerance, kinds[1])
+    return told
+
+
+def _write_demands(demands: Demands, quantity: QuantityWriter) -> Iterator[Any]:
+    if demands.whole_turn:
+        yield WHOLE_TURN
+    if demands.one_branch:
+        yield ONE_BRANCH
+    if demands.transmission is not None:
+        yield {"transmission": quantity(demands.transmission, "angle")}
+    if demands.inside is not None:
+        yield {"inside": [[quantity(each, "length") for each in corner] for corner in demands.inside]}

@@ -1,12 +1,72 @@
-"""How far entries are missed."""
+"""The results that a task wants: as expressions in unknowns and numbers, and how far entries are missed."""
 
 from __future__ import annotations
 
+import casadi as ca
 import numpy as np
 
+from planar.derivatives.design_equations import DesignEquations, design_equations
+from planar.derivatives.result_slopes import tied_dimensions
+from planar.equations.elimination import stack_expressions
 from planar.foundation.arrays import Array
+from planar.foundation.errors import BadInput
 from planar.foundation.jets import TURN
-from planar.synthesis.task.synthesis_task import Wanted, WantedFunction, WantedPath
+from planar.model.mechanism import Mechanism, named_points
+from planar.synthesis.task.synthesis_task import Wanted, WantedFunction, WantedPath, WantedPoses
+
+
+def wanted_expression(design: DesignEquations, wanted: Wanted) -> ca.SX:
+    """The parts (parts,) of what is wanted, SI: of a point x and y, of a link those of its origin and its angle, of a
+    pair its position."""
+    frames, _ = design.placed
+    if isinstance(wanted, WantedPath):
+        name = carried_name(design.mechanism, wanted.point)
+        point = next((point for point in named_points(design.mechanism) if point.name == name), None)
+        if point is None:
+            raise BadInput("$.wanted", f"{design.mechanism.name!r} has no point {wanted.point!r}")
+        link, at = point.members[0]
+        return stack_expressions(frames[link].to_world(design.work.shapes[link].position(at)))
+    if isinstance(wanted, WantedPoses):
+        if wanted.link not in frames:
+            raise BadInput("$.wanted", f"{design.mechanism.name!r} has no link {wanted.link!r}")
+        frame = frames[wanted.link]
+        return ca.vertcat(ca.SX(frame.x), ca.SX(frame.y), ca.SX(frame.angle))
+    if wanted.to_pair not in design.work.relative_motions:
+        raise BadInput("$.wanted", f"{design.mechanism.name!r} has no pair {wanted.to_pair!r}")
+    return design.in_link_coordinates(ca.vertcat(*design.work.relative_positions([wanted.to_pair])))
+
+
+def set_apart(point: str) -> str:
+    """What a wanted point of a chain is called where a joint of it bears its name."""
+    return f"{point} wanted"
+
+
+def carried_name(mechanism: Mechanism, point: str) -> str:
+    """The name of a wanted point in a mechanism, which may be one of a chain where it is set apart from a joint."""
+    apart = set_apart(point)
+    return apart if any(point.name == apart for point in named_points(mechanism)) else point
+
+
+def depended_numbers(mechanism: Mechanism, wanted: tuple[Wanted, ...]) -> tuple[str, ...]:
+    """The numbers of links and pairs that what is wanted, or how the mechanism closes, depends on."""
+    design = design_equations(mechanism)
+    depends = ca.vertcat(design.F, *(wanted_expression(design, item) for item in wanted))
+    used = ca.which_depends(depends, design.d, 1, False)
+    return tuple(
+        dimension.name
+        for dimension, is_used in zip(design.dimensions, used, strict=True)
+        if is_used and dimension.path[0] in ("links", "pairs")
+    )
+
+
+def influential_numbers(mechanism: Mechanism, wanted: tuple[Wanted, ...]) -> tuple[str, ...]:
+    """The lengths and angles among them that can change alone."""
+    used, tied = {*depended_numbers(mechanism, wanted)}, {*tied_dimensions(mechanism)}
+    return tuple(
+        dimension.name
+        for dimension in design_equations(mechanism).dimensions
+        if dimension.name in used - tied and dimension.kind in ("length", "angle")
+    )
 
 
 def _wrapped(angles: Array) -> Array:

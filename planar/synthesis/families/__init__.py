@@ -1,1 +1,0 @@
-"""Tasks that leave numbers open: exact designs sampled from the family of all of them."""
