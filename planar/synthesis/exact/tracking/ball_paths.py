@@ -161,6 +161,12 @@ def _predicted(points: Sequence[tuple[float, list[Any]]], here: float) -> list[A
     return [sum((weight * each for weight, each in zip(weights, own, strict=True)), ball(0.0)).mid() for own in entries]
 
 
+SAME_SOLUTION = 1e-9
+"""Of the size of a solution: two that are nearer to each other are one."""
+MAX_CORRECTION = 0.1
+"""Of the size of a solution: one that moves farther as it is polished may have come to another one."""
+
+
 class ExactCertificates(NamedTuple):
     """Of every solution: whether it is proved, and proved to be real; `x` are the solutions to the last digit."""
 
@@ -184,6 +190,11 @@ def certify_member(family: Family, member: Member, x: ComplexArray) -> ExactCert
             if box is not None:
                 proved[k], half[k] = True, box.half
                 exact[k] = [complex(one) for one in box.middle]
+        correction = np.abs(exact - x).max(axis=1, initial=0.0) / np.abs(x).max(axis=1, initial=1.0)
+        for k in np.flatnonzero(correction > MAX_CORRECTION).tolist():
+            distance = np.abs(np.delete(exact, k, axis=0) - exact[k]).max(axis=1, initial=0.0)
+            if distance.min(initial=np.inf) < SAME_SOLUTION * np.abs(exact[k]).max(initial=1.0):
+                boxes[k], proved[k], half[k], exact[k] = None, False, np.inf, x[k]  # polished to another one
         proved = apart_boxes(exact, half, proved)
         for k, box in enumerate(boxes):
             real[k] = box is not None and proved[k] and is_own_image(box)
