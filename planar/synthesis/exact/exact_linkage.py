@@ -163,15 +163,17 @@ class _LinkageWriter:
 
     def _note_line(self, slide: SlidingRow) -> None:
         """The numbers of a line that are sought, and how far its slider is from what it goes through."""
-        link, name = slide.pair.bodies[0], slide.pair.name
+        (link, block), name = slide.pair.links, slide.pair.name
         way = self._way(slide.direction) / self.axes[link]
         slider = self._own(link, self._world(slide.slider))
         at = self.pose.coordinates(link, slide.through, slide.pair)
-        angle = self.pose.line_angle(name)
+        turn = self.pose.line_turn(slide.pair)
         given = self.problem.first_slides.get(name)
-        if angle is not None and angle not in self.pose.free:
-            drawn = exp(1j * float(self.pose.numbers[angle].value))
-            way = way if (way * drawn.conjugate()).real > 0.0 else -way
+        along_line = None if turn is None else exp(1j * turn)
+        if slide.end is not None:
+            along_line = evaluate(slide.end.substitute(self.pose.values), self.values) / self.axes[link]
+        if along_line is not None:
+            way = way if (way * along_line.conjugate()).real > 0.0 else -way
         if isinstance(slide.through, str) and (link, slide.through) in self.pose.places:
             through = self._own(link, self._world(self.pose.places[link, slide.through]))
         elif given is not None:
@@ -179,10 +181,12 @@ class _LinkageWriter:
         else:
             through = self._place_on_line(slider, way, at, link)
         along = ((slider - through) * way.conjugate()).real
-        if angle is not None and angle in self.pose.free:
+        if along_line is None:
             if along < 0.0 and name in self.pose.patched:
                 way, along = -way, -along
-            self.numbers[angle] = phase(way)
+            self.numbers[f"{name}.line.angle"] = phase(way)
+        if f"{name}.turn" in self.pose.free:
+            self.numbers[f"{name}.turn"] = phase(self.axes[block] / (way * self.axes[link]))
         self._note(at, through)
         self.displacements[name] = along
         self.lines[name] = way * self.axes[link]
@@ -254,8 +258,8 @@ class _AxesRows:
         is_elsewhere = (self.name, slide.through) in pose.places
         if given is not None and not is_elsewhere:
             self.points.append((slider - given(writer.problem.items[0]) * way, at))
-        angle = pose.line_angle(slide.pair.name)
-        turn = None if angle is None or angle in pose.free else exp(1j * float(pose.numbers[angle].value))
+        line_turn = pose.line_turn(slide.pair)
+        turn = None if line_turn is None else exp(1j * line_turn)
         has_place = given is None and not is_elsewhere and all(at.is_given)
         self.lines.append((slider, way, turn, at.value if has_place else None))
 
