@@ -185,7 +185,7 @@ class _LinkageWriter:
             if along < 0.0 and name in self.pose.patched:
                 way, along = -way, -along
             self.numbers[f"{name}.line.angle"] = phase(way)
-        if f"{name}.turn" in self.pose.free:
+        if f"{name}.turn" in self.pose.free and block in self.pose.axes:
             self.numbers[f"{name}.turn"] = phase(self.axes[block] / (way * self.axes[link]))
         self._note(at, through)
         self.displacements[name] = along

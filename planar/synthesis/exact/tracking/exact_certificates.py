@@ -19,6 +19,10 @@ from planar.synthesis.exact.relations.family import Family, Member
 from planar.synthesis.exact.tracking.member_in_balls import MemberInBalls
 
 
+MAX_CORRECTION = 0.1
+"""Of the size of a solution: how far the proved one may be from it."""
+
+
 class ExactCertificates(NamedTuple):
     """Of every solution: whether it is proved, and proved to be real; `x` are the solutions to the last digit."""
 
@@ -38,6 +42,8 @@ def certify_member(family: Family, member: Member, x: ComplexArray) -> ExactCert
         for k, each in enumerate(x):
             middle = polished_balls(equations, each)
             box = prove_box(equations, middle) if middle is not None else None
+            if box is not None and _distance(box, each) > MAX_CORRECTION * np.abs(each).max(initial=1.0):
+                box = None  # that is another solution
             boxes.append(box)
             if box is not None:
                 proved[k], half[k] = True, box.half
@@ -46,3 +52,7 @@ def certify_member(family: Family, member: Member, x: ComplexArray) -> ExactCert
         for k, box in enumerate(boxes):
             real[k] = box is not None and proved[k] and is_own_image(box)
         return ExactCertificates(proved, real, exact)
+
+
+def _distance(box: ProvedBox, x: ComplexArray) -> float:
+    return float(np.abs(np.array([complex(number) for number in box.middle]) - x).max(initial=0.0))
