@@ -257,7 +257,11 @@ def test_dyads_are_alike_only_where_the_numbers_given_to_them_are():
     ("free", "count", "sentence"),
     [
         (("AB.length", "BC.B"), 3, "with the numbers that are free: 3 conditions on the link 'DC' are too many"),
-        (("AB.length", "BC.B", "DC.length", "BC.C"), 4, "1 condition on the link 'AB' is too many, 1 condition on the link"),
+        (
+            ("AB.length", "BC.B", "DC.length", "BC.C"),
+            4,
+            "1 condition on the link 'AB' is too many, 1 condition on the link",
+        ),
         (("AB.length", "DC.length", "BC.B", "BC.C", "AD.A"), 5, "exactly .*: 2 conditions on the link 'DC' are too"),
     ],
 )

@@ -176,5 +176,5 @@ def test_a_dyad_that_slides_twice_and_more_poses_than_a_slide_takes_are_refused_
         planar.synthesise(task(plate, parallel), complete=True)
     five = poses(4, "rod")
     five["poses"].append({"at": [99, -30], "angle": 99})
-    with pytest.raises(planar.BadInput, match="1 condition on .* is too many"):
+    with pytest.raises(planar.BadInput, match=r"1 condition on .* is too many"):
         planar.synthesise(task(crank_and(SWING, G=[5, 10]), five), complete=True)

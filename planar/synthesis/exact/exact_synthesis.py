@@ -87,13 +87,11 @@ def _complete_list(problem: ExactProblem, solved: Sequence[ComponentSolutions], 
     """The list of all linkages, each judged."""
     judge = DesignJudge(problem.task, problem.size, is_exact=True)
     designs: list[ExactDesign] = []
-    far: set[int] = set()
     for labelled, certified, is_far in _linkages(solved):
-        designs.append(_best_design(problem, judge, labelled, certified, len(designs) + 1))
-        if is_far:
-            far.add(id(designs[-1]))
+        design = _best_design(problem, judge, labelled, certified, len(designs) + 1)
+        designs.append(replace(design, is_far=is_far))
         say(f"{count_phrase(len(designs), 'linkage')} judged")
-    designs.sort(key=lambda design: _rank(design, id(design) in far))
+    designs.sort(key=_rank)
     return CompleteSynthesis(problem.task, tuple(designs), (), problem.size, **_list_numbers(solved, designs))
 
 
@@ -108,10 +106,10 @@ def _list_numbers(solved: Sequence[ComponentSolutions], designs: Sequence[ExactD
     }
 
 
-def _rank(design: ExactDesign, is_far: bool) -> tuple[bool, bool, bool, float]:
+def _rank(design: ExactDesign) -> tuple[bool, bool, bool, float]:
     """The sound ones first, then those that are nearly at infinity, and last those whose file differs."""
     error = design.error if np.isfinite(design.error) else np.inf
-    return bool(design.file_difference), is_far, bool(design.defects), error
+    return bool(design.file_difference), design.is_far, bool(design.defects), error
 
 
 def _single_start(task: SynthesisTask) -> Mechanism:

@@ -141,7 +141,7 @@ class ReferencePose:
         def position(mechanism: Mechanism) -> complex:
             spot = name
             if pair is not None:
-                line, original = (each.pairs[places[1][1]].line for each in (mechanism, self.mechanism))
+                line, original = (each.pairs[places[1][1]].line for each in (mechanism, self.mechanism))  # type: ignore[attr-defined]
                 spot = line.to if name == original.to else line.through
             at = link_shape(mechanism.links[index]).position(spot)
             return complex(at.x, at.y)

@@ -18,7 +18,6 @@ from planar.foundation.arrays import BoolArray, ComplexArray
 from planar.synthesis.exact.relations.family import Family, Member
 from planar.synthesis.exact.tracking.member_in_balls import MemberInBalls
 
-
 MAX_CORRECTION = 0.1
 """Of the size of a solution: how far the proved one may be from it."""
 
