@@ -10,7 +10,9 @@ from benchmarks.known_linkages.known_tasks import Verdict, conditions_on_numbers
 from benchmarks.known_linkages.makers import MAKERS, write_mechanism
 from benchmarks.known_linkages.other_solutions import other_solutions
 from planar.foundation.private_cache import disable_cache
+from planar.synthesis.exact.relations.sought_numbers import sought_numbers
 from planar.synthesis.exact.tracking import generic_store
+from planar.synthesis.task.starts import start_mechanisms
 
 LISTS = {
     "four-bar": (2, 14),
@@ -92,3 +94,9 @@ def test_conditions_are_counted_by_the_rank():
     assert judge(task.linkage, task.items, task.angles, task.free) is task.verdict is Verdict.LIST
     assert judge(task.linkage, task.items, task.angles, task.free[:-1]) is Verdict.TOO_MANY
     assert judge(task.linkage, task.items, task.angles, names) is Verdict.OPEN
+
+
+def test_numbers_are_sought_though_a_position_of_the_start_is_a_dead_point():
+    drawn = draw_task("slider-crank", 19)
+    task = planar.read_task(drawn.value)
+    assert sought_numbers(task, next(iter(start_mechanisms(task)))) == drawn.free

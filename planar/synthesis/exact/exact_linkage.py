@@ -30,6 +30,10 @@ Values = dict[int, complex]
 """Of symbols, by their numbers."""
 
 
+class OppositeLineError(ValueError):
+    """A line from its second point to its first one: a solution of the equations that is no linkage."""
+
+
 class ExactLinkage(NamedTuple):
     """A mechanism, the numbers of it that were sought (SI), and where its running input is (n,) at the entries of each
     wanted item of the task, rad or m; `opposite` are links whose length is negative, so that points stand for it."""
@@ -41,7 +45,8 @@ class ExactLinkage(NamedTuple):
 
 
 def exact_linkage(problem: ExactProblem, solution: Mapping[int, complex], name: str) -> ExactLinkage:
-    """The linkage of a real solution, the values of all unknowns. Raises BadInput where no file could say it."""
+    """The linkage of a real solution, the values of all unknowns. Raises BadInput where no file could say it, and
+    OppositeLineError where it is no linkage."""
     return _LinkageWriter(problem, {**problem.first_values(), **solution}).write(name)
 
 
@@ -172,8 +177,10 @@ class _LinkageWriter:
         along_line = None if turn is None else exp(1j * turn)
         if slide.end is not None:
             along_line = evaluate(slide.end.substitute(self.pose.values), self.values) / self.axes[link]
-        if along_line is not None:
-            way = way if (way * along_line.conjugate()).real > 0.0 else -way
+        if along_line is not None and (way * along_line.conjugate()).real < 0.0:
+            if slide.end is not None and name not in self.pose.patched:
+                raise OppositeLineError(f"the line of {name!r} goes the opposite way")
+            way = -way
         if isinstance(slide.through, str) and (link, slide.through) in self.pose.places:
             through = self._own(link, self._world(self.pose.places[link, slide.through]))
         elif given is not None:
