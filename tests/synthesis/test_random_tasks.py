@@ -12,7 +12,7 @@ from benchmarks.known_linkages.other_solutions import other_solutions
 from planar.foundation.private_cache import disable_cache
 from planar.synthesis.exact.relations.sought_numbers import sought_numbers
 from planar.synthesis.exact.tracking import generic_store
-from planar.synthesis.task.starts import start_mechanisms
+from planar.synthesis.task.starts import free_numbers, start_mechanisms
 
 LISTS = {
     "four-bar": (2, 14),
@@ -99,4 +99,5 @@ def test_conditions_are_counted_by_the_rank():
 def test_numbers_are_sought_though_a_position_of_the_start_is_a_dead_point():
     drawn = draw_task("slider-crank", 19)
     task = planar.read_task(drawn.value)
-    assert sought_numbers(task, next(iter(start_mechanisms(task)))) == drawn.free
+    start = next(iter(start_mechanisms(task)))
+    assert sought_numbers(task, start, free_numbers(task, start)) == drawn.free

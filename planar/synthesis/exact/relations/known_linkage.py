@@ -21,7 +21,6 @@ from planar.synthesis.exact.relations.polynomials import Polynomial
 from planar.synthesis.exact.relations.reference_pose import PATCH_ANGLE
 from planar.synthesis.exact.relations.unknowns import NumberKind
 from planar.synthesis.task.freedom import moving_start
-from planar.synthesis.task.starts import free_numbers
 from planar.synthesis.task.synthesis_task import Wanted, WantedFunction, WantedPath
 from planar.synthesis.task.wanted_expressions import wanted_expression
 
@@ -79,8 +78,8 @@ def component_unknowns(component: Component, values: Mapping[int, complex]) -> C
 def sample_linkage(problem: ExactProblem) -> KnownLinkage:
     """A linkage near the start with other values of the numbers that are sought, and what it does at as many entries.
     Raises NoAnswer where it does not move."""
-    task, start = problem.task, problem.mechanism
-    mechanism = moving_start(start, free_numbers(task, start))
+    start = problem.mechanism
+    mechanism = moving_start(start, problem.free_numbers)
     design = design_equations(mechanism)
     motion = cycle(mechanism, POSITIONS, pair=mechanism.inputs[0].pair)
     z, t = design.coordinates_at(motion)
