@@ -18,8 +18,10 @@ from planar.foundation.arrays import BoolArray, ComplexArray
 from planar.synthesis.exact.relations.family import Family, Member
 from planar.synthesis.exact.tracking.member_in_balls import MemberInBalls
 
+SAME = 1e-9
+"""Of the size of a solution: two that are nearer to each other are one."""
 MAX_CORRECTION = 0.1
-"""Of the size of a solution: how far the proved one may be from it."""
+"""Of the size of a solution: one that moves farther as it is polished may have come to another one."""
 
 
 class ExactCertificates(NamedTuple):
@@ -41,17 +43,16 @@ def certify_member(family: Family, member: Member, x: ComplexArray) -> ExactCert
         for k, each in enumerate(x):
             middle = polished_balls(equations, each)
             box = prove_box(equations, middle) if middle is not None else None
-            if box is not None and _distance(box, each) > MAX_CORRECTION * np.abs(each).max(initial=1.0):
-                box = None  # that is another solution
             boxes.append(box)
             if box is not None:
                 proved[k], half[k] = True, box.half
                 exact[k] = [complex(one) for one in box.middle]
+        correction = np.abs(exact - x).max(axis=1, initial=0.0) / np.abs(x).max(axis=1, initial=1.0)
+        for k in np.flatnonzero(correction > MAX_CORRECTION).tolist():
+            distance = np.abs(np.delete(exact, k, axis=0) - exact[k]).max(axis=1, initial=0.0)
+            if distance.min(initial=np.inf) < SAME * np.abs(exact[k]).max(initial=1.0):
+                boxes[k], proved[k], half[k], exact[k] = None, False, np.inf, x[k]  # polished to another one
         proved = apart_boxes(exact, half, proved)
         for k, box in enumerate(boxes):
             real[k] = box is not None and proved[k] and is_own_image(box)
         return ExactCertificates(proved, real, exact)
-
-
-def _distance(box: ProvedBox, x: ComplexArray) -> float:
-    return float(np.abs(np.array([complex(number) for number in box.middle]) - x).max(initial=0.0))
