@@ -309,17 +309,25 @@ def _scan(task: KnownTask, item: Item, numbers: Mapping[str, Any]) -> Array:
     grid = np.linspace(-np.pi, np.pi, GRID)
     if item.inputs is not None and item.is_absolute:
         return item.inputs
-    least = np.full(len(item.targets), np.inf)
-    found = np.zeros(len(item.targets))
-    relative = None if item.inputs is None else item.inputs - item.inputs[0]
-    for signs in _combinations(task):
-        angles = grid[:, None] + (np.zeros(len(item.targets)) if relative is None else relative)
-        rows = np.abs(_rows(task, item, numbers, angles, signs)).max(axis=0)
-        rows = np.where(np.isfinite(rows), rows, np.inf)
-        if relative is not None:
-            rows = np.broadcast_to(rows.max(axis=1, keepdims=True), angles.shape)
-        row = rows.argmin(axis=0)
-        own = rows.min(axis=0)
-        found = np.where(own < least, angles[row, np.arange(len(row))], found)
-        least = np.minimum(own, least)
-    return found
+    count = len(item.targets)
+    least, positions = np.full(count, np.inf), np.zeros(count)
+    relative = np.zeros(count) if item.inputs is None else item.inputs - item.inputs[0]
+    angles = grid[:, None] + relative
+    for first in _combinations(task):
+        misses = []
+        for signs in _combinations(task):
+            rows = np.abs(_rows(task, item, numbers, angles, _entry_signs(count, first, signs))).max(axis=0)
+            misses.append(np.where(np.isfinite(rows), rows, np.inf))
+        miss = np.min(misses, axis=0)
+        if item.inputs is not None:  # all entries go together
+            miss = np.broadcast_to(miss.max(axis=1, keepdims=True), angles.shape)
+        row = miss.argmin(axis=0)
+        is_better = miss.min(axis=0) < least
+        positions = np.where(is_better, angles[row, np.arange(count)], positions)
+        least = np.minimum(miss.min(axis=0), least)
+    return positions
+
+
+def _entry_signs(count: int, first: tuple[float, ...], others: tuple[float, ...]) -> tuple[Array, ...]:
+    """The signs of the assembly at every entry: those of the first one, and those of all others."""
+    return tuple(np.append(one, np.full(count - 1, other)) for one, other in zip(first, others, strict=True))
