@@ -11,7 +11,15 @@ import numpy as np
 
 import planar
 from benchmarks.known_linkages.closed_forms import Position
-from benchmarks.known_linkages.known_tasks import STEP, Item, KnownTask, Verdict, item_rows, jacobian
+from benchmarks.known_linkages.known_tasks import (
+    STEP,
+    Item,
+    KnownTask,
+    Verdict,
+    conditions_on_numbers,
+    item_rows,
+    jacobian,
+)
 from benchmarks.known_linkages.other_solutions import STARTS, other_solutions
 from benchmarks.known_linkages.vectors import Vector
 from planar.foundation.arrays import Array
@@ -140,7 +148,9 @@ def _missing(
     assert known.is_met
     may_exchange = task.linkage.kind == "four-bar" and all(item.inputs is None for item in task.items)
     is_lost = found.complete.startswith("incomplete")
-    same = [design for design, met in listed if is_same(task, known, met, may_exchange)]
+    rows = conditions_on_numbers(*jacobian(task.linkage, task.items, task.angles, task.free))
+    is_movable = len(task.free) > len(rows)  # where the linkage stands is open
+    same = [design for design, met in listed if is_same(task, known, met, may_exchange, is_movable)]
     if not same:
         kind = "the known linkage is missing from " + ("an incomplete list" if is_lost else "a list")
         yield Fault(kind, " | ".join(found.summary))
@@ -149,7 +159,7 @@ def _missing(
     for k, (_, met) in enumerate(listed):
         if any(is_same(task, met, other, may_exchange) for _, other in listed[:k]):
             yield Fault("a linkage is listed twice", f"design {k + 1} of {len(listed)}")
-    if is_lost or not same:
+    if is_lost or not same or is_movable:
         return
     others = [_met_by(task, *each) for each in other_solutions(task, starts)]
     missing = [each for each in others if not any(is_same(task, each, met, may_exchange) for _, met in listed)]
@@ -162,25 +172,30 @@ def _met_by(task: KnownTask, numbers: dict[str, float], angle: float, signs: tup
     return Met(0.0, 0.0, angle, signs, first, numbers)
 
 
-def is_same(task: KnownTask, one: Met, other: Met, may_exchange: bool) -> bool:
-    """Whether two linkages have the same pins at the first entry."""
-    wanted = _features(task, one)
+def is_same(task: KnownTask, one: Met, other: Met, may_exchange: bool, from_frame: bool = False) -> bool:
+    """Whether two linkages have the same pins at the first entry, in the plane or on the frame."""
+    wanted = _features(task, one, from_frame)
     size = max(abs(each - next(iter(wanted.values()))) for each in wanted.values()) + 1e-9
-    has = _features(task, other)
+    has = _features(task, other, from_frame)
     names: list[dict[str, str]] = [{}, EXCHANGED] if may_exchange else [{}]
     return any(
         all(abs(has[name] - wanted[names_.get(name, name)]) < SAME * size for name in wanted) for names_ in names
     )
 
 
-def _features(task: KnownTask, met: Met) -> dict[str, complex]:
-    """Places by which linkages are told from each other: pins, P, and the direction of a line up to a half turn."""
+def _features(task: KnownTask, met: Met, from_frame: bool) -> dict[str, complex]:
+    """Places by which linkages are told from each other: pins, P, and the direction of a line up to a half turn; on
+    the frame, or in the plane."""
     position = met.first
     found = {name: _complex(pin) for name, pin in position.pins.items()}
     if task.linkage.structure.coupler is not None and any(item.what != "function" for item in task.items):
         found["P"] = _complex(position.place(met.numbers, task.linkage.structure.coupler, "P"))
     if position.line is not None:
         found["line"] = _complex(position.line) ** 2
+    if from_frame:
+        origin, output = found[task.linkage.structure.inputs], task.linkage.structure.output
+        way = _complex(position.line) if position.line is not None and output == "s" else found[output] - origin
+        found = {name: z / (way / abs(way)) ** 2 if name == "line" else (z - origin) / way for name, z in found.items()}
     return found
 
 
@@ -294,17 +309,25 @@ def _scan(task: KnownTask, item: Item, numbers: Mapping[str, Any]) -> Array:
     grid = np.linspace(-np.pi, np.pi, GRID)
     if item.inputs is not None and item.is_absolute:
         return item.inputs
-    least = np.full(len(item.targets), np.inf)
-    found = np.zeros(len(item.targets))
-    relative = None if item.inputs is None else item.inputs - item.inputs[0]
-    for signs in _combinations(task):
-        angles = grid[:, None] + (np.zeros(len(item.targets)) if relative is None else relative)
-        rows = np.abs(_rows(task, item, numbers, angles, signs)).max(axis=0)
-        rows = np.where(np.isfinite(rows), rows, np.inf)
-        if relative is not None:
-            rows = np.broadcast_to(rows.max(axis=1, keepdims=True), angles.shape)
-        row = rows.argmin(axis=0)
-        own = rows.min(axis=0)
-        found = np.where(own < least, angles[row, np.arange(len(row))], found)
-        least = np.minimum(own, least)
-    return found
+    count = len(item.targets)
+    least, positions = np.full(count, np.inf), np.zeros(count)
+    relative = np.zeros(count) if item.inputs is None else item.inputs - item.inputs[0]
+    angles = grid[:, None] + relative
+    for first in _combinations(task):
+        misses = []
+        for signs in _combinations(task):
+            rows = np.abs(_rows(task, item, numbers, angles, _entry_signs(count, first, signs))).max(axis=0)
+            misses.append(np.where(np.isfinite(rows), rows, np.inf))
+        miss = np.min(misses, axis=0)
+        if item.inputs is not None:  # all entries go together
+            miss = np.broadcast_to(miss.max(axis=1, keepdims=True), angles.shape)
+        row = miss.argmin(axis=0)
+        is_better = miss.min(axis=0) < least
+        positions = np.where(is_better, angles[row, np.arange(count)], positions)
+        least = np.minimum(miss.min(axis=0), least)
+    return positions
+
+
+def _entry_signs(count: int, first: tuple[float, ...], others: tuple[float, ...]) -> tuple[Array, ...]:
+    """The signs of the assembly at every entry: those of the first one, and those of all others."""
+    return tuple(np.append(one, np.full(count - 1, other)) for one, other in zip(first, others, strict=True))

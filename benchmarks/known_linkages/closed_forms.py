@@ -53,6 +53,9 @@ SECOND_ENDS = {"g": "D", "AB": "B", "BC": "C", "DC": "C", "EF": "F", "GF": "F", 
 """The second of the ends of links that may be written by ends."""
 
 
+Kinematics = Callable[[Numbers, Any, tuple[Any, ...]], Position]
+
+
 class _Builder:
     """The position of a linkage as its parts are added."""
 
@@ -145,25 +148,18 @@ def slider_crank(numbers: Numbers, angle: Any, signs: tuple[Any, ...]) -> Positi
     return made.position(displacement, line)
 
 
-def swinging_block(numbers: Numbers, angle: Any, signs: tuple[Any, ...]) -> Position:
-    """Frame f with O and D, crank c, a rod whose line "s" goes through D."""
-    made = _Builder(numbers, "f")
-    made.crank("c", "O", "A", angle)
-    made.fix("D")
-    line = made.line_through("rod", "A", "D", signs[0])
-    return made.position(line, line)
+def inverted_slider(pin: str, other: str) -> Kinematics:
+    """The closed form of a frame f with O and D, a crank c with A, and a link "rod" with a pin and a line "s" through
+    the other one of A and D: a swinging block, whose output is the line, or a slotted lever."""
 
+    def kinematics(numbers: Numbers, angle: Any, signs: tuple[Any, ...]) -> Position:
+        builder = _Builder(numbers, "f")
+        builder.crank("c", "O", "A", angle)
+        builder.fix("D")
+        line = builder.line_through("rod", pin, other, signs[0])
+        return builder.position(line if other == "D" else builder.directions["rod"], line)
 
-def slotted_lever(numbers: Numbers, angle: Any, signs: tuple[Any, ...]) -> Position:
-    """Frame f with O and D, crank c, a lever "rod" about D whose line "s" goes through the crank's pin."""
-    made = _Builder(numbers, "f")
-    made.crank("c", "O", "A", angle)
-    made.fix("D")
-    line = made.line_through("rod", "D", "A", signs[0])
-    return made.position(made.directions["rod"], line)
-
-
-Kinematics = Callable[[Numbers, Any, tuple[Any, ...]], Position]
+    return kinematics
 
 
 class Structure(NamedTuple):
@@ -183,7 +179,7 @@ class Structure(NamedTuple):
 STRUCTURES = {
     "four-bar": Structure(four_bar, 1, "g", "A", "D", "BC", (("A", "B"), ("D", "C"))),
     "slider-crank": Structure(slider_crank, 1, "f", "O", "s", "rod"),
-    "swinging block": Structure(swinging_block, 1, "f", "O", "D", "rod"),
-    "slotted lever": Structure(slotted_lever, 1, "f", "O", "D", None),
+    "swinging block": Structure(inverted_slider("A", "D"), 1, "f", "O", "D", "rod"),
+    "slotted lever": Structure(inverted_slider("D", "A"), 1, "f", "O", "D", None),
     "Watt II": Structure(watt_two, 2, "g", "A", "G", None),
 }

@@ -142,35 +142,24 @@ def slider_crank(rng: np.random.Generator) -> KnownLinkage:
     return _finish("slider-crank", made, a - o, "c", line, bool(rng.random() < 0.5))
 
 
-def swinging_block(rng: np.random.Generator) -> KnownLinkage:
-    """An inverted slider-crank: the rod slides through a block about D."""
-    o, a, d, p = _places(rng, 0.0, 0.4j, 1.5, 0.7 + 0.5j)
-    made = _Writer(rng)
-    made.frame("f", {"O": o, "D": d}, False)
-    made.link("c", {"O": o, "A": a})
-    _rod_with_line(made, "A", a, d, {"P": p})
-    return _finish("swinging block", made, a - o, "c", "point", True)
+def inverted_slider(kind: str, pin: str) -> Callable[[np.random.Generator], KnownLinkage]:
+    """The maker of a kind of inverted slider-crank: the pin of the rod is the crank's A, and the rod slides through a
+    block about D, or it is D, and the crank's pin slides along the rod."""
 
+    def make(rng: np.random.Generator) -> KnownLinkage:
+        o, a, d, p = _places(rng, 0.0, 0.4j, 1.5, 0.7 + 0.5j)
+        writer = _Writer(rng)
+        writer.frame("f", {"O": o, "D": d}, False)
+        writer.link("c", {"O": o, "A": a})
+        place, other = (a, d) if pin == "A" else (d, a)
+        way = np.exp(1j * rng.uniform(-np.pi, np.pi))
+        origin = place if rng.random() < 0.6 else complex(*rng.uniform(-1.0, 1.0, 2))
+        through = place + complex(*rng.uniform(-0.3, 0.3, 2)) if rng.random() < 0.7 else place + 0.0j
+        writer.drawn("rod", {pin: place, "G": through, "P": p}, origin, way)
+        writer.numbers["s.line.angle"] = float(np.angle((other - through) / way * rng.choice([1.0, -1.0])))
+        return _finish(kind, writer, a - o, "c", "point", True)
 
-def slotted_lever(rng: np.random.Generator) -> KnownLinkage:
-    """An inverted slider-crank: the crank's pin slides along a lever about D."""
-    o, a, d, p = _places(rng, 0.0, 0.4j, 1.5, 0.7 + 0.5j)
-    made = _Writer(rng)
-    made.frame("f", {"O": o, "D": d}, False)
-    made.link("c", {"O": o, "A": a})
-    _rod_with_line(made, "D", d, a, {"P": p})
-    return _finish("slotted lever", made, a - o, "c", "point", True)
-
-
-def _rod_with_line(made: _Writer, pin: str, place: Place, other: Place, more: dict[str, Place]) -> None:
-    """A link with a pin, and a line through its point G at an angle, on which the other place is."""
-    rng = made.rng
-    way = np.exp(1j * rng.uniform(-np.pi, np.pi))
-    origin = place if rng.random() < 0.6 else complex(*rng.uniform(-1.0, 1.0, 2))
-    through = place + complex(*rng.uniform(-0.3, 0.3, 2)) if rng.random() < 0.7 else place + 0.0j
-    off = other - through
-    made.drawn("rod", {pin: place, "G": through, **more}, origin, way)
-    made.numbers["s.line.angle"] = float(np.angle(off / way * rng.choice([1.0, -1.0])))
+    return make
 
 
 def _finish(kind: str, made: _Writer, crank: Place, link: str, line: str = "", is_block: bool = False) -> KnownLinkage:
@@ -188,8 +177,8 @@ def _finish(kind: str, made: _Writer, crank: Place, link: str, line: str = "", i
 MAKERS: dict[str, Callable[[np.random.Generator], KnownLinkage]] = {
     "four-bar": four_bar,
     "slider-crank": slider_crank,
-    "swinging block": swinging_block,
-    "slotted lever": slotted_lever,
+    "swinging block": inverted_slider("swinging block", "A"),
+    "slotted lever": inverted_slider("slotted lever", "D"),
     "Watt II": watt_two,
 }
 

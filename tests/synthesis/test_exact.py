@@ -249,7 +249,7 @@ def test_what_is_no_solution_is_not_certified():
     ("value", "said"),
     [
         (task({"chains": [4]}, {"point": "P", "through": [[0, 0]]}), "that of one mechanism"),
-        (task("four-bar", {"point": "E", "through": [[k, k * k] for k in range(10)]}), "can meet 1 condition less"),
+        (task("four-bar", {"point": "E", "through": [[k, k * k] for k in range(10)]}), "1 condition on .* is too many"),
         (
             task("stephenson-3-five-bar", {"point": "E", "through": [[k, k * k] for k in range(9)]}),
             "more than one unknown turn",

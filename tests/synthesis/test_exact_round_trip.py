@@ -256,9 +256,13 @@ def test_dyads_are_alike_only_where_the_numbers_given_to_them_are():
 @pytest.mark.parametrize(
     ("free", "count", "sentence"),
     [
-        (("AB.length", "BC.B"), 3, "with the numbers that are free: the link 'DC' can meet 3 conditions less"),
-        (("AB.length", "BC.B", "DC.length", "BC.C"), 4, "link 'AB' can meet 1 condition less than is wanted, the link"),
-        (("AB.length", "DC.length", "BC.B", "BC.C", "AD.A"), 5, "exactly .*: the link 'DC' can meet 2 conditions less"),
+        (("AB.length", "BC.B"), 3, "with the numbers that are free: 3 conditions on the link 'DC' are too many"),
+        (
+            ("AB.length", "BC.B", "DC.length", "BC.C"),
+            4,
+            "1 condition on the link 'AB' is too many, 1 condition on the link",
+        ),
+        (("AB.length", "DC.length", "BC.B", "BC.C", "AD.A"), 5, "exactly .*: 2 conditions on the link 'DC' are too"),
     ],
 )
 def test_a_part_that_cannot_meet_its_conditions_is_refused_by_its_links(free, count, sentence):

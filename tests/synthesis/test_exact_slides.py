@@ -2,9 +2,14 @@
 
 import numpy as np
 import pytest
+from planar.synthesis.exact.tracking.exact_certificates import certify_member
 
 import planar
 from planar.foundation.jets import value_and_rates
+from planar.foundation.private_cache import disable_cache
+from planar.synthesis.exact.relations.exact_problem import ExactProblem
+from planar.synthesis.exact.tracking import generic_store
+from planar.synthesis.task.starts import start_mechanisms
 
 UNITS = {"length": "mm", "angle": "deg"}
 POSES = [(0, 0, 0), (30, 20, 25), (70, 25, 60), (95, 5, 80)]
@@ -145,7 +150,7 @@ def test_four_poses_of_a_rod_on_two_slides_are_those_of_the_one_that_made_them()
 def test_two_slides_that_are_alike_can_not_take_four_poses():
     """Every pin on a circle of Cardan's stays on a line: two that do leave no other condition to be met."""
     second = {"sliding": "other", "on": "frame", "block": "B", "line": {"through": "Q", "angle": 110}}
-    with pytest.raises(planar.BadInput, match="'block B' can meet 1 condition less than is wanted and has 1"):
+    with pytest.raises(planar.BadInput, match="'block B' is too many and 1 number of it stays open"):
         planar.synthesise(task(slides_at_both_ends(second), poses(4, "rod")), complete=True)
 
 
@@ -176,5 +181,70 @@ def test_a_dyad_that_slides_twice_and_more_poses_than_a_slide_takes_are_refused_
         planar.synthesise(task(plate, parallel), complete=True)
     five = poses(4, "rod")
     five["poses"].append({"at": [99, -30], "angle": 99})
-    with pytest.raises(planar.BadInput, match="can meet 1 condition less"):
+    with pytest.raises(planar.BadInput, match=r"1 condition on .* is too many"):
         planar.synthesise(task(crank_and(SWING, G=[5, 10]), five), complete=True)
+
+
+def slider_crank(end, crank, rod):
+    """A slider-crank whose line goes through G to a second point H."""
+    return {
+        "planar": 1,
+        "units": {"length": "m", "angle": "rad"},
+        "frame": "f",
+        "links": {
+            "f": {"points": {"O": [0, 0], "G": [0.05, 0.12], "H": [2, end]}},
+            "c": {"ends": ["O", "A"], "length": crank},
+            "rod": {"ends": ["A", "B"], "length": rod},
+        },
+        "pairs": [
+            {"turning": "O"},
+            {"turning": "A"},
+            {"sliding": "s", "on": "f", "block": "B", "line": {"through": "G", "to": "H"}},
+        ],
+        "inputs": [{"pair": "O", "position": 1}],
+        "sketch": {"B": [1, 0.2]},
+    }
+
+
+def slider_pairs(angles):
+    """Displacements along the line with H at y = 0.3 m of a crank of 0.35 m and a rod of 0.8 m."""
+    turn = np.exp(-1j * np.angle(1.95 + 0.18j))
+    pin = (0.35 * np.exp(1j * np.array(angles)) - (0.05 + 0.12j)) * turn
+    return np.stack([angles, pin.real + np.sqrt(0.64 - pin.imag**2)], axis=1).tolist()
+
+
+@pytest.mark.parametrize(
+    ("start", "free", "others"),
+    [
+        (slider_crank(0.3, 0.3, 0.9), {"c.length": 0.35, "rod.length": 0.8}, 0),
+        (slider_crank(0.31, 0.3, 0.9), {"c.length": 0.35, "rod.length": 0.8, "f.H.y": 0.3}, 0),
+        (slider_crank(0.31, 0.35, 0.8), {"f.H.y": 0.3}, 1),
+    ],
+)
+def test_lines_through_two_points_are_given_or_sought_by_their_coordinates(monkeypatch, start, free, others):
+    """Solutions whose line goes from H to G are no linkages, and are not listed."""
+    monkeypatch.setattr(generic_store, "trace_test", lambda *_, **__: True)
+    wanted = {"from": "O", "to": "s", "pairs": slider_pairs([0.3, 0.9, 1.6][: len(free)]), "absolute": True}
+    value = {"planar": 1, "units": start["units"], "start": start, "wanted": [wanted], "free": [*free]}
+    with disable_cache():
+        designs = planar.synthesise(value, complete=True)
+    assert len(designs) == 1 + others and all(design.certified for design in designs)
+    assert any(design.numbers == pytest.approx(free, abs=1e-9) for design in designs)
+
+
+def test_a_path_that_ends_nearly_at_infinity_is_not_the_solution_to_which_it_is_polished():
+    """Of three absolute pairs of an offset slider-crank Freudenstein's equations, linear, have one solution."""
+    start = slider_crank(0.12, 0.3, 0.9)
+    start["links"]["f"]["points"] = {"O": [0, 0], "G": [0, 0.05]}
+    start["pairs"][2]["line"] = {"through": "G", "angle": 0}
+    angles = np.array([0.3, 0.8, 1.2])
+    displacements = 0.35 * np.cos(angles) + np.sqrt(0.64 - (0.35 * np.sin(angles) - 0.12) ** 2)
+    wanted = {"from": "O", "to": "s", "pairs": np.stack([angles, displacements], axis=1).tolist(), "absolute": True}
+    free = ["c.length", "rod.length", "f.G.y"]
+    read = planar.read_task({"planar": 1, "units": start["units"], "start": start, "wanted": [wanted], "free": free})
+    (component,) = ExactProblem(read, next(iter(start_mechanisms(read)))).components
+    solution = np.array([0.371519746 + 0.114924525j, 1.26021799 + 0.13333333j])
+    end = np.array([-5.99254229e-08 - 1.24069954e-08j, 3.98314693e04 + 2.13973812e04j])
+    conjugate_end = np.array([-6.77674777e-08 + 5.11617918e-08j, -3.98314316e04 - 2.13974101e04j])
+    x = np.array([[*solution, *solution.conj()], [*end, *conjugate_end]])
+    assert certify_member(component.family, component.member, x).proved.tolist() == [True, False]

@@ -16,12 +16,13 @@ class ExactDesign(SynthesisedDesign):
     """A linkage that meets a task exactly. `certified`: a box of its own is proved to hold it and no other, and its own
     file, read again, meets every entry to round-off in some assembly; defective ones are listed, too, and say so in
     `defects` and `shortages`. `numbers` are those that were sought, by name (SI); links that are `opposite` have a
-    negative length, and points in its place. `file_difference` says how the file differs from the solution of the
-    equations, which is no defect of the design; empty where it does not."""
+    negative length, and points in its place. One that `is_far` is nearly at infinity. `file_difference` says how the
+    file differs from the solution of the equations, which is no defect of the design; empty where it does not."""
 
     certified: bool = False
     opposite: tuple[str, ...] = ()
     file_difference: str = ""
+    is_far: bool = False
 
     def __repr__(self) -> str:
         word = "certified" if self.certified else "not certified"

@@ -30,6 +30,10 @@ Values = dict[int, complex]
 """Of symbols, by their numbers."""
 
 
+class OppositeLineError(ValueError):
+    """A line from its second point to its first one: a solution of the equations that is no linkage."""
+
+
 class ExactLinkage(NamedTuple):
     """A mechanism, the numbers of it that were sought (SI), and where its running input is (n,) at the entries of each
     wanted item of the task, rad or m; `opposite` are links whose length is negative, so that points stand for it."""
@@ -41,7 +45,8 @@ class ExactLinkage(NamedTuple):
 
 
 def exact_linkage(problem: ExactProblem, solution: Mapping[int, complex], name: str) -> ExactLinkage:
-    """The linkage of a real solution, the values of all unknowns. Raises BadInput where no file could say it."""
+    """The linkage of a real solution, the values of all unknowns. Raises BadInput where no file could say it, and
+    OppositeLineError where it is no linkage."""
     return _LinkageWriter(problem, {**problem.first_values(), **solution}).write(name)
 
 
@@ -163,15 +168,19 @@ class _LinkageWriter:
 
     def _note_line(self, slide: SlidingRow) -> None:
         """The numbers of a line that are sought, and how far its slider is from what it goes through."""
-        link, name = slide.pair.bodies[0], slide.pair.name
+        (link, block), name = slide.pair.links, slide.pair.name
         way = self._way(slide.direction) / self.axes[link]
         slider = self._own(link, self._world(slide.slider))
         at = self.pose.coordinates(link, slide.through, slide.pair)
-        angle = self.pose.line_angle(name)
+        turn = self.pose.line_turn(slide.pair)
         given = self.problem.first_slides.get(name)
-        if angle is not None and angle not in self.pose.free:
-            drawn = exp(1j * float(self.pose.numbers[angle].value))
-            way = way if (way * drawn.conjugate()).real > 0.0 else -way
+        along_line = None if turn is None else exp(1j * turn)
+        if slide.end is not None:
+            along_line = evaluate(slide.end.substitute(self.pose.values), self.values) / self.axes[link]
+        if along_line is not None and (way * along_line.conjugate()).real < 0.0:
+            if slide.end is not None and name not in self.pose.patched:
+                raise OppositeLineError(f"the line of {name!r} goes the opposite way")
+            way = -way
         if isinstance(slide.through, str) and (link, slide.through) in self.pose.places:
             through = self._own(link, self._world(self.pose.places[link, slide.through]))
         elif given is not None:
@@ -179,10 +188,12 @@ class _LinkageWriter:
         else:
             through = self._place_on_line(slider, way, at, link)
         along = ((slider - through) * way.conjugate()).real
-        if angle is not None and angle in self.pose.free:
+        if along_line is None:
             if along < 0.0 and name in self.pose.patched:
                 way, along = -way, -along
-            self.numbers[angle] = phase(way)
+            self.numbers[f"{name}.line.angle"] = phase(way)
+        if f"{name}.turn" in self.pose.free and block in self.pose.axes:
+            self.numbers[f"{name}.turn"] = phase(self.axes[block] / (way * self.axes[link]))
         self._note(at, through)
         self.displacements[name] = along
         self.lines[name] = way * self.axes[link]
@@ -254,8 +265,8 @@ class _AxesRows:
         is_elsewhere = (self.name, slide.through) in pose.places
         if given is not None and not is_elsewhere:
             self.points.append((slider - given(writer.problem.items[0]) * way, at))
-        angle = pose.line_angle(slide.pair.name)
-        turn = None if angle is None or angle in pose.free else exp(1j * float(pose.numbers[angle].value))
+        line_turn = pose.line_turn(slide.pair)
+        turn = None if line_turn is None else exp(1j * line_turn)
         has_place = given is None and not is_elsewhere and all(at.is_given)
         self.lines.append((slider, way, turn, at.value if has_place else None))
 

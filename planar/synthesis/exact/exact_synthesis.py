@@ -16,7 +16,7 @@ from planar.model.wording import count_phrase
 from planar.synthesis.design_search import DesignSearch
 from planar.synthesis.exact.complete_synthesis import CompleteSynthesis, DyadCurve, ExactDesign
 from planar.synthesis.exact.dyad_curves import dyad_curve, is_dyad
-from planar.synthesis.exact.exact_linkage import ExactLinkage, exact_linkage
+from planar.synthesis.exact.exact_linkage import ExactLinkage, OppositeLineError, exact_linkage
 from planar.synthesis.exact.list_words import completeness, counted_class, file_difference, list_remarks, solution_count
 from planar.synthesis.exact.relations.condition_count import count_parts
 from planar.synthesis.exact.relations.exact_problem import Component, ExactProblem
@@ -84,13 +84,12 @@ def _complete_list(problem: ExactProblem, solved: Sequence[ComponentSolutions], 
     """The list of all linkages, each judged."""
     judge = DesignJudge(problem.task, problem.size, is_exact=True)
     designs: list[ExactDesign] = []
-    far: set[int] = set()
     for labelled, certified, is_far in _linkages(solved):
-        designs.append(_best_design(problem, judge, labelled, certified, len(designs) + 1))
-        if is_far:
-            far.add(id(designs[-1]))
+        design = _best_design(problem, judge, labelled, certified, len(designs) + 1)
+        if design is not None:
+            designs.append(replace(design, is_far=is_far))
         say(f"{count_phrase(len(designs), 'linkage')} judged")
-    designs.sort(key=lambda design: _rank(design, id(design) in far))
+    designs.sort(key=_rank)
     return CompleteSynthesis(problem.task, tuple(designs), (), problem.size, **_list_numbers(solved, designs))
 
 
@@ -105,10 +104,10 @@ def _list_numbers(solved: Sequence[ComponentSolutions], designs: Sequence[ExactD
     }
 
 
-def _rank(design: ExactDesign, is_far: bool) -> tuple[bool, bool, bool, float]:
+def _rank(design: ExactDesign) -> tuple[bool, bool, bool, float]:
     """The sound ones first, then those that are nearly at infinity, and last those whose file differs."""
     error = design.error if np.isfinite(design.error) else np.inf
-    return bool(design.file_difference), is_far, bool(design.defects), error
+    return bool(design.file_difference), design.is_far, bool(design.defects), error
 
 
 def _single_start(task: SynthesisTask) -> Mechanism:
@@ -168,19 +167,21 @@ def _exchanged(one: ComponentSolutions, row: int) -> list[dict[int, complex]]:
 
 def _best_design(
     problem: ExactProblem, judge: DesignJudge, labelled: list[dict[int, complex]], certified: bool, number: int
-) -> ExactDesign:
-    """A linkage with its links named so that it has the fewest defects."""
-    found: list[ExactDesign] = []
-    for each in labelled:
+) -> ExactDesign | None:
+    """A linkage with its links named so that it has the fewest defects; None for a solution that is no linkage."""
+    designs: list[ExactDesign] = []
+    for values in labelled:
         try:
-            linkage = exact_linkage(problem, each, f"{problem.task.name}: {problem.mechanism.name} {number}")
-        except BadInput as problem_found:
-            found.append(_unwritten(problem, certified, f"no file could say it: {problem_found.sentence}"))
+            linkage = exact_linkage(problem, values, f"{problem.task.name}: {problem.mechanism.name} {number}")
+        except OppositeLineError:
             continue
-        found.append(_judged(problem, judge, linkage, certified))
-        if not found[-1].defects and not found[-1].file_difference:
+        except BadInput as error:
+            designs.append(_unwritten(problem, certified, f"no file could say it: {error.sentence}"))
+            continue
+        designs.append(_judged(problem, judge, linkage, certified))
+        if not designs[-1].defects and not designs[-1].file_difference:
             break
-    return min(found, key=lambda each: (bool(each.file_difference), len(each.defects)))
+    return min(designs, key=lambda design: (bool(design.file_difference), len(design.defects)), default=None)
 
 
 def _unwritten(problem: ExactProblem, certified: bool, why: str) -> ExactDesign:

@@ -38,6 +38,8 @@ RANDOM_STARTS = 24
 """Of mechanisms at random, more and more different from a start that does not move."""
 LEAST_POSITIONS = 24
 """Of a motion, at which derivatives are taken."""
+NEARLY_SINGULAR = 1e6
+"""Of the median of derivatives: a position with greater ones is a dead point."""
 MOVES = 4
 """Along x, along y, a turn, growth."""
 
@@ -201,7 +203,8 @@ def _result_rows(mechanism: Mechanism, wanted: Sequence[Wanted], free: FreeNumbe
     system = ImplicitSystem([Level(design.z, design.F)], design.t)
     whole = ca.vertcat(*results)
     found = system.slopes(system.result_jacobians(whole), [z[0]], t)
-    regular = ~found.is_singular
+    sizes = np.abs(found.slopes).max(axis=(1, 2), initial=0.0)
+    regular = ~found.is_singular & (sizes <= NEARLY_SINGULAR * np.median(sizes))
     values = np.array(ca.Function("values", [design.z, design.t], [whole])(z[0][regular].T, t[regular].T)).T
     units = [
         design.solver.unit if _is_length(mechanism, item, part) else 1.0

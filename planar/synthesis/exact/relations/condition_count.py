@@ -37,10 +37,15 @@ class PartCount(NamedTuple):
     @property
     def sentence(self) -> str:
         """What it cannot meet, or what stays open, in words."""
-        verb = "have" if len(self.links) > 1 else "has"
-        told = [f"can meet {count_phrase(self.excess, 'condition')} less than is wanted"] if self.excess else []
-        told += [f"{verb} {count_phrase(self.open, 'number')} more"] if self.open else []
-        return f"{self.name} {' and '.join(told)}"
+        parts = []
+        if self.excess:
+            verb = "is" if self.excess == 1 else "are"
+            parts.append(f"{count_phrase(self.excess, 'condition')} on {self.name} {verb} too many")
+        if self.open:
+            verb = "stays" if self.open == 1 else "stay"
+            name = self.name if not self.excess else "it" if len(self.links) < 2 else "them"
+            parts.append(f"{count_phrase(self.open, 'number')} of {name} {verb} open")
+        return " and ".join(parts)
 
 
 def count_parts(problem: ExactProblem) -> tuple[PartCount, ...]:

@@ -23,6 +23,7 @@ from planar.synthesis.exact.relations.reference_pose import LinkAxes, ReferenceP
 from planar.synthesis.exact.relations.sought_numbers import sought_numbers
 from planar.synthesis.exact.relations.unknowns import GivenNumber, NumberKind, refuse
 from planar.synthesis.fitting.wanted_equations import wanted_size
+from planar.synthesis.task.starts import free_numbers
 from planar.synthesis.task.synthesis_task import SynthesisTask, Wanted, WantedFunction, WantedPath, WantedPoses
 
 
@@ -48,7 +49,8 @@ class ExactProblem:
     def __init__(self, task: SynthesisTask, mechanism: Mechanism):
         self.task, self.mechanism = task, mechanism
         self.items = _ordered_items(task, mechanism)
-        self.free = sought_numbers(task, mechanism)
+        self.free_numbers = free_numbers(task, mechanism)
+        self.free = sought_numbers(task, mechanism, self.free_numbers)
         self.pose = ReferencePose(mechanism, self.free)
         self.place: Polynomial | None = None
         "of what the first item places, at its first entry"

@@ -12,6 +12,7 @@ from functools import cached_property
 from typing import NamedTuple
 
 from planar.model.link_shapes import Link
+from planar.model.pairs.sliding import SlidingPair
 from planar.synthesis.exact.relations.polynomials import Polynomial, as_polynomial
 from planar.synthesis.exact.relations.reference_pose import Coordinates, LinkAxes, ReferencePose, SlidingRow
 from planar.synthesis.exact.relations.unknowns import NumberKind
@@ -41,14 +42,18 @@ def add_given_numbers(
 ) -> None:
     """The conditions of all numbers that are given, with displacements that are known at the first entry;
     `known_slides` are pairs of which entries say how far they slide."""
-    frame = pose.mechanism.frame
+    parts = []
     for link in pose.mechanism.links:
-        lines = [_Line(pose, each, displacements) for each in pose.slides if each.pair.bodies[0] == link.name]
-        if link.name == frame:
-            for each in lines:
-                each.add_to_frame()
+        lines = [_Line(pose, slide, displacements) for slide in pose.slides if slide.pair.links[0] == link.name]
+        if link.name == pose.mechanism.frame:
+            for line in lines:
+                line.add_to_frame()
         else:
-            _LinkConditions(pose, link, lines).add()
+            parts.append(_LinkConditions(pose, link, lines))
+    while parts:  # first those links of which directions are known
+        part = next((part for part in parts if part.find_direction() is not None), parts[0])
+        parts.remove(part)
+        part.add()
     for slide in pose.slides:
         pose.seek_direction(slide.pair.name, slide.pair.name in known_slides)
 
@@ -60,8 +65,8 @@ class _Line:
         self.pose, self.slide, self.link = pose, slide, slide.pair.bodies[0]
         self.is_elsewhere = isinstance(slide.through, str) and (self.link, slide.through) in pose.places
         "whether it goes through a place that is another's, too"
-        self.angle = pose.line_angle(slide.pair.name)
-        self.has_angle = self.angle is not None and self.angle not in pose.free
+        self.turn = pose.line_turn(slide.pair)
+        "the angle in the axes of its link, where it is given (rad)"
         self.through: Polynomial | None = None
         "the place from which displacements count, where one is known"
         self.along: Polynomial | None = None
@@ -78,14 +83,15 @@ class _Line:
     def has_place(self) -> bool:
         """Whether no number that is sought moves it across itself."""
         steps = [step for step, is_given in zip((1.0, 1.0j), self.at.is_given, strict=True) if not is_given]
-        if not self.has_angle:
+        if self.turn is None:
             return not steps
-        assert self.angle is not None
-        back = exp(-1j * float(self.pose.numbers[self.angle].value))
+        back = exp(-1j * self.turn)
         return all(abs((step * back).imag) < PARALLEL for step in steps)
 
     def add_elsewhere(self) -> None:
-        """That it goes through a place that is another's, too."""
+        """That it goes through places of points."""
+        if self.slide.end is not None:
+            self.add_across(self.slide.end)
         off = _now(self.pose, self.slide.slider - self.pose.place(self.link, str(self.slide.through)))
         if self.along is not None:
             self.pose.tie(off - self.along)
@@ -133,7 +139,13 @@ class _LinkConditions:
             if each.through is not None
         ]
         self.offsets = [each for each in others if each.through is None and each.has_place]
-        self.angles = [each for each in lines if each.has_angle]
+        self.turns = [(line.slide, self._turn(line.turn)) for line in lines if line.turn is not None]
+        "slides with the direction of their lines in the axes of the link"
+        for slide in pose.slides:
+            pair = slide.pair
+            if pair.links[1] == link.name and isinstance(pair, SlidingPair) and f"{pair.name}.turn" not in pose.free:
+                turn = self._turn(-pair.block_angle) if pair.block_angle else as_polynomial(1.0)
+                self.turns.append((slide, turn))
         self.direction, self.origin = pose.axes.get(link.name, LinkAxes(None, None))
         self.anchors = self._anchors()
 
@@ -171,24 +183,32 @@ class _LinkConditions:
             self.origin = self.pose.table.add_unknown().value
             self.anchors = [_Anchor("", self.origin, 0.0)] * 2
         rest = self._rest()
-        count = sum(x + y for _, x, y in rest) + len(self.angles) + len(self.offsets)
+        count = sum(x + y for _, x, y in rest) + len(self.turns) + len(self.offsets)
         if self.direction is None:
             if count < 2:
                 return
-            if not self.angles and not self.offsets and count == 2 and len(rest) == 1:
+            if not self.turns and not self.offsets and count == 2 and len(rest) == 1:
                 self._add_distance(rest[0][0])
                 return
-            self.direction = self._sought_direction()
-        way = self.direction
+        way = self.find_direction() or self._sought_direction()
         self.pose.axes[self.link.name] = LinkAxes(way, self.origin)
-        for line in self.angles:
-            assert line.angle is not None
-            turn = self.pose.table.add_given(NumberKind.TURN, float(self.pose.numbers[line.angle].value)).value
-            self.pose.tie(line.slide.direction - way * turn)
+        for slide, turn in self.turns:
+            self.pose.tie(slide.direction - way * turn)
         for point, x, y in rest:
             self._add_point(point, (x, y), way)
         for line in self.offsets:
             line.add_across(self._offset(line, way))
+
+    def find_direction(self) -> Polynomial | None:
+        """The x-axis, where it is known, or that of a line is."""
+        for slide, turn in self.turns:
+            if self.direction is None and self.pose.is_known(slide.direction):
+                self.direction = slide.direction * turn.conjugate
+                self.turns = [other for other in self.turns if other[0] is not slide]
+        return self.direction
+
+    def _turn(self, angle: float) -> Polynomial:
+        return self.pose.table.add_given(NumberKind.TURN, angle).value
 
     def _sought_direction(self) -> Polynomial:
         way = self.pose.table.add_unknown().value

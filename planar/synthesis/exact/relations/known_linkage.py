@@ -9,19 +9,18 @@ import casadi as ca
 import numpy as np
 
 from planar.derivatives.design_equations import design_equations
-from planar.document.dimensions import file_dimensions
 from planar.foundation.arrays import Array, ComplexArray
 from planar.foundation.errors import NoAnswer, Outcome
 from planar.foundation.jets import value_and_rates
 from planar.model.link_shapes import link_shape
 from planar.model.mechanism import Mechanism
+from planar.model.pairs.guide_line import GuidedPair
 from planar.solving.cycle import cycle
 from planar.synthesis.exact.relations.exact_problem import Component, ExactProblem
 from planar.synthesis.exact.relations.polynomials import Polynomial
 from planar.synthesis.exact.relations.reference_pose import PATCH_ANGLE
 from planar.synthesis.exact.relations.unknowns import NumberKind
 from planar.synthesis.task.freedom import moving_start
-from planar.synthesis.task.starts import free_numbers
 from planar.synthesis.task.synthesis_task import Wanted, WantedFunction, WantedPath
 from planar.synthesis.task.wanted_results import wanted_expression
 
@@ -45,7 +44,7 @@ def linkage_values(problem: ExactProblem, known: KnownLinkage) -> dict[int, comp
     pose, found = problem.pose, problem.first_values(known.items)
     axes = {known.mechanism.frame: (0.0j, 1.0 + 0.0j), **known.axes}
     shapes = {each.name: link_shape(each) for each in known.mechanism.links}
-    numbers = file_dimensions(known.mechanism)
+    lines = {pair.name: pair.line for pair in known.mechanism.pairs if isinstance(pair, GuidedPair)}
 
     def assign(value: Polynomial | None, number: complex, kind: NumberKind) -> None:
         if value is not None and len(value.terms) == 1:
@@ -59,7 +58,8 @@ def linkage_values(problem: ExactProblem, known: KnownLinkage) -> dict[int, comp
         assign(place, axes[link][0] + axes[link][1] * complex(float(at.x), float(at.y)), NumberKind.PLACE)
     for slide in pose.slides:
         name = slide.pair.name
-        way = axes[slide.pair.bodies[0]][1] * np.exp(1j * numbers[str(pose.line_angle(name))].value)
+        link = slide.pair.links[0]
+        way = axes[link][1] * np.exp(1j * lines[name].direction_angle(shapes[link]))
         patch = complex(np.exp(1j * PATCH_ANGLE))
         way = way / (way * patch.conjugate()).real if name in pose.patched else way
         assign(slide.direction, complex(way), NumberKind.TURN)
@@ -78,8 +78,8 @@ def component_unknowns(component: Component, values: Mapping[int, complex]) -> C
 def sample_linkage(problem: ExactProblem) -> KnownLinkage:
     """A linkage near the start with other values of the numbers that are sought, and what it does at as many entries.
     Raises NoAnswer where it does not move."""
-    task, start = problem.task, problem.mechanism
-    mechanism = moving_start(start, free_numbers(task, start))
+    start = problem.mechanism
+    mechanism = moving_start(start, problem.free_numbers)
     design = design_equations(mechanism)
     motion = cycle(mechanism, POSITIONS, pair=mechanism.inputs[0].pair)
     z, t = design.coordinates_at(motion)

@@ -6,8 +6,9 @@ later turns from there. A pin is one place then, and lengths and coordinates tha
 
 from __future__ import annotations
 
+from cmath import phase
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 from planar.document.dimensions import change_dimension, file_dimensions
@@ -15,6 +16,7 @@ from planar.foundation.geometry import Frame, Vector
 from planar.model.link_shapes import LinkShape, PointReference, link_shape
 from planar.model.mechanism import Mechanism
 from planar.model.pairs import MeasureKind, Pair
+from planar.model.pairs.guide_line import GuidedPair
 from planar.synthesis.exact.relations.polynomials import AngleSum, Direction, Polynomial, Symbol, complex_row, point
 from planar.synthesis.exact.relations.unknowns import NumberKind, SymbolTable, refuse
 
@@ -39,13 +41,18 @@ class PlacedShape(LinkShape):
 
 @dataclass(frozen=True)
 class SlidingRow:
-    """A pair with a coordinate of its own: the place `slider` of its second link, that `through` which its line goes
-    (a name or coordinates), and its line's `direction`."""
+    """A pair with a displacement: the place `slider` of its second link, the `direction` of its line, and the vector
+    along the line to its second point, None where the angle of the line in its link is given or sought."""
 
-    pair: Pair
+    pair: GuidedPair
     slider: Polynomial
-    through: PointReference
     direction: Polynomial
+    end: Polynomial | None
+
+    @property
+    def through(self) -> PointReference:
+        """The point of the line from which displacements count, by name or coordinates."""
+        return self.pair.line.through
 
 
 class LinkAxes(NamedTuple):
@@ -88,7 +95,7 @@ class ReferencePose:
         "the line of a pair that has one"
         self.patched: set[str] = set()
         "pairs whose line's direction has a length of its own"
-        self.pairs = [self._with_direction(index) for index in range(len(mechanism.pairs))]
+        self.pairs = [self._with_direction(pair) for pair in mechanism.pairs]
         for pair in self.pairs:
             if tuple(pair.residual_kinds) not in KNOWN_KINDS or len(pair.coordinate_kinds) > 1:
                 raise refuse(f"{pair.name!r} is neither a pin nor a slide")
@@ -134,7 +141,8 @@ class ReferencePose:
         def position(mechanism: Mechanism) -> complex:
             spot = name
             if pair is not None:
-                spot = self.line_through(mechanism.pairs[places[1][1]])
+                line, original = (each.pairs[places[1][1]].line for each in (mechanism, self.mechanism))  # type: ignore[attr-defined]
+                spot = line.to if name == original.to else line.through
             at = link_shape(mechanism.links[index]).position(spot)
             return complex(at.x, at.y)
 
@@ -151,30 +159,26 @@ class ReferencePose:
 
     # pairs
 
-    def _with_direction(self, index: int) -> Pair:
-        """A pair whose line has a direction as a symbol."""
-        pair = self.mechanism.pairs[index]
-        for each in self.numbers.values():
-            if each.address[:2] != ("pairs", index) or each.kind != "angle":
-                continue
-            trial = Direction(self.table.add())
-            changed = change_dimension(self.mechanism, each, trial).pairs[index]
-            shapes = [PlacedShape(lambda _: self.table.add().value) for _ in pair.bodies]
-            numbers = changed.measure(shapes)
-            if not any(isinstance(n, Polynomial) and trial.symbol.own in n.symbols for n in numbers):
-                continue
-            is_given = pair.bodies[0] == self.mechanism.frame and each.name not in self.free
-            way = self.table.add_given(NumberKind.TURN, float(each.value)) if is_given else self.table.add()
-            self.directions[pair.name] = Direction(way)
-            return change_dimension(self.mechanism, each, self.directions[pair.name]).pairs[index]
-        return pair
+    def _with_direction(self, pair: Pair) -> Pair:
+        """The pair with a symbol for the direction of its line, if it has one."""
+        if not isinstance(pair, GuidedPair):
+            return pair
+        turn = self.line_turn(pair) if pair.links[0] == self.mechanism.frame else None
+        symbol = self.table.add() if turn is None else self.table.add_given(NumberKind.TURN, turn)
+        self.directions[pair.name] = Direction(symbol)
+        line = pair.line._replace(to=None, angle=self.directions[pair.name])  # type: ignore[arg-type]
+        return replace(pair, line=line)
+
+    def is_known(self, value: Polynomial) -> bool:
+        """Whether all of it is given or sought."""
+        symbols = [number.symbol for number in self.table.given] + self.table.unknowns
+        return value.substitute(self.values).symbols <= {k for symbol in symbols for k in symbol}
 
     def seek_direction(self, pair: str, is_unit: bool) -> None:
         """Seek the direction of a line where it is neither given nor tied: of length one, or of one length along a
         direction, which leaves its sign open and has no second solution."""
         way = self.directions[pair].symbol
-        known = {each.symbol.own for each in self.table.given} | {each.own for each in self.table.unknowns}
-        if way.own in known or way.own in self.values:
+        if self.is_known(way.value):
             return
         self.table.unknowns.append(way)
         if is_unit:
@@ -184,15 +188,12 @@ class ReferencePose:
         along = way.value * self.table.add_given(NumberKind.TURN, PATCH_ANGLE).value.conjugate
         self.conditions.append(along + along.conjugate - 2.0)
 
-    def line_angle(self, pair: str) -> str | None:
-        """The number of the file that is the direction of a pair's line."""
-        index = [each.name for each in self.mechanism.pairs].index(pair)
-        own = [
-            name
-            for name, each in self.numbers.items()
-            if each.address[:2] == ("pairs", index) and each.kind == "angle" and "line" in each.address
-        ]
-        return own[0] if own else None
+    def line_turn(self, pair: GuidedPair) -> float | None:
+        """The angle of a pair's line in the axes of its link (rad); None where a number of it is sought."""
+        if pair.line.to is None:
+            return None if f"{pair.name}.line.angle" in self.free else pair.line.angle
+        ends = [self.coordinates(pair.links[0], end, pair) for end in (pair.line.through, pair.line.to)]
+        return phase(ends[1].value - ends[0].value) if all(map(all, (end.is_given for end in ends))) else None
 
     def pair_rows(
         self, pair: Pair, frames: dict[str, Frame], own: Sequence[Polynomial]
@@ -208,23 +209,15 @@ class ReferencePose:
         return [complex_row(rows[0], rows[1])], turns
 
     def _sliding_row(self, pair: Pair) -> SlidingRow:
-        point_ = pair.point_on_line()
-        if point_ is None or pair.name not in self.directions:
-            raise refuse(f"the line of {pair.name!r} is not given by a direction")
-        slider = self.place(pair.bodies[1], point_[0][1])
-        return SlidingRow(pair, slider, self.line_through(pair), self.directions[pair.name].symbol.value)
-
-    @staticmethod
-    def line_through(pair: Pair) -> PointReference:
-        """What the line of a pair goes through, by name or by coordinates."""
-        asked: list[PointReference] = []
-
-        def note(name: PointReference) -> Polynomial:
-            asked.append(name)
-            return Polynomial({})
-
-        pair.measure([PlacedShape(note) for _ in pair.bodies])
-        return asked[0]
+        if not isinstance(pair, GuidedPair):
+            raise refuse(f"{pair.name!r} does not slide along a line")
+        original = next(each for each in self.mechanism.pairs if each.name == pair.name)
+        line, link = original.line, pair.links[0]  # type: ignore[attr-defined]
+        end = None
+        if line.to is not None and self.line_turn(original) is None:  # type: ignore[arg-type]
+            end = self.place(link, line.to) - self.place(link, line.through)
+        slider = self.place(pair.links[1], pair.point)
+        return SlidingRow(original, slider, self.directions[pair.name].symbol.value, end)  # type: ignore[arg-type]
 
     # ties
 

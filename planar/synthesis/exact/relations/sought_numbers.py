@@ -16,7 +16,7 @@ from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput, PlanarError
 from planar.model.mechanism import Mechanism
 from planar.synthesis.task.freedom import number_slopes
-from planar.synthesis.task.starts import free_numbers
+from planar.synthesis.task.starts import FreeNumbers
 from planar.synthesis.task.synthesis_task import SynthesisTask, WantedFunction
 
 NO_INFLUENCE = 1e-10
@@ -25,9 +25,8 @@ DEPENDENT = 1e-8
 """Of a column: what other columns leave of it is nothing."""
 
 
-def sought_numbers(task: SynthesisTask, mechanism: Mechanism) -> tuple[str, ...]:
+def sought_numbers(task: SynthesisTask, mechanism: Mechanism, free: FreeNumbers) -> tuple[str, ...]:
     """The names of the numbers that are sought. Raises BadInput for one that is named and changes nothing wanted."""
-    free = free_numbers(task, mechanism)
     is_function = isinstance(task.wanted[0], WantedFunction)
     standing = [name for name in free.names if name in _frame_numbers(mechanism)] if is_function else []
     if not task.free:
