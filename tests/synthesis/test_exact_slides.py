@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
-from planar.synthesis.exact.tracking.exact_certificates import certify_member
 
 import planar
 from planar.foundation.jets import value_and_rates
 from planar.foundation.private_cache import disable_cache
 from planar.synthesis.exact.relations.exact_problem import ExactProblem
-from planar.synthesis.exact.tracking import generic_store
+from planar.synthesis.exact.tracking import generic_solutions
+from planar.synthesis.exact.tracking.ball_paths import certify_member
 from planar.synthesis.task.starts import start_mechanisms
 
 UNITS = {"length": "mm", "angle": "deg"}
@@ -223,7 +223,7 @@ def slider_pairs(angles):
 )
 def test_lines_through_two_points_are_given_or_sought_by_their_coordinates(monkeypatch, start, free, others):
     """Solutions whose line goes from H to G are no linkages, and are not listed."""
-    monkeypatch.setattr(generic_store, "trace_test", lambda *_, **__: True)
+    monkeypatch.setattr(generic_solutions, "trace_test", lambda *_, **__: True)
     wanted = {"from": "O", "to": "s", "pairs": slider_pairs([0.3, 0.9, 1.6][: len(free)]), "absolute": True}
     value = {"planar": 1, "units": start["units"], "start": start, "wanted": [wanted], "free": [*free]}
     with disable_cache():
