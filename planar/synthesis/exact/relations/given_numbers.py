@@ -12,7 +12,6 @@ from functools import cached_property
 from typing import NamedTuple
 
 from planar.model.link_shapes import Link
-from planar.model.pairs.sliding import SlidingPair
 from planar.synthesis.exact.relations.polynomials import Polynomial, as_polynomial
 from planar.synthesis.exact.relations.reference_pose import Coordinates, LinkAxes, ReferencePose, SlidingRow
 from planar.synthesis.exact.relations.unknowns import NumberKind
@@ -143,9 +142,9 @@ class _LinkConditions:
         "slides with the direction of their lines in the axes of the link"
         for slide in pose.slides:
             pair = slide.pair
-            if pair.links[1] == link.name and isinstance(pair, SlidingPair) and f"{pair.name}.turn" not in pose.free:
-                turn = self._turn(-pair.block_angle) if pair.block_angle else as_polynomial(1.0)
-                self.turns.append((slide, turn))
+            angle: float | None = getattr(pair, "block_angle", None)  # None where the link may turn on the line
+            if pair.links[1] == link.name and angle is not None and f"{pair.name}.turn" not in pose.free:
+                self.turns.append((slide, self._turn(-angle) if angle else as_polynomial(1.0)))
         self.direction, self.origin = pose.axes.get(link.name, LinkAxes(None, None))
         self.anchors = self._anchors()
 
