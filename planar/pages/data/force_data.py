@@ -197,8 +197,9 @@ def _advantage_data(rows: BalanceRows, state: State) -> Iterator[dict[str, Any]]
         load, along = mechanism.loads[index], ""
         if name != load.target:
             along = name
-            force = load.force or (load.torque or load.effort or 0.0, 0.0)
-            units = [load.scaled(1.0 / ca.sqrt(force[0] ** 2 + force[1] ** 2))]
+            numbers = load.force if load.force is not None else (load.torque, load.effort)
+            size = ca.sqrt(sum(number**2 for number in numbers if number is not None))
+            units = [load.scaled(1.0 / size)]
         elif load.point is not None:
             along, units = "path", [Load(point=name, force=way) for way in ((1.0, 0.0), (0.0, 1.0))]
         elif load.link is not None:
