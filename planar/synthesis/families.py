@@ -445,6 +445,8 @@ CANDIDATES = 1.5
 """Members that are judged at most, times the designs that are listed."""
 MAX_HOPELESS = 25_000
 """Members that are tried where not even the entries of any keep the demands; after these only the nearest go on."""
+SAME_LINKAGE = 1e-6
+"""Of the size: members whose numbers are nearer to each other are one linkage."""
 NEAREST = 3
 """Members that are judged where none keeps the demands, so that it is said what they lack."""
 
@@ -502,7 +504,9 @@ class FamilySearch:
                 self._recombine(join_members(basis))
             if self._is_enough() or self._is_hopeless() or self.is_over() or (basis and not self.dimension):
                 break
-        if self.tried and self.dimension and not self._is_enough():
+        if self.tried and not self.dimension:
+            self._keep_distinct()
+        elif self.tried and not self._is_enough():
             self._improve()
         return self._judged()
 
@@ -559,6 +563,14 @@ class FamilySearch:
         self.screenings.append(Screening(screening.violation[rows], screening.transmission[rows]))
         return screening
 
+    def _keep_distinct(self) -> None:
+        """Keep one of the members that are the same linkage, where nothing is left open."""
+        members, violation, transmission = self._known()
+        apart = np.abs(members.numbers[:, None] - members.numbers).max(axis=2, initial=0.0)
+        rows = np.unique(np.argmax(apart < SAME_LINKAGE, axis=1))
+        self.members, self.screenings = [members.take(rows)], [Screening(violation[rows], transmission[rows])]
+        self.tried, self.met = len(rows), int((violation[rows] == 0.0).sum())
+
     def _known(self) -> tuple[ExactMembers, Array, Array]:
         """The members that are kept, their violations and their least transmission angles."""
         violation, transmission = (np.concatenate(parts) for parts in zip(*self.screenings, strict=True))
@@ -575,7 +587,7 @@ class FamilySearch:
         most = max(NEAREST, int(CANDIDATES * self.count))
         chosen = self._spread(members.numbers, np.flatnonzero(violation == 0.0), transmission, most)
         nearest = np.argsort(np.where(violation > 0.0, violation, np.inf), kind="stable")[:NEAREST]
-        for row in [*chosen, *nearest.tolist()]:
+        for row in [*chosen, *nearest[violation[nearest] > 0.0].tolist()]:
             if len(sound) >= self.count or (sound and violation[row] > 0.0):
                 break
             self.say(f"{count_phrase(len(sound), 'design')} judged")

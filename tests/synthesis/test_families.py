@@ -14,6 +14,7 @@ from planar.synthesis.design_search import DesignSearch
 from planar.synthesis.families import FamilySearch, MemberSampler, independent_parts, null_space, recombine
 from planar.synthesis.synthesis import least_transmission
 from planar.synthesis.task.starts import start_mechanisms
+from tests.builders import four_bar_document
 
 LID = {
     "planar": 1,
@@ -149,3 +150,18 @@ def test_draws_by_closed_forms_are_exact():
         for pivot, joints in ((designs.a, designs.b), (designs.d, designs.c)):
             assert np.ptp(np.abs(joints - pivot[:, None]), axis=1).max(initial=0.0) < 1e-8
         assert np.ptp(np.abs(designs.b - designs.c), axis=1).max(initial=0.0) < 1e-8
+
+
+def test_a_task_that_leaves_nothing_open_lists_each_linkage_once():
+    """The length of a rocker that stands at 120 deg with the crank at 60 deg: |D + r - B| = BC has two solutions."""
+    start = four_bar_document(50, 66, 56, 100, 60, omega="1 rad/s", units={"length": "mm", "angle": "deg"})
+    apart = 0.1 - 0.05 * np.exp(1j * np.radians(60.0))
+    along = (apart * np.exp(-1j * np.radians(120.0))).real
+    root = np.sqrt(along**2 - abs(apart) ** 2 + 0.066**2)
+    rocker = next(name for name in planar.dimensions(planar.loads(json.dumps(start))) if name.startswith("DC"))
+    wanted = {"from": "A", "to": "D", "pairs": [[60, 120]], "absolute": True}
+    task = {"planar": 1, "units": {"angle": "deg"}, "start": start, "wanted": [wanted], "free": [rocker]}
+    found = planar.synthesise(task, many=4)
+    values = sorted(design.numbers[rocker] for design in found)
+    np.testing.assert_allclose(values, [-along - root, -along + root], atol=1e-9)
+    assert any("single linkages" in remark and "spread over" not in remark for remark in found.remarks)
