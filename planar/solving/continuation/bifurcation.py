@@ -29,6 +29,8 @@ from planar.solving.newton import settle
 
 SMALL_SINGULAR_VALUE = 0.1
 """A singular value below this part of the greatest may be one that vanishes near by."""
+MOST_SMALL_VALUES = 4
+"""Singular values, with the one that is zero, that are brought to zero together where single ones do not lead there."""
 ON_BRANCH_RATIO = 1e-2
 """A point is on a way if it is no further from it than this part of its distance from the change point."""
 START_DISTANCE_TOLERANCE = 1e-6
@@ -78,6 +80,8 @@ def bifurcation_candidates(curve: SolutionCurve, here: CurvePoint, farthest: flo
         if second > 2 and start.values[size - second] > SMALL_SINGULAR_VALUE * max(start.values[0], 1.0):
             return
         found = _refine_candidate(curve, y, start.right[[size - second, size - 1]].T, start, farthest)
+        if found is None and 2 < second <= MOST_SMALL_VALUES:
+            found = _refine_candidate(curve, y, start.right[size - second :].T, start, farthest)
         if found is not None and found.null.shape[1] > 2:
             found = _refine_candidate(curve, found.y, found.null)
         if found is not None:
