@@ -349,10 +349,11 @@ class MemberScreen:
     def _entry_lacks(self, members: ExactMembers) -> Array:
         """By how much (n,) the wanted entries themselves miss what is demanded of the whole motion."""
         lacks = np.zeros(len(members.numbers))
-        for guard in (self.search.guards or {}).values():
-            if guard.rows and not guard.turns_only:
-                for y in members.unknowns:
-                    lacks = np.maximum(lacks, -guard.slacks(members.numbers, y).min(axis=1, initial=0.0))
+        guards = self.search.guards
+        if guards is None or guards[True].turns_only:
+            return lacks
+        for y in members.unknowns:  # both guards demand the same
+            lacks = np.maximum(lacks, -guards[True].slacks(members.numbers, y).min(axis=1, initial=0.0))
         return lacks
 
     def _follow(self, members: ExactMembers) -> tuple[Array, Array]:
