@@ -11,7 +11,7 @@ import numpy as np
 
 from planar.analysis.centres.centres import Centres, centres, extent
 from planar.analysis.centres.velocities import LinkByCentres, links_by_centres
-from planar.analysis.motion.load_direction import LOAD_PREFIX, find_unit_load, loads_by_name
+from planar.analysis.motion.load_direction import find_unit_load, loads_by_name
 from planar.analysis.rate_equations import Rate, RateEquations, rate_equations
 from planar.document.first_argument import takes_result
 from planar.dynamics.external_actions import KinematicArrays, action_powers, action_velocities, actions_of_load
@@ -88,8 +88,7 @@ def loaded_outputs(state: State) -> dict[str, int]:
     link, goes by its own name alone.
     """
     outputs: dict[str, int] = {}
-    for index, load in enumerate(state.mechanism.loads):
-        own_name = f"{LOAD_PREFIX}{index}"
+    for index, (own_name, load) in enumerate(loads_by_name(state.mechanism).items()):
         is_point = load.target in state._point_names
         is_ambiguous = load.point is None and (is_point or (load.pair is not None and load.target in state.frames))
         is_loaded = any(load.force) if load.force is not None else bool(load.torque or load.effort)
