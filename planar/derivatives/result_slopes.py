@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Container, Mapping
 from typing import NamedTuple
 
 import casadi as ca
@@ -165,19 +165,23 @@ def refuse_stiffness(forces: Forces) -> None:
         )
 
 
-def tied_dimensions(mechanism: Mechanism) -> tuple[str, ...]:
-    """The numbers of a file that cannot change alone, either way: others have to go with them.
+def tied_dimensions(mechanism: Mechanism, among: Container[str] | None = None) -> tuple[str, ...]:
+    """The numbers of a file, or those with these names, that cannot change alone, either way: others have to go with
+    them.
 
     So the radii of wheels and the distance of their centres, or the rises of a cam's law.
     """
-    found: tuple[str, ...] | None = mechanism.__dict__.get("_tied_dimensions")  # kept: each is tried
-    if found is None:
-        design = design_equations(mechanism)
-        found = tuple(
-            each.name for each in design.dimensions if each.path[0] in ("links", "pairs") and _is_tied(design, each)
-        )
-        object.__setattr__(mechanism, "_tied_dimensions", found)
-    return found
+    known: dict[str, bool] = mechanism.__dict__.setdefault("_tied_dimensions", {})  # kept: each is tried
+    design = design_equations(mechanism)
+    chosen = [
+        each
+        for each in design.dimensions
+        if each.path[0] in ("links", "pairs") and (among is None or each.name in among)
+    ]
+    for each in chosen:
+        if each.name not in known:
+            known[each.name] = _is_tied(design, each)
+    return tuple(each.name for each in chosen if known[each.name])
 
 
 def _is_tied(design: DesignEquations, dimension: Dimension) -> bool:

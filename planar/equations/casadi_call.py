@@ -26,6 +26,14 @@ def read_function(text: str | None) -> ca.Function | None:
         return None
 
 
+def formula_text(rows: ca.SX, *symbols: ca.SX) -> str:
+    """Rows in columns of symbols, as casadi writes a function: the same text whatever the symbols are called."""
+    renamed = [ca.SX.sym(f"q{k}", each.numel()) for k, each in enumerate(symbols)]
+    function = ca.Function("rows", list(symbols), [ca.densify(rows)])
+    text: str = ca.Function("rows", renamed, [function(*renamed)]).serialize()
+    return text
+
+
 class BufferedFunction:
     """A function of dense columns. Results are (columns, rows), or (positions, columns, rows).
 

@@ -12,11 +12,13 @@ Each is a quadratic equation. Its two roots are the two assemblies; they meet at
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
 
+from planar.equations.casadi_call import formula_text
 from planar.equations.symbolic_equations import Block, ConstraintEquations, is_piecewise_in
 from planar.foundation.arrays import Array
 from planar.foundation.generic_numbers import generic_numbers
@@ -81,31 +83,70 @@ class _ComplexNumber(NamedTuple):
         return _ComplexNumber(self.x, -self.y)
 
 
+class _DerivedForm(NamedTuple):
+    """The closed form of a formula of two rows: a function (unknowns, other symbols, sign) -> the parts of the values
+    one after the other, and what else a `ClosedForm` holds; how many parts each value has, and whether there is an arm.
+    """
+
+    function: ca.Function
+    part_counts: tuple[int, ...]
+    has_arm: bool
+
+    def form_of(self, unknowns: ca.SX, others: ca.SX) -> ClosedForm:
+        """The form of these unknowns where these symbols stand in its rows."""
+        sign = ca.SX.sym("sign")
+        *found, lengths, arm = self.function(unknowns, others, sign)
+        parts = iter(found)
+        values = tuple(tuple(next(parts) for _ in range(count)) for count in self.part_counts)
+        side, coalescence = parts
+        return ClosedForm(values, sign, side, coalescence, lengths, arm if self.has_arm else None)
+
+
 def find_closed_form(e: ConstraintEquations, stage: Block) -> ClosedForm | None:
     """The closed form of a block; None where it has none of the three forms."""
     if stage.is_free or stage.rows.stop - stage.rows.start != 2 or stage.unknowns.stop - stage.unknowns.start != 2:
         return None
-    angles = [e.coordinates[column].kind is MeasureKind.ANGLE for column in e.unknowns[stage.unknowns]]
+    angles = tuple(e.coordinates[column].kind is MeasureKind.ANGLE for column in e.unknowns[stage.unknowns])
     if not any(angles) or any(
         e.rows[row].kind is MeasureKind.ANGLE for row in range(stage.rows.start, stage.rows.stop)
     ):
         return None
-    if is_piecewise_in(e.F[stage.rows], e.z[stage.unknowns]):
+    rows, unknowns = e.F[stage.rows], e.z[stage.unknowns]
+    others = ca.vertcat(ca.SX(0, 1), *(each for each in ca.symvar(rows) if not ca.depends_on(unknowns, each)))
+    derived = _derive_form(formula_text(rows, unknowns, others), angles)
+    return derived and derived.form_of(unknowns, others)
+
+
+@lru_cache(maxsize=1024)
+def _derive_form(formula: str, angles: tuple[bool, ...]) -> _DerivedForm | None:
+    """The closed form of rows that are a function, as casadi writes it, of two unknowns, some of them angles, and of
+    other symbols: once for all blocks of that formula."""
+    function = ca.Function.deserialize(formula)
+    both, others = (ca.SX.sym(name, function.numel_in(k)) for k, name in enumerate(("unknowns", "others")))
+    rows = function(both, others)
+    if is_piecewise_in(rows, both):
         return None
     first = 0 if angles[0] else 1
-    unknowns = [e.z[stage.unknowns.start + k] for k in (first, 1 - first)]
-    found = _solve_two_angles(e, stage, unknowns) if all(angles) else _solve_angle_and_length(e, stage, unknowns)
-    return found and found._replace(values=found.values[::-1] if first else found.values)
+    form = (_solve_two_angles if all(angles) else _solve_angle_and_length)(rows, [both[first], both[1 - first]])
+    if form is None:
+        return None
+    values = form.values[::-1] if first else form.values
+    arm = ca.SX(0.0) if form.squared_arm is None else form.squared_arm
+    found = [*(part for value in values for part in value), form.sign_expression, form.coalescence]
+    wanted = [ca.densify(each) for each in (*found, form.squared_lengths, arm)]
+    part_counts = tuple(len(value) for value in values)
+    return _DerivedForm(
+        ca.Function("form", [both, others, form.sign], wanted), part_counts, form.squared_arm is not None
+    )
 
 
-def _solve_two_angles(e: ConstraintEquations, stage: Block, unknowns: list[ca.SX]) -> ClosedForm | None:
+def _solve_two_angles(rows: ca.SX, unknowns: list[ca.SX]) -> ClosedForm | None:
     one, two = unknowns
-    rows = e.F[stage.rows]
     by_one = _cos_sin_coefficients(ca.substitute(rows, two, 0.0), one)
     by_two = _cos_sin_coefficients(ca.substitute(rows, one, 0.0), two)
     rest = ca.substitute(rows, ca.vertcat(one, two), ca.SX.zeros(2)) - by_one[0] - by_two[0]
     model = rest + _combine_cos_sin(*by_one, one) + _combine_cos_sin(*by_two, two)
-    signs = _rotation_senses(e, rows - model, [by_one, by_two])
+    signs = _rotation_senses(rows - model, [by_one, by_two])
     if signs is None or 0 in signs:
         return None
     a, b, g = (_rows_as_complex(part, signs) for part in (by_one[0], by_two[0], rest))
@@ -126,9 +167,8 @@ def _solve_two_angles(e: ConstraintEquations, stage: Block, unknowns: list[ca.SX
     return ClosedForm((tuple(e1), tuple(e2)), sign, side, coalescence, lengths)
 
 
-def _solve_angle_and_length(e: ConstraintEquations, stage: Block, unknowns: list[ca.SX]) -> ClosedForm | None:
+def _solve_angle_and_length(rows: ca.SX, unknowns: list[ca.SX]) -> ClosedForm | None:
     turn, slide = unknowns
-    rows = e.F[stage.rows]
     still = ca.substitute(rows, slide, 0.0)
     moved = ca.substitute(ca.jacobian(rows, slide), slide, 0.0)
     turned = _cos_sin_coefficients(still, turn)
@@ -138,11 +178,11 @@ def _solve_angle_and_length(e: ConstraintEquations, stage: Block, unknowns: list
     )
     model = fixed_rows + _combine_cos_sin(*turned, turn)
     model = model + slide * (fixed_slide + _combine_cos_sin(*turned_slide, turn))
-    signs = _rotation_senses(e, rows - model, [turned, turned_slide])
+    signs = _rotation_senses(rows - model, [turned, turned_slide])
     if signs is None:
         return None
     parts = fixed_slide, turned_slide[0], turned[0]
-    rest = _which_vanish(e, list(parts))
+    rest = _which_vanish(list(parts))
     fixed, d, a, g = (_rows_as_complex(part, signs) for part in (*parts, fixed_rows))
     sign = ca.SX.sym("sign")
     if rest[1] and not rest[0] and not rest[2]:
@@ -184,13 +224,13 @@ def _rows_as_complex(rows: ca.SX, signs: list[int]) -> _ComplexNumber:
     return _ComplexNumber(rows[1], rows[0]) if -1 in signs else _ComplexNumber(rows[0], rows[1])
 
 
-def _rotation_senses(e: ConstraintEquations, gap: ca.SX, turned: list[tuple[ca.SX, ca.SX]]) -> list[int] | None:
+def _rotation_senses(gap: ca.SX, turned: list[tuple[ca.SX, ca.SX]]) -> list[int] | None:
     """Which way every pair of factors turns: +1 left, -1 right, 0 where both vanish; None where the form is not it.
 
     Left: the factors of the sine are those of the cosine, turned to the left by a right angle. All have to turn alike,
     and the form has to agree with the equations.
     """
-    found, values = [], [_evaluate_at_random(e, [gap, *each]) for each in turned]
+    found, values = [], [_evaluate_at_random([gap, *each]) for each in turned]
     for left, cosine, sine in values:
         if not np.all(np.abs(left) < ZERO_TOLERANCE):
             return None
@@ -203,14 +243,13 @@ def _rotation_senses(e: ConstraintEquations, gap: ca.SX, turned: list[tuple[ca.S
     return found if len(set(found) - {0}) == 1 else None
 
 
-def _which_vanish(e: ConstraintEquations, parts: list[ca.SX]) -> list[bool]:
-    return [bool(np.all(np.abs(each) < ZERO_TOLERANCE)) for each in _evaluate_at_random(e, parts)]
+def _which_vanish(parts: list[ca.SX]) -> list[bool]:
+    return [bool(np.all(np.abs(each) < ZERO_TOLERANCE)) for each in _evaluate_at_random(parts)]
 
 
-def _evaluate_at_random(e: ConstraintEquations, parts: list[ca.SX]) -> list[Array]:
+def _evaluate_at_random(parts: list[ca.SX]) -> list[Array]:
     """Expressions (2,) in numbers (2, places): at random places an identity holds by accident nowhere."""
-    function = ca.Function("parts", [e.z, e.u, e.p], [ca.densify(part) for part in parts])
-    ends = np.cumsum([symbol.numel() for symbol in (e.z, e.u, e.p)])
-    values = np.split(generic_numbers(ends[2], SAMPLE_POINTS), ends[:2])
-    found = function(*values)
+    symbols = ca.vertcat(ca.SX(0, 1), *ca.symvar(ca.vertcat(*parts)))
+    function = ca.Function("parts", [symbols], [ca.densify(part) for part in parts])
+    found = function(generic_numbers(symbols.numel(), SAMPLE_POINTS))
     return [each.full() for each in (found if isinstance(found, tuple) else (found,))]

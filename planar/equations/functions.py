@@ -339,9 +339,15 @@ class EquationFunctions:
         return self.equations.is_square
 
 
+MAX_CSE_NODES = 30_000
+"""Of expressions in which what stands in several places is looked for: the time for that grows faster than they do, and
+what it saves is little."""
+
+
 def function_with_cse(name: str, given: Sequence[ca.SX], wanted: Sequence[ca.SX]) -> ca.Function:
-    """A function in which what stands in several places is computed once."""
-    return ca.Function(name, given, ca.cse(list(wanted)))
+    """A function in which what stands in several places is computed once, as far as it is not too long."""
+    is_short = sum(ca.n_nodes(each) for each in wanted) <= MAX_CSE_NODES
+    return ca.Function(name, given, ca.cse(list(wanted)) if is_short else list(wanted))
 
 
 def equation_functions(mechanism: Mechanism) -> EquationFunctions:

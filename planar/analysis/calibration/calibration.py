@@ -137,9 +137,9 @@ def calibrate(  # many: what is measured, and how it is fitted
 def _free_dimensions(mechanism: Mechanism, free: Sequence[str]) -> tuple[Dimension, ...]:
     """The numbers that are sought. Raises BadInput."""
     known = {each.name: each for each in design_dimensions(mechanism) if each.path[0] in ("links", "pairs")}
-    tied = {*tied_dimensions(mechanism)}
     if isinstance(free, str):
         raise BadInput("free", f"a list of names is wanted, as [{free!r}]")
+    tied = {*tied_dimensions(mechanism, free or None)}
     for name in free:
         find_dimension(file_dimensions(mechanism), name)
         if name not in known:

@@ -203,7 +203,7 @@ def _check_free_names(task: SynthesisTask, mechanism: Mechanism, known: Mapping[
     """Refuse numbers by name that cannot be sought."""
     if not task.free:
         return
-    used, tied = depended_numbers(mechanism, task.wanted), {*tied_dimensions(mechanism)}
+    used, tied = depended_numbers(mechanism, task.wanted), {*tied_dimensions(mechanism, task.free)}
     for name in task.free:
         if name not in known:
             raise BadInput("$.free", f"{mechanism.name!r} has no number {name!r} that links and pairs depend on")

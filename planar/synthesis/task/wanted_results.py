@@ -61,7 +61,8 @@ def depended_numbers(mechanism: Mechanism, wanted: tuple[Wanted, ...]) -> tuple[
 
 def influential_numbers(mechanism: Mechanism, wanted: tuple[Wanted, ...]) -> tuple[str, ...]:
     """The lengths and angles among them that can change alone."""
-    used, tied = {*depended_numbers(mechanism, wanted)}, {*tied_dimensions(mechanism)}
+    used = {*depended_numbers(mechanism, wanted)}
+    tied = {*tied_dimensions(mechanism, used)}
     return tuple(
         dimension.name
         for dimension in design_equations(mechanism).dimensions
