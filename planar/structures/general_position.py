@@ -48,6 +48,8 @@ class GeneralPosition:
         along, across = ([np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)])
         self._held = velocity, np.stack([turning, np.einsum("dk,kdm->km", across, velocity)], axis=1)
         self._rates = turning, np.einsum("dk,kdm->km", along, velocity)
+        self._known: tuple[tuple[int, ...], Array] | None = None
+        "the motions of the slides that were asked for last"
 
     def moves_as_counted(self, slides: Sequence[int]) -> bool:
         """Whether, with these joints slides and the others pins, the chain has the freedom that it has by count, and
@@ -64,12 +66,13 @@ class GeneralPosition:
 
     def _motions(self, slides: Sequence[int]) -> Array:
         """All motions that the joints allow (motions, rates), orthonormal; three are those of the whole plane."""
-        pins, sliding = self._held
-        rows = pins.copy()
-        rows[list(slides)] = sliding[list(slides)]
-        _, sizes, motions = np.linalg.svd(rows[self._independent].reshape(-1, rows.shape[-1]))
-        found: Array = motions[int(np.sum(sizes > TOLERANCE * sizes[0])) :]
-        return found
+        if self._known is None or self._known[0] != tuple(slides):
+            pins, sliding = self._held
+            rows = pins.copy()
+            rows[list(slides)] = sliding[list(slides)]
+            _, sizes, motions = np.linalg.svd(rows[self._independent].reshape(-1, rows.shape[-1]))
+            self._known = tuple(slides), motions[int(np.sum(sizes > TOLERANCE * sizes[0])) :]
+        return self._known[1]
 
     def _joint_rates(self, slides: Sequence[int]) -> Array:
         """What gives the rate of each joint from a motion (joints, rates)."""

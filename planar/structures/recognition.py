@@ -251,8 +251,8 @@ def _describe(
 
 
 def _mechanism_number(chain: Chain, frame: int, drives: tuple[int, ...]) -> int | None:
-    """The place among all mechanisms of a chain, where they are not too many."""
-    if comb(chain.joints, chain.freedom) > MAX_DRIVE_SETS:
+    """The place among all mechanisms of a chain, where that has a number and they are not too many."""
+    if chain.number is None or comb(chain.joints, chain.freedom) > MAX_DRIVE_SETS:
         return None
     every = chain.mechanisms(moving_drives=True)
     return next((k for k, each in enumerate(every) if (each.frame, each.drives) == (frame, drives)), None)

@@ -29,6 +29,8 @@ from planar.solving.newton import settle
 
 SMALL_SINGULAR_VALUE = 0.1
 """A singular value below this part of the greatest may be one that vanishes near by."""
+ALIKE_RATIO = 30.0
+"""Singular values are small alike that are no more than so many times the least."""
 MOST_SMALL_VALUES = 4
 """Singular values, with the one that is zero, that are brought to zero together where single ones do not lead there."""
 ON_BRANCH_RATIO = 1e-2
@@ -58,8 +60,8 @@ class Bifurcation(NamedTuple):
     """A change point with the ways through it, points at one place whose tangents are the ways: first the one that
     leads from where the walk came.
 
-    `whole` says whether these are all; where ways touch one another, or are many without an end, they are not told.
-    `lost` is how much rank the Jacobian lacks.
+    `is_complete` says whether these are all; where ways touch one another, or are very many, they are not told.
+    `rank_loss` is how much rank the Jacobian lacks.
     """
 
     y: Array
@@ -73,9 +75,15 @@ def bifurcation_candidates(curve: SolutionCurve, here: CurvePoint, farthest: flo
     no longer than `farthest`.
 
     Each small singular value is brought to zero; where several loops come near a change point at once, each is found.
+    Where many are small alike, as at the flat position of a scissor lift, they are first brought to zero together.
     """
     y, size = here.y + min(here.regular_distance, 0.1) * here.tangent, len(here.y)
     start = _decompose(curve, y)
+    small = start.values < min(SMALL_SINGULAR_VALUE * max(start.values[0], 1.0), ALIKE_RATIO * start.values[-1])
+    if small.sum() >= MOST_SMALL_VALUES:
+        found = _refine_candidate(curve, y, start.right[size - 1 - small.sum() :].T, start, farthest)
+        if found is not None:
+            yield found
     for second in range(2, size + 1):
         if second > 2 and start.values[size - second] > SMALL_SINGULAR_VALUE * max(start.values[0], 1.0):
             return
@@ -186,9 +194,10 @@ def bifurcation_ahead(curve: SolutionCurve, here: CurvePoint, y: Array) -> Bifur
     came = None if first is None else ways.branch_along(first)
     if first is None or came is None or not _leads_to(curve, here, came):
         return None
-    others = [ways.branch_along(c) for c in branch_directions(ways.forms) if not is_same_direction(c, first)]
+    directions = branch_directions(ways.forms)
+    others = [ways.branch_along(c) for c in directions.found if not is_same_direction(c, first)]
     told = tuple(way for way in others if way is not None)
-    return Bifurcation(y, (came, *told), len(told) == len(others), len(first) - 1)
+    return Bifurcation(y, (came, *told), directions.is_complete and len(told) == len(others), len(first) - 1)
 
 
 def bifurcation_at_start(curve: SolutionCurve, y: Array) -> Bifurcation | None:
@@ -205,8 +214,8 @@ def bifurcation_at_start(curve: SolutionCurve, y: Array) -> Bifurcation | None:
     if near is None or np.linalg.norm(near.y - y) > START_DISTANCE_TOLERANCE or near.residual > curve.solver.tolerance:
         return None
     ways = _BranchConditions(curve, near.y)
-    found = branch_directions(ways.forms)
-    told = [way for way in map(ways.branch_along, found) if way is not None]
+    directions = branch_directions(ways.forms)
+    told = [way for way in map(ways.branch_along, directions.found) if way is not None]
     moving = [way if way.input_rate > 0.0 else way.reversed() for way in told if abs(way.input_rate) > ZERO_INPUT_RATE]
     if not moving:
         return None
@@ -214,7 +223,8 @@ def bifurcation_at_start(curve: SolutionCurve, y: Array) -> Bifurcation | None:
     sense = np.sign(curve.input_direction[np.argmax(np.abs(curve.input_direction))])
     rates = [tuple(np.round(sense * way.tangent[:-1] / way.input_rate, 6)) for way in moving]
     order = sorted(range(len(moving)), key=lambda k: (round(float(np.linalg.norm(rates[k])), 6), rates[k]))
-    return Bifurcation(near.y, tuple(moving[k] for k in order), len(told) == len(found), near.null.shape[1] - 1)
+    is_complete = directions.is_complete and len(told) == len(directions.found)
+    return Bifurcation(near.y, tuple(moving[k] for k in order), is_complete, near.null.shape[1] - 1)
 
 
 def _leads_to(curve: SolutionCurve, here: CurvePoint, branch: CurvePoint) -> bool:

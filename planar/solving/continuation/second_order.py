@@ -10,10 +10,11 @@ of kinematic singularities of lower pair linkages and serial manipulators, J. Me
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 
-from planar.foundation.arrays import Array, append_number, greatest_size, length_of, stack_row
+from planar.foundation.arrays import Array, ComplexArray, append_number, greatest_size, length_of, stack_row
 from planar.solving.checks.singular_values import SINGULAR_TOLERANCE
 from planar.solving.newton import settle, shortest_step
 
@@ -23,8 +24,12 @@ EXACT_FORM_TOLERANCE = 1e-10
 """There a quadratic form below this part of the greatest vanishes."""
 SAME_DIRECTION_TOLERANCE = 1e-6
 """Directions that are nearer to one another are one."""
-STARTS_PER_NULL_VECTOR = 12
-"""Directions for each null vector from which others are looked for."""
+MAX_NULL_VECTORS = 6
+"""Of k null vectors there are up to 2^(k - 1) directions: of more than so many they are not looked for."""
+STARTS_PER_DIRECTION, MAX_DIRECTION_STEPS = 24, 40
+"""Complex directions from which Newton's method starts, for each that there may be, and its steps."""
+SETTLED_DIRECTION = 1e-9
+"""Of its size: a complex direction that moves less has settled."""
 MAX_REFINEMENTS, CONVERGED_STEP = 12, 1e-13
 
 
@@ -45,21 +50,58 @@ def nearest_direction(forms: Array, c: Array, tolerance: float = EXACT_FORM_TOLE
     return c if vanishes and abs(c @ c - 1.0) < SAME_DIRECTION_TOLERANCE else None
 
 
-def branch_directions(forms: Array, tolerance: float = EXACT_FORM_TOLERANCE) -> list[Array]:
-    """All directions (k,) of length one in which quadratic forms (forms, k, k) vanish, each with one of its two senses.
+class BranchDirections(NamedTuple):
+    """Directions (k,) of length one, each with one of its two senses, and whether these are surely all."""
+
+    found: list[Array]
+    is_complete: bool
+
+
+def branch_directions(forms: Array, tolerance: float = EXACT_FORM_TOLERANCE) -> BranchDirections:
+    """The directions (k,) in which quadratic forms (forms, k, k) vanish.
 
     `tolerance` is how exactly the forms are known, as a part of the greatest. None where all vanish, or where two
     directions are one: branches that only touch are not parted by this order. Of two null vectors the directions are
-    the roots of a polynomial; of more, where Newton's method leads to from many starts.
+    the roots of a polynomial. Of more Newton's method looks for all complex ones, of which there are 2^(k - 1) by
+    Bezout's theorem if no two are one: the real ones among so many are all.
     """
     size = forms.shape[1]
     if size == 2:
-        return _roots_of_two(forms, tolerance)
-    found: list[Array] = []
-    for start in np.random.default_rng(0).normal(size=(STARTS_PER_NULL_VECTOR * size, size)):
-        c = nearest_direction(forms, start, tolerance)
-        if c is not None and not any(is_same_direction(c, other) for other in found):
-            found.append(c)
+        return BranchDirections(_roots_of_two(forms, tolerance), True)
+    scale = greatest_size(forms)
+    if size > MAX_NULL_VECTORS or len(forms) < size - 1 or scale < SINGULAR_TOLERANCE:
+        return BranchDirections([], False)
+    rng = np.random.default_rng(0)
+    mixed = forms / scale
+    if len(forms) > size - 1:
+        mixed = np.tensordot(rng.normal(size=(size - 1, len(forms))), mixed, 1)
+    every = _complex_directions(mixed, STARTS_PER_DIRECTION * 2 ** (size - 1), rng)
+    real = [c.real for c in every if np.abs(c.imag).max() < SAME_DIRECTION_TOLERANCE]
+    found = [way for c in real if (way := nearest_direction(forms, c, tolerance)) is not None]
+    return BranchDirections(found, len(every) == 2 ** (size - 1))
+
+
+def _complex_directions(forms: Array, start_count: int, rng: np.random.Generator) -> list[ComplexArray]:
+    """The complex directions (k,) in which k - 1 forms vanish, to which Newton's method leads from random starts, with
+    steps normal to where it is: of length one, the greatest entry positive."""
+    size = forms.shape[1]
+    c = rng.normal(size=(start_count, size)) + 1j * rng.normal(size=(start_count, size))
+    change = np.full(start_count, np.inf)
+    for _ in range(MAX_DIRECTION_STEPS):
+        c /= np.linalg.norm(c, axis=1, keepdims=True)
+        rows = np.einsum("fij,sj->sfi", forms, c)
+        slopes = np.concatenate([2.0 * rows, c.conj()[:, None]], axis=1)
+        open_ = np.append(np.einsum("sfi,si->sf", rows, c), np.zeros((len(c), 1)), axis=1)
+        is_regular = np.abs(np.linalg.det(slopes)) > 0.0
+        c, slopes, open_ = c[is_regular], slopes[is_regular], open_[is_regular]
+        step = np.linalg.solve(slopes, open_[..., None])[..., 0]
+        c, change = c - step, np.linalg.norm(step, axis=1)
+    found: list[ComplexArray] = []
+    for way in c[change < SETTLED_DIRECTION]:
+        greatest = way[np.argmax(np.abs(way))]
+        own = way * (abs(greatest) / greatest / np.linalg.norm(way))
+        if all(1.0 - abs(np.vdot(own, other)) > SAME_DIRECTION_TOLERANCE for other in found):
+            found.append(own)
     return found
 
 

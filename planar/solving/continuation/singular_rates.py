@@ -116,7 +116,7 @@ class _RateConditions:
         along, across = second_order(base, 1.0 / speed), second_order(free, 0.0)
         mixed = 0.5 * (second_order(base + free, 1.0 / speed) - along - across)
         forms = np.array([[along, mixed], [mixed, across]]).transpose(2, 0, 1)
-        ways = [c for c in branch_directions(forms, FORM_TOLERANCE) if abs(c[0]) > ZERO_INPUT_RATE]
+        ways = [c for c in branch_directions(forms, FORM_TOLERANCE).found if abs(c[0]) > ZERO_INPUT_RATE]
         return tangents.base + speed * ways[0][1] / ways[0][0] * free if len(ways) == 1 else None
 
     def _refine(self, z: Array, z1: Array) -> Array:

@@ -430,7 +430,8 @@ def _is_closed(family: Family, known: GenericSolutions, V: ComplexArray, rng: np
     first = 1 + 2 * np.repeat(np.arange(LOOPS), len(V))
     nodes = np.zeros_like(first)
     ends = np.tile(V, (LOOPS, 1))
-    for target in (first, first + 1, np.zeros_like(first)):
+    for corner in range(3):  # paths that are lost on the way do not go on
+        target = first + corner if corner < 2 else np.zeros_like(first)
         paths = track_paths(
             EdgeHomotopy(family, members, np.stack([nodes, target], axis=1)), ends, PREDICTION, CORRECTION, STEPS
         )
