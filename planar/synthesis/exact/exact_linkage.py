@@ -24,14 +24,16 @@ from planar.synthesis.exact.relations.unknowns import NumberKind
 
 PARALLEL = 1e-12
 """Of a unit vector: a part that is nothing."""
-AXES_STEPS, AXES_MET = 40, 1e-13
+AXES_STEPS, AXES_MET, AXES_OPEN = 40, 1e-13, 1e-6
+"""Newton's steps for the axes of a link; rad, or of the size: what is met, and what no axes meet if none miss less."""
 
 Values = dict[int, complex]
 """Of symbols, by their numbers."""
 
 
-class OppositeLineError(ValueError):
-    """A line from its second point to its first one: a solution of the equations that is no linkage."""
+class NoLinkageError(ValueError):
+    """A solution of the equations that is no linkage: a line goes from its second point to its first one, or the places
+    are real where numbers of a link are not, as a coordinate of a point beyond its distance."""
 
 
 class ExactLinkage(NamedTuple):
@@ -46,7 +48,7 @@ class ExactLinkage(NamedTuple):
 
 def exact_linkage(problem: ExactProblem, solution: Mapping[int, complex], name: str) -> ExactLinkage:
     """The linkage of a real solution, the values of all unknowns. Raises BadInput where no file could say it, and
-    OppositeLineError where it is no linkage."""
+    NoLinkageError where it is no linkage."""
     return _LinkageWriter(problem, {**problem.first_values(), **solution}).write(name)
 
 
@@ -179,7 +181,7 @@ class _LinkageWriter:
             along_line = evaluate(slide.end.substitute(self.pose.values), self.values) / self.axes[link]
         if along_line is not None and (way * along_line.conjugate()).real < 0.0:
             if slide.end is not None and name not in self.pose.patched:
-                raise OppositeLineError(f"the line of {name!r} goes the opposite way")
+                raise NoLinkageError(f"the line of {name!r} goes the opposite way")
             way = -way
         if isinstance(slide.through, str) and (link, slide.through) in self.pose.places:
             through = self._own(link, self._world(self.pose.places[link, slide.through]))
@@ -285,18 +287,23 @@ class _AxesRows:
         return np.array(found)
 
     def solve(self, origin: complex, way: complex) -> tuple[complex, complex]:
-        """The axes that are nearest to some by which points are as they are drawn. Raises BadInput where there are
-        none."""
+        """The axes that are nearest to some by which points are as they are drawn. Raises NoLinkageError where there
+        are none, and BadInput where they are not found to round-off."""
         size = self.writer.problem.size
         reach = max((abs(place) / size for place, _ in self.points), default=1.0)  # what is far is rounded more
+        least = np.inf
         for turn in (0.0, 1.0, -1.0, 2.0, -2.0, 3.0, -3.0, 4.0):
             x = np.array([phase(way) + turn * np.pi / 4 * self.is_open[0], origin.real / size, origin.imag / size])
             for _ in range(AXES_STEPS):
                 rows = self.rows(x)
-                if np.abs(rows).max(initial=0.0) < AXES_MET * max(1.0, reach):
+                miss = np.abs(rows).max(initial=0.0) / max(1.0, reach)
+                least = min(least, miss)
+                if miss < AXES_MET:
                     return complex(x[1], x[2]) * size, exp(1j * x[0])
                 slopes = np.array([(self.rows(x + h) - self.rows(x - h)) / 2e-6 for h in 1e-6 * np.eye(3)]).T
                 x = x - self.is_open * np.linalg.lstsq(slopes * self.is_open, rows, rcond=1e-9)[0]
+        if least > AXES_OPEN:
+            raise NoLinkageError(f"no axes of {self.name!r} give its points the numbers that are given")
         raise BadInput("$.free", f"no axes of {self.name!r} give its points the numbers that are given")
 
 

@@ -16,7 +16,7 @@ from planar.model.wording import count_phrase
 from planar.synthesis.design_search import DesignSearch
 from planar.synthesis.exact.complete_synthesis import CompleteSynthesis, DyadCurve, ExactDesign
 from planar.synthesis.exact.dyad_curves import dyad_curve, is_dyad
-from planar.synthesis.exact.exact_linkage import ExactLinkage, OppositeLineError, exact_linkage
+from planar.synthesis.exact.exact_linkage import ExactLinkage, NoLinkageError, exact_linkage
 from planar.synthesis.exact.list_words import completeness, counted_class, file_difference, list_remarks, solution_count
 from planar.synthesis.exact.relations.condition_count import count_parts
 from planar.synthesis.exact.relations.exact_problem import Component, ExactProblem
@@ -173,7 +173,7 @@ def _best_design(
     for values in labelled:
         try:
             linkage = exact_linkage(problem, values, f"{problem.task.name}: {problem.mechanism.name} {number}")
-        except OppositeLineError:
+        except NoLinkageError:
             continue
         except BadInput as error:
             designs.append(_unwritten(problem, certified, f"no file could say it: {error.sentence}"))
