@@ -6,6 +6,7 @@ Slow. Predictor by the polynomial through the last points, corrector by Newton's
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import prod
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -92,6 +93,8 @@ SINGULAR_END = 1e-18
 """What is left of the way where a path is said to end where several solutions meet."""
 FAR = 1e5
 """An unknown that is greater where next to nothing of the way is left goes to infinity."""
+FARTHEST = 1e11
+"""What is farther out than this is at infinity."""
 MOST_STEPS = 10_000
 POINTS = 6
 """Through so many the predictor goes at most."""
@@ -101,31 +104,35 @@ SAFETY, FACTORS = 0.8, (0.2, 2.0)
 """Of the step that corrections call for, and its bounds over the one before it."""
 
 
-def follow_in_balls(family: Family, begin: Member, x: ComplexArray, end: Member) -> ComplexArray:
-    """Solutions x (paths, unknowns) of one member followed to another; infinite where a path goes to
-    infinity, no numbers where it does not come to an end."""
+def follow_in_balls(family: Family, begin: Member, x: ComplexArray, end: Member, left: float = 1.0) -> ComplexArray:
+    """Solutions x (paths, unknowns) on the way from one member to another, where so much of it is left, followed to its
+    end; infinite where a path goes to infinity, no numbers where it does not come to an end."""
     found = np.full_like(x, np.nan)
     with ball_precision():
         for k, own in enumerate(x):
-            w, is_end = _follow_path(family, begin, [ball(complex(each)) for each in own], end)
+            w, is_end = _follow_path(family, begin, [ball(complex(each)) for each in own], end, left)
             if is_end:
                 found[k] = [complex(value) for value in w]
-            elif max((abs(complex(value)) for value in w), default=0.0) > FAR:
+            elif _greatest(w) > FAR:
                 found[k] = np.inf
     return found
 
 
-def _follow_path(family: Family, begin: Member, w: list[Any], end: Member) -> tuple[list[Any], bool]:
+def _greatest(w: Sequence[Any]) -> float:
+    return max((abs(complex(value)) for value in w), default=0.0)
+
+
+def _follow_path(family: Family, begin: Member, w: list[Any], end: Member, left: float) -> tuple[list[Any], bool]:
     """The last point of the path from a solution, and whether that is its end; none where it was lost before."""
-    first = _corrected(MemberInBalls(family, end, begin, 1.0), w)[0]
+    first = _corrected(MemberInBalls(family, end, begin, left), w)[0]
     if first is None:
         return [], False
-    points = [(1.0, first)]
+    points = [(left, first)]
     step = FIRST_STEP
     for _ in range(MOST_STEPS):
         left = points[-1][0]
-        if left < SINGULAR_END or step < LEAST_STEP:
-            return (points[-1][1] if left < SINGULAR_END else []), False
+        if left < SINGULAR_END or step < LEAST_STEP or _greatest(points[-1][1]) > FARTHEST:
+            return (points[-1][1] if step >= LEAST_STEP else []), False
         here = left * (1.0 - step) if step < 0.5 else 0.0
         at, off = _corrected(MemberInBalls(family, end, begin, here), _predicted(points, here))
         if at is not None:
@@ -152,11 +159,12 @@ def _corrected(equations: MemberInBalls, w: list[Any]) -> tuple[list[Any] | None
 
 
 def _predicted(points: Sequence[tuple[float, list[Any]]], here: float) -> list[Any]:
-    """The polynomial through points, elsewhere (Lagrange)."""
+    """The polynomial through points, elsewhere (Lagrange); with all digits, as far out the rounding of a double in one
+    unknown moves another one by more than the step does."""
     weights = []
     for k, (one, _) in enumerate(points):
         others = [other for n, (other, _) in enumerate(points) if n != k]
-        weights.append(float(np.prod([(here - other) / (one - other) for other in others])))
+        weights.append(prod([(ball(here) - other) / (ball(one) - other) for other in others], start=ball(1.0)))
     entries = zip(*(w for _, w in points), strict=True)
     return [sum((weight * each for weight, each in zip(weights, own, strict=True)), ball(0.0)).mid() for own in entries]
 

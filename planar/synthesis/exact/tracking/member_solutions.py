@@ -27,7 +27,13 @@ from planar.foundation.arrays import Array, BoolArray, ComplexArray, IntArray
 from planar.model.wording import count_phrase
 from planar.synthesis.exact.relations.exact_problem import Component
 from planar.synthesis.exact.relations.family import Family, Member
-from planar.synthesis.exact.tracking.ball_paths import MOST_PATHS, ExactCertificates, certify_member, follow_in_balls
+from planar.synthesis.exact.tracking.ball_paths import (
+    FARTHEST,
+    MOST_PATHS,
+    ExactCertificates,
+    certify_member,
+    follow_in_balls,
+)
 from planar.synthesis.exact.tracking.family_names import FamilyName
 from planar.synthesis.exact.tracking.generic_solutions import (
     CLOSER_STEPS,
@@ -138,6 +144,8 @@ CLOSER_PASSES = ((1e-5, MAX_STEPS), (1e-7, CLOSER_STEPS))
 digits; by the second where there are too many for balls."""
 OTHER_WAYS = 3
 """By way of how many random members linkages that are missing are sought."""
+LAST_PART = 1e-5
+"""Of the way: what balls follow of paths that doubles followed to an end where no solution is."""
 INFINITY = 1e-6
 """Of homogeneous coordinates of length one."""
 Progress = Callable[[str], None]
@@ -282,13 +290,19 @@ def _follow_all(family: Family, record: FamilyRecord, member: Member, say: Progr
 
 
 def proved_in_balls(
-    family: Family, record: FamilyRecord, rows: IntArray, member: Member, say: Progress
+    family: Family, record: FamilyRecord, rows: IntArray, member: Member, say: Progress, left: float = 1.0
 ) -> tuple[IntArray, ComplexArray, IntArray]:
     """What the paths from those solutions of the random member come to in balls, where that is proved: the number of
-    each that does, its solution of the member (solutions, unknowns), and the numbers of those that go to infinity."""
+    each that does, its solution of the member (solutions, unknowns), and the numbers of those that go to infinity.
+
+    Doubles follow them until only so much of the way is `left`.
+    """
     say(f"{count_phrase(len(rows), 'path')} in balls")
-    begin = affine_solutions(record.solutions.V[rows])
-    x = follow_in_balls(family, record.solutions.member, begin, member)
+    V, start = record.solutions.V[rows], record.solutions.member
+    if left < 1.0:
+        there = follow(family, start, V, start.towards(member, 1.0 - left), DETOUR_PRECISION, CLOSER_STEPS)
+        V, rows = there.V[there.is_single], rows[there.is_single]
+    x = follow_in_balls(family, start, affine_solutions(V), member, left)
     came = np.flatnonzero(np.isfinite(x).all(axis=1))
     proof = certify_member(family, member, x[came])
     return rows[came[proof.proved]], proof.x[proof.proved], rows[np.isinf(x).all(axis=1)]
@@ -315,8 +329,6 @@ REAL = 1e-7
 """Of a solution's size: one that differs from its own conjugate by less is real."""
 FAR = 1e4
 """Sizes of the task: what is farther out is nearly at infinity."""
-FARTHEST = 1e11
-"""What is farther out than this is at infinity."""
 
 
 class ComponentSolutions(NamedTuple):
@@ -433,7 +445,7 @@ def with_ball_paths(
     rows = np.setdiff1d(record.classes[open_classes], whole.ball_rows)
     if (whole.members == 1 and whole.found >= many) or not 0 < len(rows) <= MOST_PATHS:
         return whole
-    own, x, infinite = proved_in_balls(component.family, record, rows, component.member, say)
+    own, x, infinite = proved_in_balls(component.family, record, rows, component.member, say, LAST_PART)
     infinite_classes = np.array([class_of[k] for k in infinite.tolist()], dtype=int)
     whole = _with_infinite(whole, np.full((len(infinite), whole.x.shape[1]), np.inf, dtype=complex), infinite_classes)
     return _with_new(record, whole, x, np.array([class_of[k] for k in own.tolist()], dtype=int))
