@@ -40,6 +40,8 @@ from planar.synthesis.task.synthesis_task import (
     WantedPoses,
 )
 
+SAME_NUMBERS = 1e-9
+"""Of a number, or of the size: what differs less is the same."""
 FAMILY_DESIGNS = 24
 """Designs that are listed of a family."""
 
@@ -89,8 +91,24 @@ def _complete_list(problem: ExactProblem, solved: Sequence[ComponentSolutions], 
         if design is not None:
             designs.append(replace(design, is_far=is_far))
         say(f"{count_phrase(len(designs), 'linkage')} judged")
-    designs.sort(key=_rank)
+    designs = _distinct(sorted(designs, key=_rank), problem.size)
     return CompleteSynthesis(problem.task, tuple(designs), (), problem.size, **_list_numbers(solved, designs))
+
+
+def _distinct(designs: Sequence[ExactDesign], size: float) -> list[ExactDesign]:
+    """The first of each linkage, by numbers that differ by no more than round-off of the size (m).
+
+    Two solutions may be assemblies of one, as where the offset of a slide is given as zero and either sense of its line
+    turns alike.
+    """
+    found: list[ExactDesign] = []
+    for design in designs:
+        own = np.array([*design.numbers.values()])
+        others = (np.array([*each.numbers.values()]) for each in found if each.numbers.keys() == design.numbers.keys())
+        within = SAME_NUMBERS * np.maximum(min(1.0, size), np.abs(own))
+        if not len(own) or not any(bool((np.abs(own - other) < within).all()) for other in others):
+            found.append(design)
+    return found
 
 
 def _list_numbers(solved: Sequence[ComponentSolutions], designs: Sequence[ExactDesign]) -> dict[str, Any]:
