@@ -283,3 +283,46 @@ def test_families_of_many_numbers_have_a_name_whatever_the_order_of_links():
     free = ["f.O.y", "rod.P.x"]
     (one,), (two,) = (problem_of(each, wanted, free).components for each in (maker, planar.from_dict(other)))
     assert len(one.given) > 6 and name_family(one.family).text == name_family(two.family).text
+
+
+@pytest.mark.parametrize(
+    ("place", "offsets"), [([1.8, 2.2], (1.4115379434219804, -1.41153794342198)), ([1.0, 1.2], ())]
+)
+def test_a_point_nearer_than_its_given_coordinate_is_of_no_linkage(place, is_far):
+    """P.y = +-sqrt(|BP|^2 - 1.2^2) is real only where P is farther from B than 1.2 m; the trace shows that the two
+    solutions are all."""
+    links = {
+        "AD": {"points": {"A": [0.0, 0.0], "D": [3.0, 0.0]}},
+        "AB": {"ends": ["A", "B"], "length": 1.0},
+        "BC": {"points": {"B": [0.0, 0.0], "C": [2.5, 0.3], "P": [1.2, 0.8]}},
+        "DC": {"ends": ["D", "C"], "length": 2.0},
+    }
+    start = {"planar": 1, "units": UNITS, "frame": "AD", "links": links, "pairs": [{"turning": pin} for pin in "ABCD"]}
+    start |= {"inputs": [{"pair": "A", "position": 1.0}], "sketch": {"B": [0.54, 0.84], "C": [2.9, 2.0]}}
+    wanted = {"point": "P", "through": [{"at": place, "input": 1.0}], "absolute": True}
+    task = {"planar": 1, "units": UNITS, "start": start, "wanted": [wanted], "free": ["BC.P.y", "DC.length"]}
+    listed = planar.synthesise(task, complete=True)
+    assert (listed.found, listed.complete) == (2, "numerically complete")
+    offset = np.sqrt(abs(complex(*place) - np.exp(1.0j)) ** 2 - 1.2**2 + 0.0j).real
+    values = sorted(each.numbers["BC.P.y"] for each in listed.designs)
+    np.testing.assert_allclose(values, [-offset, offset] if is_far else [], atol=1e-9)
+
+
+def test_both_senses_of_a_line_through_its_pin_are_one_linkage():
+    """A block that swings on a line through its crank's pin turns alike whichever way the line goes."""
+    links = {
+        "f": {"points": {"O": [0.0, 0.0], "D": [1.0, -0.4]}},
+        "c": {"ends": ["O", "A"], "length": 0.4},
+        "rod": {"points": {"A": [0.0, 0.0]}},
+    }
+    pairs = [{"turning": "O"}, {"turning": "A"}]
+    pairs.append({"sliding": "s", "on": "rod", "block": "D", "line": {"through": "A", "angle": 0.3}})
+    start = {"planar": 1, "units": UNITS, "frame": "f", "links": links, "pairs": pairs}
+    start |= {"inputs": [{"pair": "O", "position": 1.0}], "sketch": {"A": [0.2, 0.35]}}
+    inputs = np.array([0.5, 1.1, 1.7])
+    turned = np.angle(1.1 - 0.4j - 0.4 * np.exp(1j * inputs))
+    function = {"from": "O", "to": "D", "pairs": np.stack([inputs, turned], axis=1).tolist()}
+    task = {"planar": 1, "units": UNITS, "start": start, "wanted": [function], "free": ["f.D.x"]}
+    values = [each.numbers["f.D.x"] for each in planar.synthesise(task, complete=True).designs]
+    assert len({round(value, 9) for value in values}) == len(values)
+    assert min(abs(value - 1.1) for value in values) < 1e-9

@@ -357,12 +357,17 @@ class _Slices:
         self.graph.add_node(first, normalize(W))
         while len(self.graph.nodes) < FIRST_SLICES[len(V) > FEW]:
             self.graph.add_node(self.random_slice(), W[:0])
-        self.levels = [1]
+        self.levels = self._add_levels(1)
+
+    def _add_levels(self, node: int) -> list[int]:
+        """The number of a slice, and those of the same slice at other levels."""
+        levels = [node]
         for level in LEVELS:
-            moved = self.graph.nodes[1].copy()
+            moved = self.graph.nodes[node].copy()
             moved[0, 0] += level * np.abs(moved).max()
-            self.levels.append(self.graph.add_node(moved, W[:0]))
-            self.graph.leaves.add(self.levels[-1])
+            levels.append(self.graph.add_node(moved, self.graph.solutions[0][:0]))
+            self.graph.leaves.add(levels[-1])
+        return levels
 
     def random_slice(self) -> Slice:
         """Coefficients at random; none of conjugates where places tell solutions from each other."""
@@ -380,7 +385,11 @@ class _Slices:
                     return False
             if self._is_even():
                 return True
-            self.graph.add_node(self.random_slice(), self.graph.solutions[0][:0])
+            # where a path to another level was lost, those of another slice are tried
+            is_lost = len({len(self.graph.solutions[level]) for level in self.levels}) > 1
+            node = self.graph.add_node(self.random_slice(), self.graph.solutions[0][:0])
+            if is_lost:
+                self.levels = self._add_levels(node)
         return False
 
     def _is_even(self) -> bool:
@@ -413,7 +422,8 @@ def _form_size(x: ComplexArray) -> int:
 
 def _random_line(family: Family, rng: np.random.Generator) -> tuple[ComplexArray, ...]:
     """Changes of the numbers of one entry, or of those that conditions hold where there is none."""
-    moving = max(range(1, len(family.parts)), key=lambda k: family.parts[k].entry_count, default=0)
+    entries = [k for k, part in enumerate(family.parts) if k and part.kinds and part.rows.equation_count]
+    moving = max(entries, key=lambda k: family.parts[k].entry_count, default=0)
     line: list[ComplexArray] = []
     for k, part in enumerate(family.parts):
         change: ComplexArray = np.zeros((part.entry_count, len(part.kinds), 2), dtype=complex)
