@@ -13,7 +13,10 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 import planar
+from planar.derivatives import result_slopes
+from planar.derivatives.design_equations import design_dimensions
 from planar.document.dimensions import change_dimension, file_dimensions
+from planar.document.revised.changed_numbers import with_values
 from planar.dynamics.lagrangian import LagrangianFunctions
 from planar.equations.coordinates import FRAME_PARTS, frames_from_coordinates
 from planar.equations.residuals import input_positions, pair_residuals
@@ -358,6 +361,31 @@ def test_numbers_that_cannot_change_alone_are_named_and_have_none():
     assert {"arm.length", "inner mesh.radii.0"} <= {*wheels.tied}
     rack = planar.sensitivity(state_of("rack-steering"), "travel")
     assert {"frame.O.y", "mesh.radius"} <= {*rack.tied}
+
+
+@pytest.mark.parametrize("stem", ["planetary-gear-set", "three-parallel-cranks"])
+def test_numbers_that_cannot_change_alone_are_found_by_few_checks_of_the_file(stem, monkeypatch):
+    mechanism, checks = replace(MODELS[stem], published=()), []
+
+    def counted(mechanism, values):
+        checks.append(values)
+        return with_values(mechanism, values)
+
+    def is_refused(name, factor):
+        try:
+            with_values(mechanism, {name: factor * planar.dimensions(mechanism)[name]})
+        except BadInput:
+            return True
+        return False
+
+    monkeypatch.setattr(result_slopes, "with_values", counted)
+    found = result_slopes.tied_dimensions(mechanism)
+    names = [each.name for each in design_dimensions(mechanism) if each.path[0] in ("links", "pairs")]
+    tried = [name for name in names if planar.dimensions(mechanism)[name]]
+    assert [name for name in found if name in tried] == [
+        name for name in tried if is_refused(name, 1.001) and is_refused(name, 0.999)
+    ]
+    assert len(checks) < 2 + 4 * len(found) * np.log2(len(names))
 
 
 def test_at_a_dead_point_there_are_none():
