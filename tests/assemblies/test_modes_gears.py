@@ -15,6 +15,7 @@ from planar.document import files
 from planar.equations.symbolic_equations import slice_length
 from planar.solving.assembly.block_assemblies import BlockAssemblies
 from planar.solving.prepared_mechanism import PreparedMechanism
+from tests.draws import first_cases
 from tests.inversions import unknowns_of
 from tests.linkages import Built, random_linkage
 
@@ -41,13 +42,16 @@ def by_scanning(ratio: float, turns: int, apart: float, many: int = 400_001) -> 
 
 @pytest.mark.parametrize(
     ("wheels", "p", "q"),
-    [
-        ({"gear": "w", "teeth": [20, 20]}, -1, 1),
-        ({"gear": "w", "teeth": [20, 40]}, -1, 2),
-        ({"gear": "w", "teeth": [30, 20]}, -3, 2),
-        ({"chain": "w", "ratio": 1.5}, 3, 2),
-        ({"chain": "w", "ratio": 3}, 3, 1),
-    ],
+    first_cases(
+        [
+            ({"gear": "w", "teeth": [20, 20]}, -1, 1),
+            ({"gear": "w", "teeth": [20, 40]}, -1, 2),
+            ({"chain": "w", "ratio": 1.5}, 3, 2),
+            ({"gear": "w", "teeth": [30, 20]}, -3, 2),
+            ({"chain": "w", "ratio": 3}, 3, 1),
+        ],
+        3,
+    ),
 )
 def test_a_geared_five_bar_has_as_many_as_the_degree_of_its_closing_says(wheels, p, q):
     """With angles q phi and p phi the square of the way from A to B is of degree max(|p|, q, |p - q|) in exp(i phi)."""
