@@ -124,7 +124,7 @@ def told_error(state):
 )
 def test_the_rates_of_short_links_are_as_exact_as_is_told_or_refused(drawn, value, exact):
     refused, solved = [], []
-    for given in drawn(np.random.default_rng(3), draws(140)):
+    for given in drawn(np.random.default_rng(3), draws(280)):
         both = [exact(*given, side) for side in (1, -1)]
         if both[0] is None:
             continue
