@@ -80,7 +80,7 @@ REACH = [
     (1.0, 1.2, 1.3, 3.0, 150.0),
     (0.7, 1.0, 2.8, 2.0, -40.0),
 ]
-"""Crank, coupler, rocker, ground and the crank's angle: in turn one whose bars are too short, and one with a bar too long."""
+"""Crank, coupler, rocker, ground and the crank's angle: in turn bars that are too short, and a bar that is too long."""
 
 
 @pytest.mark.parametrize(("crank", "coupler", "rocker", "ground", "at"), first_cases(REACH, 2))
