@@ -4,6 +4,7 @@ import os
 from collections.abc import Callable, Hashable, Iterable
 from typing import Any, TypeVar
 
+import pytest
 from hypothesis import settings
 
 T = TypeVar("T")
@@ -41,6 +42,17 @@ def part(of: Iterable[Any], one_in: int, first: int = 0) -> list[Any]:
     """About one in so many of what a law goes through, from the first on; all of them in an exhaustive run."""
     every = list(of)
     return every if is_exhaustive() else every[first :: max(one_in, round(one_in / SHARE))]
+
+
+def first_cases(cases: Iterable[T], count: int = 1) -> list[T]:
+    """The first cases of a test whose others repeat what these show; all cases in an exhaustive run."""
+    every = list(cases)
+    return every if is_exhaustive() else every[:count]
+
+
+def repeats(shown_by: str) -> pytest.MarkDecorator:
+    """A mark of tests that run in exhaustive runs alone, with a sentence on what shows the same in any run."""
+    return pytest.mark.skipif(not is_exhaustive(), reason=f"runs with {EXHAUSTIVE_OPTION}: {shown_by}")
 
 
 def covering(cases: Iterable[T], kinds_of: Callable[[T], Iterable[Hashable]]) -> list[T]:

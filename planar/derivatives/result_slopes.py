@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Mapping
+from collections.abc import Container, Mapping, Sequence
 from typing import NamedTuple
 
 import casadi as ca
@@ -32,6 +32,8 @@ OPENING = 1e-6
 """Constraints that are opened by more than this part of a change (sizes, rad) do not go with it."""
 NUDGE = 1e-3
 """Of a number, or of the size: a change of its own that a file may be refused for."""
+GOLDEN_FRACTION = (5.0**0.5 - 1.0) / 2.0
+"""Its multiples leave fractions that are all different: no two numbers are changed by the same part."""
 
 
 class NamedSlopes(NamedTuple):
@@ -171,26 +173,41 @@ def tied_dimensions(mechanism: Mechanism, among: Container[str] | None = None) -
 
     So the radii of wheels and the distance of their centres, or the rises of a cam's law.
     """
-    known: dict[str, bool] = mechanism.__dict__.setdefault("_tied_dimensions", {})  # kept: each is tried
+    known: dict[str, bool] = mechanism.__dict__.setdefault("_tied_dimensions", {})  # kept: numbers are tried
     design = design_equations(mechanism)
     chosen = [
         each
         for each in design.dimensions
         if each.path[0] in ("links", "pairs") and (among is None or each.name in among)
     ]
-    for each in chosen:
-        if each.name not in known:
-            known[each.name] = _is_tied(design, each)
+    untried = [each for each in chosen if each.name not in known]
+    bound = {*_find_tied(design, untried)}
+    known.update({each.name: each.name in bound for each in untried})
     return tuple(each.name for each in chosen if known[each.name])
 
 
-def _is_tied(design: DesignEquations, dimension: Dimension) -> bool:
-    """Whether a file with a number somewhat greater is refused, and one with a lesser as well."""
-    size = abs(dimension.value) or (design.solver.unit if dimension.kind == "length" else 1.0)
-    for way in (1.0, -1.0):
-        try:
-            with_values(design.mechanism, {dimension.name: dimension.value + way * NUDGE * size})
-        except BadInput:
-            continue
+def _find_tied(design: DesignEquations, dimensions: Sequence[Dimension]) -> list[str]:
+    """Those of some numbers that cannot change alone, found by halving.
+
+    A file is checked once for all numbers that are free: changed together, each by a part of its own, tied numbers do
+    not go with one another but by chance.
+    """
+    if not dimensions or any(_is_accepted(design, dimensions, sign) for sign in (1.0, -1.0)):
+        return []
+    if len(dimensions) == 1:
+        return [dimensions[0].name]
+    middle = len(dimensions) // 2
+    return [*_find_tied(design, dimensions[:middle]), *_find_tied(design, dimensions[middle:])]
+
+
+def _is_accepted(design: DesignEquations, dimensions: Sequence[Dimension], sign: float) -> bool:
+    """Whether a file is accepted in which these numbers are somewhat greater, or less for a sign of -1."""
+    values = {}
+    for index, each in enumerate(dimensions):
+        size = abs(each.value) or (design.solver.unit if each.kind == "length" else 1.0)
+        values[each.name] = each.value + sign * NUDGE * (1.0 + index * GOLDEN_FRACTION % 1.0) * size
+    try:
+        with_values(design.mechanism, values)
+    except BadInput:
         return False
     return True

@@ -7,7 +7,7 @@ import pytest
 
 import planar
 from planar.document.tables.measured_table import read_measured_table
-from tests.command import process
+from tests.command import run
 
 NOISE = 1e-4
 
@@ -103,7 +103,7 @@ def test_the_command_reads_a_run_back_and_writes_the_fitted_file(tmp_path):
         "--drawing",
         str(drawing),
     ]
-    done = process(tmp_path, "calibrate", "crank-rocker", "m.csv", "--json", *options)
+    done = run(tmp_path, "calibrate", "crank-rocker", "m.csv", "--json", *options)
     assert json.loads(done.out)["values"]["coupler.length"] == pytest.approx(0.18, rel=1e-9)
     assert planar.dimensions(fitted)["coupler.length"] == pytest.approx(0.18, rel=1e-9)
     assert drawing.stat().st_size > 1000

@@ -12,17 +12,23 @@ import planar
 from planar.cli import main
 from planar.foundation.errors import BadInput, Outcome
 from tests.builders import slider_crank
+from tests.draws import first_cases
 from tests.known import MODELS
 
 ARM = {"boom cylinder": (2.0, 3.0, 9), "stick cylinder": (2.4, 3.5, 8)}
 
 
+@pytest.mark.parametrize(
+    ("model", "link", "point", "over"),
+    first_cases([("open-arm", "upper arm", "B", None), ("excavator-arm", "boom", "E", ARM)]),
+)
 @pytest.mark.parametrize("inertia", [True, False])
-def test_every_position_of_a_map_has_the_forces_of_that_position(inertia):
-    arm = replace(MODELS["excavator-arm"], masses=(planar.Mass("boom", 900.0, "E", 50.0),), gravity=(0.0, -9.81))
-    found = planar.force_map(arm, ARM, inertia=inertia)
+def test_every_position_of_a_map_has_the_forces_of_that_position(model, link, point, over, inertia):
+    arm = replace(MODELS[model], masses=(planar.Mass(link, 900.0, point, 50.0),), gravity=(0.0, -9.81), published=())
+    over = over or {given.pair: (given.position, given.position + 0.5, 4) for given in arm.inputs[:2]}
+    found = planar.force_map(arm, over, inertia=inertia)
     assert found.is_reached.all()
-    for node in ((0, 0), (3, 7), (8, 2)):
+    for node in ((0, 0), (1, 3), (3, 2)):
         at = {name: float(each[k]) for (name, each), k in zip(found.over.items(), node, strict=True)}
         one = planar.forces(planar.solve(arm, at), inertia)
         for name, effort in one.inputs.items():
@@ -39,7 +45,7 @@ def test_the_worst_case_of_a_two_link_arm_is_solved_for_between_the_positions():
     tip = max(state.points, key=lambda name: hypot(*state.point(name).position))
     arm = replace(arm, loads=(planar.Load(point=tip, force=(0.0, -10.0)),), masses=(), springs=(), published=())
     first, second, third = (given.pair for given in arm.inputs)
-    found = planar.force_map(arm, {first: (-1.0, 1.7, 8), second: (-1.1, 1.3, 7), third: (-0.9, 1.2, 6)}, inertia=False)
+    found = planar.force_map(arm, {first: (-1.0, 1.7, 5), second: (-1.1, 1.3, 4), third: (-0.9, 1.2, 4)}, inertia=False)
     worst = next(each for each in found.worst if each.kind == "greatest effort" and each.of == first)
     reach = [planar.solve(arm, {first: 0.0, second: 0.0, third: 0.0}).point(tip).position]
     far = float(np.hypot(*(reach[0] - state.point(first).position)))
@@ -125,10 +131,11 @@ def test_what_is_asked_amiss_is_refused():
         planar.force_map("excavator-arm", dict.fromkeys((*ARM, "bucket cylinder"), (2.0, 3.0, 200)))
 
 
-def test_the_command_tells_worst_cases(capsys):
-    over = "boom cylinder=2000mm:3000mm,stick cylinder=2400mm:3500mm"
+def test_the_command_tells_worst_cases(capsys, tmp_path):
+    path = tmp_path / "five-bar.json"
+    path.write_text(planar.dumps(five_bar((0.6, 0.8, 0.5, 0.7, 0.85), (0.05, 1.7), (66.0, 44.0), -1.0)))
     with pytest.raises(SystemExit):
-        main(["forces", "excavator-arm", "--over", over, "--static", "--steps", "6"])
+        main(["forces", str(path), "--over", "O=0deg:60deg,P=80deg:100deg", "--static", "--steps", "3"])
     text = capsys.readouterr().out
-    assert "Worst cases over boom cylinder and stick cylinder" in text
-    assert "49 positions, 7 by 7" in text
+    assert "Worst cases over O and P" in text
+    assert "16 positions, 4 by 4" in text

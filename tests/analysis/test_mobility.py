@@ -15,7 +15,7 @@ from planar.solving.checks.singular_values import rank
 from planar.solving.full_constraints import FullConstraints
 from planar.solving.position import PositionSolver
 from tests.builders import four_bar_document
-from tests.draws import part
+from tests.draws import first_cases, part
 from tests.linkages import conditioning, determinate, random_linkage
 
 MODELS = Path(__file__).parents[2] / "models"
@@ -120,11 +120,14 @@ def test_a_crank_beside_bars_in_line_is_all_that_moves():
 
 @pytest.mark.parametrize(
     ("lengths", "theta", "sketch"),
-    [
-        ((2, 3, 1.5, 6.5), 0, {"B": [2, 0], "C": [5, 0]}),
-        ((6.5, 3, 1.5, 2), 0, {"B": [6.5, 0], "C": [3.5, 0]}),
-        ((2, 6.5, 1.5, 3), 180, {"B": [-2, 0], "C": [4.5, 0]}),
-    ],
+    first_cases(
+        [
+            ((2, 3, 1.5, 6.5), 0, {"B": [2, 0], "C": [5, 0]}),
+            ((2, 6.5, 1.5, 3), 180, {"B": [-2, 0], "C": [4.5, 0]}),
+            ((6.5, 3, 1.5, 2), 0, {"B": [6.5, 0], "C": [3.5, 0]}),
+        ],
+        2,
+    ),
 )
 def test_a_four_bar_that_just_reaches_cannot_move_at_all(lengths, theta, sketch):
     """The longest is the other three together. Three angles, and of two closures the one along the line vanishes to
@@ -186,8 +189,20 @@ def third_crank(theta, off, along=0.8):
     return mechanism(links, pins("ABCDEF"), [{"pair": "A", "position": theta, "velocity": "3 rad/s"}], sketch)
 
 
-@pytest.mark.parametrize("theta", [0, 60, 180])
-@pytest.mark.parametrize(("off", "along"), [(0.7, 0.8), (0.0, 0.8), (0.0, 0.5), (0.0, 1.3)])
+PLACES = [(0.7, 0.8), (0.0, 0.8), (0.0, 0.5), (0.0, 1.3)]
+"""Of the third crank's pins: off the line of the others, and along it."""
+
+
+@pytest.mark.parametrize(
+    ("theta", "off", "along"),
+    first_cases(
+        sorted(
+            ((theta, *place) for place in PLACES for theta in (0, 60, 180)),
+            key=lambda case: (0, 60, 180, 60)[PLACES.index(case[1:])] != case[0],
+        ),
+        len(PLACES),
+    ),
+)
 def test_of_six_pins_of_three_parallel_cranks_one_is_superfluous(theta, off, along):
     value = third_crank(theta, off, along)
     found = planar.mobility(value)

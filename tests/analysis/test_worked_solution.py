@@ -23,6 +23,7 @@ from planar.model.file_units import rate_unit
 from planar.reports.tables.worked_solution import record, solution_text
 from tests.builders import four_bar_document
 from tests.command import run
+from tests.draws import first_cases
 from tests.hostile import NAMES, hostile_document
 from tests.known import MODELS, some_models, state_of
 from tests.linkages import random_linkage
@@ -426,7 +427,7 @@ def test_names_are_texts_whatever_they_look_like() -> None:
     json.dumps(record(solution))
 
 
-@pytest.mark.parametrize("seed", (3, 10, 20, 30, 41, 50))
+@pytest.mark.parametrize("seed", first_cases((3, 10, 41, 20, 30, 50), 3))
 def test_random_linkages_are_explained(seed: int) -> None:
     """Any links in any loops: points and links are told of as the state has them."""
     try:

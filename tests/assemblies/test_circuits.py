@@ -14,7 +14,7 @@ from planar.assemblies.circuits.chebyshev_zeros import SignedLog, find_zeros
 from planar.assemblies.polynomial.completeness import Completeness
 from tests.builders import bare_four_bar, slider_crank_document
 from tests.closed_forms import between
-from tests.draws import draws, part
+from tests.draws import draws, first_cases, is_exhaustive, part
 from tests.linkages import random_linkage
 
 CLAIMED = Completeness.NUMERICALLY
@@ -211,8 +211,9 @@ def test_a_linkage_that_never_goes_together_has_no_circuit():
     assert found.complete is CLAIMED
 
 
-@pytest.mark.parametrize("turns", [0, -1, 2])
-@pytest.mark.parametrize("position", [-0.6, 0.8])
+@pytest.mark.parametrize(
+    ("position", "turns"), first_cases([(-0.6, -1), (0.8, 0), (0.8, 2), (-0.6, 0), (-0.6, 2), (0.8, -1)], 3)
+)
 def test_an_interval_is_written_around_the_files_position_as_the_range_of_cycle_is(position, turns):
     mechanism = bare_four_bar(2.0, 1.8, 3.0, 4.0, position + turns * TURN)
     found = planar.circuits(mechanism)
@@ -236,7 +237,7 @@ def test_a_circuit_that_is_not_there_at_the_files_input_is_found():
     assert all(found.of(mode)[0] is each for each in found for mode in [planar.modes(each.mechanism).nearest])
 
 
-@pytest.mark.parametrize("name", ["four-bar", "klann-leg", "stephenson-2-six-bar", "umbrella"])
+@pytest.mark.parametrize("name", first_cases(["four-bar", "stephenson-2-six-bar", "klann-leg", "umbrella"], 2))
 def test_numbers_of_assemblies_are_those_listed_anywhere_in_an_interval(name):
     mechanism = planar.load(name)
     found = planar.circuits(mechanism)
@@ -248,7 +249,7 @@ def test_numbers_of_assemblies_are_those_listed_anywhere_in_an_interval(name):
             assert all(found.of(mode) is not None for mode in modes)
 
 
-@pytest.mark.parametrize("name", ["four-bar", "klann-leg", "slider-crank"])
+@pytest.mark.parametrize("name", first_cases(["four-bar", "slider-crank", "klann-leg"], 2))
 def test_rows_of_a_circuits_motion_lie_on_their_branches(name):
     for circuit in planar.circuits(planar.load(name)):
         assert len(circuit.branch) == len(circuit.motion)
@@ -275,8 +276,9 @@ def test_the_order_does_not_depend_on_the_sketch():
         ("antiparallelogram", "branches cross"),
         ("geared-five-bar", "turns"),
         ("rapsons-slide", "without end"),
-        *part([("peaucellier-lipkin", "branches cross"), ("umbrella", "branches cross")], 2),  # of some no way on
-    ],
+        ("peaucellier-lipkin", "branches cross"),  # of some no way on
+        ("umbrella", "branches cross"),
+    ][: None if is_exhaustive() else 3],
 )
 def test_what_is_not_known_is_not_claimed(name, why):
     mechanism = planar.load(name)

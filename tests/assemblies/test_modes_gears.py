@@ -15,6 +15,7 @@ from planar.document import files
 from planar.equations.symbolic_equations import slice_length
 from planar.solving.assembly.block_assemblies import BlockAssemblies
 from planar.solving.prepared_mechanism import PreparedMechanism
+from tests.draws import first_cases, is_exhaustive
 from tests.inversions import unknowns_of
 from tests.linkages import Built, random_linkage
 
@@ -41,13 +42,16 @@ def by_scanning(ratio: float, turns: int, apart: float, many: int = 400_001) -> 
 
 @pytest.mark.parametrize(
     ("wheels", "p", "q"),
-    [
-        ({"gear": "w", "teeth": [20, 20]}, -1, 1),
-        ({"gear": "w", "teeth": [20, 40]}, -1, 2),
-        ({"gear": "w", "teeth": [30, 20]}, -3, 2),
-        ({"chain": "w", "ratio": 1.5}, 3, 2),
-        ({"chain": "w", "ratio": 3}, 3, 1),
-    ],
+    first_cases(
+        [
+            ({"gear": "w", "teeth": [20, 20]}, -1, 1),
+            ({"gear": "w", "teeth": [20, 40]}, -1, 2),
+            ({"chain": "w", "ratio": 1.5}, 3, 2),
+            ({"gear": "w", "teeth": [30, 20]}, -3, 2),
+            ({"chain": "w", "ratio": 3}, 3, 1),
+        ],
+        3,
+    ),
 )
 def test_a_geared_five_bar_has_as_many_as_the_degree_of_its_closing_says(wheels, p, q):
     """With angles q phi and p phi the square of the way from A to B is of degree max(|p|, q, |p - q|) in exp(i phi)."""
@@ -111,7 +115,7 @@ def with_whole_ratios(built: Built, seed: int) -> dict | None:
 
 def test_of_random_geared_linkages_the_assembly_that_was_built_and_all_that_starts_find_are_listed():
     compared = between = 0
-    for seed in (11, 13, 41, 113, 137, 185, 190, 292, 499):
+    for seed in first_cases((13, 113, 499, 11, 41, 137, 185, 190, 292), 3):
         built = random_linkage(seed, 2 + seed % 6, 0.5, 0.1)
         setup = PreparedMechanism(files.from_dict(with_whole_ratios(built, seed)))
         z, e = unknowns_of(setup, built), setup.equations
@@ -132,5 +136,5 @@ def test_of_random_geared_linkages_the_assembly_that_was_built_and_all_that_star
                 assert gaps.max(axis=1).min() < 1e-6
             compared += 1
             between += any(row.kind.value == "turns" for row in e.rows[stage.rows])
-    assert compared >= 6
-    assert between >= 2  # groups with rows between angles alone
+    assert compared >= (6 if is_exhaustive() else 2)
+    assert between >= (2 if is_exhaustive() else 1)  # groups with rows between angles alone

@@ -19,6 +19,7 @@ from planar.model.pairs import pair_types
 from planar.solving.position import PositionSolver
 from tests.builders import block_slider_crank, four_bar
 from tests.closed_forms import ROCKER, TURN, rocker
+from tests.draws import first_cases
 from tests.known import MODELS
 from tests.linkages import random_linkage
 
@@ -109,7 +110,8 @@ def test_mixed_mechanisms_are_the_cycles_of_each(backend):
 
 
 @pytest.mark.parametrize(
-    ("seed", "links", "higher"), [*((s, 1 + s % 5, 0.0) for s in range(8)), (9, 3, 0.5), (10, 4, 0.5)]
+    ("seed", "links", "higher"),
+    first_cases([(9, 3, 0.5), (10, 4, 0.5), *((seed, 1 + seed % 5, 0.0) for seed in range(7, -1, -1))], 5),
 )
 def test_random_linkages_of_every_pair_type(seed, links, higher):
     mechanism = files.from_dict(random_linkage(seed, links, higher=higher).value)

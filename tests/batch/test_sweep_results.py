@@ -100,7 +100,7 @@ def test_a_store_has_all_results_and_is_of_one_request(suffix, tmp_path):
         swept(store, links=["BC", "AB"])
 
 
-@pytest.mark.parametrize("model", part(["002-E3.6a", "four-bar", "band-drafting-machine"], 3))
+@pytest.mark.parametrize("model", part(["slider-crank", "002-E3.6a", "four-bar", "band-drafting-machine"], 4))
 def test_any_number_of_the_file_may_be_swept(model):
     mechanism = MODELS[model]
     given = mechanism.inputs[0]

@@ -28,7 +28,7 @@ from planar.equations.mechanism_numbers import equation_structure
 from planar.foundation.errors import BadInput, Outcome
 from planar.model.mechanism import named_points
 from tests.builders import designs_around
-from tests.draws import part
+from tests.draws import first_cases, part
 from tests.known import MODELS
 from tests.linkages import random_linkage
 from tests.watchdog import watched
@@ -104,8 +104,16 @@ def test_a_run_of_a_model_is_the_one_that_casadi_gives(stem, runner):
             np.testing.assert_allclose(told, wanted, rtol=0, atol=(1e-12, 1e-9, 2e-7)[order] * scale)
 
 
-@pytest.mark.parametrize("at_two", [False, True])
-@pytest.mark.parametrize("stem", ["four-bar", "offset-slider-crank", "crank-and-slotted-lever"])
+@pytest.mark.parametrize(
+    ("stem", "at_two"),
+    first_cases(
+        [
+            *[("four-bar", True), ("offset-slider-crank", False), ("crank-and-slotted-lever", True)],
+            *[("four-bar", False), ("offset-slider-crank", True), ("crank-and-slotted-lever", False)],
+        ],
+        3,
+    ),
+)
 def test_a_run_from_signs_is_that_from_the_unknowns(stem, at_two):
     """Of designs at one input, or at two; one starts nowhere, and of another the assembly is to be found yet."""
     motion = planar.cycle(MODELS[stem])

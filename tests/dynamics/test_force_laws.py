@@ -5,6 +5,7 @@ from __future__ import annotations
 from copy import deepcopy
 from dataclasses import replace
 from functools import cache
+from itertools import product
 from math import cos, sin
 from typing import Any
 
@@ -21,13 +22,17 @@ from planar.model.mechanism import Mechanism, named_points
 from planar.model.pairs import pair_types
 from planar.results.motion import State
 from planar.solving.position import PositionSolver, solve
-from tests.draws import part
+from tests.draws import first_cases, is_exhaustive, part, repeats
 from tests.known import MODELS, some_models
 from tests.linkages import LIFTING, conditioning, random_linkage
 
 EXACT = 1e-10
 WELL = 1e-2
 """Linkages nearer to a dead point than this lose digits by their own conditioning, not by the solver's fault."""
+
+
+COUNT = 40 if is_exhaustive() else 7
+"""Linkages that are made."""
 
 
 def worked(mechanism: Mechanism, seed: int) -> Mechanism:
@@ -66,7 +71,7 @@ def linkages() -> tuple[tuple[dict[str, Any], Mechanism, State], ...]:
     """Well-conditioned random linkages of up to ten links, higher pairs among them, with their file values."""
     found: list[tuple[dict[str, Any], Mechanism, State]] = []
     for seed in range(400):
-        if len(found) == 40:
+        if len(found) == COUNT:
             break
         value = random_linkage(seed, 1 + seed % 10, higher=0.3 * (seed % 2)).value
         mechanism = worked(planar.from_dict(value), seed)
@@ -92,7 +97,7 @@ def forces_of(number: int) -> Forces:
     return planar.forces(linkages()[number][2])
 
 
-numbered = pytest.mark.parametrize("number", part(range(40), 4))
+numbered = pytest.mark.parametrize("number", part(range(COUNT), 4))
 
 
 def scale_of(found: Forces) -> float:
@@ -123,6 +128,7 @@ def test_power_virtual_work_and_free_bodies_balance_on_random_linkages(number):
     assert all(np.isfinite(effort) for effort in found.inputs.values())
 
 
+@repeats("few of the linkages are tried there")
 def test_they_are_of_all_sizes_and_types():
     mechanisms = [mechanism for _, mechanism, _ in linkages()]
     assert len(mechanisms) == 40
@@ -170,8 +176,9 @@ def test_no_pair_does_work_on_a_motion_that_it_allows(number):
             assert abs(parts.sum()) <= 1e-9 * max(1.0, np.abs(parts).max()), name
 
 
-@pytest.mark.parametrize("number", range(0, 40, 3))
-@pytest.mark.parametrize("turned", [0.7, -2.4])
+@pytest.mark.parametrize(
+    ("number", "turned"), first_cases([(6, 0.7), (3, -2.4), *product(range(0, COUNT, 3), (0.7, -2.4))], 2)
+)
 def test_a_world_that_is_moved_and_turned_has_its_forces_turned(number, turned):
     """The old frame is pinned to a new one at some place and angle, gravity and loads turned alike."""
     full, mechanism = written(number)
@@ -205,7 +212,7 @@ def test_a_world_that_is_moved_and_turned_has_its_forces_turned(number, turned):
         assert other.undetermined == {}
 
 
-@pytest.mark.parametrize("number", range(0, 40, 4))
+@pytest.mark.parametrize("number", range(0, COUNT, 4))
 def test_at_rest_the_forces_of_loads_add_up(number):
     _, mechanism, _ = linkages()[number]
     still = replace(mechanism, springs=(), inputs=tuple(each._replace(velocity=0.0) for each in mechanism.inputs))
@@ -225,7 +232,7 @@ def test_at_rest_the_forces_of_loads_add_up(number):
             np.testing.assert_allclose(added, reaction.force, atol=EXACT * scale)
 
 
-@pytest.mark.parametrize("number", range(0, 40, 5))
+@pytest.mark.parametrize("number", range(0, COUNT, 5))
 def test_a_file_in_other_units_says_the_same(number):
     _, mechanism, _ = linkages()[number]
     other = planar.from_dict(planar.to_dict(replace(mechanism, units=FileUnits("mm", "deg"))))
@@ -233,7 +240,7 @@ def test_a_file_in_other_units_says_the_same(number):
 
 
 @pytest.mark.parametrize("size", [1e-6, 1e6])
-@pytest.mark.parametrize("number", range(0, 40, 8))
+@pytest.mark.parametrize("number", range(0, COUNT, 8))
 def test_a_mechanism_of_another_size_balances_alike(number, size):
     """Lengths by a factor and masses by its square, in the same time: forces by its third power."""
     full, mechanism = written(number)

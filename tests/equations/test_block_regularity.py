@@ -5,8 +5,10 @@ import numpy as np
 import pytest
 
 import planar
+from planar.equations.acceptance import AcceptanceResult
 from planar.equations.block_regularity import reduce_to_triangle, regularity_bound
-from planar.solving.position import PositionSolver
+from planar.solving.position import PositionSolver, solved_mechanism
+from tests.known import MODELS
 
 
 @pytest.mark.parametrize("size", [3, 5, 8])
@@ -112,3 +114,14 @@ def test_a_matrix_that_loses_a_column_on_the_way_is_singular_and_not_unknown(mat
     block = ca.SX.sym("block", *entries.shape)
     bound = regularity_bound(block, ca.SX.ones(len(entries)), ca.SX.ones(len(entries)) * 1e-9)
     assert float(ca.Function("bound", [block], [bound])(entries)) == pytest.approx(0.0, abs=1e-12)
+
+
+@pytest.mark.parametrize("stem", ["whitworth", "double-butterfly", "geared-five-bar"])
+def test_the_function_for_regularity_alone_says_what_that_of_a_position_says(stem):
+    found = solved_mechanism(MODELS[stem])
+    solver, given = found.solver, found.solver.inputs
+    scales = given.p, solver.row_scale, solver.min_column_scale
+    verdict = solver.acceptance.position(found.assembly.z, given.u1, given.u, given.u1, given.u2, *scales)[1]
+    alone = solver.acceptance.regularity(found.assembly.z, given.u, *scales)[0][0, 0]
+    assert 0.0 < alone < 1.0
+    assert AcceptanceResult(*verdict[0]).regularity == pytest.approx(alone, rel=1e-12)

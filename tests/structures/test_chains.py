@@ -11,6 +11,7 @@ import planar
 from planar.structures.canonical_form import greatest_numberings
 from planar.structures.contracted_graphs import contracted_graphs, has_cut_vertex
 from planar.structures.rigid_parts import has_rigid_part
+from tests.draws import first_cases
 
 PUBLISHED = {(4, 1): 1, (6, 1): 2, (8, 1): 16, (10, 1): 230, (7, 2): 4, (8, 3): 7}
 """By links and freedom. Of freedom 1: T. Mruthyunjaya, Mechanism and Machine Theory 38, 2003; E. Butcher, C. Hartman,
@@ -83,7 +84,7 @@ def brute_force(links, joints):
     return [graph for known in found.values() for graph in known]
 
 
-@pytest.mark.parametrize("links, freedom", [(4, 1), (5, 2), (6, 1), (6, 3), (7, 2)])
+@pytest.mark.parametrize("links, freedom", first_cases([(4, 1), (5, 2), (6, 1), (6, 3), (7, 2)], 4))
 def test_brute_force_finds_the_same_chains(links, freedom):
     """Naively, with the isomorphisms of another library."""
     found = planar.chains(links, freedom)

@@ -61,8 +61,8 @@ def is_surely_regular(setup: PreparedMechanism, z: Array) -> bool:
     if setup.acceptance is None:
         return False
     s = setup.inputs
-    verdict = setup.acceptance.position(z, s.u1, s.u, s.u1, s.u2, s.p, setup.row_scale, setup.min_column_scale)[1]
-    return bool(AcceptanceResult(*verdict[0].tolist()).regularity >= MIN_FAST_REGULARITY)
+    regularity = setup.acceptance.regularity(z, s.u, s.p, setup.row_scale, setup.min_column_scale)[0]
+    return bool(regularity[0, 0] >= MIN_FAST_REGULARITY)
 
 
 class FastSamples(NamedTuple):
