@@ -285,9 +285,7 @@ def test_families_of_many_numbers_have_a_name_whatever_the_order_of_links():
     assert len(one.given) > 6 and name_family(one.family).text == name_family(two.family).text
 
 
-@pytest.mark.parametrize(
-    ("place", "offsets"), [([1.8, 2.2], (1.4115379434219804, -1.41153794342198)), ([1.0, 1.2], ())]
-)
+@pytest.mark.parametrize(("place", "is_far"), [([1.8, 2.2], True), ([1.0, 1.2], False)])
 def test_a_point_nearer_than_its_given_coordinate_is_of_no_linkage(place, is_far):
     """P.y = +-sqrt(|BP|^2 - 1.2^2) is real only where P is farther from B than 1.2 m; the trace shows that the two
     solutions are all."""
