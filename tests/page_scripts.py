@@ -143,18 +143,22 @@ class Windows:
         self._running = running
         self._free: dict[bool, list[tuple[Any, list[str]]]] = {False: [], True: []}
 
-    def take(self, has_touch: bool) -> tuple[Any, list[str]]:
-        """A window that nobody looks at, and a list that takes what goes wrong in it."""
+    def take(self, has_touch: bool, size: tuple[int, int]) -> tuple[Any, list[str]]:
+        """A window of a size (px) that nobody looks at, and a list that takes what goes wrong in it."""
+        viewport = dict(zip(("width", "height"), size, strict=True))
         if self._free[has_touch]:
-            return self._free[has_touch].pop()
-        context = self._running.new_context(has_touch=has_touch)
+            window, wrong = self._free[has_touch].pop()
+            if window.viewport_size != viewport:
+                window.set_viewport_size(viewport)
+            return window, wrong
+        context = self._running.new_context(has_touch=has_touch, viewport=viewport)
         context.set_default_timeout(10_000)
         return watched_window(context)
 
     def give_back(self, has_touch: bool, window: Any, wrong: list[str]) -> None:
-        """What it shows ends, what was pressed is let go, and what went wrong is forgotten."""
+        """Release what was pressed, stop the motion, forget what went wrong; the page is replaced by the next one."""
         window.mouse.up()
-        window.goto("about:blank")
+        window.evaluate("globalThis.controls?.pause()")
         wrong.clear()
         self._free[has_touch].append((window, wrong))
 

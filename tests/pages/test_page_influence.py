@@ -5,15 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-import pytest
 
 import planar
 from planar.analysis.tolerance.spread import LinearSpread
 from planar.analysis.tolerance.variations import find_variations
 from planar.foundation.errors import NoAnswer, PlanarError
-from planar.pages.view import view
 from tests.known import MODELS, some_models
-from tests.page_scripts import in_node, needs_node, watched_window
+from tests.page_scripts import in_node, needs_node
 
 SCRIPTS = ("layers/ink.js", "solve/slopes.js", "controls/influence.js", "layers/bands.js")
 STEMS = ("four-bar", "whitworth", "scotch-yoke", "geared-five-bar", "double-butterfly", "ten-link", "klann-leg")
@@ -82,20 +80,6 @@ WORST = """
   [...document.querySelectorAll(".influence tbody tr:last-child td")].slice(0, 2)
     .map(({ dataset }) => JSON.parse(dataset.si))
 """
-
-
-@pytest.fixture
-def shown(chromium, tmp_path):
-    context = chromium.new_context(viewport={"width": 1280, "height": 900})
-    window, wrong = watched_window(context)
-
-    def show(mechanism):
-        window.goto(view(mechanism, tmp_path / "page.html").as_uri())
-        return window
-
-    yield show
-    assert not wrong
-    context.close()
 
 
 def test_the_table_and_the_band_follow_the_files_tolerances_or_one_of_them_all(shown):

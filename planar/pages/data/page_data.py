@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from itertools import islice
 from typing import Any
 
@@ -47,15 +48,40 @@ PROBE_RATIO = 0.02
 MAX_HALVINGS = 40
 MAX_ASSEMBLIES = 64
 """Assemblies that a page offers."""
+MAX_CACHED_PAGES = 16
+"""Mechanisms whose data is kept: an answer, the page and a notebook's output ask for it one after the other."""
 
 
-# long: one record after the other, as the scripts read them
 def page_data(mechanism: Mechanism, z: np.ndarray | None = None) -> tuple[dict[str, Any], str]:
-    """The data of a page, and its functions.
+    """Return the data of a page, and its functions. Entries may be added to the data; those returned are shared.
 
     `z` are the unknowns of an assembly; left out, that nearest to the sketch. Raises NoAnswer where the mechanism has
     no position to start from, or does not move.
     """
+    if z is not None or not _is_hashable(mechanism):
+        return _computed_page_data(mechanism, z)
+    data, functions = _cached_page_data(mechanism)
+    return dict(data), functions
+
+
+def _is_hashable(mechanism: Mechanism) -> bool:
+    """Whether a mechanism has a hash; one that is made in Python of lists has none."""
+    try:
+        hash(mechanism)
+    except TypeError:
+        return False
+    return True
+
+
+@lru_cache(maxsize=MAX_CACHED_PAGES)
+def _cached_page_data(mechanism: Mechanism) -> tuple[dict[str, Any], str]:
+    """The data of a page at the assembly nearest to the sketch."""
+    return _computed_page_data(mechanism, None)
+
+
+# long: one record after the other, as the scripts read them
+def _computed_page_data(mechanism: Mechanism, z: np.ndarray | None) -> tuple[dict[str, Any], str]:
+    """Compute the data of a page, and its functions."""
     known = solved_mechanism(mechanism)
     solver, z = known.solver, known.assembly.z if z is None else z
     e, program, state = solver.equations, solver.functions, rest_position(mechanism)
