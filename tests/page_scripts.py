@@ -17,6 +17,8 @@ from planar.document.files import read_asset
 from planar.pages.data.page_data import page_data
 from planar.pages.overlay_style import overlay_script
 from planar.pages.page import script_safe_json
+from tests.draws import covering, is_exhaustive
+from tests.known import MODELS, kinds_of_model
 
 NODE = shutil.which("node") or shutil.which("nodejs")
 BROWSERS = ("chromium-headless-shell", "chromium", "chromium-browser", "google-chrome")
@@ -69,6 +71,10 @@ MISNAMED = r"""Array.from(document.querySelectorAll(":is(button, a, summary)[ari
 """Those that are not called as they are lettered: who speaks that means the control (WCAG 2, 2.5.3)."""
 CLOSE = 1e-12
 """Of the greatest of its kind: as nearly a page's numbers are Python's."""
+SLOW_PAGE = "double-parallelogram"
+"""A model whose page takes seconds, since it passes change points; of its kinds only its units are no other model's."""
+PAGE_STEMS = [*MODELS] if is_exhaustive() else covering((stem for stem in MODELS if stem != SLOW_PAGE), kinds_of_model)
+"""Models of every kind, whose data is computed once for all tests of scripts in a process."""
 
 _carried = cache(page_data)
 needs_node = pytest.mark.skipif(NODE is None, reason="needs Node.js")

@@ -75,7 +75,7 @@ def drawing_context(chromium):
 @pytest.fixture
 def drawing(chromium, drawing_context, tmp_path):
     """Opens the page of a file, or of empty paper, in which nothing must go wrong."""
-    opened, contexts = [], []
+    opened, contexts, others = [], [], drawing_context.pages
 
     def begin(value=None, path=None, hand=Pencil, **context):
         serving = served(value, path, tmp_path)
@@ -89,7 +89,8 @@ def drawing(chromium, drawing_context, tmp_path):
     begin.opened = opened
     yield begin
     for page in drawing_context.pages:
-        page.close()
+        if page not in others:
+            page.close()
     for each in contexts:
         each.close()
     for serving, _, _ in opened:

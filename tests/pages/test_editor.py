@@ -10,6 +10,7 @@ import pytest
 
 import planar
 from planar.document.texts.mechanism_link import read_link
+from planar.pages.editor.answer import BLANK
 from tests.drawn_linkages import (
     CAM,
     LINKAGES,
@@ -23,10 +24,40 @@ from tests.draws import covering
 from tests.guide_screens import draw_six_bar, guide_steps
 from tests.hostile import harmful_mechanism
 from tests.page_scripts import settled
-from tests.pencil import KeyPencil, Pencil
+from tests.pencil import KeyPencil, Pencil, served
 
 CLOSE = 1e-10
 """m: numbers of a drawn file have twelve figures."""
+
+
+EMPTY = """(file) => {
+  for (const { key, kind, value } of TOOL_NUMBERS) {
+    const field = editing.panel.numbers.fields[key];
+    if (kind === "tick") field.checked = false;
+    else field.value = value;
+  }
+  editing.use("bar");
+  editing.replace(file);
+}"""
+"""Leaves nothing of a drawing, and the numbers beside the tools as they are at first."""
+
+
+@pytest.fixture(scope="module")
+def paper(drawing_context):
+    """One window for all drawings from nothing."""
+    with served() as server:
+        pencil = Pencil(drawing_context, server)
+        yield pencil
+        pencil.window.close()
+
+
+@pytest.fixture
+def sheet(paper):
+    """An empty sheet, on which nothing must go wrong."""
+    paper.window.evaluate(EMPTY, BLANK)
+    paper.wait()
+    yield paper
+    assert paper.wrong == []
 
 
 def equal(drawn, written):
@@ -46,13 +77,12 @@ def equal(drawn, written):
 
 
 @pytest.mark.parametrize("name", covering(LINKAGES, drawn_kinds))
-def test_a_linkage_drawn_from_nothing_is_the_written_one(name, drawing):
+def test_a_linkage_drawn_from_nothing_is_the_written_one(name, sheet):
     draw, written = LINKAGES[name]
-    hand = drawing()
-    draw(hand)
+    draw(sheet)
     many = len(written["inputs"])
-    assert hand.told() == f"mobility {many}, {many} input{'s' * (many > 1)}"
-    equal(hand.mechanism(), written)
+    assert sheet.told() == f"mobility {many}, {many} input{'s' * (many > 1)}"
+    equal(sheet.mechanism(), written)
 
 
 @pytest.mark.parametrize(
@@ -68,34 +98,31 @@ def test_a_linkage_drawn_from_nothing_is_the_written_one(name, drawing):
         ),
     ],
 )
-def test_a_cam_is_drawn_with_the_law_that_stands_beside(law, pieces, drawing):
-    hand = drawing()
-    draw_cam(hand, lift=8, **law)
+def test_a_cam_is_drawn_with_the_law_that_stands_beside(law, pieces, sheet):
+    draw_cam(sheet, lift=8, **law)
     *others, cam = CAM["pairs"]
     wanted = [{"motion": motion, "in": angle} | ({"by": by} if by else {}) for motion, by, angle in pieces]
-    equal(hand.mechanism(), CAM | {"pairs": [*others, cam | {"law": wanted}]})
+    equal(sheet.mechanism(), CAM | {"pairs": [*others, cam | {"law": wanted}]})
 
 
-def test_a_cam_of_more_than_a_turn_is_not_drawn(drawing):
-    hand = drawing()
-    draw_cam(hand, rise=200, dwell=61, back=100)
-    assert "360 deg at the most" in hand.said()
-    assert not any("cam" in pair for pair in hand.file()["pairs"])
+def test_a_cam_of_more_than_a_turn_is_not_drawn(sheet):
+    draw_cam(sheet, rise=200, dwell=61, back=100)
+    assert "360 deg at the most" in sheet.said()
+    assert not any("cam" in pair for pair in sheet.file()["pairs"])
 
 
-def test_a_place_on_the_side_of_a_link_lies_in_its_line_unless_alt_is_held(drawing):
-    hand = drawing()
-    hand.bars((0, 0), (100, 40))
-    way, step = np.array([100, 40]) / hypot(100, 40), hand.window.evaluate("editing.sketch.step * 1000")
-    off = 2 / hand.window.evaluate("page.view.scale / 1000")  # of 2 px, in mm
+def test_a_place_on_the_side_of_a_link_lies_in_its_line_unless_alt_is_held(sheet):
+    sheet.bars((0, 0), (100, 40))
+    way, step = np.array([100, 40]) / hypot(100, 40), sheet.window.evaluate("editing.sketch.step * 1000")
+    off = 2 / sheet.window.evaluate("page.view.scale / 1000")  # of 2 px, in mm
     place = 36.7 * way + off * np.array([-way[1], way[0]])
-    hand.use("Point", 20 * way, place)
-    hand.tool("Point")
-    hand.click(20 * way)
-    hand.window.keyboard.down("Alt")
-    hand.click(place + 30 * way)
-    hand.window.keyboard.up("Alt")
-    first, second = hand.file()["links"]["AB"]["points"].values()
+    sheet.use("Point", 20 * way, place)
+    sheet.tool("Point")
+    sheet.click(20 * way)
+    sheet.window.keyboard.down("Alt")
+    sheet.click(place + 30 * way)
+    sheet.window.keyboard.up("Alt")
+    first, second = sheet.file()["links"]["AB"]["points"].values()
     assert first[1] == 0
     assert first[0] == pytest.approx(36.7, abs=step / 10)
     assert first[0] / step * 10 == pytest.approx(round(first[0] / step * 10), abs=1e-9)
@@ -129,7 +156,17 @@ def test_the_guides_steps_lead_from_empty_paper_to_a_moving_six_bar(drawing):
     assert hand.window.locator("#drawing circle.centre").count() >= 10
 
 
-@pytest.mark.parametrize("name", ["slider-crank", "Stephenson", "epicyclic", "cam", "slot"])
+KEYED = {
+    "slider-crank": {"one place", "two places"},
+    "epicyclic": {"one place", "two places"},
+    "Stephenson": {"one place", "two places", "many places"},
+    "cam": {"one place", "two places"},
+    "slot": {"one place", "two places"},
+}
+"""Linkages that are drawn by keys, and the places that a use of their tools takes; Enter presses as a mouse does."""
+
+
+@pytest.mark.parametrize("name", covering(KEYED, KEYED.get))
 def test_a_linkage_is_drawn_by_keys_alone(name, drawing):
     draw, written = LINKAGES[name]
     hand = drawing(hand=KeyPencil)
@@ -245,36 +282,35 @@ def test_names_are_changed_and_pins_and_links_go(drawing):
     assert "Zapfen 1" in planar.solve(hand.mechanism()).points
 
 
-def test_a_link_is_copied_and_mirrored(drawing):
-    hand = drawing()
-    hand.use("Plate", (0, 0), (60, 0), (20, 40), (20, 40))
-    hand.use("Pins", (30, 0))
+def test_a_link_is_copied_and_mirrored(sheet):
+    sheet.use("Plate", (0, 0), (60, 0), (20, 40), (20, 40))
+    sheet.use("Pins", (30, 0))
     # the server answers while the button is held down: the click is heard all the same
-    box = hand.window.get_by_role("button", name="Copy ABC", exact=True).bounding_box()
-    hand.wait()
-    hand.window.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
-    hand.window.mouse.down()
-    with hand.window.expect_response("**/answer"):
-        hand.window.evaluate("() => { editing.ask(); }")
-    settled(hand.window)
-    hand.window.mouse.up()
-    hand.wait()
-    hand.click((8, 16))
-    hand.button("Mirror ABC")
-    found = {name: [round(1000 * each, 6) for each in at] for name, at in hand.window.evaluate("[...editing.at]")}
-    step = round(1000 * hand.window.evaluate("editing.sketch.step"), 6)
+    box = sheet.window.get_by_role("button", name="Copy ABC", exact=True).bounding_box()
+    sheet.wait()
+    sheet.window.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+    sheet.window.mouse.down()
+    with sheet.window.expect_response("**/answer"):
+        sheet.window.evaluate("() => { editing.ask(); }")
+    settled(sheet.window)
+    sheet.window.mouse.up()
+    sheet.wait()
+    sheet.click((8, 16))
+    sheet.button("Mirror ABC")
+    found = {name: [round(1000 * each, 6) for each in at] for name, at in sheet.window.evaluate("[...editing.at]")}
+    step = round(1000 * sheet.window.evaluate("editing.sketch.step"), 6)
     assert [found[name] for name in "DEF"] == [
         [2 * step, -2 * step],
         [60 + 2 * step, -2 * step],
         [20 + 2 * step, 40 - 2 * step],
     ]
     assert [found[name] for name in "GH"] == [[120, 0], [100, 40]]
-    assert hand.file()["pairs"] == [{"turning": "B"}]
-    mirrored = hand.file()["links"]["GBH"]
+    assert sheet.file()["pairs"] == [{"turning": "B"}]
+    mirrored = sheet.file()["links"]["GBH"]
     assert mirrored == {"ends": ["G", "B"], "length": 60, "points": {"H": [20, -40]}}
     # a tool's numbers and hint take room from the drawing, which knows so at once
     heights = "(tool) => { editing.use(tool); return [page.view.height, svg.clientHeight]; }"
-    seen = [hand.window.evaluate(heights, tool) for tool in ("cam", "pin")]
+    seen = [sheet.window.evaluate(heights, tool) for tool in ("cam", "pin")]
     assert seen[0][0] != seen[1][0]
     assert all(view == element for view, element in seen)
 
@@ -315,14 +351,13 @@ def test_what_does_not_go_together_is_shown_with_what_mends_it(drawing):
     assert hand.window.get_by_role("button", name="Play").is_visible()
 
 
-def test_what_is_loose_is_coloured(drawing):
-    hand = drawing()
-    hand.bars((0, 0), (20, 40), (100, 70))
-    hand.drive((0, 0))
-    assert "mobility 2, 1 input" in hand.told()
-    assert "'BC' hangs at 'B' alone" in hand.told()
-    assert hand.window.locator(".pencil .link").count() == 2
-    assert hand.window.locator(".pencil .loose").count() == 1
+def test_what_is_loose_is_coloured(sheet):
+    sheet.bars((0, 0), (20, 40), (100, 70))
+    sheet.drive((0, 0))
+    assert "mobility 2, 1 input" in sheet.told()
+    assert "'BC' hangs at 'B' alone" in sheet.told()
+    assert sheet.window.locator(".pencil .link").count() == 2
+    assert sheet.window.locator(".pencil .loose").count() == 1
 
 
 def test_texts_of_a_file_are_shown_and_never_run(drawing):
@@ -431,17 +466,16 @@ def test_without_its_server_what_is_drawn_stays_and_leaves_as_a_link(drawing):
     assert json.loads(read_link(link)) == hand.file()
 
 
-def test_a_slide_is_driven_from_where_it_stands(drawing):
-    hand = drawing()
-    draw_slider_crank(hand)
-    hand.click((0, 0), (150, 0))
-    (given,) = hand.mechanism().inputs
+def test_a_slide_is_driven_from_where_it_stands(sheet):
+    draw_slider_crank(sheet)
+    sheet.click((0, 0), (150, 0))
+    (given,) = sheet.mechanism().inputs
     assert (given.pair, given.position, given.velocity) == (
         "C slide",
         pytest.approx(0.0, abs=CLOSE),
         pytest.approx(0.1),
     )
-    assert planar.solve(hand.mechanism()).point("B").position == pytest.approx([0.03, 0.04], abs=CLOSE)
+    assert planar.solve(sheet.mechanism()).point("B").position == pytest.approx([0.03, 0.04], abs=CLOSE)
 
 
 # what acts

@@ -11,7 +11,9 @@ import pytest
 from PIL import Image
 
 import planar
+from tests.draws import is_exhaustive
 from tests.page_scripts import FAINT, MISNAMED, NAMELESS, downloaded, settled
+from tests.prepared_search import send_designs
 from tests.small_searches import search_few
 
 ON_PICTURE = """(places) => {
@@ -238,7 +240,9 @@ def test_designs_that_the_server_finds_are_listed_and_taken_over_in_one_step(dra
 
 
 def test_a_search_is_found_again_by_a_page_that_is_loaded_again_and_so_is_its_answer(drawing, monkeypatch):
-    monkeypatch.setattr("planar.pages.editor.search.search_for", search_few)
+    # what a search that is begun by a request finds is shown by the tests of the server
+    searching = search_few if is_exhaustive() else send_designs
+    monkeypatch.setattr("planar.pages.editor.search.search_for", searching)
     hand = wished(drawing)
     server = drawing.opened[0][1]
     hand.window.on("dialog", lambda dialog: dialog.accept())

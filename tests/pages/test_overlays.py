@@ -21,13 +21,13 @@ from planar.foundation.geometry import Vector
 from planar.pages.data.page_data import page_data
 from planar.pages.data.polygon_data import outline_sides
 from planar.pages.overlay_style import LAYER_PENS, overlay_styles
-from tests.known import MODELS, found_centres, some_models
-from tests.page_scripts import in_node, needs_node
+from tests.known import MODELS, found_centres
+from tests.page_scripts import PAGE_STEMS, in_node, needs_node
 
 SCRIPTS = ("layers/ink.js", "layers/points.js", "layers/polygons.js", "layers/centres.js")
 FEW = {
     stem: MODELS[stem]
-    for stem in ("four-bar", "crank-and-slotted-lever", "klann-leg", "002-E3.6a", "two-stroke-engine")
+    for stem in ("four-bar", "crank-and-slotted-lever", "klann-leg", "watt-six-bar", "two-stroke-engine")
 }
 POLYGONS = {"velocity": velocity_polygon, "acceleration": acceleration_polygon}
 
@@ -50,7 +50,7 @@ def drawn() -> dict[str, Any]:
       });
       return found;
     """
-    return in_node(FEW | {stem: MODELS[stem] for stem in some_models(8)}, act, *SCRIPTS)
+    return in_node(FEW | {stem: MODELS[stem] for stem in PAGE_STEMS}, act, *SCRIPTS)
 
 
 @needs_node

@@ -25,7 +25,7 @@ from planar.pages.view import view
 from tests.builders import triangle
 from tests.draws import covering
 from tests.hostile import harmful_mechanism
-from tests.known import MODELS
+from tests.known import MODELS, kinds_of_model
 from tests.page_scripts import CLOSE, FAINT, MISNAMED, NAMELESS, PLACES, SCREENS, downloaded, opened, same, settled
 
 STEMS = ("crank-rocker", "slider-crank", "scotch-yoke", "watt-six-bar", "whitworth", "planetary-gear-set", "open-arm")
@@ -145,7 +145,9 @@ def test_a_dead_point_stops_it_and_is_told(shown):
 # layers
 
 
-@pytest.mark.parametrize("stem", ["watt-six-bar", "000-P2", "planetary-gear-set", "walschaerts-valve-gear"])
+@pytest.mark.parametrize(
+    "stem", covering(["watt-six-bar", "000-P2", "planetary-gear-set", "walschaerts-valve-gear"], kinds_of_model)
+)
 def test_every_layer_is_shown_without_a_problem(stem, shown):
     window = shown(MODELS[stem])
     boxes = window.locator("#layers").get_by_role("checkbox")
@@ -455,17 +457,18 @@ def test_nothing_is_wider_than_the_screen(stem, screens, shown):
         assert (sum(json.loads(f"[{dark[4:-1]}]")) < 380) == (scheme == "dark")
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_texts_stand_out_from_their_paper(scheme, shown):
+def test_texts_stand_out_from_their_paper(shown):
     """WCAG 2, 1.4.3: a contrast of 4.5 to 1, but for what cannot be used now."""
-    window = shown(MODELS["excavator-arm"], scheme=scheme)
+    window = shown(MODELS["excavator-arm"])
     window.evaluate("document.querySelectorAll('details').forEach((each) => { each.open = true; })")
     for box in window.locator("#layers").get_by_role("checkbox").all():
         box.check()
-    settled(window)
-    faint = window.evaluate(FAINT)
-    assert faint["count"] > 100
-    assert faint["least"] == []
+    for scheme in ("light", "dark"):
+        window.emulate_media(color_scheme=scheme)
+        settled(window)
+        faint = window.evaluate(FAINT)
+        assert faint["count"] > 100
+        assert faint["least"] == [], scheme
 
 
 def test_long_names_stay_in_the_picture_and_letters_stand_above_the_layers(shown):

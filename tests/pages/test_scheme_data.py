@@ -20,8 +20,8 @@ from planar.pages.data.dimension_numbers import DimensionNumbers
 from planar.pages.data.scheme_data import motion_positions, moving_scene, scheme_data
 from planar.pages.drawing_style import symbol_script
 from planar.solving.position import solved_mechanism
-from tests.known import MODELS, some_models
-from tests.page_scripts import in_node, needs_node
+from tests.known import MODELS
+from tests.page_scripts import PAGE_STEMS, in_node, needs_node
 
 PER_MM = 1e-3
 CURVED_SLOT = planar.from_dict(
@@ -97,7 +97,7 @@ def test_strokes_on_a_page_are_those_of_a_drawing_for_other_dimensions_too(name)
 
 @needs_node
 def test_scripts_evaluate_strokes_as_python_does():
-    names = [*some_models(3)[:12], "belt-arm", "planetary-gear-set", "rack-steering"]
+    names = [*PAGE_STEMS, "belt-arm", "planetary-gear-set", "rack-steering"]
     models = {name: MODELS[name] for name in names if all(pair.measures_symbols for pair in MODELS[name].pairs)}
     models["curved"] = CURVED_SLOT
     table = symbol_script().replace("const ", "globalThis.")
