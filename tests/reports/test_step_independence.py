@@ -26,7 +26,7 @@ def test_printed_numbers_do_not_depend_on_the_steps(tmp_path, model, words):
 
 def test_the_efficiency_over_a_motion_does_not_depend_on_the_steps():
     """Of a clamp whose guide bears now on this side, now on that, so that its friction steps between positions."""
-    first, second = (mean_efficiency(planar.forces(planar.cycle("toggle-clamp", steps))) for steps in (24, 31))
+    first, second = (mean_efficiency(planar.forces(planar.cycle("toggle-clamp", steps))) for steps in (12, 17))
     assert first == pytest.approx(second, rel=1e-8)
 
 
