@@ -19,6 +19,8 @@ from planar.dynamics.load_attachment import attachments
 from planar.model.loads import Course, Load, Mass, Spring
 from planar.model.mechanism import Mechanism, relative_motions
 from planar.pages.data.page_data import page_data
+from tests.draws import covering
+from tests.known import MODELS, kinds_of_model
 from tests.rubbing import with_friction
 
 pytestmark = pytest.mark.skipif(shutil.which("node") is None, reason="there is no node here to run a page's scripts")
@@ -117,26 +119,35 @@ def alike(found: dict[str, Any], mechanism: Mechanism) -> None:
         assert (np.abs(sums[0] - sums[1]) <= 2.0 * least).all()
 
 
+def pair_kinds(name: str) -> set[object]:
+    """Types of pairs, with whether the frame is one of their links."""
+    mechanism = MODELS[name]
+    return {(type(pair), mechanism.frame in pair.links) for pair in mechanism.pairs}
+
+
 LOADED = ("toggle-clamp", "000-P2", "two-stroke-engine", "physical-pendulum", "balanced-lamp", "gear-reducer")
 
 
-@pytest.mark.parametrize("name", LOADED)
+@pytest.mark.parametrize("name", covering(LOADED, kinds_of_model))
 def test_the_forces_of_a_page_are_those_of_python(name):
     alike(on_page(planar.load(name)), planar.load(name))
 
 
 @pytest.mark.parametrize(
     "name",
-    [
-        "four-bar",
-        "000-P2",
-        "rolling-wheel",
-        "gear-reducer",
-        "planetary-gear-set",
-        "hypocycloid-dwell",
-        "scissor-lift",
-        "002-E3.1",
-    ],
+    covering(
+        [
+            "four-bar",
+            "000-P2",
+            "rolling-wheel",
+            "gear-reducer",
+            "planetary-gear-set",
+            "hypocycloid-dwell",
+            "scissor-lift",
+            "002-E3.1",
+        ],
+        pair_kinds,
+    ),
 )
 def test_masses_loads_and_springs_of_every_kind_act_on_a_page_as_in_python(name):
     mechanism = acted_on(planar.load(name))
@@ -144,7 +155,8 @@ def test_masses_loads_and_springs_of_every_kind_act_on_a_page_as_in_python(name)
 
 
 @pytest.mark.parametrize(
-    "name", ["four-bar", "slider-crank", "whitworth", "gear-reducer", "rolling-wheel", "rack-steering"]
+    "name",
+    covering(["four-bar", "slider-crank", "whitworth", "gear-reducer", "rolling-wheel", "rack-steering"], pair_kinds),
 )
 def test_friction_on_a_page_is_that_of_python(name):
     mechanism = acted_on(with_friction(planar.load(name), np.random.default_rng(5), 0.1))

@@ -16,6 +16,7 @@ from planar.pages.data.wanted_data import PageTask, wanted_data
 from planar.pages.page import page
 from planar.synthesis.task.synthesis_task import WantedFunction, WantedPath, WantedPoses
 from tests.command import run
+from tests.draws import covering
 from tests.known import MODELS
 from tests.page_scripts import in_node, needs_node
 
@@ -71,8 +72,10 @@ RECOVERED = [
 
 
 @needs_node
-@pytest.mark.parametrize(("model", "point", "factors", "every"), RECOVERED)
-@pytest.mark.parametrize("timed", [False, True])
+@pytest.mark.parametrize(
+    ("model", "point", "factors", "every", "timed"),
+    covering(((*case, timed) for case in RECOVERED for timed in (False, True)), lambda case: {case[0], case[-1]}),
+)
 def test_lost_dimensions_are_found_again(model, point, factors, every, timed):
     nominal = MODELS[model]
     numbers = planar.dimensions(nominal)
