@@ -28,8 +28,10 @@ SAME = 1e-5
 """Of the size of a linkage: pins nearer to each other are the same."""
 ROUND_OFF = 1e-9
 """Of the size, and rad: the least miss that counts."""
-GRID = 721
+GRID = 14_401
 """Positions of the input that are tried where a design misses at those it names."""
+REFINED_HALVINGS = 20
+"""Of a step to where a linkage cannot be assembled."""
 EXCHANGED = {"A": "D", "D": "A", "B": "C", "C": "B"}
 """Names of pins of a four-bar whose cranks change their names."""
 
@@ -299,8 +301,13 @@ def _refined(task: KnownTask, item: Item, numbers: Mapping[str, Any], said: Arra
         if item.inputs is not None:
             along, square = along.sum(), square.sum()
         step = np.divide(along, square, out=np.zeros_like(along), where=(square > 0.0) & np.isfinite(along))
-        moved = angles - np.clip(step, -0.2, 0.2)
-        angles = np.where(np.isfinite(np.abs(_rows(task, item, numbers, moved, signs))).all(), moved, angles)
+        step = np.clip(step, -0.2, 0.2)
+        for _ in range(REFINED_HALVINGS):  # beside a dead point a whole step may lead beyond it
+            is_within = np.isfinite(np.abs(_rows(task, item, numbers, angles - step, signs))).all(axis=0)
+            if is_within.all():
+                break
+            step = np.where(is_within if item.inputs is None else False, step, 0.5 * step)
+        angles = np.where(is_within if item.inputs is None else is_within.all(), angles - step, angles)
     return angles
 
 
