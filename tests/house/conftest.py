@@ -9,14 +9,19 @@ from tests.small_searches import SMALL_SEARCH
 
 FAMILY_DESIGNS = 4
 """Designs that are listed of a family."""
-LESS: dict[str, dict[str, object]] = {
+COARSE_MAPS: dict[str, dict[str, object]] = {
     "planar.analysis.force_maps.force_map": {"USUAL_COUNTS": (7, 3, 3)},
     "planar.analysis.force_maps.worst_cases": {"REFINEMENTS": 2, "SEARCHED_LINES": 2, "MORE_BORDERS": 4},
+}
+"""Those of force maps."""
+LESS: dict[str, dict[str, object]] = {
+    **COARSE_MAPS,
     "planar.synthesis.exact.exact_synthesis": {"FAMILY_DESIGNS": FAMILY_DESIGNS},
     "planar.synthesis.synthesise": SMALL_SEARCH,
 }
 """Numbers of modules, and what they are here."""
 COARSE: dict[str, dict[str, object]] = {
+    **COARSE_MAPS,
     "planar.drawing.output.animation": {"PIXELS_PER_MM": 1.0, "DPI": 25.0, "MIN_PATH_STEPS": 36},
     "planar.drawing.output.matplotlib_figure": {"RESOLUTION": 40},
     "planar.drawing.output.grid_sheets": {"RESOLUTION": 40},
@@ -25,7 +30,7 @@ COARSE: dict[str, dict[str, object]] = {
     "planar.drawing.diagrams.cognate_drawing": {"MIN_PATH_STEPS": 72},
     "planar.drawing.designs.design_picture": {"MIN_PATH_STEPS": 72},
 }
-"""The same of pictures that nobody looks at."""
+"""The same of maps, and of pictures that nobody looks at."""
 
 
 def set_numbers(patch: pytest.MonkeyPatch, modules: dict[str, dict[str, object]]) -> None:
