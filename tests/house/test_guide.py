@@ -93,7 +93,7 @@ def test_a_command_of_the_guide_runs(line, folder):
     for written, tried in SHORTER.items():
         line = line.replace(written, tried)
     words = shlex.split(line, comments=True)
-    words += ["--steps", "40"] if words[1] == "simulate" and "--steps" not in words else []
+    words += ["--steps", "8"] if words[1] == "simulate" and "--steps" not in words else []
     done = command.run(folder, *words[1:])
     if "# refused" in line:
         assert done.status in (1, 2)
