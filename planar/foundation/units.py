@@ -75,6 +75,7 @@ UNIT_TABLE: dict[str, tuple[str, float, float]] = {
     "kg m^2": ("moment of inertia", 1.0, 1.0),
     "N/m": ("stiffness", 1.0, 1.0),
     "N/mm": ("stiffness", 1e3, 1.0),
+    "N/um": ("stiffness", 1e6, 1.0),
     "N m/rad": ("torsional stiffness", 1.0, 1.0),
     "N s/m": ("damping", 1.0, 1.0),
     "N m s/rad": ("torsional damping", 1.0, 1.0),

@@ -21,6 +21,7 @@ from planar.drawing.centres.two_directions import directions_picture
 from planar.drawing.paper.picture import Arrow, Circle, Label, Pen, Polyline, extent
 from planar.drawing.paper.scales import parse_scale
 from tests.command import run
+from tests.draws import covering, is_exhaustive
 from tests.figures import visible_texts
 from tests.known import MODELS as ALL
 from tests.known import found_centres as found
@@ -392,7 +393,8 @@ def test_a_circle_grows_with_its_links_up_to_a_limit():
 
 
 def moving_links():
-    for stem in list(MODELS)[::5]:
+    stems = list(MODELS)[::5]
+    for stem in dict.fromkeys([*stems[::3], *covering(stems, lambda stem: {*map(type, MODELS[stem].pairs)})]):
         mechanism, state = MODELS[stem], found(stem).state
         for link in state.frames:
             if link == mechanism.frame:
@@ -421,7 +423,7 @@ def test_the_centre_from_two_directions_is_the_one_against_the_frame():
         told = [float(note.split("= ")[-1].removesuffix(" rad/s")) for note in picture.notes if "ω = v / r at" in note]
         turning = abs(found(stem).state.link(link).angular_velocity)
         assert told == pytest.approx([turning] * len(told), rel=2e-3), (stem, link)
-    assert count > 30
+    assert count > (30 if is_exhaustive() else 10)
 
 
 def arm(**points):

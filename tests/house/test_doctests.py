@@ -3,6 +3,7 @@
 import doctest
 import inspect
 import re
+from functools import wraps
 from importlib import import_module
 from pathlib import Path
 
@@ -16,10 +17,33 @@ ENTRIES = class_entries()
 CLASSES = [name for name in planar.__all__ if inspect.isclass(getattr(planar, name))]
 
 
+@pytest.fixture(scope="module", autouse=True)
+def computed_once():
+    """What several examples compute is computed once."""
+    with pytest.MonkeyPatch.context() as patch:
+        for name in ("force_map", "simulate", "synthesise"):
+            patch.setattr(planar, name, remembered(getattr(planar, name)))
+        yield
+
+
+def remembered(function):
+    """The function, which remembers its results by its arguments; one that reports progress is called each time."""
+    results = {}
+
+    @wraps(function)
+    def call(*args, **named):
+        key = repr((args, named))
+        if key not in results or "progress" in named:
+            results[key] = function(*args, **named)
+        return results[key]
+
+    return call
+
+
 @pytest.mark.parametrize("name", FUNCTIONS)
 def test_a_function_has_an_example_among_those_of_its_module(name):
     """Those of modules are run by the tests of the public face."""
-    value = getattr(planar, name)
+    value = inspect.unwrap(getattr(planar, name))
     module = import_module(value.__module__)
     assert ">>> " in Path(inspect.getsourcefile(module)).read_text(encoding="utf-8")
     found = doctest.DocTestFinder(exclude_empty=True).find(module)

@@ -30,6 +30,7 @@ from tests import command
 from tests.draws import covering, part
 from tests.guide_pictures import PICTURES
 from tests.guide_screens import SCREENS
+from tests.house.conftest import FAMILY_DESIGNS
 
 ROOT = Path(__file__).parents[2]
 FOLDER = ROOT / "planar" / "guide"
@@ -68,7 +69,13 @@ def kinds_of(line: str) -> set[tuple[str, ...]]:
     return {(words[1],), *drawing, *files, *options, *refusals}
 
 
-SHORTER = {"--duration 5s": "--duration 1s", "chains 8 --mechanisms": "chains 6 --mechanisms"}
+SHORTER = {
+    "--duration 5s": "--duration 200ms",
+    "--duration 2s": "--duration 200ms",
+    "chains 8 --m": "chains 6 --m",
+    "--count 200 --steps 60": "--count 4 --steps 12",
+    "--samples 200": "--samples 20",
+}
 """What commands are tried with: they do the same."""
 
 
@@ -79,13 +86,14 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
+@pytest.mark.usefixtures("coarse_pictures")
 @pytest.mark.parametrize("line", covering(COMMANDS, kinds_of))
 def test_a_command_of_the_guide_runs(line, folder):
     line = re.sub(r"--vary \d+", "--vary 1", line.partition(" > ")[0])  # of a class one is like another
     for written, tried in SHORTER.items():
         line = line.replace(written, tried)
     words = shlex.split(line, comments=True)
-    words += ["--steps", "40"] if words[1] == "simulate" and "--steps" not in words else []
+    words += ["--steps", "8"] if words[1] == "simulate" and "--steps" not in words else []
     done = command.run(folder, *words[1:])
     if "# refused" in line:
         assert done.status in (1, 2)
@@ -102,15 +110,29 @@ def test_a_command_of_the_guide_runs(line, folder):
         assert len(done.out) > 100
 
 
+SHORTER_SNIPPETS = {
+    '"stick-slip", 5.0)': '"stick-slip", 0.2, steps=8)',
+    ", 21)": ", 4)",  # positions of a map of forces
+    "0.7, 1000)": "0.7, 20)",  # designs of a sweep
+    "0.3, 1000)": "0.3, 20)",
+    "cycle(mechanism, steps=360)": "cycle(mechanism, steps=60)",
+    "met > 20": f"met > {FAMILY_DESIGNS}",
+    "\n24 4 True": f"\n{FAMILY_DESIGNS} 4 True",
+}
+"""What snippets, and what they print, are tried with."""
+
+
+@pytest.mark.usefixtures("coarse_pictures")
 @pytest.mark.parametrize("page", [page for page in PAGES if blocks(page, "python")])
 def test_the_snippets_of_a_page_run(page, folder):
-    text = "\n".join(blocks(page, "python")).replace('"stick-slip", 5.0)', '"stick-slip", 1.0, steps=40)')
-    text = re.sub(r"(\(\d\.\d, \d\.\d), 21\)", r"\1, 7)", text)  # of a map of forces
-    whole, told = compile(text, page, "exec"), io.StringIO()
+    code, expected = ("".join(blocks(page, kind)) for kind in ("python", "text"))
+    for written, tried in SHORTER_SNIPPETS.items():
+        code, expected = code.replace(written, tried), expected.replace(written, tried)
+    whole, told = compile(code, page, "exec"), io.StringIO()
     with chdir(folder), redirect_stdout(told):
         exec(whole, {"__name__": "__main__"})
     printed = told.getvalue().splitlines()
-    assert [line for text in blocks(page, "text") for line in text.splitlines() if line not in printed] == []
+    assert [line for line in expected.splitlines() if line not in printed] == []
 
 
 def test_what_snippets_name_of_modules_is_there_in_a_process_that_has_imported_no_more():

@@ -255,6 +255,7 @@ def test_names_that_are_not_there_are_unknown():
             ask("nothing")
 
 
+@pytest.mark.usefixtures("coarse_pictures")
 @pytest.mark.parametrize("name", sorted(COMMANDS))
 def test_every_command_of_a_model_takes_set_and_what_is_piped_in(name, tmp_path, monkeypatch, capfd):
     more = {
