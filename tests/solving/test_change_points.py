@@ -6,7 +6,7 @@ import pytest
 import planar
 from planar.document import files
 from planar.foundation.errors import NoAnswer, Outcome
-from tests.builders import bar_document, block_slider_crank, four_bar
+from tests.builders import bar_document, block_slider_crank, four_bar, lift_document
 from tests.checks import passes_residual_check, same_angles
 from tests.closed_forms import PARALLELOGRAM, TURN, antiparallelogram, coupler, rates, rocker
 from tests.draws import part
@@ -328,3 +328,12 @@ def test_a_run_in_time_from_a_change_point_is_refused_as_the_position_is_and_goe
     assert in_time.value.reason == at_rest.value.reason
     assert "`branches` (--branch)" in in_time.value.reason
     assert planar.cycle(mechanism, 10, duration=0.1, branches=[2]).outcome is Outcome.SOLVED
+
+
+@pytest.mark.parametrize(("stages", "told"), [(3, "4 branches"), (6, "32 branches"), (10, "at least 2 branches")])
+def test_at_the_flat_position_of_a_lift_any_number_of_stages_turns_over(stages, told):
+    """Each stage beyond the first may open either way; of very many branches none are counted."""
+    limits = planar.cycle(planar.from_dict(lift_document(stages)), 4).limits
+    flat = [each.told for each in limits if each.kind == "change point" and each.input]
+    assert len(flat) == 2
+    assert all(f"m {told} of the motion cross" in each for each in flat)

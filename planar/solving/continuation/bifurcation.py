@@ -31,6 +31,8 @@ SMALL_SINGULAR_VALUE = 0.1
 """A singular value below this part of the greatest may be one that vanishes near by."""
 ALIKE_RATIO = 30.0
 """Singular values are small alike that are no more than so many times the least."""
+MOST_ALIKE_VALUES = 64
+"""Beyond so many, as in a long row, it is not looked for where all vanish."""
 MOST_SMALL_VALUES = 4
 """Singular values, with the one that is zero, that are brought to zero together where single ones do not lead there."""
 ON_BRANCH_RATIO = 1e-2
@@ -80,7 +82,7 @@ def bifurcation_candidates(curve: SolutionCurve, here: CurvePoint, farthest: flo
     y, size = here.y + min(here.regular_distance, 0.1) * here.tangent, len(here.y)
     start = _decompose(curve, y)
     small = start.values < min(SMALL_SINGULAR_VALUE * max(start.values[0], 1.0), ALIKE_RATIO * start.values[-1])
-    if small.sum() >= MOST_SMALL_VALUES:
+    if MOST_SMALL_VALUES <= small.sum() <= MOST_ALIKE_VALUES:
         found = _refine_candidate(curve, y, start.right[size - 1 - small.sum() :].T, start, farthest)
         if found is not None:
             yield found
