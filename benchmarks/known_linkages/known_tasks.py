@@ -19,6 +19,8 @@ RANK_TOLERANCE = 1e-7
 """Of the greatest singular value: what is less is zero."""
 CLEAR = 1e-4
 """Of the greatest: the least singular value of a task that is drawn for a list."""
+NEIGHBOUR = 1e-3
+"""m or rad: how far the numbers of a linkage are from those of one beside it."""
 MIN_RANGE = 120
 """Of the positions of the input that are tried: fewer without a dead point are too short a motion."""
 MORE_ENTRIES = 14
@@ -185,6 +187,24 @@ def judge(linkage: KnownLinkage, items: Sequence[Item], angles: Sequence[Array],
     return Verdict.OPEN if independent_count(linkage, items, free) > found else Verdict.LIST
 
 
+def is_rank_special(
+    rng: np.random.Generator, linkage: KnownLinkage, items: Sequence[Item], angles: Sequence[Array], free: Sequence[str]
+) -> bool:
+    """Whether linkages beside it, with the tasks that they meet, have a greater rank: it is at a fold, as where a
+    coordinate is zero that follows from a length and another one."""
+    moved = {name: value + NEIGHBOUR * rng.normal() for name, value in linkage.numbers.items()}
+    other = linkage._replace(numbers=moved)
+    beside = [
+        make_item(other, item.what, own, item.inputs is not None, item.is_absolute)
+        for item, own in zip(items, angles, strict=True)
+    ]
+    ranks = [
+        rank(np.nan_to_num(conditions_on_numbers(*jacobian(each, wanted, angles, free))))
+        for each, wanted in ((linkage, items), (other, beside))
+    ]
+    return ranks[1] > ranks[0]
+
+
 def independent_count(linkage: KnownLinkage, items: Sequence[Item], free: Sequence[str]) -> int:
     """How many independent numbers among these any task of this kind depends on."""
     many, their = [], []
@@ -320,6 +340,8 @@ def _try_task(rng: np.random.Generator, plan: Plan, name: str) -> KnownTask | No
     wanted = {"right": [Verdict.LIST], "any": [Verdict.TOO_MANY, Verdict.OPEN]}.get(wish, [*Verdict])
     value = _write_task(rng, plan, name, linkage, items, free)
     if verdict not in wanted or not _is_clear(verdict, values[-1]) or value is None:
+        return None
+    if verdict is Verdict.TOO_MANY and is_rank_special(np.random.default_rng(7), linkage, items, angles, free):
         return None
     condition = float(values[0] / values[-1]) if values[-1] > 0.0 else np.inf
     return KnownTask(plan.name, linkage, tuple(items), tuple(angles), free, verdict, condition, value)
