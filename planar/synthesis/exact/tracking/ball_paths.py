@@ -131,8 +131,9 @@ def _follow_path(family: Family, begin: Member, w: list[Any], end: Member, left:
     step = FIRST_STEP
     for _ in range(MOST_STEPS):
         left = points[-1][0]
-        if left < SINGULAR_END or step < LEAST_STEP or _greatest(points[-1][1]) > FARTHEST:
-            return (points[-1][1] if step >= LEAST_STEP else []), False
+        is_over = left < SINGULAR_END or _greatest(points[-1][1]) > FARTHEST
+        if is_over or step < LEAST_STEP:
+            return (points[-1][1] if is_over else []), False
         here = left * (1.0 - step) if step < 0.5 else 0.0
         at, off = _corrected(MemberInBalls(family, end, begin, here), _predicted(points, here))
         if at is not None:
