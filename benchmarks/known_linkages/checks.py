@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 import planar
-from benchmarks.known_linkages.closed_forms import Position
+from benchmarks.known_linkages.closed_forms import Position, crank_angles
 from benchmarks.known_linkages.known_tasks import (
     STEP,
     Item,
@@ -30,6 +30,8 @@ ROUND_OFF = 1e-9
 """Of the size, and rad: the least miss that counts."""
 GRID = 14_401
 """Positions of the input that are tried where a design misses at those it names."""
+LEAST_MISSES = 12
+"""Positions of the input from which it is refined where all entries go together."""
 REFINED_HALVINGS = 20
 """Of a step to where a linkage cannot be assembled."""
 EXCHANGED = {"A": "D", "D": "A", "B": "C", "C": "B"}
@@ -214,9 +216,8 @@ def how_it_meets(task: KnownTask, numbers: Mapping[str, Any], inputs: Sequence[A
     first: tuple[float, tuple[float, ...]] | None = None
     for k, item in enumerate(task.items):
         said = None if inputs is None else np.asarray(inputs[k], float)
-        if said is None or not np.isfinite(said).all():
-            said = _scan(task, item, numbers)
-        own, angle, signs = _meet_item(task, item, numbers, said)
+        near = _scan(task, item, numbers) if said is None or not np.isfinite(said).all() else [said]
+        own, angle, signs = min((_meet_item(task, item, numbers, each) for each in near), key=lambda met: met[0])
         misses.append(own)
         first = first or (angle, signs)
     assert first is not None
@@ -311,28 +312,55 @@ def _refined(task: KnownTask, item: Item, numbers: Mapping[str, Any], said: Arra
     return angles
 
 
-def _scan(task: KnownTask, item: Item, numbers: Mapping[str, Any]) -> Array:
-    """Where the input comes nearest to every entry, over a whole turn."""
-    grid = np.linspace(-np.pi, np.pi, GRID)
+def _scan(task: KnownTask, item: Item, numbers: Mapping[str, Any]) -> list[Array]:
+    """Where the input comes near to every entry, over a whole turn: several such positions where all go together."""
     if item.inputs is not None and item.is_absolute:
-        return item.inputs
-    count = len(item.targets)
-    least, positions = np.full(count, np.inf), np.zeros(count)
+        return [item.inputs]
+    count, structure = len(item.targets), task.linkage.structure
+    grid = np.linspace(-np.pi, np.pi, GRID)
     relative = np.zeros(count) if item.inputs is None else item.inputs - item.inputs[0]
+    near_ends = _beside_dead_points(task, numbers, grid)
+    grid = np.sort(np.concatenate([grid, *(near_ends - each for each in np.unique(relative))]))
     angles = grid[:, None] + relative
-    for first in _combinations(task):
+    if item.inputs is None and structure.coupler is not None:
+        angles = np.vstack([angles, crank_angles(structure, numbers, item.targets[:, :2], item.what == "places")])
+    every = []
+    for first in _combinations(task) if _counts_from_first(item) else [()]:
         misses = []
         for signs in _combinations(task):
-            rows = np.abs(_rows(task, item, numbers, angles, _entry_signs(count, first, signs))).max(axis=0)
-            misses.append(np.where(np.isfinite(rows), rows, np.inf))
-        miss = np.min(misses, axis=0)
-        if item.inputs is not None:  # all entries go together
-            miss = np.broadcast_to(miss.max(axis=1, keepdims=True), angles.shape)
-        row = miss.argmin(axis=0)
-        is_better = miss.min(axis=0) < least
-        positions = np.where(is_better, angles[row, np.arange(count)], positions)
-        least = np.minimum(miss.min(axis=0), least)
-    return positions
+            rows = _rows(task, item, numbers, angles, _entry_signs(count, first, signs) if first else signs)
+            miss = np.abs(rows).max(axis=0)
+            misses.append(np.where(np.isfinite(miss), miss, np.inf))
+        every.append(np.min(misses, axis=0))
+    miss = np.min(every, axis=0)
+    if item.inputs is None:
+        return [angles[miss.argmin(axis=0), np.arange(count)]]
+    whole = np.pad(miss.max(axis=1), 1, constant_values=np.inf)
+    (least,) = np.nonzero((whole[1:-1] <= whole[:-2]) & (whole[1:-1] <= whole[2:]) & np.isfinite(whole[1:-1]))
+    return [angles[row] for row in least[np.argsort(whole[1:-1][least])][:LEAST_MISSES]] or [angles[0]]
+
+
+def _beside_dead_points(task: KnownTask, numbers: Mapping[str, Any], grid: Array) -> Array:
+    """Positions of the input nearer and nearer to where the linkage ceases to be assembled."""
+    found = []
+    for signs in _combinations(task):
+
+        def is_assembled(angles: Array, signs: tuple[float, ...] = signs) -> Array:
+            with np.errstate(all="ignore"):
+                output = task.linkage.structure.kinematics(numbers, angles, signs).output
+            here: Array = np.isfinite(output.x if isinstance(output, Vector) else output)
+            return here
+
+        is_here = is_assembled(grid)
+        (cells,) = np.nonzero(is_here[1:] != is_here[:-1])
+        within, beyond = (np.where(is_here[cells] == side, grid[cells], grid[cells + 1]) for side in (True, False))
+        step = within - beyond
+        for _ in range(REFINED_HALVINGS + 30):
+            middle = 0.5 * (within + beyond)
+            is_middle = is_assembled(middle)
+            within, beyond = np.where(is_middle, middle, within), np.where(is_middle, beyond, middle)
+        found.append((within + step * 0.5 ** np.arange(REFINED_HALVINGS)[:, None]).ravel())
+    return np.concatenate(found)
 
 
 def _entry_signs(count: int, first: tuple[float, ...], others: tuple[float, ...]) -> tuple[Array, ...]:

@@ -174,12 +174,31 @@ class Structure(NamedTuple):
     coupler: str | None
     dyads: tuple[tuple[str, str], ...] = ()
     "pins of parts of it that differ in their names alone"
+    crank: tuple[str, str, str] = ("c", "O", "A")
+    "the link of the input, its pivot and its pin"
 
 
 STRUCTURES = {
-    "four-bar": Structure(four_bar, 1, "g", "A", "D", "BC", (("A", "B"), ("D", "C"))),
+    "four-bar": Structure(four_bar, 1, "g", "A", "D", "BC", (("A", "B"), ("D", "C")), ("AB", "A", "B")),
     "slider-crank": Structure(slider_crank, 1, "f", "O", "s", "rod"),
     "swinging block": Structure(inverted_slider("A", "D"), 1, "f", "O", "D", "rod"),
     "slotted lever": Structure(inverted_slider("D", "A"), 1, "f", "O", "D", None),
-    "Watt II": Structure(watt_two, 2, "g", "A", "G", None),
+    "Watt II": Structure(watt_two, 2, "g", "A", "G", None, crank=("AB", "A", "B")),
 }
+
+
+def crank_angles(structure: Structure, numbers: Numbers, targets: Any, at_point: bool) -> Any:
+    """Both positions of the input (2, targets) at which P, or the origin of the coupler's axes, is on the circle about
+    its target (targets, 2) that its pin on the crank has."""
+    assert structure.coupler is not None
+    link, pivot, pin = structure.crank
+    crank = drawn_point(numbers, link, pin) - drawn_point(numbers, link, pivot)
+    point = drawn_point(numbers, structure.coupler, "P") if at_point else Vector(0.0, 0.0)
+    radius_square = (drawn_point(numbers, structure.coupler, pin) - point).squared
+    centre, place = drawn_point(numbers, structure.frame, pivot), Vector(targets[:, 0], targets[:, 1])
+    found = []
+    for sign in (1.0, -1.0):
+        way = circle_intersection(centre, crank.squared, place, radius_square, sign) - centre
+        turn = direction_between(crank, way)
+        found.append(np.arctan2(turn.y, turn.x))
+    return np.array(found)

@@ -15,7 +15,7 @@ from planar.synthesis.exact.tracking import generic_solutions
 from planar.synthesis.task.starts import free_numbers, start_mechanisms
 
 LISTS = {
-    "four-bar": (2, 14),
+    "four-bar": (2, 14, 324),
     "slider-crank": (3,),
     "slotted lever": (0, 3, 11, 12, 14, 15),
     "swinging block": (0, 2, 3, 14, 15),

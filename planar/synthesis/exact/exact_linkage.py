@@ -5,6 +5,7 @@ from __future__ import annotations
 from cmath import exp, phase
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
+from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
@@ -22,6 +23,8 @@ from planar.synthesis.exact.relations.polynomials import Polynomial
 from planar.synthesis.exact.relations.reference_pose import Coordinates, LinkAxes, SlidingRow
 from planar.synthesis.exact.relations.unknowns import NumberKind
 
+NO_LENGTH = 1e-9
+"""Of the size of the task: pins that are less apart are at one place."""
 PARALLEL = 1e-12
 """Of a unit vector: a part that is nothing."""
 AXES_STEPS, AXES_MET, AXES_OPEN = 40, 1e-13, 1e-6
@@ -32,8 +35,11 @@ Values = dict[int, complex]
 
 
 class NoLinkageError(ValueError):
-    """A solution of the equations that is no linkage: a line goes from its second point to its first one, or the places
-    are real where numbers of a link are not, as a coordinate of a point beyond its distance."""
+    """A solution of the equations that is no linkage.
+
+    Two pins of a link are at one place, a line goes from its second point to its first one, or the places are real
+    where numbers of a link are not, as a coordinate of a point beyond its distance.
+    """
 
 
 class ExactLinkage(NamedTuple):
@@ -107,6 +113,7 @@ class _LinkageWriter:
 
     def write(self, name: str) -> ExactLinkage:
         """The mechanism with its numbers."""
+        self._check_pins()
         for link in self.mechanism.links:
             if link.name != self.mechanism.frame:
                 self.origins[link.name], self.axes[link.name] = self._link_axes(link)
@@ -129,6 +136,17 @@ class _LinkageWriter:
         whole = replace(whole, sketch=tuple(self._sketch(whole)))
         chosen = {name: value for name, value in numbers.items() if name in self.pose.free or name not in self.numbers}
         return ExactLinkage(whole, chosen, self._inputs(running, start), opposite)
+
+    def _check_pins(self) -> None:
+        """Raise NoLinkageError where pins of a link are at one place that are apart in the start."""
+        pins = {member for pair in self.mechanism.pairs if pair.has_pin() for member in pair.coincident_points()}
+        nothing = NO_LENGTH * self.problem.size
+        for link in self.mechanism.links:
+            places, shape = self._places(link), link_shape(link)
+            for one, other in combinations([name for name in places if (link.name, name) in pins], 2):
+                start = shape.position(one) - shape.position(other)
+                if abs(places[one] - places[other]) < nothing < np.hypot(float(start.x), float(start.y)):
+                    raise NoLinkageError(f"{one!r} and {other!r} of {link.name!r} are at one place")
 
     def _places(self, link: Link) -> dict[str, complex]:
         return {name: self._world(place) for (own, name), place in self.pose.places.items() if own == link.name}
