@@ -16,7 +16,7 @@ from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 
 import planar
-from planar.analysis.centres.centres import Centre, Centres, centres
+from planar.analysis.centres.centres import Centre, Centres, OpeningPairs, centres
 from planar.analysis.centres.two_directions import centre_of
 from planar.analysis.centres.velocities import links_by_centres, velocity_by_centres
 from planar.document import files
@@ -962,3 +962,25 @@ def test_the_command_refuses_what_it_cannot_do_in_a_sentence(tmp_path):
     assert ended.err.startswith("planar: too few inputs:")
     assert run(tmp_path, "centres", "four-bar", "-o", "x.txt").status == 0
     assert "I24 = I12 I14 × I23 I34" in (tmp_path / "x.txt").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_openings_are_counted_as_centres_become_known(seed):
+    """Beside the same count made at once from all that is known."""
+    rng, count = np.random.default_rng(seed), 9
+    opening, known = OpeningPairs(count), np.zeros((count, count), dtype=int)
+    left = {*combinations(range(count), 2)}
+    while left:
+        line = (known == 0) & (known @ known > 0)
+        np.fill_diagonal(line, val=False)
+        opens = line.astype(int) @ known
+        opens = opens + opens.T
+        assert opening.best_pair() == max(sorted(left), key=lambda two: opens[two])
+        pair = sorted(left)[rng.integers(len(left))]
+        left.remove(pair)
+        if rng.random() < 0.2:
+            opening.exclude(pair)
+        else:
+            opening.add_known([pair])
+            known[pair] = known[pair[::-1]] = 1
+    assert opening.best_pair() is None

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import combinations
+from itertools import combinations, islice
 from typing import NamedTuple
 
 import numpy as np
@@ -32,7 +32,7 @@ from planar.analysis.rate_equations import rate_equations as rates_of
 from planar.analysis.rate_ratios import LEAST_ERROR, LinkPoles, solve_link_poles
 from planar.analysis.vector_chains import VectorChains
 from planar.document.first_argument import takes_result
-from planar.foundation.arrays import Array, IntArray
+from planar.foundation.arrays import Array
 from planar.foundation.errors import Unknown
 from planar.foundation.notebook_display import Displayable
 from planar.foundation.short_repr import short_repr
@@ -153,6 +153,55 @@ def extent(state: State) -> tuple[Array, float]:
     return 0.5 * (low + high), float((high - low).max()) or 1.0
 
 
+class OpeningPairs:
+    """How many centres would have two lines if that of two links were known, for all pairs of links while centres
+    become known."""
+
+    def __init__(self, link_count: int):
+        shape = (link_count, link_count)
+        self.known_count = 0
+        self._is_known, self._has_line = np.zeros(shape, dtype=int), np.zeros(shape, dtype=int)
+        self._is_open = np.triu(np.ones(shape, dtype=bool), 1)
+        "of links in their order: neither known nor excluded"
+        self._opened = np.zeros(shape, dtype=int)
+        "for links a and b how many others have a line with a and a known centre with b"
+
+    def add_known(self, pairs: Iterable[tuple[int, ...]]) -> None:
+        """Take centres of pairs of links as known."""
+        known, line = self._is_known, self._has_line
+        for a, b in pairs:
+            self.known_count += 1
+            self.exclude((a, b))
+            if line[a, b]:
+                self._change_line(a, b, -1)
+            known[a, b] = known[b, a] = 1
+            self._opened[:, b] += line[:, a]
+            self._opened[:, a] += line[:, b]
+            for one, via in ((a, b), (b, a)):
+                for other in np.flatnonzero(known[via] & ~known[one] & ~line[one]):
+                    if other != one:
+                        self._change_line(one, int(other), 1)
+
+    def _change_line(self, a: int, b: int, by: int) -> None:
+        self._has_line[a, b] += by
+        self._has_line[b, a] += by
+        self._opened[a] += by * self._is_known[b]
+        self._opened[b] += by * self._is_known[a]
+
+    def exclude(self, pair: tuple[int, ...]) -> None:
+        """Offer a pair no more."""
+        a, b = sorted(pair)
+        self._is_open[a, b] = False
+
+    def best_pair(self) -> tuple[int, int] | None:
+        """The first pair that opens most, of those that are neither known nor excluded; None where there is none."""
+        if not self._is_open.any():
+            return None
+        opened = np.where(self._is_open, self._opened + self._opened.T, -1)
+        a, b = np.unravel_index(int(opened.argmax()), opened.shape)
+        return int(a), int(b)
+
+
 class _CentreSearch:
     """The centres of one position while they are found."""
 
@@ -180,7 +229,15 @@ class _CentreSearch:
         """All of them, as far as they are determined."""
         self.construction.find_all()
         moved: LinkPoles | None = None
-        while left := self._remaining_pairs():
+        opening = OpeningPairs(len(self.links))
+        place = {link: index for index, link in enumerate(self.links)}
+        while True:
+            opening.add_known(
+                [tuple(place[link] for link in two) for two in islice(self.found, opening.known_count, None)]
+            )
+            next_pair = opening.best_pair()
+            if next_pair is None:
+                return
             moved = moved or solve_link_poles(self.chains.equations, self.chains, self.middle, self.size)
             further = moved.links is None and self.motions.mobility == 1
             if further:
@@ -188,36 +245,19 @@ class _CentreSearch:
             if moved.links is None:
                 self.open_reason = moved.reason
                 return
-            opens = self._count_opened()
-            place = {link: index for index, link in enumerate(self.links)}
-            two = max(left, key=lambda two: opens[tuple(place[link] for link in two)])
-            a, b = two
+            a, b = (self.links[index] for index in next_pair)
+            two = frozenset((a, b))
             relative = moved.links[b] - moved.links[a]
             length = float(np.linalg.norm(relative))
             if length <= self.motions.as_one_ratio:
                 self.as_one.add(two)
+                opening.exclude(next_pair)
                 continue
             nearly = self.construction.count_lines(two) > 1
             told = "the lines known are one, or nearly" if nearly else "no two lines are known"
             self.by_equations[two] = f"{told}, and to first order more could move" if further else told
             self.construction.add_centre(two, FoundCentre(normalise(relative), moved.error / length))
             self.construction.find_all()
-
-    def _remaining_pairs(self) -> list[LinkPair]:
-        every = map(frozenset, combinations(self.links, 2))
-        return [two for two in every if two not in self.found and two not in self.as_one]
-
-    def _count_opened(self) -> IntArray:
-        """How many open centres would have two lines if that of two links were known, (links, links)."""
-        place = {link: index for index, link in enumerate(self.links)}
-        known = np.zeros((len(self.links), len(self.links)), dtype=int)
-        for two in self.found:
-            a, b = (place[link] for link in two)
-            known[a, b] = known[b, a] = 1
-        one_line = (known == 0) & (known @ known > 0)
-        np.fill_diagonal(one_line, False)
-        opened: IntArray = one_line.astype(int) @ known
-        return opened + opened.T
 
     def result(self) -> Centres:
         """The centres in metres, with names and derivations, and their proof."""
