@@ -82,13 +82,13 @@ class StepCheck(NamedTuple):
 
 
 class AcceptanceFunctions:
-    """The compiled functions of one structure. Only for structures whose every block has as many constraints as
-    unknowns."""
+    """The compiled functions of one structure. Only for structures of few unknowns whose every block has as many
+    constraints as unknowns."""
 
     def __init__(self, structure: Mechanism, program: EquationFunctions):
         self.structure, self.functions, self.equations = structure, program, program.equations
         sizes = [slice_length(block.unknowns) for block in self.equations.blocks]
-        self.is_available = program.is_square and max(sizes, default=0) <= MAX_BLOCK_SIZE
+        self.is_available = program.is_square and not program.is_sparse and max(sizes, default=0) <= MAX_BLOCK_SIZE
         self.block_starts = np.array([block.unknowns.start for block in self.equations.blocks], dtype=int)
 
     @cached_property

@@ -16,9 +16,10 @@ import numpy as np
 
 from planar.equations.casadi_call import ON_ARM, BufferedFunction, ClosedFormAssemblies, RunFunction, read_function
 from planar.equations.elimination import stack_expressions
-from planar.equations.linear import solve_linear
+from planar.equations.linear import solve_linear, solve_vectors
 from planar.equations.mechanism_numbers import equation_structure, structure_fingerprint
 from planar.equations.rates import rate_symbols, time_derivatives
+from planar.equations.sparse_matrices import MAX_DENSE_UNKNOWNS, SparseMatrices, SparsePattern
 from planar.equations.symbolic_equations import (
     Block,
     ConstraintEquations,
@@ -26,7 +27,7 @@ from planar.equations.symbolic_equations import (
     equations_from_outline,
     slice_length,
 )
-from planar.foundation.arrays import Array
+from planar.foundation.arrays import Array, greatest_size
 from planar.foundation.kept_texts import KeptTexts
 from planar.foundation.private_cache import PrivateCache
 from planar.model.mechanism import Mechanism
@@ -36,6 +37,8 @@ MAX_CACHED_STRUCTURES = 256
 
 KEPT_EQUATIONS = PrivateCache("equations", ".equations", b"planar equations\n", 128 * 2**20)
 """Equations and functions of structures, as casadi writes them; those of one take from 0.1 to 1 MB."""
+SETTLED_STEP = 1e-9
+"""rad or sizes: after a shorter step of Newton's method the next one is round-off."""
 RUN_NEWTON_STEPS = 4
 """Unrolled steps of a position within a run: from a start a degree or so away, four square the error away."""
 
@@ -55,8 +58,8 @@ class EquationRates(NamedTuple):
     w: Array
     w1: Array
     w2: Array
-    jacobian: Array
-    "(rows, unknowns)"
+    jacobian: Array | SparseMatrices
+    "(rows, unknowns), by its entries where unknowns are many"
     input_jacobian: Array
     "(rows, inputs)"
 
@@ -76,6 +79,9 @@ class EquationFunctions:
 
     def __init__(self, equations: ConstraintEquations, texts: KeptTexts | None = None):
         self.equations, self._texts = equations, texts
+        unknowns = equations.z.numel()
+        self.is_sparse = equations.is_square and unknowns == equations.F.numel() and unknowns > MAX_DENSE_UNKNOWNS
+        "whether Jacobians are by their entries"
 
     def kept(self, name: str, make: Callable[[], Kept]) -> Kept:
         """What `make` makes of this structure, from the disk where it is kept there by this name."""
@@ -181,8 +187,34 @@ class EquationFunctions:
         y = e.y
         y1, y2 = rate_symbols(y, 2)
         first, second = time_derivatives(both, y, y1, y2)
-        outputs = [ca.horzcat(both, first, second), e.jacobian]
-        return ca.Function("kinematics", [y, y1, y2, e.p], [ca.densify(output) for output in outputs])
+        outputs = [ca.densify(ca.horzcat(both, first, second)), self._jacobian_entries]
+        return ca.Function("kinematics", [y, y1, y2, e.p], outputs)
+
+    @property
+    def _jacobian_entries(self) -> ca.SX:
+        """dF/dy (rows, y), or the column of its entries that are not zero."""
+        jacobian = self.equations.jacobian
+        return stack_expressions(map(ca.SX, jacobian.nonzeros())) if self.is_sparse else ca.densify(jacobian)
+
+    @cached_property
+    def _pattern(self) -> SparsePattern:
+        """Where the entries of dF/dy stand."""
+        own = self.equations.jacobian.sparsity()
+        return SparsePattern(own.shape, np.array(own.row()), np.array(own.colind()))
+
+    @cached_property
+    def _unknowns_pattern(self) -> SparsePattern:
+        return self._pattern.first_columns(self.equations.z.numel())
+
+    def _split_jacobian(self, slopes: Array) -> tuple[Array | SparseMatrices, Array]:
+        """dF/dz and dF/du (..., rows, unknowns or inputs) as functions give them, columns first."""
+        unknowns = self.equations.z.numel()
+        if not self.is_sparse:
+            slopes = slopes.swapaxes(-1, -2)
+            return slopes[..., :unknowns], slopes[..., unknowns:]
+        whole, own = SparseMatrices(self._pattern, slopes[..., 0, :]), self._unknowns_pattern
+        drives: Array = whole[..., slice(None), slice(unknowns, None)]
+        return SparseMatrices(own, whole.values[..., : len(own.rows)]), drives
 
     @kept_function
     def _third_rate_function(self) -> ca.Function:
@@ -251,14 +283,13 @@ class EquationFunctions:
 
     def kinematics(self, y: Array, y1: Array, y2: Array, p: Array) -> EquationRates:
         """Everything at one position, y = (z, u) with its first and second derivatives, or at samples (samples, y)."""
-        rows, unknowns = self.equations.F.numel(), self.equations.z.numel()
+        rows = self.equations.F.numel()
         if y.ndim == 1:
             parts, slopes = self._kinematics_calls[0](y, y1, y2, p)
-            return EquationRates._make((*parts[:, :rows], *parts[:, rows:], slopes[:unknowns].T, slopes[unknowns:].T))
-        parts, slopes = self._kinematics_calls[0].evaluate_batch(len(y), y, y1, y2, p)
-        parts, slopes = parts.transpose(1, 0, 2), slopes.transpose(0, 2, 1)
-        parted = *parts[..., :rows], *parts[..., rows:], slopes[..., :unknowns], slopes[..., unknowns:]
-        return EquationRates._make(parted)
+        else:
+            parts, slopes = self._kinematics_calls[0].evaluate_batch(len(y), y, y1, y2, p)
+            parts = parts.transpose(1, 0, 2)
+        return EquationRates._make((*parts[..., :rows], *parts[..., rows:], *self._split_jacobian(slopes)))
 
     @kept_function
     def newton_function(self) -> ca.Function:
@@ -272,6 +303,10 @@ class EquationFunctions:
 
     def correct_samples(self, z: Array, u: Array, p: Array) -> Array:
         """The same at samples z (samples, unknowns), u and p alike, each by itself."""
+        if self.is_sparse:
+            for _ in range(RUN_NEWTON_STEPS):
+                z = z - solve_vectors(self.jacobians(z, u, p)[0], self._residuals(z, u, p))
+            return z
         return self._newton_call.evaluate_batch(len(z), z, u, p)[0][:, 0]
 
     @cached_property
@@ -294,7 +329,28 @@ class EquationFunctions:
 
     def run_samples(self, z: Array, u: Array, p: Array) -> Array:
         """The unknowns at every sample of inputs u (samples, inputs), each from the one before, the first from z."""
-        return self._run_function(z, u, p)
+        return self._run_sparse(z, u, p) if self.is_sparse else self._run_function(z, u, p)
+
+    def _run_sparse(self, z: Array, u: Array, p: Array) -> Array:
+        """The same, each from where the rates of the one before lead."""
+        found: Array = np.empty((len(u), len(z)))
+        step: Array = np.zeros(len(z))
+        for k, inputs in enumerate(u):
+            z = z + step
+            for _ in range(RUN_NEWTON_STEPS):
+                slopes, drives = self.jacobians(z[None], inputs[None], p)
+                change = solve_vectors(slopes[0], self._residuals(z[None], inputs[None], p)[0])
+                z = z - change
+                if not greatest_size(change) > SETTLED_STEP:
+                    break
+            found[k] = z
+            if k + 1 < len(u):
+                step = -solve_vectors(slopes[0], drives[0] @ (u[k + 1] - inputs))
+        return found
+
+    def _residuals(self, z: Array, u: Array, p: Array) -> Array:
+        """F (samples, rows)."""
+        return self._residual_call.evaluate_batch(len(z), z, u, p)[0][:, 0]
 
     @cached_property
     def _run_function(self) -> RunFunction:
@@ -303,35 +359,34 @@ class EquationFunctions:
     @kept_function
     def _jacobian_function(self) -> ca.Function:
         e = self.equations
-        return ca.Function("slopes", [e.z, e.u, e.p], [ca.densify(e.jacobian)])
+        return ca.Function("slopes", [e.z, e.u, e.p], [self._jacobian_entries])
 
-    def jacobians(self, z: Array, u: Array, p: Array) -> tuple[Array, Array]:
+    def jacobians(self, z: Array, u: Array, p: Array) -> tuple[Array | SparseMatrices, Array]:
         """dF/dz (samples, rows, unknowns) and dF/du (samples, rows, inputs) at z (samples, unknowns), u alike."""
         samples, unknowns = z.shape
         rows, inputs = self.equations.F.numel(), u.shape[1]
         if rows == 0:
             return np.zeros((samples, 0, unknowns)), np.zeros((samples, 0, inputs))
         called = self._kinematics_calls[1]
-        both = (
+        return self._split_jacobian(
             called(z[0], u[0], p)[0][None] if samples == 1 else called.evaluate_batch(samples, z, u, p)[0]
-        ).transpose(0, 2, 1)
-        return both[:, :, :unknowns], both[:, :, unknowns:]
+        )
 
     @kept_function
     def _residual_function(self) -> ca.Function:
         e = self.equations
-        return ca.Function("left", [e.z, e.u, e.p], [ca.densify(e.F), ca.densify(e.jacobian)])
+        return ca.Function("left", [e.z, e.u, e.p], [ca.densify(e.F), self._jacobian_entries])
 
     @cached_property
     def _residual_call(self) -> BufferedFunction:
         return BufferedFunction(self._residual_function)
 
-    def residuals_and_jacobian(self, z: Array, u: Array, p: Array) -> tuple[Array, Array]:
+    def residuals_and_jacobian(self, z: Array, u: Array, p: Array) -> tuple[Array, Array | SparseMatrices]:
         """F (rows,) and its Jacobian (rows, unknowns and inputs) at one position."""
         if not len(self.equations.rows):
             return np.zeros(0), np.zeros((0, len(z) + len(u)))
         left, slope = self._residual_call(z, u, p)
-        return left[0], slope.T
+        return left[0], SparseMatrices(self._pattern, slope[0]) if self.is_sparse else slope.T
 
     @cached_property
     def is_square(self) -> bool:

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 import casadi as ca
 import numpy as np
 
+from planar.equations.sparse_matrices import SparseMatrices
 from planar.foundation.arrays import Array
 
 MAX_CRAMER_UNKNOWNS = 4
@@ -129,7 +130,7 @@ def _row_minors(rows: ca.SX, columns: Sequence[int]) -> list[tuple[tuple[int, ..
 
 
 def solve_arrays(
-    matrices: Array,
+    matrices: Array | SparseMatrices,
     right_sides: Array,
     least_determinant: float = 0.0,
     least_squares: bool = False,
@@ -139,6 +140,8 @@ def solve_arrays(
     Not numbers where the determinant of a square matrix is not above `least_determinant`; with `least_squares` those
     of least squares where there are more than two unknowns. With more rows, or fewer, than unknowns always those.
     """
+    if isinstance(matrices, SparseMatrices):
+        return matrices.solve(right_sides)
     rows, unknowns = matrices.shape[-2:]
     if rows != unknowns:
         return _pseudo_inverses(matrices) @ right_sides
@@ -166,13 +169,13 @@ def solve_arrays(
 
 
 def solve_vectors(
-    matrices: Array, vectors: Array, least_determinant: float = 0.0, least_squares: bool = False
+    matrices: Array | SparseMatrices, vectors: Array, least_determinant: float = 0.0, least_squares: bool = False
 ) -> Array:
     """The same of one vector each: vectors (..., rows) to (..., unknowns)."""
     return solve_arrays(matrices, vectors[..., None], least_determinant, least_squares)[..., 0]
 
 
-def inverse_arrays(matrices: Array) -> Array:
+def inverse_arrays(matrices: Array | SparseMatrices) -> Array:
     """matrices^-1 (..., unknowns, rows), or what gives least squares; not numbers where one is singular."""
     return solve_arrays(matrices, np.eye(matrices.shape[-2]))
 

@@ -57,7 +57,7 @@ def _holds_along_motion(setup: PreparedMechanism, program: EquationFunctions, y:
     inputs = len(setup.inputs.u)
     if not inputs:
         return False
-    slope = program.residuals_and_jacobian(y[:-inputs], y[-inputs:], setup.inputs.p)[1]
+    slope = np.asarray(program.residuals_and_jacobian(y[:-inputs], y[-inputs:], setup.inputs.p)[1])
     least = np.concatenate([setup.min_column_scale, np.ones(inputs)])
     sizes = column_norms(slope, least)
     ways = null_space(slope / sizes, MIN_REGULARITY, unit=1.0).T / sizes

@@ -7,7 +7,7 @@ two solve is theirs to give: a block of constraints, or those along a curve with
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -19,9 +19,9 @@ from planar.foundation.arrays import Array, greatest_size
 
 ResidualFunction = Callable[[Array], tuple[Array, Array]]
 """Unknowns (starts, n) -> what is left open (starts, m), and its Jacobian (starts, m, n)."""
-SystemFunction = Callable[[Array], tuple[Array, Array]]
-"""The same from one place: unknowns (n,) -> residuals (m,), Jacobian (m, n)."""
-StepSolver = Callable[[Array, Array], Array]
+SystemFunction = Callable[[Array], tuple[Array, Any]]
+"""The same from one place: unknowns (n,) -> residuals (m,), Jacobian (m, n), an array or what stands for one."""
+StepSolver = Callable[[Any, Array], Array]
 """Jacobian (m, n), residuals (m,) -> the step (n,) that closes them to first order."""
 
 CLOSED_TOLERANCE = 1e-11

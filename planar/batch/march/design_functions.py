@@ -28,8 +28,10 @@ class DesignFunctions:
 
     def jacobians(self, z: Array, u: Array) -> tuple[Array, Array]:
         """dF/dz (designs, rows, unknowns) and dF/du (designs, rows, inputs), as `EquationFunctions.jacobians`."""
-        return self.functions.jacobians(z, u, self.p)
+        slopes, drives = self.functions.jacobians(z, u, self.p)
+        return np.asarray(slopes), drives
 
     def kinematics(self, y: Array, y1: Array, y2: Array) -> EquationRates:
         """As `EquationFunctions.kinematics`, with an entry for each design."""
-        return self.functions.kinematics(y, y1, y2, self.p)
+        found = self.functions.kinematics(y, y1, y2, self.p)
+        return found._replace(jacobian=np.asarray(found.jacobian))

@@ -6,6 +6,7 @@ import numpy as np
 
 from planar.equations.functions import EquationFunctions
 from planar.equations.linear import solve_arrays
+from planar.equations.sparse_matrices import SparseMatrices
 from planar.foundation.arrays import Array, BoolArray
 from planar.solving.checks.singular_values import (
     DIFFERENCE_STEP,
@@ -44,7 +45,7 @@ class BranchCheck:
         second = self._singular_distances(z[1:], u[1:], slopes[1:], after, way)
         return smooth & self._keeps_signs(slopes) & np.all(first + second > SINGULAR_DISTANCE_RATIO, axis=1)
 
-    def _keeps_signs(self, slopes: Array) -> Array:
+    def _keeps_signs(self, slopes: Array | SparseMatrices) -> Array:
         """For each step whether the determinant of every block keeps its sign (steps,).
 
         Of two assemblies that come near to each other before a dead point each has another one, so that no step leads
@@ -72,7 +73,9 @@ class BranchCheck:
             else np.ones(len(input_step), dtype=bool)
         )
 
-    def _singular_distances(self, z: Array, u: Array, slopes: Array, rates: Array, input_step: Array) -> Array:
+    def _singular_distances(
+        self, z: Array, u: Array, slopes: Array | SparseMatrices, rates: Array, input_step: Array
+    ) -> Array:
         """How far each block is from where it could be singular (samples, blocks), in steps of rates and way."""
         pace = np.maximum(np.max(np.abs(np.hstack([rates, input_step])), axis=1, initial=0.0), 1e-300)[:, None]
         nudge = DIFFERENCE_STEP / np.maximum(pace, DIFFERENCE_STEP)

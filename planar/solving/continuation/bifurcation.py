@@ -13,8 +13,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from planar.equations.sparse_matrices import SparseMatrices
 from planar.foundation.arrays import Array
-from planar.solving.checks.singular_values import SINGULAR_TOLERANCE, null_space
+from planar.solving.checks.singular_values import SINGULAR_TOLERANCE
+from planar.solving.continuation.bordered_jacobian import BorderedJacobian, closing_step
 from planar.solving.continuation.second_order import (
     CONVERGED_STEP,
     EXACT_SINGULAR_TOLERANCE,
@@ -33,6 +35,8 @@ ALIKE_RATIO = 30.0
 """Singular values are small alike that are no more than so many times the least."""
 MOST_ALIKE_VALUES = 64
 """Beyond so many, as in a long row, it is not looked for where all vanish."""
+LEAST_VALUES = 8
+"""Singular values that are looked at where unknowns are many."""
 MOST_SMALL_VALUES = 4
 """Singular values, with the one that is zero, that are brought to zero together where single ones do not lead there."""
 ON_BRANCH_RATIO = 1e-2
@@ -79,19 +83,19 @@ def bifurcation_candidates(curve: SolutionCurve, here: CurvePoint, farthest: flo
     Each small singular value is brought to zero; where several loops come near a change point at once, each is found.
     Where many are small alike, as at the flat position of a scissor lift, they are first brought to zero together.
     """
-    y, size = here.y + min(here.regular_distance, 0.1) * here.tangent, len(here.y)
+    y = here.y + min(here.regular_distance, 0.1) * here.tangent
     start = _decompose(curve, y)
-    small = start.values < min(SMALL_SINGULAR_VALUE * max(start.values[0], 1.0), ALIKE_RATIO * start.values[-1])
+    small = start.values < min(SMALL_SINGULAR_VALUE * start.greatest, ALIKE_RATIO * start.values[-1])
     if MOST_SMALL_VALUES <= small.sum() <= MOST_ALIKE_VALUES:
-        found = _refine_candidate(curve, y, start.right[size - 1 - small.sum() :].T, start, farthest)
+        found = _refine_candidate(curve, y, start.right[-1 - small.sum() :].T, start, farthest)
         if found is not None:
             yield found
-    for second in range(2, size + 1):
-        if second > 2 and start.values[size - second] > SMALL_SINGULAR_VALUE * max(start.values[0], 1.0):
+    for second in range(2, len(start.right) + 1):
+        if second > 2 and start.values[1 - second] > SMALL_SINGULAR_VALUE * start.greatest:
             return
-        found = _refine_candidate(curve, y, start.right[[size - second, size - 1]].T, start, farthest)
+        found = _refine_candidate(curve, y, start.right[[-second, -1]].T, start, farthest)
         if found is None and 2 < second <= MOST_SMALL_VALUES:
-            found = _refine_candidate(curve, y, start.right[size - second :].T, start, farthest)
+            found = _refine_candidate(curve, y, start.right[-second:].T, start, farthest)
         if found is not None and found.null.shape[1] > 2:
             found = _refine_candidate(curve, found.y, found.null)
         if found is not None:
@@ -100,18 +104,32 @@ def bifurcation_candidates(curve: SolutionCurve, here: CurvePoint, farthest: flo
 
 class _Decomposition(NamedTuple):
     """The constraints at a point: F (rows,), J (rows, n + 1), and the singular values of J with their vectors, those on
-    the left as columns and those on the right as rows."""
+    the left as columns and those on the right as rows; the least ones alone where unknowns are many. `greatest` is no
+    less than the greatest of them, or than one."""
 
     residual: Array
-    jacobian: Array
+    jacobian: Array | SparseMatrices
     left: Array
     values: Array
     right: Array
+    greatest: float
+
+    @property
+    def null(self) -> Array:
+        """The null vectors of J (n + 1, k)."""
+        return self.right[int(np.sum(self.values > SINGULAR_TOLERANCE * self.greatest)) :].T
 
 
 def _decompose(curve: SolutionCurve, y: Array) -> _Decomposition:
     residual, jacobian = curve.residuals_and_jacobian(y)
-    return _Decomposition(residual, jacobian, *np.linalg.svd(jacobian))
+    if isinstance(jacobian, SparseMatrices):
+        try:
+            found = BorderedJacobian(jacobian, np.ones(len(y))).least_singular_vectors(LEAST_VALUES)
+            return _Decomposition(residual, jacobian, *found, max(jacobian.greatest_singular_value_bound(), 1.0))
+        except ValueError:
+            jacobian = np.asarray(jacobian)
+    left, values, right = np.linalg.svd(jacobian)
+    return _Decomposition(residual, jacobian, left, values, right, max(values[0], 1.0) if values.size else 1.0)
 
 
 def _refine_candidate(
@@ -133,10 +151,9 @@ def _refine_candidate(
     found, is_settled = settle(here, lambda _, step: step, y, MAX_REFINEMENTS, settled_at, longest_step)
     if not is_settled:
         return None
-    residual, jacobian = curve.residuals_and_jacobian(found)
-    null = null_space(jacobian, SINGULAR_TOLERANCE, unit=1.0)
-    gap = float(np.max(np.abs(residual), initial=0.0))
-    return BifurcationCandidate(found, null, gap) if null.shape[1] > 1 else None
+    there = _decompose(curve, found)
+    gap = float(np.max(np.abs(there.residual), initial=0.0))
+    return BifurcationCandidate(found, there.null, gap) if there.null.shape[1] > 1 else None
 
 
 def _step_to_lower_rank(curve: SolutionCurve, y: Array, constraints: _Decomposition, null_start: Array) -> Array:
@@ -146,12 +163,16 @@ def _step_to_lower_rank(curve: SolutionCurve, y: Array, constraints: _Decomposit
     apart. The step closes F along all others, and moves along N so that L^T J N vanishes to first order. Where L^T F
     stays open the curve only comes near a change point.
     """
-    residual, jacobian, left, values, right = constraints
+    residual, jacobian, left, values, right, _ = constraints
     nearest = np.argsort(-np.linalg.norm(right @ null_start, axis=1), kind="stable")[: null_start.shape[1]]
     others = np.setdiff1d(np.arange(len(values)), nearest)
-    closing: Array = -right[others].T @ ((left[:, others].T @ residual) / values[others])
-    null, forms, defects = right[nearest].T, [], []
-    for weights in np.delete(left, others, axis=1).T:
+    null, left_null = right[nearest].T, np.delete(left, others, axis=1)
+    if isinstance(jacobian, SparseMatrices):
+        closing = closing_step(jacobian, residual, left_null, np.delete(right, others, axis=0).T)
+    else:
+        closing = -right[others].T @ ((left[:, others].T @ residual) / values[others])
+    forms, defects = [], []
+    for weights in left_null.T:
         slopes = null.T @ curve.weighted_hessian(y, weights)
         forms.append(slopes @ null)
         defects.append(weights @ jacobian @ null + slopes @ closing)

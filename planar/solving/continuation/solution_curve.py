@@ -8,8 +8,10 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from planar.equations.functions import EquationFunctions
+from planar.equations.sparse_matrices import SparseMatrices
 from planar.foundation.arrays import Array, append_number, greatest_size, length_of, stack_row
 from planar.solving.checks.singular_values import DIFFERENCE_STEP, column_norms, singular_distance
+from planar.solving.continuation.bordered_jacobian import BorderedJacobian
 from planar.solving.newton import SystemFunction, correct, correct_at_rank
 
 MAX_CORRECTIONS = 10
@@ -76,11 +78,11 @@ class ImplicitCurve:
     def __init__(self, system: SystemFunction):
         self._system = system
 
-    def residuals_and_jacobian(self, y: Array) -> tuple[Array, Array]:
-        """F (rows,) and J (rows, n + 1)."""
+    def residuals_and_jacobian(self, y: Array) -> tuple[Array, Array | SparseMatrices]:
+        """F (rows,) and J (rows, n + 1), by its entries where unknowns are many."""
         return self._system(y)
 
-    def jacobian(self, y: Array) -> Array:
+    def jacobian(self, y: Array) -> Array | SparseMatrices:
         """J (rows, n + 1)."""
         return self.residuals_and_jacobian(y)[1]
 
@@ -90,12 +92,17 @@ class ImplicitCurve:
 
     def second_derivative(self, y: Array, direction: Array) -> Array:
         """The second derivative of F along a direction (rows,)."""
-        change = self.jacobian(y + DIFFERENCE_STEP * direction) - self.jacobian(y)
-        return change @ direction / DIFFERENCE_STEP
+        change: Array = self.jacobian(y + DIFFERENCE_STEP * direction) @ direction - self.jacobian(y) @ direction
+        return change / DIFFERENCE_STEP
 
     def point_at(self, y: Array, towards: Array) -> CurvePoint:
         """The point at y, its tangent less than a right angle from a direction."""
         slope = self.jacobian(y)
+        if isinstance(slope, SparseMatrices):
+            found = self._sparse_point_at(y, towards, slope)
+            if found is not None:
+                return found
+            slope = np.asarray(slope)
         least = self._least_singular_value(slope)
         many = len(y) - 1
         if len(slope) == many and least > REGULAR_SINGULAR_VALUE:
@@ -114,6 +121,23 @@ class ImplicitCurve:
         bend = -vt[:many].T @ np.where(kept, along / np.where(kept, s[:many], 1.0), 0.0)
         return CurvePoint(y, tangent, bend, self._regular_distance(y, tangent, slope, least))
 
+    def _sparse_point_at(self, y: Array, towards: Array, slope: SparseMatrices) -> CurvePoint | None:
+        """The same of many unknowns; None where all singular values have to be looked at."""
+        try:
+            bordered = BorderedJacobian(slope, towards)
+        except ValueError:
+            return None
+        least = bordered.least_singular_value(slope.column_norms(MIN_COLUMN_NORM))
+        if not (least > REGULAR_SINGULAR_VALUE and bordered.tangent_ratio < MAX_TANGENT_RATIO):
+            return None
+        tangent = bordered.tangent
+        bend = bordered.step(-self.second_derivative(y, tangent), tangent)
+        return CurvePoint(y, tangent, bend, self._sparse_regular_distance(y, bordered, least))
+
+    def _sparse_regular_distance(self, y: Array, bordered: BorderedJacobian, least: float) -> float:
+        """The same as `_regular_distance`."""
+        return np.inf
+
     def _least_singular_value(self, slope: Array) -> float:
         """The least singular value of J, columns of one size, so that a small link counts as much as a large one."""
         many = slope.shape[1] - 1
@@ -128,8 +152,12 @@ class ImplicitCurve:
     def correct(self, y: Array, normal: Array) -> Array | None:
         """The point of the curve near y in the plane through y with this normal; None where Newton finds none."""
 
-        def step(slope: Array, left: Array) -> Array:
-            return _solve_shortest(stack_row(slope, normal), append_number(-left, 0.0))
+        def step(slope: Array | SparseMatrices, left: Array) -> Array:
+            if isinstance(slope, SparseMatrices):
+                found = _sparse_step(slope, left, normal)
+                if found is not None:
+                    return found
+            return _solve_shortest(stack_row(np.asarray(slope), normal), append_number(-left, 0.0))
 
         y, gap = correct(self.residuals_and_jacobian, step, y, MAX_CORRECTIONS)
         return y if gap <= CLOSED_TOLERANCE * max(1.0, greatest_size(y)) else None
@@ -162,11 +190,13 @@ class SolutionCurve(ImplicitCurve):
         many = len(matrix[0]) - len(self.input_direction) if matrix.size else 0
         return np.hstack([matrix[:, :many], matrix[:, many:] @ self.input_direction[:, None]])
 
-    def residuals_and_jacobian(self, y: Array) -> tuple[Array, Array]:
+    def residuals_and_jacobian(self, y: Array) -> tuple[Array, Array | SparseMatrices]:
         """F (rows,) and J (rows, n + 1)."""
         left, slope = self.functions.residuals_and_jacobian(y[:-1], self.inputs(y), self.p)
         if self._is_along_input:
             return left, slope
+        if isinstance(slope, SparseMatrices):
+            return left, slope.join_last_columns(self.input_direction)
         many = len(y) - 1
         narrow = np.empty((len(slope), many + 1))
         narrow[:, :many] = slope[:, :many]
@@ -205,6 +235,17 @@ class SolutionCurve(ImplicitCurve):
         turned = np.linalg.lstsq(slope / sizes, change, rcond=0.1 * ZERO_SINGULAR_VALUE)[0]
         return max(clear, 1.0 / max(float(np.linalg.norm(turned)), 1e-300))
 
+    def _sparse_regular_distance(self, y: Array, bordered: BorderedJacobian, least: float) -> float:
+        slope, tangent = bordered.jacobian, bordered.tangent
+        there = self.jacobian(y + DIFFERENCE_STEP * tangent)
+        assert isinstance(there, SparseMatrices)
+        change = SparseMatrices(slope.pattern, (there.values - slope.values) / DIFFERENCE_STEP)
+        sizes = slope.column_norms(MIN_COLUMN_NORM)
+        clear = float(singular_distance(least, np.asarray(length_of(change.divide_columns(sizes).values))))
+        if clear >= SHORT_REGULAR_DISTANCE:
+            return clear
+        return max(clear, 1.0 / max(bordered.relative_change(change, sizes), 1e-300))
+
     def correct_beside_bifurcation(self, y: Array, rank_loss: int, with_inputs: bool) -> Array:
         """A position beside a change point, closed to round-off but not moved from one branch to the other.
 
@@ -212,6 +253,15 @@ class SolutionCurve(ImplicitCurve):
         """
         many = len(y) - 1
         return correct_at_rank(self.residuals_and_jacobian, y, many - rank_loss, many + with_inputs)
+
+
+def _sparse_step(slope: SparseMatrices, left: Array, normal: Array) -> Array | None:
+    """The step that closes what is open, normal to a direction; None where it is that of a singular system."""
+    try:
+        found = BorderedJacobian(slope, normal).step(-left)
+    except ValueError:
+        return None
+    return found if greatest_size(found) < MAX_SOLVED_STEP else None
 
 
 def _solve_shortest(system: Array, known: Array) -> Array:

@@ -8,6 +8,7 @@ import numpy as np
 
 from planar.equations.functions import EquationRates
 from planar.equations.linear import solve_vectors
+from planar.equations.sparse_matrices import SparseMatrices
 from planar.equations.symbolic_equations import Block
 from planar.foundation.arrays import Array
 from planar.solving.checks.singular_values import MIN_REGULARITY, ZERO_REGULARITY, null_space, rank
@@ -51,16 +52,18 @@ def _contradiction_rank(motion: EquationRates) -> int:
     return int(np.sum(np.linalg.svd(left, compute_uv=False) > MIN_REGULARITY))
 
 
-def regularity(setup: PreparedMechanism, jacobian: Array) -> Array:
+def regularity(setup: PreparedMechanism, jacobian: Array | SparseMatrices) -> Array:
     """The least singular value of every group's slope (..., stages), each column by what its links could reach at best.
 
     Zero at a dead point or a change point; lengths are divided by the reach of the block's links, so that neither
     their size nor that of the whole matters. `jacobian` is (..., rows, unknowns).
     """
-    scaled = _scaled_jacobian(setup, jacobian)
-    stages = setup.equations.blocks
-    found = [_least_singular_value(scaled[..., stage.rows, stage.unknowns]) for stage in stages]
-    return np.stack(found, axis=-1) if stages else np.zeros((*jacobian.shape[:-2], 0))
+    found = []
+    for stage in setup.equations.blocks:
+        own = jacobian[..., stage.rows, stage.unknowns] / setup.row_scale[stage.rows, None]
+        sizes = np.maximum(np.linalg.norm(own, axis=-2), setup.min_column_scale[stage.unknowns])
+        found.append(_least_singular_value(own / sizes[..., None, :]))
+    return np.stack(found, axis=-1) if found else np.zeros((*jacobian.shape[:-2], 0))
 
 
 def _least_singular_value(block_jacobian: Array) -> Array:
@@ -72,12 +75,13 @@ def _least_singular_value(block_jacobian: Array) -> Array:
     return values[..., -1] / np.maximum(1.0, values[..., 0])
 
 
-def _scaled_jacobian(setup: PreparedMechanism, jacobian: Array) -> Array:
+def _scaled_jacobian(setup: PreparedMechanism, jacobian: Array | SparseMatrices) -> Array:
     """A Jacobian (..., rows, unknowns and inputs), every block's lengths in units of its reach, columns of one size.
 
     The size of an unknown's column is that in its own block, whatever large or small things later blocks hang on it.
     A column that could reach further than it does now keeps what it lacks: it is that which vanishes.
     """
+    jacobian = np.asarray(jacobian)
     scaled = jacobian / setup.row_scale[:, None]
     sizes = np.maximum(np.linalg.norm(jacobian, axis=-2), 1.0)
     for stage in setup.equations.blocks:
@@ -114,12 +118,13 @@ def is_always_singular(setup: PreparedMechanism, stage: Block, z: Array) -> bool
     return True
 
 
-def jacobian_at(setup: PreparedMechanism, z: Array, u: Array) -> Array:
+def jacobian_at(setup: PreparedMechanism, z: Array, u: Array) -> Array | SparseMatrices:
     """dF/dz (rows, unknowns) at unknowns z and inputs u."""
-    return setup.functions.jacobians(z[None], u[None], setup.inputs.p)[0][0]
+    found: Array | SparseMatrices = setup.functions.jacobians(z[None], u[None], setup.inputs.p)[0][0]
+    return found
 
 
-def links_free_at_rest(setup: PreparedMechanism, jacobian: Array) -> list[str]:
+def links_free_at_rest(setup: PreparedMechanism, jacobian: Array | SparseMatrices) -> list[str]:
     """The links that can move while the inputs are held, from the null vectors of the Jacobian."""
     null = null_space(_scaled_jacobian(setup, jacobian), MIN_REGULARITY, unit=1.0)
     return moved_links(setup, np.max(np.abs(null), axis=1)) if null.size else []

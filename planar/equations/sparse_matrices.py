@@ -1,0 +1,188 @@
+"""Matrices of many unknowns by their entries that are not zero; they stand for arrays where these would be large."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from copy import copy
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from planar.foundation.arrays import Array, IntArray
+
+if TYPE_CHECKING:
+    from scipy.sparse import csc_matrix
+    from scipy.sparse.linalg import SuperLU
+
+MAX_DENSE_UNKNOWNS = 60
+"""Square systems of more unknowns are kept by their entries and solved by a sparse factorisation."""
+MIN_PIVOT_RATIO = 0.01
+"""A pivot is taken from the diagonal where it is no less than this part of the greatest in its column."""
+
+
+class SparsePattern:
+    """Where entries stand, column after column: `rows` (entries,), and the `first` entry of every column, with the end
+    of the last (columns + 1,)."""
+
+    def __init__(self, shape: tuple[int, int], rows: IntArray, first: IntArray):
+        self.shape, self.rows, self.first = shape, rows, first
+        self._blocks: dict[tuple[int, int, int, int], tuple[IntArray, IntArray]] = {}
+
+    @cached_property
+    def columns(self) -> IntArray:
+        """The column of every entry."""
+        return np.repeat(np.arange(self.shape[1]), np.diff(self.first))
+
+    @cached_property
+    def _zeros(self) -> csc_matrix:
+        from scipy.sparse import csc_matrix  # few mechanisms are so large
+
+        return csc_matrix((np.zeros(len(self.rows)), self.rows, self.first), shape=self.shape)
+
+    def matrix(self, values: Array) -> csc_matrix:
+        """The matrix of these entries as scipy has it."""
+        found = copy(self._zeros)  # to check its indices takes ten times as long
+        found.data = np.ascontiguousarray(values)
+        return found
+
+    @cached_property
+    def bordered(self) -> SparsePattern:
+        """The pattern with a full row below."""
+        entries = np.arange(1, self.shape[1] + 1)
+        rows = np.insert(self.rows, self.first[1:], self.shape[0])
+        return SparsePattern((self.shape[0] + 1, self.shape[1]), rows, self.first + np.append(0, entries))
+
+    def block_entries(self, rows: slice, columns: slice) -> tuple[IntArray, IntArray]:
+        """The entries of a block, and their places in it, row after row."""
+        key = rows.start, rows.stop, columns.start, columns.stop
+        if key not in self._blocks:
+            entries = np.arange(self.first[columns.start], self.first[columns.stop])
+            own = self.rows[entries]
+            entries = entries[(own >= rows.start) & (own < rows.stop)]
+            width = columns.stop - columns.start
+            places = (self.rows[entries] - rows.start) * width + self.columns[entries] - columns.start
+            self._blocks[key] = entries, places
+        return self._blocks[key]
+
+    def first_columns(self, count: int) -> SparsePattern:
+        """The pattern of so many of the first columns."""
+        return SparsePattern((self.shape[0], count), self.rows[: self.first[count]], self.first[: count + 1])
+
+
+class SparseMatrices:
+    """Matrices (..., rows, columns) of one pattern by their `values` (..., entries).
+
+    Blocks of rows and columns are arrays, and numpy's functions take the whole as one.
+    """
+
+    def __init__(self, pattern: SparsePattern, values: Array):
+        self.pattern, self.values = pattern, values
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """As that of an array."""
+        return (*self.values.shape[:-1], *self.pattern.shape)
+
+    @property
+    def ndim(self) -> int:
+        """As that of an array."""
+        return self.values.ndim + 1
+
+    @property
+    def size(self) -> int:
+        """As that of an array: whether there is anything in it."""
+        return int(np.prod(self.shape))
+
+    def __len__(self) -> int:
+        return self.shape[0]
+
+    def __getitem__(self, key: Any) -> Any:
+        """Some of the matrices, or a block of rows and columns of all (..., rows, columns) as an array."""
+        if isinstance(key, tuple) and len(key) > 1 and isinstance(key[-1], slice) and isinstance(key[-2], slice):
+            both = zip(key[-2:], self.pattern.shape, strict=True)
+            rows, columns = (slice(*each.indices(many)[:2]) for each, many in both)
+            entries, places = self.pattern.block_entries(rows, columns)
+            shape = rows.stop - rows.start, columns.stop - columns.start
+            found = np.zeros((*self.values.shape[:-1], shape[0] * shape[1]))
+            found[..., places] = self.values[..., entries]
+            return found.reshape(*self.values.shape[:-1], *shape)
+        return SparseMatrices(self.pattern, self.values[key])
+
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> Array:
+        found = np.zeros(self.shape)
+        found[..., self.pattern.rows, self.pattern.columns] = self.values
+        return found
+
+    def __matmul__(self, other: Array) -> Array:
+        if self.values.ndim == 1:
+            found: Array = self.single @ other
+            return found
+        return np.asarray(self) @ other
+
+    @cached_property
+    def single(self) -> csc_matrix:
+        """One matrix (rows, columns) as scipy has it."""
+        return self.pattern.matrix(self.values)
+
+    def bordered(self, row: Array) -> csc_matrix:
+        """The same with a row (columns,) below it."""
+        return self.pattern.bordered.matrix(np.insert(self.values, self.pattern.first[1:], row))
+
+    def column_norms(self, least: float) -> Array:
+        """The sizes of the columns (..., columns), `least` at least."""
+        squares = np.zeros((*self.values.shape[:-1], self.pattern.shape[1]))
+        filled = np.flatnonzero(np.diff(self.pattern.first))
+        squares[..., filled] = np.add.reduceat(self.values**2, self.pattern.first[filled], axis=-1)
+        return np.maximum(np.sqrt(squares), least)
+
+    def greatest_singular_value_bound(self) -> float:
+        """A number that no singular value of one matrix exceeds: the root of its greatest sums of columns and rows."""
+        sizes = np.abs(self.values)
+        sums = (np.bincount(each, sizes).max(initial=0.0) for each in (self.pattern.columns, self.pattern.rows))
+        return float(np.sqrt(np.prod([*sums])))
+
+    def divide_columns(self, sizes: Array) -> SparseMatrices:
+        """Every column (columns,) divided by its size."""
+        return SparseMatrices(self.pattern, self.values / sizes[self.pattern.columns])
+
+    def join_last_columns(self, weights: Array) -> SparseMatrices:
+        """One matrix whose last columns are one, the sum of each times its weight (columns,)."""
+        if len(weights) == 1:
+            last, values = self.pattern.first[-2], self.values.copy()
+            values[last:] *= weights[0]
+            return SparseMatrices(self.pattern, values)
+        from scipy.sparse import csc_matrix, hstack  # few mechanisms are so large
+
+        first = self.pattern.shape[1] - len(weights)
+        joined = self.single[:, first:] @ csc_matrix(weights[:, None])
+        found = hstack([self.single[:, :first], joined], format="csc")
+        return SparseMatrices(SparsePattern(found.shape, found.indices, found.indptr), found.data)
+
+    def solve(self, right_sides: Array) -> Array:
+        """matrices^-1 right sides (..., unknowns, k), each by a factorisation of its own; not numbers where one is
+        singular."""
+        many = self.values.reshape(-1, self.values.shape[-1])
+        right = np.broadcast_to(right_sides, (*self.values.shape[:-1], *right_sides.shape[-2:]))
+        found = np.full((len(many), *right.shape[-2:]), np.nan)
+        for out, values, own in zip(found, many, right.reshape(found.shape), strict=True):
+            factors = factorised(self.pattern.matrix(values))
+            if factors is not None:
+                out[:] = factors.solve(np.ascontiguousarray(own))
+        return found.reshape(right.shape)
+
+    def __iter__(self) -> Iterator[SparseMatrices]:
+        return (self[k] for k in range(len(self)))
+
+
+def factorised(matrix: csc_matrix) -> SuperLU | None:
+    """The factors of a square matrix; None where it is singular to the last bit, or not all of it a number."""
+    from scipy.sparse.linalg import splu  # few mechanisms are so large
+
+    if not np.isfinite(matrix.data).all():
+        return None
+    try:
+        # groups of links stand one below the other: that pivots stay among their own rows keeps the factors as sparse
+        return splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=MIN_PIVOT_RATIO)
+    except RuntimeError:
+        return None
