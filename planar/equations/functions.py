@@ -194,7 +194,7 @@ class EquationFunctions:
     def _jacobian_entries(self) -> ca.SX:
         """dF/dy (rows, y), or the column of its entries that are not zero."""
         jacobian = self.equations.jacobian
-        return stack_expressions(map(ca.SX, jacobian.nonzeros())) if self.is_sparse else ca.densify(jacobian)
+        return jacobian.nz[:] if self.is_sparse else ca.densify(jacobian)
 
     @cached_property
     def _pattern(self) -> SparsePattern:
