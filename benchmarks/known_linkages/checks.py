@@ -182,8 +182,14 @@ def is_same(task: KnownTask, one: Met, other: Met, may_exchange: bool, from_fram
     size = max(abs(each - next(iter(wanted.values()))) for each in wanted.values()) + 1e-9
     has = _features(task, other, from_frame)
     names: list[dict[str, str]] = [{}, EXCHANGED] if may_exchange else [{}]
+    senses = (1.0, -1.0) if from_frame and "line" in has else (1.0,)  # the line of a slide may be written either way
     return any(
-        all(abs(has[name] - wanted[names_.get(name, name)]) < SAME * size for name in wanted) for names_ in names
+        all(
+            abs(has[name] * (1.0 if name == "line" else sense) - wanted[names_.get(name, name)]) < SAME * size
+            for name in wanted
+        )
+        for names_ in names
+        for sense in senses
     )
 
 

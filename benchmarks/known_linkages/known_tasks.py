@@ -184,23 +184,26 @@ def judge(linkage: KnownLinkage, items: Sequence[Item], angles: Sequence[Array],
     found = rank(own)
     if found < len(own):
         return Verdict.TOO_MANY
-    return Verdict.OPEN if independent_count(linkage, items, free) > found else Verdict.LIST
+    most = max(independent_count(each, items, free) for each in (linkage, beside(linkage)))
+    return Verdict.OPEN if most > found else Verdict.LIST
 
 
-def is_rank_special(
-    rng: np.random.Generator, linkage: KnownLinkage, items: Sequence[Item], angles: Sequence[Array], free: Sequence[str]
-) -> bool:
-    """Whether linkages beside it, with the tasks that they meet, have a greater rank: it is at a fold, as where a
-    coordinate is zero that follows from a length and another one."""
-    moved = {name: value + NEIGHBOUR * rng.normal() for name, value in linkage.numbers.items()}
-    other = linkage._replace(numbers=moved)
-    beside = [
+def beside(linkage: KnownLinkage) -> KnownLinkage:
+    """A linkage beside it, all of whose numbers are others: that of a fold, as where a coordinate is zero, is none."""
+    rng = np.random.default_rng(7)
+    return linkage._replace(numbers={name: value + NEIGHBOUR * rng.normal() for name, value in linkage.numbers.items()})
+
+
+def is_rank_special(linkage: KnownLinkage, items: Sequence[Item], angles: Sequence[Array], free: Sequence[str]) -> bool:
+    """Whether linkages beside it, with the tasks that they meet, have a greater rank."""
+    other = beside(linkage)
+    near = [
         make_item(other, item.what, own, item.inputs is not None, item.is_absolute)
         for item, own in zip(items, angles, strict=True)
     ]
     ranks = [
         rank(np.nan_to_num(conditions_on_numbers(*jacobian(each, wanted, angles, free))))
-        for each, wanted in ((linkage, items), (other, beside))
+        for each, wanted in ((linkage, items), (other, near))
     ]
     return ranks[1] > ranks[0]
 
@@ -341,7 +344,7 @@ def _try_task(rng: np.random.Generator, plan: Plan, name: str) -> KnownTask | No
     value = _write_task(rng, plan, name, linkage, items, free)
     if verdict not in wanted or not _is_clear(verdict, values[-1]) or value is None:
         return None
-    if verdict is Verdict.TOO_MANY and is_rank_special(np.random.default_rng(7), linkage, items, angles, free):
+    if verdict is Verdict.TOO_MANY and is_rank_special(linkage, items, angles, free):
         return None
     condition = float(values[0] / values[-1]) if values[-1] > 0.0 else np.inf
     return KnownTask(plan.name, linkage, tuple(items), tuple(angles), free, verdict, condition, value)

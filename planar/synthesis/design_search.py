@@ -113,6 +113,12 @@ DEMANDING, LACK_WEIGHT = 6, 0.3
 lack (rad, or of the extent of what is wanted) counts so much beside their distance."""
 
 
+def has_given_lengths(task: SynthesisTask, mechanism: Mechanism) -> bool:
+    """Whether a length of the file is not among the numbers that are named as free."""
+    lengths = {name for name, each in file_dimensions(mechanism).items() if each.kind == "length" and each.value}
+    return bool(lengths - {*task.free})
+
+
 class _FitStart(NamedTuple):
     """From where a design is fitted: its numbers, the unknowns at entries, and at positions that are guarded."""
 
@@ -131,7 +137,8 @@ class DesignSearch:
         own = design_equations(mechanism).solver.unit
         self.size = wanted_size(task, own)
         self.can_move = can_move_whole(task, mechanism, free_numbers(task, mechanism))
-        if self.can_move and not task.within:  # its scale is that of what is wanted, however large its file is
+        # its scale is that of what is wanted, however large its file is, where no length of the file is to be kept
+        if self.can_move and not task.within and not (task.free and has_given_lengths(task, mechanism)):
             mechanism = similar_mechanism(mechanism, self.size / own)
             own = design_equations(mechanism).solver.unit
         self.mechanism = mechanism

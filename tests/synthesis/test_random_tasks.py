@@ -10,6 +10,7 @@ from benchmarks.known_linkages.known_tasks import Verdict, conditions_on_numbers
 from benchmarks.known_linkages.makers import MAKERS, write_mechanism
 from benchmarks.known_linkages.other_solutions import other_solutions
 from planar.foundation.private_cache import disable_cache
+from planar.synthesis.design_search import DesignSearch
 from planar.synthesis.exact.relations.sought_numbers import sought_numbers
 from planar.synthesis.exact.tracking import generic_solutions
 from planar.synthesis.task.starts import free_numbers, start_mechanisms
@@ -18,7 +19,7 @@ LISTS = {
     "four-bar": (2, 14, 324),
     "slider-crank": (3,),
     "slotted lever": (0, 3, 11, 12, 14, 15),
-    "swinging block": (0, 2, 3, 14, 15),
+    "swinging block": (0, 2, 3, 14, 15, 438),
 }
 REFUSALS = {
     "four-bar": (7, 19),
@@ -94,6 +95,14 @@ def test_conditions_are_counted_by_the_rank():
     assert judge(task.linkage, task.items, task.angles, task.free) is task.verdict is Verdict.LIST
     assert judge(task.linkage, task.items, task.angles, task.free[:-1]) is Verdict.TOO_MANY
     assert judge(task.linkage, task.items, task.angles, names) is Verdict.OPEN
+
+
+def test_numbers_that_are_given_beside_those_named_are_not_scaled():
+    task = draw_task("slider-crank", 428)  # its free numbers bring the poses to any size
+    given = {name: value for name, value in task.linkage.numbers.items() if name not in task.free}
+    search = DesignSearch(planar.read_task(task.value), next(iter(start_mechanisms(planar.read_task(task.value)))))
+    assert search.can_move
+    assert {name: planar.dimensions(search.mechanism)[name] for name in given} == pytest.approx(given)
 
 
 def test_numbers_are_sought_though_a_position_of_the_start_is_a_dead_point():

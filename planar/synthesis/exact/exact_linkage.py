@@ -44,12 +44,15 @@ class NoLinkageError(ValueError):
 
 class ExactLinkage(NamedTuple):
     """A mechanism, the numbers of it that were sought (SI), and where its running input is (n,) at the entries of each
-    wanted item of the task, rad or m; `opposite` are links whose length is negative, so that points stand for it."""
+    wanted item of the task, rad or m; `opposite` are links whose length is negative, so that points stand for it.
+    `pose` (n,) are its points at the first entry, x + i y in units of the task, and the squares of its lines'
+    directions."""
 
     mechanism: Mechanism
     numbers: dict[str, float]
     inputs: tuple[Array, ...]
-    opposite: tuple[str, ...] = ()
+    opposite: tuple[str, ...]
+    pose: ComplexArray
 
 
 def exact_linkage(problem: ExactProblem, solution: Mapping[int, complex], name: str) -> ExactLinkage:
@@ -135,7 +138,9 @@ class _LinkageWriter:
         whole = with_values(base, numbers | {f"{running}.position": start})
         whole = replace(whole, sketch=tuple(self._sketch(whole)))
         chosen = {name: value for name, value in numbers.items() if name in self.pose.free or name not in self.numbers}
-        return ExactLinkage(whole, chosen, self._inputs(running, start), opposite)
+        places = [self._world(place) / self.problem.size for place in self.pose.places.values()]
+        pose = np.array([*places, *(way * way for way in self.lines.values())])
+        return ExactLinkage(whole, chosen, self._inputs(running, start), opposite, pose)
 
     def _check_pins(self) -> None:
         """Raise NoLinkageError where pins of a link are at one place that are apart in the start."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from itertools import combinations, permutations, product
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -40,8 +40,8 @@ from planar.synthesis.task.synthesis_task import (
     WantedPoses,
 )
 
-SAME_NUMBERS = 1e-9
-"""Of a number, or of the size: what differs less is the same."""
+SAME_POSE = 1e-9
+"""Of the size, or of how far it is: a point that differs less is the same."""
 FAMILY_DESIGNS = 24
 """Designs that are listed of a family."""
 
@@ -85,30 +85,36 @@ def synthesise_all(
 def _complete_list(problem: ExactProblem, solved: Sequence[ComponentSolutions], say: Progress) -> CompleteSynthesis:
     """The list of all linkages, each judged."""
     judge = DesignJudge(problem.task, problem.size, is_exact=True)
-    designs: list[ExactDesign] = []
+    judged: list[_PosedDesign] = []
     for labelled, certified, is_far in _linkages(solved):
-        design = _best_design(problem, judge, labelled, certified, len(designs) + 1)
-        if design is not None:
-            designs.append(replace(design, is_far=is_far))
-        say(f"{count_phrase(len(designs), 'linkage')} judged")
-    designs = _distinct(sorted(designs, key=_rank), problem.size)
+        found = _best_design(problem, judge, labelled, certified, len(judged) + 1)
+        if found is not None:
+            judged.append(_PosedDesign(replace(found.design, is_far=is_far), found.pose))
+        say(f"{count_phrase(len(judged), 'linkage')} judged")
+    designs = _distinct(sorted(judged, key=lambda each: _rank(each.design)))
     return CompleteSynthesis(problem.task, tuple(designs), (), problem.size, **_list_numbers(solved, designs))
 
 
-def _distinct(designs: Sequence[ExactDesign], size: float) -> list[ExactDesign]:
-    """The first of each linkage, by numbers that differ by no more than round-off of the size (m).
+class _PosedDesign(NamedTuple):
+    """A design with the pose of its linkage at the first entry, see `ExactLinkage`; an empty one if it has no file."""
 
-    Two solutions may be assemblies of one, as where the offset of a slide is given as zero and either sense of its line
-    turns alike.
+    design: ExactDesign
+    pose: ComplexArray
+
+
+def _distinct(designs: Sequence[_PosedDesign]) -> list[ExactDesign]:
+    """The first of each linkage: two are one whose points and lines are the same at the first entry, to round-off.
+
+    Two solutions may differ in how a link is drawn alone, as where either sense of a line turns alike, or where a point
+    of a link has one of its coordinates given and two directions of the link's axes lead to it.
     """
-    found: list[ExactDesign] = []
-    for design in designs:
-        own = np.array([*design.numbers.values()])
-        others = (np.array([*each.numbers.values()]) for each in found if each.numbers.keys() == design.numbers.keys())
-        within = SAME_NUMBERS * np.maximum(min(1.0, size), np.abs(own))
-        if not len(own) or not any(bool((np.abs(own - other) < within).all()) for other in others):
-            found.append(design)
-    return found
+    found: list[_PosedDesign] = []
+    for own in designs:
+        within = SAME_POSE * np.maximum(1.0, np.abs(own.pose))
+        known = [each.pose for each in found if len(each.pose) == len(own.pose) > 0]
+        if not any(bool((np.abs(own.pose - pose) < within).all()) for pose in known):
+            found.append(own)
+    return [each.design for each in found]
 
 
 def _list_numbers(solved: Sequence[ComponentSolutions], designs: Sequence[ExactDesign]) -> dict[str, Any]:
@@ -185,21 +191,23 @@ def _exchanged(one: ComponentSolutions, row: int) -> list[dict[int, complex]]:
 
 def _best_design(
     problem: ExactProblem, judge: DesignJudge, labelled: list[dict[int, complex]], certified: bool, number: int
-) -> ExactDesign | None:
+) -> _PosedDesign | None:
     """A linkage with its links named so that it has the fewest defects; None for a solution that is no linkage."""
-    designs: list[ExactDesign] = []
+    designs: list[_PosedDesign] = []
     for values in labelled:
         try:
             linkage = exact_linkage(problem, values, f"{problem.task.name}: {problem.mechanism.name} {number}")
         except NoLinkageError:
             continue
         except BadInput as error:
-            designs.append(_unwritten(problem, certified, f"no file could say it: {error.sentence}"))
+            unwritten = _unwritten(problem, certified, f"no file could say it: {error.sentence}")
+            designs.append(_PosedDesign(unwritten, np.zeros(0, complex)))
             continue
-        designs.append(_judged(problem, judge, linkage, certified))
-        if not designs[-1].defects and not designs[-1].file_difference:
+        design = _judged(problem, judge, linkage, certified)
+        designs.append(_PosedDesign(design, linkage.pose))
+        if not design.defects and not design.file_difference:
             break
-    return min(designs, key=lambda design: (bool(design.file_difference), len(design.defects)), default=None)
+    return min(designs, key=lambda each: (bool(each.design.file_difference), len(each.design.defects)), default=None)
 
 
 def _unwritten(problem: ExactProblem, certified: bool, why: str) -> ExactDesign:
