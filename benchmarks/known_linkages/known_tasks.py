@@ -209,9 +209,11 @@ def is_rank_special(linkage: KnownLinkage, items: Sequence[Item], angles: Sequen
 
 
 def independent_count(linkage: KnownLinkage, items: Sequence[Item], free: Sequence[str]) -> int:
-    """How many independent numbers among these any task of this kind depends on."""
+    """How many independent numbers among these any task of this kind depends on; 0 of one that hardly moves."""
     many, their = [], []
     range_ = angles_about(linkage)
+    if len(range_) < MIN_RANGE:
+        return 0
     for item in items:
         own = np.linspace(range_[3], range_[-4], MORE_ENTRIES)
         inputs = None if item.inputs is None else own

@@ -35,8 +35,10 @@ ALIKE_RATIO = 30.0
 """Singular values are small alike that are no more than so many times the least."""
 MOST_ALIKE_VALUES = 64
 """Beyond so many, as in a long row, it is not looked for where all vanish."""
+MORE_VALUES = 2
+"""Singular values that are looked at, beside those which are brought to zero."""
 LEAST_VALUES = 8
-"""Singular values that are looked at where unknowns are many."""
+"""Singular values, the least ones, of which each is brought to zero."""
 MOST_SMALL_VALUES = 4
 """Singular values, with the one that is zero, that are brought to zero together where single ones do not lead there."""
 ON_BRANCH_RATIO = 1e-2
@@ -80,7 +82,8 @@ def bifurcation_candidates(curve: SolutionCurve, here: CurvePoint, farthest: flo
     """The points next to this one at which the Jacobian has more than one null vector, those that Newton finds by steps
     no longer than `farthest`.
 
-    Each small singular value is brought to zero; where several loops come near a change point at once, each is found.
+    Each of the least singular values that is small is brought to zero; where several loops come near a change point at
+    once, each is found.
     Where many are small alike, as at the flat position of a scissor lift, they are first brought to zero together.
     """
     y = here.y + min(here.regular_distance, 0.1) * here.tangent
@@ -90,7 +93,7 @@ def bifurcation_candidates(curve: SolutionCurve, here: CurvePoint, farthest: flo
         found = _refine_candidate(curve, y, start.right[-1 - small.sum() :].T, start, farthest)
         if found is not None:
             yield found
-    for second in range(2, len(start.right) + 1):
+    for second in range(2, min(len(start.right), LEAST_VALUES + 1) + 1):
         if second > 2 and start.values[1 - second] > SMALL_SINGULAR_VALUE * start.greatest:
             return
         found = _refine_candidate(curve, y, start.right[[-second, -1]].T, start, farthest)
@@ -120,11 +123,12 @@ class _Decomposition(NamedTuple):
         return self.right[int(np.sum(self.values > SINGULAR_TOLERANCE * self.greatest)) :].T
 
 
-def _decompose(curve: SolutionCurve, y: Array) -> _Decomposition:
+def _decompose(curve: SolutionCurve, y: Array, least: int = LEAST_VALUES) -> _Decomposition:
+    """The constraints at y, with so many of the least singular values where unknowns are many."""
     residual, jacobian = curve.residuals_and_jacobian(y)
     if isinstance(jacobian, SparseMatrices):
         try:
-            found = BorderedJacobian(jacobian, np.ones(len(y))).least_singular_vectors(LEAST_VALUES)
+            found = BorderedJacobian(jacobian, np.ones(len(y))).least_singular_vectors(least)
             return _Decomposition(residual, jacobian, *found, max(jacobian.greatest_singular_value_bound(), 1.0))
         except ValueError:
             jacobian = np.asarray(jacobian)
@@ -143,8 +147,10 @@ def _refine_candidate(
     these (n + 1, k); None where Newton's method does not settle by steps no longer than the longest.
     """
 
+    many = null_start.shape[1] + MORE_VALUES
+
     def here(tried: Array) -> tuple[Array, Array]:
-        constraints = start if start is not None and tried is y else _decompose(curve, tried)
+        constraints = start if start is not None and tried is y else _decompose(curve, tried, many)
         return _step_to_lower_rank(curve, tried, constraints, null_start), np.zeros((0, 0))
 
     settled_at = (len(y), CONVERGED_STEP)

@@ -41,22 +41,22 @@ class BorderedJacobian:
         "of length one, less than a right angle from the border"
 
     def step(self, right_side: Array, normal: Array | None = None) -> Array:
-        """x (n + 1,) with J x = right side (n,), normal to a direction, or to the border."""
-        found: Array = self._factors.solve(append_number(right_side, 0.0))
+        """x (n + 1, ...) with J x = right side (n, ...), normal to a direction, or to the border."""
+        found: Array = self._factors.solve(np.concatenate([right_side, 0.0 * right_side[:1]]))
         if normal is not None:
-            found = found - (normal @ found) / (normal @ self.tangent) * self.tangent
+            found = found - np.multiply.outer(self.tangent, (normal @ found) / (normal @ self.tangent))
         return found
 
     def pseudo_inverse(self, right_side: Array, sizes: Array) -> Array:
-        """J_s^+ right side (n,), where J_s is J with columns divided by their sizes (n + 1,)."""
-        normal = sizes * sizes * self.tangent
-        return sizes * self.step(right_side, normal)
+        """J_s^+ right side (n, ...), where J_s is J with columns divided by their sizes (n + 1,)."""
+        found = self.step(right_side, sizes * sizes * self.tangent)
+        return (sizes * found.T).T
 
     def transposed_pseudo_inverse(self, vector: Array, sizes: Array) -> Array:
-        """(J_s^+)^T vector (n + 1,)."""
+        """(J_s^+)^T vector (n + 1, ...)."""
         ahead = sizes * self.tangent
-        across = vector - (ahead @ vector) / (ahead @ ahead) * ahead
-        found: Array = self._factors.solve(sizes * across, trans="T")
+        across = vector - np.multiply.outer(ahead, (ahead @ vector) / (ahead @ ahead))
+        found: Array = self._factors.solve(np.ascontiguousarray((sizes * across.T).T), trans="T")
         return found[:-1]
 
     def least_singular_vectors(self, count: int) -> tuple[Array, Array, Array]:
@@ -69,10 +69,8 @@ class BorderedJacobian:
         many = min(count + MORE_VECTORS, rows)
         left = np.linalg.qr(np.random.default_rng(rows).normal(size=(rows, many)))[0]
         for _ in range(SUBSPACE_STEPS):
-            right = np.array([self.pseudo_inverse(each, even) for each in left.T])
-            left = np.linalg.qr(np.array([self.transposed_pseudo_inverse(each, even) for each in right]).T)[0]
-        right = np.array([self.pseudo_inverse(each, even) for each in left.T])
-        turned, inverses, right = np.linalg.svd(right, full_matrices=False)
+            left = np.linalg.qr(self.transposed_pseudo_inverse(self.pseudo_inverse(left, even), even))[0]
+        turned, inverses, right = np.linalg.svd(self.pseudo_inverse(left, even).T, full_matrices=False)
         order = slice(min(count, many) - 1, None, -1) if count < many else slice(None, None, -1)
         values = 1.0 / np.maximum(inverses, 1e-300)
         return (left @ turned)[:, order], values[order], np.vstack([right[order], self.tangent])

@@ -23,7 +23,7 @@ ZERO_COMPONENT = 1e-7
 """A part of a unit vector that is zero but for rounding."""
 MAX_REMOVALS = 60
 """Links or pairs of a structure whose removal is tried."""
-MAX_COORDINATES = 600
+MAX_COORDINATES = 200
 """Coordinates: a larger mechanism is not searched for inputs that are stuck, or for how it moves in general."""
 
 
