@@ -221,6 +221,24 @@ steps_option = click.option(
 )
 
 
+timeout_option = click.option(
+    "--timeout", metavar="TIME", help="End after so long (5 s, 2 min), with what was found by then, as Ctrl-C does."
+)
+
+
+@contextmanager
+def limited_time(timeout: str | None) -> Iterator[None]:
+    """A context that ends what is computed in it after the time of `--timeout`. Raises BadInput."""
+    from planar.document import read_time
+    from planar.foundation.time_limit import time_limit
+
+    seconds = None if timeout is None else read_time(timeout, "--timeout")
+    if seconds is not None and not seconds > 0.0:
+        raise BadInput("--timeout", f"a time above zero is wanted, not {timeout!r:.40}")
+    with time_limit(seconds):
+        yield
+
+
 def output_option(help: str, required: bool = False) -> Callable[[Any], Any]:  # noqa: A002
     """The option that names a file to write."""
     kind = click.Path(dir_okay=False, path_type=Path)

@@ -26,6 +26,7 @@ from planar.equations.mechanism_numbers import mechanism_size
 from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput, NoAnswer, Outcome
 from planar.foundation.short_repr import short_repr
+from planar.foundation.time_limit import time_is_over, time_limit
 from planar.model.mechanism import Input, Mechanism
 from planar.model.run_arguments import check_steps
 from planar.model.wording import join_all_names
@@ -104,6 +105,7 @@ def simulate(
     *,
     moving: bool = False,
     tick: ProgressCallback | None = None,
+    timeout: float | None = None,
 ) -> Simulation:
     """The motion of a mechanism that is let go at the file's position, for a duration (s), in so many steps.
 
@@ -118,7 +120,8 @@ def simulate(
     it is pressed there. Pairs with friction stick and slip: what friction follows and the accelerations are found
     together, and sticking, slipping and turning back are events (J. P. Den Hartog; F. Pfeiffer, C. Glocker).
 
-    A motion that cannot go on says so in its `outcome` and `reason`, as where friction leaves no solution or several.
+    A motion that cannot go on says so in its `outcome` and `reason`, as where friction leaves no solution or several,
+    or after `timeout` s or a Ctrl-C.
     Raises BadInput for a duration or names that are none, and where what friction follows is not determined, NoAnswer
     where there is no position to start from, nothing can move, or something can move that has no mass.
 
@@ -150,7 +153,8 @@ def simulate(
         if moving
         else replace(mechanism, inputs=tuple(_initial_input(each, kept) for each in mechanism.inputs))
     )
-    return _SimulationRun(solve(started), kept, duration, steps).run(tick)
+    with time_limit(timeout):
+        return _SimulationRun(solve(started), kept, duration, steps).run(tick)
 
 
 def _initial_input(given: Input, kept: Sequence[str]) -> Input:
@@ -232,9 +236,10 @@ class _SimulationRun:
             return np.array(rows), Outcome.BRANCH_LOST, _end_sentence(0.0, why)
         try:
             stopped = self._add_rows(rows, tick)
-        except NoAnswer as massless:
-            told = _end_sentence(float(self.time[len(rows) - 1]), f": beyond, {massless.reason}")
-            return np.array(rows), massless.outcome, told
+        except NoAnswer as ended:
+            beyond = "" if ended.outcome is Outcome.INTERRUPTED else "beyond, "
+            told = _end_sentence(float(self.time[len(rows) - 1]), f": {beyond}{ended.reason}")
+            return np.array(rows), ended.outcome, told
         return np.array(rows), Outcome.BRANCH_LOST if stopped else Outcome.SOLVED, stopped
 
     def _add_rows(self, rows: list[Array], tick: ProgressCallback | None) -> str:
@@ -286,6 +291,8 @@ class _SimulationRun:
                 good = [*good[-REMEMBERED_STEPS:], (at, y)]
             if tick is not None:
                 tick(at / last)
+            if time_is_over() and solver.status == "running":
+                raise NoAnswer(Outcome.INTERRUPTED, time_is_over())
         return ""
 
     def _hold_pieces(self, time: float, y: Array, ahead: Array | None = None) -> None:

@@ -26,6 +26,7 @@ class Outcome(StrEnum):
     TOO_INEXACT = "too inexact"
     STOP = "stop"
     STRUCTURE = "structure"
+    INTERRUPTED = "interrupted"
 
 
 class TrackingEnd(StrEnum):
@@ -36,6 +37,7 @@ class TrackingEnd(StrEnum):
     BRANCH_LOST = "lost"
     OUT_OF_RANGE = "far"
     WORK_LIMIT = "spent"
+    INTERRUPTED = "interrupted"
     STOP = "stop"
 
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from planar.document.first_argument import takes_mechanism
 from planar.foundation.errors import BadInput, NoAnswer
+from planar.foundation.time_limit import time_limit
 from planar.model.mechanism import LARGEST_COUNTED_ANGLE, Mechanism
 from planar.model.run_arguments import check_number, check_steps
 from planar.model.wording import quote_names
@@ -39,6 +40,7 @@ def cycle(
     duration: float | None = None,
     jerk: bool = False,
     progress: Progress | None = None,
+    timeout: float | None = None,
 ) -> Motion:
     """The motion of the assembly nearest to the sketch while one input runs from `start` to `stop` (rad or m).
 
@@ -64,8 +66,9 @@ def cycle(
     A motion that ends before `stop` says so in its `outcome` and `reason`; its last row is the dead point itself, where
     no velocity is determined: rates are NaN there. One that takes too much work ends as well: more than 5,000 arcs of
     the curve of positions, and 100 more for each turn of the range. `progress(done, total)` is called while a long
-    range is followed, in rad or m of the input's way. Raises BadInput for an input or a range that is not there,
-    NoAnswer where there is no position to start from or nothing can move (see `planar.inspect`).
+    range is followed, in rad or m of the input's way. After `timeout` s, or a Ctrl-C, the motion ends where it is, with
+    the outcome "interrupted". Raises BadInput for an input or a range that is not there, NoAnswer where there is no
+    position to start from or nothing can move (see `planar.inspect`).
 
     >>> import planar
     >>> len(planar.cycle(planar.load("slider-crank"), steps=12))
@@ -90,7 +93,9 @@ def cycle(
     if is_timed:
         if any(ranged):
             raise BadInput("duration", "a run in time has no range of one input; give the one or the other")
-        return _explained_run(known, pair, lambda: TimeRun(mechanism, branches, jerk).run(int(steps), duration))
+        return _explained_run(
+            known, pair, lambda: TimeRun(mechanism, branches, jerk).run(int(steps), duration), timeout
+        )
     if circuit and (stop is not None or there_and_back):
         raise BadInput("circuit", "a circuit goes all round; it has no end to stop at, and comes back by itself")
 
@@ -100,16 +105,19 @@ def cycle(
             return runner.run_circuit(int(steps), start)
         return runner.run_range(int(steps), start, stop, there_and_back)
 
-    return _explained_run(known, pair, run)
+    return _explained_run(known, pair, run, timeout)
 
 
-def _explained_run(known: SolvedMechanism, pair: str | None, run: Callable[[], Motion]) -> Motion:
-    """A run; where it fails because no input can run from the position, `motion_refusal` says why.
+def _explained_run(
+    known: SolvedMechanism, pair: str | None, run: Callable[[], Motion], timeout: float | None
+) -> Motion:
+    """A run of `timeout` s at most; where no input can run from the position, `motion_refusal` says why.
 
     Of a run in which every input stands still a remark says so.
     """
     try:
-        motion = run()
+        with time_limit(timeout):
+            motion = run()
     except NoAnswer as problem:
         raise known.motion_refusal(pair) or problem from None
     positions = [given.position for given in motion.inputs.values()]

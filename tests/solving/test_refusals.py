@@ -3,6 +3,7 @@
 import copy
 import json
 import re
+import signal
 from dataclasses import replace
 
 import numpy as np
@@ -10,7 +11,7 @@ import pytest
 
 import planar
 from planar.document import files
-from planar.foundation.errors import NoAnswer, Outcome
+from planar.foundation.errors import BadInput, NoAnswer, Outcome
 from planar.solving import newton, position
 from planar.solving.assembly import block_assemblies, nearest_assembly
 from planar.solving.diagnosis import refusals, remedy
@@ -189,7 +190,39 @@ def test_a_slide_that_goes_out_without_an_end_is_lost_there():
 
 
 def test_every_outcome_is_provoked_here():
-    assert {*CASES, "solved", "branch lost"} == {str(outcome) for outcome in Outcome}
+    assert {*CASES, "solved", "branch lost", "interrupted"} == {str(outcome) for outcome in Outcome}
+
+
+def test_a_run_ends_where_its_time_is_over_or_the_user_interrupts_it(tmp_path):
+    mechanism = files.from_dict(mm_four_bar())  # its input has limits, which are walked to
+    ended = planar.cycle(mechanism, 12, stop=2.0 * np.pi, timeout=1e-9)
+    assert ended.outcome is Outcome.INTERRUPTED
+    assert "when the time limit of 1e-09 s was reached; go on from there, or give more time" in ended.reason
+    with pytest.raises(NoAnswer, match=r"followed as far as A = .*, when the time limit of 1e-09 s was reached"):
+        planar.cycle(mechanism, 12, timeout=1e-9)
+    assert planar.cycle(mechanism, 12).outcome is Outcome.SOLVED  # nothing of that is kept
+
+    def interrupt(done, total):
+        signal.raise_signal(signal.SIGINT)
+
+    interrupted = planar.cycle(mechanism, 12, stop=2.0 * np.pi, progress=interrupt)
+    assert interrupted.outcome is Outcome.INTERRUPTED
+    assert "when the user interrupted it" in interrupted.reason
+    name = written(tmp_path, mm_four_bar())
+    by_command = run(tmp_path, "cycle", name, "--to", "360", "--timeout", "1 us")
+    assert "when the time limit of 1e-06 s was reached" in by_command.refused(1)
+    assert run(tmp_path, "cycle", name, "--timeout", "-1 s").refused(2).startswith("--timeout: ")
+    with pytest.raises(BadInput, match="timeout: a time above zero, in s, is wanted, not 0"):
+        planar.cycle(mechanism, timeout=0)
+
+
+def test_circuits_and_simulations_end_where_their_time_is_over():
+    found = planar.circuits(planar.load("watt-six-bar"), timeout=1e-9)
+    assert found.complete.name == "NOT"
+    assert "the time limit of 1e-09 s was reached" in found.remarks[0]
+    let_go = planar.simulate(planar.load("door-closer"), 1.0, 20, timeout=1e-9).motion
+    assert (let_go.outcome, len(let_go) < 21) == (Outcome.INTERRUPTED, True)
+    assert let_go.reason.endswith("s: the time limit of 1e-09 s was reached")
 
 
 # cannot be assembled: the gap, and the dimension offered

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from itertools import islice, pairwise
+from itertools import islice, pairwise, takewhile
 from math import pi, remainder
 from typing import NamedTuple
 
@@ -22,6 +22,7 @@ from planar.assemblies.modes import Mode, Modes
 from planar.assemblies.polynomial.completeness import Completeness
 from planar.foundation.angles import distances
 from planar.foundation.arrays import Array
+from planar.foundation.time_limit import time_is_over
 from planar.model.mechanism import Drive, Mechanism, replace_inputs
 from planar.model.wording import count_phrase
 from planar.solving.diagnosis import refusals
@@ -120,7 +121,7 @@ class CircuitSearch:
             more = [self._list_assemblies(at, at) for at in tried]
             circuits, differing = self._follow_circuits([*places, *more])
             fresh = self._new_dead_points(cuts, circuits)
-            if not fresh:
+            if not fresh or time_is_over():
                 break
             cuts = self._distinct((*cuts, *fresh))
             if not known.doubts:
@@ -161,8 +162,9 @@ class CircuitSearch:
         moved = (*self.standing_drives, Drive(self.pair, bare.position))
         solver = self.solver.with_inputs_of(replace_inputs(self.mechanism, moved))
         modes = Modes(solver, self.mechanism, moved, False)
-        listing = tuple(islice((mode for mode in modes if solver.is_inside_stops(mode.z)), MAX_ASSEMBLIES + 1))
-        whole = len(listing) <= MAX_ASSEMBLIES
+        in_time = takewhile(lambda _: not time_is_over(), modes)
+        listing = tuple(islice((mode for mode in in_time if solver.is_inside_stops(mode.z)), MAX_ASSEMBLIES + 1))
+        whole = len(listing) <= MAX_ASSEMBLIES and not time_is_over()
         return ListedInterval(
             low, high, solver, listing[:MAX_ASSEMBLIES], whole, modes.complete is not Completeness.NOT
         )
@@ -175,10 +177,10 @@ class CircuitSearch:
         strange, between = 0, False
         for place, own in zip(places, taken, strict=True):
             for number, mode in enumerate(place.modes):
-                if own[number] or mode.double:  # from where branches meet none is followed
+                if own[number] or mode.double or time_is_over():  # from where branches meet none is followed
                     continue
                 each = trace_circuit(place.solver, self.index, mode.z)
-                if not each.branches:
+                if not each.branches or time_is_over():
                     continue
                 circuits.append((each, mode))
                 passed = set()
@@ -191,6 +193,8 @@ class CircuitSearch:
                 between |= len(passed) < len(each.branches)
         twice = sum(int(np.sum(count > 1)) for count in taken)
         missed = sum(int(np.sum(count == 0)) for count in taken)
+        if time_is_over():
+            return circuits, [f"not all assemblies were followed, as {time_is_over()}"]
         differing = []
         if strange:
             differing.append("circuits run through assemblies that are not listed")
@@ -229,7 +233,7 @@ class CircuitSearch:
     ) -> list[str]:
         """What of the lists, and of following, leaves it open whether these are all."""
         doubts = []
-        if not all(place.is_whole for place in places):
+        if not all(place.is_whole for place in places) and not time_is_over():
             doubts.append(f"there are positions with more than {MAX_ASSEMBLIES} assemblies")
         if not all(place.is_complete for place in places):
             doubts.append("lists of assemblies are not known to be complete")

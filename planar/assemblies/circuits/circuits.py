@@ -17,6 +17,7 @@ from planar.foundation.angles import TURN, interval_offset
 from planar.foundation.arrays import Array
 from planar.foundation.errors import Outcome
 from planar.foundation.notebook_display import Displayable
+from planar.foundation.time_limit import time_limit
 from planar.model.mechanism import (
     Drive,
     Mechanism,
@@ -37,11 +38,12 @@ TURN_TOLERANCE = 1e-12
 
 
 @takes_mechanism
-def circuits(mechanism: Mechanism, pair: str | None = None) -> Circuits:
+def circuits(mechanism: Mechanism, pair: str | None = None, *, timeout: float | None = None) -> Circuits:
     """All circuits of a mechanism while one input runs, the others standing still.
 
     A circuit is a connected curve of positions, a branch a part of it without a dead point (T. Chase, J. Mirth,
-    J. Mech. Des. 115, 1993). `pair` names the input that runs, where there are several.
+    J. Mech. Des. 115, 1993). `pair` names the input that runs, where there are several. After
+    `timeout` s, or a Ctrl-C, those are returned that were found, and `remarks` say so.
 
     Raises BadInput where there is no such input, NoAnswer where the inputs leave links free whatever the dimensions, or
     nothing can move.
@@ -55,7 +57,8 @@ def circuits(mechanism: Mechanism, pair: str | None = None) -> Circuits:
     # another position of the input may be assembled, and within the stops
     if problem is not None and problem.outcome not in (Outcome.CANNOT_BE_ASSEMBLED, Outcome.STOP):
         raise problem
-    return Circuits(mechanism, mechanism.inputs[running_input_index(mechanism, pair)].pair)
+    with time_limit(timeout):
+        return Circuits(mechanism, mechanism.inputs[running_input_index(mechanism, pair)].pair)
 
 
 @dataclass(frozen=True, eq=False)

@@ -23,6 +23,7 @@ from planar.assemblies.polynomial.isotropic_form import isotropic_form
 from planar.assemblies.search_tree import is_linear
 from planar.equations.symbolic_equations import Block, slice_length
 from planar.foundation.arrays import Array
+from planar.foundation.time_limit import time_is_over
 from planar.model.pairs import MeasureKind
 from planar.solving.assembly.block_assemblies import block_dependencies
 from planar.solving.newton import CLOSED_TOLERANCE
@@ -92,6 +93,9 @@ class _DeadPointSearch:
                         if not each.is_complete:
                             raise DeadPointsUnclaimed("they cannot be told apart to rounding")
             except DeadPointsUnclaimed as why:
+                if time_is_over():
+                    doubts.append(f"dead points may be missing: {why}")
+                    break
                 doubts.append(f"dead points of the group with {', '.join(stage.links)} may be missing: {why}")
             found.append(_distinct(crossed))
             crossings.append(_distinct(touched))
@@ -144,6 +148,9 @@ class _DeadPointSearch:
 
     def _discriminants(self, level: int, at: float) -> dict[DyadChoices, SignedLog]:
         """N of a block with the input at a place, for each choice before it."""
+        over = time_is_over()
+        if over:
+            raise DeadPointsUnclaimed(over)
         found: dict[DyadChoices, SignedLog] = {}
         u = self._inputs_at(at)
         for choices, z in self._earlier_assemblies(level, at):

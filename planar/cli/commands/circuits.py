@@ -12,6 +12,7 @@ from planar.cli.options import (
     at_option,
     input_option,
     json_option,
+    limited_time,
     main,
     model_argument,
     output_option,
@@ -20,6 +21,7 @@ from planar.cli.options import (
     read_model,
     refuse_overwriting,
     show_status,
+    timeout_option,
 )
 from planar.cli.streams import print_json
 from planar.foundation.errors import BadInput
@@ -30,8 +32,11 @@ from planar.foundation.errors import BadInput
 @json_option
 @input_option
 @at_option
+@timeout_option
 @output_option("Write the tables to a .txt, .svg or .html file.")
-def circuits(model: str, as_json: bool, pair: str | None, at: tuple[str, ...], output: Path | None) -> None:
+def circuits(
+    model: str, as_json: bool, pair: str | None, at: tuple[str, ...], timeout: str | None, output: Path | None
+) -> None:
     """All circuits while an input runs, their branches, and where it goes together."""
     from planar.assemblies.circuits.circuits import circuits as all_circuits
     from planar.assemblies.modes import modes
@@ -41,7 +46,7 @@ def circuits(model: str, as_json: bool, pair: str | None, at: tuple[str, ...], o
         raise BadInput("-o", "tables go to a file or SI values are printed with --json; give one of the two")
     mechanism = read_model(model)
     refuse_overwriting(model, output)
-    with show_status(f"{mechanism.name}: circuits"):
+    with limited_time(timeout), show_status(f"{mechanism.name}: circuits"):
         here = modes(mechanism, parse_drives(mechanism, at), certify=False)
         found = all_circuits(here.mechanism, pair)
         told = record(found, here) if as_json else table(found, here)

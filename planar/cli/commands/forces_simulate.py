@@ -13,6 +13,7 @@ from planar.cli.options import (
     at_option,
     frame_number_option,
     json_option,
+    limited_time,
     load_model,
     main,
     mode_option,
@@ -28,6 +29,7 @@ from planar.cli.options import (
     show_progress,
     show_status,
     steps_option,
+    timeout_option,
 )
 from planar.cli.streams import print_json
 from planar.foundation.errors import BadInput
@@ -261,6 +263,7 @@ def _forces_over_motion(
 @click.option(
     "--of", multiple=True, metavar="NAME", help="With --diagrams: the slide, link, point or pair that is drawn."
 )
+@timeout_option
 @output_option("Write positions, velocities, accelerations, energies to a .csv, .xlsx, .json, .npz or .parquet file.")
 # many: options of the command
 def simulate(
@@ -273,6 +276,7 @@ def simulate(
     moving: bool,
     diagrams: Path | None,
     of: tuple[str, ...],
+    timeout: str | None,
     output: Path | None,
 ) -> None:
     """The mechanism let go: its motion in time under loads, weights, springs and friction."""
@@ -290,7 +294,7 @@ def simulate(
         raise BadInput("--of", "this says what diagrams are of; say where to with --diagrams")
     if output is not None:
         check_writable(output.suffix)
-    with show_progress(mechanism.name) as progress:
+    with limited_time(timeout), show_progress(mechanism.name) as progress:
         tick = None if progress is None else lambda done: progress(done, 1.0)
         try:
             found = let_go(mechanism, read_time(duration, "--duration"), steps, driven, moving=moving, tick=tick)

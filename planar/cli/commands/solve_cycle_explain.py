@@ -13,6 +13,7 @@ from planar.cli.options import (
     at_option,
     frame_number_option,
     json_option,
+    limited_time,
     load_model,
     main,
     mode_option,
@@ -27,6 +28,7 @@ from planar.cli.options import (
     scale_option,
     show_progress,
     show_status,
+    timeout_option,
 )
 from planar.cli.streams import print_json
 from planar.foundation.errors import BadInput, unknown_format_error
@@ -231,6 +233,7 @@ def _solve_model(  # many: one for each option
     metavar="NAME",
     help="Also what is asked of a pair, link or point: stroke or swing, greatest speed, time ratio, dwells, area, ...",
 )
+@timeout_option
 @output_option("Write positions, velocities and accelerations to a .csv, .xlsx, .json, .npz or .parquet file.")
 def cycle(
     model: str,
@@ -240,6 +243,7 @@ def cycle(
     asked: tuple[str, ...],
     output: Path | None,
     steps: int,
+    timeout: str | None,
     **course: Any,
 ) -> None:
     """The whole motion: position to position through the range of an input, or in time by the inputs' laws.
@@ -258,7 +262,7 @@ def cycle(
         from planar.reports.files.run_formats import check_writable
 
         check_writable(output.suffix)
-    with show_progress(f"{mechanism.name}: {steps} steps", transient=True) as progress:
+    with limited_time(timeout), show_progress(f"{mechanism.name}: {steps} steps", transient=True) as progress:
         motion = run_motion(mechanism, steps, **course, jerk=jerk, progress=progress)
         if not as_json:
             motion.limits  # noqa: B018 - solved for while the sign is up

@@ -249,8 +249,10 @@ def limits_along(  # long: one kind of limit after the other
     met = setup.stops_at(tracker.point.y[:-1], curve.inputs(tracker.point.y))
     for stop in met if tracker.ending is TrackingEnd.STOP else ():
         yield noted("stop", stop.pair, tracker.point, stop.position)
-    if tracker.ending is TrackingEnd.WORK_LIMIT:
+    if tracker.ending in (TrackingEnd.WORK_LIMIT, TrackingEnd.INTERRUPTED):
         told = "what lies beyond was not followed: it takes more work than one answer may; name a nearer range"
+        if tracker.ending is TrackingEnd.INTERRUPTED:
+            told = "what lies beyond was not followed, as the computation was ended"
         yield noted("not followed further", pair, tracker.point, None, told)
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from planar.foundation.arrays import Array, greatest_size, length_of
 from planar.foundation.errors import TrackingEnd
 from planar.foundation.root_finding import find_root
+from planar.foundation.time_limit import time_is_over
 from planar.model.pairs import MeasureKind
 from planar.solving.checks.singular_values import SINGULAR_DISTANCE_RATIO
 from planar.solving.continuation.bifurcation import (
@@ -93,11 +94,11 @@ class ArcBudget:
         self.arcs_left, self._report = most, tell
 
     def spend(self, u: Array) -> bool:
-        """Count an arc from inputs u (inputs,); False where nothing is left to spend."""
+        """Count an arc from inputs u (inputs,); False where nothing is left to spend, or the time is over."""
         self.arcs_left -= 1
         if self._report is not None:
             self._report(u)
-        return self.arcs_left >= 0
+        return self.arcs_left >= 0 and not time_is_over()
 
 
 def next_point(curve: ImplicitCurve, here: CurvePoint, longest: float) -> tuple[CurvePoint | None, float]:
@@ -182,7 +183,7 @@ class CurveTracker:
         while True:
             here = self.point
             if not self.budget.spend(self.curve.inputs(here.y)):
-                self.ending = TrackingEnd.WORK_LIMIT
+                self.ending = TrackingEnd.INTERRUPTED if time_is_over() else TrackingEnd.WORK_LIMIT
                 return
             if self._approaching and here.regular_distance < min(
                 SEARCH_DISTANCE, REPEATED_SEARCH_RATIO * self._last_search_distance, self.step

@@ -14,6 +14,7 @@ from planar.equations.symbolic_equations import slice_length
 from planar.foundation.arrays import Array
 from planar.foundation.errors import MAX_NAMES_LISTED, NoAnswer, Outcome, TrackingEnd
 from planar.foundation.errors import join_names as several
+from planar.foundation.time_limit import time_is_over
 from planar.model.mechanism import unjoined_points
 from planar.model.pairs import MeasureKind, joining_entry_text
 from planar.model.wording import amount, count_phrase, join_all_names, quote_names
@@ -254,6 +255,11 @@ def motion_ended(setup: PreparedMechanism, links: Sequence[str], where: str, end
             f"this assembly can be followed only to {where}: there {_links(links)} are out by millions of times the "
             f"mechanism's size; stop short of it, or write the place that is wanted as the input's `position` in the "
             "file",
+        )
+    if ending is TrackingEnd.INTERRUPTED:
+        return NoAnswer(
+            Outcome.INTERRUPTED,
+            f"this assembly was followed as far as {where}, when {time_is_over()}; go on from there, or give more time",
         )
     if ending is TrackingEnd.WORK_LIMIT:
         return NoAnswer(

@@ -9,6 +9,7 @@ import numpy as np
 
 from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput, NoAnswer, Outcome, TrackingEnd
+from planar.foundation.time_limit import time_is_over
 from planar.model.wording import join_all_names
 from planar.results.motion import Motion
 from planar.solving.continuation.fast_path import FastSamples, fast_run
@@ -154,14 +155,21 @@ class RangeRun(RunningInput):
     def _whole_range(self, steps: int, here: float) -> RunSamples:
         """One turn on where the input makes it, else all between its limits."""
         key = self.index, self.branches
-        if key not in self.known.range_ends:
+        ends = self.known.range_ends.get(key)
+        if ends is None:
             turn = None if self.is_sliding else self._one_turn(steps, here)
             if isinstance(turn, RunSamples):
                 return turn
             high = turn or self._find_range_end(self.assembly.z, here, 1.0)
-            self.known.range_ends[key] = self._find_range_end(self.assembly.z, here, -1.0), high
-        low, high = self.known.range_ends[key]
+            ends = self._find_range_end(self.assembly.z, here, -1.0), high
+            if not time_is_over():
+                self.known.range_ends[key] = ends
+        low, high = ends
         if high.position - low.position < MIN_RANGE:
+            if TrackingEnd.INTERRUPTED in (low.ending, high.ending):
+                raise refusals.motion_ended(
+                    self.solver, (), self.solver.describe_input(self.pair, here), TrackingEnd.INTERRUPTED
+                )
             self.solver.state(self.assembly.z)  # says why nothing goes on from a dead point or a change point
             at = self.solver.describe_input(self.pair, here)
             told = f"the input at {self.pair!r} can all but not move from {at}, as its motion ends close by both ways"
@@ -197,7 +205,7 @@ class RangeRun(RunningInput):
             if end.ending is not None:
                 return end
         found = self._run(steps, here, here + 2.0 * pi)
-        return found if found.outcome is Outcome.SOLVED else None
+        return found if found.outcome in (Outcome.SOLVED, Outcome.INTERRUPTED) else None
 
     def _with_range_ends(self, found: RunSamples, ends: tuple[_RangeEnd, ...]) -> RunSamples:
         """Rows of a range that ends by itself, with what there is to say of its ends."""
