@@ -44,7 +44,7 @@ def main() -> None:
         ROW: against_links,
         **{linkage.name: _compare(linkage) for linkage in LINKAGES},
         "links": lambda: tables.growth(grow(links) for links in LINKS),
-        "many links": lambda: tables.far(grow_far(*each) for each in FAR),
+        "many links": lambda: tables.far(map(grow_far, FAR)),
         LONG: long,
         CODE: compilings,
         COLD: cold_starts,

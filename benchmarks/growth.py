@@ -18,6 +18,7 @@ from planar.equations.mechanism_numbers import equation_structure
 from planar.equations.symbolic_equations import build_equations
 from planar.solving.continuation.path import follow_samples
 from planar.solving.position import PositionSolver
+from planar.solving.structure import mechanism_structure
 
 Array = np.ndarray
 
@@ -44,21 +45,24 @@ class Growth:
 
 @dataclass(frozen=True)
 class Far:
-    """Seconds of the steps for many links, each done once; None for what was not waited for."""
+    """Seconds of the steps for many links, each done once."""
 
     links: int
     parsing: float
     equations: float
-    program: float | None
-    assembly: float | None
-    position: float | None
+    assembly: float
+    position: float
+    run: float
+    inspection: float
 
 
-FAR = ((100, True), (400, True), (1000, False))
-"""Numbers of links, and whether the steps after the equations are waited for too."""
+FAR = (100, 400, 1000)
+"""Numbers of links."""
+FAR_STEPS = 72
+"""Of a run."""
 
 
-def grow_far(links: int, whole: bool) -> Far:
+def grow_far(links: int) -> Far:
     """Time a long row of four-bars, once."""
     taken = [perf_counter()]
 
@@ -67,18 +71,18 @@ def grow_far(links: int, whole: bool) -> Far:
 
     mechanism = planar.from_dict(chain.document(links))
     done()
-    equations = build_equations(equation_structure(mechanism))
+    mechanism_structure(mechanism)
     done()
-    if whole:
-        _ = EquationFunctions(equations).newton_function
-        done()
-        solver = PositionSolver(mechanism)
-        z = solver.find_assembly().z
-        done()
-        solver.state(z)
-        done()
-    spent = [after - before for before, after in pairwise(taken)] + 3 * [None]
-    return Far(links, *spent[:5])
+    solver = PositionSolver(mechanism)
+    z = solver.find_assembly().z
+    done()
+    solver.state(z)
+    done()
+    planar.cycle(mechanism, FAR_STEPS)
+    done()
+    planar.inspect(mechanism)
+    done()
+    return Far(links, *(after - before for before, after in pairwise(taken)))
 
 
 def grow(links: int) -> Growth:

@@ -83,13 +83,14 @@ def far(measured: Iterable[Far]) -> RenderableType:
         "links",
         "file",
         "equations",
-        "program of a run",
         "assembly",
         "a position with rates",
+        "a run of 72 steps",
+        "inspection",
     )
     for each in measured:
-        steps = (each.parsing, each.equations, each.program, each.assembly, each.position)
-        table.add_row(str(each.links), *("not waited for" if step is None else time(step) for step in steps))
+        steps = (each.parsing, each.equations, each.assembly, each.position, each.run, each.inspection)
+        table.add_row(str(each.links), *map(time, steps))
     return table
 
 
