@@ -129,6 +129,12 @@ class SparseMatrices:
         """The same with a row (columns,) below it."""
         return self.pattern.bordered.matrix(np.insert(self.values, self.pattern.first[1:], row))
 
+    def bordered_by_blocks(self, right: Array, below: Array) -> csc_matrix:
+        """One matrix with columns (rows, k) on its right, rows (k, columns) below it, and zeros in the corner."""
+        from scipy.sparse import bmat, csc_matrix  # few mechanisms are so large
+
+        return bmat([[self.single, csc_matrix(right)], [csc_matrix(below), None]], format="csc")
+
     def column_norms(self, least: float) -> Array:
         """The sizes of the columns (..., columns), `least` at least."""
         squares = np.zeros((*self.values.shape[:-1], self.pattern.shape[1]))

@@ -27,7 +27,12 @@ from planar.solving.assembly.nearest_assembly import (
     sketch_distance_remarks,
 )
 from planar.solving.checks.singular_values import MIN_REGULARITY
-from planar.solving.continuation.fast_path import StraightPathCache, fast_position, is_surely_regular
+from planar.solving.continuation.fast_path import (
+    MIN_FAST_REGULARITY,
+    StraightPathCache,
+    fast_position,
+    is_surely_regular,
+)
 from planar.solving.lazy_frames import lazy_frames
 from planar.solving.newton import CLOSED_TOLERANCE
 from planar.solving.prepared_mechanism import PreparedMechanism
@@ -131,6 +136,15 @@ class PositionSolver(PreparedMechanism):
         from planar.solving.assembly.sketch_remarks import sketch_remarks  # only where there is something to say
 
         return (*remarks, *sketch_remarks(self, BlockAssemblies(self), found))
+
+    def is_surely_regular(self, z: Array) -> bool:
+        """Whether every block is surely determined at an assembly."""
+        if not self.functions.is_sparse:
+            return is_surely_regular(self, z)
+        from planar.solving.rates.regularity import jacobian_at, regularity  # few mechanisms have so many unknowns
+
+        found = regularity(self, jacobian_at(self, z, self.inputs.u))
+        return bool(found.min(initial=1.0) >= MIN_FAST_REGULARITY)
 
     def _is_regular(self, z: Array) -> bool:
         """Whether every block of an assembly is determined there."""
@@ -425,7 +439,7 @@ class SolvedMechanism:
         except NoAnswer as problem:
             return problem
         mechanism = self.solver.mechanism
-        if self.solver.functions.is_square and mechanism.inputs and is_surely_regular(self.solver, z):
+        if self.solver.functions.is_square and mechanism.inputs and self.solver.is_surely_regular(z):
             return None  # regular positions need no judgement
         inputs = tuple(Input(given.pair, given.position) for given in mechanism.inputs)
         # rates, loads and remarks make no difference to the judgement, nor to the assembly

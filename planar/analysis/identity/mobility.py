@@ -14,7 +14,6 @@ from planar.model.mechanism import Mechanism
 from planar.model.wording import count_phrase, join_all_names
 from planar.solving.assembly.nearest_assembly import Assembly, AssemblySearchFailure
 from planar.solving.checks.singular_values import null_space, rank
-from planar.solving.continuation.fast_path import is_surely_regular
 from planar.solving.diagnosis.redundancy import smallest_dependent_sets
 from planar.solving.full_constraints import FullConstraints, find_closed_position, motion_dimension
 from planar.solving.position import PositionSolver
@@ -52,7 +51,7 @@ def mobility(mechanism: Mechanism) -> Mobility:
     inputs = len(mechanism.inputs)
     if inputs == gruebler(mechanism) > 0 and setup.functions.is_square:
         nearest = setup.nearest()
-        if isinstance(nearest, Assembly) and is_surely_regular(setup, nearest.z):
+        if isinstance(nearest, Assembly) and setup.is_surely_regular(nearest.z):
             return Mobility(inputs, inputs, inputs, 0, (), ())  # all is determined, and nothing held twice
     constraints = FullConstraints(setup)
     return mobility_at(constraints, closed_position(setup, constraints))

@@ -97,9 +97,7 @@ class BorderedJacobian:
 
 def closing_step(jacobian: SparseMatrices, residual: Array, left: Array, null: Array) -> Array:
     """x (n + 1,), normal to null vectors (n + 1, k + 1), that closes F in all directions but those left ones (n, k)."""
-    from scipy.sparse import bmat, csc_matrix  # few mechanisms are so large
-
-    factors = factorised(bmat([[jacobian.single, csc_matrix(left)], [csc_matrix(null.T), None]], format="csc"))
+    factors = factorised(jacobian.bordered_by_blocks(left, null.T))
     many = null.shape[0]
     if factors is None:
         return np.full(many, np.nan)

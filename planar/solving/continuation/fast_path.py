@@ -14,7 +14,6 @@ from planar.solving.checks.branch_check import is_move_allowed
 from planar.solving.checks.residual_check import CONTACT_TOLERANCE, EPS, NEGLIGIBLE_ERROR
 from planar.solving.checks.singular_values import SINGULAR_DISTANCE_RATIO
 from planar.solving.prepared_mechanism import PositionInputs, PreparedMechanism
-from planar.solving.rates.regularity import regularity
 
 if TYPE_CHECKING:
     from planar.solving.stops import PairStops
@@ -59,14 +58,11 @@ def fast_position(setup: PreparedMechanism, z: Array) -> FastPosition | None:
 
 def is_surely_regular(setup: PreparedMechanism, z: Array) -> bool:
     """Whether every block is surely determined at a position."""
-    s = setup.inputs
     if setup.acceptance is None:
-        if not setup.functions.is_sparse:
-            return False
-        found = regularity(setup, setup.functions.jacobians(z[None], s.u[None], s.p)[0])
-        return bool(found.min(initial=1.0) >= MIN_FAST_REGULARITY)
-    least = setup.acceptance.regularity(z, s.u, s.p, setup.row_scale, setup.min_column_scale)[0]
-    return bool(least[0, 0] >= MIN_FAST_REGULARITY)
+        return False
+    s = setup.inputs
+    regularity = setup.acceptance.regularity(z, s.u, s.p, setup.row_scale, setup.min_column_scale)[0]
+    return bool(regularity[0, 0] >= MIN_FAST_REGULARITY)
 
 
 class FastSamples(NamedTuple):
