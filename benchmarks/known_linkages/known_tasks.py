@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from enum import StrEnum
 from typing import Any, NamedTuple
 
@@ -184,19 +184,21 @@ def judge(linkage: KnownLinkage, items: Sequence[Item], angles: Sequence[Array],
     found = rank(own)
     if found < len(own):
         return Verdict.TOO_MANY
-    most = max(independent_count(each, items, free) for each in (linkage, beside(linkage)))
+    most = max(independent_count(each, items, free) for each in (linkage, beside(linkage, free)))
     return Verdict.OPEN if most > found else Verdict.LIST
 
 
-def beside(linkage: KnownLinkage) -> KnownLinkage:
-    """A linkage beside it, all of whose numbers are others: that of a fold, as where a coordinate is zero, is none."""
+def beside(linkage: KnownLinkage, names: Collection[str]) -> KnownLinkage:
+    """A linkage beside it with other numbers of these names: that of a fold, as where a coordinate is zero, is none."""
     rng = np.random.default_rng(7)
-    return linkage._replace(numbers={name: value + NEIGHBOUR * rng.normal() for name, value in linkage.numbers.items()})
+    moves = {name: NEIGHBOUR * rng.normal() for name in linkage.numbers}
+    numbers = {name: value + moves[name] * (name in names) for name, value in linkage.numbers.items()}
+    return linkage._replace(numbers=numbers)
 
 
 def is_rank_special(linkage: KnownLinkage, items: Sequence[Item], angles: Sequence[Array], free: Sequence[str]) -> bool:
     """Whether linkages beside it, with the tasks that they meet, have a greater rank."""
-    other = beside(linkage)
+    other = beside(linkage, linkage.numbers)
     near = [
         make_item(other, item.what, own, item.inputs is not None, item.is_absolute)
         for item, own in zip(items, angles, strict=True)
