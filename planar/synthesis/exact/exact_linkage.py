@@ -335,8 +335,9 @@ def _with_opposite_links(
 ) -> tuple[Mechanism, dict[str, float], tuple[str, ...]]:
     """The mechanism with points for each link whose length is negative, its numbers, and the names of such links."""
     links, values, opposite = list[Link](), dict(numbers), list[str]()
+    lengths = {each.path[1]: each.name for each in file_dimensions(mechanism).values() if _is_link_length(each)}
     for link in mechanism.links:
-        name = next((name for name, each in file_dimensions(mechanism).items() if _is_length(each, link)), None)
+        name = lengths.get(link.name)
         if name is None or values.get(name, 0.0) >= 0.0 or link.ends is None:
             links.append(link)
             continue
@@ -349,5 +350,5 @@ def _with_opposite_links(
     return replace(mechanism, links=tuple(links)) if opposite else mechanism, values, tuple(opposite)
 
 
-def _is_length(each: Dimension, link: Link) -> bool:
-    return each.path == ("links", link.name, "length")
+def _is_link_length(each: Dimension) -> bool:
+    return len(each.path) == 3 and (each.path[0], each.path[2]) == ("links", "length")
