@@ -15,6 +15,7 @@ from planar.assemblies.polynomial.completeness import Completeness
 from tests.builders import bare_four_bar, slider_crank_document
 from tests.closed_forms import between
 from tests.draws import draws, first_cases, is_exhaustive, part
+from tests.known import MODELS
 from tests.linkages import random_linkage
 
 CLAIMED = Completeness.NUMERICALLY
@@ -367,3 +368,13 @@ def test_a_function_that_touches_zero_is_told_from_one_that_does_not(lift):
 @pytest.mark.parametrize("place", np.random.default_rng(6).uniform(-1.0, 1.0, 20))
 def test_a_jump_is_not_taken_for_a_function_that_is_known(place):
     assert not find_zeros(lambda x: SignedLog(1.0 if x < place else -1.0, 0.0), -1.0, 1.0).is_complete
+
+
+def test_of_many_blocks_that_hang_on_one_another_the_own_circuit_alone_is_listed():
+    found = planar.circuits(MODELS["chain-42"])
+    assert "up to 2^20 assemblies hang on one another" in found.remarks[0]
+    (own,) = found
+    limits = sorted(planar.cycle(MODELS["chain-42"], 12).inputs["A0"].position[[0, -1]])
+    assert {each.assemblies for each in found.intervals} == {None}
+    assert own.home_range == pytest.approx(tuple(limits))
+    assert found.complete is Completeness.NOT

@@ -15,6 +15,7 @@ from planar.assemblies.circuits.dead_points import (
     SAME_POSITION_DISTANCE,
     CriticalPositions,
     critical_positions,
+    longest_choice,
 )
 from planar.assemblies.circuits.stop_positions import stop_positions
 from planar.assemblies.circuits.traced_circuit import TracedCircuit, trace_circuit
@@ -31,6 +32,8 @@ from planar.solving.position import PositionSolver, solved_mechanism
 TURN = 2.0 * pi
 MAX_ASSEMBLIES = 256
 """Assemblies at one position of the input up to which circuits are looked for."""
+MAX_LONGEST_CHOICE = 12
+"""Blocks that hang on one another and may be assembled in two ways: of more not all circuits are looked for."""
 MAX_ROUNDS = 4
 """How often dead points that only circuits showed part the input's range anew."""
 TRIAL_POSITIONS = 12
@@ -106,6 +109,12 @@ class CircuitSearch:
 
     def find_circuits(self) -> CircuitSearchResult:
         """All that are found, once circuits show no dead point that was not known."""
+        many = longest_choice(self.solver)
+        if many > MAX_LONGEST_CHOICE:
+            return self._own_circuit(
+                f"up to 2^{many} assemblies hang on one another, too many to be followed; only the circuit of the "
+                "file's own assembly is listed"
+            )
         known = critical_positions(self.solver, self.index)
         doubts = list(known.doubts)
         cuts = self._distinct((*known.positions, *known.crossings, *self._stop_positions()))
@@ -134,6 +143,17 @@ class CircuitSearch:
             doubts.append("the number of assemblies changes where no dead point was found")
         doubts += differing + self._completeness_doubts(places, circuits)
         return CircuitSearchResult(tuple(circuits), tuple(kept), intervals, *self._completeness_claim(kept, doubts))
+
+    def _own_circuit(self, why: str) -> CircuitSearchResult:
+        """The circuit of the assembly nearest to the sketch alone. Raises NoAnswer where there is none."""
+        z = solved_mechanism(self.solver.mechanism).assembly.z
+        curve = trace_circuit(self.solver, self.index, z)
+        cuts = self._distinct((*curve.dead_points, *curve.stops))
+        span = (cuts[0], cuts[-1]) if cuts else (0.0, TURN)
+        ranges = self._cut_range(CriticalPositions((), (), span, ()), cuts[1:-1] if self.is_sliding else cuts)
+        intervals = tuple(InputInterval(low, high, None) for low, high in ranges)
+        mode = Mode(None, (), False, False, z, self.solver)
+        return CircuitSearchResult(((curve, mode),), tuple(cuts), intervals, Completeness.NOT, (why,))
 
     def _stop_positions(self) -> Iterator[float]:
         """Where pairs pass their stops, along circuits that have none."""

@@ -55,6 +55,13 @@ class CriticalPositions(NamedTuple):
     doubts: tuple[str, ...]
 
 
+def longest_choice(setup: PreparedMechanism) -> int:
+    """How many blocks of two unknowns or more hang on one another at most: each may be assembled in two ways."""
+    blocks = setup.equations.blocks
+    chosen = {k for k, block in enumerate(blocks) if slice_length(block.unknowns) > 1}
+    return max((len(chosen & {k, *before}) for k, before in enumerate(_earlier_blocks(setup))), default=0)
+
+
 def critical_positions(setup: PreparedMechanism, index: int) -> CriticalPositions:
     """The dead points of one input, the others standing still."""
     return _DeadPointSearch(setup, index).search()

@@ -46,10 +46,17 @@ def count_text(circuits: Circuits) -> str:
 def _assembly_range_text(circuits: Circuits) -> str:
     if not circuits.assembles:
         return "no position of the input was found at which it goes together"
+    if _is_range_unknown(circuits):
+        return "where else it goes together is not known"
     if _assembles_all_round(circuits):
         return "it goes together all round"
     ends = [" to ".join(_position_text(circuits, end) for end in both) for both in circuits.assembles]
     return f"it goes together with {circuits.pair} from {join_all_names(ends)}"
+
+
+def _is_range_unknown(circuits: Circuits) -> bool:
+    """Whether it is not known at which positions of the input it goes together."""
+    return all(each.assemblies is None for each in circuits.intervals)
 
 
 def _assembles_all_round(circuits: Circuits) -> bool:
@@ -156,7 +163,7 @@ def record(circuits: Circuits, modes: Modes) -> dict[str, Any]:
         "inputs": {given.pair: given.position for given in circuits.mechanism.inputs},
         "complete": circuits.complete.value,
         "critical": list(circuits.critical),
-        "assembles": [list(both) for both in circuits.assembles],
+        "assembles": None if _is_range_unknown(circuits) else [list(both) for both in circuits.assembles],
         "intervals": [each._asdict() for each in circuits.intervals],
         "nearest": next((each.mode.number for each in lying if each.is_sketched), None),
         "circuits": [
