@@ -333,7 +333,7 @@ class EquationFunctions:
 
     def _run_sparse(self, z: Array, u: Array, p: Array) -> Array:
         """The same, each from where the rates of the one before lead."""
-        found: Array = np.empty((len(u), len(z)))
+        samples: Array = np.empty((len(u), len(z)))
         step: Array = np.zeros(len(z))
         for k, inputs in enumerate(u):
             z = z + step
@@ -343,10 +343,10 @@ class EquationFunctions:
                 z = z - change
                 if not greatest_size(change) > SETTLED_STEP:
                     break
-            found[k] = z
+            samples[k] = z
             if k + 1 < len(u):
                 step = -solve_vectors(slopes[0], drives[0] @ (u[k + 1] - inputs))
-        return found
+        return samples
 
     def _residuals(self, z: Array, u: Array, p: Array) -> Array:
         """F (samples, rows)."""

@@ -42,9 +42,9 @@ class SparsePattern:
 
     def matrix(self, values: Array) -> csc_matrix:
         """The matrix of these entries as scipy has it."""
-        found = copy(self._zeros)  # to check its indices takes ten times as long
-        found.data = np.ascontiguousarray(values)
-        return found
+        matrix = copy(self._zeros)  # to check its indices takes ten times as long
+        matrix.data = np.ascontiguousarray(values)
+        return matrix
 
     @cached_property
     def bordered(self) -> SparsePattern:
@@ -104,20 +104,20 @@ class SparseMatrices:
             rows, columns = (slice(*each.indices(many)[:2]) for each, many in both)
             entries, places = self.pattern.block_entries(rows, columns)
             shape = rows.stop - rows.start, columns.stop - columns.start
-            found = np.zeros((*self.values.shape[:-1], shape[0] * shape[1]))
-            found[..., places] = self.values[..., entries]
-            return found.reshape(*self.values.shape[:-1], *shape)
+            blocks = np.zeros((*self.values.shape[:-1], shape[0] * shape[1]))
+            blocks[..., places] = self.values[..., entries]
+            return blocks.reshape(*self.values.shape[:-1], *shape)
         return SparseMatrices(self.pattern, self.values[key])
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> Array:
-        found = np.zeros(self.shape)
-        found[..., self.pattern.rows, self.pattern.columns] = self.values
-        return found
+        dense = np.zeros(self.shape)
+        dense[..., self.pattern.rows, self.pattern.columns] = self.values
+        return dense
 
     def __matmul__(self, other: Array) -> Array:
         if self.values.ndim == 1:
-            found: Array = self.single @ other
-            return found
+            product: Array = self.single @ other
+            return product
         return np.asarray(self) @ other
 
     @cached_property
@@ -162,20 +162,20 @@ class SparseMatrices:
 
         first = self.pattern.shape[1] - len(weights)
         joined = self.single[:, first:] @ csc_matrix(weights[:, None])
-        found = hstack([self.single[:, :first], joined], format="csc")
-        return SparseMatrices(SparsePattern(found.shape, found.indices, found.indptr), found.data)
+        narrow = hstack([self.single[:, :first], joined], format="csc")
+        return SparseMatrices(SparsePattern(narrow.shape, narrow.indices, narrow.indptr), narrow.data)
 
     def solve(self, right_sides: Array) -> Array:
         """matrices^-1 right sides (..., unknowns, k), each by a factorisation of its own; not numbers where one is
         singular."""
         many = self.values.reshape(-1, self.values.shape[-1])
         right = np.broadcast_to(right_sides, (*self.values.shape[:-1], *right_sides.shape[-2:]))
-        found = np.full((len(many), *right.shape[-2:]), np.nan)
-        for out, values, own in zip(found, many, right.reshape(found.shape), strict=True):
+        solutions = np.full((len(many), *right.shape[-2:]), np.nan)
+        for out, values, own in zip(solutions, many, right.reshape(solutions.shape), strict=True):
             factors = factorised(self.pattern.matrix(values))
             if factors is not None:
                 out[:] = factors.solve(np.ascontiguousarray(own))
-        return found.reshape(right.shape)
+        return solutions.reshape(right.shape)
 
     def __iter__(self) -> Iterator[SparseMatrices]:
         return (self[k] for k in range(len(self)))

@@ -42,22 +42,22 @@ class BorderedJacobian:
 
     def step(self, right_side: Array, normal: Array | None = None) -> Array:
         """x (n + 1, ...) with J x = right side (n, ...), normal to a direction, or to the border."""
-        found: Array = self._factors.solve(np.concatenate([right_side, 0.0 * right_side[:1]]))
+        step: Array = self._factors.solve(np.concatenate([right_side, 0.0 * right_side[:1]]))
         if normal is not None:
-            found = found - np.multiply.outer(self.tangent, (normal @ found) / (normal @ self.tangent))
-        return found
+            step = step - np.multiply.outer(self.tangent, (normal @ step) / (normal @ self.tangent))
+        return step
 
     def pseudo_inverse(self, right_side: Array, sizes: Array) -> Array:
         """J_s^+ right side (n, ...), where J_s is J with columns divided by their sizes (n + 1,)."""
-        found = self.step(right_side, sizes * sizes * self.tangent)
-        return (sizes * found.T).T
+        step = self.step(right_side, sizes * sizes * self.tangent)
+        return (sizes * step.T).T
 
     def transposed_pseudo_inverse(self, vector: Array, sizes: Array) -> Array:
         """(J_s^+)^T vector (n + 1, ...)."""
         ahead = sizes * self.tangent
         across = vector - np.multiply.outer(ahead, (ahead @ vector) / (ahead @ ahead))
-        found: Array = self._factors.solve(np.ascontiguousarray((sizes * across.T).T), trans="T")
-        return found[:-1]
+        bordered_solution: Array = self._factors.solve(np.ascontiguousarray((sizes * across.T).T), trans="T")
+        return bordered_solution[:-1]
 
     def least_singular_vectors(self, count: int) -> tuple[Array, Array, Array]:
         """The least singular values of J, the greater ones first (count,), with their vectors: those on the left as
@@ -89,8 +89,8 @@ class BorderedJacobian:
 
         def squared(vector: Array) -> Array:
             moved = self.pseudo_inverse(scaled @ vector, sizes)
-            found: Array = scaled.T @ self.transposed_pseudo_inverse(moved, sizes)
-            return found
+            back: Array = scaled.T @ self.transposed_pseudo_inverse(moved, sizes)
+            return back
 
         return norm_by_powers(squared, len(self.border))
 
@@ -101,8 +101,8 @@ def closing_step(jacobian: SparseMatrices, residual: Array, left: Array, null: A
     many = null.shape[0]
     if factors is None:
         return np.full(many, np.nan)
-    found: Array = factors.solve(np.concatenate([-residual, np.zeros(null.shape[1])]))[:many]
-    return found
+    step: Array = factors.solve(np.concatenate([-residual, np.zeros(null.shape[1])]))[:many]
+    return step
 
 
 def norm_by_powers(squared: Callable[[Array], Array], size: int) -> float:
