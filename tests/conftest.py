@@ -4,6 +4,7 @@ import atexit
 import gc
 import os
 import re
+import signal
 import sys
 from collections import Counter
 from tempfile import TemporaryDirectory
@@ -47,6 +48,14 @@ def pytest_terminal_summary(terminalreporter):
     missing = Counter(match[1] or match[2] for reason in reasons if (match := MISSING_PROGRAM.search(reason)))
     names = ", ".join(f"{name} {count}" for name, count in sorted(missing.items())) or "none"
     terminalreporter.write_line(f"tests skipped for want of a program: {sum(missing.values())} ({names})")
+
+
+@pytest.fixture
+def interruptions():
+    """Ctrl-C interrupts, as in a program that a user starts: where tests run in the background it is ignored."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
 
 
 @pytest.hookimpl(wrapper=True)

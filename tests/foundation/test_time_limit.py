@@ -20,6 +20,7 @@ def test_a_limit_is_over_after_its_time_and_within_others():
         assert time_is_over() == ""
 
 
+@pytest.mark.usefixtures("interruptions")
 def test_the_first_interruption_ends_a_computation_and_the_second_one_raises():
     before = signal.getsignal(signal.SIGINT)
     with time_limit(None), time_limit(None):

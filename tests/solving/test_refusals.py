@@ -193,6 +193,7 @@ def test_every_outcome_is_provoked_here():
     assert {*CASES, "solved", "branch lost", "interrupted"} == {str(outcome) for outcome in Outcome}
 
 
+@pytest.mark.usefixtures("interruptions")
 def test_a_run_ends_where_its_time_is_over_or_the_user_interrupts_it(tmp_path):
     mechanism = files.from_dict(mm_four_bar())  # its input has limits, which are walked to
     ended = planar.cycle(mechanism, 12, stop=2.0 * np.pi, timeout=1e-9)
