@@ -16,7 +16,7 @@ import numpy as np
 
 from planar.equations.casadi_call import ON_ARM, BufferedFunction, ClosedFormAssemblies, RunFunction, read_function
 from planar.equations.elimination import stack_expressions
-from planar.equations.linear import solve_linear, solve_vectors
+from planar.equations.linear import solve_arrays, solve_linear, solve_vectors
 from planar.equations.mechanism_numbers import equation_structure, structure_fingerprint
 from planar.equations.rates import rate_symbols, time_derivatives
 from planar.equations.sparse_matrices import MAX_DENSE_UNKNOWNS, SparseMatrices, SparsePattern
@@ -194,7 +194,7 @@ class EquationFunctions:
     def _jacobian_entries(self) -> ca.SX:
         """dF/dy (rows, y), or the column of its entries that are not zero."""
         jacobian = self.equations.jacobian
-        return jacobian.nz[:] if self.is_sparse else ca.densify(jacobian)
+        return ca.vec(jacobian.nz[:]) if self.is_sparse else ca.densify(jacobian)
 
     @cached_property
     def _pattern(self) -> SparsePattern:
@@ -305,7 +305,8 @@ class EquationFunctions:
         """The same at samples z (samples, unknowns), u and p alike, each by itself."""
         if self.is_sparse:
             for _ in range(RUN_NEWTON_STEPS):
-                z = z - solve_vectors(self.jacobians(z, u, p)[0], self._residuals(z, u, p))
+                left, entries = self._residual_call.evaluate_batch(len(z), z, u, p)
+                z = z - solve_vectors(self._split_jacobian(entries)[0], left[:, 0])
             return z
         return self._newton_call.evaluate_batch(len(z), z, u, p)[0][:, 0]
 
@@ -338,19 +339,16 @@ class EquationFunctions:
         for k, inputs in enumerate(u):
             z = z + step
             for _ in range(RUN_NEWTON_STEPS):
-                slopes, drives = self.jacobians(z[None], inputs[None], p)
-                change = solve_vectors(slopes[0], self._residuals(z[None], inputs[None], p)[0])
-                z = z - change
-                if not greatest_size(change) > SETTLED_STEP:
+                left, entries = self._residual_call(z, inputs, p)
+                slopes, drives = self._split_jacobian(entries)
+                solution = solve_arrays(slopes, np.column_stack([left[0], drives]))
+                z = z - solution[:, 0]
+                if not greatest_size(solution[:, 0]) > SETTLED_STEP:
                     break
             samples[k] = z
             if k + 1 < len(u):
-                step = -solve_vectors(slopes[0], drives[0] @ (u[k + 1] - inputs))
+                step = -solution[:, 1:] @ (u[k + 1] - inputs)
         return samples
-
-    def _residuals(self, z: Array, u: Array, p: Array) -> Array:
-        """F (samples, rows)."""
-        return self._residual_call.evaluate_batch(len(z), z, u, p)[0][:, 0]
 
     @cached_property
     def _run_function(self) -> RunFunction:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from copy import copy
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -83,11 +82,6 @@ class SparseMatrices:
     def shape(self) -> tuple[int, ...]:
         """As that of an array."""
         return (*self.values.shape[:-1], *self.pattern.shape)
-
-    @property
-    def ndim(self) -> int:
-        """As that of an array."""
-        return self.values.ndim + 1
 
     @property
     def size(self) -> int:
@@ -176,9 +170,6 @@ class SparseMatrices:
             if factors is not None:
                 out[:] = factors.solve(np.ascontiguousarray(own))
         return solutions.reshape(right.shape)
-
-    def __iter__(self) -> Iterator[SparseMatrices]:
-        return (self[k] for k in range(len(self)))
 
 
 def factorised(matrix: csc_matrix) -> SuperLU | None:

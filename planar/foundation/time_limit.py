@@ -11,6 +11,7 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
+from numbers import Real
 from time import monotonic
 from types import FrameType
 
@@ -43,7 +44,9 @@ _CURRENT: ContextVar[TimeLimit | None] = ContextVar("time limit", default=None)
 @contextmanager
 def time_limit(seconds: float | None) -> Iterator[TimeLimit]:
     """A context whose computations end after so many seconds, or where the user interrupts them. Raises BadInput."""
-    if seconds is not None and not (isinstance(seconds, int | float) and 0.0 < seconds < LONGEST_LIMIT):
+    if seconds is not None and not (
+        isinstance(seconds, Real) and not isinstance(seconds, bool) and 0.0 < seconds < LONGEST_LIMIT
+    ):
         raise BadInput("timeout", f"a time above zero, in s, is wanted, not {seconds!r:.40}")
     limit = TimeLimit(seconds, _CURRENT.get())
     token = _CURRENT.set(limit)

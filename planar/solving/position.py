@@ -143,8 +143,8 @@ class PositionSolver(PreparedMechanism):
             return is_surely_regular(self, z)
         from planar.solving.rates.regularity import jacobian_at, regularity  # few mechanisms have so many unknowns
 
-        found = regularity(self, jacobian_at(self, z, self.inputs.u))
-        return bool(found.min(initial=1.0) >= MIN_FAST_REGULARITY)
+        of_blocks = regularity(self, jacobian_at(self, z, self.inputs.u))
+        return bool(of_blocks.min(initial=1.0) >= MIN_FAST_REGULARITY)
 
     def _is_regular(self, z: Array) -> bool:
         """Whether every block of an assembly is determined there."""

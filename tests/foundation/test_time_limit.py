@@ -45,7 +45,7 @@ def test_other_threads_have_limits_without_interruptions():
     assert told == ["the time limit of 1e-09 s was reached"]
 
 
-@pytest.mark.parametrize("seconds", [0, -1.0, float("nan"), float("inf"), "5"])
+@pytest.mark.parametrize("seconds", [0, -1.0, float("nan"), float("inf"), "5", True])
 def test_what_is_no_time_is_refused(seconds):
     with pytest.raises(BadInput, match="timeout: a time above zero, in s, is wanted"), time_limit(seconds):
         pass

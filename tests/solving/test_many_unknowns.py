@@ -20,8 +20,16 @@ from tests.builders import lift_document
 from tests.draws import first_cases
 from tests.known import MODELS
 
-CURVES = ["peaucellier-lipkin", "scissor-lift", "balanced-lamp", "watt-parallel-motion", "four-bar", "parallelogram"]
-"""Models with dead points, change points, positions of lost rank, redundant pairs, or none of these."""
+CURVES = [
+    "peaucellier-lipkin",
+    "scissor-lift",
+    "balanced-lamp",
+    "watt-parallel-motion",
+    "tangent-cam",
+    "four-bar",
+    "antiparallelogram",
+]
+"""Models with dead points, change points, positions of lost rank, redundant pairs, one unknown, or none of these."""
 
 
 def clear_structures():
@@ -108,7 +116,7 @@ def run_of(mechanism):
         return problem
 
 
-@pytest.mark.parametrize("stem", first_cases(CURVES, 4))
+@pytest.mark.parametrize("stem", first_cases(CURVES, 5))
 def test_runs_are_the_same_by_entries_and_by_arrays(stem, few_dense_unknowns):
     by_arrays = run_of(MODELS[stem])
     few_dense_unknowns()

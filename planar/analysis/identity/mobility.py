@@ -48,13 +48,13 @@ def mobility(mechanism: Mechanism) -> Mobility:
     setup = PositionSolver(mechanism)
     if setup.equations.open_rows:
         return _mobility_of_least_misfit(setup)
-    inputs = len(mechanism.inputs)
-    if inputs == gruebler(mechanism) > 0 and setup.functions.is_square:
-        nearest = setup.nearest()
-        if isinstance(nearest, Assembly) and setup.is_surely_regular(nearest.z):
-            return Mobility(inputs, inputs, inputs, 0, (), ())  # all is determined, and nothing held twice
     constraints = FullConstraints(setup)
-    return mobility_at(constraints, closed_position(setup, constraints))
+    w, inputs = closed_position(setup, constraints), len(mechanism.inputs)
+    if inputs == gruebler(mechanism) > 0 and setup.functions.is_square:
+        z = w[list(setup.equations.unknowns)]
+        if setup.max_residual(z, setup.inputs.u) <= setup.tolerance and setup.is_surely_regular(z):
+            return Mobility(inputs, inputs, inputs, 0, (), ())  # all is determined, and nothing held twice
+    return mobility_at(constraints, w)
 
 
 def _mobility_of_least_misfit(solver: PositionSolver) -> Mobility:

@@ -99,9 +99,9 @@ class ImplicitCurve:
         """The point at y, its tangent less than a right angle from a direction."""
         slope = self.jacobian(y)
         if isinstance(slope, SparseMatrices):
-            found = self._sparse_point_at(y, towards, slope)
-            if found is not None:
-                return found
+            point = self._sparse_point_at(y, towards, slope)
+            if point is not None:
+                return point
             slope = np.asarray(slope)
         least = self._least_singular_value(slope)
         many = len(y) - 1
@@ -127,14 +127,15 @@ class ImplicitCurve:
             bordered = BorderedJacobian(slope, towards)
         except ValueError:
             return None
-        least = bordered.least_singular_value(slope.column_norms(MIN_COLUMN_NORM))
+        sizes = slope.column_norms(MIN_COLUMN_NORM)
+        least = bordered.least_singular_value(sizes)
         if not (least > REGULAR_SINGULAR_VALUE and bordered.tangent_ratio < MAX_TANGENT_RATIO):
             return None
         tangent = bordered.tangent
         bend = bordered.step(-self.second_derivative(y, tangent), tangent)
-        return CurvePoint(y, tangent, bend, self._sparse_regular_distance(y, bordered, least))
+        return CurvePoint(y, tangent, bend, self._sparse_regular_distance(y, bordered, sizes, least))
 
-    def _sparse_regular_distance(self, y: Array, bordered: BorderedJacobian, least: float) -> float:
+    def _sparse_regular_distance(self, y: Array, bordered: BorderedJacobian, sizes: Array, least: float) -> float:
         """The same as `_regular_distance`."""
         return np.inf
 
@@ -154,9 +155,9 @@ class ImplicitCurve:
 
         def step(slope: Array | SparseMatrices, left: Array) -> Array:
             if isinstance(slope, SparseMatrices):
-                found = _sparse_step(slope, left, normal)
-                if found is not None:
-                    return found
+                sparse = _sparse_step(slope, left, normal)
+                if sparse is not None:
+                    return sparse
             return _solve_shortest(stack_row(np.asarray(slope), normal), append_number(-left, 0.0))
 
         y, gap = correct(self.residuals_and_jacobian, step, y, MAX_CORRECTIONS)
@@ -235,12 +236,11 @@ class SolutionCurve(ImplicitCurve):
         turned = np.linalg.lstsq(slope / sizes, change, rcond=0.1 * ZERO_SINGULAR_VALUE)[0]
         return max(clear, 1.0 / max(float(np.linalg.norm(turned)), 1e-300))
 
-    def _sparse_regular_distance(self, y: Array, bordered: BorderedJacobian, least: float) -> float:
+    def _sparse_regular_distance(self, y: Array, bordered: BorderedJacobian, sizes: Array, least: float) -> float:
         slope, tangent = bordered.jacobian, bordered.tangent
         there = self.jacobian(y + DIFFERENCE_STEP * tangent)
         assert isinstance(there, SparseMatrices)
         change = SparseMatrices(slope.pattern, (there.values - slope.values) / DIFFERENCE_STEP)
-        sizes = slope.column_norms(MIN_COLUMN_NORM)
         clear = float(singular_distance(least, np.asarray(length_of(change.divide_columns(sizes).values))))
         if clear >= SHORT_REGULAR_DISTANCE:
             return clear
@@ -258,10 +258,10 @@ class SolutionCurve(ImplicitCurve):
 def _sparse_step(slope: SparseMatrices, left: Array, normal: Array) -> Array | None:
     """The step that closes what is open, normal to a direction; None where it is that of a singular system."""
     try:
-        found = BorderedJacobian(slope, normal).step(-left)
+        step = BorderedJacobian(slope, normal).step(-left)
     except ValueError:
         return None
-    return found if greatest_size(found) < MAX_SOLVED_STEP else None
+    return step if greatest_size(step) < MAX_SOLVED_STEP else None
 
 
 def _solve_shortest(system: Array, known: Array) -> Array:

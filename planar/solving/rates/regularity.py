@@ -58,12 +58,12 @@ def regularity(setup: PreparedMechanism, jacobian: Array | SparseMatrices) -> Ar
     Zero at a dead point or a change point; lengths are divided by the reach of the block's links, so that neither
     their size nor that of the whole matters. `jacobian` is (..., rows, unknowns).
     """
-    found = []
+    least_values = []
     for stage in setup.equations.blocks:
         own = jacobian[..., stage.rows, stage.unknowns] / setup.row_scale[stage.rows, None]
         sizes = np.maximum(np.linalg.norm(own, axis=-2), setup.min_column_scale[stage.unknowns])
-        found.append(_least_singular_value(own / sizes[..., None, :]))
-    return np.stack(found, axis=-1) if found else np.zeros((*jacobian.shape[:-2], 0))
+        least_values.append(_least_singular_value(own / sizes[..., None, :]))
+    return np.stack(least_values, axis=-1) if least_values else np.zeros((*jacobian.shape[:-2], 0))
 
 
 def _least_singular_value(block_jacobian: Array) -> Array:
