@@ -25,12 +25,15 @@ class CoordinateSymbols(NamedTuple):
 
 @dataclass
 class EliminationRow:
-    """A constraint under elimination: sum of factor * coordinate, plus a rest that is not linear in them."""
+    """A constraint under elimination: sum of factor * coordinate, plus a rest that is not linear in them.
+
+    The rest is a sum of rests of the pairs' own rows, each times its multiplier.
+    """
 
     factors: dict[int, float]
-    rest: ca.SX
+    multipliers: dict[int, float]
     rest_coordinates: set[int]
-    "coordinates whose symbols stand in `rest`"
+    "coordinates on which the rest depends"
     nonlinear: set[int]
     "coordinates that the constraint depends on, through others or not, other than by its factors"
 
@@ -39,9 +42,17 @@ class EliminationRow:
         """Every coordinate on which the constraint depends."""
         return set(self.factors) | self.nonlinear
 
-    def as_expression(self, symbols: CoordinateSymbols) -> ca.SX:
+    def rest(self, rests: Sequence[ca.SX]) -> ca.SX:
+        """The rest as an expression, from those of the pairs' rows."""
+        total: ca.SX | None = None
+        for row, multiplier in self.multipliers.items():
+            term = rests[row] if multiplier == 1.0 else multiplier * rests[row]
+            total = term if total is None else total + term
+        return ca.SX(0.0) if total is None else total
+
+    def as_expression(self, symbols: CoordinateSymbols, rests: Sequence[ca.SX]) -> ca.SX:
         """The constraint as one expression."""
-        return sum((slope * symbols.values[column] for column, slope in self.factors.items()), self.rest)
+        return sum((slope * symbols.values[column] for column, slope in self.factors.items()), self.rest(rests))
 
 
 EliminationSteps = list[tuple[int, EliminationRow]]
@@ -51,38 +62,6 @@ EliminationSteps = list[tuple[int, EliminationRow]]
 def stack_expressions(expressions: Iterable[ca.SX]) -> ca.SX:
     """Expressions one below the other, symbolic though there be none."""
     return ca.vertcat(ca.SX(0, 1), *expressions)
-
-
-def split_constant_factors(closures: Sequence[ca.SX], symbols: CoordinateSymbols) -> list[EliminationRow]:
-    """The constraints with their constant factors taken out."""
-    count = len(symbols.values)
-    both = [symbol for pair in symbols.cos_sin.values() for symbol in pair]
-    owner = [index for index in symbols.cos_sin for _ in range(2)]
-    everything = stack_expressions([*symbols.values, *both])
-    stacked = stack_expressions(closures)
-    slopes = ca.jacobian(stacked, everything)
-    factors: list[dict[int, float]] = [{} for _ in closures]
-    bent: list[set[int]] = [set() for _ in closures]
-    crooked: set[int] = set()
-    rows, columns = slopes.sparsity().get_triplet()
-    entries: list[ca.SX] = slopes.nonzeros()  # type: ignore[assignment]  # casadi says SXElem, which it hands to nobody
-    for row, column, slope in zip(rows, columns, entries, strict=True):
-        if column < count and slope.is_constant():
-            factors[row][column] = float(slope)
-        else:
-            bent[row].add(column if column < count else owner[column - count])
-            if column < count:
-                crooked.add(column)
-    # a symbol that is linear wherever it stands is taken out of all constraints at once, any other one by one
-    straight = [column for column in range(count) if column not in crooked]
-    zeroed = stack_expressions(symbols.values[index] for index in straight)
-    rest = ca.vertsplit(ca.substitute(stacked, zeroed, ca.SX.zeros(len(straight))))
-    lines = []
-    for row, expression in enumerate(rest):
-        bends = [symbols.values[column] for column in factors[row] if column in crooked]
-        straightened = ca.substitute(expression, ca.vertcat(*bends), ca.SX.zeros(len(bends))) if bends else expression
-        lines.append(EliminationRow(factors[row], straightened, set(bent[row]), set(bent[row])))
-    return lines
 
 
 def eliminate(
@@ -124,21 +103,32 @@ def _substitute_pivot(line: EliminationRow, pivot: int, pivot_line: EliminationR
     ratio = factor / pivot_line.factors[pivot]
     for column, slope in pivot_line.factors.items():
         if column != pivot:
-            before = line.factors.get(column, 0.0)
-            total = before - ratio * slope
-            if abs(total) <= CANCELLATION_TOLERANCE * max(abs(before), abs(ratio * slope)):
-                line.factors.pop(column, None)
-            else:
-                line.factors[column] = total
-    line.rest = line.rest - ratio * pivot_line.rest
+            _add_term(line.factors, column, -ratio * slope)
+    for row, multiplier in pivot_line.multipliers.items():
+        _add_term(line.multipliers, row, -ratio * multiplier)
     line.rest_coordinates |= pivot_line.rest_coordinates
     line.nonlinear |= pivot_line.nonlinear
 
 
+def _add_term(terms: dict[int, float], key: int, term: float) -> None:
+    """Add to a factor of a sum; one that cancels is left out."""
+    previous = terms.get(key, 0.0)
+    total = previous + term
+    if abs(total) <= CANCELLATION_TOLERANCE * max(abs(previous), abs(term)):
+        terms.pop(key, None)
+    else:
+        terms[key] = total
+
+
 def back_substitute(
-    remaining: dict[int, ca.SX], solved: EliminationSteps, symbols: CoordinateSymbols, wanted: list[ca.SX]
+    remaining: dict[int, ca.SX],
+    solved: Sequence[tuple[int, EliminationRow]],
+    symbols: CoordinateSymbols,
+    rests: Sequence[ca.SX],
+    wanted: list[ca.SX],
 ) -> list[ca.SX]:
-    """Expressions with every coordinate replaced: the remaining ones as given, the solved ones by their constraints."""
+    """Expressions with every coordinate replaced: the remaining ones as given, the solved ones by their constraints, in
+    an order in which they can be computed."""
     replaced: list[ca.SX] = []
     by: list[ca.SX] = []
     for column, value in remaining.items():
@@ -147,10 +137,10 @@ def back_substitute(
         if column in symbols.cos_sin:
             replaced += symbols.cos_sin[column]
             by += [ca.cos(value), ca.sin(value)]
-    for column, line in _dependency_order(solved):
+    for column, line in solved:
         factor = line.factors[column]
         others = {other: -slope / factor for other, slope in line.factors.items() if other != column}
-        rest = -line.rest / factor
+        rest = -line.rest(rests) / factor
         replaced.append(symbols.values[column])
         by.append(sum((slope * symbols.values[other] for other, slope in others.items()), rest))
         if column in symbols.cos_sin:
@@ -170,7 +160,7 @@ def _cos_sin_of_sum(angle: ca.SX, others: dict[int, float], rest: ca.SX, symbols
     return [cosine, sine]
 
 
-def _dependency_order(solved: EliminationSteps) -> EliminationSteps:
+def dependency_order(solved: EliminationSteps) -> EliminationSteps:
     """The solved coordinates, each after those in which it is expressed."""
     line_of = dict(solved)
     done: dict[int, EliminationRow] = {}

@@ -14,10 +14,19 @@ from typing import Any, NamedTuple, TypeVar, cast
 import casadi as ca
 import numpy as np
 
+from planar.equations.assembled_equations import AssembledEquations
+from planar.equations.block_types import MAX_BLOCK_TYPES, BlockTypeKey, PlacedBlock, block_equations, place_blocks
 from planar.equations.casadi_call import ON_ARM, BufferedFunction, ClosedFormAssemblies, RunFunction, read_function
 from planar.equations.elimination import stack_expressions
 from planar.equations.linear import solve_arrays, solve_linear, solve_vectors
 from planar.equations.mechanism_numbers import equation_structure, structure_fingerprint
+from planar.equations.placed_blocks import (
+    BlockAssemblyCall,
+    BlockCall,
+    KnownCoordinates,
+    PlacedAssemblies,
+    PlacedBlockCall,
+)
 from planar.equations.rates import rate_symbols, time_derivatives
 from planar.equations.sparse_matrices import MAX_DENSE_UNKNOWNS, SparseMatrices, SparsePattern
 from planar.equations.symbolic_equations import (
@@ -79,9 +88,10 @@ class EquationFunctions:
 
     def __init__(self, equations: ConstraintEquations, texts: KeptTexts | None = None):
         self.equations, self._texts = equations, texts
-        unknowns = equations.z.numel()
-        self.is_sparse = equations.is_square and unknowns == equations.F.numel() and unknowns > MAX_DENSE_UNKNOWNS
-        "whether Jacobians are by their entries"
+        self._unknown_count, self._row_count = len(equations.unknowns), len(equations.rows)
+        self._assembled = assembled_if_large(equations)
+        self.is_sparse = self._assembled is not None
+        "whether Jacobians are by their entries, and all is computed by elements and types of blocks"
 
     def kept(self, name: str, make: Callable[[], Kept]) -> Kept:
         """What `make` makes of this structure, from the disk where it is kept there by this name."""
@@ -112,27 +122,60 @@ class EquationFunctions:
         outputs = [e.F[block.rows], ca.densify(e.jacobian[block.rows, block.unknowns])]
         return ca.Function("closing", [e.z, e.u, e.p], outputs)
 
-    def block_call(self, block: Block) -> BufferedFunction:
+    def block_call(self, block: Block) -> BlockCall:
         """The same, called on arrays: F and the Jacobian's columns (unknowns, rows)."""
         if block.block_index not in self._block_calls:
-            self._block_calls[block.block_index] = BufferedFunction(self.block_function(block))
+            self._block_calls[block.block_index] = self._make_block_call(block)
         return self._block_calls[block.block_index]
 
     @cached_property
-    def _block_calls(self) -> dict[int, BufferedFunction]:
+    def _block_calls(self) -> dict[int, BlockCall]:
         return {}
 
-    def block_assemblies(self, block: Block) -> ClosedFormAssemblies | None:
+    def _make_block_call(self, block: Block) -> BlockCall:
+        by_type = self._functions_of_type(block)
+        if self._known_coordinates is None or by_type is None:
+            return BufferedFunction(self.block_function(block))
+        call = by_type.block_call(by_type.equations.blocks[0])
+        assert isinstance(call, BufferedFunction)
+        return PlacedBlockCall(block, call, self._known_coordinates)
+
+    def _functions_of_type(self, block: Block) -> EquationFunctions | None:
+        """The functions of a block's type; None for one that has none."""
+        placed = self._placed_blocks[block.block_index]
+        return None if placed is None else functions_of_block_type(placed.key)
+
+    @cached_property
+    def _placed_blocks(self) -> tuple[PlacedBlock | None, ...]:
+        return place_blocks(self.equations)
+
+    @cached_property
+    def _known_coordinates(self) -> KnownCoordinates | None:
+        """Where blocks stand that are called by their types; None where functions of the whole are."""
+        if self._assembled is None:
+            return None
+        types = map(self._functions_of_type, self.equations.blocks)
+        calls = [None if each is None else each._coordinate_call for each in types]
+        return KnownCoordinates(self.equations, self._assembled, self._placed_blocks, calls)
+
+    def block_assemblies(self, block: Block) -> BlockAssemblyCall | None:
         """Both assemblies of a block; None for one without a closed form."""
         if block.block_index not in self._block_assemblies:
             self._block_assemblies[block.block_index] = self._make_assemblies(block)
         return self._block_assemblies[block.block_index]
 
     @cached_property
-    def _block_assemblies(self) -> dict[int, ClosedFormAssemblies | None]:
+    def _block_assemblies(self) -> dict[int, BlockAssemblyCall | None]:
         return {}
 
-    def _make_assemblies(self, block: Block) -> ClosedFormAssemblies | None:
+    def _make_assemblies(self, block: Block) -> BlockAssemblyCall | None:
+        if self._known_coordinates is not None:
+            by_type = self._functions_of_type(block)
+            if by_type is not None:
+                assemblies = by_type.block_assemblies(by_type.equations.blocks[0])
+                if not isinstance(assemblies, ClosedFormAssemblies):
+                    return None
+                return PlacedAssemblies(block, assemblies, self._known_coordinates)
         k = block.block_index
         form = self.kept(f"assembly {k}", lambda: self._make_assembly_function(block))
         if form is None:
@@ -145,7 +188,8 @@ class EquationFunctions:
         """(z, u, p, sign) -> the unknowns of a block in closed form, and where its assemblies meet, if it has one."""
         from planar.equations.closed_form import find_closed_form  # most functions are read
 
-        e, form = self.equations, find_closed_form(self.equations, block)
+        e = self.equations
+        form = find_closed_form(e, block)
         if form is None:
             return None
         found = stack_expressions(ca.atan2(each[1], each[0]) if len(each) == 2 else each[0] for each in form.values)
@@ -165,8 +209,18 @@ class EquationFunctions:
         e = self.equations
         return ca.Function("positions", [e.z, e.u, e.p], [ca.densify(e.w)])
 
+    def coordinates_ahead(self, block_index: int, z: Array, u: Array, p: Array) -> Array:
+        """w (coordinates,) at z (unknowns,), as far as known ahead of a block; the rest of it may hold anything."""
+        if self._known_coordinates is None:
+            return self.coordinates(z, u, p)
+        return self._known_coordinates.coordinates_ahead(block_index, z, u, p)
+
     def coordinates(self, z: Array, u: Array, p: Array) -> Array:
         """w (coordinates,) at z (unknowns,), or (samples, coordinates) at z (samples, unknowns), u alike."""
+        if self._assembled is not None:
+            single = z.ndim == 1
+            w = self._assembled.coordinates(np.atleast_2d(z), np.atleast_2d(u), p)
+            return w[0] if single else w
         if z.ndim == 1:
             return self._coordinate_call(z, u, p)[0][0]
         return self._coordinate_call.evaluate_batch(len(z), z, u, p)[0][:, 0]
@@ -187,34 +241,30 @@ class EquationFunctions:
         y = e.y
         y1, y2 = rate_symbols(y, 2)
         first, second = time_derivatives(both, y, y1, y2)
-        outputs = [ca.densify(ca.horzcat(both, first, second)), self._jacobian_entries]
+        outputs = [ca.densify(ca.horzcat(both, first, second)), self._dense_jacobian]
         return ca.Function("kinematics", [y, y1, y2, e.p], outputs)
 
     @property
-    def _jacobian_entries(self) -> ca.SX:
-        """dF/dy (rows, y), or the column of its entries that are not zero."""
-        jacobian = self.equations.jacobian
-        return ca.vec(jacobian.nz[:]) if self.is_sparse else ca.densify(jacobian)
-
-    @cached_property
-    def _pattern(self) -> SparsePattern:
-        """Where the entries of dF/dy stand."""
-        own = self.equations.jacobian.sparsity()
-        return SparsePattern(own.shape, np.array(own.row()), np.array(own.colind()))
+    def _dense_jacobian(self) -> ca.SX:
+        """dF/dy (rows, y)."""
+        return ca.densify(self.equations.jacobian)
 
     @cached_property
     def _unknowns_pattern(self) -> SparsePattern:
-        return self._pattern.first_columns(self.equations.z.numel())
+        assert self._assembled is not None
+        return self._assembled.pattern.first_columns(self._unknown_count)
 
-    def _split_jacobian(self, slopes: Array) -> tuple[Array | SparseMatrices, Array]:
-        """dF/dz and dF/du (..., rows, unknowns or inputs) as functions give them, columns first."""
-        unknowns = self.equations.z.numel()
-        if not self.is_sparse:
-            slopes = slopes.swapaxes(-1, -2)
-            return slopes[..., :unknowns], slopes[..., unknowns:]
-        whole, own = SparseMatrices(self._pattern, slopes[..., 0, :]), self._unknowns_pattern
-        drives: Array = whole[..., slice(None), slice(unknowns, None)]
-        return SparseMatrices(own, whole.values[..., : len(own.rows)]), drives
+    def _split_entries(self, entries: Array) -> tuple[SparseMatrices, Array]:
+        """dF/dz and dF/du (..., rows, unknowns or inputs) from the entries (..., entries) of dF/dy."""
+        assert self._assembled is not None
+        both, pattern = SparseMatrices(self._assembled.pattern, entries), self._unknowns_pattern
+        input_jacobian: Array = both[..., slice(None), slice(self._unknown_count, None)]
+        return SparseMatrices(pattern, entries[..., : len(pattern.rows)]), input_jacobian
+
+    def _split_columns(self, slopes: Array) -> tuple[Array, Array]:
+        """The same from the columns (..., y, rows) of dF/dy."""
+        slopes = slopes.swapaxes(-1, -2)
+        return slopes[..., : self._unknown_count], slopes[..., self._unknown_count :]
 
     @kept_function
     def _third_rate_function(self) -> ca.Function:
@@ -234,7 +284,7 @@ class EquationFunctions:
 
     def third_rates(self, y: Array, y1: Array, y2: Array, y3: Array, p: Array) -> tuple[Array, Array]:
         """The third time derivatives of F (samples, rows) and of w (samples, coordinates); y (samples, y) alike."""
-        rows = self.equations.F.numel()
+        rows = self._row_count
         both = self._jerk_function(y.T, y1.T, y2.T, y3.T, p).full().T
         return both[:, :rows], both[:, rows:]
 
@@ -283,13 +333,22 @@ class EquationFunctions:
 
     def kinematics(self, y: Array, y1: Array, y2: Array, p: Array) -> EquationRates:
         """Everything at one position, y = (z, u) with its first and second derivatives, or at samples (samples, y)."""
-        rows = self.equations.F.numel()
+        rows = self._row_count
+        if self._assembled is not None:
+            single, many = y.ndim == 1, np.atleast_2d(y)
+            residuals, coordinates, entries = self._assembled.kinematics(
+                many, np.broadcast_to(y1, many.shape), np.broadcast_to(y2, many.shape), p
+            )
+            if single:
+                residuals, coordinates, entries = residuals[0], coordinates[0], entries[0]
+            orders = (values[..., order, :] for values in (residuals, coordinates) for order in range(3))
+            return EquationRates._make((*orders, *self._split_entries(entries)))
         if y.ndim == 1:
             parts, slopes = self._kinematics_calls[0](y, y1, y2, p)
         else:
             parts, slopes = self._kinematics_calls[0].evaluate_batch(len(y), y, y1, y2, p)
             parts = parts.transpose(1, 0, 2)
-        return EquationRates._make((*parts[..., :rows], *parts[..., rows:], *self._split_jacobian(slopes)))
+        return EquationRates._make((*parts[..., :rows], *parts[..., rows:], *self._split_columns(slopes)))
 
     @kept_function
     def newton_function(self) -> ca.Function:
@@ -303,10 +362,11 @@ class EquationFunctions:
 
     def correct_samples(self, z: Array, u: Array, p: Array) -> Array:
         """The same at samples z (samples, unknowns), u and p alike, each by itself."""
-        if self.is_sparse:
+        if self._assembled is not None:
+            u = np.broadcast_to(u, (len(z), u.shape[-1]))
             for _ in range(RUN_NEWTON_STEPS):
-                left, entries = self._residual_call.evaluate_batch(len(z), z, u, p)
-                z = z - solve_vectors(self._split_jacobian(entries)[0], left[:, 0])
+                residuals, entries = self._assembled.residuals_and_jacobians(z, u, p)
+                z = z - solve_vectors(self._split_entries(entries)[0], residuals)
             return z
         return self._newton_call.evaluate_batch(len(z), z, u, p)[0][:, 0]
 
@@ -334,14 +394,15 @@ class EquationFunctions:
 
     def _run_sparse(self, z: Array, u: Array, p: Array) -> Array:
         """The same, each from where the rates of the one before lead."""
+        assert self._assembled is not None
         samples: Array = np.empty((len(u), len(z)))
         step: Array = np.zeros(len(z))
         for k, inputs in enumerate(u):
             z = z + step
             for _ in range(RUN_NEWTON_STEPS):
-                left, entries = self._residual_call(z, inputs, p)
-                slopes, drives = self._split_jacobian(entries)
-                solution = solve_arrays(slopes, np.column_stack([left[0], drives]))
+                residuals, entries = self._assembled.residuals_and_jacobians(z[None], inputs[None], p)
+                slopes, drives = self._split_entries(entries[0])
+                solution = solve_arrays(slopes, np.column_stack([residuals[0], drives]))
                 z = z - solution[:, 0]
                 if not greatest_size(solution[:, 0]) > SETTLED_STEP:
                     break
@@ -357,23 +418,24 @@ class EquationFunctions:
     @kept_function
     def _jacobian_function(self) -> ca.Function:
         e = self.equations
-        return ca.Function("slopes", [e.z, e.u, e.p], [self._jacobian_entries])
+        return ca.Function("slopes", [e.z, e.u, e.p], [self._dense_jacobian])
 
     def jacobians(self, z: Array, u: Array, p: Array) -> tuple[Array | SparseMatrices, Array]:
         """dF/dz (samples, rows, unknowns) and dF/du (samples, rows, inputs) at z (samples, unknowns), u alike."""
         samples, unknowns = z.shape
-        rows, inputs = self.equations.F.numel(), u.shape[1]
-        if rows == 0:
-            return np.zeros((samples, 0, unknowns)), np.zeros((samples, 0, inputs))
+        if self._row_count == 0:
+            return np.zeros((samples, 0, unknowns)), np.zeros((samples, 0, u.shape[1]))
+        if self._assembled is not None:
+            return self._split_entries(self._assembled.residuals_and_jacobians(z, u, p).entries)
         called = self._kinematics_calls[1]
-        return self._split_jacobian(
+        return self._split_columns(
             called(z[0], u[0], p)[0][None] if samples == 1 else called.evaluate_batch(samples, z, u, p)[0]
         )
 
     @kept_function
     def _residual_function(self) -> ca.Function:
         e = self.equations
-        return ca.Function("left", [e.z, e.u, e.p], [ca.densify(e.F), self._jacobian_entries])
+        return ca.Function("left", [e.z, e.u, e.p], [ca.densify(e.F), self._dense_jacobian])
 
     @cached_property
     def _residual_call(self) -> BufferedFunction:
@@ -383,8 +445,11 @@ class EquationFunctions:
         """F (rows,) and its Jacobian (rows, unknowns and inputs) at one position."""
         if not len(self.equations.rows):
             return np.zeros(0), np.zeros((0, len(z) + len(u)))
+        if self._assembled is not None:
+            residuals, entries = self._assembled.residuals_and_jacobians(z[None], u[None], p)
+            return residuals[0], SparseMatrices(self._assembled.pattern, entries[0])
         left, slope = self._residual_call(z, u, p)
-        return left[0], SparseMatrices(self._pattern, slope[0]) if self.is_sparse else slope.T
+        return left[0], slope.T
 
     @cached_property
     def is_square(self) -> bool:
@@ -395,6 +460,19 @@ class EquationFunctions:
 MAX_CSE_NODES = 30_000
 """Of expressions in which what stands in several places is looked for: the time for that grows faster than they do, and
 what it saves is little."""
+
+
+def assembled_if_large(equations: ConstraintEquations) -> AssembledEquations | None:
+    """How equations are evaluated from their elements, where unknowns are many; None where expressions are."""
+    unknown_count = len(equations.unknowns)
+    is_large = equations.is_square and unknown_count == len(equations.rows) and unknown_count > MAX_DENSE_UNKNOWNS
+    return equations.assembled if is_large else None
+
+
+@lru_cache(maxsize=MAX_BLOCK_TYPES)
+def functions_of_block_type(key: BlockTypeKey) -> EquationFunctions:
+    """The functions of a block type: its blocks are one, its u what is known ahead of it."""
+    return EquationFunctions(block_equations(key))
 
 
 def function_with_cse(name: str, given: Sequence[ca.SX], wanted: Sequence[ca.SX]) -> ca.Function:
@@ -417,7 +495,7 @@ def _cached_equation_functions(structure: Mechanism) -> EquationFunctions:
     if function is not None and outline is not None:
         return EquationFunctions(equations_from_outline(json.loads(outline), function), texts)
     equations = build_equations(structure)
-    if texts is not None:
+    if texts is not None and assembled_if_large(equations) is None:
         texts.add("function", lambda: equations.as_function().serialize())
         texts.add("outline", lambda: json.dumps(equations.outline()))
     return EquationFunctions(equations, texts)

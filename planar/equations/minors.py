@@ -53,7 +53,10 @@ def add_minors(program: EquationFunctions, blocks: Mapping[int, LowRankBlock]) -
             rows += [ConstraintRow(e.rows[stage.rows.start].pair, MeasureKind.PURE)] * len(minors)
             left += minors
         stages.append(stage._replace(rows=slice(first, len(rows))))
-    return EquationFunctions(replace(e, rows=tuple(rows), blocks=tuple(stages), F=stack_expressions(left)))
+    expressions = e.expressions._replace(F=stack_expressions(left))
+    return EquationFunctions(
+        replace(e, rows=tuple(rows), blocks=tuple(stages), make_expressions=lambda: expressions, elimination=None)
+    )
 
 
 def _minors(slope: ca.SX, block: LowRankBlock) -> Iterator[ca.SX]:

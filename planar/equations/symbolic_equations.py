@@ -5,7 +5,7 @@ The symbols z, u, p, w and F are those of the table in `planar.equations`.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -13,23 +13,27 @@ from typing import Any, NamedTuple
 import casadi as ca
 import numpy as np
 
-from planar.equations.block_decomposition import decompose_blocks
-from planar.equations.coordinates import Coordinate
+from planar.equations.assembled_equations import AssembledEquations, Elimination
+from planar.equations.block_decomposition import BlockIndices, decompose_blocks
+from planar.equations.coordinates import FRAME_PARTS, Coordinate
+from planar.equations.elements import ElementPlacement, PlacedElement
 from planar.equations.elimination import (
     CoordinateSymbols,
+    EliminationRow,
     EliminationSteps,
     back_substitute,
+    dependency_order,
     eliminate,
     expression_unknowns,
-    split_constant_factors,
     stack_expressions,
 )
-from planar.equations.residuals import ConstraintRow, residuals, split_pair_numbers, wrapped_residual
+from planar.equations.residuals import ConstraintRow, wrapped_residual
 from planar.foundation.generic_numbers import generic_numbers
-from planar.foundation.geometry import GROUND, Frame, frame_at
 from planar.model.mechanism import Mechanism, relative_motions
 from planar.model.pairs import MeasureKind
 
+MIN_MOVING_SLOPE = 1e-12
+"""An entry of a Jacobian at random places, unknowns of about one, that is greater than rounding."""
 PIECEWISE_OPERATIONS = frozenset((ca.OP_FLOOR, ca.OP_LT, ca.OP_LE))
 """What formulas that are put together of pieces have in them."""
 
@@ -50,9 +54,22 @@ def slice_length(part: slice) -> int:
     return part.stop - part.start
 
 
+class ConstraintExpressions(NamedTuple):
+    """The symbols of `planar.equations`, and F and w in them."""
+
+    z: ca.SX
+    u: ca.SX
+    p: ca.SX
+    w: ca.SX
+    F: ca.SX
+
+
 @dataclass(frozen=True, eq=False)
 class ConstraintEquations:
-    """The symbols of `planar.equations`; `coordinates`, `rows`, `unknowns` say which name owns which entry."""
+    """The symbols of `planar.equations`; `coordinates`, `rows`, `unknowns` say which name owns which entry.
+
+    Expressions are made when they are first asked for: structures of many unknowns are evaluated without any.
+    """
 
     coordinates: tuple[Coordinate, ...]
     unknowns: tuple[int, ...]
@@ -60,13 +77,9 @@ class ConstraintEquations:
     blocks: tuple[Block, ...]
     known_after_block: tuple[int, ...]
     """For every coordinate the block after which it is known; -1 for one that follows from the inputs alone."""
-    z: ca.SX
-    u: ca.SX
-    p: ca.SX
-    w: ca.SX
-    F: ca.SX
     input_kinds: tuple[MeasureKind, ...]
     """What every entry of u is."""
+    make_expressions: Callable[[], ConstraintExpressions]
     open_rows: tuple[int, ...] = ()
     """Of all rows of the pairs, in the mechanism's order, those that may stay open by a misfit."""
     misfit_columns: tuple[int, ...] = ()
@@ -74,6 +87,48 @@ class ConstraintEquations:
     row_variables: tuple[int, ...] = ()
     """For every row of F the coordinate that is the unknown by which it is the derivative of the sum of squares; HELD
     for one that has to close beside that, UNRELATED for any other."""
+    elimination: Elimination | None = None
+    """How the equations are assembled from elements; None where expressions alone say what they are."""
+    row_indices: tuple[int, ...] = ()
+    """The rows of F among all rows of the structure."""
+
+    @cached_property
+    def assembled(self) -> AssembledEquations | None:
+        """The same equations, evaluated from their elements."""
+        if self.elimination is None:
+            return None
+        is_angle = [row.kind is MeasureKind.ANGLE for row in self.rows]
+        return AssembledEquations(self.elimination, self.unknowns, self.row_indices, is_angle)
+
+    @cached_property
+    def expressions(self) -> ConstraintExpressions:
+        """F and w, and what they are made of."""
+        return self.make_expressions()
+
+    @property
+    def z(self) -> ca.SX:
+        """The unknowns."""
+        return self.expressions.z
+
+    @property
+    def u(self) -> ca.SX:
+        """The inputs."""
+        return self.expressions.u
+
+    @property
+    def p(self) -> ca.SX:
+        """The numbers."""
+        return self.expressions.p
+
+    @property
+    def w(self) -> ca.SX:
+        """The coordinates."""
+        return self.expressions.w
+
+    @property
+    def F(self) -> ca.SX:  # noqa: N802  # as the symbol is
+        """The residuals."""
+        return self.expressions.F
 
     @cached_property
     def unknown_is_angle(self) -> np.ndarray:
@@ -121,8 +176,12 @@ class ConstraintEquations:
 
 def equations_from_outline(outline: Mapping[str, Any], function: ca.Function) -> ConstraintEquations:
     """The equations of an outline, the same as those of which it was made, and their function (z, u, p) -> F, w."""
-    z, u, p = (function.sx_in(k) for k in range(3))
-    F, w = function(z, u, p)
+
+    def make_expressions() -> ConstraintExpressions:
+        z, u, p = (function.sx_in(k) for k in range(3))
+        F, w = function(z, u, p)
+        return ConstraintExpressions(z, u, p, w, F)
+
     return ConstraintEquations(
         tuple(Coordinate(owner, part, MeasureKind(kind), own) for owner, part, kind, own in outline["coordinates"]),
         tuple(outline["unknowns"]),
@@ -132,25 +191,30 @@ def equations_from_outline(outline: Mapping[str, Any], function: ca.Function) ->
             for each in outline["blocks"]
         ),
         tuple(outline["known_after_block"]),
-        z,
-        u,
-        p,
-        w,
-        F,
         tuple(map(MeasureKind, outline["input_kinds"])),
+        make_expressions,
         tuple(outline["open_rows"]),
         tuple(outline["misfit_columns"]),
         tuple(outline["row_variables"]),
     )
 
 
-class _MechanismCoordinates(NamedTuple):
-    """A mechanism's coordinates as symbols, and as the frames and own coordinates that the pairs' formulas take."""
+class _EliminatedStructure(NamedTuple):
+    """A structure's constraints after elimination; `unknowns` are the coordinates that remain, `remaining_rows` the
+    rows of all that close them."""
 
-    coordinates: list[Coordinate]
-    symbols: CoordinateSymbols
-    frames: dict[str, Frame]
-    own: dict[str, list[ca.SX]]
+    mechanism: Mechanism
+    given_links: tuple[str, ...]
+    coordinates: tuple[Coordinate, ...]
+    rows: tuple[ConstraintRow, ...]
+    "all rows: those of the pairs, then those of the inputs"
+    input_kinds: tuple[MeasureKind, ...]
+    elimination: Elimination
+    unknowns: tuple[int, ...]
+    remaining_rows: tuple[int, ...]
+    surplus_rows: tuple[int, ...]
+    "rows of pairs that are held more than once"
+    groups: tuple[BlockIndices, ...]
 
 
 def build_equations(mechanism: Mechanism, given_links: Sequence[str] = ()) -> ConstraintEquations:
@@ -159,15 +223,16 @@ def build_equations(mechanism: Mechanism, given_links: Sequence[str] = ()) -> Co
     The links that are `given` are no unknowns: where they are is told by u, ahead of the inputs' positions. Of a
     mechanism that closes within a misfit the pairs that are held more than once take the position of least misfit.
     """
-    found, surplus = _build_equations(mechanism, given_links)
-    if mechanism.closes_within is None or not _is_overdetermined(found):
-        return found
-    if surplus:
-        found, _ = _build_equations(mechanism, given_links, surplus)
-    if _is_overdetermined(found):  # it showed after elimination only, or not for these alone
-        every = [row for pair in mechanism.pairs for row in pair.residual_kinds]
-        found, _ = _build_equations(mechanism, given_links, range(len(every)))
-    return found
+    structure = _eliminate_structure(mechanism, tuple(given_links))
+    equations = _assembled_equations_of(structure)
+    if mechanism.closes_within is None or not _is_overdetermined(equations):
+        return equations
+    if structure.surplus_rows:
+        equations = _least_misfit_equations_of(structure, structure.surplus_rows)
+    if _is_overdetermined(equations):  # it showed after elimination only, or not for these alone
+        pair_rows = len(structure.rows) - len(mechanism.inputs)
+        equations = _least_misfit_equations_of(structure, range(pair_rows))
+    return equations
 
 
 def _is_overdetermined(equations: ConstraintEquations) -> bool:
@@ -175,100 +240,255 @@ def _is_overdetermined(equations: ConstraintEquations) -> bool:
     return any(slice_length(block.rows) > slice_length(block.unknowns) for block in equations.blocks)
 
 
-def _build_equations(
-    mechanism: Mechanism, given_links: Sequence[str], open_rows: Sequence[int] = ()
-) -> tuple[ConstraintEquations, list[int]]:
-    """The equations in which some rows of pairs may stay open, and the rows of pairs that are held more than once."""
-    named = relative_motions(mechanism)
-    drives = (
+def _eliminate_structure(mechanism: Mechanism, given_links: tuple[str, ...]) -> _EliminatedStructure:
+    """The constraints of a structure, shortened by the coordinates that enter them with constant factors."""
+    motions = relative_motions(mechanism)
+    driven = [motions[given.pair] for given in mechanism.inputs]
+    input_kinds = (
         *(MeasureKind.LENGTH, MeasureKind.LENGTH, MeasureKind.ANGLE) * len(given_links),
-        *(named[g.pair].input_kind for g in mechanism.inputs),
+        *(motion.input_kind for motion in driven),
     )
-    u = ca.SX.sym("u", len(drives))
-    unknown = _make_coordinates(mechanism, {link: u[3 * k : 3 * k + 3] for k, link in enumerate(given_links)})
-    # each by a name of its own: casadi's search for common expressions (3.8.2) may take those of one name for one
-    p = stack_expressions(
-        ca.SX.sym(f"of {pair.name} {k}") for pair in mechanism.pairs for k in range(len(pair.number_kinds))
-    )
-    numbers = split_pair_numbers(mechanism.pairs, p)
-    closing = list(residuals(mechanism, unknown.frames, numbers, unknown.own, u[3 * len(given_links) :]))
-    rows = [row for row, _ in closing]
-    misfits = {row: ca.SX.sym(f"misfit {row}") for row in open_rows}
-    values = [value - misfits[k] if k in misfits else value for k, (_, value) in enumerate(closing)]
-    lines = split_constant_factors(values, unknown.symbols)
+    coordinates: list[Coordinate] = []
+    frame_columns: dict[str, range] = {}
+    for link in mechanism.links:
+        if link.name != mechanism.frame and link.name not in given_links:
+            first = len(coordinates)
+            frame_columns[link.name] = range(first, first + 3)
+            kinds = (MeasureKind.LENGTH, MeasureKind.LENGTH, MeasureKind.ANGLE)
+            coordinates += [
+                Coordinate(link.name, part, kind, True) for part, kind in zip(FRAME_PARTS, kinds, strict=True)
+            ]
+    own_columns: dict[str, range] = {}
+    number_columns: dict[str, range] = {}
+    number_count = 0
+    for pair in mechanism.pairs:
+        own_columns[pair.name] = range(len(coordinates), len(coordinates) + len(pair.coordinate_kinds))
+        coordinates += [Coordinate(pair.name, part, kind, False) for part, kind in pair.coordinate_kinds]
+        number_columns[pair.name] = range(number_count, number_count + len(pair.number_kinds))
+        number_count += len(pair.number_kinds)
+    for k, link_name in enumerate(given_links):
+        frame_columns[link_name] = range(len(coordinates) + 3 * k, len(coordinates) + 3 * k + 3)
+
+    placement = ElementPlacement(frame_columns, own_columns, number_columns)
+    elements: list[PlacedElement] = []
+    rows: list[ConstraintRow] = []
+    for pair in mechanism.pairs:
+        elements.append(placement.residual_of(pair, len(rows)))
+        rows += [ConstraintRow(pair.name, kind) for kind in pair.residual_kinds]
+    for motion in driven:
+        elements.append(placement.input_position_of(motion, len(rows)))
+        rows.append(ConstraintRow(motion.name, motion.input_kind))
+    lines = _elimination_rows(elements)
+    for k in range(len(driven)):
+        factors, column = lines[len(rows) - len(driven) + k].factors, len(coordinates) + 3 * len(given_links) + k
+        factors[column] = factors.get(column, 0.0) - 1.0
 
     solved: EliminationSteps = []
-    columns: list[int] = []
-    left: list[int] = []
+    unknowns: list[int] = []
+    remaining_rows: list[int] = []
     surplus: list[int] = []
-    tied: set[int] = set()
-    pair_rows = len(rows) - len(mechanism.inputs)
-    for group in decompose_blocks([line.dependencies for line in lines], len(unknown.coordinates)):
-        remaining_rows, remaining = eliminate(group.rows, group.columns, lines, solved)
+    is_coordinate = range(len(coordinates)).__contains__
+    groups = decompose_blocks([{*filter(is_coordinate, line.dependencies)} for line in lines], len(coordinates))
+    for group in groups:
+        group_rows, group_unknowns = eliminate(group.rows, group.columns, lines, solved)
         if len(group.rows) > len(group.columns):
-            surplus += [row for row in group.rows if row < pair_rows]
-        if misfits.keys() & set(group.rows):
-            tied |= {*range(len(columns), len(columns) + len(remaining))}
-        columns += remaining
-        left += remaining_rows
-    z = ca.SX.sym("z", len(columns))
-    open_ones = [wrapped_residual(lines[row].as_expression(unknown.symbols), rows[row].kind) for row in left]
-    wanted = [stack_expressions(open_ones), stack_expressions(unknown.symbols.values)]
-    F, w = back_substitute(dict(zip(columns, ca.vertsplit(z), strict=True)), solved, unknown.symbols, wanted)
-    kept = tuple(rows[row] for row in left)
-    whole = ConstraintEquations(tuple(unknown.coordinates), tuple(columns), kept, (), (), z, u, p, w, F, drives)
-    if misfits:
-        whole = _with_least_misfit(whole, rows, left, misfits, sorted(tied))
-    return _split_into_blocks(mechanism, whole), surplus
+            surplus += [row for row in group.rows if row < len(rows) - len(driven)]
+        unknowns += group_unknowns
+        remaining_rows += group_rows
+    elimination = Elimination(
+        tuple(elements),
+        tuple(dependency_order(solved)),
+        tuple(lines),
+        len(coordinates),
+        len(input_kinds),
+        number_count,
+    )
+    return _EliminatedStructure(
+        mechanism,
+        given_links,
+        tuple(coordinates),
+        tuple(rows),
+        input_kinds,
+        elimination,
+        tuple(unknowns),
+        tuple(remaining_rows),
+        tuple(surplus),
+        groups,
+    )
+
+
+def _elimination_rows(elements: Sequence[PlacedElement]) -> list[EliminationRow]:
+    """The rows of elements before elimination."""
+    lines: list[EliminationRow] = []
+    for placed in elements:
+        element = placed.element
+        for row, local_factors, local_nonlinear in zip(placed.rows, element.factors, element.nonlinear, strict=True):
+            factors = {placed.coordinates[k]: factor for k, factor in local_factors.items()}
+            nonlinear = {placed.coordinates[k] for k in local_nonlinear}
+            lines.append(EliminationRow(factors, {row: 1.0}, set(nonlinear), set(nonlinear)))
+    return lines
+
+
+def _assembled_equations_of(structure: _EliminatedStructure) -> ConstraintEquations:
+    """The equations of a structure, their blocks found by numbers at random places.
+
+    What cancels in a sum shows in numbers only: an entry of the Jacobian that vanishes at random places is none. Left
+    standing it would have a block, or a link, wait for unknowns that are solved after it.
+    """
+    elimination, unknown_count = structure.elimination, len(structure.unknowns)
+    remaining = tuple(structure.rows[row] for row in structure.remaining_rows)
+    assembled = AssembledEquations(
+        elimination, structure.unknowns, structure.remaining_rows, [row.kind is MeasureKind.ANGLE for row in remaining]
+    )
+    ends = np.cumsum([unknown_count, elimination.input_count, elimination.number_count])
+    z, u, p = np.split(generic_numbers(2, int(ends[-1])), ends[:2], axis=1)
+    residual_entries = assembled.residuals_and_jacobians(z, u, p).entries
+    moved: list[set[int]] = []
+    for pattern, entries in (
+        (assembled.pattern, residual_entries),
+        (assembled.coordinate_pattern, assembled.coordinate_jacobians(z, u, p)),
+    ):
+        moving: list[set[int]] = [set() for _ in range(pattern.shape[0])]
+        is_moving = (np.abs(entries).sum(axis=0) > MIN_MOVING_SLOPE) & (pattern.columns < unknown_count)
+        for row, column in zip(pattern.rows[is_moving].tolist(), pattern.columns[is_moving].tolist(), strict=True):
+            moving[row].add(column)
+        moved += moving
+
+    def make_expressions() -> ConstraintExpressions:
+        return _without_idle_unknowns(_expressions_of(structure, {}), moved)
+
+    equations = ConstraintEquations(
+        structure.coordinates, structure.unknowns, remaining, (), (), structure.input_kinds, make_expressions
+    )
+    return _split_into_blocks(structure, equations, moved)
+
+
+def _expressions_of(structure: _EliminatedStructure, misfits: Mapping[int, ca.SX]) -> ConstraintExpressions:
+    """F and w as expressions, in the order in which elimination leaves them; some rows stay open by their misfits."""
+    return expressions_of_elimination(
+        structure.elimination,
+        structure.coordinates,
+        structure.input_kinds,
+        structure.unknowns,
+        [(row, structure.rows[row].kind) for row in structure.remaining_rows],
+        [f"{pair.name} {k}" for pair in structure.mechanism.pairs for k in range(len(pair.number_kinds))],
+        misfits,
+    )
+
+
+def expressions_of_elimination(
+    elimination: Elimination,
+    coordinates: Sequence[Coordinate],
+    input_kinds: Sequence[MeasureKind],
+    unknowns: Sequence[int],
+    rows: Sequence[tuple[int, MeasureKind]],
+    number_names: Sequence[str],
+    misfits: Mapping[int, ca.SX],
+) -> ConstraintExpressions:
+    """F and w as expressions: w in the order of the coordinates, F in that of rows, each a line of the elimination."""
+    u = ca.SX.sym("u", elimination.input_count)
+    inputs = ca.vertsplit(u) if elimination.input_count else []
+    # each by a name of its own: casadi's search for common expressions (3.8.2) may take those of one name for one
+    p = stack_expressions(ca.SX.sym(f"of {name}") for name in number_names)
+    values = [ca.SX.sym(f"of {coordinate.owner}.{coordinate.part}") for coordinate in coordinates]
+    cos_sin = {
+        k: (ca.SX.sym(f"cos {coordinate.owner}"), ca.SX.sym(f"sin {coordinate.owner}"))
+        for k, coordinate in enumerate(coordinates)
+        if coordinate.of_link and coordinate.kind is MeasureKind.ANGLE
+    }
+    for k, (kind, value) in enumerate(zip(input_kinds, inputs, strict=True), len(values)):
+        if kind is not MeasureKind.LENGTH:
+            cos_sin[k] = ca.cos(value), ca.sin(value)
+    symbols = CoordinateSymbols([*values, *inputs], cos_sin)
+    rests: list[ca.SX] = []
+    for placed in elimination.elements:
+        taken = placed.element.arguments
+        arguments = [
+            *(symbols.values[placed.coordinates[k]] for k in taken.coordinates),
+            *(cos_sin[placed.coordinates[3 * k + 2]][0] for k in taken.cosines),
+            *(cos_sin[placed.coordinates[3 * k + 2]][1] for k in taken.sines),
+            *(p[placed.numbers[k]] for k in taken.numbers),
+        ]
+        rests += ca.vertsplit(placed.element.rest_function(stack_expressions(arguments)))
+    for row, misfit in misfits.items():
+        rests[row] = rests[row] - misfit
+    z = ca.SX.sym("z", len(unknowns))
+    residuals = [wrapped_residual(elimination.lines[row].as_expression(symbols, rests), kind) for row, kind in rows]
+    replaced = dict(zip(unknowns, ca.vertsplit(z), strict=True)) if unknowns else {}
+    F, w = back_substitute(
+        replaced, elimination.solved, symbols, rests, [stack_expressions(residuals), stack_expressions(values)]
+    )
+    return ConstraintExpressions(z, u, p, w, F)
+
+
+def _without_idle_unknowns(expressions: ConstraintExpressions, moved: Sequence[set[int]]) -> ConstraintExpressions:
+    """F and w with no unknown in an entry that does not move it; `moved` are those that move each entry."""
+    z, u, p, w, F = expressions
+    both, row_count = ca.vertcat(F, w), F.numel()
+    for row, unknowns in enumerate(expression_unknowns(both, z)):
+        idle = sorted(unknowns - moved[row])
+        if idle:
+            both[row] = ca.substitute(both[row], z[idle], ca.SX.zeros(len(idle)))
+    return ConstraintExpressions(z, u, p, both[row_count:], both[:row_count])
+
+
+def _least_misfit_equations_of(structure: _EliminatedStructure, open_rows: Sequence[int]) -> ConstraintEquations:
+    """The equations of the position of least misfit, in which some rows of pairs may stay open."""
+    misfits = {row: ca.SX.sym(f"misfit {row}") for row in open_rows}
+    equations = _with_least_misfit(structure, _expressions_of(structure, misfits), misfits)
+    expressions = equations.expressions
+    moved = _moving_unknowns(expressions)
+    equations = replace(equations, make_expressions=lambda: _without_idle_unknowns(expressions, moved))
+    return _split_into_blocks(structure, equations, moved)
 
 
 def _with_least_misfit(
-    e: ConstraintEquations,
-    rows: Sequence[ConstraintRow],
-    left: Sequence[int],
-    misfits: Mapping[int, ca.SX],
-    tied: Sequence[int],
+    structure: _EliminatedStructure, expressions: ConstraintExpressions, misfits: Mapping[int, ca.SX]
 ) -> ConstraintEquations:
-    """Equations whose rows may stay open by their misfits, made those of the position of least misfit.
-
-    `rows` are all rows, `left` those that elimination leaves, `tied` the unknowns that the misfits move.
-    """
+    """Equations whose rows may stay open by their misfits, made those of the position of least misfit."""
     from planar.equations.misfits.least_misfit import HELD, UNRELATED, least_misfit_equations  # few pairs may stay open
 
-    found = least_misfit_equations(ca.vertcat(e.F, e.w), e.z, left, misfits, tied)
-    first = len(e.coordinates)
-    shown = [Coordinate(rows[row].pair, f"misfit {row}", rows[row].kind, False) for row in misfits]
-    shown += [Coordinate(rows[left[k]].pair, "multiplier", MeasureKind.LENGTH, False) for k in found.held]
-    place = {row: first + k for k, row in enumerate(misfits)}
-    names = [rows[row].pair for row in left if row in misfits] or [rows[row].pair for row in misfits]
+    z, u, p, w, F = expressions
+    rows, remaining_rows, unknowns = structure.rows, structure.remaining_rows, structure.unknowns
+    loose = {column for group in structure.groups if misfits.keys() & set(group.rows) for column in group.columns}
+    tied = [k for k, column in enumerate(unknowns) if column in loose]
+    system = least_misfit_equations(ca.vertcat(F, w), z, remaining_rows, misfits, tied)
+    first = len(structure.coordinates)
+    added = [Coordinate(rows[row].pair, f"misfit {row}", rows[row].kind, False) for row in misfits]
+    added += [Coordinate(rows[remaining_rows[k]].pair, "multiplier", MeasureKind.LENGTH, False) for k in system.held]
+    column_of = {row: first + k for k, row in enumerate(misfits)}
+    names = [rows[row].pair for row in remaining_rows if row in misfits] or [rows[row].pair for row in misfits]
     labels = [ConstraintRow(names[k % len(names)], MeasureKind.ANGLE) for k in range(len(tied))]
-    labels += [rows[row] for row in found.free] + [rows[left[k]] for k in (*found.held, *found.unrelated)]
-    untied = [k for k in range(e.z.numel()) if k not in {*tied}]
-    variables = [*(e.unknowns[k] for k in tied), *(place[row] for row in found.free)]
-    multipliers = range(first + len(misfits), first + len(shown))
-    return replace(
-        e,
-        coordinates=(*e.coordinates, *shown),
-        unknowns=(*variables, *multipliers, *(e.unknowns[k] for k in untied)),
+    labels += [rows[row] for row in system.free]
+    labels += [rows[remaining_rows[k]] for k in (*system.held, *system.unrelated)]
+    untied = [k for k in range(len(unknowns)) if k not in {*tied}]
+    variables = [*(unknowns[k] for k in tied), *(column_of[row] for row in system.free)]
+    multipliers = range(first + len(misfits), first + len(added))
+    all_unknowns = ca.vertcat(system.unknowns, *(z[k] for k in untied))
+    whole = ConstraintExpressions(all_unknowns, u, ca.vertcat(p, system.weights), system.w, system.F)
+    return ConstraintEquations(
+        coordinates=(*structure.coordinates, *added),
+        unknowns=(*variables, *multipliers, *(unknowns[k] for k in untied)),
         rows=tuple(labels),
-        z=ca.vertcat(found.unknowns, *(e.z[k] for k in untied)),
-        p=ca.vertcat(e.p, found.weights),
-        w=found.w,
-        F=found.F,
+        blocks=(),
+        known_after_block=(),
+        input_kinds=structure.input_kinds,
+        make_expressions=lambda: whole,
         open_rows=tuple(misfits),
-        misfit_columns=tuple(place.values()),
-        row_variables=(*variables, *([HELD] * len(found.held)), *([UNRELATED] * len(found.unrelated))),
+        misfit_columns=tuple(column_of.values()),
+        row_variables=(*variables, *([HELD] * len(system.held)), *([UNRELATED] * len(system.unrelated))),
     )
 
 
-def _split_into_blocks(mechanism: Mechanism, equations: ConstraintEquations) -> ConstraintEquations:
+def _split_into_blocks(
+    structure: _EliminatedStructure, equations: ConstraintEquations, moved: Sequence[set[int]]
+) -> ConstraintEquations:
     """The shortened equations split once more, in the order in which they are solved.
 
     Only now does it show where constraints hold each other twice: angles that a ring of slides closes by itself
-    have dropped out, and what was matched with them is free.
+    have dropped out, and what was matched with them is free. `moved` are the unknowns that move every entry of F and w.
     """
-    both, moved = _drop_idle_unknowns(equations)
-    equations = replace(equations, F=both[: len(equations.rows)], w=both[len(equations.rows) :])
+    mechanism = structure.mechanism
     groups = [
         group
         for group in decompose_blocks(moved[: len(equations.rows)], len(equations.unknowns))
@@ -303,65 +523,38 @@ def _split_into_blocks(mechanism: Mechanism, equations: ConstraintEquations) -> 
         first_unknown, first_row = stages[-1].unknowns.stop, stages[-1].rows.stop
     columns = [column for group in groups for column in group.columns]
     order = [row for group in groups for row in group.rows]
+
+    def make_expressions() -> ConstraintExpressions:
+        z, u, p, w, F = equations.expressions
+        return ConstraintExpressions(z[columns], u, p, w, F[order])
+
     return replace(
         equations,
         unknowns=tuple(equations.unknowns[column] for column in columns),
         rows=tuple(equations.rows[row] for row in order),
         blocks=tuple(stages),
         known_after_block=known_from,
-        z=equations.z[columns],
-        F=equations.F[order],
+        make_expressions=make_expressions,
         row_variables=tuple(equations.row_variables[row] for row in order) if equations.row_variables else (),
+        elimination=None if equations.open_rows else structure.elimination,
+        row_indices=() if equations.open_rows else tuple(structure.remaining_rows[row] for row in order),
     )
 
 
-def _drop_idle_unknowns(equations: ConstraintEquations) -> tuple[ca.SX, list[set[int]]]:
-    """F and w, one below the other, with no unknown in an entry that does not move it; and those that move each.
-
-    What cancels in a sum shows in numbers only: an entry of the Jacobian that vanishes at random places is none. Left
-    standing it would have a block, or a link, wait for unknowns that are solved after it.
-    """
-    both = ca.vertcat(equations.F, equations.w)
-    touched = expression_unknowns(both, equations.z)
+def _moving_unknowns(expressions: ConstraintExpressions) -> list[set[int]]:
+    """The unknowns that move each entry of F and w at random places."""
+    z, u, p, w, F = expressions
+    both = ca.vertcat(F, w)
+    touched = expression_unknowns(both, z)
     if not any(touched):
-        return both, touched
-    slope = ca.Function("slope", [equations.z, equations.u, equations.p], [ca.jacobian(both, equations.z)])
-    ends = np.cumsum([symbol.numel() for symbol in (equations.z, equations.u, equations.p)])
-    found = [slope(*np.split(numbers, ends[:2])) for numbers in generic_numbers(2, ends[2])]
-    seen = sum(np.abs(np.array(each.nonzeros())) for each in found)
-    rows, columns = found[0].sparsity().get_triplet()
-    alive = {(row, column) for row, column, value in zip(rows, columns, seen, strict=True) if value > 1e-12}
-    moved = [{column for column in held if (row, column) in alive} for row, held in enumerate(touched)]
-    idle = {row: sorted(held - moved[row]) for row, held in enumerate(touched) if held != moved[row]}
-    for row, columns in idle.items():
-        both[row] = ca.substitute(both[row], equations.z[columns], ca.SX.zeros(len(columns)))
-    return both, moved
-
-
-def _make_coordinates(mechanism: Mechanism, given: Mapping[str, ca.SX]) -> _MechanismCoordinates:
-    coordinates: list[Coordinate] = []
-    values: list[ca.SX] = []
-    turned: dict[int, tuple[ca.SX, ca.SX]] = {}
-    frames: dict[str, Frame] = {}
-
-    def add(owner: str, part: str, kind: MeasureKind, of_link: bool) -> ca.SX:
-        coordinates.append(Coordinate(owner, part, kind, of_link))
-        values.append(ca.SX.sym(f"of {owner}.{part}"))
-        return values[-1]
-
-    for link in mechanism.links:
-        if link.name == mechanism.frame:
-            frames[link.name] = GROUND
-            continue
-        if link.name in given:
-            frames[link.name] = frame_at(*ca.vertsplit(given[link.name]))
-            continue
-        x, y = (add(link.name, part, MeasureKind.LENGTH, True) for part in ("x", "y"))
-        angle = add(link.name, "angle", MeasureKind.ANGLE, True)
-        both = turned[len(values) - 1] = ca.SX.sym(f"cos {link.name}"), ca.SX.sym(f"sin {link.name}")
-        frames[link.name] = Frame(x, y, *both, angle)
-    own = {pair.name: [add(pair.name, *each, False) for each in pair.coordinate_kinds] for pair in mechanism.pairs}
-    return _MechanismCoordinates(coordinates, CoordinateSymbols(values, turned), frames, own)
+        return touched
+    slope = ca.Function("slope", [z, u, p], [ca.jacobian(both, z)])
+    ends = np.cumsum([symbol.numel() for symbol in (z, u, p)])
+    slopes = [slope(*np.split(numbers, ends[:2])) for numbers in generic_numbers(2, ends[2])]
+    sizes = sum(np.abs(np.array(values.nonzeros())) for values in slopes)
+    rows, columns = slopes[0].sparsity().get_triplet()
+    moving = {(row, column) for row, column, size in zip(rows, columns, sizes, strict=True) if size > MIN_MOVING_SLOPE}
+    return [{column for column in unknowns if (row, column) in moving} for row, unknowns in enumerate(touched)]
 
 
 def is_piecewise_in(expression: ca.SX, symbols: ca.SX) -> bool:

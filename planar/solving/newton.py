@@ -11,9 +11,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from planar.equations.casadi_call import BufferedFunction
 from planar.equations.functions import EquationFunctions
 from planar.equations.linear import solve_vectors
+from planar.equations.placed_blocks import BlockCall
 from planar.equations.symbolic_equations import slice_length
 from planar.foundation.arrays import Array, greatest_size
 
@@ -198,7 +198,7 @@ def correct_blocks(
             continue
         own, evaluate = block.unknowns, functions.block_call(block)
 
-        def here(x: Array, own: slice = own, evaluate: BufferedFunction = evaluate) -> tuple[Array, Array]:
+        def here(x: Array, own: slice = own, evaluate: BlockCall = evaluate) -> tuple[Array, Array]:
             z[own] = x
             left, slope = evaluate(z, u, p)
             return left[0], slope.T.reshape(len(left[0]), len(x))

@@ -219,7 +219,8 @@ class BlockAssemblies:
         pairs = {name: self.pairs[name] for name in stage.pairs}
         links = {*stage.links, *(link for pair in pairs.values() for link in pair.bodies)}
         links |= {link for _, link, _ in sketched.values()}
-        frames, own = frames_from_coordinates(self._coordinates(whole).tolist(), self.column, links, pairs)
+        w = self.functions.coordinates_ahead(stage.block_index + 1, whole, self.u, self.p)
+        frames, own = frames_from_coordinates(w.tolist(), self.column, links, pairs)
         gaps = [
             frames[link].to_world(self.local[link][point]) - self.sketch[name]
             for name, (_, link, point) in sketched.items()
@@ -303,9 +304,8 @@ class BlockAssemblies:
         """The angle at which the sketch, and the points that are known already, show a link of the block."""
         names = {name for link in stage.links for _, name in self.points_of[link]}
         known = {name: self.first_link[name] for name in names if self.first_link[name][0] < stage.block_index}
-        frames, _ = frames_from_coordinates(
-            self._coordinates(z), self.column, {link for _, link, _ in known.values()}, {}
-        )
+        w = self.functions.coordinates_ahead(stage.block_index, z, self.u, self.p)
+        frames, _ = frames_from_coordinates(w, self.column, {link for _, link, _ in known.values()}, {})
         located = {name: self.sketch[name] for name in names if name in self.sketch}
         located |= {name: frames[link].to_world(self.local[link][point]) for name, (_, link, point) in known.items()}
         angles = {}

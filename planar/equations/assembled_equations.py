@@ -1,0 +1,504 @@
+"""The equations of a structure evaluated from its elements by index arrays: no expression of the whole is made.
+
+Every coordinate that elimination solved for is a constant linear combination of y = (z, u) and of the rests of the
+pairs' rows, and so is every remaining constraint. The rests depend on few coordinates, those of their own bodies. They
+are computed in *stages*: a stage has the rests whose coordinates are known, and then the coordinates that follow from
+these and on which later rests depend.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from planar.equations.elements import Element, PlacedElement
+from planar.equations.elimination import EliminationRow
+from planar.equations.sparse_matrices import SparsePattern
+from planar.foundation.angles import wrap_angle
+from planar.foundation.arrays import Array, IntArray
+
+
+class Elimination(NamedTuple):
+    """How the rows of all pairs and inputs were solved for coordinates. Indices of coordinates are those of (w, u)."""
+
+    elements: tuple[PlacedElement, ...]
+    solved: tuple[tuple[int, EliminationRow], ...]
+    "the coordinates that were solved for, each by a row, in an order in which they can be computed"
+    lines: tuple[EliminationRow, ...]
+    coordinate_count: int
+    input_count: int
+    number_count: int
+
+
+class _Combinations(NamedTuple):
+    """Sums of the form: coefficient times an entry of x, in the order of their results, `starts` are the first terms
+    of every result, `results` their places."""
+
+    results: IntArray
+    starts: IntArray
+    sources: IntArray
+    coefficients: Array
+
+    def set_in(self, target: Array, x: Array) -> None:
+        """Set the results in target (..., entries) from x (..., entries)."""
+        if len(self.results):
+            target[..., self.results] = np.add.reduceat(self.coefficients * x[..., self.sources], self.starts, axis=-1)
+
+
+def _combinations(terms: Iterable[tuple[int, Mapping[int, float]]]) -> _Combinations:
+    filled = [(result, sums) for result, sums in terms if sums]
+    lengths = [len(sums) for _, sums in filled]
+    return _Combinations(
+        np.array([result for result, _ in filled], dtype=int),
+        np.cumsum([0, *lengths])[:-1] if lengths else np.zeros(0, int),
+        np.array([source for _, sums in filled for source in sums], dtype=int),
+        np.array([value for _, sums in filled for value in sums.values()], dtype=float),
+    )
+
+
+class _Products(NamedTuple):
+    """Sums of products: of an entry of a and an entry of b, in the order of their results."""
+
+    results: IntArray
+    starts: IntArray
+    left: IntArray
+    right: IntArray
+
+    def set_in(self, target: Array, a: Array, b: Array) -> None:
+        """Set the results in target (..., entries)."""
+        if len(self.results):
+            products = a[..., self.left] * b[..., self.right]
+            target[..., self.results] = np.add.reduceat(products, self.starts, axis=-1)
+
+
+class _ElementGroup(NamedTuple):
+    """The places of one element in a structure that are evaluated together (instances first).
+
+    `arguments` index (s, cos s, sin s, p), `rows` the rests, `slopes` entries of their derivatives, `coordinates` s.
+    """
+
+    element: Element
+    arguments: IntArray
+    rows: IntArray
+    slopes: IntArray
+    coordinates: IntArray
+
+    def _call(self, function_name: str, values: Array, *rates: Array) -> list[Array]:
+        samples, count = len(values), len(self.arguments)
+        arguments = [values[:, self.arguments], *(each[:, self.coordinates] for each in rates)]
+        flat = [each.reshape(samples * count, -1) for each in arguments]
+        results = getattr(self.element, function_name).evaluate_batch(samples * count, *flat)
+        return [each.reshape(samples, count, -1) for each in results]
+
+    def evaluate(self, values: Array, rests: Array, slopes: Array | None) -> None:
+        """Set the rests (samples, rows) and the entries of their slopes (samples, entries)."""
+        if slopes is None:
+            (rests[:, self.rows],) = self._call("rest_call", values)
+        elif self.slopes.size:
+            rests[:, self.rows], slopes[:, self.slopes] = self._call("slopes_call", values)
+        else:
+            rests[:, self.rows] = self._call("rest_call", values)[0]
+
+    def evaluate_second_rates(self, values: Array, rates: Array, rests: Array) -> None:
+        """Set the second rates of the rests (samples, rows) that follow from first rates of s (samples, s) alone."""
+        if self.slopes.size:
+            (rests[:, self.rows],) = self._call("second_rate_call", values, rates)
+
+
+class _Stage(NamedTuple):
+    """Rests that can be computed, then coordinates that follow from them."""
+
+    groups: list[_ElementGroup]
+    rest_rates: _Products
+    "(entries of slopes, s) -> rates of the stage's rests"
+    coordinates: _Combinations
+    "x -> s"
+
+
+class AssembledJacobians(NamedTuple):
+    """F (samples, rows) and the entries of dF/dy (samples, entries)."""
+
+    residuals: Array
+    entries: Array
+
+
+class AssembledEquations:
+    """Evaluates the equations of one structure. `unknowns` are the coordinates of z, `rows` those of F among the pairs'
+    own, of which some are angles that close modulo a turn."""
+
+    def __init__(
+        self, elimination: Elimination, unknowns: Sequence[int], rows: Sequence[int], is_angle: Sequence[bool]
+    ):
+        self._elimination, self._unknowns = elimination, np.array(unknowns, dtype=int)
+        self._angle_rows = np.flatnonzero(is_angle)
+        self._coordinate_count = elimination.coordinate_count
+        self._y_count = len(unknowns) + elimination.input_count
+        self._row_count = len(rows)
+        self._state_count = elimination.coordinate_count + elimination.input_count
+        self._rest_count = len(elimination.lines)
+        self._coordinate_sums = self._eliminated_coordinates()[: self._coordinate_count]
+        self._residual_sums = [self._line_sums(elimination.lines[row]) for row in rows]
+        self._make_slope_entries()
+        self._make_stages()
+        self._all_coordinates = _combinations(enumerate(self._coordinate_sums))
+        self._all_residuals = _combinations(enumerate(self._residual_sums))
+
+    # sums over x = (y, rests)
+
+    def _eliminated_coordinates(self) -> list[dict[int, float]]:
+        """Every entry of s as a sum over x."""
+        first_input = len(self._unknowns) - self._coordinate_count
+        sums: list[dict[int, float]] = [{} for _ in range(self._coordinate_count)]
+        sums += [{first_input + column: 1.0} for column in range(self._coordinate_count, self._state_count)]
+        for k, column in enumerate(self._unknowns):
+            sums[column] = {k: 1.0}
+        self._state_sums = sums
+        for column, line in self._elimination.solved:
+            factor = line.factors[column]
+            sums[column] = {source: -value / factor for source, value in self._line_sums(line, column).items()}
+        return sums
+
+    def _line_sums(self, line: EliminationRow, pivot: int | None = None) -> dict[int, float]:
+        """A constraint as a sum over x, a pivot left out."""
+        total: dict[int, float] = {}
+        for column, factor in line.factors.items():
+            if column != pivot:
+                for source, value in self._state_sums[column].items():
+                    total[source] = total.get(source, 0.0) + factor * value
+        for row, multiplier in line.multipliers.items():
+            source = self._y_count + row
+            total[source] = total.get(source, 0.0) + multiplier
+        return {source: value for source, value in total.items() if value != 0.0}
+
+    # stages
+
+    def _make_slope_entries(self) -> None:
+        """Number the entries of the derivatives of all rests by s."""
+        rows: list[int] = []
+        columns: list[int] = []
+        self._first_slope: list[int] = []
+        self._row_coordinates: list[list[int]] = [[] for _ in self._elimination.lines]
+        self._row_slopes: list[list[int]] = [[] for _ in self._elimination.lines]
+        for placed in self._elimination.elements:
+            self._first_slope.append(len(rows))
+            for row, column in placed.element.slope_entries:
+                self._row_coordinates[placed.rows[row]].append(placed.coordinates[column])
+                self._row_slopes[placed.rows[row]].append(len(rows))
+                rows.append(placed.rows[row])
+                columns.append(placed.coordinates[column])
+        self._slope_columns = np.array(columns, dtype=int)
+        self._slope_count = len(rows)
+
+    def _make_stages(self) -> None:
+        """Part rests and the coordinates on which they depend into stages."""
+        first = self._coordinate_count
+        needed = {column for columns in self._row_coordinates for column in columns}
+        level: dict[int, int] = {int(column): 0 for column in self._unknowns}
+        row_level: dict[int, int] = {}
+        y_count = self._y_count
+
+        def level_of_row(row: int) -> int:
+            if row not in row_level:
+                columns = self._row_coordinates[row]
+                row_level[row] = max((level[column] for column in columns if column < first), default=0)
+            return row_level[row]
+
+        for column, _ in self._elimination.solved:
+            if column in needed:
+                sources = [source - y_count for source in self._coordinate_sums[column] if source >= y_count]
+                level[column] = 1 + max(map(level_of_row, sources), default=-1)
+        early = {column: value for column, value in level.items() if column in needed and column not in self._unknowns}
+        self._start_coordinates = _combinations(
+            (column, self._coordinate_sums[column])
+            for column in [*map(int, self._unknowns), *(column for column, value in early.items() if value == 0)]
+        )
+        count = 1 + max([*map(level_of_row, range(len(self._row_coordinates))), *early.values()], default=0)
+        by_stage: list[dict[Element, list[tuple[PlacedElement, int]]]] = [{} for _ in range(count)]
+        for placed, first_slope in zip(self._elimination.elements, self._first_slope, strict=True):
+            for stage in {level_of_row(row) for row in placed.rows}:
+                by_stage[stage].setdefault(placed.element, []).append((placed, first_slope))
+        self._find_trigonometric_columns()
+        self._stages = []
+        for stage, elements in enumerate(by_stage):
+            rows = [row for row in range(len(self._row_coordinates)) if level_of_row(row) == stage]
+            terms = [(row, self._row_slopes[row]) for row in rows if self._row_slopes[row]]
+            slopes = [slope for _, entries in terms for slope in entries]
+            products = _Products(
+                np.array([row for row, _ in terms], dtype=int),
+                np.cumsum([0, *(len(entries) for _, entries in terms)])[:-1] if terms else np.zeros(0, int),
+                np.array(slopes, dtype=int),
+                self._slope_columns[slopes],
+            )
+            columns = [column for column, value in early.items() if value == stage + 1]
+            self._stages.append(
+                _Stage(
+                    [self._group(element, places) for element, places in elements.items()],
+                    products,
+                    _combinations((column, self._coordinate_sums[column]) for column in columns),
+                )
+            )
+        self._early_columns = early
+
+    def _find_trigonometric_columns(self) -> None:
+        """The entries of s whose cosines and sines are needed."""
+        columns: set[int] = set()
+        for placed in self._elimination.elements:
+            for body in {*placed.element.arguments.cosines, *placed.element.arguments.sines}:
+                columns.add(placed.coordinates[3 * body + 2])
+        self._angles = np.array(sorted(columns), dtype=int)
+        self._angle_place = {int(column): k for k, column in enumerate(self._angles)}
+
+    def _group(self, element: Element, places: Sequence[tuple[PlacedElement, int]]) -> _ElementGroup:
+        taken = element.arguments
+        first_cosine = self._state_count
+        first_sine, first_number = first_cosine + len(self._angles), first_cosine + 2 * len(self._angles)
+        arguments = []
+        for placed, _ in places:
+            angle_of = [self._angle_place.get(placed.coordinates[3 * k + 2], 0) for k in range(len(element.cosines))]
+            arguments.append(
+                [
+                    *(placed.coordinates[k] for k in taken.coordinates),
+                    *(first_cosine + angle_of[k] for k in taken.cosines),
+                    *(first_sine + angle_of[k] for k in taken.sines),
+                    *(first_number + placed.numbers[k] for k in taken.numbers),
+                ]
+            )
+        width = len(element.slope_entries)
+        return _ElementGroup(
+            element,
+            np.array(arguments, dtype=int).reshape(len(places), -1),
+            np.array([list(placed.rows) for placed, _ in places], dtype=int),
+            np.array([range(start, start + width) for _, start in places], dtype=int).reshape(len(places), -1),
+            np.array([placed.coordinates for placed, _ in places], dtype=int).reshape(len(places), -1),
+        )
+
+    # values
+
+    def _evaluate(self, z: Array, u: Array, p: Array, slopes: Array | None) -> tuple[Array, Array]:
+        """The arguments of elements (samples, (s, cos s, sin s, p)) and x (samples, x)."""
+        samples = len(z)
+        x: Array = np.zeros((samples, self._y_count + self._rest_count))
+        x[:, : z.shape[1]], x[:, z.shape[1] : self._y_count] = z, u
+        angle_count = len(self._angles)
+        values: Array = np.zeros((samples, self._state_count + 2 * angle_count + p.shape[-1]))
+        values[:, self._state_count + 2 * angle_count :] = p
+        state = values[:, : self._state_count]
+        state[:, self._coordinate_count :] = u
+        self._start_coordinates.set_in(state, x)
+        cosines = values[:, self._state_count : self._state_count + angle_count]
+        sines = values[:, self._state_count + angle_count : self._state_count + 2 * angle_count]
+        for stage in self._stages:
+            angles = state[:, self._angles]
+            np.cos(angles, out=cosines)
+            np.sin(angles, out=sines)
+            for group in stage.groups:
+                group.evaluate(values, x[:, self._y_count :], slopes)
+            stage.coordinates.set_in(state, x)
+        return values, x
+
+    def _new_slopes(self, samples: int) -> Array:
+        return np.zeros((samples, self._slope_count))
+
+    def coordinates(self, z: Array, u: Array, p: Array) -> Array:
+        """w (samples, coordinates) at z (samples, unknowns), u and p (numbers,) or alike."""
+        _, x = self._evaluate(z, u, p, None)
+        return self._sums(self._all_coordinates, x, self._coordinate_count)
+
+    @staticmethod
+    def _sums(combinations: _Combinations, x: Array, count: int) -> Array:
+        sums: Array = np.zeros((len(x), count))
+        combinations.set_in(sums, x)
+        return sums
+
+    def _residuals(self, x: Array) -> Array:
+        residuals = self._sums(self._all_residuals, x, self._row_count)
+        residuals[:, self._angle_rows] = wrap_angle(residuals[:, self._angle_rows])
+        return residuals
+
+    def residuals_and_jacobians(self, z: Array, u: Array, p: Array) -> AssembledJacobians:
+        """F and the entries of dF/dy by their `pattern` at samples."""
+        slopes = self._new_slopes(len(z))
+        _, x = self._evaluate(z, u, p, slopes)
+        return AssembledJacobians(self._residuals(x), self._jacobian_plan.entries(slopes))
+
+    def coordinate_jacobians(self, z: Array, u: Array, p: Array) -> Array:
+        """The entries of dw/dy by `coordinate_pattern` at samples (samples, entries)."""
+        slopes = self._new_slopes(len(z))
+        self._evaluate(z, u, p, slopes)
+        return self._coordinate_plan.entries(slopes)
+
+    def kinematics(self, y: Array, y1: Array, y2: Array, p: Array) -> tuple[Array, Array, Array]:
+        """F (samples, 3, rows) and w (samples, 3, coordinates) with their first and second rates, and the entries of
+        dF/dy."""
+        samples, split = len(y), len(self._unknowns)
+        slopes = self._new_slopes(samples)
+        values, x = self._evaluate(y[:, :split], y[:, split:], p, slopes)
+        residuals, coordinates = [self._residuals(x)], [self._sums(self._all_coordinates, x, self._coordinate_count)]
+        bending: Array = np.zeros((samples, self._rest_count))
+        for order, rates in enumerate((y1, y2), 1):
+            x_rates: Array = np.zeros_like(x)
+            x_rates[:, : self._y_count] = rates
+            state_rates: Array = np.zeros((samples, self._state_count))
+            state_rates[:, self._coordinate_count :] = rates[:, split:]
+            self._start_coordinates.set_in(state_rates, x_rates)
+            rest_rates = x_rates[:, self._y_count :]
+            for stage in self._stages:
+                stage.rest_rates.set_in(rest_rates, slopes, state_rates)
+                rows = stage.rest_rates.results
+                rest_rates[:, rows] += bending[:, rows]
+                stage.coordinates.set_in(state_rates, x_rates)
+            residuals.append(self._sums(self._all_residuals, x_rates, self._row_count))
+            coordinates.append(self._sums(self._all_coordinates, x_rates, self._coordinate_count))
+            if order == 1:
+                for stage in self._stages:
+                    for group in stage.groups:
+                        group.evaluate_second_rates(values, state_rates, bending)
+        entries = self._jacobian_plan.entries(slopes)
+        return np.stack(residuals, axis=1), np.stack(coordinates, axis=1), entries
+
+    # Jacobians
+
+    @property
+    def pattern(self) -> SparsePattern:
+        """Where the entries of dF/dy stand."""
+        return self._jacobian_plan.pattern
+
+    @property
+    def coordinate_pattern(self) -> SparsePattern:
+        """Where the entries of dw/dy stand."""
+        return self._coordinate_plan.pattern
+
+    @cached_property
+    def _rest_plan(self) -> _RestPlan:
+        """How the derivatives of rests by y are computed."""
+        first_input = len(self._unknowns) - self._coordinate_count
+        state_entries: dict[int, dict[int, int]] = {}
+        constants: list[float] = []
+
+        def add_state(column: int, sums: Mapping[int, float]) -> dict[int, int]:
+            entries = {}
+            for source, value in sums.items():
+                entries[source] = len(constants)
+                constants.append(value)
+            state_entries[column] = entries
+            return entries
+
+        for k, column in enumerate(self._unknowns):
+            add_state(int(column), {k: 1.0})
+        for column in range(self._coordinate_count, self._state_count):
+            add_state(column, {first_input + column: 1.0})
+        for column, stage_number in self._early_columns.items():
+            if stage_number == 0:
+                add_state(column, self._coordinate_sums[column])
+        rest_entries: dict[int, dict[int, int]] = {}
+        rest_count = 0
+        steps: list[tuple[_Products, _Combinations]] = []
+        for number, stage in enumerate(self._stages):
+            terms: list[tuple[int, list[int], list[int]]] = []
+            for row in stage.rest_rates.results:
+                entries: dict[int, int] = {}
+                pairs: dict[int, list[tuple[int, int]]] = {}
+                for slope, column in zip(self._row_slopes[row], self._row_coordinates[row], strict=True):
+                    for source, place in state_entries[column].items():
+                        pairs.setdefault(source, []).append((slope, place))
+                for source, products in pairs.items():
+                    entries[source] = rest_count
+                    terms.append((rest_count, [a for a, _ in products], [b for _, b in products]))
+                    rest_count += 1
+                rest_entries[int(row)] = entries
+            products_of_stage = _Products(
+                np.array([result for result, _, _ in terms], dtype=int),
+                np.cumsum([0, *(len(a) for _, a, _ in terms)])[:-1] if terms else np.zeros(0, int),
+                np.array([k for _, a, _ in terms for k in a], dtype=int),
+                np.array([k for _, _, b in terms for k in b], dtype=int),
+            )
+            sums: list[tuple[int, dict[int, float]]] = []
+            for column, stage_number in self._early_columns.items():
+                if stage_number == number + 1:
+                    constant, varying = self._expand(self._coordinate_sums[column], rest_entries)
+                    sources = {**constant, **varying}
+                    places = add_state(column, {source: constant.get(source, 0.0) for source in sources})
+                    sums += [(places[source], parts) for source, parts in varying.items()]
+            steps.append((products_of_stage, _combinations(sums)))
+        return _RestPlan(np.array(constants), rest_count, steps, rest_entries)
+
+    def _expand(
+        self, sums: Mapping[int, float], rest_entries: Mapping[int, Mapping[int, int]]
+    ) -> tuple[dict[int, float], dict[int, dict[int, float]]]:
+        """The derivative of a sum over x by y: constants, and for every entry of y sums over entries of the rests'."""
+        constant = {source: value for source, value in sums.items() if source < self._y_count}
+        varying: dict[int, dict[int, float]] = {}
+        for source, value in sums.items():
+            if source >= self._y_count:
+                for column, entry in rest_entries.get(source - self._y_count, {}).items():
+                    parts = varying.setdefault(column, {})
+                    parts[entry] = parts.get(entry, 0.0) + value
+        return constant, varying
+
+    def _plan(self, all_sums: Sequence[Mapping[int, float]]) -> _JacobianPlan:
+        plan = self._rest_plan
+        entries: list[tuple[int, int, float, dict[int, float]]] = []
+        for row, sums in enumerate(all_sums):
+            constant, varying = self._expand(sums, plan.rest_entries)
+            entries += [
+                (column, row, constant.get(column, 0.0), varying.get(column, {})) for column in {**constant, **varying}
+            ]
+        entries.sort(key=lambda entry: entry[:2])
+        columns = np.array([entry[0] for entry in entries], dtype=int)
+        first = np.searchsorted(columns, np.arange(self._y_count + 1))
+        pattern = SparsePattern(
+            (len(all_sums), self._y_count), np.array([entry[1] for entry in entries], dtype=np.int32), first
+        )
+        return _JacobianPlan(
+            pattern, np.array([entry[2] for entry in entries]), _combinations(enumerate(e[3] for e in entries)), plan
+        )
+
+    @cached_property
+    def _jacobian_plan(self) -> _JacobianPlan:
+        return self._plan(self._residual_sums)
+
+    @cached_property
+    def _coordinate_plan(self) -> _JacobianPlan:
+        return self._plan(self._coordinate_sums)
+
+
+class _RestPlan(NamedTuple):
+    """The derivatives of rests by y: entries of those of s begin as constants, then stage after stage products of
+    slopes and entries of s give entries of the rests, and these change entries of s."""
+
+    state_constants: Array
+    rest_count: int
+    steps: list[tuple[_Products, _Combinations]]
+    rest_entries: dict[int, dict[int, int]]
+    "for every row its entries by y"
+
+    def entries(self, slopes: Array) -> Array:
+        """Entries (samples, entries) of the derivatives of all rests."""
+        rests: Array = np.zeros((len(slopes), self.rest_count))
+        state = np.repeat(self.state_constants[None], len(slopes), axis=0)
+        for products, sums in self.steps:
+            products.set_in(rests, slopes, state)
+            if len(sums.results):
+                constant = state[:, sums.results].copy()
+                sums.set_in(state, rests)
+                state[:, sums.results] += constant
+        return rests
+
+
+class _JacobianPlan(NamedTuple):
+    """Entries of a Jacobian, column after column: constants, and sums over entries of the rests' derivatives."""
+
+    pattern: SparsePattern
+    constants: Array
+    sums: _Combinations
+    rest_plan: _RestPlan
+
+    def entries(self, slopes: Array) -> Array:
+        """The entries (samples, entries)."""
+        rests = self.rest_plan.entries(slopes)
+        entries: Array = np.zeros((len(slopes), len(self.constants)))
+        self.sums.set_in(entries, rests)
+        return entries + self.constants

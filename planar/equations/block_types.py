@@ -1,0 +1,180 @@
+"""Block types: blocks whose equations are the same from the coordinates that are known ahead of them on.
+
+Each is derived once, whatever the mechanism and wherever in it the block stands, and its functions take only what its
+own equations need: its unknowns, the coordinates of earlier blocks and inputs next to it, and its numbers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Sequence
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+
+from planar.equations.assembled_equations import Elimination
+from planar.equations.coordinates import Coordinate
+from planar.equations.elements import Element, PlacedElement
+from planar.equations.elimination import EliminationRow
+from planar.equations.residuals import ConstraintRow
+from planar.equations.symbolic_equations import Block, ConstraintEquations, expressions_of_elimination
+from planar.foundation.arrays import IntArray
+from planar.model.pairs import MeasureKind
+
+MAX_BLOCK_TYPES = 1024
+
+
+class BlockTypeKey(NamedTuple):
+    """What a block type is derived from, all indices of coordinates local: the block's own ones, then known ones."""
+
+    elements: tuple[tuple[Element, tuple[int, ...], tuple[int, ...]], ...]
+    "each with its coordinates and numbers"
+    solved: tuple[tuple[int, Hashable, Hashable], ...]
+    "own coordinates that are eliminated, with the factors and multipliers of their rows"
+    residuals: tuple[tuple[Hashable, Hashable], ...]
+    "factors and multipliers of the rows that remain"
+    row_kinds: tuple[MeasureKind, ...]
+    own_kinds: tuple[tuple[MeasureKind, bool], ...]
+    "what every own coordinate is, and whether it is one of a link"
+    unknowns: tuple[int, ...]
+    known_kinds: tuple[MeasureKind, ...]
+    number_count: int
+
+
+class PlacedBlock(NamedTuple):
+    """A block of a structure by its type: `known` index (w, u), `numbers` p, `coordinates` w."""
+
+    key: BlockTypeKey
+    known: IntArray
+    numbers: IntArray
+    coordinates: IntArray
+
+
+def place_blocks(e: ConstraintEquations) -> tuple[PlacedBlock | None, ...]:
+    """The types of all blocks; None for a block whose rows do not follow from earlier blocks term by term."""
+    if e.elimination is None:
+        return (None,) * len(e.blocks)
+    elimination = e.elimination
+    placer = _BlockPlacer(e, elimination)
+    columns_of_level: list[list[int]] = [[] for _ in e.blocks]
+    for column, level in enumerate(e.known_after_block):
+        if level >= 0:
+            columns_of_level[level].append(column)
+    return tuple(placer.place(block, columns_of_level[block.block_index]) for block in e.blocks)
+
+
+class _BlockPlacer:
+    def __init__(self, e: ConstraintEquations, elimination: Elimination):
+        self._equations, self._elimination = e, elimination
+        self._line_of = dict(elimination.solved)
+        self._order = {column: place for place, (column, _) in enumerate(elimination.solved)}
+        self._element_of_row = {row: placed for placed in elimination.elements for row in placed.rows}
+
+    def place(self, block: Block, columns: Sequence[int]) -> PlacedBlock | None:
+        """A block by its type; `columns` are the coordinates that are known after it."""
+        e, elimination = self._equations, self._elimination
+        unknowns = list(e.unknowns[block.unknowns])
+        solved = sorted((column for column in columns if column in self._order), key=self._order.__getitem__)
+        own = [*unknowns, *solved]
+        if set(own) != set(columns) or block.is_free:
+            return None
+        residual_lines = [elimination.lines[row] for row in e.row_indices[block.rows]]
+        solved_lines = [self._line_of[column] for column in solved]
+        local = {column: k for k, column in enumerate(own)}
+        known: list[int] = []
+
+        def index(column: int) -> int:
+            if column not in local:
+                local[column] = len(local)
+                known.append(column)
+            return local[column]
+
+        elements: dict[int, PlacedElement] = {}
+        for line in (*solved_lines, *residual_lines):
+            for row in line.multipliers:
+                placed = self._element_of_row[row]
+                elements.setdefault(placed.rows.start, placed)
+        numbers: list[int] = []
+        local_rows: dict[int, int] = {}
+        local_elements = []
+        for placed in elements.values():
+            first = len(numbers)
+            taken = placed.element.arguments.numbers
+            numbers += [placed.numbers[k] for k in taken]
+            number_of = dict(zip(taken, range(first, len(numbers)), strict=True))
+            for row in placed.rows:
+                local_rows[row] = len(local_rows)
+            coordinates = tuple(
+                index(column) if used else -1
+                for column, used in zip(placed.coordinates, _used_coordinates(placed.element), strict=True)
+            )
+            local_numbers = tuple(number_of.get(k, -1) for k in range(len(placed.numbers)))
+            local_elements.append((placed.element, coordinates, local_numbers))
+
+        def terms(line: EliminationRow) -> tuple[Hashable, Hashable]:
+            return (
+                tuple((index(column), factor) for column, factor in line.factors.items()),
+                tuple((local_rows[row], multiplier) for row, multiplier in line.multipliers.items()),
+            )
+
+        solved_terms = tuple((local[column], *terms(line)) for column, line in zip(solved, solved_lines, strict=True))
+        residual_terms = tuple(terms(line) for line in residual_lines)
+        level = block.block_index
+        if any(column < len(e.coordinates) and e.known_after_block[column] >= level for column in known):
+            return None
+        key = BlockTypeKey(
+            tuple(local_elements),
+            solved_terms,
+            residual_terms,
+            tuple(row.kind for row in e.rows[block.rows]),
+            tuple((e.coordinates[column].kind, e.coordinates[column].of_link) for column in own),
+            tuple(range(len(unknowns))),
+            tuple(self._kind_of(column) for column in known),
+            len(numbers),
+        )
+        return PlacedBlock(key, np.array(known, dtype=int), np.array(numbers, dtype=int), np.array(own, dtype=int))
+
+    def _kind_of(self, column: int) -> MeasureKind:
+        e = self._equations
+        count = len(e.coordinates)
+        return e.coordinates[column].kind if column < count else e.input_kinds[column - count]
+
+
+def _used_coordinates(element: Element) -> list[bool]:
+    """Which local coordinates the rest of an element depends on."""
+    used = set().union(*element.nonlinear, element.arguments.coordinates)
+    return [k in used for k in range(element.coordinate_count)]
+
+
+@lru_cache(maxsize=MAX_BLOCK_TYPES)
+def block_equations(key: BlockTypeKey) -> ConstraintEquations:
+    """The equations of a block type: z its unknowns, u the coordinates that are known ahead of it, w its own ones."""
+    count = len(key.own_kinds)
+    elements: list[PlacedElement] = []
+    row_count = 0
+    for element, columns, numbers in key.elements:
+        element_rows = range(row_count, row_count + len(element.rest))
+        elements.append(PlacedElement(element, columns, numbers, element_rows))
+        row_count = element_rows.stop
+    solved = tuple((column, _line(factors, multipliers)) for column, factors, multipliers in key.solved)
+    lines = tuple(_line(factors, multipliers) for factors, multipliers in key.residuals)
+    elimination = Elimination(tuple(elements), solved, lines, count, len(key.known_kinds), key.number_count)
+    coordinates = tuple(Coordinate(f"own {k}", "angle", *kind) for k, kind in enumerate(key.own_kinds))
+    rows = tuple(ConstraintRow("", kind) for kind in key.row_kinds)
+    names = [f"number {k}" for k in range(key.number_count)]
+    block = Block(slice(0, len(key.unknowns)), slice(0, len(rows)), (), (), False, 0)
+    return ConstraintEquations(
+        coordinates,
+        key.unknowns,
+        rows,
+        (block,),
+        (0,) * count,
+        key.known_kinds,
+        lambda: expressions_of_elimination(
+            elimination, coordinates, key.known_kinds, key.unknowns, list(enumerate(key.row_kinds)), names, {}
+        ),
+    )
+
+
+def _line(factors: Hashable, multipliers: Hashable) -> EliminationRow:
+    return EliminationRow(dict(factors), dict(multipliers), set(), set())  # type: ignore[call-overload]  # of a key
