@@ -20,6 +20,9 @@ from planar.equations.sparse_matrices import SparsePattern
 from planar.foundation.angles import wrap_angle
 from planar.foundation.arrays import Array, IntArray
 
+MAX_KEPT_NUMBERS = 10**6
+"""Numbers of an evaluation that is kept."""
+
 
 class Elimination(NamedTuple):
     """How the rows of all pairs and inputs were solved for coordinates. Indices of coordinates are those of (w, u)."""
@@ -125,6 +128,23 @@ class AssembledJacobians(NamedTuple):
     entries: Array
 
 
+class _Evaluation(NamedTuple):
+    """What was computed at samples: the arguments of elements (samples, (s, cos s, sin s, p)), x (samples, x), and the
+    entries of the derivatives of rests (samples, entries)."""
+
+    z: Array
+    u: Array
+    p: Array
+    values: Array
+    x: Array
+    slopes: Array | None
+
+    def entries(self, plan: _JacobianPlan) -> Array:
+        """The entries of a Jacobian (samples, entries)."""
+        assert self.slopes is not None
+        return plan.entries(self.slopes)
+
+
 class AssembledEquations:
     """Evaluates the equations of one structure. `unknowns` are the coordinates of z, `rows` those of F among the pairs'
     own, of which some are angles that close modulo a turn."""
@@ -143,6 +163,7 @@ class AssembledEquations:
         self._residual_sums = [self._line_sums(elimination.lines[row]) for row in rows]
         self._make_slope_entries()
         self._make_stages()
+        self._last: _Evaluation | None = None
         self._all_coordinates = _combinations(enumerate(self._coordinate_sums))
         self._all_residuals = _combinations(enumerate(self._residual_sums))
 
@@ -277,19 +298,30 @@ class AssembledEquations:
 
     # values
 
-    def _evaluate(self, z: Array, u: Array, p: Array, slopes: Array | None) -> tuple[Array, Array]:
-        """The arguments of elements (samples, (s, cos s, sin s, p)) and x (samples, x)."""
+    def _evaluate(self, z: Array, u: Array, p: Array, with_slopes: bool) -> _Evaluation:
+        """Everything at samples; that of the last ones is kept, of which rates are often asked for next."""
+        last = self._last
+        if (
+            last is not None
+            and (last.slopes is not None or not with_slopes)
+            and np.array_equal(last.z, z)
+            and np.array_equal(last.u, u)
+            and np.array_equal(last.p, p)
+        ):
+            return last
         samples = len(z)
         x: Array = np.zeros((samples, self._y_count + self._rest_count))
         x[:, : z.shape[1]], x[:, z.shape[1] : self._y_count] = z, u
+        slopes: Array | None = np.zeros((samples, self._slope_count)) if with_slopes else None
         angle_count = len(self._angles)
-        values: Array = np.zeros((samples, self._state_count + 2 * angle_count + p.shape[-1]))
-        values[:, self._state_count + 2 * angle_count :] = p
+        first_number = self._state_count + 2 * angle_count
+        values: Array = np.zeros((samples, first_number + p.shape[-1]))
+        values[:, first_number:] = p
         state = values[:, : self._state_count]
         state[:, self._coordinate_count :] = u
         self._start_coordinates.set_in(state, x)
         cosines = values[:, self._state_count : self._state_count + angle_count]
-        sines = values[:, self._state_count + angle_count : self._state_count + 2 * angle_count]
+        sines = values[:, self._state_count + angle_count : first_number]
         for stage in self._stages:
             angles = state[:, self._angles]
             np.cos(angles, out=cosines)
@@ -297,15 +329,13 @@ class AssembledEquations:
             for group in stage.groups:
                 group.evaluate(values, x[:, self._y_count :], slopes)
             stage.coordinates.set_in(state, x)
-        return values, x
-
-    def _new_slopes(self, samples: int) -> Array:
-        return np.zeros((samples, self._slope_count))
+        evaluation = _Evaluation(z.copy(), u.copy(), p.copy(), values, x, slopes)
+        self._last = evaluation if values.size <= MAX_KEPT_NUMBERS else None
+        return evaluation
 
     def coordinates(self, z: Array, u: Array, p: Array) -> Array:
         """w (samples, coordinates) at z (samples, unknowns), u and p (numbers,) or alike."""
-        _, x = self._evaluate(z, u, p, None)
-        return self._sums(self._all_coordinates, x, self._coordinate_count)
+        return self._sums(self._all_coordinates, self._evaluate(z, u, p, False).x, self._coordinate_count)
 
     @staticmethod
     def _sums(combinations: _Combinations, x: Array, count: int) -> Array:
@@ -320,22 +350,20 @@ class AssembledEquations:
 
     def residuals_and_jacobians(self, z: Array, u: Array, p: Array) -> AssembledJacobians:
         """F and the entries of dF/dy by their `pattern` at samples."""
-        slopes = self._new_slopes(len(z))
-        _, x = self._evaluate(z, u, p, slopes)
-        return AssembledJacobians(self._residuals(x), self._jacobian_plan.entries(slopes))
+        evaluation = self._evaluate(z, u, p, True)
+        return AssembledJacobians(self._residuals(evaluation.x), evaluation.entries(self._jacobian_plan))
 
     def coordinate_jacobians(self, z: Array, u: Array, p: Array) -> Array:
         """The entries of dw/dy by `coordinate_pattern` at samples (samples, entries)."""
-        slopes = self._new_slopes(len(z))
-        self._evaluate(z, u, p, slopes)
-        return self._coordinate_plan.entries(slopes)
+        return self._evaluate(z, u, p, True).entries(self._coordinate_plan)
 
     def kinematics(self, y: Array, y1: Array, y2: Array, p: Array) -> tuple[Array, Array, Array]:
         """F (samples, 3, rows) and w (samples, 3, coordinates) with their first and second rates, and the entries of
         dF/dy."""
         samples, split = len(y), len(self._unknowns)
-        slopes = self._new_slopes(samples)
-        values, x = self._evaluate(y[:, :split], y[:, split:], p, slopes)
+        evaluation = self._evaluate(y[:, :split], y[:, split:], p, True)
+        values, x, slopes = evaluation.values, evaluation.x, evaluation.slopes
+        assert slopes is not None
         residuals, coordinates = [self._residuals(x)], [self._sums(self._all_coordinates, x, self._coordinate_count)]
         bending: Array = np.zeros((samples, self._rest_count))
         for order, rates in enumerate((y1, y2), 1):
@@ -356,7 +384,7 @@ class AssembledEquations:
                 for stage in self._stages:
                     for group in stage.groups:
                         group.evaluate_second_rates(values, state_rates, bending)
-        entries = self._jacobian_plan.entries(slopes)
+        entries = evaluation.entries(self._jacobian_plan)
         return np.stack(residuals, axis=1), np.stack(coordinates, axis=1), entries
 
     # Jacobians

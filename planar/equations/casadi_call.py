@@ -47,6 +47,7 @@ class BufferedFunction:
         self.output_buffers = [np.zeros(function.size_out(k)[::-1]) for k in range(function.n_out())]
         self.call_buffers = self._bind_buffers()
         self._mapped: dict[int, tuple[Any, Any]] = {}
+        self._few: dict[int, tuple[list[Array], list[Array], Any, Any]] = {}
 
     def _bind_buffers(self) -> Any:
         buffer, run = self.function.buffer()
@@ -67,6 +68,8 @@ class BufferedFunction:
 
     def evaluate_batch(self, count: int, *arguments: Array) -> list[Array]:
         """The results at many positions; arguments (positions, entries), or (entries,) for all of them alike."""
+        if count <= CHUNK_SIZES[1]:
+            return self._evaluate_few(count, arguments)
         room = -(-count // CHUNK_SIZES[-1]) * CHUNK_SIZES[-1]  # whole calls: what is over is not looked at
         given, found = [], [np.empty((room, *own.shape)) for own in self.output_buffers]
         for own, each in zip(self.input_buffers, arguments, strict=True):
@@ -91,6 +94,25 @@ class BufferedFunction:
                     run()
                     done, first = done + size, False
         return [each[:count] for each in found]
+
+    def _evaluate_few(self, count: int, arguments: tuple[Array, ...]) -> list[Array]:
+        """The same at few positions, by a call that is as long and whose buffers stay."""
+        with self.lock:
+            if count not in self._few:
+                inputs: list[Array] = [np.zeros((count, len(own))) for own in self.input_buffers]
+                outputs: list[Array] = [np.zeros((count, *own.shape)) for own in self.output_buffers]
+                buffer, run = self.function.map(count).buffer() if count > 1 else self.function.buffer()
+                for set_, arrays in ((buffer.set_arg, inputs), (buffer.set_res, outputs)):
+                    for k, array in enumerate(arrays):
+                        if array.size:
+                            set_(k, array.reshape(-1).data)
+                self._few[count] = inputs, outputs, run, buffer
+            inputs, outputs, run, _ = self._few[count]
+            for array, argument in zip(inputs, arguments, strict=True):
+                array[:] = argument
+            if count:
+                run()
+            return [array.copy() for array in outputs]
 
     def _mapped_call(self, size: int) -> tuple[Any, Any]:
         if size not in self._mapped:

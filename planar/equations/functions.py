@@ -16,7 +16,14 @@ import numpy as np
 
 from planar.equations.assembled_equations import AssembledEquations
 from planar.equations.block_types import MAX_BLOCK_TYPES, BlockTypeKey, PlacedBlock, block_equations, place_blocks
-from planar.equations.casadi_call import ON_ARM, BufferedFunction, ClosedFormAssemblies, RunFunction, read_function
+from planar.equations.casadi_call import (
+    ON_ARM,
+    POLISHING_STEPS,
+    BufferedFunction,
+    ClosedFormAssemblies,
+    RunFunction,
+    read_function,
+)
 from planar.equations.elimination import stack_expressions
 from planar.equations.linear import solve_arrays, solve_linear, solve_vectors
 from planar.equations.mechanism_numbers import equation_structure, structure_fingerprint
@@ -36,6 +43,7 @@ from planar.equations.symbolic_equations import (
     equations_from_outline,
     slice_length,
 )
+from planar.foundation.angles import wrap_angle
 from planar.foundation.arrays import Array, greatest_size
 from planar.foundation.kept_texts import KeptTexts
 from planar.foundation.private_cache import PrivateCache
@@ -48,6 +56,12 @@ KEPT_EQUATIONS = PrivateCache("equations", ".equations", b"planar equations\n", 
 """Equations and functions of structures, as casadi writes them; those of one take from 0.1 to 1 MB."""
 SETTLED_STEP = 1e-9
 """rad or sizes: after a shorter step of Newton's method the next one is round-off."""
+MAX_UNROLLED_UNKNOWNS = 12
+"""Unknowns of a block whose steps of Newton's method are unrolled: expressions of a larger one would be too long."""
+MAX_ELEMENT_EVALUATIONS = 100.0
+"""Evaluations by elements that take about as long as it takes to derive functions of a whole structure."""
+SAMPLES_PER_EVALUATION = 64.0
+"""Samples that take as long as one evaluation takes whatever their number."""
 RUN_NEWTON_STEPS = 4
 """Unrolled steps of a position within a run: from a start a degree or so away, four square the error away."""
 
@@ -84,14 +98,45 @@ def kept_function(make: Callable[[Any], ca.Function]) -> cached_property[ca.Func
 
 
 class EquationFunctions:
-    """The casadi functions of one structure, each built when it is first asked for; `texts` is where they are kept."""
+    """The equations of one structure as functions of arrays; `texts` is where derived ones are kept.
+
+    They are evaluated by elements and block types, which are derived once for all structures. From a structure that is
+    evaluated often casadi functions of the whole are derived, each when it is first asked for, unless its unknowns are
+    many.
+    """
 
     def __init__(self, equations: ConstraintEquations, texts: KeptTexts | None = None):
         self.equations, self._texts = equations, texts
         self._unknown_count, self._row_count = len(equations.unknowns), len(equations.rows)
-        self._assembled = assembled_if_large(equations)
-        self.is_sparse = self._assembled is not None
-        "whether Jacobians are by their entries, and all is computed by elements and types of blocks"
+        is_square = equations.is_square and self._unknown_count == self._row_count
+        self.is_sparse = is_square and self._unknown_count > MAX_DENSE_UNKNOWNS and equations.elimination is not None
+        "whether Jacobians are by their entries"
+        self.is_compiled = equations.elimination is None
+        "whether functions of the whole are derived"
+        self._evaluation_count = 0.0
+
+    def _elements(self, samples: int = 1) -> AssembledEquations | None:
+        """The equations as elements evaluate them at samples; None where functions of the whole do that."""
+        if self.is_compiled:
+            return None
+        if not self.is_sparse:
+            self._evaluation_count += 1.0 + samples / SAMPLES_PER_EVALUATION
+            if self._evaluation_count > MAX_ELEMENT_EVALUATIONS:
+                self.compile()
+                return None
+        return self.equations.assembled
+
+    def compile(self) -> None:
+        """Derive functions of the whole from now on."""
+        if self.is_compiled or self.is_sparse:
+            return
+        self.is_compiled = True
+        self._block_calls.clear()
+        self._block_assemblies.clear()
+        if self._texts is not None:
+            equations = self.equations
+            self._texts.add("function", lambda: equations.as_function().serialize())
+            self._texts.add("outline", lambda: json.dumps(equations.outline()))
 
     def kept(self, name: str, make: Callable[[], Kept]) -> Kept:
         """What `make` makes of this structure, from the disk where it is kept there by this name."""
@@ -133,8 +178,8 @@ class EquationFunctions:
         return {}
 
     def _make_block_call(self, block: Block) -> BlockCall:
-        by_type = self._functions_of_type(block)
-        if self._known_coordinates is None or by_type is None:
+        by_type = None if self.is_compiled else self._functions_of_type(block)
+        if by_type is None:
             return BufferedFunction(self.block_function(block))
         call = by_type.block_call(by_type.equations.blocks[0])
         assert isinstance(call, BufferedFunction)
@@ -150,13 +195,12 @@ class EquationFunctions:
         return place_blocks(self.equations)
 
     @cached_property
-    def _known_coordinates(self) -> KnownCoordinates | None:
-        """Where blocks stand that are called by their types; None where functions of the whole are."""
-        if self._assembled is None:
-            return None
+    def _known_coordinates(self) -> KnownCoordinates:
+        """Where blocks stand that are called by their types."""
         types = map(self._functions_of_type, self.equations.blocks)
-        calls = [None if each is None else each._coordinate_call for each in types]
-        return KnownCoordinates(self.equations, self._assembled, self._placed_blocks, calls)
+        calls = [None if functions is None else functions._coordinate_call for functions in types]
+        assert self.equations.assembled is not None
+        return KnownCoordinates(self.equations, self.equations.assembled, self._placed_blocks, calls)
 
     def block_assemblies(self, block: Block) -> BlockAssemblyCall | None:
         """Both assemblies of a block; None for one without a closed form."""
@@ -169,13 +213,12 @@ class EquationFunctions:
         return {}
 
     def _make_assemblies(self, block: Block) -> BlockAssemblyCall | None:
-        if self._known_coordinates is not None:
-            by_type = self._functions_of_type(block)
-            if by_type is not None:
-                assemblies = by_type.block_assemblies(by_type.equations.blocks[0])
-                if not isinstance(assemblies, ClosedFormAssemblies):
-                    return None
-                return PlacedAssemblies(block, assemblies, self._known_coordinates)
+        by_type = None if self.is_compiled else self._functions_of_type(block)
+        if by_type is not None:
+            assemblies = by_type.block_assemblies(by_type.equations.blocks[0])
+            if not isinstance(assemblies, ClosedFormAssemblies):
+                return None
+            return PlacedAssemblies(block, assemblies, self._known_coordinates)
         k = block.block_index
         form = self.kept(f"assembly {k}", lambda: self._make_assembly_function(block))
         if form is None:
@@ -186,9 +229,16 @@ class EquationFunctions:
 
     def _make_assembly_function(self, block: Block) -> ca.Function | None:
         """(z, u, p, sign) -> the unknowns of a block in closed form, and where its assemblies meet, if it has one."""
+        e, placed = self.equations, self._placed_blocks[block.block_index]
+        if placed is not None:
+            of_type = _closed_form_of_type(placed.key)
+            if of_type is None:
+                return None
+            sign, states = ca.SX.sym("sign"), ca.vertcat(e.w, e.u)
+            arguments = e.z[block.unknowns], states[placed.known.tolist()], e.p[placed.numbers.tolist()], sign
+            return ca.Function(of_type.name(), [e.z, e.u, e.p, sign], list(of_type(*arguments)))
         from planar.equations.closed_form import find_closed_form  # most functions are read
 
-        e = self.equations
         form = find_closed_form(e, block)
         if form is None:
             return None
@@ -211,16 +261,16 @@ class EquationFunctions:
 
     def coordinates_ahead(self, block_index: int, z: Array, u: Array, p: Array) -> Array:
         """w (coordinates,) at z (unknowns,), as far as known ahead of a block; the rest of it may hold anything."""
-        if self._known_coordinates is None:
+        if self.is_compiled:
             return self.coordinates(z, u, p)
         return self._known_coordinates.coordinates_ahead(block_index, z, u, p)
 
     def coordinates(self, z: Array, u: Array, p: Array) -> Array:
         """w (coordinates,) at z (unknowns,), or (samples, coordinates) at z (samples, unknowns), u alike."""
-        if self._assembled is not None:
-            single = z.ndim == 1
-            w = self._assembled.coordinates(np.atleast_2d(z), np.atleast_2d(u), p)
-            return w[0] if single else w
+        if z.ndim == 1 and (elements := self._elements()) is not None:
+            return elements.coordinates(z[None], u[None], p)[0]
+        if z.ndim == 2 and (elements := self._elements(len(z))) is not None:
+            return elements.coordinates(z, np.broadcast_to(u, (len(z), u.shape[-1])), p)
         if z.ndim == 1:
             return self._coordinate_call(z, u, p)[0][0]
         return self._coordinate_call.evaluate_batch(len(z), z, u, p)[0][:, 0]
@@ -251,13 +301,17 @@ class EquationFunctions:
 
     @cached_property
     def _unknowns_pattern(self) -> SparsePattern:
-        assert self._assembled is not None
-        return self._assembled.pattern.first_columns(self._unknown_count)
+        assert self.equations.assembled is not None
+        return self.equations.assembled.pattern.first_columns(self._unknown_count)
 
-    def _split_entries(self, entries: Array) -> tuple[SparseMatrices, Array]:
+    def _split_entries(self, entries: Array) -> tuple[Array | SparseMatrices, Array]:
         """dF/dz and dF/du (..., rows, unknowns or inputs) from the entries (..., entries) of dF/dy."""
-        assert self._assembled is not None
-        both, pattern = SparseMatrices(self._assembled.pattern, entries), self._unknowns_pattern
+        assert self.equations.assembled is not None
+        both = SparseMatrices(self.equations.assembled.pattern, entries)
+        if not self.is_sparse:
+            dense = np.asarray(both)
+            return dense[..., : self._unknown_count], dense[..., self._unknown_count :]
+        pattern = self._unknowns_pattern
         input_jacobian: Array = both[..., slice(None), slice(self._unknown_count, None)]
         return SparseMatrices(pattern, entries[..., : len(pattern.rows)]), input_jacobian
 
@@ -334,12 +388,12 @@ class EquationFunctions:
     def kinematics(self, y: Array, y1: Array, y2: Array, p: Array) -> EquationRates:
         """Everything at one position, y = (z, u) with its first and second derivatives, or at samples (samples, y)."""
         rows = self._row_count
-        if self._assembled is not None:
-            single, many = y.ndim == 1, np.atleast_2d(y)
-            residuals, coordinates, entries = self._assembled.kinematics(
-                many, np.broadcast_to(y1, many.shape), np.broadcast_to(y2, many.shape), p
-            )
-            if single:
+        many = np.atleast_2d(y)
+        elements = self._elements(len(many))
+        if elements is not None:
+            y1, y2 = np.broadcast_to(y1, many.shape), np.broadcast_to(y2, many.shape)
+            residuals, coordinates, entries = elements.kinematics(many, y1, y2, p)
+            if y.ndim == 1:
                 residuals, coordinates, entries = residuals[0], coordinates[0], entries[0]
             orders = (values[..., order, :] for values in (residuals, coordinates) for order in range(3))
             return EquationRates._make((*orders, *self._split_entries(entries)))
@@ -362,10 +416,11 @@ class EquationFunctions:
 
     def correct_samples(self, z: Array, u: Array, p: Array) -> Array:
         """The same at samples z (samples, unknowns), u and p alike, each by itself."""
-        if self._assembled is not None:
+        elements = self._elements(RUN_NEWTON_STEPS * len(z))
+        if elements is not None:
             u = np.broadcast_to(u, (len(z), u.shape[-1]))
             for _ in range(RUN_NEWTON_STEPS):
-                residuals, entries = self._assembled.residuals_and_jacobians(z, u, p)
+                residuals, entries = elements.residuals_and_jacobians(z, u, p)
                 z = z - solve_vectors(self._split_entries(entries)[0], residuals)
             return z
         return self._newton_call.evaluate_batch(len(z), z, u, p)[0][:, 0]
@@ -390,17 +445,59 @@ class EquationFunctions:
 
     def run_samples(self, z: Array, u: Array, p: Array) -> Array:
         """The unknowns at every sample of inputs u (samples, inputs), each from the one before, the first from z."""
-        return self._run_sparse(z, u, p) if self.is_sparse else self._run_function(z, u, p)
+        elements = self._elements(RUN_NEWTON_STEPS * len(u))
+        if elements is None:
+            return self._run_function(z, u, p)
+        if any(slice_length(block.unknowns) > MAX_UNROLLED_UNKNOWNS for block in self.equations.blocks):
+            return self._run_whole(elements, z, u, p)
+        return self._run_blocks(elements, z, u, p)
 
-    def _run_sparse(self, z: Array, u: Array, p: Array) -> Array:
+    def _run_blocks(self, elements: AssembledEquations, z: Array, u: Array, p: Array) -> Array:
+        """The same block after block, each at all samples."""
+        samples: Array = np.repeat(z[None], len(u), axis=0)
+        # what follows from the inputs alone is right whatever the unknowns are
+        states: Array = np.hstack([elements.coordinates(samples, u, p), u])
+        for block, placed in zip(self.equations.blocks, self._placed_blocks, strict=True):
+            if not slice_length(block.unknowns):
+                continue
+            if placed is None:
+                return self._run_whole(elements, z, u, p)
+            by_type = functions_of_block_type(placed.key)
+            known, numbers = states[:, placed.known], p[placed.numbers]
+            samples[:, block.unknowns] = own = by_type.run_block(z[block.unknowns], known, numbers)
+            states[:, placed.coordinates] = by_type.coordinates(own, known, numbers)
+        return samples
+
+    def run_block(self, z: Array, known: Array, numbers: Array) -> Array:
+        """The unknowns (samples, unknowns) of a block type at what it rests on (samples, known), from z (unknowns,)."""
+        assemblies = self.block_assemblies(self.equations.blocks[0])
+        if assemblies is None:
+            return self._run_function(z, known, numbers)
+        tried = np.repeat(z[None], len(known), axis=0)
+        both, _ = assemblies.evaluate_batch(tried, known, numbers)
+        is_angle = self.equations.unknown_is_angle
+
+        def distance(values: Array) -> float:
+            move = values - z
+            return float(np.abs(np.where(is_angle, wrap_angle(move), move)).max(initial=0.0))
+
+        samples: Array = min(both, key=lambda values: distance(values[0]) if np.isfinite(values[0]).all() else np.inf)
+        steps = np.diff(samples[:, is_angle], axis=0, prepend=z[None, is_angle])
+        samples[:, is_angle] = z[is_angle] + np.cumsum(wrap_angle(steps), axis=0)
+        call = self.block_call(self.equations.blocks[0])
+        for _ in range(POLISHING_STEPS):
+            residuals, columns = call.evaluate_batch(len(known), samples, known, numbers)
+            samples = samples - solve_vectors(columns.swapaxes(-1, -2), residuals[:, 0])
+        return samples
+
+    def _run_whole(self, elements: AssembledEquations, z: Array, u: Array, p: Array) -> Array:
         """The same, each from where the rates of the one before lead."""
-        assert self._assembled is not None
         samples: Array = np.empty((len(u), len(z)))
         step: Array = np.zeros(len(z))
         for k, inputs in enumerate(u):
             z = z + step
             for _ in range(RUN_NEWTON_STEPS):
-                residuals, entries = self._assembled.residuals_and_jacobians(z[None], inputs[None], p)
+                residuals, entries = elements.residuals_and_jacobians(z[None], inputs[None], p)
                 slopes, drives = self._split_entries(entries[0])
                 solution = solve_arrays(slopes, np.column_stack([residuals[0], drives]))
                 z = z - solution[:, 0]
@@ -425,8 +522,9 @@ class EquationFunctions:
         samples, unknowns = z.shape
         if self._row_count == 0:
             return np.zeros((samples, 0, unknowns)), np.zeros((samples, 0, u.shape[1]))
-        if self._assembled is not None:
-            return self._split_entries(self._assembled.residuals_and_jacobians(z, u, p).entries)
+        elements = self._elements(samples)
+        if elements is not None:
+            return self._split_entries(elements.residuals_and_jacobians(z, u, p).entries)
         called = self._kinematics_calls[1]
         return self._split_columns(
             called(z[0], u[0], p)[0][None] if samples == 1 else called.evaluate_batch(samples, z, u, p)[0]
@@ -445,9 +543,11 @@ class EquationFunctions:
         """F (rows,) and its Jacobian (rows, unknowns and inputs) at one position."""
         if not len(self.equations.rows):
             return np.zeros(0), np.zeros((0, len(z) + len(u)))
-        if self._assembled is not None:
-            residuals, entries = self._assembled.residuals_and_jacobians(z[None], u[None], p)
-            return residuals[0], SparseMatrices(self._assembled.pattern, entries[0])
+        elements = self._elements()
+        if elements is not None:
+            residuals, entries = elements.residuals_and_jacobians(z[None], u[None], p)
+            jacobian = SparseMatrices(elements.pattern, entries[0])
+            return residuals[0], jacobian if self.is_sparse else np.asarray(jacobian)
         left, slope = self._residual_call(z, u, p)
         return left[0], slope.T
 
@@ -462,17 +562,17 @@ MAX_CSE_NODES = 30_000
 what it saves is little."""
 
 
-def assembled_if_large(equations: ConstraintEquations) -> AssembledEquations | None:
-    """How equations are evaluated from their elements, where unknowns are many; None where expressions are."""
-    unknown_count = len(equations.unknowns)
-    is_large = equations.is_square and unknown_count == len(equations.rows) and unknown_count > MAX_DENSE_UNKNOWNS
-    return equations.assembled if is_large else None
-
-
 @lru_cache(maxsize=MAX_BLOCK_TYPES)
 def functions_of_block_type(key: BlockTypeKey) -> EquationFunctions:
     """The functions of a block type: its blocks are one, its u what is known ahead of it."""
     return EquationFunctions(block_equations(key))
+
+
+@lru_cache(maxsize=MAX_BLOCK_TYPES)
+def _closed_form_of_type(key: BlockTypeKey) -> ca.Function | None:
+    """(unknowns, known, numbers, sign) -> the closed form of a block type; None where it has none."""
+    functions = functions_of_block_type(key)
+    return functions._make_assembly_function(functions.equations.blocks[0])
 
 
 def function_with_cse(name: str, given: Sequence[ca.SX], wanted: Sequence[ca.SX]) -> ca.Function:
@@ -494,8 +594,4 @@ def _cached_equation_functions(structure: Mechanism) -> EquationFunctions:
     function = read_function(told)
     if function is not None and outline is not None:
         return EquationFunctions(equations_from_outline(json.loads(outline), function), texts)
-    equations = build_equations(structure)
-    if texts is not None and assembled_if_large(equations) is None:
-        texts.add("function", lambda: equations.as_function().serialize())
-        texts.add("outline", lambda: json.dumps(equations.outline()))
-    return EquationFunctions(equations, texts)
+    return EquationFunctions(build_equations(structure), texts)

@@ -139,9 +139,9 @@ class PositionSolver(PreparedMechanism):
 
     def is_surely_regular(self, z: Array) -> bool:
         """Whether every block is surely determined at an assembly."""
-        if not self.functions.is_sparse:
+        if self.acceptance is not None:
             return is_surely_regular(self, z)
-        from planar.solving.rates.regularity import jacobian_at, regularity  # few mechanisms have so many unknowns
+        from planar.solving.rates.regularity import jacobian_at, regularity
 
         of_blocks = regularity(self, jacobian_at(self, z, self.inputs.u))
         return bool(of_blocks.min(initial=1.0) >= MIN_FAST_REGULARITY)

@@ -50,11 +50,14 @@ class MechanismStructure:
         )
         self.counts = bool(links_counting_turns(mechanism))
 
-    @cached_property
+    @property
     def acceptance(self) -> AcceptanceFunctions | None:
         """What judges positions in compiled functions, for the structures that have it."""
-        found = acceptance_functions(self.mechanism)
-        return found if found.is_available else None
+        return self._acceptance if self._acceptance.is_available else None
+
+    @cached_property
+    def _acceptance(self) -> AcceptanceFunctions:
+        return acceptance_functions(self.mechanism)
 
     @cached_property
     def point_locations(self) -> PointLocations:
