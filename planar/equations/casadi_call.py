@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from threading import Lock
 from typing import Any
 
@@ -47,6 +48,7 @@ class BufferedFunction:
         self.output_buffers = [np.zeros(function.size_out(k)[::-1]) for k in range(function.n_out())]
         self.call_buffers = self._bind_buffers()
         self._mapped: dict[int, tuple[Any, Any]] = {}
+        self._asked: Counter[int] = Counter()
         self._few: dict[int, tuple[list[Array], list[Array], Any, Any]] = {}
 
     def _bind_buffers(self) -> Any:
@@ -68,8 +70,10 @@ class BufferedFunction:
 
     def evaluate_batch(self, count: int, *arguments: Array) -> list[Array]:
         """The results at many positions; arguments (positions, entries), or (entries,) for all of them alike."""
-        if count <= CHUNK_SIZES[1]:
-            return self._evaluate_few(count, arguments)
+        if count <= CHUNK_SIZES[0]:
+            self._asked[count] += 1
+            if count <= CHUNK_SIZES[1] or self._asked[count] > 2:
+                return self._evaluate_few(count, arguments)
         room = -(-count // CHUNK_SIZES[-1]) * CHUNK_SIZES[-1]  # whole calls: what is over is not looked at
         given, found = [], [np.empty((room, *own.shape)) for own in self.output_buffers]
         for own, each in zip(self.input_buffers, arguments, strict=True):

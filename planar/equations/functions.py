@@ -302,7 +302,8 @@ class EquationFunctions:
     @cached_property
     def _unknowns_pattern(self) -> SparsePattern:
         assert self.equations.assembled is not None
-        return self.equations.assembled.pattern.first_columns(self._unknown_count)
+        blocks = [(block.rows, block.unknowns) for block in self.equations.blocks if slice_length(block.rows)]
+        return self.equations.assembled.pattern.first_columns(self._unknown_count, blocks)
 
     def _split_entries(self, entries: Array) -> tuple[Array | SparseMatrices, Array]:
         """dF/dz and dF/du (..., rows, unknowns or inputs) from the entries (..., entries) of dF/dy."""

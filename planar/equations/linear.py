@@ -16,6 +16,8 @@ from planar.foundation.arrays import Array
 
 MAX_CRAMER_UNKNOWNS = 4
 """More unknowns are not solved by determinants."""
+MIN_SUBSTITUTIONS = 8
+"""Sparse matrices from which on they are solved together, block after block, and not each by its factors."""
 RANK_TOLERANCE = 1e-12
 """Singular values below this part of the greatest count as zero where there are more rows, or fewer, than unknowns."""
 
@@ -141,7 +143,8 @@ def solve_arrays(
     of least squares where there are more than two unknowns. With more rows, or fewer, than unknowns always those.
     """
     if isinstance(matrices, SparseMatrices):
-        return matrices.solve(right_sides)
+        is_batch = int(np.prod(matrices.shape[:-2])) >= MIN_SUBSTITUTIONS and matrices.pattern.blocks
+        return _substitute_blocks(matrices, right_sides) if is_batch else matrices.solve(right_sides)
     rows, unknowns = matrices.shape[-2:]
     if rows != unknowns:
         return _pseudo_inverses(matrices) @ right_sides
@@ -166,6 +169,20 @@ def solve_arrays(
     if least_squares:
         found[~regular] = np.linalg.pinv(np.nan_to_num(matrices[~regular])) @ right_sides[~regular]
     return found
+
+
+def _substitute_blocks(matrices: SparseMatrices, right_sides: Array) -> Array:
+    """The same of many matrices that are triangular by blocks, one diagonal block of all after the other."""
+    pattern = matrices.pattern
+    right = np.broadcast_to(right_sides, (*matrices.shape[:-1], right_sides.shape[-1]))
+    solutions: Array = np.zeros(right.shape)
+    for (rows, columns), (entries, starts) in zip(pattern.blocks, pattern.earlier_entries, strict=True):
+        rest = right[..., rows, :].copy()
+        if len(entries):
+            terms = matrices.values[..., entries, None] * solutions[..., pattern.columns[entries], :]
+            rest[..., pattern.rows[entries[starts]] - rows.start, :] -= np.add.reduceat(terms, starts, axis=-2)
+        solutions[..., columns, :] = solve_arrays(matrices[..., rows, columns], rest)
+    return solutions
 
 
 def solve_vectors(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from copy import copy
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -24,8 +25,11 @@ class SparsePattern:
     """Where entries stand, column after column: `rows` (entries,), and the `first` entry of every column, with the end
     of the last (columns + 1,)."""
 
-    def __init__(self, shape: tuple[int, int], rows: IntArray, first: IntArray):
-        self.shape, self.rows, self.first = shape, rows, first
+    def __init__(
+        self, shape: tuple[int, int], rows: IntArray, first: IntArray, blocks: Sequence[tuple[slice, slice]] = ()
+    ):
+        """`blocks` are the rows and columns of square diagonal blocks, if the matrix is triangular by them."""
+        self.shape, self.rows, self.first, self.blocks = shape, rows, first, blocks
         self._blocks: dict[tuple[int, int, int, int], tuple[IntArray, IntArray]] = {}
 
     @cached_property
@@ -64,9 +68,22 @@ class SparsePattern:
             self._blocks[key] = entries, places
         return self._blocks[key]
 
-    def first_columns(self, count: int) -> SparsePattern:
-        """The pattern of so many of the first columns."""
-        return SparsePattern((self.shape[0], count), self.rows[: self.first[count]], self.first[: count + 1])
+    def first_columns(self, count: int, blocks: Sequence[tuple[slice, slice]] = ()) -> SparsePattern:
+        """The pattern of so many of the first columns, triangular by some blocks."""
+        return SparsePattern((self.shape[0], count), self.rows[: self.first[count]], self.first[: count + 1], blocks)
+
+    @cached_property
+    def earlier_entries(self) -> list[tuple[IntArray, IntArray]]:
+        """For every block the entries in its rows before its own columns, row after row, and the first one of every
+        row that has some."""
+        order = np.argsort(self.rows, kind="stable")
+        sorted_rows = self.rows[order]
+        parts: list[tuple[IntArray, IntArray]] = []
+        for rows, columns in self.blocks:
+            entries = order[np.searchsorted(sorted_rows, rows.start) : np.searchsorted(sorted_rows, rows.stop)]
+            entries = entries[self.columns[entries] < columns.start]
+            parts.append((entries, np.flatnonzero(np.diff(self.rows[entries], prepend=-1))))
+        return parts
 
 
 class SparseMatrices:
@@ -113,6 +130,13 @@ class SparseMatrices:
             product: Array = self.single @ other
             return product
         return np.asarray(self) @ other
+
+    __array_ufunc__ = None  # an array times it is its own product
+
+    def __rmatmul__(self, other: Array) -> Array:
+        """A row (rows,), or rows (k, rows), times one matrix."""
+        product: Array = (self.single.T @ np.asarray(other).T).T
+        return product
 
     @cached_property
     def single(self) -> csc_matrix:

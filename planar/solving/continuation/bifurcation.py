@@ -179,7 +179,7 @@ def _step_to_lower_rank(curve: SolutionCurve, y: Array, constraints: _Decomposit
         closing = -right[others].T @ ((left[:, others].T @ residual) / values[others])
     forms, defects = [], []
     for weights in left_null.T:
-        slopes = null.T @ curve.weighted_hessian(y, weights)
+        slopes = curve.weighted_hessian_products(y, weights, null)
         forms.append(slopes @ null)
         defects.append(weights @ jacobian @ null + slopes @ closing)
     if not forms:
@@ -196,7 +196,7 @@ class _BranchConditions:
         self.u, self.s, self.vt = np.linalg.svd(curve.jacobian(y))
         self.rank = int(np.sum(self.s > EXACT_SINGULAR_TOLERANCE * max(self.s[0], 1.0)))
         self.null, self.left_null = self.vt[self.rank :].T, self.u[:, self.rank :]
-        forms = [self.null.T @ curve.weighted_hessian(y, rows) @ self.null for rows in self.left_null.T]
+        forms = [curve.weighted_hessian_products(y, rows, self.null) @ self.null for rows in self.left_null.T]
         self.forms = np.array(forms).reshape(-1, *2 * [self.null.shape[1]])
 
     def branch_along(self, c: Array) -> CurvePoint | None:

@@ -314,13 +314,22 @@ def _solve_compiled(
         told.parts[same], told.sure[same] = sure.coordinate_rates[beside:], True
         told.open = max(told.open, sure.residual)
         return first + through
+    accepted = accepted_samples(solver, p, found[first], u[rest])
+    if accepted is None:
+        return first + 1
+    found[first + 1 : first + len(accepted)] = accepted[1:]
+    return first + len(accepted)
+
+
+def accepted_samples(solver: PathSolver, p: Array, z: Array, u: Array) -> Array | None:
+    """The unknowns at the first inputs u (samples, inputs) that pass both checks, from those of the first; None where
+    samples cannot be tried at once."""
     if not solver.functions.is_square or solver.stops is not None:
-        return first + 1  # between samples a stop may be met
-    after = slice(first + 1, rest.stop)
-    found[after] = solver.functions.run_samples(found[first], u[after], p)
-    after = slice(first + 1, first + 1 + _count_accepted(solver, p, found[rest], u[rest]))
-    found[after] = _correct_once(solver.functions, p, found[after], u[after])
-    return after.stop
+        return None  # between samples a stop may be met
+    samples = np.concatenate([z[None], solver.functions.run_samples(z, u[1:], p)])
+    count = 1 + _count_accepted(solver, p, samples, u)
+    samples[1:count] = _correct_once(solver.functions, p, samples[1:count], u[1:count])
+    return samples[:count]
 
 
 def _straight_follower(

@@ -215,6 +215,18 @@ class SolutionCurve(ImplicitCurve):
         hessian = self.functions.weighted_hessian(self.unknowns_and_inputs(y), weights, self.p)
         return self.narrow_columns(self.narrow_columns(hessian).T)
 
+    def weighted_hessian_products(self, y: Array, weights: Array, directions: Array) -> Array:
+        """The same times directions (n + 1, k), as rows (k, n + 1); of many unknowns by differences of the Jacobian."""
+        if not self.functions.is_sparse:
+            products: Array = directions.T @ self.weighted_hessian(y, weights)
+            return products
+        rows = []
+        for direction in directions.T:
+            step = DIFFERENCE_STEP * direction
+            ahead, behind = (weights @ self.jacobian(place) for place in (y + step, y - step))
+            rows.append((ahead - behind) / (2.0 * DIFFERENCE_STEP))
+        return np.array(rows)
+
     def is_closed(self, y: Array) -> bool:
         """Whether a point passes the residual check."""
         return self.solver.max_residual(y[:-1], self.inputs(y)) <= self.solver.tolerance

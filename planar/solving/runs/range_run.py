@@ -13,7 +13,7 @@ from planar.foundation.time_limit import time_is_over
 from planar.model.wording import join_all_names
 from planar.results.motion import Motion
 from planar.solving.continuation.fast_path import FastSamples, fast_run
-from planar.solving.continuation.path import FollowedSamples, PathFollower, follow_samples, follow_to
+from planar.solving.continuation.path import FollowedSamples, PathFollower, accepted_samples, follow_samples, follow_to
 from planar.solving.continuation.path_pieces import BranchRates, bifurcations_until
 from planar.solving.continuation.predictor_corrector import (
     SHOWN_SLIDE_EXTENT,
@@ -36,6 +36,8 @@ from planar.solving.runs.samples import (
     splice_runs,
 )
 
+RANGE_SAMPLES = 73
+"""Places of a turn, or of the greatest travel of a slide, between which the range of an input ends."""
 MIN_RANGE = 1e-5
 """rad or sizes: a range shorter than this is none."""
 
@@ -64,7 +66,7 @@ class RangeRun(RunningInput):
         if stop is not None or not self.is_sliding:
             last = first + 2.0 * pi if stop is None else stop / self.scale
             return self._to_motion(self._run(steps, first, last), back)
-        end = self._find_range_end(
+        end = self._range_end(
             follow_to(self.solver, self.p, self.assembly.z, self.u, self.inputs_at(first)), first, 1.0
         )
         grid = np.linspace(first, end.position, steps + 1)
@@ -160,8 +162,8 @@ class RangeRun(RunningInput):
             turn = None if self.is_sliding else self._one_turn(steps, here)
             if isinstance(turn, RunSamples):
                 return turn
-            high = turn or self._find_range_end(self.assembly.z, here, 1.0)
-            ends = self._find_range_end(self.assembly.z, here, -1.0), high
+            high = turn or self._range_end(self.assembly.z, here, 1.0)
+            ends = self._range_end(self.assembly.z, here, -1.0), high
             if not time_is_over():
                 self.known.range_ends[key] = ends
         low, high = ends
@@ -200,8 +202,12 @@ class RangeRun(RunningInput):
                 given,
                 fast_samples=FastSamples(sure.coordinate_rates, np.ones(steps + 1, dtype=bool), sure.residual),
             )
-        if sure is not None and len(sure.z) <= steps:
-            end = self._find_range_end(self.assembly.z, here, 1.0)  # walking tells it sooner than a run would
+        known = accepted_samples(self.solver, self.p, self.assembly.z, given.u) if sure is None else sure.z
+        if known is not None and len(known) <= steps:
+            start = max(len(known) - 2, 0) if self.solver.functions.is_sparse else 0
+            place = here + 2.0 * pi * start / steps
+            # walking tells it sooner than a run would
+            end = self._find_range_end(known[start], place, 1.0, 2.0 * pi * (1.0 - start / steps))
             if end.ending is not None:
                 return end
         found = self._run(steps, here, here + 2.0 * pi)
@@ -254,9 +260,23 @@ class RangeRun(RunningInput):
         )
         return reached.with_problem(found.stopped)
 
-    def _find_range_end(self, z: Array, here: float, sign: float) -> _RangeEnd:
-        """Where the range of the input ends, one way from a position with unknowns z."""
+    def _range_end(self, z: Array, here: float, sign: float) -> _RangeEnd:
+        """Where the range of the input ends, one way from a position with unknowns z.
+
+        Steps along a curve of many unknowns are short: it is followed only where samples are not surely sound.
+        """
         far = SHOWN_SLIDE_EXTENT if self.is_sliding else 2.0 * pi
+        if self.solver.functions.is_sparse:
+            places = here + sign * np.linspace(0.0, far, RANGE_SAMPLES)
+            u = np.array([self.inputs_at(place) for place in places])
+            accepted = accepted_samples(self.solver, self.p, z, u)
+            if accepted is not None:
+                last = max(len(accepted) - 2, 0)
+                z, here, far = accepted[last], float(places[last]), far * (1.0 - last / (RANGE_SAMPLES - 1))
+        return self._find_range_end(z, here, sign, far)
+
+    def _find_range_end(self, z: Array, here: float, sign: float, far: float) -> _RangeEnd:
+        """The same by following the curve so far."""
         start = self.inputs_at(here)
         trip = PathFollower(
             self.solver, self.p, z, start, self.inputs_at(here + sign) - start, self.branches, self.arc_budget(0.0)
