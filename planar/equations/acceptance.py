@@ -5,7 +5,7 @@ It says yes to what is surely sound. To what it does not, the general path says 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from functools import cached_property, lru_cache
 from typing import Any, Generic, NamedTuple, TypeVar
 
@@ -25,16 +25,13 @@ from planar.equations.functions import (
 )
 from planar.equations.mechanism_numbers import equation_structure
 from planar.equations.rates import UnknownRates, block_jacobian, first_and_second_rates, time_derivatives
-from planar.equations.residuals import closing_error, residuals, scalars, split_pair_numbers
+from planar.equations.residuals import CARRIED_ROUNDING, closing_error, residuals, scalars, split_pair_numbers
 from planar.equations.symbolic_equations import slice_length
 from planar.foundation.geometry import Frame, frame_at, frame_term_sizes
 from planar.foundation.jets import Jet, TermSizes, term_sizes
 from planar.model.mechanism import Mechanism
 from planar.model.pairs import MeasureKind
 
-CARRIED_ROUNDING = 1e-3
-"""The rates of a constraint are judged by its own terms, and by this part of the greatest speed anywhere: some rounding
-of that is carried round a loop into terms that are small, as where a link comes to rest."""
 MAX_BLOCK_SIZE = 12
 """Unknowns of a block: the expressions of a larger one would be too long."""
 
@@ -95,6 +92,16 @@ class AcceptanceFunctions:
     def is_available(self) -> bool:
         """Whether the structure has such functions: it is small, and has been evaluated so often that they pay."""
         return self._is_small and self.functions.is_compiled
+
+    @staticmethod
+    def result(verdict: Iterable[Judged]) -> AcceptanceResult[Judged]:
+        """What the functions of positions judge, by name."""
+        return AcceptanceResult(*verdict)
+
+    @staticmethod
+    def step_result(verdict: Iterable[float]) -> StepCheck:
+        """What the function of steps judges, by name."""
+        return StepCheck(*verdict)
 
     @cached_property
     def corrected_position(self) -> BufferedFunction:

@@ -6,7 +6,7 @@ own equations need: its unknowns, the coordinates of earlier blocks and inputs n
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Sequence
+from collections.abc import Hashable, Iterable, Sequence
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -89,27 +89,20 @@ class _BlockPlacer:
                 known.append(column)
             return local[column]
 
-        elements: dict[int, PlacedElement] = {}
-        for line in (*solved_lines, *residual_lines):
-            for row in line.multipliers:
-                placed = self._element_of_row[row]
-                elements.setdefault(placed.rows.start, placed)
         numbers: list[int] = []
         local_rows: dict[int, int] = {}
         local_elements = []
-        for placed in elements.values():
-            first = len(numbers)
+        for placed in self._elements_of((*solved_lines, *residual_lines)):
             taken = placed.element.arguments.numbers
+            number_of = {k: len(numbers) + place for place, k in enumerate(taken)}
             numbers += [placed.numbers[k] for k in taken]
-            number_of = dict(zip(taken, range(first, len(numbers)), strict=True))
             for row in placed.rows:
                 local_rows[row] = len(local_rows)
-            coordinates = tuple(
-                index(column) if used else -1
-                for column, used in zip(placed.coordinates, _used_coordinates(placed.element), strict=True)
+            used = _used_coordinates(placed.element)
+            coordinates = tuple(index(column) if k in used else -1 for k, column in enumerate(placed.coordinates))
+            local_elements.append(
+                (placed.element, coordinates, tuple(number_of.get(k, -1) for k in range(len(placed.numbers))))
             )
-            local_numbers = tuple(number_of.get(k, -1) for k in range(len(placed.numbers)))
-            local_elements.append((placed.element, coordinates, local_numbers))
 
         def terms(line: EliminationRow) -> tuple[Hashable, Hashable]:
             return (
@@ -134,16 +127,20 @@ class _BlockPlacer:
         )
         return PlacedBlock(key, np.array(known, dtype=int), np.array(numbers, dtype=int), np.array(own, dtype=int))
 
+    def _elements_of(self, lines: Sequence[EliminationRow]) -> Iterable[PlacedElement]:
+        """The elements whose rests stand in lines, each once."""
+        placed = (self._element_of_row[row] for line in lines for row in line.multipliers)
+        return {element.rows.start: element for element in placed}.values()
+
     def _kind_of(self, column: int) -> MeasureKind:
         e = self._equations
         count = len(e.coordinates)
         return e.coordinates[column].kind if column < count else e.input_kinds[column - count]
 
 
-def _used_coordinates(element: Element) -> list[bool]:
-    """Which local coordinates the rest of an element depends on."""
-    used = set().union(*element.nonlinear, element.arguments.coordinates)
-    return [k in used for k in range(element.coordinate_count)]
+def _used_coordinates(element: Element) -> set[int]:
+    """The local coordinates that the rest of an element depends on."""
+    return set().union(*element.nonlinear, element.arguments.coordinates)
 
 
 @lru_cache(maxsize=MAX_BLOCK_TYPES)

@@ -16,8 +16,6 @@ from planar.foundation.arrays import Array
 
 MAX_CRAMER_UNKNOWNS = 4
 """More unknowns are not solved by determinants."""
-MIN_SUBSTITUTIONS = 8
-"""Sparse matrices from which on they are solved together, block after block, and not each by its factors."""
 RANK_TOLERANCE = 1e-12
 """Singular values below this part of the greatest count as zero where there are more rows, or fewer, than unknowns."""
 
@@ -143,8 +141,8 @@ def solve_arrays(
     of least squares where there are more than two unknowns. With more rows, or fewer, than unknowns always those.
     """
     if isinstance(matrices, SparseMatrices):
-        is_batch = int(np.prod(matrices.shape[:-2])) >= MIN_SUBSTITUTIONS and matrices.pattern.blocks
-        return _substitute_blocks(matrices, right_sides) if is_batch else matrices.solve(right_sides)
+        has_blocks = len(matrices.pattern.blocks) > 1
+        return _substitute_blocks(matrices, right_sides) if has_blocks else matrices.solve(right_sides)
     rows, unknowns = matrices.shape[-2:]
     if rows != unknowns:
         return _pseudo_inverses(matrices) @ right_sides
@@ -172,7 +170,7 @@ def solve_arrays(
 
 
 def _substitute_blocks(matrices: SparseMatrices, right_sides: Array) -> Array:
-    """The same of many matrices that are triangular by blocks, one diagonal block of all after the other."""
+    """The same of matrices that are triangular by blocks, one diagonal block of all after the other."""
     pattern = matrices.pattern
     right = np.broadcast_to(right_sides, (*matrices.shape[:-1], right_sides.shape[-1]))
     solutions: Array = np.zeros(right.shape)

@@ -18,6 +18,9 @@ from planar.foundation.jets import Scalar, cos, sin
 from planar.model.mechanism import Mechanism, relative_motions
 from planar.model.pairs import MeasureKind, Pair
 
+CARRIED_ROUNDING = 1e-3
+"""The rates of a constraint are judged by its own terms, and by this part of the greatest speed anywhere: some rounding
+of that is carried round a loop into terms that are small, as where a link comes to rest."""
 Frames = Mapping[str, Frame]
 """Of every link."""
 PairValues = Mapping[str, Sequence[Scalar]]

@@ -30,7 +30,7 @@ from planar.equations.elimination import (
 from planar.equations.residuals import ConstraintRow, wrapped_residual
 from planar.foundation.generic_numbers import generic_numbers
 from planar.model.mechanism import Mechanism, relative_motions
-from planar.model.pairs import MeasureKind
+from planar.model.pairs import MeasureKind, Pair
 
 MIN_MOVING_SLOPE = 1e-12
 """An entry of a Jacobian at random places, unknowns of about one, that is greater than rounding."""
@@ -240,20 +240,22 @@ def _is_overdetermined(equations: ConstraintEquations) -> bool:
     return any(slice_length(block.rows) > slice_length(block.unknowns) for block in equations.blocks)
 
 
-def _eliminate_structure(mechanism: Mechanism, given_links: tuple[str, ...]) -> _EliminatedStructure:
-    """The constraints of a structure, shortened by the coordinates that enter them with constant factors."""
-    motions = relative_motions(mechanism)
-    driven = [motions[given.pair] for given in mechanism.inputs]
-    input_kinds = (
-        *(MeasureKind.LENGTH, MeasureKind.LENGTH, MeasureKind.ANGLE) * len(given_links),
-        *(motion.input_kind for motion in driven),
-    )
+class _ElementsOfStructure(NamedTuple):
+    """The elements of a structure with its coordinates, all rows, and how many numbers there are."""
+
+    elements: tuple[PlacedElement, ...]
+    coordinates: tuple[Coordinate, ...]
+    rows: tuple[ConstraintRow, ...]
+    number_count: int
+
+
+def _place_elements(mechanism: Mechanism, given_links: Sequence[str], driven: Sequence[Pair]) -> _ElementsOfStructure:
+    """The elements of all pairs, then those of the inputs."""
     coordinates: list[Coordinate] = []
     frame_columns: dict[str, range] = {}
     for link in mechanism.links:
         if link.name != mechanism.frame and link.name not in given_links:
-            first = len(coordinates)
-            frame_columns[link.name] = range(first, first + 3)
+            frame_columns[link.name] = range(len(coordinates), len(coordinates) + 3)
             kinds = (MeasureKind.LENGTH, MeasureKind.LENGTH, MeasureKind.ANGLE)
             coordinates += [
                 Coordinate(link.name, part, kind, True) for part, kind in zip(FRAME_PARTS, kinds, strict=True)
@@ -268,7 +270,6 @@ def _eliminate_structure(mechanism: Mechanism, given_links: tuple[str, ...]) -> 
         number_count += len(pair.number_kinds)
     for k, link_name in enumerate(given_links):
         frame_columns[link_name] = range(len(coordinates) + 3 * k, len(coordinates) + 3 * k + 3)
-
     placement = ElementPlacement(frame_columns, own_columns, number_columns)
     elements: list[PlacedElement] = []
     rows: list[ConstraintRow] = []
@@ -278,6 +279,18 @@ def _eliminate_structure(mechanism: Mechanism, given_links: tuple[str, ...]) -> 
     for motion in driven:
         elements.append(placement.input_position_of(motion, len(rows)))
         rows.append(ConstraintRow(motion.name, motion.input_kind))
+    return _ElementsOfStructure(tuple(elements), tuple(coordinates), tuple(rows), number_count)
+
+
+def _eliminate_structure(mechanism: Mechanism, given_links: tuple[str, ...]) -> _EliminatedStructure:
+    """The constraints of a structure, shortened by the coordinates that enter them with constant factors."""
+    motions = relative_motions(mechanism)
+    driven = [motions[given.pair] for given in mechanism.inputs]
+    input_kinds = (
+        *(MeasureKind.LENGTH, MeasureKind.LENGTH, MeasureKind.ANGLE) * len(given_links),
+        *(motion.input_kind for motion in driven),
+    )
+    elements, coordinates, rows, number_count = _place_elements(mechanism, given_links, driven)
     lines = _elimination_rows(elements)
     for k in range(len(driven)):
         factors, column = lines[len(rows) - len(driven) + k].factors, len(coordinates) + 3 * len(given_links) + k
@@ -296,7 +309,7 @@ def _eliminate_structure(mechanism: Mechanism, given_links: tuple[str, ...]) -> 
         unknowns += group_unknowns
         remaining_rows += group_rows
     elimination = Elimination(
-        tuple(elements),
+        elements,
         tuple(dependency_order(solved)),
         tuple(lines),
         len(coordinates),
@@ -306,8 +319,8 @@ def _eliminate_structure(mechanism: Mechanism, given_links: tuple[str, ...]) -> 
     return _EliminatedStructure(
         mechanism,
         given_links,
-        tuple(coordinates),
-        tuple(rows),
+        coordinates,
+        rows,
         input_kinds,
         elimination,
         tuple(unknowns),

@@ -212,7 +212,6 @@ class PositionSolver(PreparedMechanism):
 
     def _examined_state(self, z: Array, remarks: tuple[str, ...]) -> State:
         """The state by the general checks, which say why where there is none."""
-        from planar.solving.diagnosis.singular_refusals import SingularPosition, determined_mobility
         from planar.solving.rates.sample_rates import sample_rates
 
         gaps = self.residuals(z[None], self.inputs.u[None])[:, 0]
@@ -223,8 +222,26 @@ class PositionSolver(PreparedMechanism):
             from planar.solving.assembly.least_misfit import refuse_misfit
 
             refuse_misfit(self, z, self.inputs.u)
+        mobility = self.inputs.u.size
+        if not (self.functions.is_square and self._is_regular(z)):
+            judged = self._judged_mobility(z, remarks)
+            if isinstance(judged, State):
+                return judged
+            mobility = judged
+        rates = sample_rates(self, z[None], self._one_sample(), {}, False)
+        doubt = rates.doubts
+        if doubt is not None and doubt.errors.is_too_inexact[0]:
+            raise doubt.refusal(self, 0, self.describe_position())
+        remarks = (*remarks, doubt.remark()) if doubt else remarks
+        return self._checked_state([part[0] for part in rates.coordinate_rates], mobility, residual, remarks)
+
+    def _judged_mobility(self, z: Array, remarks: tuple[str, ...]) -> int | State:
+        """The mobility at a position; where the constraints are singular there the state, if they have rates all the
+        same. Raises NoAnswer."""
+        from planar.solving.diagnosis.singular_refusals import SingularPosition, determined_mobility
+
         try:
-            mobility = determined_mobility(self, z, self._kinematics_at_rest(z))
+            return determined_mobility(self, z, self._kinematics_at_rest(z))
         except (SingularPosition, NoAnswer) as problem:
             regular = self.regularized(z)
             if regular is not None:
@@ -238,12 +255,6 @@ class PositionSolver(PreparedMechanism):
             if state is None:
                 raise problem.refusal() from None
             return state
-        rates = sample_rates(self, z[None], self._one_sample(), {}, False)
-        doubt = rates.doubts
-        if doubt is not None and doubt.errors.is_too_inexact[0]:
-            raise doubt.refusal(self, 0, self.describe_position())
-        remarks = (*remarks, doubt.remark()) if doubt else remarks
-        return self._checked_state([part[0] for part in rates.coordinate_rates], mobility, residual, remarks)
 
     def _open_refusal(self, z: Array, residual: float, pair: str) -> NoAnswer:
         """What to say of a position that does not close: where it all but does, it may be since it is singular."""
@@ -332,8 +343,6 @@ class PositionSolver(PreparedMechanism):
     def _checked_state(
         self, coordinate_rates: Sequence[Array], mobility: int, residual: float, remarks: tuple[str, ...]
     ) -> State:
-        from planar.solving.diagnosis import refusals
-
         parts = np.stack(coordinate_rates, axis=1) * self.scale[:, None]
         frames, own = frames_from_coordinates(
             [Jet(*each) for each in parts.tolist()], self.column, self.shapes, self.pairs
@@ -341,6 +350,8 @@ class PositionSolver(PreparedMechanism):
         gaps = self.residual_check.rate_residuals(frames, own)
         for (gap, pair), what in zip(gaps, ("velocities", "accelerations"), strict=True):
             if float(np.max(gap)) > 1e3 * self.tolerance:
+                from planar.solving.diagnosis import refusals
+
                 if self.inputs.u.size > mobility:
                     raise refusals.disagreeing_inputs(self, mobility, what)
                 raise refusals.broken_rates(self, what, pair, float(np.max(gap)))

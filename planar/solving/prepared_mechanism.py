@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, NamedTuple, Self
 
 import numpy as np
 
-from planar.equations.acceptance import AcceptanceFunctions
 from planar.equations.coordinates import frames_from_coordinates
 from planar.equations.functions import EquationFunctions
 from planar.equations.mechanism_numbers import pair_numbers_from, shapes_of_links, size_from_extents
@@ -26,6 +25,7 @@ from planar.solving.checks.residual_check import ResidualCheck
 from planar.solving.structure import mechanism_structure
 
 if TYPE_CHECKING:
+    from planar.equations.acceptance import AcceptanceFunctions
     from planar.solving.stops import MetStop, PairStops
 
 ZERO_POSITION = 1e-14

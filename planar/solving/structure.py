@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from functools import cached_property, lru_cache
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from planar.equations.acceptance import AcceptanceFunctions, acceptance_functions
 from planar.equations.coordinates import coordinate_columns
 from planar.equations.functions import MAX_CACHED_STRUCTURES, EquationFunctions, equation_functions
 from planar.foundation.errors import BadInput
@@ -22,6 +21,9 @@ from planar.model.mechanism import (
     relative_motions,
 )
 from planar.model.pairs import MeasureKind, Pair
+
+if TYPE_CHECKING:
+    from planar.equations.acceptance import AcceptanceFunctions
 
 
 class PointLocations(NamedTuple):
@@ -53,10 +55,14 @@ class MechanismStructure:
     @property
     def acceptance(self) -> AcceptanceFunctions | None:
         """What judges positions in compiled functions, for the structures that have it."""
+        if not self.functions.is_compiled:
+            return None
         return self._acceptance if self._acceptance.is_available else None
 
     @cached_property
     def _acceptance(self) -> AcceptanceFunctions:
+        from planar.equations.acceptance import acceptance_functions  # most mechanisms are solved a few times
+
         return acceptance_functions(self.mechanism)
 
     @cached_property

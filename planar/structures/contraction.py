@@ -58,11 +58,13 @@ class _Contraction(NamedTuple):
     marked: tuple[bool, ...]
 
     def bundles(self, numbering: Sequence[int]) -> Iterator[list[list[int]]]:
-        """The paths between each two, in the order of the word for a numbering, from the lower to the higher number."""
-        for k, a in enumerate(numbering):
-            for b in numbering[k:]:
-                found = self.paths.get((min(a, b), max(a, b)), ())
-                yield [path if a <= b else path[::-1] for path in found]
+        """The paths between each two that some join, in the order of the word for a numbering, from the lower to the
+        higher number."""
+        number = {link: k for k, link in enumerate(numbering)}
+        ends = sorted(sorted((number[a], number[b])) for a, b in self.paths)
+        for low, high in ends:
+            a, b = numbering[low], numbering[high]
+            yield [path if a <= b else path[::-1] for path in self.paths[min(a, b), max(a, b)]]
 
     def row(self, numbering: Sequence[int]) -> list[int]:
         """How many binary links are on each edge."""

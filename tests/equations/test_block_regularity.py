@@ -74,6 +74,7 @@ def test_assemblies_beside_each_other_have_other_signs_in_a_block_of_six_unknown
     for seed in (3, 4, 9):
         mechanism = all_but_a_parallelogram(seed)
         solver, start = PositionSolver(mechanism), mechanism.inputs[0].position
+        solver.functions.compile()
         e, p = solver.equations, solver.inputs.p
         assert e.z.numel() == 6
         motion = planar.cycle(mechanism, 2000, start, start + 2.0 * np.pi)
@@ -120,6 +121,7 @@ def test_a_matrix_that_loses_a_column_on_the_way_is_singular_and_not_unknown(mat
 def test_the_function_for_regularity_alone_says_what_that_of_a_position_says(stem):
     found = solved_mechanism(MODELS[stem])
     solver, given = found.solver, found.solver.inputs
+    solver.functions.compile()
     scales = given.p, solver.row_scale, solver.min_column_scale
     verdict = solver.acceptance.position(found.assembly.z, given.u1, given.u, given.u1, given.u2, *scales)[1]
     alone = solver.acceptance.regularity(found.assembly.z, given.u, *scales)[0][0, 0]

@@ -80,7 +80,7 @@ LIBRARIES = {
     "xlsxwriter": {"reports"},
 }
 MOST_LINES, LONGEST_FUNCTION, MOST_PARAMETERS = 800, 60, 8
-MOST_MODULES_TO_SOLVE, MOST_OTHERS_TO_SOLVE = 108, 40
+MOST_MODULES_TO_SOLVE, MOST_OTHERS_TO_SOLVE = 120, 40
 """Modules of planar, and others beside the libraries that are needed, which `planar solve` loads."""
 BESIDE_OTHER_JOINTS = {ROOT / "formats" / "drawn" / f"drawn_{what}.py" for what in ("document", "mechanism")}
 FILES = sorted(ROOT.rglob("*.py"))
@@ -260,14 +260,14 @@ def test_solving_loads_neither_scipy_nor_networkx_nor_what_only_pictures_need():
 
 
 def test_the_command_that_solves_loads_few_modules(tmp_path, monkeypatch):
-    """Each takes some half a millisecond; what a rare position or a new structure needs is loaded there."""
+    """Each takes some half a millisecond; what a rare position or a structure that is solved often needs is loaded
+    there."""
     monkeypatch.setenv("PLANAR_CACHE", str(tmp_path))
     code = "from planar.cli import main; main(['solve', '000-P1'], standalone_mode=False)"
-    first, loaded = loaded_by(code), loaded_by(code)
+    loaded = loaded_by(code)
     assert not loaded & {"scipy", "networkx", "llvmlite", "pint", "matplotlib", "numpy.random", "difflib"}
-    rare = {"solving.continuation.path", "solving.diagnosis.refusals", "solving.rates.regularity", "model.input_laws"}
-    assert not loaded & {f"planar.{name}" for name in (*rare, "cli.commands.modes", "equations.closed_form")}
-    assert loaded < first
+    rare = {"solving.continuation.path", "solving.diagnosis.refusals", "equations.acceptance", "model.input_laws"}
+    assert not loaded & {f"planar.{name}" for name in (*rare, "cli.commands.modes")}
     own, beside = ({name for name in loaded if name.startswith("planar.") == is_own} for is_own in (True, False))
     floor = loaded_by("import numpy, casadi, click, rich.console, rich.table")
     assert len(own) <= MOST_MODULES_TO_SOLVE

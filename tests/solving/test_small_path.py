@@ -37,6 +37,13 @@ def mechanism(theta=1.0, lengths=ROCKER):
     return four_bar(*lengths, theta)
 
 
+def compiled(mechanism):
+    """A solver whose functions of the whole are derived from the start."""
+    solver = PositionSolver(mechanism)
+    solver.functions.compile()
+    return solver
+
+
 def turn(solver, rows=91):
     """Inputs of a turn (rows, inputs), with velocity 2 and acceleration 3."""
     u = solver.inputs.u + np.linspace(0.0, 2.0 * np.pi, rows)[:, None]
@@ -75,7 +82,7 @@ def test_the_compiled_path_tells_what_the_general_one_does(name, monkeypatch):
     monkeypatch.setattr(position, "fast_position", lambda *_: None)
     monkeypatch.setattr(path, "fast_run", lambda *_: None)
     monkeypatch.setattr("planar.solving.runs.range_run.fast_run", lambda *_: None)
-    slow = PositionSolver(model).state(PositionSolver(model).find_assembly().z), planar.cycle(model, 60)
+    slow = compiled(model).state(compiled(model).find_assembly().z), planar.cycle(model, 60)
     for one, other in zip(quick, slow, strict=True):
         assert one.remarks == other.remarks
         for point, parts in other.points.items():
@@ -87,7 +94,7 @@ def test_the_compiled_path_tells_what_the_general_one_does(name, monkeypatch):
 
 
 def test_a_run_is_told_by_compiled_functions_alone_where_nothing_is_near():
-    solver = PositionSolver(mechanism())
+    solver = compiled(mechanism())
     u, u1, u2 = turn(solver)
     found = path.follow_samples(solver, solver.inputs.p, solver.find_assembly().z, u, (), (u1, u2))
     assert found.general_count == 0
@@ -96,7 +103,7 @@ def test_a_run_is_told_by_compiled_functions_alone_where_nothing_is_near():
 
 
 def test_a_course_ends_before_a_row_that_has_flipped(monkeypatch):
-    solver, other = PositionSolver(mechanism()), PositionSolver(four_bar(*ROCKER, 1.0, -1))
+    solver, other = compiled(mechanism()), compiled(four_bar(*ROCKER, 1.0, -1))
     z, flipped = solver.find_assembly().z, other.find_assembly().z
     u, u1, u2 = turn(solver)
     assert len(fast_run(solver, z, u, u1, u2).z) == len(u)
@@ -113,7 +120,7 @@ def test_a_course_ends_before_a_row_that_has_flipped(monkeypatch):
 
 @pytest.mark.parametrize("spoil", [1e-6, np.nan])
 def test_a_course_ends_before_a_row_that_is_open(monkeypatch, spoil):
-    solver = PositionSolver(mechanism())
+    solver = compiled(mechanism())
     u, u1, u2 = turn(solver)
     real = solver.functions.run_samples
 
@@ -128,13 +135,14 @@ def test_a_course_ends_before_a_row_that_is_open(monkeypatch, spoil):
 
 @pytest.mark.parametrize("order", ["first", "second"])
 def test_wrong_rates_of_a_compiled_function_do_not_pass(order, monkeypatch):
-    solver = PositionSolver(mechanism())
+    solver = compiled(mechanism())
     z = solver.find_assembly().z
     assert fast_position(solver, z) is not None
     real = getattr(acceptance.UnknownRates, order)
     monkeypatch.setattr(acceptance.UnknownRates, order, lambda self, *given: real(self, *given) * (1.0 + 1e-7))
     wrong = acceptance.AcceptanceFunctions(solver.structure.mechanism, EquationFunctions(solver.equations))
-    monkeypatch.setattr(solver.structure, "acceptance", wrong)
+    wrong.functions.compile()
+    monkeypatch.setattr(solver.structure, "_acceptance", wrong)
     assert fast_position(solver, z) is None
     s = solver.inputs
     told = acceptance.AcceptanceResult(
@@ -147,7 +155,7 @@ def test_a_position_beside_a_dead_point_is_left_to_the_general_path():
     """B, C and D all but in line: the crank of a triple rocker stands next to its limit."""
     lengths = (1.0, 0.8, 0.7, 0.9)
     limit = between(1.0, 0.9, 1.5)
-    near, far = (PositionSolver(four_bar(*lengths, limit - gap)) for gap in (1e-8, 0.3))
+    near, far = (compiled(four_bar(*lengths, limit - gap)) for gap in (1e-8, 0.3))
     assert fast_position(far, far.find_assembly().z) is not None
     assert fast_position(near, near.find_assembly().z) is None
 
@@ -234,7 +242,7 @@ def test_frames_are_placed_when_they_are_asked_for():
 
 @pytest.mark.parametrize("name", CLOSED)
 def test_both_assemblies_in_closed_form_are_those_that_newtons_method_finds(name, monkeypatch):
-    setup = PositionSolver(planar.load(name))
+    setup = compiled(planar.load(name))
     z, seen = setup.find_assembly().z, 0
     for stage in setup.equations.blocks:
         quick = BlockAssemblies(setup)._closed_form(stage, z)

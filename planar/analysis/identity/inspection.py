@@ -206,7 +206,8 @@ def _describe_motions(mechanism: Mechanism) -> dict[str, str]:
             runs.append(_run_input(mechanism, given))
         except PlanarError:
             return {link.name: "fixed" if link.name == mechanism.frame else "unknown" for link in mechanism.links}
-    return {link.name: _describe_motion(mechanism, link.name, runs) for link in mechanism.links}
+    pinned = _pinned_links(mechanism)
+    return {link.name: _describe_motion(mechanism, link.name, runs, link.name in pinned) for link in mechanism.links}
 
 
 def _is_back_at_start(run: Motion) -> bool:
@@ -223,7 +224,7 @@ def _run_input(mechanism: Mechanism, given: Input) -> Motion:
         return cycle(mechanism, RUN_STEPS, given.position - far, given.position + far, given.pair)
 
 
-def _describe_motion(mechanism: Mechanism, link: str, runs: list[Motion]) -> str:
+def _describe_motion(mechanism: Mechanism, link: str, runs: list[Motion], is_pinned: bool) -> str:
     if link == mechanism.frame:
         return "fixed"
     if not runs:
@@ -234,7 +235,7 @@ def _describe_motion(mechanism: Mechanism, link: str, runs: list[Motion]) -> str
     strays = max(float(np.ptp(place, axis=1).max()) for place in places) > STANDSTILL_TOLERANCE * size
     if swing <= STANDSTILL_TOLERANCE:
         return "translates" if strays else "stands still"
-    if not _is_pinned(mechanism, link):
+    if not is_pinned:
         return "general plane motion"
     if any(_is_turning_fully(run, link) for run in runs):
         return "turns fully"
@@ -246,14 +247,14 @@ def _origin_coordinate(run: Motion, link: str, axis: str) -> Array:
     return np.broadcast_to(jet.parts[0], (len(run),))
 
 
-def _is_pinned(mechanism: Mechanism, link: str) -> bool:
-    """Whether a pin holds the link to the frame."""
-    return any(
-        pair.is_lower_pair and pair.input_kind is MeasureKind.ANGLE and mechanism.frame in pin and link in pin
-        for group in pair_entries(mechanism)
-        for pair in group[:1]
-        for pin in [{end for each in group for end in each.links}]
-    )
+def _pinned_links(mechanism: Mechanism) -> set[str]:
+    """The links that a pin holds to the frame."""
+    pinned: set[str] = set()
+    for group in pair_entries(mechanism):
+        links = {link for pair in group for link in pair.links}
+        if group[0].is_lower_pair and group[0].input_kind is MeasureKind.ANGLE and mechanism.frame in links:
+            pinned |= links
+    return pinned
 
 
 def _is_turning_fully(run: Motion, link: str) -> bool:

@@ -11,8 +11,8 @@ from math import inf, isfinite, pi
 
 import numpy as np
 
-from planar.equations.acceptance import CARRIED_ROUNDING
 from planar.equations.residuals import (
+    CARRIED_ROUNDING,
     ConstraintRow,
     Frames,
     PairValues,

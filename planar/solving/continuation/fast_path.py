@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
 
-from planar.equations.acceptance import AcceptanceFunctions, AcceptanceResult, StepCheck
 from planar.equations.functions import EquationFunctions
 from planar.foundation.arrays import Array, BoolArray, IntArray
 from planar.solving.checks.branch_check import is_move_allowed
@@ -16,6 +15,7 @@ from planar.solving.checks.singular_values import SINGULAR_DISTANCE_RATIO
 from planar.solving.prepared_mechanism import PositionInputs, PreparedMechanism
 
 if TYPE_CHECKING:
+    from planar.equations.acceptance import AcceptanceFunctions, AcceptanceResult
     from planar.solving.stops import PairStops
 
 MIN_FAST_REGULARITY = 1e-3
@@ -51,7 +51,7 @@ def fast_position(setup: PreparedMechanism, z: Array) -> FastPosition | None:
         return None
     s = setup.inputs
     parts, verdict, _, _ = judged.position(z, s.u1, s.u, s.u1, s.u2, s.p, setup.row_scale, setup.min_column_scale)
-    told: AcceptanceResult[float] = AcceptanceResult(*verdict[0].tolist())
+    told = judged.result(verdict[0].tolist())
     passed = _is_accepted(setup, told) and told.regularity >= MIN_FAST_REGULARITY
     return FastPosition(parts.T, told.residual) if passed else None
 
@@ -155,7 +155,7 @@ def fast_run(setup: FastSolver, z: Array, u: Array, u1: Array, u2: Array) -> Fas
         len(u), found, axis, u, u1, u2, p, setup.row_scale, setup.min_column_scale
     )
     settled = settled[:, 0]
-    told: AcceptanceResult[Array] = AcceptanceResult(*verdict[:, 0].T)
+    told = judged.result(verdict[:, 0].T)
     # what is not a number is not below anything
     fine = told.residual <= setup.tolerance
     fine &= np.isfinite(told.finite_sum)
@@ -247,7 +247,7 @@ class StraightPathCache:
         judged = self.setup.acceptance
         assert judged is not None
         after, verdict = judged.step_check(z, u, step, self.setup.inputs.p)
-        told = StepCheck(*verdict[0].tolist())
+        told = judged.step_result(verdict[0].tolist())
         passed = (
             told.residual <= self.setup.tolerance
             and isfinite(told.finite_sum)
