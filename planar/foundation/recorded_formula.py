@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from math import floor
 from typing import Any, NamedTuple
 
 from planar.foundation.jets import Scalar, atan2, cos, sin, sqrt, tan
@@ -172,6 +173,6 @@ _FUNCTIONS: dict[str, Callable[..., Scalar]] = {
     "sin": sin,
     "tan": tan,
     "sqrt": sqrt,
-    "floor": lambda a: a.floor(),
+    "floor": lambda a: a.floor() if hasattr(a, "floor") else floor(a),
     "atan2": atan2,
 }

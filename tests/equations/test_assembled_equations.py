@@ -1,0 +1,111 @@
+"""Equations that are assembled from elements, and blocks by their types, beside functions of the whole."""
+
+import casadi as ca
+import numpy as np
+import pytest
+
+import planar
+from planar.equations.functions import EquationFunctions
+from planar.equations.mechanism_numbers import equation_structure
+from planar.equations.sparse_matrices import SparseMatrices
+from planar.equations.symbolic_equations import build_equations
+from planar.model.pairs import pair_types
+from planar.solving.position import PositionSolver
+from tests.builders import lift_document
+from tests.known import MODELS, some_models
+
+SOLVED = [stem for stem in some_models(4) if MODELS[stem].inputs]
+
+
+def random_place(equations, samples, seed=0):
+    """z, u and p at random places."""
+    rng = np.random.default_rng(seed)
+    counts = len(equations.unknowns), len(equations.input_kinds), equations.elimination.number_count
+    z, u, p = (rng.uniform(0.5, 1.5, (samples, count)) for count in counts)
+    return z, u, p[0]
+
+
+def test_every_pair_type_is_in_a_model_that_is_compared():
+    assert {type(pair) for stem in some_models(4) for pair in MODELS[stem].pairs} == set(pair_types().values())
+
+
+@pytest.mark.parametrize("stem", some_models(4))
+def test_elements_say_what_expressions_of_the_whole_say(stem):
+    equations = build_equations(equation_structure(MODELS[stem]))
+    if equations.elimination is None:
+        assert MODELS[stem].closes_within is not None
+        return
+    assembled, whole = equations.assembled, EquationFunctions(equations)
+    whole.compile()
+    z, u, p = random_place(equations, 3)
+    y = np.hstack([z, u])
+    y1, y2 = np.random.default_rng(1).normal(size=(2, *y.shape))
+    expected = whole.kinematics(y, y1, y2, p)
+    residuals, coordinates, entries = assembled.kinematics(y, y1, y2, p)
+    for order in range(3):
+        np.testing.assert_allclose(residuals[:, order], expected[order], rtol=1e-10, atol=1e-10)
+        np.testing.assert_allclose(coordinates[:, order], expected[3 + order], rtol=1e-10, atol=1e-10)
+    jacobian = np.asarray(SparseMatrices(assembled.pattern, entries))
+    both = np.concatenate([np.asarray(expected.jacobian), expected.input_jacobian], axis=2)
+    np.testing.assert_allclose(jacobian, both, rtol=1e-10, atol=1e-10)
+    np.testing.assert_array_equal(assembled.residuals_and_jacobians(z, u, p).entries, entries)
+    slope = ca.Function("slope", [equations.z, equations.u, equations.p], [ca.jacobian(equations.w, equations.y)])
+    moved = np.asarray(SparseMatrices(assembled.coordinate_pattern, assembled.coordinate_jacobians(z, u, p)))
+    np.testing.assert_allclose(moved[1], slope(z[1], u[1], p).full(), rtol=1e-10, atol=1e-10)
+    np.testing.assert_allclose(assembled.coordinates(z, u, p), coordinates[:, 0], rtol=1e-12)
+
+
+@pytest.mark.parametrize("stem", SOLVED)
+def test_types_of_blocks_say_what_functions_of_the_whole_say(stem):
+    solver = PositionSolver(MODELS[stem])
+    equations = build_equations(equation_structure(MODELS[stem]))
+    if equations.elimination is None or not equations.is_square:
+        return
+    by_types, whole = EquationFunctions(equations), EquationFunctions(equations)
+    whole.compile()
+    z, u, p = random_place(equations, 5)
+    p = solver.inputs.p
+    for block in equations.blocks:
+        first, second = (functions.block_call(block) for functions in (by_types, whole))
+        for a, b in zip(first.evaluate_batch(5, z, u, p), second.evaluate_batch(5, z, u, p), strict=True):
+            np.testing.assert_allclose(a, b, rtol=1e-10, atol=1e-10)
+        for k in (0, 3, 1):  # from one position to another, of which one block or all differ
+            for a, b in zip(first(z[k], u[k], p), second(z[k], u[k], p), strict=True):
+                np.testing.assert_allclose(a, b, rtol=1e-10, atol=1e-10)
+        first, second = (functions.block_assemblies(block) for functions in (by_types, whole))
+        assert (first is None) == (second is None)
+        if first is not None:
+            a, b = (assemblies.evaluate_batch(z, u, p) for assemblies in (first, second))
+            np.testing.assert_allclose(np.array(a[0]), np.array(b[0]), rtol=1e-9, atol=1e-9)
+            np.testing.assert_allclose(a[1], b[1], rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.parametrize("stem", SOLVED)
+def test_runs_block_after_block_are_those_of_functions_of_the_whole(stem):
+    solver = PositionSolver(MODELS[stem])
+    if not solver.functions.is_square or solver.equations.elimination is None:
+        return
+    by_types, whole = (EquationFunctions(solver.equations) for _ in range(2))
+    whole.compile()
+    z, u, p = solver.find_assembly().z, solver.inputs.u, solver.inputs.p
+    steps = u + np.linspace(0.01, 0.1, 10)[:, None] * np.random.default_rng(0).uniform(0.5, 1.0, len(u))
+    np.testing.assert_allclose(by_types.run_samples(z, steps, p), whole.run_samples(z, steps, p), rtol=1e-9, atol=1e-9)
+
+
+def test_equal_blocks_share_one_type():
+    equations = build_equations(equation_structure(planar.from_dict(lift_document(4))))
+    functions = EquationFunctions(equations)
+    keys = [placed.key for placed in functions._placed_blocks if placed is not None and placed.key.unknowns]
+    assert len(set(keys)) < len(keys)
+
+
+def test_a_structure_that_is_evaluated_often_is_compiled_and_says_the_same():
+    solver = PositionSolver(MODELS["crank-rocker"])
+    functions = EquationFunctions(build_equations(equation_structure(MODELS["crank-rocker"])))
+    z, u, p = solver.find_assembly().z, solver.inputs.u, solver.inputs.p
+    first = functions.residuals_and_jacobian(z, u, p)
+    for _ in range(1000):
+        functions.coordinates(z, u, p)
+    assert functions.is_compiled
+    for a, b in zip(first, functions.residuals_and_jacobian(z, u, p), strict=True):
+        np.testing.assert_allclose(a, b, rtol=1e-12, atol=1e-14)
