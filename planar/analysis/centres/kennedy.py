@@ -109,7 +109,7 @@ class KennedyConstruction:
             others = others[(others != end) & (others != via)]
             if len(others):
                 numbers = self._number[end, others]
-                lines = _cross(one.at, self._at[via, others])
+                lines = cross_products(one.at, self._at[via, others])
                 self._add_lines(numbers, self._first + via, lines, one.error + self._error[via, others])
         self._apply_ratios(two)
 
@@ -144,7 +144,7 @@ class KennedyConstruction:
         if not len(numbers):
             return
         lines, errors = lines / lengths[:, None], errors / lengths
-        meets = _cross(lines[:, None], self._lines[numbers])
+        meets = cross_products(lines[:, None], self._lines[numbers])
         sines = _lengths(meets)
         sums = errors[:, None] + self._line_error[numbers]
         wrong = np.where(sines > 0.0, sums / np.where(sines > 0.0, sines, 1.0), np.inf)
@@ -208,7 +208,7 @@ def _error_decade(error: float) -> int:
     return int(np.floor(np.log10(error)))
 
 
-def _cross(a: Array, b: Array) -> Array:
+def cross_products(a: Array, b: Array) -> Array:
     """Vector products (..., 3), without what numpy's own does beside."""
     x, y, z = a[..., 0], a[..., 1], a[..., 2]
     u, v, w = b[..., 0], b[..., 1], b[..., 2]

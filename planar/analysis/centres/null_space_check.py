@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
 
-from planar.analysis.centres.kennedy import LinkPair
+from planar.analysis.centres.kennedy import LinkPair, cross_products
 from planar.analysis.rate_equations import derivative
 from planar.analysis.rate_ratios import choose_motion
 from planar.foundation.arrays import Array
@@ -131,15 +130,16 @@ def prove_centres(found: Mapping[LinkPair, Array], links: Sequence[str], motions
         a, b = (place[link] for link in two)
         at[a, b] = at[b, a] = one
     stands = {link: group[0] for group in links_moving_as_one(links, motions) for link in group}
-    threes = [
-        [place[link] for link in three]
-        for three in combinations(links, 3)
-        if len({stands.get(link, link) for link in three}) > 1
-    ]
-    first, second, third = np.array(threes, dtype=int).reshape(-1, 3).T
-    triples = np.stack([at[first, second], at[second, third], at[first, third]], axis=1)
-    known = ~np.isnan(triples).any(axis=(1, 2))
-    collinear = float(np.abs(np.linalg.det(triples[known])).max(initial=0.0))
+    kinds = np.array([place[stands.get(link, link)] for link in links], dtype=int)
+    collinear = 0.0
+    for first in range(len(links) - 2):
+        second, third = np.triu_indices(len(links) - first - 1, 1)
+        second, third = second + first + 1, third + first + 1
+        apart = (kinds[second] != kinds[first]) | (kinds[third] != kinds[first])
+        second, third = second[apart], third[apart]
+        # of three links that are known; what is not a number is passed over
+        volumes = np.einsum("ij,ij->i", cross_products(at[first, second], at[second, third]), at[first, third])
+        collinear = max(collinear, float(np.nanmax(np.abs(volumes), initial=0.0)))
     if not motions.mobility or not found:
         return CentresProof(None, collinear, None)
     centres = np.array(list(found.values()))[:, None]

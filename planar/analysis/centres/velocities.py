@@ -104,18 +104,25 @@ def links_by_centres(centres: Centres) -> dict[str, LinkByCentres]:
         return {link: LinkByCentres(0.0 * each.motion, each.by) for link, each in moving.items()}
     here = _ScaledCentres(centres)
     found = {frame: LinkByCentres(np.zeros(3), ())} | here.input_motions(given.pair, given.velocity)
-    while len(found) < len(centres.numbers):
-        best: tuple[float, str, str] | None = None
-        for known in found:
-            for link in centres.numbers:
-                if link not in found and known != frame:
-                    apart = here.separation(link, known)
-                    if apart > COINCIDENT_TOLERANCE and (best is None or apart > best[0]):
-                        best = (apart, link, known)
-        if best is None:
-            raise _undetermined_answer(centres, [link for link in centres.numbers if link not in found], given.pair)
-        _, link, known = best
+    links, ways = [*centres.numbers], [link for link in found if link != frame]
+    separations = np.array(
+        [[0.0 if link in found else here.separation(link, known) for link in links] for known in ways]
+    ).reshape(-1, len(links))
+    greatest, through = separations.max(axis=0, initial=0.0), np.zeros(len(links), dtype=int)
+    if ways:
+        through = separations.argmax(axis=0)
+    while len(found) < len(links):
+        # of separations alike that of the link which was known first, then of the link which comes first
+        rest = [k for k, link in enumerate(links) if link not in found and greatest[k] > COINCIDENT_TOLERANCE]
+        if not rest:
+            raise _undetermined_answer(centres, [link for link in links if link not in found], given.pair)
+        best = min(rest, key=lambda k: (-greatest[k], through[k], k))
+        link, known = links[best], ways[through[best]]
         found[link] = here.motion_through(link, known, found[known])
+        ways.append(link)
+        new = np.array([0.0 if other in found else here.separation(other, link) for other in links])
+        is_better = new > greatest
+        greatest[is_better], through[is_better] = new[is_better], len(ways) - 1
     return {link: each._replace(motion=here.in_metres(each.motion)) for link, each in found.items()}
 
 

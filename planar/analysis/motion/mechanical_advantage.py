@@ -23,6 +23,8 @@ from planar.model.mechanism import Input, relative_motions
 from planar.model.wording import REST_TOLERANCE, join_all_names
 from planar.results.motion import State
 
+MAX_LINKS_BY_CENTRES = 60
+"""Links whose centres are constructed for a second value; the time for that grows with their cube."""
 LEAST_SEPARATION = 1e-3
 """Centres that lie closer together than this, homogeneous and of length one, tell the line through them badly."""
 PoleOfLink = Callable[[str], Array]
@@ -144,6 +146,12 @@ class _AdvantagesOverInput:
             why = f"{rate.rest} here however {self.input} moves, so that no {effort} at it is too great"
             return result._replace(why=why)
         result = result._replace(by_power=1.0 / rate.value)
+        count = len(self.state.frames)
+        if count > MAX_LINKS_BY_CENTRES:
+            centre_count = count * (count - 1) // 2
+            return result._replace(
+                why=f"not by centres: {count} links have {centre_count}; `planar centres` lists them"
+            )
         try:
             by_centres, through = self._rate_by_centres(rate.links, rate.from_motions)
         except NoAnswer as problem:

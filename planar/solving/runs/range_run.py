@@ -207,7 +207,8 @@ class RangeRun(RunningInput):
             start = max(len(known) - 2, 0) if self.solver.functions.is_sparse else 0
             place = here + 2.0 * pi * start / steps
             # walking tells it sooner than a run would
-            end = self._find_range_end(known[start], place, 1.0, 2.0 * pi * (1.0 - start / steps))
+            z = known[start] if start else self.assembly.z
+            end = self._find_range_end(z, place, 1.0, 2.0 * pi * (1.0 - start / steps))
             if end.ending is not None:
                 return end
         found = self._run(steps, here, here + 2.0 * pi)
