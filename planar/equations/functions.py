@@ -1,12 +1,11 @@
 """The compiled casadi functions of a structure's equations over z, u and p: residuals, Jacobians, rates.
 
-What is derived of a structure is kept on disk, its equations as well as its functions, by a fingerprint of all that
-it depends on: to derive it takes many times as long as to read it.
+The functions that are derived of a whole structure are kept on disk, by a fingerprint of all that they depend on: to
+derive them takes many times as long as to read them.
 """
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Sequence
 from functools import cached_property, lru_cache
 from typing import Any, NamedTuple, TypeVar, cast
@@ -40,7 +39,6 @@ from planar.equations.symbolic_equations import (
     Block,
     ConstraintEquations,
     build_equations,
-    equations_from_outline,
     slice_length,
 )
 from planar.foundation.angles import wrap_angle
@@ -133,10 +131,6 @@ class EquationFunctions:
         self.is_compiled = True
         self._block_calls.clear()
         self._block_assemblies.clear()
-        if self._texts is not None:
-            equations = self.equations
-            self._texts.add("function", lambda: equations.as_function().serialize())
-            self._texts.add("outline", lambda: json.dumps(equations.outline()))
 
     def kept(self, name: str, make: Callable[[], Kept]) -> Kept:
         """What `make` makes of this structure, from the disk where it is kept there by this name."""
@@ -591,8 +585,4 @@ def equation_functions(mechanism: Mechanism) -> EquationFunctions:
 def _cached_equation_functions(structure: Mechanism) -> EquationFunctions:
     key = structure_fingerprint(structure)
     texts = None if key is None or KEPT_EQUATIONS.folder() is None else KeptTexts(KEPT_EQUATIONS, key)
-    told, outline = (texts.take("function"), texts.take("outline")) if texts else (None, None)
-    function = read_function(told)
-    if function is not None and outline is not None:
-        return EquationFunctions(equations_from_outline(json.loads(outline), function), texts)
     return EquationFunctions(build_equations(structure), texts)

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -155,48 +155,6 @@ class ConstraintEquations:
     def as_function(self) -> ca.Function:
         """(z, u, p) -> F, w."""
         return ca.Function("equations", [self.z, self.u, self.p], [self.F, self.w])
-
-    def outline(self) -> dict[str, Any]:
-        """All but the expressions, as a JSON value; with `as_function` it is what `equations_from_outline` takes."""
-        return {
-            "coordinates": [(each.owner, each.part, each.kind.value, each.of_link) for each in self.coordinates],
-            "unknowns": self.unknowns,
-            "rows": [(row.pair, row.kind.value) for row in self.rows],
-            "blocks": [
-                (each.unknowns.start, each.unknowns.stop, each.rows.start, each.rows.stop, *each[2:])
-                for each in self.blocks
-            ],
-            "known_after_block": self.known_after_block,
-            "input_kinds": [kind.value for kind in self.input_kinds],
-            "open_rows": self.open_rows,
-            "misfit_columns": self.misfit_columns,
-            "row_variables": self.row_variables,
-        }
-
-
-def equations_from_outline(outline: Mapping[str, Any], function: ca.Function) -> ConstraintEquations:
-    """The equations of an outline, the same as those of which it was made, and their function (z, u, p) -> F, w."""
-
-    def make_expressions() -> ConstraintExpressions:
-        z, u, p = (function.sx_in(k) for k in range(3))
-        F, w = function(z, u, p)
-        return ConstraintExpressions(z, u, p, w, F)
-
-    return ConstraintEquations(
-        tuple(Coordinate(owner, part, MeasureKind(kind), own) for owner, part, kind, own in outline["coordinates"]),
-        tuple(outline["unknowns"]),
-        tuple(ConstraintRow(pair, MeasureKind(kind)) for pair, kind in outline["rows"]),
-        tuple(
-            Block(slice(*each[:2]), slice(*each[2:4]), tuple(each[4]), tuple(each[5]), *each[6:])
-            for each in outline["blocks"]
-        ),
-        tuple(outline["known_after_block"]),
-        tuple(map(MeasureKind, outline["input_kinds"])),
-        make_expressions,
-        tuple(outline["open_rows"]),
-        tuple(outline["misfit_columns"]),
-        tuple(outline["row_variables"]),
-    )
 
 
 class _EliminatedStructure(NamedTuple):
