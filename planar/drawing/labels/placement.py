@@ -41,8 +41,8 @@ READ_ON_DISTANCE, READ_ON_COST = 10.0, 4.0
 """mm within which a figure that follows words in their line is read as theirs, and what that costs."""
 ACCEPTABLE_COST = 12.0
 """What the place of a letter costs at the most where nothing is wrong with it."""
-MAX_SWEEPS = 5
-"""Rounds in which letters may move; most drawings need two."""
+MAX_SWEEPS, MAX_CHOICES = 5, 700
+"""Rounds in which labels choose again, most drawings need two; and choices in all of them: very many choose once."""
 
 
 class PlacedLabel(NamedTuple):
@@ -298,6 +298,7 @@ class _LabelPlacer:
 
     def _cheapest(self, index: int, choice: _LabelCandidates, others: np.ndarray) -> tuple[int, float]:
         """The cheapest candidate beside others, and its cost; the rest is not looked at once that is sure."""
+        others = self._others_near(choice, others)
         best, least, start, count = 0, np.inf, 0, 24
         while start < len(choice.costs) and choice.costs[start] < least:
             part = slice(start, start + count)
@@ -306,6 +307,15 @@ class _LabelPlacer:
                 best, least = start + int(costs.argmin()), float(costs.min())
             start, count = start + count, 2 * count
         return best, least
+
+    def _others_near(self, choice: _LabelCandidates, others: np.ndarray) -> np.ndarray:
+        """Those of others (indices) that can cost any of the candidates something."""
+        parts = np.concatenate([choice.boxes, bounding_boxes(choice.leaders)])
+        region = np.concatenate([np.nanmin(parts[:, :2], axis=0), np.nanmax(parts[:, 2:], axis=0)])[None]
+        reach = np.concatenate([self.boxes[others], bounding_boxes(self.leaders[others])])
+        reach[len(others) :] = np.where(np.isnan(reach[len(others) :]), self.boxes[others], reach[len(others) :])
+        near = nearby_pairs(region, reach, READ_ON_DISTANCE)[1] % max(len(others), 1)
+        return others[np.unique(near)]
 
     def _choose(self, index: int) -> float:
         """Put one letter where it costs least now, looking farther off while nothing good is found; that cost."""
@@ -327,8 +337,9 @@ class _LabelPlacer:
         order = [int(each) for each in np.argsort(freedom, kind="stable")]
         for index in order:
             self._choose(index)
-        tries = len(order)
-        for _ in range(MAX_SWEEPS):
+        sweeps = min(MAX_SWEEPS, MAX_CHOICES // max(len(order), 1))
+        tries = min(len(order), MAX_CHOICES - sweeps * len(order))
+        for _ in range(sweeps):
             before = self.boxes.copy()
             for index in order:
                 if self._choose(index) > ACCEPTABLE_COST and tries > 0:

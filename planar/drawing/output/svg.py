@@ -12,7 +12,7 @@ from math import cos, hypot, radians, sin
 
 import numpy as np
 
-from planar.drawing.paper.boxes import Box, lengths_inside_boxes
+from planar.drawing.paper.boxes import Box, bounding_boxes, lengths_inside_boxes, nearby_pairs
 from planar.drawing.paper.pens import FILL_COLOURS, MM_PER_POINT, PEN_STYLES, PenStyle, pen_style
 from planar.drawing.paper.picture import (
     Arrow,
@@ -145,6 +145,7 @@ def _format_number(value: float) -> str:
 def _label_elements(letters: Sequence[Label], strokes: Sequence[Mark]) -> Iterable[tuple[str, Box]]:
     """Every letter and its box, where it covers the least of strokes and of letters before it, near rather than far."""
     ends = stroke_segments(strokes).ends
+    bounds = bounding_boxes(ends)
     taken: list[Box] = []
     for letter in letters:
         text = " ".join(letter.text.split())[:MAX_LABEL_LENGTH]
@@ -168,7 +169,9 @@ def _label_elements(letters: Sequence[Label], strokes: Sequence[Mark]) -> Iterab
         boxes = np.array([(x - wide / 2, y - tall / 2, x + wide / 2, y + tall / 2) for x, y in spots])
         costs = np.repeat(np.arange(len(LABEL_DISTANCES)), LABEL_DIRECTIONS)[: len(boxes)].astype(float)
         if len(ends):
-            costs += 4.0 * np.maximum(lengths_inside_boxes(boxes[:, None], ends[None], 0.2), 0.0).sum(axis=1)
+            region = np.concatenate([boxes[:, :2].min(axis=0), boxes[:, 2:].max(axis=0)])[None]
+            near = ends[nearby_pairs(region, bounds, 0.2)[1]]
+            costs += 4.0 * np.maximum(lengths_inside_boxes(boxes[:, None], near[None], 0.2), 0.0).sum(axis=1)
         for other in taken:
             meets = (np.minimum(boxes[:, 2:], other[2:]) - np.maximum(boxes[:, :2], other[:2])).min(axis=1)
             costs += 40.0 * np.maximum(meets, 0.0)

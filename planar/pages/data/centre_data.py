@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from itertools import combinations
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import chain, combinations, islice
 from typing import Any
 
 from planar.analysis.centres.centres import extent
@@ -66,12 +66,26 @@ def _third_links(links: Sequence[str], primary: PrimaryCentres) -> dict[tuple[st
         construction = KennedyConstruction(links, primary)
         construction.find_all()
         located = construction.found
-    shown = {link: {other for two in primary.centres if link in two for other in two - {link}} for link in links}
+    shown: dict[str, set[str]] = {link: set() for link in links}
+    for a, b in map(tuple, primary.centres):
+        shown[a].add(b)
+        shown[b].add(a)
+    place = {link: k for k, link in enumerate(links)}
     chosen = {}
     for two in pairs:
         found, (one, other) = located.get(frozenset(two)), two
-        first = [line.link for line in found.lines if line.link] if found else []
-        ranks = (first, shown[one] & shown[other], shown[one] ^ shown[other], links)
-        ordered = dict.fromkeys(third for rank in ranks for third in links if third in rank and third not in two)
-        chosen[two] = [*ordered][:MAX_LINES]
+        first = {line.link for line in found.lines if line.link} if found else set()
+        ranks = (first, shown[one] & shown[other], shown[one] ^ shown[other])
+        best = dict.fromkeys(third for rank in ranks for third in sorted(rank, key=place.__getitem__))
+        thirds = (third for third in chain(best, links) if third not in two)
+        chosen[two] = [*islice(_distinct(thirds), MAX_LINES)]
     return chosen
+
+
+def _distinct(names: Iterable[str]) -> Iterator[str]:
+    """Names in their order, each once."""
+    passed: set[str] = set()
+    for name in names:
+        if name not in passed:
+            passed.add(name)
+            yield name
