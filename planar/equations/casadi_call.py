@@ -13,6 +13,9 @@ from planar.foundation.arrays import Array
 
 CHUNK_SIZES = (256, 32, 8)
 """Positions that are worked on by one call."""
+MAX_MAPPED_ENTRIES = 20_000
+"""Entries of a function's results: one of more is called for one position after the other, since to make a call of
+many positions takes long, and room."""
 POLISHING_STEPS = 2
 """Newton's steps that carry a closed form to round-off."""
 ON_ARM = "assembly_on_arm"
@@ -70,6 +73,13 @@ class BufferedFunction:
 
     def evaluate_batch(self, count: int, *arguments: Array) -> list[Array]:
         """The results at many positions; arguments (positions, entries), or (entries,) for all of them alike."""
+        if sum(own.size for own in self.output_buffers) > MAX_MAPPED_ENTRIES:
+            results = [np.empty((count, *own.shape)) for own in self.output_buffers]
+            for k in range(count):
+                found = self(*(argument if argument.ndim == 1 else argument[k] for argument in arguments))
+                for result, part in zip(results, found, strict=True):
+                    result[k] = part
+            return results
         if count <= CHUNK_SIZES[0]:
             self._asked[count] += 1
             if count <= CHUNK_SIZES[1] or self._asked[count] > 2:
