@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from planar.equations.casadi_call import BufferedFunction
 from planar.equations.elements import Element, PlacedElement
 from planar.equations.elimination import EliminationRow
 from planar.equations.sparse_matrices import SparsePattern
@@ -89,26 +90,26 @@ class _ElementGroup(NamedTuple):
     slopes: IntArray
     coordinates: IntArray
 
-    def _call(self, function_name: str, values: Array, *rates: Array) -> list[Array]:
+    def _call(self, function: BufferedFunction, values: Array, *rates: Array) -> list[Array]:
         samples, count = len(values), len(self.arguments)
-        arguments = [values[:, self.arguments], *(each[:, self.coordinates] for each in rates)]
-        flat = [each.reshape(samples * count, -1) for each in arguments]
-        results = getattr(self.element, function_name).evaluate_batch(samples * count, *flat)
-        return [each.reshape(samples, count, -1) for each in results]
+        arguments = [values[:, self.arguments], *(rate[:, self.coordinates] for rate in rates)]
+        flat = [argument.reshape(samples * count, argument.shape[-1]) for argument in arguments]
+        results = function.evaluate_batch(samples * count, *flat)
+        return [result.reshape(samples, count, result.shape[-1]) for result in results]
 
     def evaluate(self, values: Array, rests: Array, slopes: Array | None) -> None:
         """Set the rests (samples, rows) and the entries of their slopes (samples, entries)."""
         if slopes is None:
-            (rests[:, self.rows],) = self._call("rest_call", values)
+            (rests[:, self.rows],) = self._call(self.element.rest_call, values)
         elif self.slopes.size:
-            rests[:, self.rows], slopes[:, self.slopes] = self._call("slopes_call", values)
+            rests[:, self.rows], slopes[:, self.slopes] = self._call(self.element.slopes_call, values)
         else:
-            rests[:, self.rows] = self._call("rest_call", values)[0]
+            rests[:, self.rows] = self._call(self.element.rest_call, values)[0]
 
     def evaluate_second_rates(self, values: Array, rates: Array, rests: Array) -> None:
         """Set the second rates of the rests (samples, rows) that follow from first rates of s (samples, s) alone."""
         if self.slopes.size:
-            (rests[:, self.rows],) = self._call("second_rate_call", values, rates)
+            (rests[:, self.rows],) = self._call(self.element.second_rate_call, values, rates)
 
 
 class _Stage(NamedTuple):

@@ -1,4 +1,4 @@
-"""The compiled casadi functions of a structure's equations over z, u and p: residuals, Jacobians, rates.
+"""A structure's equations as functions of arrays z, u and p: residuals, Jacobians, rates, by elements or compiled.
 
 The functions that are derived of a whole structure are kept on disk, by a fingerprint of all that they depend on: to
 derive them takes many times as long as to read them.
@@ -440,9 +440,9 @@ class EquationFunctions:
 
     def run_samples(self, z: Array, u: Array, p: Array) -> Array:
         """The unknowns at every sample of inputs u (samples, inputs), each from the one before, the first from z."""
-        elements = self._elements(RUN_NEWTON_STEPS * len(u))
+        elements = self._elements(RUN_NEWTON_STEPS * len(u)) if len(u) else None
         if elements is None:
-            return self._run_function(z, u, p)
+            return self._run_function(z, u, p) if len(u) else np.empty((0, len(z)))
         if any(slice_length(block.unknowns) > MAX_UNROLLED_UNKNOWNS for block in self.equations.blocks):
             return self._run_whole(elements, z, u, p)
         return self._run_blocks(elements, z, u, p)

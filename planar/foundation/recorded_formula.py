@@ -20,11 +20,6 @@ class RecordedFormula(NamedTuple):
     operations: tuple[Operation, ...]
     results: tuple[Operand, ...]
 
-    @property
-    def arguments(self) -> list[int]:
-        """The arguments that the formula takes, in the order of their first use."""
-        return [operation[1] for operation in self.operations if operation[0] == "argument"]
-
     def evaluate(self, arguments: Sequence[Scalar]) -> list[Scalar]:
         """Compute the results in any arithmetic from the values of all arguments."""
         values: list[Scalar] = []

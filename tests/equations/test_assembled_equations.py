@@ -53,6 +53,7 @@ def test_elements_say_what_expressions_of_the_whole_say(stem):
     moved = np.asarray(SparseMatrices(assembled.coordinate_pattern, assembled.coordinate_jacobians(z, u, p)))
     np.testing.assert_allclose(moved[1], slope(z[1], u[1], p).full(), rtol=1e-10, atol=1e-10)
     np.testing.assert_allclose(assembled.coordinates(z, u, p), coordinates[:, 0], rtol=1e-12)
+    assert assembled.kinematics(y[:0], y1[:0], y2[:0], p)[0].shape == (0, 3, len(equations.rows))
 
 
 @pytest.mark.parametrize("stem", SOLVED)
@@ -88,6 +89,7 @@ def test_runs_block_after_block_are_those_of_functions_of_the_whole(stem):
     by_types, whole = (EquationFunctions(solver.equations) for _ in range(2))
     whole.compile()
     z, u, p = solver.find_assembly().z, solver.inputs.u, solver.inputs.p
+    assert by_types.run_samples(z, u[None][:0], p).shape == (0, len(z))
     steps = u + np.linspace(0.01, 0.1, 10)[:, None] * np.random.default_rng(0).uniform(0.5, 1.0, len(u))
     np.testing.assert_allclose(by_types.run_samples(z, steps, p), whole.run_samples(z, steps, p), rtol=1e-9, atol=1e-9)
 
