@@ -728,6 +728,13 @@ def test_the_search_for_an_assembly_stops_after_its_effort(monkeypatch):
         planar.solve(MODELS["chain-42"].with_values({"frame.A15.y": 1e13}))
 
 
+def test_a_search_that_stops_before_a_block_fails_says_so_too(monkeypatch):
+    monkeypatch.setattr(nearest_assembly, "MAX_REPEATED_EFFORT", -1.0)
+    monkeypatch.setattr(refusals, "_remedy", lambda *_: "change it")
+    with pytest.raises(NoAnswer, match=r"the search stopped after \d+ steps"):
+        planar.solve(planar.from_dict(mm_four_bar(theta=71)))
+
+
 def test_a_dyad_out_of_reach_is_told_by_its_closed_form_not_by_all_starts(monkeypatch):
     # without it "closed to round-off" is met at this size by combinations of earlier blocks that are far from closed
     calls, damped = [], block_assemblies.damped_newton

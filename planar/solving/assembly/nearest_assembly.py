@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import heapq
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from itertools import count
 from math import hypot, pi, remainder, tau
 from typing import NamedTuple
@@ -103,6 +103,11 @@ class _Node(NamedTuple):
     "blocks in which another choice lies as near to the sketch"
 
 
+def _failure_beyond(node: _Node, stages: Sequence[Block]) -> AssemblySearchFailure:
+    """What to say of a search that stopped before any block failed."""
+    return AssemblySearchFailure(stages[len(node.ranks)], node.z)
+
+
 def find_nearest_assembly(
     candidates: BlockAssemblies, is_regular: Callable[[Array], bool] | None = None
 ) -> Assembly | AssemblySearchFailure:
@@ -152,10 +157,12 @@ def find_nearest_assembly(
                     (*node.ties, len(node.ranks)) if alike else node.ties,
                 ),
             )
+    if chosen is None and not groups.is_hopeless:  # cut off: what is whole already will do
+        chosen = min((node for node in heap if len(node.ranks) == len(stages)), default=None)
     if chosen is None:
-        assert groups.last_failure is not None
+        failure = groups.last_failure or _failure_beyond(max(heap, key=lambda node: len(node.ranks)), stages)
         is_cut_off = bool(heap) and not groups.is_hopeless
-        return groups.last_failure._replace(effort=candidates.effort, is_cut_off=is_cut_off)
+        return failure._replace(effort=candidates.effort, is_cut_off=is_cut_off)
     return Assembly((taken or chosen).z, (taken or chosen).ties if tied else (), bool(heap))
 
 
