@@ -117,4 +117,4 @@ def test_a_process_with_another_alphabet_prints_tables_and_json_that_reads_as_ev
     assert "omega_AB = 10.5 rad/s, anticlockwise" in done
     assert "\\" not in done
     plain = command.process(tmp_path, "solve", name, "--json", PYTHONIOENCODING="cp437").out
-    assert json.loads(plain) == json.loads(command.run(tmp_path, "solve", name, "--json").done())
+    assert json.loads(plain) == json.loads(command.process(tmp_path, "solve", name, "--json").done())
