@@ -28,7 +28,7 @@ from planar.pages.data.page_data import page_data
 from planar.reports.files.table_files import encode_tables
 from planar.reports.fitted_table import plain_table
 from planar.reports.number_format import paragraphs, precision_text, vector_direction
-from tests.command import FROM_OUTSIDE, ROOT, run
+from tests.command import FROM_OUTSIDE, ROOT, process, run
 from tests.draws import part
 
 WIDTHS = (40, 60, 80, 100, 200)
