@@ -85,13 +85,8 @@ class AcceptanceFunctions:
     def __init__(self, structure: Mechanism, program: EquationFunctions):
         self.structure, self.functions, self.equations = structure, program, program.equations
         sizes = [slice_length(block.unknowns) for block in self.equations.blocks]
-        self._is_small = program.is_square and not program.is_sparse and max(sizes, default=0) <= MAX_BLOCK_SIZE
+        self.is_available = program.is_square and not program.is_sparse and max(sizes, default=0) <= MAX_BLOCK_SIZE
         self.block_starts = np.array([block.unknowns.start for block in self.equations.blocks], dtype=int)
-
-    @property
-    def is_available(self) -> bool:
-        """Whether the structure has such functions: it is small, and has been evaluated so often that they pay."""
-        return self._is_small and self.functions.is_compiled
 
     @staticmethod
     def result(verdict: Iterable[Judged]) -> AcceptanceResult[Judged]:

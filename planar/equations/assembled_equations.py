@@ -1,4 +1,4 @@
-"""The equations of a structure evaluated from its elements by index arrays: no expression of the whole is made.
+"""The equations of a structure evaluated from its elements by index arrays: no expression of a structure is made.
 
 Every coordinate that elimination solved for is a constant linear combination of y = (z, u) and of the rests of the
 pairs' rows, and so is every remaining constraint. The rests depend on few coordinates, those of their own bodies. They
@@ -9,6 +9,7 @@ these and on which later rests depend.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
@@ -52,12 +53,17 @@ class _Combinations(NamedTuple):
             target[..., self.results] = np.add.reduceat(self.coefficients * x[..., self.sources], self.starts, axis=-1)
 
 
+def _starts(lengths: Iterable[int]) -> IntArray:
+    """The places of the first terms of sums of so many terms each."""
+    starts: IntArray = np.cumsum([0, *lengths])[:-1]
+    return starts
+
+
 def _combinations(terms: Iterable[tuple[int, Mapping[int, float]]]) -> _Combinations:
     filled = [(result, sums) for result, sums in terms if sums]
-    lengths = [len(sums) for _, sums in filled]
     return _Combinations(
         np.array([result for result, _ in filled], dtype=int),
-        np.cumsum([0, *lengths])[:-1] if lengths else np.zeros(0, int),
+        _starts(len(sums) for _, sums in filled),
         np.array([source for _, sums in filled for source in sums], dtype=int),
         np.array([value for _, sums in filled for value in sums.values()], dtype=float),
     )
@@ -76,6 +82,16 @@ class _Products(NamedTuple):
         if len(self.results):
             products = a[..., self.left] * b[..., self.right]
             target[..., self.results] = np.add.reduceat(products, self.starts, axis=-1)
+
+
+def _products(terms: Sequence[tuple[int, Sequence[tuple[int, int]]]]) -> _Products:
+    """Sums by their results, each of pairs of an entry of a and one of b."""
+    return _Products(
+        np.array([result for result, _ in terms], dtype=int),
+        _starts(len(pairs) for _, pairs in terms),
+        np.array([left for _, pairs in terms for left, _ in pairs], dtype=int),
+        np.array([right for _, pairs in terms for _, right in pairs], dtype=int),
+    )
 
 
 class _ElementGroup(NamedTuple):
@@ -99,12 +115,10 @@ class _ElementGroup(NamedTuple):
 
     def evaluate(self, values: Array, rests: Array, slopes: Array | None) -> None:
         """Set the rests (samples, rows) and the entries of their slopes (samples, entries)."""
-        if slopes is None:
+        if slopes is None or not self.slopes.size:
             (rests[:, self.rows],) = self._call(self.element.rest_call, values)
-        elif self.slopes.size:
-            rests[:, self.rows], slopes[:, self.slopes] = self._call(self.element.slopes_call, values)
         else:
-            rests[:, self.rows] = self._call(self.element.rest_call, values)[0]
+            rests[:, self.rows], slopes[:, self.slopes] = self._call(self.element.slopes_call, values)
 
     def evaluate_second_rates(self, values: Array, rates: Array, rests: Array) -> None:
         """Set the second rates of the rests (samples, rows) that follow from first rates of s (samples, s) alone."""
@@ -129,9 +143,10 @@ class AssembledJacobians(NamedTuple):
     entries: Array
 
 
-class _Evaluation(NamedTuple):
-    """What was computed at samples: the arguments of elements (samples, (s, cos s, sin s, p)), x (samples, x), and the
-    entries of the derivatives of rests (samples, entries)."""
+@dataclass(eq=False)
+class _Evaluation:
+    """What was computed at samples: the arguments of elements (samples, (s, cos s, sin s, p)), x (samples, x), the
+    entries of the derivatives of rests (samples, entries), and those of dF/dy once they have been asked for."""
 
     z: Array
     u: Array
@@ -139,11 +154,7 @@ class _Evaluation(NamedTuple):
     values: Array
     x: Array
     slopes: Array | None
-
-    def entries(self, plan: _JacobianPlan) -> Array:
-        """The entries of a Jacobian (samples, entries)."""
-        assert self.slopes is not None
-        return plan.entries(self.slopes)
+    jacobian_entries: Array | None = None
 
 
 class AssembledEquations:
@@ -199,45 +210,38 @@ class AssembledEquations:
 
     def _make_slope_entries(self) -> None:
         """Number the entries of the derivatives of all rests by s."""
-        rows: list[int] = []
-        columns: list[int] = []
+        self._slope_count = 0
         self._first_slope: list[int] = []
-        self._row_coordinates: list[list[int]] = [[] for _ in self._elimination.lines]
-        self._row_slopes: list[list[int]] = [[] for _ in self._elimination.lines]
+        self._row_slopes: list[list[tuple[int, int]]] = [[] for _ in self._elimination.lines]
+        "for every row the numbers of its entries, each with its column in s"
         for placed in self._elimination.elements:
-            self._first_slope.append(len(rows))
+            self._first_slope.append(self._slope_count)
             for row, column in placed.element.slope_entries:
-                self._row_coordinates[placed.rows[row]].append(placed.coordinates[column])
-                self._row_slopes[placed.rows[row]].append(len(rows))
-                rows.append(placed.rows[row])
-                columns.append(placed.coordinates[column])
-        self._slope_columns = np.array(columns, dtype=int)
-        self._slope_count = len(rows)
+                self._row_slopes[placed.rows[row]].append((self._slope_count, placed.coordinates[column]))
+                self._slope_count += 1
 
     def _make_stages(self) -> None:
         """Part rests and the coordinates on which they depend into stages."""
         first = self._coordinate_count
-        needed = {column for columns in self._row_coordinates for column in columns}
+        needed = {column for entries in self._row_slopes for _, column in entries}
         level: dict[int, int] = {int(column): 0 for column in self._unknowns}
         row_level: dict[int, int] = {}
         y_count = self._y_count
 
         def level_of_row(row: int) -> int:
             if row not in row_level:
-                columns = self._row_coordinates[row]
+                columns = (column for _, column in self._row_slopes[row])
                 row_level[row] = max((level[column] for column in columns if column < first), default=0)
             return row_level[row]
 
+        early: dict[int, int] = {}
         for column, _ in self._elimination.solved:
             if column in needed:
                 sources = [source - y_count for source in self._coordinate_sums[column] if source >= y_count]
-                level[column] = 1 + max(map(level_of_row, sources), default=-1)
-        early = {column: value for column, value in level.items() if column in needed and column not in self._unknowns}
-        self._start_coordinates = _combinations(
-            (column, self._coordinate_sums[column])
-            for column in [*map(int, self._unknowns), *(column for column, value in early.items() if value == 0)]
-        )
-        count = 1 + max([*map(level_of_row, range(len(self._row_coordinates))), *early.values()], default=0)
+                level[column] = early[column] = 1 + max(map(level_of_row, sources), default=-1)
+        self._start_columns = [*self._unknowns.tolist(), *(column for column, value in early.items() if value == 0)]
+        self._start_coordinates = _combinations((column, self._state_sums[column]) for column in self._start_columns)
+        count = 1 + max([*map(level_of_row, range(self._rest_count)), *early.values()], default=0)
         by_stage: list[dict[Element, list[tuple[PlacedElement, int]]]] = [{} for _ in range(count)]
         for placed, first_slope in zip(self._elimination.elements, self._first_slope, strict=True):
             for stage in {level_of_row(row) for row in placed.rows}:
@@ -245,20 +249,13 @@ class AssembledEquations:
         self._find_trigonometric_columns()
         self._stages = []
         for stage, elements in enumerate(by_stage):
-            rows = [row for row in range(len(self._row_coordinates)) if level_of_row(row) == stage]
+            rows = [row for row in range(self._rest_count) if level_of_row(row) == stage]
             terms = [(row, self._row_slopes[row]) for row in rows if self._row_slopes[row]]
-            slopes = [slope for _, entries in terms for slope in entries]
-            products = _Products(
-                np.array([row for row, _ in terms], dtype=int),
-                np.cumsum([0, *(len(entries) for _, entries in terms)])[:-1] if terms else np.zeros(0, int),
-                np.array(slopes, dtype=int),
-                self._slope_columns[slopes],
-            )
             columns = [column for column, value in early.items() if value == stage + 1]
             self._stages.append(
                 _Stage(
                     [self._group(element, places) for element, places in elements.items()],
-                    products,
+                    _products(terms),
                     _combinations((column, self._coordinate_sums[column]) for column in columns),
                 )
             )
@@ -352,11 +349,19 @@ class AssembledEquations:
     def residuals_and_jacobians(self, z: Array, u: Array, p: Array) -> AssembledJacobians:
         """F and the entries of dF/dy by their `pattern` at samples."""
         evaluation = self._evaluate(z, u, p, True)
-        return AssembledJacobians(self._residuals(evaluation.x), evaluation.entries(self._jacobian_plan))
+        return AssembledJacobians(self._residuals(evaluation.x), self._jacobian_entries(evaluation))
+
+    def _jacobian_entries(self, evaluation: _Evaluation) -> Array:
+        if evaluation.jacobian_entries is None:
+            assert evaluation.slopes is not None
+            evaluation.jacobian_entries = self._jacobian_plan.entries(evaluation.slopes)
+        return evaluation.jacobian_entries
 
     def coordinate_jacobians(self, z: Array, u: Array, p: Array) -> Array:
         """The entries of dw/dy by `coordinate_pattern` at samples (samples, entries)."""
-        return self._evaluate(z, u, p, True).entries(self._coordinate_plan)
+        slopes = self._evaluate(z, u, p, True).slopes
+        assert slopes is not None
+        return self._coordinate_plan.entries(slopes)
 
     def kinematics(self, y: Array, y1: Array, y2: Array, p: Array) -> tuple[Array, Array, Array]:
         """F (samples, 3, rows) and w (samples, 3, coordinates) with their first and second rates, and the entries of
@@ -385,7 +390,7 @@ class AssembledEquations:
                 for stage in self._stages:
                     for group in stage.groups:
                         group.evaluate_second_rates(values, state_rates, bending)
-        entries = evaluation.entries(self._jacobian_plan)
+        entries = self._jacobian_entries(evaluation)
         return np.stack(residuals, axis=1), np.stack(coordinates, axis=1), entries
 
     # Jacobians
@@ -403,7 +408,6 @@ class AssembledEquations:
     @cached_property
     def _rest_plan(self) -> _RestPlan:
         """How the derivatives of rests by y are computed."""
-        first_input = len(self._unknowns) - self._coordinate_count
         state_entries: dict[int, dict[int, int]] = {}
         constants: list[float] = []
 
@@ -415,35 +419,24 @@ class AssembledEquations:
             state_entries[column] = entries
             return entries
 
-        for k, column in enumerate(self._unknowns):
-            add_state(int(column), {k: 1.0})
-        for column in range(self._coordinate_count, self._state_count):
-            add_state(column, {first_input + column: 1.0})
-        for column, stage_number in self._early_columns.items():
-            if stage_number == 0:
-                add_state(column, self._coordinate_sums[column])
+        for column in (*self._start_columns, *range(self._coordinate_count, self._state_count)):
+            add_state(column, self._state_sums[column])
         rest_entries: dict[int, dict[int, int]] = {}
         rest_count = 0
         steps: list[tuple[_Products, _Combinations]] = []
         for number, stage in enumerate(self._stages):
-            terms: list[tuple[int, list[int], list[int]]] = []
+            terms: list[tuple[int, list[tuple[int, int]]]] = []
             for row in stage.rest_rates.results:
                 entries: dict[int, int] = {}
                 pairs: dict[int, list[tuple[int, int]]] = {}
-                for slope, column in zip(self._row_slopes[row], self._row_coordinates[row], strict=True):
+                for slope, column in self._row_slopes[row]:
                     for source, place in state_entries[column].items():
                         pairs.setdefault(source, []).append((slope, place))
-                for source, products in pairs.items():
+                for source, factors in pairs.items():
                     entries[source] = rest_count
-                    terms.append((rest_count, [a for a, _ in products], [b for _, b in products]))
+                    terms.append((rest_count, factors))
                     rest_count += 1
                 rest_entries[int(row)] = entries
-            products_of_stage = _Products(
-                np.array([result for result, _, _ in terms], dtype=int),
-                np.cumsum([0, *(len(a) for _, a, _ in terms)])[:-1] if terms else np.zeros(0, int),
-                np.array([k for _, a, _ in terms for k in a], dtype=int),
-                np.array([k for _, _, b in terms for k in b], dtype=int),
-            )
             sums: list[tuple[int, dict[int, float]]] = []
             for column, stage_number in self._early_columns.items():
                 if stage_number == number + 1:
@@ -451,7 +444,7 @@ class AssembledEquations:
                     sources = {**constant, **varying}
                     places = add_state(column, {source: constant.get(source, 0.0) for source in sources})
                     sums += [(places[source], parts) for source, parts in varying.items()]
-            steps.append((products_of_stage, _combinations(sums)))
+            steps.append((_products(terms), _combinations(sums)))
         return _RestPlan(np.array(constants), rest_count, steps, rest_entries)
 
     def _expand(

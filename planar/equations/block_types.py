@@ -36,7 +36,8 @@ class BlockTypeKey(NamedTuple):
     row_kinds: tuple[MeasureKind, ...]
     own_kinds: tuple[tuple[MeasureKind, bool], ...]
     "what every own coordinate is, and whether it is one of a link"
-    unknowns: tuple[int, ...]
+    unknown_count: int
+    "of own coordinates, which stand first"
     known_kinds: tuple[MeasureKind, ...]
     number_count: int
 
@@ -121,7 +122,7 @@ class _BlockPlacer:
             residual_terms,
             tuple(row.kind for row in e.rows[block.rows]),
             tuple((e.coordinates[column].kind, e.coordinates[column].of_link) for column in own),
-            tuple(range(len(unknowns))),
+            len(unknowns),
             tuple(self._kind_of(column) for column in known),
             len(numbers),
         )
@@ -158,17 +159,18 @@ def block_equations(key: BlockTypeKey) -> ConstraintEquations:
     elimination = Elimination(tuple(elements), solved, lines, count, len(key.known_kinds), key.number_count)
     coordinates = tuple(Coordinate(f"own {k}", "angle", *kind) for k, kind in enumerate(key.own_kinds))
     rows = tuple(ConstraintRow("", kind) for kind in key.row_kinds)
+    unknowns = tuple(range(key.unknown_count))
     names = [f"number {k}" for k in range(key.number_count)]
-    block = Block(slice(0, len(key.unknowns)), slice(0, len(rows)), (), (), False, 0)
+    block = Block(slice(0, key.unknown_count), slice(0, len(rows)), (), (), False, 0)
     return ConstraintEquations(
         coordinates,
-        key.unknowns,
+        unknowns,
         rows,
         (block,),
         (0,) * count,
         key.known_kinds,
         lambda: expressions_of_elimination(
-            elimination, coordinates, key.known_kinds, key.unknowns, list(enumerate(key.row_kinds)), names, {}
+            elimination, coordinates, key.known_kinds, unknowns, list(enumerate(key.row_kinds)), names, {}
         ),
     )
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
 from threading import Lock
 from typing import Any
 
@@ -38,6 +39,16 @@ def formula_text(rows: ca.SX, *symbols: ca.SX) -> str:
     return text
 
 
+def bound_call(function: Any, inputs: Sequence[Array], outputs: Sequence[Array]) -> tuple[Any, Any]:
+    """What runs a function from arrays to arrays, and the buffer, which has to live as long."""
+    buffer, run = function.buffer()
+    for set_array, arrays in ((buffer.set_arg, inputs), (buffer.set_res, outputs)):
+        for k, array in enumerate(arrays):
+            if array.size:
+                set_array(k, array.reshape(-1).data)
+    return run, buffer
+
+
 class BufferedFunction:
     """A function of dense columns. Results are (columns, rows), or (positions, columns, rows).
 
@@ -49,19 +60,11 @@ class BufferedFunction:
         self.lock = Lock()
         self.input_buffers = [np.zeros(function.numel_in(k)) for k in range(function.n_in())]
         self.output_buffers = [np.zeros(function.size_out(k)[::-1]) for k in range(function.n_out())]
-        self.call_buffers = self._bind_buffers()
+        self.call_buffers, self._buffer = bound_call(function, self.input_buffers, self.output_buffers)
+        self._is_large = sum(array.size for array in self.output_buffers) > MAX_MAPPED_ENTRIES
         self._mapped: dict[int, tuple[Any, Any]] = {}
         self._asked: Counter[int] = Counter()
         self._few: dict[int, tuple[list[Array], list[Array], Any, Any]] = {}
-
-    def _bind_buffers(self) -> Any:
-        buffer, run = self.function.buffer()
-        for set_, arrays in ((buffer.set_arg, self.input_buffers), (buffer.set_res, self.output_buffers)):
-            for k, each in enumerate(arrays):
-                if each.size:
-                    set_(k, each.reshape(-1).data)
-        self._buffer = buffer  # has to live as long as what runs it
-        return run
 
     def __call__(self, *arguments: Array) -> list[Array]:
         """The results at one position, each argument as long as the function's."""
@@ -73,11 +76,11 @@ class BufferedFunction:
 
     def evaluate_batch(self, count: int, *arguments: Array) -> list[Array]:
         """The results at many positions; arguments (positions, entries), or (entries,) for all of them alike."""
-        if sum(own.size for own in self.output_buffers) > MAX_MAPPED_ENTRIES:
-            results = [np.empty((count, *own.shape)) for own in self.output_buffers]
+        if self._is_large:
+            results = [np.empty((count, *buffer.shape)) for buffer in self.output_buffers]
             for k in range(count):
-                found = self(*(argument if argument.ndim == 1 else argument[k] for argument in arguments))
-                for result, part in zip(results, found, strict=True):
+                parts = self(*(argument if argument.ndim == 1 else argument[k] for argument in arguments))
+                for result, part in zip(results, parts, strict=True):
                     result[k] = part
             return results
         if count <= CHUNK_SIZES[0]:
@@ -115,12 +118,8 @@ class BufferedFunction:
             if count not in self._few:
                 inputs: list[Array] = [np.zeros((count, len(own))) for own in self.input_buffers]
                 outputs: list[Array] = [np.zeros((count, *own.shape)) for own in self.output_buffers]
-                buffer, run = self.function.map(count).buffer() if count > 1 else self.function.buffer()
-                for set_, arrays in ((buffer.set_arg, inputs), (buffer.set_res, outputs)):
-                    for k, array in enumerate(arrays):
-                        if array.size:
-                            set_(k, array.reshape(-1).data)
-                self._few[count] = inputs, outputs, run, buffer
+                function = self.function.map(count) if count > 1 else self.function
+                self._few[count] = inputs, outputs, *bound_call(function, inputs, outputs)
             inputs, outputs, run, _ = self._few[count]
             for array, argument in zip(inputs, arguments, strict=True):
                 array[:] = argument
@@ -166,11 +165,7 @@ class RunFunction:
             function = self.function.mapaccum("runs", size) if size > 1 else self.function
             many = [self.function.numel_in(k) for k in range(3)]
             arrays = [np.zeros(many[0]), *(np.zeros((size, each)) for each in (*many[1:], many[0]))]
-            buffer, run = function.buffer()
-            for k, each in enumerate(arrays[:3]):
-                if each.size:
-                    buffer.set_arg(k, each.reshape(-1).data)
-            buffer.set_res(0, arrays[3].reshape(-1).data)
+            run, buffer = bound_call(function, arrays[:3], arrays[3:])
             self._made[size] = run, arrays, buffer
         return self._made[size][:2]
 

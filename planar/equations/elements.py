@@ -13,6 +13,7 @@ from typing import NamedTuple
 import casadi as ca
 
 from planar.equations.casadi_call import BufferedFunction
+from planar.equations.elimination import stack_expressions
 from planar.foundation.geometry import GROUND, Frame
 from planar.foundation.jets import Scalar
 from planar.foundation.recorded_formula import RecordedFormula, RecordedNumber, record_formula
@@ -63,7 +64,7 @@ class Element:
         self.nonlinear: list[set[int]] = []
         "for every row the local coordinates on which its rest depends"
         self.rest: list[ca.SX] = []
-        everything = ca.vertcat(ca.SX(0, 1), *self.coordinates, *self.cosines, *self.sines)
+        everything = stack_expressions([*self.coordinates, *self.cosines, *self.sines])
         for value in values:
             slopes = ca.jacobian(value, everything)
             factors, nonlinear = {}, set()
@@ -74,7 +75,7 @@ class Element:
                 else:
                     body = (column - self.coordinate_count) % max(bodies, 1)
                     nonlinear.add(column if column < self.coordinate_count else 3 * body + 2)
-            linear = ca.vertcat(ca.SX(0, 1), *(self.coordinates[column] for column in factors))
+            linear = stack_expressions(self.coordinates[column] for column in factors)
             self.factors.append(factors)
             self.nonlinear.append(nonlinear)
             self.rest.append(ca.substitute(value, linear, ca.SX.zeros(len(factors))) if factors else value)
@@ -84,16 +85,20 @@ class Element:
     @cached_property
     def arguments(self) -> ElementArguments:
         """What the functions of the rest take."""
-        symbols = {symbol.name() for symbol in ca.symvar(ca.vertcat(ca.SX(0, 1), *self.rest, *self._slopes))}
-        groups = (self.coordinates, self.cosines, self.sines, self.numbers)
+        symbols = {symbol.name() for symbol in ca.symvar(stack_expressions([*self.rest, *self._slopes]))}
         return ElementArguments(
-            *(tuple(k for k, symbol in enumerate(group) if symbol.name() in symbols) for group in groups)
+            *(tuple(k for k, symbol in enumerate(group) if symbol.name() in symbols) for group in self._symbol_groups)
         )
 
+    @property
+    def _symbol_groups(self) -> tuple[list[ca.SX], ...]:
+        return self.coordinates, self.cosines, self.sines, self.numbers
+
     @cached_property
-    def _argument_symbols(self) -> list[ca.SX]:
-        groups = (self.coordinates, self.cosines, self.sines, self.numbers)
-        return [group[k] for group, chosen in zip(groups, self.arguments, strict=True) for k in chosen]
+    def _argument_column(self) -> ca.SX:
+        """The symbols of the arguments, one below the other."""
+        groups = zip(self._symbol_groups, self.arguments, strict=True)
+        return stack_expressions(group[k] for group, indices in groups for k in indices)
 
     def _derivative(self, value: ca.SX, column: int) -> ca.SX:
         """The derivative by a local coordinate; cos and sin of an angle change with it."""
@@ -111,7 +116,7 @@ class Element:
     @cached_property
     def rest_function(self) -> ca.Function:
         """(arguments) -> the rests (rows,)."""
-        return ca.Function("rest", [ca.vertcat(ca.SX(0, 1), *self._argument_symbols)], [_dense_column(self.rest)])
+        return ca.Function("rest", [self._argument_column], [_dense_column(self.rest)])
 
     @cached_property
     def rest_call(self) -> BufferedFunction:
@@ -121,25 +126,22 @@ class Element:
     @cached_property
     def slopes_call(self) -> BufferedFunction:
         """(arguments) -> the rests (rows,), and their derivatives (slope entries,)."""
-        arguments = ca.vertcat(ca.SX(0, 1), *self._argument_symbols)
-        return BufferedFunction(
-            ca.Function("slopes", [arguments], [_dense_column(self.rest), _dense_column(self._slopes)])
-        )
+        results = [_dense_column(self.rest), _dense_column(self._slopes)]
+        return BufferedFunction(ca.Function("slopes", [self._argument_column], results))
 
     @cached_property
     def second_rate_call(self) -> BufferedFunction:
         """(arguments, rates of local coordinates) -> the second rates of the rests (rows,), coordinates without any."""
-        arguments = ca.vertcat(ca.SX(0, 1), *self._argument_symbols)
         rates = ca.SX.sym("rate", self.coordinate_count)
         second = [ca.SX(0.0) for _ in self.rest]
         for (row, column), slope in zip(self.slope_entries, self._slopes, strict=True):
             for other in self.nonlinear[row]:
                 second[row] = second[row] + rates[column] * rates[other] * self._derivative(slope, other)
-        return BufferedFunction(ca.Function("second", [arguments, rates], [_dense_column(second)]))
+        return BufferedFunction(ca.Function("second", [self._argument_column, rates], [_dense_column(second)]))
 
 
 def _dense_column(values: Sequence[ca.SX]) -> ca.SX:
-    return ca.densify(ca.vertcat(ca.SX(0, 1), *values))
+    return ca.densify(stack_expressions(values))
 
 
 @lru_cache(maxsize=MAX_ELEMENTS)

@@ -51,7 +51,7 @@ MAX_CACHED_STRUCTURES = 256
 """Mechanisms of which what was derived is kept: more than come along, so that none is derived twice in a round."""
 
 KEPT_EQUATIONS = PrivateCache("equations", ".equations", b"planar equations\n", 128 * 2**20)
-"""Equations and functions of structures, as casadi writes them; those of one take from 0.1 to 1 MB."""
+"""Functions of structures, as casadi writes them; those of one take from 0.1 to 1 MB."""
 SETTLED_STEP = 1e-9
 """rad or sizes: after a shorter step of Newton's method the next one is round-off."""
 MAX_UNROLLED_UNKNOWNS = 12
@@ -261,10 +261,11 @@ class EquationFunctions:
 
     def coordinates(self, z: Array, u: Array, p: Array) -> Array:
         """w (coordinates,) at z (unknowns,), or (samples, coordinates) at z (samples, unknowns), u alike."""
-        if z.ndim == 1 and (elements := self._elements()) is not None:
-            return elements.coordinates(z[None], u[None], p)[0]
-        if z.ndim == 2 and (elements := self._elements(len(z))) is not None:
-            return elements.coordinates(z, np.broadcast_to(u, (len(z), u.shape[-1])), p)
+        many = np.atleast_2d(z)
+        elements = self._elements(len(many))
+        if elements is not None:
+            w = elements.coordinates(many, np.broadcast_to(u, (len(many), u.shape[-1])), p)
+            return w[0] if z.ndim == 1 else w
         if z.ndim == 1:
             return self._coordinate_call(z, u, p)[0][0]
         return self._coordinate_call.evaluate_batch(len(z), z, u, p)[0][:, 0]
@@ -440,9 +441,11 @@ class EquationFunctions:
 
     def run_samples(self, z: Array, u: Array, p: Array) -> Array:
         """The unknowns at every sample of inputs u (samples, inputs), each from the one before, the first from z."""
-        elements = self._elements(RUN_NEWTON_STEPS * len(u)) if len(u) else None
+        if not len(u):
+            return np.empty((0, len(z)))
+        elements = self._elements(RUN_NEWTON_STEPS * len(u))
         if elements is None:
-            return self._run_function(z, u, p) if len(u) else np.empty((0, len(z)))
+            return self._run_function(z, u, p)
         if any(slice_length(block.unknowns) > MAX_UNROLLED_UNKNOWNS for block in self.equations.blocks):
             return self._run_whole(elements, z, u, p)
         return self._run_blocks(elements, z, u, p)

@@ -75,7 +75,7 @@ class KnownCoordinates:
                 return
             own = z[block.unknowns]
             self._state[placed.coordinates] = call(own, self._state[placed.known], p[placed.numbers])[0][0]
-        # blocks behind are computed anew when they are asked for
+        # blocks behind are computed again when they are asked for
         previous[:start] = z[:start]
         previous[start:] = np.nan
 

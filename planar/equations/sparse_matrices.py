@@ -69,7 +69,7 @@ class SparsePattern:
         return self._blocks[key]
 
     def first_columns(self, count: int, blocks: Sequence[tuple[slice, slice]] = ()) -> SparsePattern:
-        """The pattern of so many of the first columns, triangular by some blocks."""
+        """The pattern of the first `count` columns, triangular by some blocks."""
         return SparsePattern((self.shape[0], count), self.rows[: self.first[count]], self.first[: count + 1], blocks)
 
     @cached_property

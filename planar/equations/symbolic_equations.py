@@ -28,6 +28,7 @@ from planar.equations.elimination import (
     stack_expressions,
 )
 from planar.equations.residuals import ConstraintRow, wrapped_residual
+from planar.foundation.arrays import Array
 from planar.foundation.generic_numbers import generic_numbers
 from planar.model.mechanism import Mechanism, relative_motions
 from planar.model.pairs import MeasureKind, Pair
@@ -162,7 +163,6 @@ class _EliminatedStructure(NamedTuple):
     rows of all that close them."""
 
     mechanism: Mechanism
-    given_links: tuple[str, ...]
     coordinates: tuple[Coordinate, ...]
     rows: tuple[ConstraintRow, ...]
     "all rows: those of the pairs, then those of the inputs"
@@ -276,7 +276,6 @@ def _eliminate_structure(mechanism: Mechanism, given_links: tuple[str, ...]) -> 
     )
     return _EliminatedStructure(
         mechanism,
-        given_links,
         coordinates,
         rows,
         input_kinds,
@@ -319,11 +318,9 @@ def _assembled_equations_of(structure: _EliminatedStructure) -> ConstraintEquati
         (assembled.pattern, residual_entries),
         (assembled.coordinate_pattern, assembled.coordinate_jacobians(z, u, p)),
     ):
-        moving: list[set[int]] = [set() for _ in range(pattern.shape[0])]
-        is_moving = (np.abs(entries).sum(axis=0) > MIN_MOVING_SLOPE) & (pattern.columns < unknown_count)
-        for row, column in zip(pattern.rows[is_moving].tolist(), pattern.columns[is_moving].tolist(), strict=True):
-            moving[row].add(column)
-        moved += moving
+        count = pattern.first[unknown_count]
+        places = pattern.rows[:count].tolist(), pattern.columns[:count].tolist()
+        moved += _moving_columns(pattern.shape[0], *places, entries[:, :count])
 
     def make_expressions() -> ConstraintExpressions:
         return _without_idle_unknowns(_expressions_of(structure, {}), moved)
@@ -436,7 +433,7 @@ def _with_least_misfit(
     variables = [*(unknowns[k] for k in tied), *(column_of[row] for row in system.free)]
     multipliers = range(first + len(misfits), first + len(added))
     all_unknowns = ca.vertcat(system.unknowns, *(z[k] for k in untied))
-    whole = ConstraintExpressions(all_unknowns, u, ca.vertcat(p, system.weights), system.w, system.F)
+    with_misfits = ConstraintExpressions(all_unknowns, u, ca.vertcat(p, system.weights), system.w, system.F)
     return ConstraintEquations(
         coordinates=(*structure.coordinates, *added),
         unknowns=(*variables, *multipliers, *(unknowns[k] for k in untied)),
@@ -444,7 +441,7 @@ def _with_least_misfit(
         blocks=(),
         known_after_block=(),
         input_kinds=structure.input_kinds,
-        make_expressions=lambda: whole,
+        make_expressions=lambda: with_misfits,
         open_rows=tuple(misfits),
         misfit_columns=tuple(column_of.values()),
         row_variables=(*variables, *([HELD] * len(system.held)), *([UNRELATED] * len(system.unrelated))),
@@ -515,17 +512,21 @@ def _split_into_blocks(
 def _moving_unknowns(expressions: ConstraintExpressions) -> list[set[int]]:
     """The unknowns that move each entry of F and w at random places."""
     z, u, p, w, F = expressions
-    both = ca.vertcat(F, w)
-    touched = expression_unknowns(both, z)
-    if not any(touched):
-        return touched
-    slope = ca.Function("slope", [z, u, p], [ca.jacobian(both, z)])
+    jacobian = ca.jacobian(ca.vertcat(F, w), z)
+    slope = ca.Function("slope", [z, u, p], [jacobian])
     ends = np.cumsum([symbol.numel() for symbol in (z, u, p)])
-    slopes = [slope(*np.split(numbers, ends[:2])) for numbers in generic_numbers(2, ends[2])]
-    sizes = sum(np.abs(np.array(values.nonzeros())) for values in slopes)
-    rows, columns = slopes[0].sparsity().get_triplet()
-    moving = {(row, column) for row, column, size in zip(rows, columns, sizes, strict=True) if size > MIN_MOVING_SLOPE}
-    return [{column for column in unknowns if (row, column) in moving} for row, unknowns in enumerate(touched)]
+    slopes = [slope(*np.split(numbers, ends[:2])).nonzeros() for numbers in generic_numbers(2, ends[2])]
+    return _moving_columns(jacobian.size1(), *jacobian.sparsity().get_triplet(), np.array(slopes))
+
+
+def _moving_columns(row_count: int, rows: Sequence[int], columns: Sequence[int], entries: Array) -> list[set[int]]:
+    """For every row the columns whose entries (places, entries) are more than rounding at random places."""
+    moving: list[set[int]] = [set() for _ in range(row_count)]
+    is_moving = np.abs(entries).sum(axis=0) > MIN_MOVING_SLOPE
+    for row, column, is_one in zip(rows, columns, is_moving.tolist(), strict=True):
+        if is_one:
+            moving[row].add(column)
+    return moving
 
 
 def is_piecewise_in(expression: ca.SX, symbols: ca.SX) -> bool:

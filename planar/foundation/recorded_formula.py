@@ -47,9 +47,7 @@ class RecordedNumber:
         return RecordedNumber(self.operations, len(self.operations) - 1)
 
     def __add__(self, other: Scalar) -> Scalar:
-        if type(other) is RecordedNumber:
-            return self._record("add", self.place, other.place)
-        return self if other == 0.0 else self._record("add", self.place, float(other))
+        return self if other == 0.0 else self._record("add", self.place, _operand(other))
 
     __radd__ = __add__
 
@@ -57,26 +55,20 @@ class RecordedNumber:
         return self._record("neg", self.place)
 
     def __sub__(self, other: Scalar) -> Scalar:
-        if type(other) is RecordedNumber:
-            return self._record("sub", self.place, other.place)
-        return self if other == 0.0 else self._record("sub", self.place, float(other))
+        return self if other == 0.0 else self._record("sub", self.place, _operand(other))
 
     def __rsub__(self, other: Scalar) -> Scalar:
         return -self if other == 0.0 else self._record("sub", float(other), self.place)
 
     def __mul__(self, other: Scalar) -> Scalar:
-        if type(other) is RecordedNumber:
-            return self._record("mul", self.place, other.place)
         if other == 0.0:
             return 0.0
-        return self if other == 1.0 else self._record("mul", self.place, float(other))
+        return self if other == 1.0 else self._record("mul", self.place, _operand(other))
 
     __rmul__ = __mul__
 
     def __truediv__(self, other: Scalar) -> Scalar:
-        if type(other) is RecordedNumber:
-            return self._record("div", self.place, other.place)
-        return self if other == 1.0 else self._record("div", self.place, float(other))
+        return self if other == 1.0 else self._record("div", self.place, _operand(other))
 
     def __rtruediv__(self, other: Scalar) -> Scalar:
         return 0.0 if other == 0.0 else self._record("div", float(other), self.place)
@@ -122,7 +114,7 @@ class RecordedNumber:
 
 
 def record_formula(formula: Callable[[Sequence[RecordedNumber]], Sequence[Scalar]], count: int) -> RecordedFormula:
-    """Record a formula of so many arguments."""
+    """Record a formula of `count` arguments."""
     operations: list[Operation] = [("argument", k) for k in range(count)]
     results = formula([RecordedNumber(operations, k) for k in range(count)])
     return _without_idle_operations(operations, [_operand(result) for result in results])

@@ -104,13 +104,19 @@ def links_by_centres(centres: Centres) -> dict[str, LinkByCentres]:
         return {link: LinkByCentres(0.0 * each.motion, each.by) for link, each in moving.items()}
     here = _ScaledCentres(centres)
     found = {frame: LinkByCentres(np.zeros(3), ())} | here.input_motions(given.pair, given.velocity)
-    links, ways = [*centres.numbers], [link for link in found if link != frame]
-    separations = np.array(
-        [[0.0 if link in found else here.separation(link, known) for link in links] for known in ways]
-    ).reshape(-1, len(links))
-    greatest, through = separations.max(axis=0, initial=0.0), np.zeros(len(links), dtype=int)
-    if ways:
-        through = separations.argmax(axis=0)
+    links, ways = [*centres.numbers], list[str]()
+    greatest, through = np.zeros(len(links)), np.zeros(len(links), dtype=int)
+
+    def add_way(known: str) -> None:
+        """Take a link as one through which others can be found."""
+        separations = np.array([0.0 if link in found else here.separation(link, known) for link in links])
+        is_better = separations > greatest
+        greatest[is_better], through[is_better] = separations[is_better], len(ways)
+        ways.append(known)
+
+    for known in found:
+        if known != frame:
+            add_way(known)
     while len(found) < len(links):
         # of separations alike that of the link which was known first, then of the link which comes first
         rest = [k for k, link in enumerate(links) if link not in found and greatest[k] > COINCIDENT_TOLERANCE]
@@ -119,10 +125,7 @@ def links_by_centres(centres: Centres) -> dict[str, LinkByCentres]:
         best = min(rest, key=lambda k: (-greatest[k], through[k], k))
         link, known = links[best], ways[through[best]]
         found[link] = here.motion_through(link, known, found[known])
-        ways.append(link)
-        new = np.array([0.0 if other in found else here.separation(other, link) for other in links])
-        is_better = new > greatest
-        greatest[is_better], through[is_better] = new[is_better], len(ways) - 1
+        add_way(link)
     return {link: each._replace(motion=here.in_metres(each.motion)) for link, each in found.items()}
 
 

@@ -312,10 +312,9 @@ class _LabelPlacer:
         """Those of others (indices) that can cost any of the candidates something."""
         parts = np.concatenate([choice.boxes, bounding_boxes(choice.leaders)])
         region = np.concatenate([np.nanmin(parts[:, :2], axis=0), np.nanmax(parts[:, 2:], axis=0)])[None]
-        reach = np.concatenate([self.boxes[others], bounding_boxes(self.leaders[others])])
-        reach[len(others) :] = np.where(np.isnan(reach[len(others) :]), self.boxes[others], reach[len(others) :])
-        near = nearby_pairs(region, reach, READ_ON_DISTANCE)[1] % max(len(others), 1)
-        return others[np.unique(near)]
+        boxes, leaders = self.boxes[others], bounding_boxes(self.leaders[others])
+        low, high = np.fmin(boxes[:, :2], leaders[:, :2]), np.fmax(boxes[:, 2:], leaders[:, 2:])
+        return others[nearby_pairs(region, np.concatenate([low, high], axis=1), READ_ON_DISTANCE)[1]]
 
     def _choose(self, index: int) -> float:
         """Put one letter where it costs least now, looking farther off while nothing good is found; that cost."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from itertools import chain, combinations, islice
 from typing import Any
 
@@ -77,15 +77,6 @@ def _third_links(links: Sequence[str], primary: PrimaryCentres) -> dict[tuple[st
         first = {line.link for line in found.lines if line.link} if found else set()
         ranks = (first, shown[one] & shown[other], shown[one] ^ shown[other])
         best = dict.fromkeys(third for rank in ranks for third in sorted(rank, key=place.__getitem__))
-        thirds = (third for third in chain(best, links) if third not in two)
-        chosen[two] = [*islice(_distinct(thirds), MAX_LINES)]
+        thirds = dict.fromkeys(chain(best, links))
+        chosen[two] = [*islice((third for third in thirds if third not in two), MAX_LINES)]
     return chosen
-
-
-def _distinct(names: Iterable[str]) -> Iterator[str]:
-    """Names in their order, each once."""
-    passed: set[str] = set()
-    for name in names:
-        if name not in passed:
-            passed.add(name)
-            yield name

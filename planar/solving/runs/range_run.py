@@ -194,7 +194,8 @@ class RangeRun(RunningInput):
 
     def _one_turn(self, steps: int, here: float) -> RunSamples | _RangeEnd | None:
         """One turn on, if the input makes it; else the end of its range, if that is known."""
-        given = self.input_rates(np.linspace(here, here + 2.0 * pi, steps + 1))
+        places = np.linspace(here, here + 2.0 * pi, steps + 1)
+        given = self.input_rates(places)
         sure = fast_run(self.solver, self.assembly.z, *given[:3])
         if sure is not None and len(sure.z) == steps + 1 and not self.with_jerk:
             return RunSamples(
@@ -204,11 +205,12 @@ class RangeRun(RunningInput):
             )
         known = accepted_samples(self.solver, self.p, self.assembly.z, given.u) if sure is None else sure.z
         if known is not None and len(known) <= steps:
-            start = max(len(known) - 2, 0) if self.solver.functions.is_sparse else 0
-            place = here + 2.0 * pi * start / steps
             # walking tells it sooner than a run would
-            z = known[start] if start else self.assembly.z
-            end = self._find_range_end(z, place, 1.0, 2.0 * pi * (1.0 - start / steps))
+            end = (
+                self._end_beyond(known, places)
+                if self.solver.functions.is_sparse
+                else self._find_range_end(self.assembly.z, here, 1.0, 2.0 * pi)
+            )
             if end.ending is not None:
                 return end
         found = self._run(steps, here, here + 2.0 * pi)
@@ -272,9 +274,14 @@ class RangeRun(RunningInput):
             u = np.array([self.inputs_at(place) for place in places])
             accepted = accepted_samples(self.solver, self.p, z, u)
             if accepted is not None:
-                last = max(len(accepted) - 2, 0)
-                z, here, far = accepted[last], float(places[last]), far * (1.0 - last / (RANGE_SAMPLES - 1))
+                return self._end_beyond(accepted, places)
         return self._find_range_end(z, here, sign, far)
+
+    def _end_beyond(self, samples: Array, places: Array) -> _RangeEnd:
+        """The same beyond samples (samples, unknowns) that are surely sound, the first at some places of the input."""
+        last = max(len(samples) - 2, 0)
+        far = float(places[-1] - places[last])
+        return self._find_range_end(samples[last], float(places[last]), 1.0 if far > 0.0 else -1.0, abs(far))
 
     def _find_range_end(self, z: Array, here: float, sign: float, far: float) -> _RangeEnd:
         """The same by following the curve so far."""
