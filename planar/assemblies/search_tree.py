@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from planar.assemblies.polynomial.completeness import BlockRoots, Completeness
-from planar.equations.casadi_call import POLISHING_STEPS
+from planar.equations.closed_form_assemblies import POLISHING_STEPS
 from planar.equations.symbolic_equations import Block, slice_length
 from planar.foundation.angles import distances
 from planar.foundation.arrays import Array
@@ -268,11 +268,7 @@ class AssemblyTree:
         """For every block: the columns x, y and angle in w of the links placed before it to which it or a later block
         is joined (-1: fixed), and the columns of the own coordinates of the joining pairs that are known before it."""
         setup = self.setup
-        sparsity = setup.functions.coordinate_function.jac_sparsity(0, 0)
-        starts = np.array([stage.unknowns.start for stage in self.stages])
-        level = np.full(len(setup.equations.coordinates), -1)
-        for row, unknown in zip(*sparsity.get_triplet(), strict=True):
-            level[row] = max(level[row], int(np.searchsorted(starts, unknown, side="right")) - 1)
+        level = setup.equations.known_after_block
         parts = {
             link.name: tuple(setup.column.get((link.name, part), -1) for part in ("x", "y", "angle"))
             for link in setup.mechanism.links

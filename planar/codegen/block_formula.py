@@ -8,9 +8,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from planar.codegen.instructions import Instruction, InstructionList, required_values
-from planar.codegen.numpy_code import NumpyFunction, compile_numpy
 from planar.foundation.arrays import Array
+from planar.foundation.instruction_list import Instruction, InstructionList, required_values
+from planar.foundation.printed_formula import PrintedFunction, compile_numpy
 
 
 class FormulaInput(NamedTuple):
@@ -36,7 +36,7 @@ class BlockFormula:
             return list(self._numpy_function(*(taken[each] for each in self.inputs.values())))
 
     @cached_property
-    def _numpy_function(self) -> NumpyFunction:
+    def _numpy_function(self) -> PrintedFunction:
         return compile_numpy(self.instructions, self.outputs, tuple(self.inputs))
 
 

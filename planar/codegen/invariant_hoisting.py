@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from typing import Generic, NamedTuple
 
-from planar.codegen.instructions import Instruction, InstructionList, Key, required_values
+from planar.foundation.instruction_list import Instruction, InstructionList, Key, required_values
 
 MAX_REUSED_TERMS = 6
 """Terms of a sum that is wanted more than once: a longer one is computed once, and not put into other sums."""

@@ -6,7 +6,8 @@ from math import isnan
 
 import casadi as ca
 
-from planar.codegen.instructions import InstructionList, required_values
+from planar.equations.generic_evaluation import inline_function
+from planar.foundation.instruction_list import InstructionList, required_values
 
 CASE_OPERATIONS = {ca.OP_NOT: "not", ca.OP_IF_ELSE_ZERO: "where"}
 """What machine code is not asked for."""
@@ -24,21 +25,14 @@ JS_FUNCTIONS = {
 }
 
 
-class CaseInstructionList(InstructionList[tuple[int, int]]):
-    """A listing that knows cases as well."""
-
-    def _add_operation(self, code: int, of: list[int]) -> int:
-        return self.add(CASE_OPERATIONS[code], *of) if code in CASE_OPERATIONS else super()._add_operation(code, of)
-
-
 def write_javascript(name: str, function: ca.Function) -> str:
     """A function of arrays, the last of which receives all results, one dense matrix after the other, column by column.
 
     Raises UnsupportedOperation where it holds an operation that is not known.
     """
-    listing = CaseInstructionList()
+    listing: InstructionList[tuple[int, int]] = InstructionList()
     inputs = [[listing.add_input((k, at)) for at in range(function.numel_in(k))] for k in range(function.n_in())]
-    wanted = [value for result in listing.inline_function(function, inputs) for value in result]
+    wanted = [value for result in inline_function(listing, function, inputs, CASE_OPERATIONS) for value in result]
     arguments = [f"a{k}" for k in range(function.n_in())]
     told: dict[int, str] = {}
     lines = []

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any
 
-from planar.codegen.instructions import InstructionList, UnsupportedOperation
+from planar.foundation.instruction_list import InstructionList, UnsupportedOperation
 
 LLVM_OPERATIONS = {"add": "fadd", "sub": "fsub", "mul": "fmul", "div": "fdiv"}
 LLVM_INTRINSICS = {"sqrt": "sqrt", "abs": "fabs", "floor": "floor"}

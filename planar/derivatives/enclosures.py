@@ -18,7 +18,6 @@ from typing import NamedTuple, TypeAlias
 import casadi as ca
 import numpy as np
 
-from planar.codegen.generic_evaluation import evaluate_function
 from planar.derivatives.implicit_system import invert_matrices
 from planar.derivatives.intervals import (
     INTERVAL_OPERATIONS,
@@ -34,6 +33,7 @@ from planar.derivatives.intervals import (
     up,
 )
 from planar.equations.casadi_call import BufferedFunction
+from planar.equations.generic_evaluation import evaluate_function
 from planar.foundation.arrays import Array, BoolArray, IntArray
 
 START_STEPS = 2

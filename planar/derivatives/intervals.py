@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import casadi as ca
 import numpy as np
 
-from planar.codegen.generic_evaluation import OPERATIONS
+from planar.equations.generic_evaluation import OPERATIONS
 from planar.foundation.arrays import Array, BoolArray
 
 HALF_PI_PARTS = (1.5707963267341256, 6.077100506506192e-11)

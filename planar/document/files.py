@@ -14,7 +14,7 @@ from typing import Any, BinaryIO
 
 from planar.document import LINK_PREFIX, read_mechanism
 from planar.foundation.errors import BadInput
-from planar.foundation.safe_files import is_existing
+from planar.foundation.safe_files import is_existing, read_package_text
 from planar.model.mechanism import Mechanism
 
 OWN_FORMAT = "planar"
@@ -181,7 +181,7 @@ def as_mechanism(source: Any) -> Mechanism:
 
 def read_packaged_text(room: str, name: str) -> str:
     """A text that comes along in a room of the package, by its path there."""
-    return (Path(__file__).parents[1] / room / name).read_text(encoding="utf-8")
+    return read_package_text(Path(__file__).parents[1] / room / name)
 
 
 def read_asset(name: str) -> str:

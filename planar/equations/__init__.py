@@ -18,19 +18,24 @@ A *block* is a group of unknowns that is solved together, by a slice of the rows
 which they are solved, so that dF/dz is triangular by blocks. An entry of F or w is a length, or an angle: one that
 closes modulo a turn, or one in which whole turns count.
 
-An *element* is the formula of a pair as a list of operations, derived once for all pairs of the same formula; the
+An *element* is the formula of a pair as a list of instructions, derived once for all pairs of the same formula; the
 equations of a mechanism are its elements, placed by indices. A *block type* is derived once for all blocks whose
-equations are the same. Functions of a whole structure are derived only where it is evaluated often.
+equations are the same. Both are instruction lists, printed as Python for floats and arrays; those of all models are
+kept with the package. Functions of a whole structure are derived only where it is evaluated often.
 
 coordinates           what stands in w, and the frames of links that it makes
 mechanism_numbers     structure, size and numbers p of a mechanism
 residuals             the residuals of all pairs and inputs, for every arithmetic
 linear                small linear systems, as expressions and for arrays
 elements              the formulas of pairs: linear part, rest, derivatives
+element_placement     which elements a mechanism has, and where
+element_derivation    elements derived by casadi
+known_types           elements and block types that are kept with the package
 elimination           coordinates that enter rows with constant factors are solved for
 symbolic_equations    structure, unknowns, rows and blocks; z, u, p, w, F as casadi expressions where they are needed
 assembled_equations   F, w, rates and Jacobians from the elements by index arrays, at any number of samples
 block_types           blocks by their own equations, placed by indices
+block_type_functions  residuals, coordinates, closed form and runs of a block type
 placed_blocks         the functions of block types, called with z, u and p of the whole
 rates                 time derivatives of expressions in y, and of the unknowns
 functions             F, w, rates and Jacobians by elements, or as compiled functions of the whole, kept on disk

@@ -8,19 +8,21 @@ these and on which later rests depend.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from planar.equations.casadi_call import BufferedFunction
 from planar.equations.elements import Element, PlacedElement
 from planar.equations.elimination import EliminationRow
 from planar.equations.sparse_matrices import SparsePattern
 from planar.foundation.angles import wrap_angle
 from planar.foundation.arrays import Array, IntArray
+from planar.foundation.jets import Scalar, cos, sin
+from planar.foundation.printed_formula import PrintedFunction
+from planar.foundation.recorded_formula import RecordedFormula
 
 MAX_KEPT_NUMBERS = 10**6
 """Numbers of an evaluation that is kept."""
@@ -95,9 +97,10 @@ def _products(terms: Sequence[tuple[int, Sequence[tuple[int, int]]]]) -> _Produc
 
 
 class _ElementGroup(NamedTuple):
-    """The places of one element in a structure that are evaluated together (instances first).
+    """The places of one element in a structure that are evaluated together.
 
-    `arguments` index (s, cos s, sin s, p), `rows` the rests, `slopes` entries of their derivatives, `coordinates` s.
+    Indices (parts of the element, instances): `arguments` of (s, cos s, sin s, p), `rows` of the rests, `slopes` of the
+    entries of their derivatives, `coordinates` of s.
     """
 
     element: Element
@@ -106,24 +109,42 @@ class _ElementGroup(NamedTuple):
     slopes: IntArray
     coordinates: IntArray
 
-    def _call(self, function: BufferedFunction, values: Array, *rates: Array) -> list[Array]:
-        samples, count = len(values), len(self.arguments)
-        arguments = [values[:, self.arguments], *(rate[:, self.coordinates] for rate in rates)]
-        flat = [argument.reshape(samples * count, argument.shape[-1]) for argument in arguments]
-        results = function.evaluate_batch(samples * count, *flat)
-        return [result.reshape(samples, count, result.shape[-1]) for result in results]
-
     def evaluate(self, values: Array, rests: Array, slopes: Array | None) -> None:
         """Set the rests (samples, rows) and the entries of their slopes (samples, entries)."""
+        element = self.element
+        arguments = [values[:, columns] for columns in self.arguments]
         if slopes is None or not self.slopes.size:
-            (rests[:, self.rows],) = self._call(self.element.rest_call, values)
+            results = _call(element.rest_function, element.rest, arguments)
         else:
-            rests[:, self.rows], slopes[:, self.slopes] = self._call(self.element.slopes_call, values)
+            results = _call(element.slopes_function, element.slopes, arguments)
+            for columns, result in zip(self.slopes, results[len(self.rows) :], strict=True):
+                slopes[:, columns] = result
+        for columns, result in zip(self.rows, results, strict=False):
+            rests[:, columns] = result
 
     def evaluate_second_rates(self, values: Array, rates: Array, rests: Array) -> None:
         """Set the second rates of the rests (samples, rows) that follow from first rates of s (samples, s) alone."""
         if self.slopes.size:
-            (rests[:, self.rows],) = self._call(self.element.second_rate_call, values, rates)
+            arguments = [values[:, columns] for columns in self.arguments]
+            arguments += [rates[:, columns] for columns in self.coordinates]
+            results = _call(self.element.second_rates_function, self.element.second_rates, arguments)
+            for columns, result in zip(self.rows, results, strict=True):
+                rests[:, columns] = result
+
+
+def _call(function: PrintedFunction, formula: RecordedFormula, arguments: Sequence[Array]) -> Sequence[Any]:
+    """A formula of arrays (samples, instances), which may be arrays of recorded numbers."""
+    if not arguments or arguments[0].dtype != object:
+        with np.errstate(all="ignore"):  # what is not defined is not a number
+            return function(*arguments)
+    values = [formula.evaluate(instance) for instance in zip(*(argument[0] for argument in arguments), strict=True)]
+    return [np.array(instances, dtype=object) for instances in zip(*values, strict=True)]
+
+
+def _elementwise(function: Callable[[Scalar], Scalar], values: Array) -> Array:
+    """A function of every number of an array, recorded ones too."""
+    called: Callable[[Array], Array] = np.frompyfunc(function, 1, 1) if values.dtype == object else function
+    return called(values)
 
 
 class _Stage(NamedTuple):
@@ -170,7 +191,7 @@ class AssembledEquations:
         self._y_count = len(unknowns) + elimination.input_count
         self._row_count = len(rows)
         self._state_count = elimination.coordinate_count + elimination.input_count
-        self._rest_count = len(elimination.lines)
+        self._rest_count = max((placed.rows.stop for placed in elimination.elements), default=0)
         self._coordinate_sums = self._eliminated_coordinates()[: self._coordinate_count]
         self._residual_sums = [self._line_sums(elimination.lines[row]) for row in rows]
         self._make_slope_entries()
@@ -178,6 +199,11 @@ class AssembledEquations:
         self._last: _Evaluation | None = None
         self._all_coordinates = _combinations(enumerate(self._coordinate_sums))
         self._all_residuals = _combinations(enumerate(self._residual_sums))
+
+    @property
+    def argument_counts(self) -> tuple[int, int, int]:
+        """How many entries z, u and p have."""
+        return len(self._unknowns), self._elimination.input_count, self._elimination.number_count
 
     # sums over x = (y, rests)
 
@@ -212,7 +238,7 @@ class AssembledEquations:
         """Number the entries of the derivatives of all rests by s."""
         self._slope_count = 0
         self._first_slope: list[int] = []
-        self._row_slopes: list[list[tuple[int, int]]] = [[] for _ in self._elimination.lines]
+        self._row_slopes: list[list[tuple[int, int]]] = [[] for _ in range(self._rest_count)]
         "for every row the numbers of its entries, each with its column in s"
         for placed in self._elimination.elements:
             self._first_slope.append(self._slope_count)
@@ -276,7 +302,7 @@ class AssembledEquations:
         first_sine, first_number = first_cosine + len(self._angles), first_cosine + 2 * len(self._angles)
         arguments = []
         for placed, _ in places:
-            angle_of = [self._angle_place.get(placed.coordinates[3 * k + 2], 0) for k in range(len(element.cosines))]
+            angle_of = [self._angle_place.get(placed.coordinates[3 * k + 2], 0) for k in range(element.body_count)]
             arguments.append(
                 [
                     *(placed.coordinates[k] for k in taken.coordinates),
@@ -286,13 +312,13 @@ class AssembledEquations:
                 ]
             )
         width = len(element.slope_entries)
-        return _ElementGroup(
-            element,
-            np.array(arguments, dtype=int).reshape(len(places), -1),
-            np.array([list(placed.rows) for placed, _ in places], dtype=int),
-            np.array([range(start, start + width) for _, start in places], dtype=int).reshape(len(places), -1),
-            np.array([placed.coordinates for placed, _ in places], dtype=int).reshape(len(places), -1),
+        indices = (
+            arguments,
+            [list(placed.rows) for placed, _ in places],
+            [range(start, start + width) for _, start in places],
+            [placed.coordinates for placed, _ in places],
         )
+        return _ElementGroup(element, *(np.array(part, dtype=int).reshape(len(places), -1).T for part in indices))
 
     # values
 
@@ -308,12 +334,12 @@ class AssembledEquations:
         ):
             return last
         samples = len(z)
-        x: Array = np.zeros((samples, self._y_count + self._rest_count))
+        x: Array = np.zeros((samples, self._y_count + self._rest_count), p.dtype)
         x[:, : z.shape[1]], x[:, z.shape[1] : self._y_count] = z, u
-        slopes: Array | None = np.zeros((samples, self._slope_count)) if with_slopes else None
+        slopes: Array | None = np.zeros((samples, self._slope_count), p.dtype) if with_slopes else None
         angle_count = len(self._angles)
         first_number = self._state_count + 2 * angle_count
-        values: Array = np.zeros((samples, first_number + p.shape[-1]))
+        values: Array = np.zeros((samples, first_number + p.shape[-1]), p.dtype)
         values[:, first_number:] = p
         state = values[:, : self._state_count]
         state[:, self._coordinate_count :] = u
@@ -322,13 +348,12 @@ class AssembledEquations:
         sines = values[:, self._state_count + angle_count : first_number]
         for stage in self._stages:
             angles = state[:, self._angles]
-            np.cos(angles, out=cosines)
-            np.sin(angles, out=sines)
+            cosines[:], sines[:] = _elementwise(cos, angles), _elementwise(sin, angles)
             for group in stage.groups:
                 group.evaluate(values, x[:, self._y_count :], slopes)
             stage.coordinates.set_in(state, x)
         evaluation = _Evaluation(z.copy(), u.copy(), p.copy(), values, x, slopes)
-        self._last = evaluation if values.size <= MAX_KEPT_NUMBERS else None
+        self._last = evaluation if values.size <= MAX_KEPT_NUMBERS and values.dtype != object else None
         return evaluation
 
     def coordinates(self, z: Array, u: Array, p: Array) -> Array:
@@ -337,13 +362,13 @@ class AssembledEquations:
 
     @staticmethod
     def _sums(combinations: _Combinations, x: Array, count: int) -> Array:
-        sums: Array = np.zeros((len(x), count))
+        sums: Array = np.zeros((len(x), count), x.dtype)
         combinations.set_in(sums, x)
         return sums
 
     def _residuals(self, x: Array) -> Array:
         residuals = self._sums(self._all_residuals, x, self._row_count)
-        residuals[:, self._angle_rows] = wrap_angle(residuals[:, self._angle_rows])
+        residuals[:, self._angle_rows] = _elementwise(wrap_angle, residuals[:, self._angle_rows])
         return residuals
 
     def residuals_and_jacobians(self, z: Array, u: Array, p: Array) -> AssembledJacobians:
@@ -499,8 +524,8 @@ class _RestPlan(NamedTuple):
 
     def entries(self, slopes: Array) -> Array:
         """Entries (samples, entries) of the derivatives of all rests."""
-        rests: Array = np.zeros((len(slopes), self.rest_count))
-        state = np.repeat(self.state_constants[None], len(slopes), axis=0)
+        rests: Array = np.zeros((len(slopes), self.rest_count), slopes.dtype)
+        state = np.repeat(self.state_constants[None].astype(slopes.dtype), len(slopes), axis=0)
         for products, sums in self.steps:
             products.set_in(rests, slopes, state)
             if len(sums.results):
@@ -521,6 +546,6 @@ class _JacobianPlan(NamedTuple):
     def entries(self, slopes: Array) -> Array:
         """The entries (samples, entries)."""
         rests = self.rest_plan.entries(slopes)
-        entries: Array = np.zeros((len(slopes), len(self.constants)))
+        entries: Array = np.zeros((len(slopes), len(self.constants)), slopes.dtype)
         self.sums.set_in(entries, rests)
         return entries + self.constants

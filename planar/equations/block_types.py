@@ -16,6 +16,7 @@ from planar.equations.assembled_equations import Elimination
 from planar.equations.coordinates import Coordinate
 from planar.equations.elements import Element, PlacedElement
 from planar.equations.elimination import EliminationRow
+from planar.equations.known_types import fingerprint
 from planar.equations.residuals import ConstraintRow
 from planar.equations.symbolic_equations import Block, ConstraintEquations, expressions_of_elimination
 from planar.foundation.arrays import IntArray
@@ -40,6 +41,15 @@ class BlockTypeKey(NamedTuple):
     "of own coordinates, which stand first"
     known_kinds: tuple[MeasureKind, ...]
     number_count: int
+
+    @property
+    def fingerprint(self) -> str:
+        """What tells the type from others in every process."""
+        elements = [(element.fingerprint, *places) for element, *places in self.elements]
+        kinds = [kind.name for kind in (*self.row_kinds, *self.known_kinds)]
+        own_kinds = [(kind.name, of_link) for kind, of_link in self.own_kinds]
+        counts = len(self.row_kinds), self.unknown_count, self.number_count
+        return fingerprint(elements, self.solved, self.residuals, kinds, own_kinds, counts)
 
 
 class PlacedBlock(NamedTuple):
@@ -151,7 +161,7 @@ def block_equations(key: BlockTypeKey) -> ConstraintEquations:
     elements: list[PlacedElement] = []
     row_count = 0
     for element, columns, numbers in key.elements:
-        element_rows = range(row_count, row_count + len(element.rest))
+        element_rows = range(row_count, row_count + element.row_count)
         elements.append(PlacedElement(element, columns, numbers, element_rows))
         row_count = element_rows.stop
     solved = tuple((column, _line(factors, multipliers)) for column, factors, multipliers in key.solved)
@@ -169,9 +179,11 @@ def block_equations(key: BlockTypeKey) -> ConstraintEquations:
         (block,),
         (0,) * count,
         key.known_kinds,
-        lambda: expressions_of_elimination(
+        make_expressions=lambda: expressions_of_elimination(
             elimination, coordinates, key.known_kinds, unknowns, list(enumerate(key.row_kinds)), names, {}
         ),
+        elimination=elimination,
+        row_indices=tuple(range(len(rows))),
     )
 
 

@@ -17,10 +17,6 @@ CHUNK_SIZES = (256, 32, 8)
 MAX_MAPPED_ENTRIES = 20_000
 """Entries of a function's results: one of more is called for one position after the other, since to make a call of
 many positions takes long, and room."""
-POLISHING_STEPS = 2
-"""Newton's steps that carry a closed form to round-off."""
-ON_ARM = "assembly_on_arm"
-"""The name of a function of closed forms that divide by an arm that changes as the mechanism moves."""
 
 
 def read_function(text: str | None) -> ca.Function | None:
@@ -168,56 +164,3 @@ class RunFunction:
             run, buffer = bound_call(function, arrays[:3], arrays[3:])
             self._made[size] = run, arrays, buffer
         return self._made[size][:2]
-
-
-class ClosedFormAssemblies:
-    """The two assemblies of one block in closed form, carried to round-off by Newton's steps.
-
-    `has_changing_arm`: whether a length of the block turns on an arm that may vanish as the mechanism moves.
-    """
-
-    def __init__(self, unknowns: slice, form: BufferedFunction, polished: BufferedFunction, has_changing_arm: bool):
-        self._unknowns, self._form, self._polished = unknowns, form, polished
-        self.has_changing_arm = has_changing_arm
-
-    def evaluate_batch(self, z: Array, u: Array, p: Array) -> tuple[list[Array], Array]:
-        """Both (positions, unknowns), not polished, and how near they are to where they meet (positions,), at z
-        (positions, unknowns), u and p alike."""
-        found = [self._form.evaluate_batch(len(z), z, u, p, np.array([sign])) for sign in (1.0, -1.0)]
-        return [own[:, 0] for own, _ in found], found[0][1][:, 0, 0]
-
-    def __call__(self, z: Array, u: Array, p: Array) -> tuple[list[Array], float, float]:
-        """Both (unknowns,), the greatest residual of the two, and how near they are to where they meet (`ClosedForm`).
-
-        What is not there is not a number.
-        """
-        found, left, bend = [], 0.0, 0.0
-        for sign in (1.0, -1.0):
-            whole = z.copy()
-            own, bends = self._form(z, u, p, np.array([sign]))
-            bend = float(bends[0, 0])
-            whole[self._unknowns] = own[0]
-            for _ in range(POLISHING_STEPS):
-                whole[self._unknowns] = self._polished(whole, u, p)[0][0]
-            # the greatest of what is left open does not see what is not a number
-            sure = np.isfinite(whole[self._unknowns]).all()
-            left = np.maximum(left, self._polished(whole, u, p)[1][0, 0] if sure else np.nan)
-            found.append(whole[self._unknowns])
-        return found, float(left), bend
-
-    def of_designs(self, z: Array, u: Array, p: Array) -> tuple[Array, Array, Array]:
-        """The same of designs z (designs, unknowns), u and p alike: both (2, designs, unknowns of the block), the
-        greatest residuals and how near they are to where they meet (designs,)."""
-        many, found = len(z), []
-        left: Array = np.zeros(many)
-        bend: Array = np.zeros(many)
-        for sign in (1.0, -1.0):
-            whole = z.copy()
-            own, bends = self._form.evaluate_batch(many, z, u, p, np.array([sign]))
-            bend, whole[:, self._unknowns] = bends[:, 0, 0], own[:, 0]
-            for _ in range(POLISHING_STEPS):
-                whole[:, self._unknowns] = self._polished.evaluate_batch(many, whole, u, p)[0][:, 0]
-            gap = self._polished.evaluate_batch(many, whole, u, p)[1][:, 0, 0]
-            left = np.maximum(left, np.where(np.isfinite(whole[:, self._unknowns]).all(axis=1), gap, np.nan))
-            found.append(whole[:, self._unknowns])
-        return np.array(found), left, bend

@@ -19,9 +19,12 @@ import casadi as ca
 import numpy as np
 
 from planar.equations.casadi_call import formula_text
+from planar.equations.elimination import stack_expressions
+from planar.equations.generic_evaluation import recorded_function
 from planar.equations.symbolic_equations import Block, ConstraintEquations, is_piecewise_in
 from planar.foundation.arrays import Array
 from planar.foundation.generic_numbers import generic_numbers
+from planar.foundation.recorded_formula import RecordedFormula
 from planar.model.pairs import MeasureKind
 
 ZERO_TOLERANCE = 1e-10
@@ -46,6 +49,16 @@ class ClosedForm(NamedTuple):
     coalescence: ca.SX
     squared_lengths: ca.SX
     squared_arm: ca.SX | None = None
+
+
+class ClosedFormFormula(NamedTuple):
+    """The formula (z, u, p, sign) of a block's unknowns in closed form, then of where its assemblies meet.
+
+    `has_changing_arm`: whether a length turns on an arm that changes as the mechanism moves.
+    """
+
+    formula: RecordedFormula
+    has_changing_arm: bool
 
 
 class _ComplexNumber(NamedTuple):
@@ -115,6 +128,16 @@ def find_closed_form(e: ConstraintEquations, stage: Block) -> ClosedForm | None:
     others = ca.vertcat(ca.SX(0, 1), *(each for each in ca.symvar(rows) if not ca.depends_on(unknowns, each)))
     derived = _derive_form(formula_text(rows, unknowns, others), angles)
     return derived and derived.form_of(unknowns, others)
+
+
+def closed_form_formula(e: ConstraintEquations, block: Block) -> ClosedFormFormula | None:
+    """The closed form of a block as a formula; None where it has none."""
+    form = find_closed_form(e, block)
+    if form is None:
+        return None
+    values = stack_expressions(ca.atan2(each[1], each[0]) if len(each) == 2 else each[0] for each in form.values)
+    function = ca.Function("form", [e.z, e.u, e.p, form.sign], [ca.densify(values), form.coalescence])
+    return ClosedFormFormula(recorded_function(function), form.squared_arm is not None)
 
 
 @lru_cache(maxsize=1024)

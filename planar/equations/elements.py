@@ -6,18 +6,15 @@ an element is a sum of coordinates times constant factors and a *rest* that is n
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from functools import cached_property, lru_cache
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
-import casadi as ca
-
-from planar.equations.casadi_call import BufferedFunction
-from planar.equations.elimination import stack_expressions
-from planar.foundation.geometry import GROUND, Frame
-from planar.foundation.jets import Scalar
-from planar.foundation.recorded_formula import RecordedFormula, RecordedNumber, record_formula
-from planar.model.pairs import Pair
+from planar.equations.known_types import fingerprint
+from planar.foundation.printed_formula import PrintedFunction, compile_formula
+from planar.foundation.recorded_formula import RecordedFormula
 
 PARTS_OF_FRAME = 5
 """x, y, cos, sin and angle of a frame are the arguments of a formula."""
@@ -32,6 +29,11 @@ class ElementKey(NamedTuple):
     own_count: int
     number_count: int
 
+    @property
+    def fingerprint(self) -> str:
+        """What tells the element from others in every process."""
+        return fingerprint(self.formula.as_text(), *self[1:])
+
 
 class ElementArguments(NamedTuple):
     """What an element's functions take, in this order: local coordinates (x, y, angle of every moving body, then own
@@ -43,111 +45,75 @@ class ElementArguments(NamedTuple):
     numbers: tuple[int, ...]
 
 
+@dataclass(frozen=True, eq=False)
 class Element:
-    """One formula of a pair type as casadi expressions: its linear part, its rest, and the derivatives of the rest."""
+    """One formula of a pair type: its linear part, its rest, and the derivatives of the rest."""
 
-    def __init__(self, key: ElementKey):
-        formula, bodies, own_count, number_count = key
-        self.coordinate_count = 3 * bodies + own_count
-        self.coordinates = [ca.SX.sym(f"q{k}") for k in range(self.coordinate_count)]
-        self.cosines = [ca.SX.sym(f"c{body}") for body in range(bodies)]
-        self.sines = [ca.SX.sym(f"s{body}") for body in range(bodies)]
-        self.numbers = [ca.SX.sym(f"n{k}") for k in range(number_count)]
-        frames = [
-            (*self.coordinates[3 * k : 3 * k + 2], self.cosines[k], self.sines[k], self.coordinates[3 * k + 2])
-            for k in range(bodies)
-        ]
-        arguments = [*(part for frame in frames for part in frame), *self.coordinates[3 * bodies :], *self.numbers]
-        values = [ca.SX(value) for value in formula.evaluate(arguments)]
-        self.factors: list[dict[int, float]] = []
-        "for every row the constant factors of local coordinates"
-        self.nonlinear: list[set[int]] = []
-        "for every row the local coordinates on which its rest depends"
-        self.rest: list[ca.SX] = []
-        everything = stack_expressions([*self.coordinates, *self.cosines, *self.sines])
-        for value in values:
-            slopes = ca.jacobian(value, everything)
-            factors, nonlinear = {}, set()
-            for place, column in enumerate(slopes.sparsity().get_triplet()[1]):
-                slope = slopes.nz[place]
-                if column < self.coordinate_count and slope.is_constant():
-                    factors[column] = float(slope)
-                else:
-                    body = (column - self.coordinate_count) % max(bodies, 1)
-                    nonlinear.add(column if column < self.coordinate_count else 3 * body + 2)
-            linear = stack_expressions(self.coordinates[column] for column in factors)
-            self.factors.append(factors)
-            self.nonlinear.append(nonlinear)
-            self.rest.append(ca.substitute(value, linear, ca.SX.zeros(len(factors))) if factors else value)
-        self.slope_entries = [(row, column) for row, columns in enumerate(self.nonlinear) for column in sorted(columns)]
-        "the rows and local coordinates of the derivatives of the rest"
+    fingerprint: str
+    "what tells it from others in every process"
+    body_count: int
+    coordinate_count: int
+    factors: tuple[Mapping[int, float], ...]
+    "for every row the constant factors of local coordinates"
+    nonlinear: tuple[frozenset[int], ...]
+    "for every row the local coordinates on which its rest depends"
+    arguments: ElementArguments
+    "what the functions of the rest take"
+    rest: RecordedFormula
+    "(arguments) -> the rests (rows,)"
+    slopes: RecordedFormula
+    "(arguments) -> the rests (rows,), then their derivatives (slope entries,)"
+    second_rates: RecordedFormula
+    "(arguments, rates of local coordinates) -> the second rates of the rests (rows,), coordinates without any"
 
-    @cached_property
-    def arguments(self) -> ElementArguments:
-        """What the functions of the rest take."""
-        symbols = {symbol.name() for symbol in ca.symvar(stack_expressions([*self.rest, *self._slopes]))}
-        return ElementArguments(
-            *(tuple(k for k, symbol in enumerate(group) if symbol.name() in symbols) for group in self._symbol_groups)
+    def as_text(self) -> str:
+        """All but the fingerprint in one line of JSON."""
+        factors = [list(factors.items()) for factors in self.factors]
+        formulas = [formula.as_text() for formula in (self.rest, self.slopes, self.second_rates)]
+        nonlinear = [sorted(columns) for columns in self.nonlinear]
+        return json.dumps([self.body_count, self.coordinate_count, factors, nonlinear, self.arguments, *formulas])
+
+    @classmethod
+    def from_text(cls, fingerprint: str, text: str) -> Element:
+        """The element of `as_text`."""
+        bodies, coordinates, factors, nonlinear, arguments, *formulas = json.loads(text)
+        return cls(
+            fingerprint,
+            bodies,
+            coordinates,
+            tuple(map(dict, factors)),
+            tuple(map(frozenset, nonlinear)),
+            ElementArguments(*map(tuple, arguments)),
+            *map(RecordedFormula.from_text, formulas),
         )
 
     @property
-    def _symbol_groups(self) -> tuple[list[ca.SX], ...]:
-        return self.coordinates, self.cosines, self.sines, self.numbers
+    def row_count(self) -> int:
+        """How many rows the formula has."""
+        return len(self.factors)
 
     @cached_property
-    def _argument_column(self) -> ca.SX:
-        """The symbols of the arguments, one below the other."""
-        groups = zip(self._symbol_groups, self.arguments, strict=True)
-        return stack_expressions(group[k] for group, indices in groups for k in indices)
-
-    def _derivative(self, value: ca.SX, column: int) -> ca.SX:
-        """The derivative by a local coordinate; cos and sin of an angle change with it."""
-        slope = ca.jacobian(value, self.coordinates[column])
-        body, part = divmod(column, 3)
-        if part == 2 and body < len(self.cosines):
-            cosine, sine = self.cosines[body], self.sines[body]
-            slope = slope - sine * ca.jacobian(value, cosine) + cosine * ca.jacobian(value, sine)
-        return slope
+    def slope_entries(self) -> list[tuple[int, int]]:
+        """The rows and local coordinates of the derivatives of the rest."""
+        return [(row, column) for row, columns in enumerate(self.nonlinear) for column in sorted(columns)]
 
     @cached_property
-    def _slopes(self) -> list[ca.SX]:
-        return [self._derivative(self.rest[row], column) for row, column in self.slope_entries]
+    def rest_function(self) -> PrintedFunction:
+        """`rest` of arrays."""
+        return self._compile(self.rest)
 
     @cached_property
-    def rest_function(self) -> ca.Function:
-        """(arguments) -> the rests (rows,)."""
-        return ca.Function("rest", [self._argument_column], [_dense_column(self.rest)])
+    def slopes_function(self) -> PrintedFunction:
+        """`slopes` of arrays."""
+        return self._compile(self.slopes)
 
     @cached_property
-    def rest_call(self) -> BufferedFunction:
-        """The same, called on arrays."""
-        return BufferedFunction(self.rest_function)
+    def second_rates_function(self) -> PrintedFunction:
+        """`second_rates` of arrays."""
+        return self._compile(self.second_rates, self.coordinate_count)
 
-    @cached_property
-    def slopes_call(self) -> BufferedFunction:
-        """(arguments) -> the rests (rows,), and their derivatives (slope entries,)."""
-        results = [_dense_column(self.rest), _dense_column(self._slopes)]
-        return BufferedFunction(ca.Function("slopes", [self._argument_column], results))
-
-    @cached_property
-    def second_rate_call(self) -> BufferedFunction:
-        """(arguments, rates of local coordinates) -> the second rates of the rests (rows,), coordinates without any."""
-        rates = ca.SX.sym("rate", self.coordinate_count)
-        second = [ca.SX(0.0) for _ in self.rest]
-        for (row, column), slope in zip(self.slope_entries, self._slopes, strict=True):
-            for other in self.nonlinear[row]:
-                second[row] = second[row] + rates[column] * rates[other] * self._derivative(slope, other)
-        return BufferedFunction(ca.Function("second", [self._argument_column, rates], [_dense_column(second)]))
-
-
-def _dense_column(values: Sequence[ca.SX]) -> ca.SX:
-    return ca.densify(stack_expressions(values))
-
-
-@lru_cache(maxsize=MAX_ELEMENTS)
-def element_of_key(key: ElementKey) -> Element:
-    """The element of a formula; pairs of the same formula share it."""
-    return Element(key)
+    def _compile(self, formula: RecordedFormula, more_arguments: int = 0) -> PrintedFunction:
+        return compile_formula(formula, sum(map(len, self.arguments)) + more_arguments)
 
 
 class PlacedElement(NamedTuple):
@@ -159,48 +125,3 @@ class PlacedElement(NamedTuple):
     numbers: tuple[int, ...]
     "indices in p"
     rows: range
-
-
-Formula = Callable[[Sequence[Frame], Sequence[Scalar], Sequence[Scalar]], Sequence[Scalar]]
-
-
-class ElementPlacement:
-    """Finds the elements of pairs: `frame_columns` are the coordinates x, y, angle of every link that moves,
-    `own_columns` and `number_columns` those of every pair."""
-
-    def __init__(
-        self,
-        frame_columns: Mapping[str, Sequence[int]],
-        own_columns: Mapping[str, Sequence[int]],
-        number_columns: Mapping[str, Sequence[int]],
-    ):
-        self._frame_columns, self._own_columns, self._number_columns = frame_columns, own_columns, number_columns
-
-    def residual_of(self, pair: Pair, first_row: int) -> PlacedElement:
-        """The element of a pair's residual; its rows begin with a row."""
-        return self._place(pair, pair.residual, first_row, len(pair.residual_kinds))
-
-    def input_position_of(self, pair: Pair, row: int) -> PlacedElement:
-        """The element of the position of a relative motion."""
-
-        def position(*arguments: Sequence[Scalar]) -> Sequence[Scalar]:
-            return (pair.input_position(*arguments),)
-
-        return self._place(pair, position, row, 1)
-
-    def _place(self, pair: Pair, formula: Formula, first_row: int, row_count: int) -> PlacedElement:
-        moving = [link for link in pair.bodies if link in self._frame_columns]
-        own, numbers = self._own_columns.get(pair.name, ()), self._number_columns.get(pair.name, ())
-
-        def recorded(arguments: Sequence[RecordedNumber]) -> Sequence[Scalar]:
-            count = PARTS_OF_FRAME * len(moving)
-            parts = (arguments[PARTS_OF_FRAME * k : PARTS_OF_FRAME * (k + 1)] for k in range(len(moving)))
-            frames = {link: Frame(x, y, c, s, angle) for link, (x, y, c, s, angle) in zip(moving, parts, strict=True)}
-            own_values, number_values = arguments[count : count + len(own)], arguments[count + len(own) :]
-            return formula([frames.get(link, GROUND) for link in pair.bodies], number_values, own_values)
-
-        count = PARTS_OF_FRAME * len(moving) + len(own) + len(numbers)
-        key = ElementKey(record_formula(recorded, count), len(moving), len(own), len(numbers))
-        columns = [column for link in moving for column in self._frame_columns[link]]
-        rows = range(first_row, first_row + row_count)
-        return PlacedElement(element_of_key(key), (*columns, *own), tuple(numbers), rows)

@@ -14,15 +14,14 @@ import casadi as ca
 import numpy as np
 
 from planar.equations.assembled_equations import AssembledEquations
-from planar.equations.block_types import MAX_BLOCK_TYPES, BlockTypeKey, PlacedBlock, block_equations, place_blocks
+from planar.equations.block_type_functions import SETTLED_STEP, BlockTypeFunctions, block_type_functions
+from planar.equations.block_types import PlacedBlock, place_blocks
 from planar.equations.casadi_call import (
-    ON_ARM,
-    POLISHING_STEPS,
     BufferedFunction,
-    ClosedFormAssemblies,
     RunFunction,
     read_function,
 )
+from planar.equations.closed_form_assemblies import ClosedFormAssemblies
 from planar.equations.elimination import stack_expressions
 from planar.equations.linear import solve_arrays, solve_linear, solve_vectors
 from planar.equations.mechanism_numbers import equation_structure, structure_fingerprint
@@ -41,9 +40,9 @@ from planar.equations.symbolic_equations import (
     build_equations,
     slice_length,
 )
-from planar.foundation.angles import wrap_angle
 from planar.foundation.arrays import Array, greatest_size
 from planar.foundation.kept_texts import KeptTexts
+from planar.foundation.printed_formula import FormulaFunction
 from planar.foundation.private_cache import PrivateCache
 from planar.model.mechanism import Mechanism
 
@@ -52,12 +51,12 @@ MAX_CACHED_STRUCTURES = 256
 
 KEPT_EQUATIONS = PrivateCache("equations", ".equations", b"planar equations\n", 128 * 2**20)
 """Functions of structures, as casadi writes them; those of one take from 0.1 to 1 MB."""
-SETTLED_STEP = 1e-9
-"""rad or sizes: after a shorter step of Newton's method the next one is round-off."""
 MAX_UNROLLED_UNKNOWNS = 12
 """Unknowns of a block whose steps of Newton's method are unrolled: expressions of a larger one would be too long."""
-MAX_ELEMENT_EVALUATIONS = 100.0
-"""Evaluations by elements that take about as long as it takes to derive functions of a whole structure."""
+MAX_ELEMENT_EVALUATIONS = 16.0
+"""Evaluations by elements that take about as long as it takes to derive simple functions of a whole structure."""
+MANY_EVALUATIONS = 250.0
+"""The same of all its functions."""
 SAMPLES_PER_EVALUATION = 64.0
 """Samples that take as long as one evaluation takes whatever their number."""
 RUN_NEWTON_STEPS = 4
@@ -99,8 +98,8 @@ class EquationFunctions:
     """The equations of one structure as functions of arrays; `texts` is where derived ones are kept.
 
     They are evaluated by elements and block types, which are derived once for all structures. From a structure that is
-    evaluated often casadi functions of the whole are derived, each when it is first asked for, unless its unknowns are
-    many.
+    evaluated several times casadi functions of the whole are derived, and from one that is evaluated often those that
+    take long to derive, unless its unknowns are many.
     """
 
     def __init__(self, equations: ConstraintEquations, texts: KeptTexts | None = None):
@@ -109,28 +108,22 @@ class EquationFunctions:
         is_square = equations.is_square and self._unknown_count == self._row_count
         self.is_sparse = is_square and self._unknown_count > MAX_DENSE_UNKNOWNS and equations.elimination is not None
         "whether Jacobians are by their entries"
-        self.is_compiled = equations.elimination is None
-        "whether functions of the whole are derived"
         self._evaluation_count = 0.0
 
     def _elements(self, samples: int = 1) -> AssembledEquations | None:
         """The equations as elements evaluate them at samples; None where functions of the whole do that."""
-        if self.is_compiled:
-            return None
-        if not self.is_sparse:
-            self._evaluation_count += 1.0 + samples / SAMPLES_PER_EVALUATION
-            if self._evaluation_count > MAX_ELEMENT_EVALUATIONS:
-                self.compile()
-                return None
-        return self.equations.assembled
+        self._evaluation_count += 1.0 + samples / SAMPLES_PER_EVALUATION
+        is_compiled = self._evaluation_count > MAX_ELEMENT_EVALUATIONS and not self.is_sparse
+        return None if is_compiled else self.equations.assembled
+
+    @property
+    def is_often_evaluated(self) -> bool:
+        """Whether functions pay that take long to derive."""
+        return self._evaluation_count > MANY_EVALUATIONS and not self.is_sparse
 
     def compile(self) -> None:
-        """Derive functions of the whole from now on."""
-        if self.is_compiled or self.is_sparse:
-            return
-        self.is_compiled = True
-        self._block_calls.clear()
-        self._block_assemblies.clear()
+        """Evaluate by functions of the whole from now on."""
+        self._evaluation_count = MANY_EVALUATIONS + 1.0
 
     def kept(self, name: str, make: Callable[[], Kept]) -> Kept:
         """What `make` makes of this structure, from the disk where it is kept there by this name."""
@@ -172,17 +165,15 @@ class EquationFunctions:
         return {}
 
     def _make_block_call(self, block: Block) -> BlockCall:
-        by_type = None if self.is_compiled else self._functions_of_type(block)
+        by_type = self._functions_of_type(block)
         if by_type is None:
             return BufferedFunction(self.block_function(block))
-        call = by_type.block_call(by_type.equations.blocks[0])
-        assert isinstance(call, BufferedFunction)
-        return PlacedBlockCall(block, call, self._known_coordinates)
+        return PlacedBlockCall(block, by_type.closing, self._known_coordinates)
 
-    def _functions_of_type(self, block: Block) -> EquationFunctions | None:
+    def _functions_of_type(self, block: Block) -> BlockTypeFunctions | None:
         """The functions of a block's type; None for one that has none."""
         placed = self._placed_blocks[block.block_index]
-        return None if placed is None else functions_of_block_type(placed.key)
+        return None if placed is None else block_type_functions(placed.key)
 
     @cached_property
     def _placed_blocks(self) -> tuple[PlacedBlock | None, ...]:
@@ -192,7 +183,7 @@ class EquationFunctions:
     def _known_coordinates(self) -> KnownCoordinates:
         """Where blocks stand that are called by their types."""
         types = map(self._functions_of_type, self.equations.blocks)
-        calls = [None if functions is None else functions._coordinate_call for functions in types]
+        calls = [None if functions is None else functions.coordinates for functions in types]
         assert self.equations.assembled is not None
         return KnownCoordinates(self.equations, self.equations.assembled, self._placed_blocks, calls)
 
@@ -207,45 +198,19 @@ class EquationFunctions:
         return {}
 
     def _make_assemblies(self, block: Block) -> BlockAssemblyCall | None:
-        by_type = None if self.is_compiled else self._functions_of_type(block)
+        by_type = self._functions_of_type(block)
         if by_type is not None:
-            assemblies = by_type.block_assemblies(by_type.equations.blocks[0])
-            if not isinstance(assemblies, ClosedFormAssemblies):
-                return None
-            return PlacedAssemblies(block, assemblies, self._known_coordinates)
-        k = block.block_index
-        form = self.kept(f"assembly {k}", lambda: self._make_assembly_function(block))
-        if form is None:
-            return None
-        polished = self.kept(f"polished {k}", lambda: self._make_polished_function(block))
-        on_arm = form.name() == ON_ARM
-        return ClosedFormAssemblies(block.unknowns, BufferedFunction(form), BufferedFunction(polished), on_arm)
+            assemblies = by_type.assemblies
+            return assemblies and PlacedAssemblies(block, assemblies, self._known_coordinates)
+        from planar.equations.closed_form import closed_form_formula  # nearly all blocks have a type
 
-    def _make_assembly_function(self, block: Block) -> ca.Function | None:
-        """(z, u, p, sign) -> the unknowns of a block in closed form, and where its assemblies meet, if it has one."""
-        e, placed = self.equations, self._placed_blocks[block.block_index]
-        if placed is not None:
-            of_type = _closed_form_of_type(placed.key)
-            if of_type is None:
-                return None
-            sign, states = ca.SX.sym("sign"), ca.vertcat(e.w, e.u)
-            arguments = e.z[block.unknowns], states[placed.known.tolist()], e.p[placed.numbers.tolist()], sign
-            return ca.Function(of_type.name(), [e.z, e.u, e.p, sign], list(of_type(*arguments)))
-        from planar.equations.closed_form import find_closed_form  # most functions are read
-
-        form = find_closed_form(e, block)
-        if form is None:
-            return None
-        found = stack_expressions(ca.atan2(each[1], each[0]) if len(each) == 2 else each[0] for each in form.values)
-        name = "assembly" if form.squared_arm is None else ON_ARM
-        return ca.Function(name, [e.z, e.u, e.p, form.sign], [found, form.coalescence])
-
-    def _make_polished_function(self, block: Block) -> ca.Function:
-        """(z, u, p) -> the unknowns of a block after one of Newton's steps, and what was open before it."""
         e = self.equations
-        left, slope = self.block_function(block)(e.z, e.u, e.p)
-        polished = [e.z[block.unknowns] - solve_linear(slope, left), ca.norm_inf(left)]
-        return ca.Function("polished", [e.z, e.u, e.p], polished)
+        form = closed_form_formula(e, block)
+        if form is None:
+            return None
+        counts = *(symbol.numel() for symbol in (e.z, e.u, e.p)), 1
+        function = FormulaFunction(form.formula, counts, ((1, slice_length(block.unknowns)), (1, 1)))
+        return ClosedFormAssemblies(block.unknowns, function, self.block_call(block), form.has_changing_arm)
 
     @kept_function
     def coordinate_function(self) -> ca.Function:
@@ -255,7 +220,7 @@ class EquationFunctions:
 
     def coordinates_ahead(self, block_index: int, z: Array, u: Array, p: Array) -> Array:
         """w (coordinates,) at z (unknowns,), as far as known ahead of a block; the rest of it may hold anything."""
-        if self.is_compiled:
+        if self.equations.elimination is None:
             return self.coordinates(z, u, p)
         return self._known_coordinates.coordinates_ahead(block_index, z, u, p)
 
@@ -267,11 +232,11 @@ class EquationFunctions:
             w = elements.coordinates(many, np.broadcast_to(u, (len(many), u.shape[-1])), p)
             return w[0] if z.ndim == 1 else w
         if z.ndim == 1:
-            return self._coordinate_call(z, u, p)[0][0]
-        return self._coordinate_call.evaluate_batch(len(z), z, u, p)[0][:, 0]
+            return self._coordinate_function(z, u, p)[0][0]
+        return self._coordinate_function.evaluate_batch(len(z), z, u, p)[0][:, 0]
 
     @cached_property
-    def _coordinate_call(self) -> BufferedFunction:
+    def _coordinate_function(self) -> BufferedFunction:
         return BufferedFunction(self.coordinate_function)
 
     @cached_property
@@ -443,8 +408,9 @@ class EquationFunctions:
         """The unknowns at every sample of inputs u (samples, inputs), each from the one before, the first from z."""
         if not len(u):
             return np.empty((0, len(z)))
-        elements = self._elements(RUN_NEWTON_STEPS * len(u))
-        if elements is None:
+        self._elements(RUN_NEWTON_STEPS * len(u))
+        elements = self.equations.assembled
+        if self.is_often_evaluated or elements is None:
             return self._run_function(z, u, p)
         if any(slice_length(block.unknowns) > MAX_UNROLLED_UNKNOWNS for block in self.equations.blocks):
             return self._run_whole(elements, z, u, p)
@@ -460,32 +426,11 @@ class EquationFunctions:
                 continue
             if placed is None:
                 return self._run_whole(elements, z, u, p)
-            by_type = functions_of_block_type(placed.key)
+            by_type = block_type_functions(placed.key)
             known, numbers = states[:, placed.known], p[placed.numbers]
-            samples[:, block.unknowns] = own = by_type.run_block(z[block.unknowns], known, numbers)
-            states[:, placed.coordinates] = by_type.coordinates(own, known, numbers)
-        return samples
-
-    def run_block(self, z: Array, known: Array, numbers: Array) -> Array:
-        """The unknowns (samples, unknowns) of a block type at what it rests on (samples, known), from z (unknowns,)."""
-        assemblies = self.block_assemblies(self.equations.blocks[0])
-        if assemblies is None:
-            return self._run_function(z, known, numbers)
-        tried = np.repeat(z[None], len(known), axis=0)
-        both, _ = assemblies.evaluate_batch(tried, known, numbers)
-        is_angle = self.equations.unknown_is_angle
-
-        def distance(values: Array) -> float:
-            move = values - z
-            return float(np.abs(np.where(is_angle, wrap_angle(move), move)).max(initial=0.0))
-
-        samples: Array = min(both, key=lambda values: distance(values[0]) if np.isfinite(values[0]).all() else np.inf)
-        steps = np.diff(samples[:, is_angle], axis=0, prepend=z[None, is_angle])
-        samples[:, is_angle] = z[is_angle] + np.cumsum(wrap_angle(steps), axis=0)
-        call = self.block_call(self.equations.blocks[0])
-        for _ in range(POLISHING_STEPS):
-            residuals, columns = call.evaluate_batch(len(known), samples, known, numbers)
-            samples = samples - solve_vectors(columns.swapaxes(-1, -2), residuals[:, 0])
+            samples[:, block.unknowns] = own = by_type.run(z[block.unknowns], known, numbers)
+            (coordinates,) = by_type.coordinates.evaluate_batch(len(u), own, known, numbers)
+            states[:, placed.coordinates] = coordinates[:, 0]
         return samples
 
     def _run_whole(self, elements: AssembledEquations, z: Array, u: Array, p: Array) -> Array:
@@ -558,19 +503,6 @@ class EquationFunctions:
 MAX_CSE_NODES = 30_000
 """Of expressions in which what stands in several places is looked for: the time for that grows faster than they do, and
 what it saves is little."""
-
-
-@lru_cache(maxsize=MAX_BLOCK_TYPES)
-def functions_of_block_type(key: BlockTypeKey) -> EquationFunctions:
-    """The functions of a block type: its blocks are one, its u what is known ahead of it."""
-    return EquationFunctions(block_equations(key))
-
-
-@lru_cache(maxsize=MAX_BLOCK_TYPES)
-def _closed_form_of_type(key: BlockTypeKey) -> ca.Function | None:
-    """(unknowns, known, numbers, sign) -> the closed form of a block type; None where it has none."""
-    functions = functions_of_block_type(key)
-    return functions._make_assembly_function(functions.equations.blocks[0])
 
 
 def function_with_cse(name: str, given: Sequence[ca.SX], wanted: Sequence[ca.SX]) -> ca.Function:

@@ -8,7 +8,7 @@ import numpy as np
 
 from planar.equations.assembled_equations import AssembledEquations
 from planar.equations.block_types import PlacedBlock
-from planar.equations.casadi_call import BufferedFunction, ClosedFormAssemblies
+from planar.equations.closed_form_assemblies import ArrayFunction, ClosedFormAssemblies
 from planar.equations.symbolic_equations import Block, ConstraintEquations
 from planar.foundation.arrays import Array
 
@@ -22,7 +22,7 @@ class KnownCoordinates:
         e: ConstraintEquations,
         assembled: AssembledEquations,
         placed: tuple[PlacedBlock | None, ...],
-        coordinate_calls: list[BufferedFunction | None],
+        coordinate_calls: list[ArrayFunction | None],
     ):
         self._equations, self._assembled, self._placed = e, assembled, placed
         self._coordinate_calls = coordinate_calls
@@ -83,16 +83,16 @@ class KnownCoordinates:
 class PlacedBlockCall:
     """A block's residuals and Jacobian by its type, as `EquationFunctions.block_call` gives them."""
 
-    def __init__(self, block: Block, function: BufferedFunction, known: KnownCoordinates):
+    def __init__(self, block: Block, function: ArrayFunction, known: KnownCoordinates):
         self._block, self._function, self._known = block, function, known
 
-    def __call__(self, z: Array, u: Array, p: Array) -> list[Array]:
-        """At one position."""
-        return self._function(*self._known.arguments(self._block, z, u, p))
+    def __call__(self, *arguments: Array) -> list[Array]:
+        """At one position z, u, p."""
+        return self._function(*self._known.arguments(self._block, *arguments))
 
-    def evaluate_batch(self, count: int, z: Array, u: Array, p: Array) -> list[Array]:
-        """At many positions; arguments (positions, entries), or (entries,) for all of them alike."""
-        return self._function.evaluate_batch(count, *self._known.arguments(self._block, z, u, p))
+    def evaluate_batch(self, count: int, *arguments: Array) -> list[Array]:
+        """At many positions z, u, p; arguments (positions, entries), or (entries,) for all of them alike."""
+        return self._function.evaluate_batch(count, *self._known.arguments(self._block, *arguments))
 
 
 class PlacedAssemblies:
@@ -115,7 +115,7 @@ class PlacedAssemblies:
         return self._assemblies.of_designs(*self._known.arguments(self._block, z, u, p))
 
 
-BlockCall = BufferedFunction | PlacedBlockCall
+BlockCall = ArrayFunction
 """(z, u, p) -> a block's F and the columns of its Jacobian."""
 BlockAssemblyCall = ClosedFormAssemblies | PlacedAssemblies
 """(z, u, p) -> both assemblies of a block."""

@@ -16,7 +16,8 @@ import numpy as np
 from planar.equations.assembled_equations import AssembledEquations, Elimination
 from planar.equations.block_decomposition import BlockIndices, decompose_blocks
 from planar.equations.coordinates import FRAME_PARTS, Coordinate
-from planar.equations.elements import ElementPlacement, PlacedElement
+from planar.equations.element_placement import ElementPlacement
+from planar.equations.elements import PlacedElement
 from planar.equations.elimination import (
     CoordinateSymbols,
     EliminationRow,
@@ -377,7 +378,7 @@ def expressions_of_elimination(
             *(cos_sin[placed.coordinates[3 * k + 2]][1] for k in taken.sines),
             *(p[placed.numbers[k]] for k in taken.numbers),
         ]
-        rests += ca.vertsplit(placed.element.rest_function(stack_expressions(arguments)))
+        rests += map(ca.SX, placed.element.rest.evaluate(arguments))
     for row, misfit in misfits.items():
         rests[row] = rests[row] - misfit
     z = ca.SX.sym("z", len(unknowns))

@@ -1,4 +1,4 @@
-"""Formulas recorded as lists of operations: equal lists are the same formula, whatever the names of its data are."""
+"""Formulas recorded as lists of instructions: equal lists are the same formula, whatever the names of its data are."""
 
 from __future__ import annotations
 
@@ -6,144 +6,153 @@ from collections.abc import Callable, Sequence
 from math import floor
 from typing import Any, NamedTuple
 
+from planar.foundation.instruction_list import Instruction, InstructionList, required_values
 from planar.foundation.jets import Scalar, atan2, cos, sin, sqrt, tan
-
-Operand = int | float
-"""The number of an operation, or a constant."""
-Operation = tuple[Any, ...]
-"""The name of an operation and its operands; ("argument", k) is the formula's argument k."""
 
 
 class RecordedFormula(NamedTuple):
-    """Operations in the order in which they are computed, and the results of a formula among them."""
+    """Instructions in the order in which they are computed, their inputs by number, and the results among them."""
 
-    operations: tuple[Operation, ...]
-    results: tuple[Operand, ...]
+    instructions: tuple[Instruction[int], ...]
+    results: tuple[int, ...]
 
     def evaluate(self, arguments: Sequence[Scalar]) -> list[Scalar]:
         """Compute the results in any arithmetic from the values of all arguments."""
         values: list[Scalar] = []
-        for name, *operands in self.operations:
-            if name == "argument":
-                values.append(arguments[operands[0]])
+        for operation, operands, number, key in self.instructions:
+            if key is not None:
+                values.append(arguments[key])
+            elif operation == "const":
+                values.append(number)
             else:
-                values.append(_FUNCTIONS[name](*(values[k] if type(k) is int else k for k in operands)))
-        return [values[k] if type(k) is int else k for k in self.results]
+                values.append(_FUNCTIONS[operation](*[values[k] for k in operands]))
+        return [values[k] for k in self.results]
+
+    def as_text(self) -> str:
+        """The formula in one line: its instructions, each with its operands, then the numbers of its results."""
+        lines = (" ".join(map(str, (value.operation, *_text_operands(value)))) for value in self.instructions)
+        return ";".join((*lines, " ".join(map(str, self.results))))
+
+    @classmethod
+    def from_text(cls, text: str) -> RecordedFormula:
+        """The formula of `as_text`."""
+        *lines, results = text.split(";")
+        return cls(tuple(_instruction_of(*line.split(" ")) for line in lines), tuple(map(int, results.split())))
+
+
+def _text_operands(value: Instruction[int]) -> Sequence[float]:
+    if value.key is not None:
+        return (value.key,)
+    return (value.number,) if value.operation == "const" else value.operands
+
+
+def _instruction_of(operation: str, *operands: str) -> Instruction[int]:
+    if operation == "const":
+        return Instruction(operation, number=float(operands[0]))
+    if operation == "input":
+        return Instruction(operation, key=int(operands[0]))
+    return Instruction(operation, tuple(map(int, operands)))
 
 
 class RecordedNumber:
     """A number that records what is computed with it: the same lines serve it as symbols and floats."""
 
-    __slots__ = ("operations", "place")
+    __slots__ = ("instructions", "number")
     __array_ufunc__ = None  # an array times it is no array of them
     is_symbolic = True
     "as the symbols of casadi: formulas that consist of pieces keep them all"
 
-    def __init__(self, operations: list[Operation], place: int):
-        self.operations, self.place = operations, place
+    def __init__(self, instructions: InstructionList[Any], number: int):
+        self.instructions, self.number = instructions, number
 
-    def _record(self, name: str, *operands: Operand) -> RecordedNumber:
-        self.operations.append((name, *operands))
-        return RecordedNumber(self.operations, len(self.operations) - 1)
+    def _record(self, operation: str, *operands: Scalar) -> RecordedNumber:
+        numbers = (number_of(operand, self.instructions) for operand in operands)
+        return RecordedNumber(self.instructions, self.instructions.add(operation, *numbers))
 
-    def __add__(self, other: Scalar) -> Scalar:
-        return self if other == 0.0 else self._record("add", self.place, _operand(other))
+    def __add__(self, other: Scalar) -> RecordedNumber:
+        return self._record("add", self, other)
 
     __radd__ = __add__
 
     def __neg__(self) -> RecordedNumber:
-        return self._record("neg", self.place)
+        return self._record("neg", self)
 
-    def __sub__(self, other: Scalar) -> Scalar:
-        return self if other == 0.0 else self._record("sub", self.place, _operand(other))
+    def __sub__(self, other: Scalar) -> RecordedNumber:
+        return self._record("sub", self, other)
 
-    def __rsub__(self, other: Scalar) -> Scalar:
-        return -self if other == 0.0 else self._record("sub", float(other), self.place)
+    def __rsub__(self, other: Scalar) -> RecordedNumber:
+        return self._record("sub", other, self)
 
-    def __mul__(self, other: Scalar) -> Scalar:
-        if other == 0.0:
-            return 0.0
-        return self if other == 1.0 else self._record("mul", self.place, _operand(other))
+    def __mul__(self, other: Scalar) -> RecordedNumber:
+        return self._record("mul", self, other)
 
     __rmul__ = __mul__
 
-    def __truediv__(self, other: Scalar) -> Scalar:
-        return self if other == 1.0 else self._record("div", self.place, _operand(other))
+    def __truediv__(self, other: Scalar) -> RecordedNumber:
+        return self._record("div", self, other)
 
-    def __rtruediv__(self, other: Scalar) -> Scalar:
-        return 0.0 if other == 0.0 else self._record("div", float(other), self.place)
+    def __rtruediv__(self, other: Scalar) -> RecordedNumber:
+        return self._record("div", other, self)
 
-    def __pow__(self, exponent: Scalar) -> Scalar:
-        return self._record("pow", self.place, float(exponent))
+    def __pow__(self, exponent: Scalar) -> RecordedNumber:
+        return self._record("pow", self, exponent)
 
     def __abs__(self) -> RecordedNumber:
-        return self._record("abs", self.place)
+        return self._record("abs", self)
 
-    def __lt__(self, other: Scalar) -> Scalar:
-        return self._record("less", self.place, _operand(other))
+    def __lt__(self, other: Scalar) -> RecordedNumber:
+        return self._record("less", self, other)
 
-    def __gt__(self, other: Scalar) -> Scalar:
-        return self._record("less", _operand(other), self.place)
+    def __gt__(self, other: Scalar) -> RecordedNumber:
+        return self._record("less", other, self)
 
-    def __le__(self, other: Scalar) -> Scalar:
-        return self._record("at_most", self.place, _operand(other))
+    def __le__(self, other: Scalar) -> RecordedNumber:
+        return self._record("most", self, other)
 
-    def __ge__(self, other: Scalar) -> Scalar:
-        return self._record("at_most", _operand(other), self.place)
+    def __ge__(self, other: Scalar) -> RecordedNumber:
+        return self._record("most", other, self)
 
     def cos(self) -> RecordedNumber:
-        return self._record("cos", self.place)
+        return self._record("cos", self)
 
     def sin(self) -> RecordedNumber:
-        return self._record("sin", self.place)
+        return self._record("sin", self)
 
     def tan(self) -> RecordedNumber:
-        return self._record("tan", self.place)
+        return self._record("tan", self)
 
     def sqrt(self) -> RecordedNumber:
-        return self._record("sqrt", self.place)
+        return self._record("sqrt", self)
 
     def floor(self) -> RecordedNumber:
-        return self._record("floor", self.place)
+        return self._record("floor", self)
 
     def arctan2(self, x: Scalar) -> RecordedNumber:
-        return self._record("atan2", self.place, _operand(x))
+        return self._record("atan2", self, x)
 
     def __rarctan2__(self, y: Scalar) -> RecordedNumber:
-        return self._record("atan2", _operand(y), self.place)
+        return self._record("atan2", y, self)
+
+
+def number_of(value: Scalar, instructions: InstructionList[Any]) -> int:
+    """The number of a value in a list: a recorded one's own, or that of a constant."""
+    return value.number if type(value) is RecordedNumber else instructions.add_constant(value)
 
 
 def record_formula(formula: Callable[[Sequence[RecordedNumber]], Sequence[Scalar]], count: int) -> RecordedFormula:
     """Record a formula of `count` arguments."""
-    operations: list[Operation] = [("argument", k) for k in range(count)]
-    results = formula([RecordedNumber(operations, k) for k in range(count)])
-    return _without_idle_operations(operations, [_operand(result) for result in results])
+    instructions: InstructionList[int] = InstructionList()
+    results = formula([RecordedNumber(instructions, instructions.add_input(k)) for k in range(count)])
+    return formula_of_results(instructions, [number_of(result, instructions) for result in results])
 
 
-def _without_idle_operations(operations: list[Operation], results: list[Operand]) -> RecordedFormula:
-    """Leave out what no result needs, arguments among it."""
-    needed = bytearray(len(operations))
-    for k in results:
-        if type(k) is int:
-            needed[k] = 1
-    for place in range(len(operations) - 1, -1, -1):
-        if needed[place] and operations[place][0] != "argument":
-            for k in operations[place][1:]:
-                if type(k) is int:
-                    needed[k] = 1
-    number: dict[int, int] = {}
-    remaining: list[Operation] = []
-    for place, operation in enumerate(operations):
-        if needed[place]:
-            number[place] = len(remaining)
-            name, *operands = operation
-            is_argument = name == "argument"
-            remaining.append((name, *(number[k] if type(k) is int and not is_argument else k for k in operands)))
-    return RecordedFormula(tuple(remaining), tuple(number[k] if type(k) is int else k for k in results))
-
-
-def _operand(value: Scalar) -> Operand:
-    return value.place if type(value) is RecordedNumber else float(value)
+def formula_of_results(instructions: InstructionList[int], results: Sequence[int]) -> RecordedFormula:
+    """The formula of some values of a list, without what they do not need."""
+    required = required_values(instructions, results)
+    numbers = {number: place for place, number in enumerate(required)}
+    needed = (instructions.instructions[number] for number in required)
+    renumbered = (value._replace(operands=tuple(numbers[k] for k in value.operands)) for value in needed)
+    return RecordedFormula(tuple(renumbered), tuple(numbers[result] for result in results))
 
 
 _FUNCTIONS: dict[str, Callable[..., Scalar]] = {
@@ -155,7 +164,9 @@ _FUNCTIONS: dict[str, Callable[..., Scalar]] = {
     "neg": lambda a: -a,
     "abs": abs,
     "less": lambda a, b: a < b,
-    "at_most": lambda a, b: a <= b,
+    "most": lambda a, b: a <= b,
+    "not": lambda a: 1.0 - a,
+    "where": lambda a, b: a * b,
     "cos": cos,
     "sin": sin,
     "tan": tan,

@@ -78,6 +78,11 @@ def discard_stream(stream: Any) -> None:
         os.close(nowhere)
 
 
+def read_package_text(path: Path) -> str:
+    """The text of a file that comes with the package."""
+    return path.read_text(encoding="utf-8")
+
+
 def read_private(path: Path) -> bytes | None:
     """A file's content if it and its folder are this user's and nobody else may write there; else None."""
     try:

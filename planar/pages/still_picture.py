@@ -19,6 +19,6 @@ def still_svg(mechanism: Mechanism, z: np.ndarray | None = None) -> str:
     """
     known = solved_mechanism(mechanism)
     solver, z = known.solver, known.assembly.z if z is None else z
-    w = solver.functions.coordinate_function(z, solver.inputs.u, solver.inputs.p).full().ravel()
+    w = solver.functions.coordinates(z, solver.inputs.u, solver.inputs.p)
     frames, own = frames_from_coordinates((w * solver.scale).tolist(), solver.column, solver.shapes, solver.pairs)
     return svg(scheme(State(mechanism, 0, 0.0, (), frames, own, solver.shapes), numbers=False), mechanism.name)

@@ -55,7 +55,7 @@ class MechanismStructure:
     @property
     def acceptance(self) -> AcceptanceFunctions | None:
         """What judges positions in compiled functions, for the structures that have it."""
-        if not self.functions.is_compiled:
+        if not self.functions.is_often_evaluated:
             return None
         return self._acceptance if self._acceptance.is_available else None
 

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 import planar
-from planar.codegen.generic_evaluation import OPERATIONS, evaluate_function
 from planar.derivatives.design_equations import design_equations
 from planar.derivatives.result_expressions import kinematic_expressions
+from planar.equations.generic_evaluation import OPERATIONS, evaluate_function
 from tests.draws import covering
 from tests.known import MODELS
 

@@ -15,17 +15,13 @@ from planar.batch.march.llvm.runner import LLVMRunner
 from planar.batch.march.numpy import runner as numpy_runner
 from planar.batch.march.numpy.runner import NumpyRunner
 from planar.batch.reference_design import reference_design
-from planar.codegen import instructions, llvm_compile, numpy_code
+from planar.codegen import instructions, llvm_compile
 from planar.codegen.aligned_arrays import allocate_aligned
-from planar.codegen.instructions import (
-    MAX_INSTRUCTIONS,
-    CosSin,
-    InstructionList,
-    UnsupportedOperation,
-    expand_angle_sums,
-)
+from planar.codegen.instructions import MAX_INSTRUCTIONS, CosSin, expand_angle_sums
 from planar.equations.mechanism_numbers import equation_structure
+from planar.foundation import printed_formula
 from planar.foundation.errors import BadInput, Outcome
+from planar.foundation.instruction_list import InstructionList, UnsupportedOperation
 from planar.model.mechanism import named_points
 from tests.builders import designs_around
 from tests.draws import first_cases, part
@@ -215,7 +211,7 @@ def test_numpy_source_says_each_value_once_and_takes_names_again():
     a, b = (made.add_input(("p", k)) for k in range(2))
     whole = made.add("mul", made.add("add", a, b), made.add("sqrt", b))
     wanted = [made.add("neg", whole), made.add("minnum", whole, made.add_constant(2.0)), a]
-    assert numpy_code.write_numpy(made, wanted, (a, b)).splitlines() == [
+    assert printed_formula.write_numpy(made, wanted, (a, b)).splitlines() == [
         "def values(x0, x1):",
         "    r0 = x0 + x1",
         "    r1 = sqrt(x1)",
@@ -224,10 +220,10 @@ def test_numpy_source_says_each_value_once_and_takes_names_again():
         "    r1 = minnum(r1, (2.0))",
         "    return (r0, r1, x0, )",
     ]
-    found = numpy_code.compile_numpy(made, wanted, (a, b))(np.array([1.0, 2.0]), 4.0)
+    found = printed_formula.compile_numpy(made, wanted, (a, b))(np.array([1.0, 2.0]), 4.0)
     np.testing.assert_allclose(np.stack(found), [[-10.0, -12.0], [2.0, 2.0], [1.0, 2.0]])
     with pytest.raises(UnsupportedOperation, match="no atan"):
-        numpy_code.write_numpy(made, [made.add("atan", a)], (a, b))
+        printed_formula.write_numpy(made, [made.add("atan", a)], (a, b))
 
 
 # how much is printed

@@ -1,5 +1,6 @@
 """Equations that are assembled from elements, and blocks by their types, beside functions of the whole."""
 
+from dataclasses import replace
 from functools import cache
 
 import casadi as ca
@@ -25,6 +26,11 @@ def equations_of(stem):
     return build_equations(equation_structure(MODELS[stem]))
 
 
+def of_expressions(equations):
+    """The functions that casadi derives from the equations of the whole."""
+    return EquationFunctions(replace(equations, elimination=None))
+
+
 SQUARE = [stem for stem in COMPARED if MODELS[stem].inputs and equations_of(stem).is_square]
 
 
@@ -44,8 +50,7 @@ def test_every_pair_type_is_in_a_model_that_is_compared():
 @pytest.mark.parametrize("stem", COMPARED)
 def test_elements_say_what_expressions_of_the_whole_say(stem):
     equations = equations_of(stem)
-    assembled, compiled = equations.assembled, EquationFunctions(equations)
-    compiled.compile()
+    assembled, compiled = equations.assembled, of_expressions(equations)
     z, u, p = random_place(equations, 3)
     y = np.hstack([z, u])
     y1, y2 = np.random.default_rng(1).normal(size=(2, *y.shape))
@@ -68,8 +73,7 @@ def test_elements_say_what_expressions_of_the_whole_say(stem):
 @pytest.mark.parametrize("stem", SQUARE)
 def test_types_of_blocks_say_what_functions_of_the_whole_say(stem):
     solver, equations = PositionSolver(MODELS[stem]), equations_of(stem)
-    by_types, compiled = EquationFunctions(equations), EquationFunctions(equations)
-    compiled.compile()
+    by_types, compiled = EquationFunctions(equations), of_expressions(equations)
     z, u, p = random_place(equations, 5)
     p = solver.inputs.p
     for block in equations.blocks:
@@ -90,8 +94,7 @@ def test_types_of_blocks_say_what_functions_of_the_whole_say(stem):
 @pytest.mark.parametrize("stem", SQUARE)
 def test_runs_block_after_block_are_those_of_functions_of_the_whole(stem):
     solver = PositionSolver(MODELS[stem])
-    by_types, compiled = (EquationFunctions(equations_of(stem)) for _ in range(2))
-    compiled.compile()
+    by_types, compiled = EquationFunctions(equations_of(stem)), of_expressions(equations_of(stem))
     z, u, p = solver.find_assembly().z, solver.inputs.u, solver.inputs.p
     assert by_types.run_samples(z, u[None][:0], p).shape == (0, len(z))
     steps = u + np.linspace(0.01, 0.1, 10)[:, None] * np.random.default_rng(0).uniform(0.5, 1.0, len(u))
@@ -107,13 +110,25 @@ def test_equal_blocks_share_one_type():
     assert len(set(keys)) < len(keys)
 
 
-def test_a_structure_that_is_evaluated_often_is_compiled_and_says_the_same():
-    solver = PositionSolver(MODELS["crank-rocker"])
-    functions = EquationFunctions(build_equations(equation_structure(MODELS["crank-rocker"])))
-    z, u, p = solver.find_assembly().z, solver.inputs.u, solver.inputs.p
-    first = functions.residuals_and_jacobian(z, u, p)
-    for _ in range(1000):
-        functions.coordinates(z, u, p)
-    assert functions.is_compiled
-    for a, b in zip(first, functions.residuals_and_jacobian(z, u, p), strict=True):
-        np.testing.assert_allclose(a, b, rtol=1e-12, atol=1e-14)
+@pytest.mark.parametrize("stem", COMPARED)
+def test_functions_joined_from_elements_say_what_index_arrays_say(stem):
+    equations = equations_of(stem)
+    functions = EquationFunctions(equations)
+    z, u, p = random_place(equations, 7)
+    expected = equations.assembled.residuals_and_jacobians(z, u, p)
+    jacobians = np.asarray(SparseMatrices(equations.assembled.pattern, expected.entries))
+    for k in range(len(z)):
+        residuals, jacobian = functions.residuals_and_jacobian(z[k], u[k], p)
+        np.testing.assert_allclose(residuals, expected.residuals[k], rtol=1e-13, atol=1e-13)
+        np.testing.assert_allclose(np.asarray(jacobian), jacobians[k], rtol=1e-13, atol=1e-13)
+        coordinates = equations.assembled.coordinates(z[k : k + 1], u[k : k + 1], p)[0]
+        np.testing.assert_allclose(functions.coordinates(z[k], u[k], p), coordinates, rtol=1e-13, atol=1e-13)
+
+
+def test_what_is_not_defined_at_a_place_is_not_a_number():
+    equations = equations_of("whitworth")
+    form = next(filter(None, map(EquationFunctions(equations).block_assemblies, equations.blocks)))
+    z, u, p = random_place(equations, 7)
+    few, many = (form.of_designs(z[:count], u[:count], 0.0 * p) for count in (1, 7))
+    assert np.isnan(few[0]).any()
+    np.testing.assert_array_equal(np.isnan(few[0]), np.isnan(many[0][:, :1]))

@@ -53,8 +53,6 @@ def texts_of(program: EquationFunctions, mechanism) -> list[str | None]:
     judged = acceptance.AcceptanceFunctions(equation_structure(mechanism), program)
     e, found = program.equations, [program.kinematics_function, program.coordinate_function, program._residual_function]
     found += map(program.block_function, e.blocks)
-    forms = [program.block_assemblies(block) for block in e.blocks]
-    found += [each and part.function for each in forms if each for part in (each._form, each._polished)]
     if judged.is_available:
         found += [program.newton_function, judged._position, judged.corrected_position.function]
         found.append(judged.step_check.function)

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from planar.foundation.geometry import Frame
+from planar.foundation.instruction_list import Instruction
 from planar.foundation.jets import atan2, cos, sign_of, sin, sqrt, tan, value_between, within_turn
 from planar.foundation.recorded_formula import RecordedFormula, record_formula
 from planar.model.pairs import pair_types
@@ -37,7 +38,8 @@ def test_every_operation_is_recorded(values):
 
 def test_zeros_and_ones_leave_no_operation_and_what_no_result_needs_is_left_out():
     formula = record_formula(lambda x: [x[0] * 1.0 + 0.0 * x[1] + 0.0, 0.0 / x[2], x[1] - 0.0], 4)
-    assert formula == RecordedFormula((("argument", 0), ("argument", 1)), (0, 0.0, 1))
+    inputs = Instruction("input", key=0), Instruction("input", key=1)
+    assert formula == RecordedFormula((*inputs, Instruction("const", number=0.0)), (0, 2, 1))
 
 
 def test_formulas_are_equal_where_their_operations_are():

@@ -80,7 +80,7 @@ LIBRARIES = {
     "xlsxwriter": {"reports"},
 }
 MOST_LINES, LONGEST_FUNCTION, MOST_PARAMETERS = 800, 60, 8
-MOST_MODULES_TO_SOLVE, MOST_OTHERS_TO_SOLVE = 120, 40
+MOST_MODULES_TO_SOLVE, MOST_OTHERS_TO_SOLVE = 125, 40
 """Modules of planar, and others beside the libraries that are needed, which `planar solve` loads."""
 BESIDE_OTHER_JOINTS = {ROOT / "formats" / "drawn" / f"drawn_{what}.py" for what in ("document", "mechanism")}
 FILES = sorted(ROOT.rglob("*.py"))

@@ -108,8 +108,7 @@ def closed_position(solver: PositionSolver, constraints: FullConstraints) -> Arr
     except NoAnswer as problem:
         nearest = problem
     if isinstance(nearest, Assembly):
-        there: Array = solver.functions.coordinate_function(nearest.z, solver.inputs.u, solver.inputs.p).full()
-        return there.ravel()
+        return solver.functions.coordinates(nearest.z, solver.inputs.u, solver.inputs.p)
     found = find_closed_position(constraints)
     if found is None:
         raise solver.unassembled(nearest) if isinstance(nearest, AssemblySearchFailure) else nearest

@@ -12,7 +12,7 @@ from planar.assemblies.modes import modes
 from planar.assemblies.search_tree import is_linear
 from planar.batch.design_arrays import values_of_design, with_design_values
 from planar.batch.reference_design import ReferenceDesign
-from planar.equations.casadi_call import POLISHING_STEPS, ClosedFormAssemblies
+from planar.equations.closed_form_assemblies import POLISHING_STEPS
 from planar.equations.linear import solve_vectors
 from planar.equations.symbolic_equations import Block, slice_length
 from planar.foundation.errors import BadInput, NoAnswer
@@ -87,7 +87,7 @@ def _list_dyads(reference: ReferenceDesign, p: Array, u: Array, fit: Array) -> t
     design, z = np.flatnonzero(fit), np.zeros((len(equations.unknowns), int(fit.sum())))
     for block, way in zip(equations.blocks, ways, strict=True):
         own_u, own_p = u[:, design].T, p[:, design].T
-        if isinstance(way, ClosedFormAssemblies):
+        if way is not None and not isinstance(way, bool):
             both, left, bend = way.of_designs(z.T, own_u, own_p)
             joins = (bend < MEETING_COSINE_SQUARED) & (left <= CLOSED_TOLERANCE)
             decided[design[~(joins | (bend > 2.0 - MEETING_COSINE_SQUARED))]] = False

@@ -128,8 +128,9 @@ class BlockCorrector:
         least = z.copy()
         own, angles = least[block.unknowns], self._is_angle(block)
         own[angles] = np.arctan2(np.sin(own[angles]), np.cos(own[angles]))
-        residuals = self.functions.block_function(block)(least, self.u[:, each], self.p[:, each])[0].full()
-        still = closed & (np.max(np.abs(residuals), axis=0, initial=0.0) <= 10.0 * CLOSED_TOLERANCE)
+        given = least.T, self.u[:, each].T, self.p[:, each].T
+        residuals = self.functions.block_call(block).evaluate_batch(len(each), *given)[0][:, 0]
+        still = closed & (np.max(np.abs(residuals), axis=1, initial=0.0) <= 10.0 * CLOSED_TOLERANCE)
         return np.where(still, least, z)
 
     def _is_angle(self, block: Block) -> Array:

@@ -22,10 +22,10 @@ from planar.batch.block_solutions.generic_start import (
 )
 from planar.batch.march.kernel import kernel_equations
 from planar.batch.reference_design import ReferenceDesign
-from planar.codegen.instructions import UnsupportedOperation
 from planar.equations.mechanism_numbers import equation_structure
 from planar.equations.symbolic_equations import Block, slice_length
 from planar.foundation.arrays import Array, BoolArray, ComplexArray
+from planar.foundation.instruction_list import UnsupportedOperation
 
 MAX_UNKNOWNS = 8
 """Unknowns of a block of which all solutions are looked for, once, in about a second at most."""

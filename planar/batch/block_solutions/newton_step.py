@@ -8,12 +8,12 @@ import casadi as ca
 import numpy as np
 
 from planar.batch.march.kernel import KernelEquations, KernelInstructions, Operand
-from planar.codegen.instructions import UnsupportedOperation, required_values
-from planar.codegen.numpy_code import NumpyFunction, compile_numpy
 from planar.equations.linear import solve_by_elimination
 from planar.equations.rates import block_jacobian
 from planar.equations.symbolic_equations import Block
 from planar.foundation.arrays import ComplexArray
+from planar.foundation.instruction_list import UnsupportedOperation, required_values
+from planar.foundation.printed_formula import PrintedFunction, compile_numpy
 from planar.model.pairs import MeasureKind
 
 ANALYTIC_OPERATIONS = frozenset({"input", "const", "add", "sub", "mul", "div", "neg", "cos", "sin"})
@@ -50,7 +50,7 @@ class ComplexNewtonStep:
         if bare:
             raise UnsupportedOperation(f"an angle stands outside cos and sin: {bare[0]}")
         self.operands: tuple[Operand, ...] = tuple(operands.values())
-        self.function: NumpyFunction = compile_numpy(made, wanted, tuple(operands))
+        self.function: PrintedFunction = compile_numpy(made, wanted, tuple(operands))
 
     def __call__(self, values: dict[Operand, Any]) -> tuple[ComplexArray, ...]:
         """The step of each unknown (lanes,)."""

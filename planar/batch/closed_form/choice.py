@@ -9,7 +9,7 @@ from planar.batch.closed_form.numpy_joiner import NumpyBlockJoiner
 from planar.batch.march.backend import DesignBatch
 from planar.batch.march.choice import available_backends
 from planar.batch.march.kernel import KernelEquations, batch_equations
-from planar.codegen.instructions import UnsupportedOperation
+from planar.foundation.instruction_list import UnsupportedOperation
 
 
 def find_joiner(batch: DesignBatch, point_blocks: tuple[int, ...], backend: str) -> BlockJoiner | None:

@@ -20,8 +20,8 @@ from planar.batch.closed_form.llvm_dead_points import MOST_WITHOUT_INTERVALS, SE
 from planar.batch.march.backend import DesignBatch
 from planar.batch.march.kernel import BareAngle, KernelBlock, KernelEquations
 from planar.batch.march.llvm.kernel_writer import KernelWriter, OperandNames
-from planar.codegen.instructions import UnsupportedOperation
 from planar.codegen.llvm_compile import compile_function
+from planar.foundation.instruction_list import UnsupportedOperation
 from planar.foundation.turns import leave_turn
 
 Array = np.ndarray

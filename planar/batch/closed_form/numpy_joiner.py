@@ -18,8 +18,8 @@ from planar.batch.closed_form.joined_blocks import (
 )
 from planar.batch.march.backend import DesignBatch
 from planar.batch.march.kernel import KernelBlock, KernelEquations, KernelInstructions, Operand
-from planar.codegen.instructions import UnsupportedOperation, required_values
-from planar.codegen.numpy_code import NumpyFunction, compile_numpy
+from planar.foundation.instruction_list import UnsupportedOperation, required_values
+from planar.foundation.printed_formula import PrintedFunction, compile_numpy
 
 Array = np.ndarray
 
@@ -29,12 +29,12 @@ class _BlockFunctions(NamedTuple):
     near these are without the arm, then that."""
 
     part: KernelBlock
-    solve: NumpyFunction
+    solve: PrintedFunction
     operands: tuple[Operand, ...]
-    locate: NumpyFunction
+    locate: PrintedFunction
     point_operands: tuple[Operand, ...]
     points: tuple[int, ...]
-    meet: NumpyFunction
+    meet: PrintedFunction
     meeting_operands: tuple[Operand, ...]
 
 
@@ -59,7 +59,7 @@ class NumpyBlockJoiner:
         stops = self.kernel.stop_outputs() if equations.stop_pairs else []
         self.stops = self._compile(self.kernel.list_values(stops), known) if stops else None
 
-    def _compile(self, wanted: list[int], known: set[Operand]) -> tuple[NumpyFunction, tuple[Operand, ...]]:
+    def _compile(self, wanted: list[int], known: set[Operand]) -> tuple[PrintedFunction, tuple[Operand, ...]]:
         made = self.kernel.hoister.result
         inputs = {each: key for each in required_values(made, wanted) if (key := made.instructions[each].key)}
         bare = set(inputs.values()) - known

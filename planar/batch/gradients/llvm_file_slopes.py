@@ -10,10 +10,12 @@ from planar.batch.march.kernel import Operand
 from planar.batch.prepare.design_numbers import DesignNumbers
 from planar.batch.prepare.llvm_numbers import write_given
 from planar.batch.reference_design import ReferenceDesign
-from planar.codegen.instructions import InstructionList, check_length, required_values
+from planar.codegen.instructions import check_length
 from planar.codegen.llvm_ir import IRWriter
 from planar.derivatives.design_equations import INPUT_RATES, DesignEquations
+from planar.equations.generic_evaluation import inline_function
 from planar.equations.mechanism_numbers import scale_lengths
+from planar.foundation.instruction_list import InstructionList, required_values
 from planar.model.link_shapes import PointMember
 
 FUNCTION_NAME = "file_slopes"
@@ -76,7 +78,7 @@ def write_file_slopes(design: DesignNumbers, sums: ca.SX, slopes: ca.SX) -> IRWr
         base: [listing.add_input((base, k)) for k in range(many)]
         for base, many in (("%values", size), ("%sums", sums.numel()))
     }
-    [wanted] = listing.inline_function(function, list(given.values()))
+    [wanted] = inline_function(listing, function, list(given.values()))
     order = required_values(listing, wanted)
     known = {
         number: t.load(t.double_pointer(base, str(k)))

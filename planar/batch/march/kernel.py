@@ -17,23 +17,19 @@ import numpy as np
 from planar.batch.march.backend import DesignBatch
 from planar.batch.march.regularity import LEAST_START_REGULARITY
 from planar.batch.march.stops import NUMBERS_PER_STOP, are_periodic, stop_rooms
-from planar.codegen.instructions import (
-    CosSin,
-    InstructionList,
-    UnsupportedOperation,
-    check_length,
-    expand_angle_sums,
-)
+from planar.codegen.instructions import CosSin, check_length, expand_angle_sums
 from planar.codegen.invariant_hoisting import InvariantHoister
 from planar.equations.closed_form import ClosedForm, find_closed_form
 from planar.equations.coordinates import coordinate_columns, frames_from_coordinates
 from planar.equations.functions import EquationFunctions
+from planar.equations.generic_evaluation import inline_function
 from planar.equations.linear import solve_by_determinants, solve_with_volume
 from planar.equations.mechanism_numbers import equation_structure
 from planar.equations.rates import UnknownRates, block_jacobian, first_and_second_rates
 from planar.equations.residuals import closing_error, residuals, scalars, split_pair_numbers
 from planar.equations.symbolic_equations import Block, ConstraintEquations, slice_length
 from planar.foundation.geometry import GROUND, Frame, Vector, frame_at
+from planar.foundation.instruction_list import InstructionList, UnsupportedOperation
 from planar.model.mechanism import Mechanism, links_counting_turns
 from planar.model.pairs import MeasureKind, Pair
 
@@ -283,7 +279,7 @@ class KernelInstructions:
             for k, is_angle in enumerate(turned):
                 if is_angle:
                     angles[numbers[k]] = CosSin(*(listing.add_input((name + part, k)) for part in "cs"))
-        wanted = [each for output in listing.inline_function(function, arguments) for each in output]
+        wanted = [each for output in inline_function(listing, function, arguments) for each in output]
         return self.hoister.rebuild(*expand_angle_sums(listing, wanted, angles))
 
     def closed_form_operands(self, part: KernelBlock) -> list[Operand]:

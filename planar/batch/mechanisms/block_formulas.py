@@ -10,21 +10,16 @@ import casadi as ca
 
 from planar.batch.mechanisms.block_type import COS, SIN, X1, X2, BlockEquations
 from planar.codegen.block_formula import BlockFormula, FormulaInput
-from planar.codegen.instructions import (
-    CosSin,
-    InstructionList,
-    UnsupportedOperation,
-    check_length,
-    expand_angle_sums,
-    required_values,
-)
+from planar.codegen.instructions import CosSin, check_length, expand_angle_sums
 from planar.equations.closed_form import ClosedForm
 from planar.equations.coordinates import coordinate_columns, frames_from_coordinates
+from planar.equations.generic_evaluation import inline_function
 from planar.equations.linear import solve_by_determinants, solve_with_volume
 from planar.equations.rates import UnknownRates, block_jacobian, first_and_second_rates
 from planar.equations.residuals import closing_error, input_residuals, pair_residuals, scalars, split_pair_numbers
 from planar.equations.symbolic_equations import Block
 from planar.foundation.geometry import GROUND, Frame, frame_at
+from planar.foundation.instruction_list import InstructionList, UnsupportedOperation, required_values
 from planar.model.pairs import MeasureKind as Measure
 
 NAN_PROBE = 1e-300
@@ -78,7 +73,7 @@ class FormulaBuilder:
         whole = ca.densify(ca.vertcat(*outputs))
         function = ca.Function("part", [self.equations.z, *self.symbols, *of], [whole], {"cse": True})
         arguments = [z, self.u, self.p, self.u1, self.u2, *more]
-        return self.instructions.inline_function(function, arguments)[0]
+        return inline_function(self.instructions, function, arguments)[0]
 
     def closed_form_assembly(self, signs: Sequence[int], polished: bool = False) -> SymbolicAssembly:
         """The unknowns, group after group, by their closed forms; polished by a step of Newton's method."""

@@ -6,7 +6,7 @@ from functools import lru_cache
 
 from planar.batch.mechanisms.block_type import COS, SIN, TURN1, TURN2, X1, X2, Y1, Y2, X, Y
 from planar.codegen.block_formula import BlockFormula, FormulaInput, KernelLayout
-from planar.codegen.instructions import InstructionList
+from planar.foundation.instruction_list import InstructionList
 
 
 @lru_cache

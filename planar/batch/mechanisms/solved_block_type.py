@@ -11,7 +11,7 @@ from typing import NamedTuple
 from planar.batch.mechanisms.block_formulas import FormulaBuilder
 from planar.batch.mechanisms.block_type import SKETCH_SUMS, BlockEquations, BlockSignature
 from planar.codegen.block_formula import BlockFormula
-from planar.codegen.instructions import UnsupportedOperation
+from planar.foundation.instruction_list import UnsupportedOperation
 from planar.model.pairs import Pair
 
 MAX_SIGNS = 2

@@ -12,11 +12,13 @@ from planar.batch.mechanisms.block_formulas import FormulaBuilder, SymbolicAssem
 from planar.batch.mechanisms.block_type import FRAME_BODY, BlockPair, BlockSignature
 from planar.batch.mechanisms.solved_block_type import BlockType, find_block_type
 from planar.codegen.block_formula import BlockFormula, FormulaInput, simplify_formula
-from planar.codegen.instructions import CosSin, InstructionList, required_values
+from planar.codegen.instructions import CosSin
 from planar.codegen.tape import TapeFormula
+from planar.equations.generic_evaluation import inline_function
 from planar.equations.linear import solve_by_determinants
 from planar.equations.rates import UnknownRates, first_and_second_rates
 from planar.foundation.geometry import Frame, Vector
+from planar.foundation.instruction_list import InstructionList, required_values
 from planar.model.pin_linkage import turning_pair_type
 
 
@@ -160,6 +162,6 @@ def _carried_formula(step: PinStep, rates: bool) -> BlockFormula:
             two = [listing.add_constant(0.0)] * 2
         else:
             two = [listing.add_input(FormulaInput("p", place + k)) for k in range(2)]
-        wanted += listing.inline_function(function, [one, two, parts])[0]
+        wanted += inline_function(listing, function, [one, two, parts])[0]
     leaves = {k: key for k in required_values(listing, wanted) if (key := listing.instructions[k].key) is not None}
     return BlockFormula(listing, tuple(wanted), leaves)

@@ -21,9 +21,9 @@ from planar.batch.prepare.llvm_start import FUNCTION_NAME as START_FUNCTION
 from planar.batch.prepare.llvm_start import write_start
 from planar.batch.prepare.run_endings import ALL_SOLVED, DEAD_POINT, STOP
 from planar.batch.prepare.value_binder import RunCall, ValueBinder, address_of
-from planar.codegen.instructions import UnsupportedOperation
 from planar.codegen.llvm_compile import compile_function
 from planar.codegen.llvm_ir import IRWriter
+from planar.foundation.instruction_list import UnsupportedOperation
 
 Array = np.ndarray
 

@@ -13,9 +13,9 @@ from planar.batch.design_stops import stop_ranges
 from planar.batch.march.kernel import KernelEquations, Operand, kernel_equations
 from planar.batch.march.stops import LEAST_RANGES, SURE_DISTANCE, TURN, stop_limits
 from planar.batch.reference_design import ReferenceDesign
-from planar.codegen.instructions import UnsupportedOperation
 from planar.document.dimensions import Dimension, input_numbers, link_lengths
 from planar.equations.mechanism_numbers import equation_structure, scaled_pair_numbers
+from planar.foundation.instruction_list import UnsupportedOperation
 from planar.model.link_shapes import Distances, Link, LinkShape, PointMember
 from planar.model.mechanism import LARGEST_INPUT_POSITION, Input, Mechanism
 from planar.model.pairs import MeasureKind, Pair

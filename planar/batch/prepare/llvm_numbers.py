@@ -9,8 +9,10 @@ import casadi as ca
 from planar.batch.march.kernel import Operand
 from planar.batch.prepare.design_numbers import DesignNumbers
 from planar.batch.prepare.run_endings import ALL_SOLVED, CANNOT_BE_ASSEMBLED, UNSURE
-from planar.codegen.instructions import InstructionList, check_length, required_values
+from planar.codegen.instructions import check_length
 from planar.codegen.llvm_ir import IRWriter
+from planar.equations.generic_evaluation import inline_function
+from planar.foundation.instruction_list import InstructionList, required_values
 
 FUNCTION_NAME = "numbers"
 SAID: Operand = ("said", 0)
@@ -41,7 +43,7 @@ def write_numbers(design: DesignNumbers, order: Sequence[Operand]) -> IRWriter:
     check_length(function.n_instructions())
     listing: InstructionList[int] = InstructionList()
     inputs = [listing.add_input(k) for k in range(len(given))]
-    [wanted] = listing.inline_function(function, [inputs])
+    [wanted] = inline_function(listing, function, [inputs])
     names: dict[int, str] = {}
     known = {number: given[k] for k, number in enumerate(inputs)}
     t.write_values(listing, required_values(listing, wanted), names, known)

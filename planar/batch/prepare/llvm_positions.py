@@ -15,8 +15,8 @@ from planar.batch.march.prediction import MAX_TURN_PER_STEP
 from planar.batch.prepare.llvm_ending import FUNCTION_NAME as ENDING_FUNCTION
 from planar.batch.prepare.llvm_ending import PositionRows, write_ending
 from planar.batch.prepare.run_endings import ALL_SOLVED
-from planar.codegen.instructions import UnsupportedOperation
 from planar.codegen.llvm_ir import IRWriter
+from planar.foundation.instruction_list import UnsupportedOperation
 
 LANES = 16
 FUNCTION_NAME = "positions"

@@ -15,8 +15,8 @@ from planar.batch.march.kernel import BareAngle, KernelBlock, KernelEquations, O
 from planar.batch.march.llvm.kernel_writer import OperandNames
 from planar.batch.prepare.llvm_numbers import SAID
 from planar.batch.prepare.run_endings import ALL_SOLVED, CANNOT_BE_ASSEMBLED, CLEARLY_OPEN, UNSURE
-from planar.codegen.instructions import UnsupportedOperation
 from planar.codegen.llvm_ir import IRWriter
+from planar.foundation.instruction_list import UnsupportedOperation
 from planar.solving.assembly.block_assemblies import MEETING_COSINE_SQUARED
 from planar.solving.assembly.nearest_assembly import EQUAL_DISTANCE_TOLERANCE
 

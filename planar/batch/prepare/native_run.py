@@ -15,7 +15,7 @@ from planar.batch.prepare.design_numbers import DesignNumbers, compiled_variable
 from planar.batch.prepare.run_endings import DEAD_POINT, STOP, UNSURE
 from planar.batch.prepare.value_binder import MAX_BOUND_NAMES
 from planar.batch.reference_design import ReferenceDesign
-from planar.codegen.instructions import UnsupportedOperation
+from planar.foundation.instruction_list import UnsupportedOperation
 from planar.model.link_shapes import PointMember
 from planar.model.mechanism import LARGEST_INPUT_POSITION
 from planar.model.pairs.base import Pair

@@ -34,8 +34,8 @@ from planar.batch.prepare.llvm_newton import (
 from planar.batch.prepare.value_binder import RunCall, ValueBinder, address_of
 from planar.batch.reference_design import ReferenceDesign
 from planar.codegen.aligned_arrays import WIDEST_VECTOR_BYTES
-from planar.codegen.instructions import UnsupportedOperation
 from planar.codegen.llvm_compile import compile_function
+from planar.foundation.instruction_list import UnsupportedOperation
 from planar.model.link_shapes import PointMember
 
 Array = np.ndarray

@@ -134,7 +134,7 @@ def motion_positions(mechanism: Mechanism, z: Array) -> Positions:
     u, p = solver.inputs.u, solver.inputs.p
 
     def frames(z: Array, u: Array) -> Mapping[str, Frame]:
-        w = solver.functions.coordinate_function(z, u, p).full().ravel()
+        w = solver.functions.coordinates(z, u, p)
         found, _ = frames_from_coordinates((w * solver.scale).tolist(), solver.column, solver.shapes, solver.pairs)
         return plain_frames(found)
 

@@ -173,7 +173,6 @@ class SolutionCurve(ImplicitCurve):
     def __init__(self, solver: CurveSolver, p: Array, start: Array, way: Array):
         self.solver, self.functions, self.p, self.start, self.input_direction = solver, solver.functions, p, start, way
         self._is_along_input = len(way) == 1 and way[0] == 1.0
-        self.functions.compile()  # a curve takes hundreds of evaluations
 
     def inputs(self, y: Array) -> Array:
         """The inputs (inputs,) at a point, or at points (points, inputs)."""

@@ -314,7 +314,7 @@ def _open_block_sentence(setup: PreparedMechanism, failure: AssemblySearchFailur
     """What to say of a block that cannot be joined; what would mend it takes as long to find as an assembly."""
     stage = failure.stage
     gaps: dict[str, float] = {}
-    still = setup.functions.block_function(stage)(failure.z, setup.inputs.u, setup.inputs.p)[0].full().ravel()
+    still = setup.functions.block_call(stage)(failure.z, setup.inputs.u, setup.inputs.p)[0][0]
     for row, left in zip(setup.equations.rows[stage.rows], still, strict=True):
         gaps[row.pair] = float(np.hypot(gaps.get(row.pair, 0.0), left))
     pair = max(gaps, key=lambda name: gaps[name])

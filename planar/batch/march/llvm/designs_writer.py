@@ -22,8 +22,8 @@ from planar.batch.march.llvm.kernel_writer import (
 from planar.batch.march.llvm.newton_blocks import HISTORY_LENGTH, NewtonBlockWriter
 from planar.batch.march.prediction import PREDICTOR_ORDER
 from planar.batch.march.regularity import LEAST_KERNEL_REGULARITY
-from planar.codegen.instructions import UnsupportedOperation
 from planar.codegen.llvm_linear import LinearSystems
+from planar.foundation.instruction_list import UnsupportedOperation
 
 FUNCTION_NAME, _READ_ARRAYS = "march", ("p", "q", "state", "drive", "rate", "table", "counts")
 ARGUMENT_TYPES = (*("int",) * 5, *("array",) * 7, *("float",) * 3, *("array",) * 3)

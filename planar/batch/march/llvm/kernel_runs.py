@@ -25,8 +25,8 @@ from planar.batch.march.prediction import (
     longest_step,
 )
 from planar.codegen.aligned_arrays import allocate_aligned, is_aligned
-from planar.codegen.instructions import UnsupportedOperation
 from planar.codegen.llvm_compile import compile_function
+from planar.foundation.instruction_list import UnsupportedOperation
 from planar.foundation.turns import leave_turn
 
 Array = np.ndarray

@@ -10,8 +10,9 @@ import casadi as ca
 
 from planar.batch.march.kernel import BareAngle, KernelBlock, KernelEquations, KernelInstructions, Operand
 from planar.batch.march.regularity import LEAST_KERNEL_REGULARITY
-from planar.codegen.instructions import check_length, required_values
+from planar.codegen.instructions import check_length
 from planar.codegen.llvm_ir import IRWriter
+from planar.foundation.instruction_list import required_values
 from planar.solving.checks.residual_check import EPS, NEGLIGIBLE_ERROR
 
 OperandNames = dict[Operand, str]

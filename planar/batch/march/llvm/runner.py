@@ -10,7 +10,7 @@ import numpy as np
 from planar.batch.march.backend import CorrectedAssemblies, DesignBatch, UnsupportedStructure
 from planar.batch.march.kernel import batch_equations
 from planar.batch.march.llvm.kernel_runs import correct_designs, run_designs_kernel, unknowns_at_steps
-from planar.codegen.instructions import UnsupportedOperation
+from planar.foundation.instruction_list import UnsupportedOperation
 
 Array = np.ndarray
 

@@ -26,7 +26,7 @@ from planar.batch.march.prediction import (
     correction_limit,
     longest_step,
 )
-from planar.codegen.instructions import UnsupportedOperation
+from planar.foundation.instruction_list import UnsupportedOperation
 
 Array = np.ndarray
 

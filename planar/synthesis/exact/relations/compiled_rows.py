@@ -10,9 +10,10 @@ import casadi as ca
 import numpy as np
 
 from planar.codegen.complex_kernel import LANES, ComplexKernel
-from planar.codegen.instructions import InstructionList
-from planar.codegen.numpy_code import NumpyFunction, compile_numpy
+from planar.equations.generic_evaluation import inline_function
 from planar.foundation.arrays import Array, ComplexArray
+from planar.foundation.instruction_list import InstructionList
+from planar.foundation.printed_formula import PrintedFunction, compile_numpy
 from planar.synthesis.exact.relations.elimination import EntryRows
 
 
@@ -41,7 +42,7 @@ class CompiledRows:
             [listing.add_input((name, k)) for k in range(self.function.numel_in(n))]
             for n, name in enumerate(("x", "q", "dq"))
         ]
-        return listing, inputs, listing.inline_function(self.function, inputs)
+        return listing, inputs, inline_function(listing, self.function, inputs)
 
     @cached_property
     def _kernel(self) -> ComplexKernel:
@@ -51,7 +52,7 @@ class CompiledRows:
         )
 
     @cached_property
-    def _without_change(self) -> NumpyFunction:
+    def _without_change(self) -> PrintedFunction:
         listing, inputs, wanted = self._listing
         return compile_numpy(listing, [each for part in wanted[:2] for each in part], [*inputs[0], *inputs[1]])
 
@@ -80,7 +81,7 @@ class CompiledRows:
         inputs = [
             [listing.add_input((name, k)) for k in range(self._nonzero.numel_in(n))] for n, name in enumerate("xq")
         ]
-        (outputs,) = listing.inline_function(self._nonzero, inputs)
+        (outputs,) = inline_function(listing, self._nonzero, inputs)
         values = ComplexKernel(listing, outputs, [*inputs[0], *inputs[1]]).in_numpy(
             np.concatenate([np.broadcast_to(x[:, None], (len(x), q.shape[1])), q])
         )

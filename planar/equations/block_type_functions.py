@@ -1,0 +1,155 @@
+"""The functions of block types: residuals and Jacobian, coordinates, both assemblies in closed form, runs.
+
+A block type's formulas are those of its elements one after the other, as `AssembledEquations` evaluates them, and its
+closed form. Those of known types are read, see `known_types`.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable
+from functools import cached_property, lru_cache
+from typing import NamedTuple
+
+import numpy as np
+
+from planar.equations.block_types import MAX_BLOCK_TYPES, BlockTypeKey, block_equations
+from planar.equations.closed_form_assemblies import POLISHING_STEPS, ArrayFunction, ClosedFormAssemblies
+from planar.equations.known_types import known_text
+from planar.equations.linear import solve_vectors
+from planar.foundation.angles import wrap_angle
+from planar.foundation.arrays import Array, greatest_size
+from planar.foundation.instruction_list import InstructionList
+from planar.foundation.printed_formula import FormulaFunction
+from planar.foundation.recorded_formula import RecordedFormula, RecordedNumber, formula_of_results, number_of
+from planar.model.pairs import MeasureKind
+
+SETTLED_STEP = 1e-9
+"""rad or sizes: after a shorter step of Newton's method the next one is round-off."""
+MAX_RUN_STEPS = 6
+"""Steps of Newton's method at a position of a run."""
+
+
+class BlockTypeFormulas(NamedTuple):
+    """The formulas of a block type: of its unknowns, the coordinates that are known ahead of it, and its numbers."""
+
+    closing: RecordedFormula
+    "-> F (rows,), then the columns of its Jacobian"
+    coordinates: RecordedFormula
+    "-> its own coordinates"
+    closed_form: RecordedFormula | None
+    "(..., sign) -> its unknowns in closed form, then where its assemblies meet; None where it has none"
+    has_changing_arm: bool
+    "whether a length of the closed form turns on an arm that changes as the mechanism moves"
+
+    def as_text(self) -> str:
+        """All in one line of JSON."""
+        formulas = self.closing, self.coordinates, self.closed_form
+        return json.dumps([*(formula and formula.as_text() for formula in formulas), self.has_changing_arm])
+
+    @classmethod
+    def from_text(cls, text: str) -> BlockTypeFormulas:
+        """The formulas of `as_text`."""
+        closing, coordinates, closed_form, has_changing_arm = json.loads(text)
+        form = closed_form and RecordedFormula.from_text(closed_form)
+        return cls(RecordedFormula.from_text(closing), RecordedFormula.from_text(coordinates), form, has_changing_arm)
+
+
+def derive_block_type(key: BlockTypeKey) -> BlockTypeFormulas:
+    """The formulas of a block type."""
+    from planar.equations.closed_form import closed_form_formula  # most types are known
+
+    equations = block_equations(key)
+    assembled = equations.assembled
+    assert assembled is not None
+    instructions: InstructionList[int] = InstructionList()
+    counts = assembled.argument_counts
+    arguments = np.empty(sum(counts), dtype=object)
+    arguments[:] = [RecordedNumber(instructions, instructions.add_input(place)) for place in range(sum(counts))]
+    z, u, p = np.split(arguments, np.cumsum(counts)[:2])
+
+    def formula_of(values: Iterable[object]) -> RecordedFormula:
+        return formula_of_results(instructions, [number_of(value, instructions) for value in values])
+
+    residuals, entries = assembled.residuals_and_jacobians(z[None], u[None], p)
+    jacobian: list[object] = [0.0] * (len(z) * len(residuals[0]))
+    pattern = assembled.pattern
+    for row, column, entry in zip(pattern.rows, pattern.columns, entries[0], strict=True):
+        if column < len(z):
+            jacobian[column * len(residuals[0]) + row] = entry
+    coordinates = formula_of(assembled.coordinates(z[None], u[None], p)[0])
+    form = closed_form_formula(equations, equations.blocks[0])
+    return BlockTypeFormulas(
+        formula_of([*residuals[0], *jacobian]),
+        coordinates,
+        form and form.formula,
+        form is not None and form.has_changing_arm,
+    )
+
+
+class BlockTypeFunctions:
+    """The functions (unknowns, known coordinates, numbers) of a block type."""
+
+    def __init__(self, key: BlockTypeKey, formulas: BlockTypeFormulas):
+        counts = key.unknown_count, len(key.known_kinds), key.number_count
+        rows = len(key.row_kinds)
+        self.closing: ArrayFunction = FormulaFunction(formulas.closing, counts, ((1, rows), (key.unknown_count, rows)))
+        "F (1, rows) and the columns of its Jacobian (unknowns, rows)"
+        self.coordinates: ArrayFunction = FormulaFunction(formulas.coordinates, counts, ((1, len(key.own_kinds)),))
+        "its own coordinates (1, coordinates)"
+        self._formulas, self._counts = formulas, counts
+        self._is_angle = np.array([kind is not MeasureKind.LENGTH for kind, _ in key.own_kinds[: counts[0]]], bool)
+
+    @cached_property
+    def assemblies(self) -> ClosedFormAssemblies | None:
+        """Both assemblies; None for a type without a closed form."""
+        formula, count = self._formulas.closed_form, self._counts[0]
+        if formula is None:
+            return None
+        form = FormulaFunction(formula, (*self._counts, 1), ((1, count), (1, 1)))
+        return ClosedFormAssemblies(slice(0, count), form, self.closing, self._formulas.has_changing_arm)
+
+    def run(self, z: Array, known: Array, numbers: Array) -> Array:
+        """The unknowns (samples, unknowns) where known coordinates are `known` (samples, known), the first from z."""
+        return self._run_newton(z, known, numbers) if self.assemblies is None else self._run_form(z, known, numbers)
+
+    def _run_form(self, z: Array, known: Array, numbers: Array) -> Array:
+        """The assembly in closed form that is the nearer to z at the first sample."""
+        assert self.assemblies is not None
+        both, _ = self.assemblies.evaluate_batch(np.repeat(z[None], len(known), axis=0), known, numbers)
+        is_angle = self._is_angle
+
+        def distance(values: Array) -> float:
+            move = values - z
+            return float(np.abs(np.where(is_angle, wrap_angle(move), move)).max(initial=0.0))
+
+        samples: Array = min(both, key=lambda values: distance(values[0]) if np.isfinite(values[0]).all() else np.inf)
+        steps = np.diff(samples[:, is_angle], axis=0, prepend=z[None, is_angle])
+        samples[:, is_angle] = z[is_angle] + np.cumsum(wrap_angle(steps), axis=0)
+        for _ in range(POLISHING_STEPS):
+            residuals, columns = self.closing.evaluate_batch(len(known), samples, known, numbers)
+            samples = samples - solve_vectors(columns.swapaxes(-1, -2), residuals[:, 0])
+        return samples
+
+    def _run_newton(self, z: Array, known: Array, numbers: Array) -> Array:
+        """By Newton's method from where the samples before lead."""
+        samples: Array = np.empty((len(known), len(z)))
+        step: Array = np.zeros(len(z))
+        for k, coordinates in enumerate(known):
+            start, z = z, z + step
+            for _ in range(MAX_RUN_STEPS):
+                residuals, columns = self.closing(z, coordinates, numbers)
+                move = solve_vectors(columns.T[None], residuals)[0]
+                z = z - move
+                if not greatest_size(move) > SETTLED_STEP:
+                    break
+            samples[k] = z
+            step = z - start if k else step
+        return samples
+
+
+@lru_cache(maxsize=MAX_BLOCK_TYPES)
+def block_type_functions(key: BlockTypeKey) -> BlockTypeFunctions:
+    """The functions of a block type, known or derived."""
+    text = known_text(key.fingerprint)
+    return BlockTypeFunctions(key, derive_block_type(key) if text is None else BlockTypeFormulas.from_text(text))

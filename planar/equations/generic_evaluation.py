@@ -1,0 +1,124 @@
+"""The instructions of a casadi function carried out on numbers of another kind: balls, symbols, or new instructions."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from types import MappingProxyType
+from typing import Any
+
+import casadi as ca
+
+from planar.foundation.instruction_list import InstructionList, UnsupportedOperation
+from planar.foundation.recorded_formula import RecordedFormula, formula_of_results
+
+OPERATIONS: Mapping[int, Callable[..., Any]] = {
+    ca.OP_ADD: lambda a, b: a + b,
+    ca.OP_SUB: lambda a, b: a - b,
+    ca.OP_MUL: lambda a, b: a * b,
+    ca.OP_DIV: lambda a, b: a / b,
+    ca.OP_NEG: lambda a: -a,
+    ca.OP_COS: lambda a: a.cos(),
+    ca.OP_SIN: lambda a: a.sin(),
+    ca.OP_SQ: lambda a: a * a,
+    ca.OP_TWICE: lambda a: a + a,
+    ca.OP_INV: lambda a: 1 / a,
+    ca.OP_ASSIGN: lambda a: a,
+}
+"""What the coefficients of a linkage are made of."""
+UNARY_OPERATIONS = {
+    ca.OP_NEG: "neg",
+    ca.OP_SQRT: "sqrt",
+    ca.OP_COS: "cos",
+    ca.OP_SIN: "sin",
+    ca.OP_FABS: "abs",
+    ca.OP_FLOOR: "floor",
+}
+BINARY_OPERATIONS = {
+    ca.OP_ADD: "add",
+    ca.OP_SUB: "sub",
+    ca.OP_MUL: "mul",
+    ca.OP_DIV: "div",
+    ca.OP_ATAN2: "atan2",
+    ca.OP_FMIN: "minnum",
+    ca.OP_FMAX: "maxnum",
+    ca.OP_LT: "less",
+    ca.OP_LE: "most",
+}
+
+
+FORMULA_OPERATIONS = {
+    ca.OP_POW: "pow",
+    ca.OP_CONSTPOW: "pow",
+    ca.OP_TAN: "tan",
+    ca.OP_NOT: "not",
+    ca.OP_IF_ELSE_ZERO: "where",
+}
+"""What formulas of pairs may have beside what machine code knows."""
+
+
+def apply_operation(code: int, operands: Sequence[Any]) -> Any:
+    """What an operation of casadi makes of numbers of any kind. Raises KeyError for one that is not of `OPERATIONS`."""
+    return OPERATIONS[code](*operands)
+
+
+def evaluate_function(
+    function: ca.Function,
+    inputs: Sequence[Sequence[Any]],
+    convert: Callable[[float], Any],
+    apply: Callable[[int, list[Any]], Any] = apply_operation,
+) -> list[list[Any]]:
+    """The results of a function, dense, column by column; `convert` makes a constant, `apply` a casadi operation."""
+    work: dict[int, Any] = {}
+    found: list[list[Any]] = [[convert(0.0)] * function.numel_out(k) for k in range(function.n_out())]
+    places = [function.sparsity_out(k).find() for k in range(function.n_out())]
+    for k in range(function.n_instructions()):
+        code, out, of = function.instruction_id(k), function.instruction_output(k), function.instruction_input(k)
+        if code == ca.OP_INPUT:
+            work[out[0]] = inputs[of[0]][of[1]]
+        elif code == ca.OP_CONST:
+            work[out[0]] = convert(function.instruction_constant(k))
+        elif code == ca.OP_OUTPUT:
+            found[out[0]][places[out[0]][out[1]]] = work[of[0]]
+        else:
+            work[out[0]] = apply(code, [work[each] for each in of])
+    return found
+
+
+def inline_function(
+    listing: InstructionList[Any],
+    function: ca.Function,
+    inputs: Sequence[Sequence[int]],
+    more_operations: Mapping[int, str] = MappingProxyType({}),
+) -> list[list[int]]:
+    """A function of values of a list: the numbers of its results, dense, column by column.
+
+    `more_operations` names operations of casadi that machine code has no instruction for. Raises UnsupportedOperation.
+    """
+
+    def apply(code: int, operands: list[int]) -> int:
+        name = more_operations.get(code) or UNARY_OPERATIONS.get(code) or BINARY_OPERATIONS.get(code)
+        if name is not None:
+            return listing.add(name, *operands)
+        if code in (ca.OP_SQ, ca.OP_TWICE):
+            return listing.add("mul" if code == ca.OP_SQ else "add", operands[0], operands[0])
+        if code == ca.OP_INV:
+            return listing.add("div", listing.add_constant(1.0), operands[0])
+        if code == ca.OP_ASSIGN:
+            return operands[0]
+        if code == ca.OP_SIGN:  # of derivatives of pieces, as what follows
+            zero = listing.add_constant(0.0)
+            return listing.add("sub", listing.add("less", zero, operands[0]), listing.add("less", operands[0], zero))
+        if code == ca.OP_NOT:
+            return listing.add("sub", listing.add_constant(1.0), operands[0])
+        raise UnsupportedOperation(f"operation {code}")
+
+    return evaluate_function(function, inputs, listing.add_constant, apply)
+
+
+def recorded_function(function: ca.Function) -> RecordedFormula:
+    """A casadi function as a formula: its arguments one after the other, its results dense, column by column."""
+    instructions: InstructionList[int] = InstructionList()
+    sizes = [function.numel_in(k) for k in range(function.n_in())]
+    inputs = [[instructions.add_input(sum(sizes[:k]) + place) for place in range(size)] for k, size in enumerate(sizes)]
+    results = inline_function(instructions, function, inputs, FORMULA_OPERATIONS)
+    return formula_of_results(instructions, [number for result in results for number in result])

@@ -1,0 +1,200 @@
+"""Instruction lists as Python source: the same values for floats and for arrays of any shape, one statement each."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from planar.foundation.arrays import Array
+from planar.foundation.instruction_list import Instructions, UnsupportedOperation, required_values
+from planar.foundation.recorded_formula import RecordedFormula
+
+OPERATORS = {"add": "+", "sub": "-", "mul": "*", "div": "/"}
+COMPARISONS = {"less": "<", "most": "<="}
+"""What gives 1 where it is true, else 0."""
+NUMPY_FUNCTIONS: Mapping[str, Callable[..., Any]] = {
+    "sqrt": np.sqrt,
+    "abs": np.abs,
+    "cos": np.cos,
+    "sin": np.sin,
+    "tan": np.tan,
+    "atan2": np.arctan2,
+    "minnum": np.fmin,
+    "maxnum": np.fmax,
+    "floor": np.floor,
+    "pow": np.power,
+    "where": lambda condition, value: np.where(condition, value, 0.0),
+}
+FLOAT_FUNCTIONS: Mapping[str, Callable[..., float]] = {
+    "sqrt": math.sqrt,
+    "abs": abs,
+    "cos": math.cos,
+    "sin": math.sin,
+    "tan": math.tan,
+    "atan2": math.atan2,
+    "minnum": lambda a, b: a if a <= b or math.isnan(b) else b,
+    "maxnum": lambda a, b: a if a >= b or math.isnan(b) else b,
+    "floor": lambda a: float(math.floor(a)),
+    "pow": math.pow,
+    "where": lambda condition, value: value if condition else 0.0,
+}
+MAX_INTERPRETED_CALLS = 12
+"""Calls that take less time, the formula's instructions carried out one by one, than printing it."""
+MAX_FLOAT_POSITIONS = 5
+"""So few positions take less time one by one, by floats, than by arrays."""
+PrintedFunction = Callable[..., tuple[Any, ...]]
+"""Arrays, or numbers, of the operands in their order, to the values that are wanted."""
+
+
+def write_python(
+    formula: Instructions, results: Sequence[int], names: Mapping[int, str], parameters: Sequence[str]
+) -> str:
+    """The source of `values`, a function of the parameters. `names` are expressions of values that are known.
+
+    A value's name is taken again once nothing needs the value, so that few arrays are in use, and in the cache.
+    Raises UnsupportedOperation.
+    """
+    names = dict(names)
+    lines = [f"def values({', '.join(parameters)}):"]
+    order = [number for number in required_values(formula, results, names) if number not in names]
+    last_use = {operand: number for number in order for operand in formula.instructions[number].operands}
+    last_use |= dict.fromkeys(results, -1)
+    free: list[str] = []
+    count = 0
+    for number in order:
+        operation, operands, constant, _ = formula.instructions[number]
+        if operation == "const":
+            names[number] = f"({constant!r})"
+            continue
+        expression = _expression(operation, [names[operand] for operand in operands])
+        unused = dict.fromkeys(operand for operand in operands if last_use[operand] == number)
+        free += [names[operand] for operand in unused if names[operand][0] == "r"]
+        if not free:
+            free.append(f"r{count}")
+            count += 1
+        names[number] = free.pop()
+        lines.append(f"    {names[number]} = {expression}")
+    lines.append(f"    return ({''.join(names[number] + ', ' for number in results)})")
+    return "\n".join(lines)
+
+
+def write_numpy(formula: Instructions, results: Sequence[int], operands: Sequence[int]) -> str:
+    """The source of `values`, a function of the operands: numbers of instructions that are known."""
+    names = {number: f"x{k}" for k, number in enumerate(operands)}
+    return write_python(formula, results, names, list(names.values()))
+
+
+def compile_source(source: str, functions: Mapping[str, Callable[..., Any]] = NUMPY_FUNCTIONS) -> PrintedFunction:
+    """The function of a source, ready to be called on arrays, or on floats by `FLOAT_FUNCTIONS`."""
+    scope: dict[str, Any] = {**functions, "nan": math.nan, "inf": math.inf}
+    exec(source, scope)
+    compiled: PrintedFunction = scope["values"]
+    return compiled
+
+
+def compile_numpy(formula: Instructions, results: Sequence[int], operands: Sequence[int]) -> PrintedFunction:
+    """The function of `write_numpy`, ready to be called on arrays."""
+    return compile_source(write_numpy(formula, results, operands))
+
+
+def compile_formula(formula: RecordedFormula, argument_count: int) -> PrintedFunction:
+    """A recorded formula of so many arguments, ready to be called on arrays."""
+    names = {number: f"x{value.key}" for number, value in enumerate(formula.instructions) if value.key is not None}
+    return compile_source(write_python(formula, formula.results, names, [f"x{k}" for k in range(argument_count)]))
+
+
+def _expression(operation: str, operands: list[str]) -> str:
+    if operation in OPERATORS:
+        return f"{operands[0]} {OPERATORS[operation]} {operands[1]}"
+    if operation in COMPARISONS:
+        return f"1.0 * ({operands[0]} {COMPARISONS[operation]} {operands[1]})"
+    if operation == "neg":
+        return f"-{operands[0]}"
+    if operation == "not":
+        return f"1.0 - {operands[0]}"
+    if operation in NUMPY_FUNCTIONS:
+        return f"{operation}({', '.join(operands)})"
+    raise UnsupportedOperation(f"there is no {operation} on arrays")
+
+
+class FormulaFunction:
+    """A recorded formula as a function of dense columns: by floats at one position, by arrays at many.
+
+    `argument_counts` are the entries of every argument, whose places, one argument after the other, are the keys of the
+    formula's inputs; `shapes` (columns, rows) are those of its results, column by column.
+    """
+
+    def __init__(
+        self, formula: RecordedFormula, argument_counts: Sequence[int], shapes: Sequence[tuple[int, int]]
+    ) -> None:
+        self.formula, self.argument_counts, self.shapes = formula, tuple(argument_counts), tuple(shapes)
+        sizes = [columns * rows for columns, rows in shapes]
+        self._call_count = 0
+        self._slices = [slice(sum(sizes[:k]), sum(sizes[: k + 1])) for k in range(len(sizes))]
+
+    @cached_property
+    def source(self) -> str:
+        """What is compiled for floats as for arrays: an argument is indexed by its entries."""
+        places = [(k, place) for k, count in enumerate(self.argument_counts) for place in range(count)]
+        names = {
+            number: "a{}[{}]".format(*places[value.key])
+            for number, value in enumerate(self.formula.instructions)
+            if value.key is not None
+        }
+        parameters = [f"a{k}" for k in range(len(self.argument_counts))]
+        return write_python(self.formula, self.formula.results, names, parameters)
+
+    @cached_property
+    def _of_floats(self) -> PrintedFunction:
+        return compile_source(self.source, FLOAT_FUNCTIONS)
+
+    @cached_property
+    def _of_arrays(self) -> PrintedFunction:
+        return compile_source(self.source)
+
+    def _interpret(self, arguments: Iterable[Iterable[Any]]) -> Sequence[Any]:
+        return self.formula.evaluate([entry for argument in arguments for entry in argument])
+
+    @property
+    def _is_printed(self) -> bool:
+        """Whether it was called so often that printing it pays."""
+        self._call_count += 1
+        return self._call_count > MAX_INTERPRETED_CALLS
+
+    def values(self, *arguments: Sequence[float]) -> Sequence[float]:
+        """All results, one after the other, at one position; what is not defined there is not a number."""
+        try:
+            return self._of_floats(*arguments) if self._is_printed else self._interpret(arguments)
+        except (ArithmeticError, ValueError):
+            return [float(value) for value in self._array_values([np.array(argument) for argument in arguments])]
+
+    def _array_values(self, arguments: Sequence[Array]) -> Sequence[Any]:
+        """The same of arrays whose first axis is that of an argument's entries."""
+        with np.errstate(all="ignore"):
+            return self._of_arrays(*arguments) if self._is_printed else self._interpret(arguments)
+
+    def __call__(self, *arguments: Array) -> list[Array]:
+        """The results (columns, rows) at one position, every argument as long as the function's."""
+        values = np.array(self.values(*(argument.tolist() for argument in arguments)))
+        return [values[part].reshape(shape) for part, shape in zip(self._slices, self.shapes, strict=True)]
+
+    def evaluate_batch(self, count: int, *arguments: Array) -> list[Array]:
+        """The results (positions, columns, rows); arguments (positions, entries), or (entries,) for all alike."""
+        if count <= MAX_FLOAT_POSITIONS:
+            positions = [self(*(each if each.ndim == 1 else each[k] for each in arguments)) for k in range(count)]
+            return [
+                np.array([results[place] for results in positions]).reshape(count, *shape)
+                for place, shape in enumerate(self.shapes)
+            ]
+        values = self._array_values([argument.T for argument in arguments])
+        results: list[Array] = []
+        for part, shape in zip(self._slices, self.shapes, strict=True):
+            result: Array = np.empty((count, part.stop - part.start))
+            for k, value in enumerate(values[part]):
+                result[:, k] = value
+            results.append(result.reshape(count, *shape))
+        return results

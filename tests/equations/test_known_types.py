@@ -1,0 +1,43 @@
+"""Elements and block types that are kept with the package: those of all models, equal to what is derived now."""
+
+import planar
+from planar.equations import block_type_functions, known_types
+from planar.equations.block_type_functions import BlockTypeFormulas, derive_block_type
+from planar.equations.elements import Element
+from planar.equations.functions import EquationFunctions
+from planar.equations.mechanism_numbers import equation_structure
+from planar.equations.symbolic_equations import build_equations
+from tests.builders import lift_document
+from tests.known_types import known_lines
+
+
+def test_the_file_is_what_is_derived_of_all_models():
+    """`python -m tests.known_types` makes it."""
+    assert known_lines() == known_types.KNOWN_TYPES_FILE.read_text(encoding="utf-8")
+
+
+def test_texts_give_back_what_they_were_made_of(monkeypatch):
+    monkeypatch.setattr(known_types, "known_text", lambda _: None)
+    equations = build_equations(equation_structure(planar.from_dict(lift_document(1))))
+    for placed in equations.elimination.elements:
+        element = placed.element
+        again = Element.from_text(element.fingerprint, element.as_text())
+        assert again.as_text() == element.as_text()
+        assert (again.factors, again.nonlinear, again.arguments) == (
+            element.factors,
+            element.nonlinear,
+            element.arguments,
+        )
+    for placed in EquationFunctions(equations)._placed_blocks:
+        formulas = derive_block_type(placed.key)
+        assert BlockTypeFormulas.from_text(formulas.as_text()) == formulas
+
+
+def test_structures_of_known_types_are_solved_without_deriving_any(monkeypatch):
+    def derive(key):
+        raise AssertionError(key)
+
+    monkeypatch.setattr(block_type_functions, "derive_block_type", derive)
+    block_type_functions.block_type_functions.cache_clear()
+    assert planar.solve(planar.from_dict(lift_document(3))).mobility == 1
+    assert len(planar.cycle(planar.load("jansen-leg"), steps=12)) == 13

@@ -1,0 +1,40 @@
+"""Makes the file of known elements and block types: of all models, and of the samples of every pair type."""
+
+from planar.equations import element_placement
+from planar.equations.block_type_functions import derive_block_type
+from planar.equations.block_types import place_blocks
+from planar.equations.element_derivation import derive_element
+from planar.equations.known_types import KNOWN_TYPES_FILE
+from planar.equations.mechanism_numbers import equation_structure
+from planar.equations.symbolic_equations import build_equations
+from tests.known import MODELS
+
+
+def known_texts() -> dict[str, str]:
+    """The texts of all elements and block types of the models, derived anew, by their fingerprints."""
+    texts: dict[str, str] = {}
+    element_of_key = element_placement.element_of_key
+
+    def recording(key):
+        element = derive_element(key)
+        texts[element.fingerprint] = element.as_text()
+        return element_of_key(key)
+
+    element_placement.element_of_key = recording
+    try:
+        for mechanism in MODELS.values():
+            for placed in place_blocks(build_equations(equation_structure(mechanism))):
+                if placed is not None and placed.key.fingerprint not in texts:
+                    texts[placed.key.fingerprint] = derive_block_type(placed.key).as_text()
+    finally:
+        element_placement.element_of_key = element_of_key
+    return texts
+
+
+def known_lines() -> str:
+    """The whole file."""
+    return "".join(f"{key}\t{text}\n" for key, text in sorted(known_texts().items()))
+
+
+if __name__ == "__main__":
+    KNOWN_TYPES_FILE.write_text(known_lines(), encoding="utf-8")
