@@ -348,18 +348,18 @@ def parallelograms_in_a_row(count, start):
     return files.from_dict(bar_document(ground, bars, ("D0", start), omega=2.0, alpha=1.0, sketch=sketch))
 
 
-@pytest.mark.parametrize("count", [2, 3])
-def test_a_start_where_several_parallelograms_are_flat_goes_on_by_every_branch(count):
-    mechanism = parallelograms_in_a_row(count, 0.0)
+@pytest.mark.parametrize(("count", "start"), [(2, 0.0), (3, 0.0), (3, 1e-9)])
+def test_a_start_where_several_parallelograms_are_flat_goes_on_by_every_branch(count, start):
+    mechanism = parallelograms_in_a_row(count, start)
     with pytest.raises(NoAnswer) as refused:
-        planar.cycle(mechanism, 8, 0.0, 1.0)
+        planar.cycle(mechanism, 8, start, 1.0)
     assert refused.value.outcome is Outcome.CHANGE_POINT
     expected = [np.array([1.0])]
     for _ in range(count):
         expected = [np.append(angles, angle) for angles in expected for angle in (angles[-1], follower(angles[-1]))]
     ends = []
     for number in range(1, 2**count + 1):
-        motion = planar.cycle(mechanism, 8, 0.0, 1.0, branches=[number])
+        motion = planar.cycle(mechanism, 8, start, 1.0, branches=[number])
         assert motion.outcome is Outcome.SOLVED
         ends.append([motion.link(f"c{k}").angle[-1] for k in range(count + 1)])
     distances = np.abs(np.exp(1j * np.array(ends))[:, None] - np.exp(1j * np.array(expected))).max(axis=2)

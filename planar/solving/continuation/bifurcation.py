@@ -238,9 +238,10 @@ def bifurcation_at_start(curve: SolutionCurve, y: Array) -> Bifurcation | None:
     First those on which the unknowns move least for the inputs, whichever way these go; None where the position is no
     such point.
     """
-    size = len(y)
-    start = np.linalg.svd(curve.jacobian(y))[2][size - 2 :].T
-    near = _refine_candidate(curve, y, start)
+    start = _decompose(curve, y)
+    counts = dict.fromkeys((max(start.null.shape[1], 2), 2))
+    refined = (_refine_candidate(curve, y, start.right[-count:].T, start) for count in counts)
+    near = next((candidate for candidate in refined if candidate is not None), None)
     if near is not None and near.null.shape[1] > 2:
         near = _refine_candidate(curve, near.y, near.null)
     if near is None or np.linalg.norm(near.y - y) > START_DISTANCE_TOLERANCE or near.residual > curve.solver.tolerance:
