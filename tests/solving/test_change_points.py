@@ -337,3 +337,36 @@ def test_at_the_flat_position_of_a_lift_any_number_of_stages_turns_over(stages, 
     flat = [each.told for each in limits if each.kind == "change point" and each.input]
     assert len(flat) == 2
     assert all(f"m {told} of the motion cross" in each for each in flat)
+
+
+def parallelograms_in_a_row(count, start):
+    """Parallelograms 1, 2, one beside the other: the rocker of one is the crank of the next."""
+    ground = {f"D{k}": [2.0 * k, 0.0] for k in range(count + 1)}
+    bars = {f"c{k}": (f"D{k}", f"B{k}", 1.0) for k in range(count + 1)}
+    bars |= {f"r{k}": (f"B{k}", f"B{k + 1}", 2.0) for k in range(count)}
+    sketch = {f"B{k}": [2.0 * k + np.cos(start), np.sin(start)] for k in range(count + 1)}
+    return files.from_dict(bar_document(ground, bars, ("D0", start), omega=2.0, alpha=1.0, sketch=sketch))
+
+
+@pytest.mark.parametrize(("count", "start"), [(2, 0.0), (3, 0.0), (3, 1e-9)])
+def test_a_start_where_several_parallelograms_are_flat_goes_on_by_every_branch(count, start):
+    mechanism = parallelograms_in_a_row(count, start)
+    with pytest.raises(NoAnswer) as refused:
+        planar.cycle(mechanism, 8, start, 1.0)
+    assert refused.value.outcome is Outcome.CHANGE_POINT
+    expected = [np.array([1.0])]
+    for _ in range(count):
+        expected = [np.append(angles, angle) for angles in expected for angle in (angles[-1], follower(angles[-1]))]
+    ends = []
+    for number in range(1, 2**count + 1):
+        motion = planar.cycle(mechanism, 8, start, 1.0, branches=[number])
+        assert motion.outcome is Outcome.SOLVED
+        ends.append([motion.link(f"c{k}").angle[-1] for k in range(count + 1)])
+    distances = np.abs(np.exp(1j * np.array(ends))[:, None] - np.exp(1j * np.array(expected))).max(axis=2)
+    assert sorted(np.argmin(distances, axis=1)) == list(range(2**count))
+    assert distances.min(axis=1).max() < 1e-9
+
+
+def follower(theta):
+    """The angle of the antiparallelogram's rocker at an angle of its crank."""
+    return antiparallelogram(theta)[0]

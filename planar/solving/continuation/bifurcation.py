@@ -167,16 +167,19 @@ def _step_to_lower_rank(curve: SolutionCurve, y: Array, constraints: _Decomposit
 
     Of the singular vectors those next to the null vectors that are sought, N on the right and L on the left, are set
     apart. The step closes F along all others, and moves along N so that L^T J N vanishes to first order. Where L^T F
-    stays open the curve only comes near a change point.
+    stays open the curve only comes near a change point. Further singular values that are zero close nothing.
     """
-    residual, jacobian, left, values, right, _ = constraints
+    residual, jacobian, left, values, right, greatest = constraints
     nearest = np.argsort(-np.linalg.norm(right @ null_start, axis=1), kind="stable")[: null_start.shape[1]]
     others = np.setdiff1d(np.arange(len(values)), nearest)
     null, left_null = right[nearest].T, np.delete(left, others, axis=1)
+    regular = others[values[others] > EXACT_SINGULAR_TOLERANCE * greatest]
     if isinstance(jacobian, SparseMatrices):
-        closing = closing_step(jacobian, residual, left_null, np.delete(right, others, axis=0).T)
+        closing = closing_step(
+            jacobian, residual, np.delete(left, regular, axis=1), np.delete(right, regular, axis=0).T
+        )
     else:
-        closing = -right[others].T @ ((left[:, others].T @ residual) / values[others])
+        closing = -right[regular].T @ ((left[:, regular].T @ residual) / values[regular])
     forms, defects = [], []
     for weights in left_null.T:
         slopes = curve.weighted_hessian_products(y, weights, null)
@@ -235,9 +238,10 @@ def bifurcation_at_start(curve: SolutionCurve, y: Array) -> Bifurcation | None:
     First those on which the unknowns move least for the inputs, whichever way these go; None where the position is no
     such point.
     """
-    size = len(y)
-    start = np.linalg.svd(curve.jacobian(y))[2][size - 2 :].T
-    near = _refine_candidate(curve, y, start)
+    start = _decompose(curve, y)
+    counts = dict.fromkeys((max(start.null.shape[1], 2), 2))
+    refined = (_refine_candidate(curve, y, start.right[-count:].T, start) for count in counts)
+    near = next((candidate for candidate in refined if candidate is not None), None)
     if near is not None and near.null.shape[1] > 2:
         near = _refine_candidate(curve, near.y, near.null)
     if near is None or np.linalg.norm(near.y - y) > START_DISTANCE_TOLERANCE or near.residual > curve.solver.tolerance:
