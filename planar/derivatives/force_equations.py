@@ -52,7 +52,7 @@ class ForceEquations:
         self.is_unknown: BoolArray = np.zeros(0, bool)
         "of the positions asked for last: where the solution is on a kink of friction, or no forces are known (n,)"
         self.constants = ca.vertcat(work.spring_turns, self.pressing, senses)
-        acting = ca.sum2(work.actions_on_links) - (work.inertia if inertia else 0.0)
+        acting = work.total_action_on_links - (work.inertia if inertia else 0.0)
         for each in self.pair_actions.values():
             acting += each
         for k, given in enumerate(mechanism.inputs):

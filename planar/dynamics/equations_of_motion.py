@@ -9,7 +9,7 @@ so that constraints may hold twice (null space method; R. Featherstone, Rigid Bo
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from copy import copy
 from typing import NamedTuple
 
@@ -25,7 +25,9 @@ from planar.dynamics.friction.contact_dynamics import (
 from planar.dynamics.friction.contact_functions import ContactFunctions, ContactValues
 from planar.dynamics.lagrangian import LagrangianFunctions
 from planar.dynamics.load_variation import CoursePiece, course_piece, load_factors
+from planar.dynamics.saddle_point import SaddlePattern, SaddleSystem, unit_pattern
 from planar.equations.casadi_call import BufferedFunction
+from planar.equations.sparse_matrices import MAX_DENSE_UNKNOWNS, SparseMatrices, SparsePattern
 from planar.foundation.arrays import Array, BoolArray
 from planar.foundation.errors import NoAnswer, Outcome
 from planar.model.wording import quote_names
@@ -34,6 +36,8 @@ from planar.solving.stops import MetStop
 
 RANK_TOLERANCE = 1e-9
 """A singular value below this part of the greatest is none."""
+CERTAIN_RANK_REGULARITY = 1e-7
+"""Constraints whose weakest is estimated above this beside the strongest are all needed."""
 MASSLESS_TOLERANCE = 1e-12
 """Of the greatest inertia: a motion with less has none that could be accelerated."""
 FULL_RANK_REGULARITY = 1e-2
@@ -42,9 +46,7 @@ CLOSED_TOLERANCE, MAX_NEWTON_STEPS = 1e-14, 8
 """Sizes: what stays open of the constraints, and Newton's steps to there."""
 
 
-NO_EFFORTS = np.zeros(0)
-FORCE_OUTPUT = 4
-"""Of what is evaluated: the number of the forces on the coordinates."""
+NO_EFFORTS: Array = np.zeros(0)
 
 
 class AccelerationResult(NamedTuple):
@@ -60,6 +62,21 @@ class AccelerationResult(NamedTuple):
     regularity: float
     efforts: Array = NO_EFFORTS
     heat: Array = NO_EFFORTS
+
+
+class _MotionTerms(NamedTuple):
+    """What the equations of motion consist of at one position: the derivatives of the constraints by the coordinates
+    (rows, coordinates), their second rates without accelerations (rows,), the masses (coordinates, coordinates), what
+    loads, dampers and motors put on the coordinates, and what weights, springs and velocities do (coordinates,), and
+    kinetic and potential energy (J).
+    """
+
+    slope: Array | SparseMatrices
+    bend: Array
+    mass: Array | SparseMatrices
+    force: Array
+    rest: Array
+    energies: Array
 
 
 class SlidingFriction(NamedTuple):
@@ -119,25 +136,29 @@ class EquationsOfMotion:
         held = [work.input_positions[k] for k in self.driven.index]
         held += work.relative_positions((*sticking, *(each.pair for each in resting)))
         rows = ca.vertcat(work.residuals, *held)
-        slope = ca.jacobian(rows, q)
+        slope, mass = ca.jacobian(rows, q), ca.jacobian(work.momentum, q1)
         loads, efforts = work.applied_forces
         force = loads + efforts
         still = ca.substitute(work.inertia, work.q2, ca.SX.zeros(q.numel()))
+        self.is_sparse = q.numel() > MAX_DENSE_UNKNOWNS
+        if self.is_sparse:
+            self._slope_pattern, self._mass_pattern = _pattern_of(slope), _pattern_of(mass)
+            self._saddle_pattern = SaddlePattern(self._mass_pattern, self._slope_pattern)
+            self._projection_pattern = SaddlePattern(unit_pattern(q.numel()), self._slope_pattern)
+        bend = ca.jtimes(ca.mtimes(slope, q1), q, q1)
+        slope, mass = (ca.vec(each).nz[:] if self.is_sparse else each for each in (slope, mass))
+        motors = ca.vertcat(ca.SX(0, 1), *(work.input_positions[k] for k, _ in self.driven.motors))
         outputs = [
-            rows,
             slope,
-            ca.jtimes(ca.mtimes(slope, q1), q, q1),
-            ca.jacobian(work.momentum, q1),
+            bend,
+            mass,
             force,
             work.conservative_forces - still,
-            work.input_positions,
             ca.vertcat(*work.energies[:2]),
+            ca.jacobian(motors, q),
         ]
-        outputs.append(
-            ca.jacobian(ca.vertcat(ca.SX(0, 1), *(work.input_positions[k] for k, _ in self.driven.motors)), q)
-        )
-        given = [q, q1, work.factors, work.spring_turns]
-        self._called = BufferedFunction(ca.Function("accelerations", given, [ca.densify(each) for each in outputs]))
+        arguments = [q, q1, work.factors, work.spring_turns]
+        self._called = BufferedFunction(ca.Function("accelerations", arguments, [ca.densify(each) for each in outputs]))
         self._closing = BufferedFunction(ca.Function("closing", [q], [ca.densify(rows), ca.densify(slope)]))
         positions = work.input_positions
         rates = ca.densify(ca.jtimes(positions, q, q1))
@@ -172,81 +193,142 @@ class EquationsOfMotion:
         """As `accelerations_at`, in one solution where every constraint is needed and holds firmly."""
         if self.rank is None or self.rank != self.work.residuals.numel() + self.driven.count:
             return self.accelerations_at(time, q, q1)
-        _, slope, bend, inertia, force, rest, *_ = self._evaluate(time, q, q1)
-        given = self.driven.motion_at(time) if self.driven.count else None
-        wanted, held, many, index = -bend[0], slope.T * self.scale, len(q), self.driven.count
-        if given is not None:
-            wanted[-index:] += given[2]
-        rubbed = self._friction(time, q, q1, (slope.T, wanted, inertia.T))
-        mass = inertia.T * self.scale * self.scale[:, None]
-        size = float(np.abs(mass).max()) or 1.0
-        whole = np.zeros((many + self.rank, many + self.rank))
-        whole[:many, :many], whole[many:, :many], whole[:many, many:] = mass / size, held, held.T
-        try:
-            push = (force[0] + rest[0] + rubbed[0]) * self.scale
-            found = np.linalg.solve(whole, np.concatenate([push / size, wanted]))
-        except np.linalg.LinAlgError:
-            return self.accelerations_at(time, q, q1)
-        power = float(force[0] @ q1)
-        efforts = np.zeros(0)
-        if given is not None:
-            efforts = -size * found[-index:]
-            power += float(efforts @ given[1])
-        return AccelerationResult(found[:many] * self.scale, power, 1.0, efforts, rubbed[1])
+        terms = self._evaluate(time, q, q1)
+        wanted, count = self._required_accelerations(time, terms), len(q)
+        rubbed = self._friction(time, q, q1, terms, wanted)
+        push = (terms.force + terms.rest + rubbed[0]) * self.scale
+        if isinstance(terms.slope, SparseMatrices):
+            solution = self._sparse_accelerations(terms, push, wanted)
+            if solution is None:
+                return self.accelerations_at(time, q, q1)
+            scaled, multipliers = solution
+        else:
+            held, mass = terms.slope * self.scale, np.asarray(terms.mass) * self.scale * self.scale[:, None]
+            size = float(np.abs(mass).max()) or 1.0
+            total = np.zeros((count + self.rank, count + self.rank))
+            total[:count, :count], total[count:, :count], total[:count, count:] = mass / size, held, held.T
+            try:
+                solved = np.linalg.solve(total, np.concatenate([push / size, wanted]))
+            except np.linalg.LinAlgError:
+                return self.accelerations_at(time, q, q1)
+            scaled, multipliers = solved[:count], size * solved[count:]
+        return self._acceleration_result(time, q1, terms, scaled, -multipliers, 1.0, rubbed[1])
 
     def accelerations_at(self, time: float, q: Array, q1: Array) -> AccelerationResult:
         """The accelerations at a time, and the power that comes in."""
-        _, slope, bend, inertia, force, rest, *_ = self._evaluate(time, q, q1)
-        wanted = -bend[0]
-        if self.driven.count:
-            wanted[-self.driven.count :] += self.driven.motion_at(time)[2]
-        held = slope.T * self.scale
-        if not np.all(np.isfinite(held)):  # of a stage far out, which the integrator takes back
+        terms = self._evaluate(time, q, q1)
+        wanted = self._required_accelerations(time, terms)
+        values = terms.slope.values if isinstance(terms.slope, SparseMatrices) else terms.slope
+        if not np.all(np.isfinite(values)):  # of a stage far out, which the integrator takes back
             return AccelerationResult(np.full(len(q), np.nan), np.nan, 1.0)
+        projection = self._projection(terms.slope)
+        rubbed = self._friction(time, q, q1, terms, wanted)
+        push = (terms.force + terms.rest + rubbed[0]) * self.scale
+        if projection is not None:
+            solution = self._sparse_accelerations(terms, push, wanted, with_mass_check=True)
+            if solution is not None:
+                return self._acceleration_result(
+                    time, q1, terms, solution[0], -solution[1], projection.regularity(), rubbed[1]
+                )
+        held, mass = np.asarray(terms.slope) * self.scale, np.asarray(terms.mass) * self.scale * self.scale[:, None]
         u, s, v = np.linalg.svd(held)
         many = self._constraint_rank(s)
         firm = float(s[many - 1] / s[0]) if many else 1.0
         ways = v[many:].T
         asked = v[:many].T @ ((u[:, :many].T @ wanted) / s[:many])
-        mass = inertia.T * self.scale * self.scale[:, None]
-        rubbed = self._friction(time, q, q1, (slope.T, wanted, inertia.T))
-        push = (force[0] + rest[0] + rubbed[0]) * self.scale
         free = ways.T @ mass @ ways
         if free.size and np.linalg.eigvalsh(free)[0] <= MASSLESS_TOLERANCE * max(float(np.abs(mass).max()), 1e-300):
             raise self._massless_error(ways, free)
         scaled = asked + ways @ np.linalg.solve(free, ways.T @ (push - mass @ asked)) if free.size else asked
-        power, efforts = float(force[0] @ q1), np.zeros(0)
+        carried: Array = np.zeros(0)
         if self.driven.count:
             # what holds the links does no work, but for the inputs, which move
             carried = np.linalg.lstsq(held.T, mass @ scaled - push, rcond=RANK_TOLERANCE)[0]
+        return self._acceleration_result(time, q1, terms, scaled, carried, firm, rubbed[1])
+
+    def _required_accelerations(self, time: float, terms: _MotionTerms) -> Array:
+        """The second rates (rows,) that the constraints ask of the coordinates."""
+        required = -terms.bend
+        if self.driven.count:
+            required[-self.driven.count :] += self.driven.motion_at(time)[2]
+        return required
+
+    def _acceleration_result(
+        self, time: float, q1: Array, terms: _MotionTerms, scaled: Array, carried: Array, firm: float, heat: Array
+    ) -> AccelerationResult:
+        """The result from scaled accelerations, and from what each constraint carries (rows,)."""
+        power, efforts = float(terms.force @ q1), NO_EFFORTS
+        if self.driven.count:
             efforts = carried[-self.driven.count :]
             power += float(efforts @ self.driven.motion_at(time)[1])
-        return AccelerationResult(scaled * self.scale, power, firm, efforts, rubbed[1])
+        return AccelerationResult(scaled * self.scale, power, firm, efforts, heat)
+
+    def _projection(self, slope: Array | SparseMatrices) -> SaddleSystem | None:
+        """The projection onto sparse constraints, scaled; None where they are dense, or not all of them are needed."""
+        if not isinstance(slope, SparseMatrices) or self.rank not in (None, len(slope)):
+            return None
+        scaled = slope.values * self.scale[slope.pattern.columns]
+        try:
+            projection = SaddleSystem(self._projection_pattern, np.ones(len(self.scale)), scaled)
+        except ValueError:
+            return None
+        if self.rank is None:
+            if projection.regularity() < CERTAIN_RANK_REGULARITY:
+                return None
+            self.rank = len(slope)
+        return projection
+
+    def _sparse_accelerations(
+        self, terms: _MotionTerms, push: Array, wanted: Array, with_mass_check: bool = False
+    ) -> tuple[Array, Array] | None:
+        """Scaled accelerations (coordinates,) and the multipliers of the constraints (rows,), where all of these are
+        needed; None where masses do not determine them."""
+        slope, mass = terms.slope, terms.mass
+        assert isinstance(slope, SparseMatrices) and isinstance(mass, SparseMatrices)
+        scaled_mass = mass.values * self.scale[mass.pattern.rows] * self.scale[mass.pattern.columns]
+        size = float(np.abs(scaled_mass).max(initial=0.0)) or 1.0
+        scaled_slope = slope.values * self.scale[slope.pattern.columns]
+        try:
+            system = SaddleSystem(self._saddle_pattern, scaled_mass / size, scaled_slope)
+        except ValueError:
+            return None
+        if with_mass_check and not system.greatest_compliance() < 1.0 / MASSLESS_TOLERANCE:
+            return None
+        scaled, multipliers = system.solve(push / size, wanted)
+        return scaled, size * multipliers
 
     def project(self, time: float, q: Array, q1: Array) -> tuple[Array, Array]:
         """The nearest coordinates and rates that the constraints allow."""
-        given = self.driven.motion_at(time)
-        ways = held = None
+        motion = self.driven.motion_at(time)
+        shortest: Callable[[Array], Array] = np.zeros_like
         for _ in range(MAX_NEWTON_STEPS):
-            left, slope = self._residuals_and_jacobian(q, given[0])
-            u, s, v = np.linalg.svd(slope * self.scale, full_matrices=False)
-            many = self._constraint_rank(s)
-            held, ways = (u[:, :many] / s[:many]).T, v[:many].T
-            step = ways @ (held @ left)
+            residual, slope = self._residuals_and_jacobian(q, motion[0])
+            shortest = self._shortest_steps(slope)
+            step = shortest(residual)
             q = q - step * self.scale
             if np.abs(step).max(initial=0.0) < CLOSED_TOLERANCE:
                 break
-        left, slope = self._residuals_and_jacobian(q, given[0])
+        slope = self._residuals_and_jacobian(q, motion[0])[1]
         wrong = slope @ q1
         if self.driven.count:
-            wrong[-self.driven.count :] -= given[1]
-        return q, (q1 - (ways @ (held @ wrong)) * self.scale if ways is not None and held is not None else q1)
+            wrong[-self.driven.count :] -= motion[1]
+        return q, q1 - shortest(wrong) * self.scale
+
+    def _shortest_steps(self, slope: Array | SparseMatrices) -> Callable[[Array], Array]:
+        """What gives the shortest scaled step (coordinates,) that changes the constraints by so much (rows,)."""
+        projection = self._projection(slope)
+        if projection is not None:
+            return projection.shortest
+        u, s, v = np.linalg.svd(np.asarray(slope) * self.scale, full_matrices=False)
+        many = self._constraint_rank(s)
+        held, ways = (u[:, :many] / s[:many]).T, v[:many].T
+        return lambda residual: ways @ (held @ residual)
 
     def impulse_response(self, time: float, q: Array, q1: Array) -> Array:
         """By how much rates change for impulses on the coordinates (coordinates, coordinates), all constraints held:
         N (N^T M N)^-1 N^T."""
-        _, slope, _, inertia, *_ = self._evaluate(time, q, q1)
-        held, mass = slope.T * self.scale, inertia.T * self.scale * self.scale[:, None]
+        terms = self._evaluate(time, q, q1)
+        held, mass = np.asarray(terms.slope) * self.scale, np.asarray(terms.mass) * self.scale * self.scale[:, None]
         _, s, v = np.linalg.svd(held)
         ways = v[self._constraint_rank(s) :].T
         free = ways @ np.linalg.solve(ways.T @ mass @ ways, ways.T)
@@ -255,8 +337,8 @@ class EquationsOfMotion:
     def free_directions(self, time: float, q: Array, q1: Array) -> Array:
         """The motions that all constraints leave (coordinates, freedoms), square to one another in parts of sizes and
         turns."""
-        slope = self._evaluate(time, q, q1)[1]
-        _, s, v = np.linalg.svd(slope.T * self.scale)
+        slope = np.asarray(self._evaluate(time, q, q1).slope)
+        _, s, v = np.linalg.svd(slope * self.scale)
         return np.asarray(v[self._constraint_rank(s) :].T * self.scale[:, None])
 
     def stays_at_rest(self, time: float, q: Array, q1: Array) -> bool:
@@ -266,7 +348,7 @@ class EquationsOfMotion:
 
     def energies(self, time: float, q: Array, q1: Array) -> Array:
         """Kinetic energy, and potential of weights and springs (2,), J."""
-        return self._evaluate(time, q, q1)[-1][0]
+        return self._evaluate(time, q, q1).energies
 
     def in_phase(self, places: Array, friction: SlidingFriction | None = None) -> EquationsOfMotion:
         """The same where pairs stick at places (sticking,), and others rub."""
@@ -283,18 +365,15 @@ class EquationsOfMotion:
         self, functions: ContactFunctions, time: float, q: Array, q1: Array, senses: Array, at_rest: BoolArray
     ) -> ContactDynamics:
         """The equations of contacts at a time, with senses and coefficients at rest of the rubbing pairs (pairs,)."""
-        _, slope, bend, inertia, *_ = self._evaluate(time, q, q1)
-        wanted = -bend[0]
-        if self.driven.count:
-            wanted[-self.driven.count :] += self.driven.motion_at(time)[2]
+        terms = self._evaluate(time, q, q1)
         values = self.contact_values(functions, time, q, q1)
-        motion = self._constrained_motion(functions, values, (slope.T, wanted, inertia.T), q1)
+        motion = self._constrained_motion(functions, values, terms, self._required_accelerations(time, terms), q1)
         return contact_dynamics(functions, values, motion, senses, at_rest)
 
     def _constrained_motion(
-        self, functions: ContactFunctions, values: ContactValues, rows: tuple[Array, Array, Array], q1: Array
+        self, functions: ContactFunctions, values: ContactValues, terms: _MotionTerms, wanted: Array, q1: Array
     ) -> ConstrainedMotion:
-        slope, wanted, mass = rows
+        slope, mass = np.asarray(terms.slope), np.asarray(terms.mass)
         at = [functions.effort_pairs.index(name) for name in self.driven.held_pairs]
         push: Array = values.push
         for k, motor in self.driven.motors:
@@ -304,14 +383,14 @@ class EquationsOfMotion:
         is_firm = self.rank == len(wanted)
         return ConstrainedMotion(mass, slope, wanted, values.efforts[:, at], push, self.scale, is_firm)
 
-    def _friction(self, time: float, q: Array, q1: Array, rows: tuple[Array, Array, Array]) -> tuple[Array, Array]:
+    def _friction(self, time: float, q: Array, q1: Array, terms: _MotionTerms, wanted: Array) -> tuple[Array, Array]:
         """What friction puts on the coordinates, and takes at every rubbing pair (W); not a number where its equations
         have no solution."""
         friction = self.friction
         if friction is None:
             return np.zeros(len(q)), NO_EFFORTS
         values = self.contact_values(friction.functions, time, q, q1)
-        motion = self._constrained_motion(friction.functions, values, rows, q1)
+        motion = self._constrained_motion(friction.functions, values, terms, wanted, q1)
         none = np.zeros(len(friction.senses), dtype=bool)
         found = contact_dynamics(friction.functions, values, motion, friction.senses, none)
         y = friction.contacts.solve(found.system)
@@ -322,12 +401,12 @@ class EquationsOfMotion:
         np.subtract.at(heat, friction.functions.pair_index[rubs], (q1 @ found.actions * y)[rubs])
         return found.actions @ y, heat
 
-    def _residuals_and_jacobian(self, q: Array, at: Array) -> tuple[Array, Array]:
+    def _residuals_and_jacobian(self, q: Array, at: Array) -> tuple[Array, Array | SparseMatrices]:
         rows, slope = self._closing(q)
-        left = rows[0]
+        residual = rows[0]
         if self.driven.count:
-            left[-self.driven.count :] -= at
-        return left, slope.T
+            residual[-self.driven.count :] -= at
+        return residual, SparseMatrices(self._slope_pattern, slope[0]) if self.is_sparse else slope.T
 
     def _load_factors(self, time: float, q: Array, q1: Array) -> Array:
         """By what loads are multiplied at a time (loads,)."""
@@ -346,14 +425,22 @@ class EquationsOfMotion:
             by = load_factors(self.work.mechanism, inputs, np.array([time]), 1)[0]
         return by
 
-    def _evaluate(self, time: float, q: Array, q1: Array) -> list[Array]:
-        *found, slopes = self._called(q, q1, self._load_factors(time, q, q1), self.spring_turns)
+    def _evaluate(self, time: float, q: Array, q1: Array) -> _MotionTerms:
+        slope, bend, mass, force, rest, energies, motor_slopes = self._called(
+            q, q1, self._load_factors(time, q, q1), self.spring_turns
+        )
+        force = force[0]
         if self.driven.motors:
             efforts = [
-                float(motor.effort_at(rate)) for (_, motor), rate in zip(self.driven.motors, q1 @ slopes, strict=True)
+                float(motor.effort_at(rate))
+                for (_, motor), rate in zip(self.driven.motors, q1 @ motor_slopes, strict=True)
             ]
-            found[FORCE_OUTPUT] = found[FORCE_OUTPUT] + slopes @ np.array(efforts)
-        return found
+            force = force + motor_slopes @ np.array(efforts)
+        vectors = force, rest[0], energies[0]
+        if self.is_sparse:
+            sparse = SparseMatrices(self._slope_pattern, slope[0]), bend[0], SparseMatrices(self._mass_pattern, mass[0])
+            return _MotionTerms(*sparse, *vectors)
+        return _MotionTerms(slope.T, bend[0], mass.T, *vectors)
 
     def _constraint_rank(self, values: Array) -> int:
         """How many constraints hold: at the start they are counted, and near a change point they stay as many."""
@@ -373,3 +460,8 @@ class EquationsOfMotion:
             f"has a mass, so nothing tells how fast; give {'one of them' if len(moved) > 1 else 'it'} a mass with an "
             f"inertia{f', or let an input drive it ({driving})' if let_go else ''}",
         )
+
+
+def _pattern_of(matrix: ca.SX) -> SparsePattern:
+    rows, first = np.array(matrix.sparsity().row(), dtype=int), np.array(matrix.sparsity().colind(), dtype=int)
+    return SparsePattern(matrix.shape, rows, first)

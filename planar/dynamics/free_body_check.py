@@ -24,12 +24,14 @@ def free_body_imbalance(
     acts, or nothing is told.
     """
     worst, greatest, links = 0.0, 0.0, []
-    for link in field.moving.frames:
-        if link == field.mechanism.frame:
-            continue
-        forces = [force_and_moment(each.at, each.force, each.couple) for each in acting if each.link == link]
-        for pair in reactions.values():
-            forces += pair_actions_on(link, pair, field.position_count)
+    forces_on: dict[str, list[Array]] = {link: [] for link in field.moving.frames if link != field.mechanism.frame}
+    for each in acting:
+        if each.link in forces_on:
+            forces_on[each.link].append(force_and_moment(each.at, each.force, each.couple))
+    for pair in reactions.values():
+        for link in {*pair.links, *pair.couples} & forces_on.keys():
+            forces_on[link] += pair_actions_on(link, pair, field.position_count)
+    for link, forces in forces_on.items():
         rows = np.array(forces).reshape(-1, field.position_count, 3) / np.array([1.0, 1.0, arm])
         told = np.isfinite(rows).all(axis=(0, 2))
         if not told.any():

@@ -138,11 +138,12 @@ class LagrangianFunctions:
     def energies(self) -> tuple[ca.SX, ca.SX, ca.SX]:
         """Kinetic energy, potential of weights and springs (J), and what dampers take up, halved (W)."""
         kinetic = potential = lost = ca.SX(0.0)
-        for mass in self.mechanism.masses:
-            at = self.mass_centre(mass)
+        centres = [coordinate for mass in self.mechanism.masses for coordinate in self.mass_centre(mass)]
+        velocities = self._time_derivative(stack_expressions(centres))
+        for k, mass in enumerate(self.mechanism.masses):
             potential += self._weight_potential(mass)
             if mass.link in self.link_columns:
-                v = self._time_derivative(stack_expressions(at))
+                v = velocities[2 * k : 2 * k + 2]
                 turning = self.q1[self.link_columns[mass.link] + 2]
                 kinetic += 0.5 * mass.mass * ca.dot(v, v) + 0.5 * mass.inertia * turning**2
         for number, spring in enumerate(self.mechanism.springs):
@@ -161,6 +162,13 @@ class LagrangianFunctions:
         ]
         springs = [-ca.gradient(stored, q) - ca.gradient(taken, q1) for stored, taken in energies]
         return ca.horzcat(ca.SX(q.numel(), 0), *loads, *weights, *springs)
+
+    @cached_property
+    def total_action_on_links(self) -> ca.SX:
+        """What all of them put on the links (coordinates,)."""
+        loads = [self.load_on_links(load) * self.factors[k] for k, load in enumerate(self.mechanism.loads)]
+        _, stored, dissipated = self.energies
+        return sum(loads, -ca.gradient(stored, self.q) - ca.gradient(dissipated, self.q1))
 
     def load_on_links(self, load: Load) -> ca.SX:
         """What a load puts on the links (coordinates,) where its course has the factor one."""

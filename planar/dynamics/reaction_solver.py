@@ -13,22 +13,24 @@ from typing import NamedTuple
 
 import numpy as np
 
+from planar.dynamics.equilibrium import Equilibrium
 from planar.dynamics.external_actions import KinematicArrays
 from planar.dynamics.load_variation import load_factors
 from planar.dynamics.sharing.least_work import Wrench, share_by_least_work
 from planar.dynamics.virtual_work import BalanceFunction, VirtualWorkBalance, balance_function
+from planar.equations.sparse_matrices import SparseMatrices, SparsePattern
 from planar.foundation.arrays import Array, BoolArray
 from planar.foundation.geometry import Vector
 from planar.foundation.short_repr import short_repr
 from planar.model.pairs import Pair
 from planar.model.pairs.base import ToothContact
 
-RANK_TOLERANCE = 1e-9
-"""A singular value below this part of the greatest is none: what it would hold is held by others, or by nothing."""
 WHEEL_LOAD_TOLERANCE = 1e-7
 """What takes efforts, or is not held, by more than this beside a force of one is no way in which wheels load pairs."""
 BALANCE_TOLERANCE = 1e-8
 """Links that stay out of balance by more than this part of the greatest force are not held by any."""
+LinkActions = Mapping[str, Array]
+"""What acts on the coordinates x, y, angle of links (n, 3), by link."""
 
 
 class ForceSolution(NamedTuple):
@@ -63,19 +65,60 @@ class ReactionSolver:
         self.frames = field.frames
         self.shapes, self.arm = field.shapes, self.work.size
         self.coordinate_scale = np.tile([1.0, 1.0, 1.0 / self.arm], len(self.work.links))
-        rows = balance.constraints.copy()
+        self.row_count = balancing.row_count
+        matrices = self._scaled_matrices()
+        self.column_scale = matrices.column_norms(1e-300)  # (n, forces)
+        self.equilibrium = Equilibrium(matrices.divide_columns(self.column_scale))
+
+    def _scaled_matrices(self) -> SparseMatrices:
+        """What forces of one in the rows of the pairs and in the inputs do to the scaled coordinates of the links
+        (n, links, forces)."""
+        constraints, directions = self.balance.constraints, self.balance.input_directions
+        values = constraints.values.copy()
+        first = constraints.pattern.first
         for name, contact in self.contacts.items():
-            rows[:, self.pair_rows[name]] = self.unit_force_on_pair(self.pairs[name], contact, contact.drive_direction)
-        held = np.concatenate([rows, balance.input_directions], axis=1) * self.coordinate_scale
-        self.column_scale = np.maximum(np.linalg.norm(held, axis=2), 1e-300)  # (n, forces)
-        self.equilibrium_matrix = (held / self.column_scale[:, :, None]).transpose(0, 2, 1)  # (n, links, forces)
+            pair, rows = self.pairs[name], self.pair_rows[name]
+            unit = self.unit_force_on_pair(pair, contact, contact.drive_direction)
+            entries = slice(first[rows.start], first[rows.stop])
+            values[:, entries] = np.concatenate([unit[link] for link in self.moving_bodies(pair)], axis=1)
+        inputs, columns = np.nonzero(directions.any(axis=0))
+        ends = first[-1] + np.cumsum(np.bincount(inputs, minlength=directions.shape[1]))
+        shape = constraints.pattern.shape[0], self.row_count + directions.shape[1]
+        pattern = SparsePattern(
+            shape, np.concatenate([constraints.pattern.rows, columns]), np.concatenate([first, ends])
+        )
+        values = np.concatenate([values, directions[:, inputs, columns]], axis=1)
+        return SparseMatrices(pattern, values * self.coordinate_scale[pattern.rows])
+
+    @property
+    def equilibrium_matrix(self) -> Array | SparseMatrices:
+        """What forces do to the scaled coordinates of the links (n, links, forces), columns of length one."""
+        return self.equilibrium.matrix
+
+    def moving_bodies(self, pair: Pair) -> list[str]:
+        """The bodies of a pair that move, in the order of their coordinates."""
+        columns = self.work.link_columns
+        return sorted((link for link in {*pair.bodies} if link in columns), key=columns.__getitem__)
 
     @cached_property
     def contacts(self) -> dict[str, ToothContact]:
         """Where teeth touch, for the pairs of which that is known."""
-        beside = tuple(self.pairs.values())
-        found = {name: pair.tooth_contact(self.frames, self.shapes, beside) for name, pair in self.pairs.items()}
-        return {name: contact for name, contact in found.items() if contact is not None}
+        entries: dict[str, list[Pair]] = {}
+        names: dict[str, list[str]] = {}
+        for pair in self.pairs.values():
+            entries.setdefault(pair.entry_name(), []).append(pair)
+            for link in pair.bodies:
+                names.setdefault(link, []).append(pair.entry_name())
+        order = {entry: k for k, entry in enumerate(entries)}
+        contacts = {}
+        for name, pair in self.pairs.items():
+            if type(pair).tooth_contact is Pair.tooth_contact:
+                continue
+            # teeth depend on the pins of their links alone
+            adjacent = {entry for link in pair.links for entry in names[link]}
+            beside = [each for entry in sorted(adjacent, key=order.__getitem__) for each in entries[entry]]
+            contacts[name] = pair.tooth_contact(self.frames, self.shapes, beside)
+        return {name: contact for name, contact in contacts.items() if contact is not None}
 
     @cached_property
     def couple_only_pairs(self) -> tuple[str, ...]:
@@ -90,18 +133,17 @@ class ReactionSolver:
         pushed = {}
         for name, contact in self.contacts.items():
             pair, rows = self.pairs[name], self.pair_rows[name]
-            press = np.abs(found[:, rows, 0] / self.column_scale[:, rows])
-            push = self.unit_force_on_pair(pair, contact, contact.separation_direction)[:, 0]
-            pushed[name] = push * (contact.pressure_tangent * press)
+            press = contact.pressure_tangent * np.abs(found[:, rows, 0] / self.column_scale[:, rows])
+            unit = self.unit_force_on_pair(pair, contact, contact.separation_direction)
+            pushed[name] = {link: action * press for link, action in unit.items()}
         return self.solve_beside(pushed)
 
-    def solve_beside(self, pushed: Mapping[str, Array]) -> ForceSolution:
-        """The same where pairs by name do more than their constraints, known on the links' coordinates (n, links)."""
-        asked = self.required_forces
+    def solve_beside(self, pushed: Mapping[str, LinkActions]) -> ForceSolution:
+        """The same where pairs by name do more than their constraints, known on the links' coordinates."""
+        required = self.required_forces
         if pushed:
-            off = sum(pushed.values()) * self.coordinate_scale
-            asked = asked - off
-        found, ways, balanced = self._solve_balance(asked[:, :, None])
+            required = required - sum(map(self.on_coordinates, pushed.values())) * self.coordinate_scale
+        found, ways, balanced = self._solve_balance(required[:, :, None])
         found, ways = share_by_least_work(self, found, ways)
         by_cause = {"": ways} | self._wheel_changes
         by_cause = {
@@ -111,13 +153,13 @@ class ReactionSolver:
         ways = np.concatenate([*by_cause.values()], axis=2)
         wrenches = {name: self.pair_wrenches(pair, found[:, self.pair_rows[name]]) for name, pair in self.pairs.items()}
         for name, push in pushed.items():
-            also = self._wrenches_on_bodies(self.pairs[name], push[:, :, None])
+            also = self._wrenches_on_bodies(self.pairs[name], {link: each[:, :, None] for link, each in push.items()})
             wrenches[name] = {
                 link: Wrench(each.force + also[link].force, each.moment + also[link].moment)
                 for link, each in wrenches[name].items()
             }
         changes = {name: self.pair_wrenches(pair, ways[:, self.pair_rows[name]]) for name, pair in self.pairs.items()}
-        inputs = slice(self.balance.constraints.shape[1], None)
+        inputs = slice(self.row_count, None)
         by = self.column_scale[:, inputs, None]
         return ForceSolution(
             (found[:, inputs] / by)[:, :, 0],
@@ -131,71 +173,55 @@ class ReactionSolver:
             balanced,
         )
 
+    def on_coordinates(self, actions: LinkActions) -> Array:
+        """What acts on links, on the coordinates of all of them (n, links)."""
+        total: Array = np.zeros((self.position_count, self.work.link_coordinate_count))
+        for link, action in actions.items():
+            first = self.work.link_columns[link]
+            total[:, first : first + 3] += action
+        return total
+
     @cached_property
     def required_forces(self) -> Array:
         """What pairs and inputs have to do together on the coordinates of the links (n, links), scaled as these are."""
         return (self.balance.inertia - self.balance.loads) * self.coordinate_scale
 
     @property
-    def inverse(self) -> Array:
-        """How forces (n, forces) follow from what they have to do together (n, forces, links)."""
-        return self._inverse_and_null_space[0]
-
-    @property
     def undetermined_forces(self) -> Array:
         """All ways in which equilibrium leaves open how forces are (n, forces, ways)."""
-        return np.concatenate([self._inverse_and_null_space[1], *self._wheel_changes.values()], axis=2)
+        return np.concatenate([self.equilibrium.null_space, *self._wheel_changes.values()], axis=2)
 
     @cached_property
     def _wheel_changes(self) -> dict[str, Array]:
         return {name: self._unknown_wheel_forces(self.pairs[name]) for name in self.couple_only_pairs}
 
-    @cached_property
-    def _inverse_and_null_space(self) -> tuple[Array, Array]:
-        """The inverse (n, forces, links) as far as there is one, and the ways (n, forces, ways) in which forces that
-        nothing asks for may stand against each other."""
-        many, links, forces = self.equilibrium_matrix.shape
-        inverse, ways = np.zeros((many, forces, links)), np.zeros((many, forces, 0))
-        weak = np.full(many, bool(self.equilibrium_matrix.size))
-        if links == forces:
-            # the norms tell that no singular value is weak, in a tenth of the time that it takes to find them
-            whole = np.full(many, True)
-            try:
-                inverse = np.linalg.inv(self.equilibrium_matrix)
-            except np.linalg.LinAlgError:  # some are singular
-                whole = np.linalg.slogdet(self.equilibrium_matrix)[0] != 0.0
-                inverse[whole] = np.linalg.inv(self.equilibrium_matrix[whole])
-            sizes = [np.linalg.norm(each, axis=(1, 2)) for each in (self.equilibrium_matrix, inverse)]
-            weak = ~whole | (sizes[0] * sizes[1] >= 1.0 / RANK_TOLERANCE)
-        if weak.any():
-            inverse[weak], spare = _pseudo_inverse(self.equilibrium_matrix[weak])
-            ways = np.zeros((many, forces, spare.shape[2]))
-            ways[weak] = spare
-        return inverse, ways
+    def _solve_balance(self, required: Array) -> tuple[Array, Array, BoolArray]:
+        """The forces (n, forces, 1) that do what is required (n, links, 1), how else they may be, and whether they
+        can."""
+        equilibrium, matrix = self.equilibrium, self.equilibrium.matrix
+        found = equilibrium.solve(required)
+        found += equilibrium.solve(required - matrix @ found)
+        residual = np.abs(required - matrix @ found).max(axis=(1, 2), initial=0.0)
+        scale = np.maximum(*(np.abs(each).max(axis=(1, 2), initial=0.0) for each in (required, found)))
+        return found, equilibrium.null_space, residual <= BALANCE_TOLERANCE * scale
 
-    def _solve_balance(self, asked: Array) -> tuple[Array, Array, BoolArray]:
-        """The forces (n, forces, 1) that do what is asked (n, links, 1), how else they may be, and whether they can."""
-        inverse, ways = self._inverse_and_null_space
-        found = inverse @ asked
-        found += inverse @ (asked - self.equilibrium_matrix @ found)
-        left = np.abs(asked - self.equilibrium_matrix @ found).max(axis=(1, 2), initial=0.0)
-        whole = np.maximum(np.abs(asked).max(axis=(1, 2), initial=0.0), np.abs(found).max(axis=(1, 2), initial=0.0))
-        return found, ways, left <= BALANCE_TOLERANCE * whole
-
-    def unit_force_on_pair(self, pair: Pair, contact: ToothContact, way: Vector) -> Array:
-        """A force of one along a way at a contact, on the second link, and its opposite on the first (n, 1, links)."""
-        found = np.zeros((self.position_count, 1, self.work.link_coordinate_count))
+    def unit_force_on_pair(self, pair: Pair, contact: ToothContact, way: Vector) -> dict[str, Array]:
+        """A force of one along a way at a contact, on the second link, and its opposite on the first."""
+        actions: dict[str, Array] = {link: np.zeros((self.position_count, 3)) for link in self.moving_bodies(pair)}
         for link, sense in zip(pair.links, (-1.0, 1.0), strict=True):
-            self._add_unit_action(found, link, contact.pitch_point, way, sense)
-        return found
+            if link in actions:
+                actions[link] += self._unit_action(link, contact.pitch_point, way, sense)
+        return actions
 
-    def _add_unit_action(self, found: Array, link: str, at: Vector, way: Vector | None, sense: float) -> None:
-        """Add a force of one along a way at a place of a link, or a couple of one at the mechanism's size."""
-        if link in self.work.link_columns:
-            first, frame = self.work.link_columns[link], self.frames[link]
-            arm = at - Vector(frame.x, frame.y)
-            for k, part in enumerate((0.0, 0.0, self.arm) if way is None else (way.x, way.y, arm.cross(way))):
-                found[:, 0, first + k] += sense * part
+    def _unit_action(self, link: str, place: Vector, way: Vector | None, sense: float) -> Array:
+        """A force of one along a way at a place, or a couple of one at the mechanism's size, on the coordinates of a
+        link (n, 3)."""
+        frame = self.frames[link]
+        arm = place - Vector(frame.x, frame.y)
+        action: Array = np.empty((self.position_count, 3))
+        for k, part in enumerate((0.0, 0.0, self.arm) if way is None else (way.x, way.y, arm.cross(way))):
+            action[:, k] = sense * part
+        return action
 
     def _unknown_wheel_forces(self, pair: Pair) -> Array:
         """How forces change with an unknown wrench between two wheels beside the couples of their row (n, forces, 4).
@@ -209,12 +235,14 @@ class ReactionSolver:
         share = np.zeros((self.position_count, self.work.link_coordinate_count, 4))
         for k, (way, against) in enumerate(((x, first), (y, first), (None, first), (None, carrier))):
             for link, sense in ((against, -1.0), (second, 1.0)):
-                self._add_unit_action(share[:, None, :, k], link, at, way, sense)
+                if link in self.work.link_columns:
+                    column = self.work.link_columns[link]
+                    share[:, column : column + 3, k] += self._unit_action(link, at, way, sense)
         share *= self.coordinate_scale[:, None]
-        change = -self._inverse_and_null_space[0] @ share
-        own, inputs = self.pair_rows[pair.name], slice(self.balance.constraints.shape[1], None)
+        change = -self.equilibrium.solve(share)
+        own, inputs = self.pair_rows[pair.name], slice(self.row_count, None)
         barred = np.concatenate([change[:, own], change[:, inputs], share + self.equilibrium_matrix @ change], axis=1)
-        s, v = np.linalg.svd(barred)[1:]
+        s, v = np.linalg.svd(barred, full_matrices=False)[1:]
         return change @ (v.transpose(0, 2, 1) * (s <= WHEEL_LOAD_TOLERANCE)[:, None]) @ v
 
     def _separation_changes(self, ways: Array) -> list[Array]:
@@ -228,11 +256,9 @@ class ReactionSolver:
         for name, contact in self.contacts.items():
             rows = self.pair_rows[name]
             press = np.linalg.norm(ways[:, rows] / self.column_scale[:, rows, None], axis=(1, 2))
-            push = (
-                self.unit_force_on_pair(self.pairs[name], contact, contact.separation_direction)[:, 0]
-                * (contact.pressure_tangent * press)[:, None]
-            )
-            found.append(-self._inverse_and_null_space[0] @ (push * self.coordinate_scale)[:, :, None])
+            unit = self.on_coordinates(self.unit_force_on_pair(self.pairs[name], contact, contact.separation_direction))
+            push = unit * (contact.pressure_tangent * press)[:, None]
+            found.append(-self.equilibrium.solve((push * self.coordinate_scale)[:, :, None]))
         return found
 
     def reaction_point(self, pair: Pair) -> Array | None:
@@ -245,40 +271,31 @@ class ReactionSolver:
 
     def pair_wrenches(self, pair: Pair, forces: Array) -> dict[str, Wrench]:
         """What a pair does to each of its bodies (n, ways) by forces of its own (n, rows, ways)."""
-        own = (self.equilibrium_matrix[:, :, self.pair_rows[pair.name]] @ forces) / self.coordinate_scale[None, :, None]
-        return self._wrenches_on_bodies(pair, own)
+        rows, actions = self.pair_rows[pair.name], {}
+        for link in self.moving_bodies(pair):
+            own = slice(self.work.link_columns[link], self.work.link_columns[link] + 3)
+            actions[link] = (self.equilibrium_matrix[:, own, rows] @ forces) / self.coordinate_scale[None, own, None]
+        return self._wrenches_on_bodies(pair, actions)
 
-    def _wrenches_on_bodies(self, pair: Pair, own: Array) -> dict[str, Wrench]:
-        """Forces on the coordinates of a pair's bodies (n, links, ways); the frame has what adds up to nothing."""
-        bodies = dict.fromkeys(pair.bodies)
-        found = {link: self._wrench_on_link(link, own) for link in bodies if link in self.work.link_columns}
+    def _wrenches_on_bodies(self, pair: Pair, actions: LinkActions) -> dict[str, Wrench]:
+        """Forces on the coordinates of a pair's bodies (n, 3, ways) by link; the frame has what adds up to nothing."""
+        found = {link: self._wrench_on_link(link, action) for link, action in actions.items()}
         none = np.zeros(())
         rest = Wrench(
             -sum((each.force for each in found.values()), none), -sum((each.moment for each in found.values()), none)
         )
-        return {link: found.get(link, rest) for link in bodies}
+        return {link: found.get(link, rest) for link in pair.bodies}
 
-    def _wrench_on_link(self, link: str, own: Array) -> Wrench:
-        at, frame = self.work.link_columns[link], self.frames[link]
-        force = own[:, at : at + 2].transpose(0, 2, 1)
-        return Wrench(force, own[:, at + 2] + frame.x[:, None] * force[..., 1] - frame.y[:, None] * force[..., 0])
+    def _wrench_on_link(self, link: str, action: Array) -> Wrench:
+        frame = self.frames[link]
+        force = action[:, :2].transpose(0, 2, 1)
+        return Wrench(force, action[:, 2] + frame.x[:, None] * force[..., 1] - frame.y[:, None] * force[..., 0])
 
 
 def bearing_point(pair: Pair) -> tuple[str, str] | None:
     """The (link, point) at which a pair without teeth bears; None where it joins its links at no place."""
     rides = pair.point_on_line()
     return next(iter(pair.coincident_points()[1:] or ((rides[0],) if rides else ())), None)
-
-
-def _pseudo_inverse(held: Array) -> tuple[Array, Array]:
-    """Those of `ReactionSolver._inverse_and_null_space` by singular values."""
-    u, s, v = np.linalg.svd(held)
-    strong = s > RANK_TOLERANCE * s[:, :1]
-    few, back = s.shape[1], v.transpose(0, 2, 1)
-    inverse = back[:, :, :few] * np.where(strong, 1.0 / np.where(strong, s, 1.0), 0.0)[:, None]
-    spare = np.ones((len(held), back.shape[2]), dtype=bool)
-    spare[:, :few] = ~strong
-    return inverse @ u.transpose(0, 2, 1)[:, :few], (back * spare[:, None, :])[:, :, spare.any(axis=0)]
 
 
 def fill_balance(field: KinematicArrays, time: Array | None, inertia: bool, at_rest: bool = False) -> ReactionSolver:

@@ -412,7 +412,8 @@ class _SimulationRun:
 
     def _state_rate(self, time: float, y: Array) -> Array:
         q, q1 = self._split_state(y)
-        way = self.equations.regular_accelerations if self.is_firm else self.equations.accelerations_at
+        is_quick = self.is_firm or self.equations.is_sparse
+        way = self.equations.regular_accelerations if is_quick else self.equations.accelerations_at
         found = way(time, q, q1)
         if not np.all(np.isfinite(found.q2)):
             raise FloatingPointError  # with no number the integrator would never end

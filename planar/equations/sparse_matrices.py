@@ -129,7 +129,14 @@ class SparseMatrices:
         if self.values.ndim == 1:
             product: Array = self.single @ other
             return product
-        return np.asarray(self) @ other
+        if other.ndim == 1:
+            return np.asarray((self @ other[:, None])[..., 0])
+        stack = self.values.shape[:-1]
+        factors = np.broadcast_to(other, (*stack, *other.shape[-2:]))
+        products: Array = np.empty((*stack, self.pattern.shape[0], other.shape[-1]))
+        for place in np.ndindex(stack):
+            products[place] = self[place].single @ factors[place]
+        return products
 
     __array_ufunc__ = None  # an array times it is its own product
 
@@ -167,8 +174,8 @@ class SparseMatrices:
         return float(np.sqrt(np.prod([*sums])))
 
     def divide_columns(self, sizes: Array) -> SparseMatrices:
-        """Every column (columns,) divided by its size."""
-        return SparseMatrices(self.pattern, self.values / sizes[self.pattern.columns])
+        """Every column (..., columns) divided by its size."""
+        return SparseMatrices(self.pattern, self.values / sizes[..., self.pattern.columns])
 
     def join_last_columns(self, weights: Array) -> SparseMatrices:
         """One matrix whose last columns are one, the sum of each times its weight (columns,)."""
@@ -196,13 +203,18 @@ class SparseMatrices:
         return solutions.reshape(right.shape)
 
 
-def factorised(matrix: csc_matrix) -> SuperLU | None:
-    """The factors of a square matrix; None where it is singular to the last bit, or not all of it a number."""
+def factorised(matrix: csc_matrix, is_ordered: bool = True) -> SuperLU | None:
+    """The factors of a square matrix; None where it is singular to the last bit, or not all of it a number.
+
+    `is_ordered`: whether rows and columns that belong together stand at the same places.
+    """
     from scipy.sparse.linalg import splu  # few mechanisms are so large
 
     if not np.isfinite(matrix.data).all():
         return None
     try:
+        if not is_ordered:
+            return splu(matrix)
         # groups of links stand one below the other: that pivots stay among their own rows keeps the factors as sparse
         return splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=MIN_PIVOT_RATIO)
     except RuntimeError:

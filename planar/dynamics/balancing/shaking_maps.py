@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -91,9 +92,9 @@ class LinkKinematics:
                 angular[:, number, k, 1] = _cross(arm, rates[1]) + _cross(first, velocity)
                 angular[:, number, k, 2] = _cross(arm, rates[2]) + _cross(second, velocity)
                 angular[:, number, k, 3] = turning
-        matrix, inverse = self.reactions.equilibrium_matrix, self.reactions.inverse
+        matrix, inverse = np.asarray(self.reactions.equilibrium_matrix), self.reactions.equilibrium.inverse
         condition = np.linalg.norm(matrix, axis=(1, 2)) * np.linalg.norm(inverse, axis=(1, 2))
-        driven = slice(self.reactions.balance.constraints.shape[1], None)
+        driven = slice(self.reactions.row_count, None)
         wrong = inverse[:, driven] @ matrix - np.eye(matrix.shape[2])[driven]
         condition[np.abs(wrong).max(axis=(1, 2), initial=0.0) > RATE_TOLERANCE] = np.inf
         return UnitRateMomentum(
@@ -129,13 +130,18 @@ class LinkKinematics:
         An effort of the input does on the links what the multipliers tell, and by virtual work these are the rates.
         """
         reactions = self.reactions
-        row = reactions.balance.constraints.shape[1] + number
+        row = reactions.row_count + number
         first = reactions.work.link_columns[axes.link]
         by = reactions.coordinate_scale[first : first + 3] / reactions.column_scale[:, row, None]
-        rates = reactions.inverse[:, row, first : first + 3] * by
+        rates = self._input_rows[:, number, first : first + 3] * by
         arm = self._origin_rates(axes)[0] - self.field.point_rates(axes.link, Vector(0.0, 0.0))
         turning = rates[:, 2]
         return rates[:, :2] + turning[:, None] * np.stack([-arm[:, 1], arm[:, 0]], axis=-1), turning
+
+    @cached_property
+    def _input_rows(self) -> Array:
+        """The rows of the inverse of equilibrium that give the efforts (n, inputs, links)."""
+        return self.reactions.equilibrium.inverse_rows(slice(self.reactions.row_count, None))
 
     def _effort_map(self, number: int) -> Array:
         """What an input supplies for mass parameters, their weights among it (n, 4 links)."""

@@ -123,7 +123,7 @@ class ContactFunctions:
             parts,
             ca.vertcat(ca.SX(0, 1), *senses),
             ca.horzcat(ca.SX(many, 0), *(work.unit_effort_on_links(name) for name in self.effort_pairs)),
-            ca.sum2(work.actions_on_links) - still,
+            work.total_action_on_links - still,
             positions,
             slopes,
             rates,

@@ -10,7 +10,7 @@ import numpy as np
 
 from planar.dynamics.external_actions import KinematicArrays
 from planar.dynamics.friction.contact_system import ContactSystem
-from planar.dynamics.reaction_solver import ReactionSolver
+from planar.dynamics.reaction_solver import LinkActions, ReactionSolver
 from planar.foundation.arrays import Array, BoolArray
 from planar.foundation.errors import BadInput
 from planar.foundation.geometry import Vector
@@ -130,11 +130,11 @@ class ContactRows:
         """The equations of contacts at given senses of the pairs' rates (n,), and what each of them does to the links
         where it is one (n, links, m)."""
         contacts = self.contacts
-        inverse = self.reactions.inverse
+        equilibrium = self.reactions.equilibrium
         width = max((each.parts[0].shape[1] for each in contacts), default=1)
-        forces = inverse.shape[1]
+        _, links, forces = equilibrium.matrix.shape
         parts = np.zeros((self.count, len(contacts), width, forces))
-        actions = np.zeros((self.count, inverse.shape[2], len(contacts)))
+        actions = np.zeros((self.count, links, len(contacts)))
         for index, each in enumerate(contacts):
             sense = senses[each.pair] if each.is_friction else np.ones(self.count)
             chosen = np.where((sense < 0.0)[:, None, None], each.parts[1], each.parts[0])
@@ -142,22 +142,29 @@ class ContactRows:
             against = -sense * each.rate_sense if each.is_friction else sense
             actions[:, :, index] = each.action * against[:, None]
         scaled = actions * self.reactions.coordinate_scale[:, None]
-        base = (inverse @ self.reactions.required_forces[:, :, None])[:, :, 0]
+        base = equilibrium.solve(self.reactions.required_forces[:, :, None])[:, :, 0]
         system = ContactSystem(
             np.einsum("nakf,nf->nak", parts, base),
-            np.einsum("nakf,nfm->nakm", parts, inverse @ scaled),
+            np.einsum("nakf,nfm->nakm", parts, equilibrium.solve(scaled)),
             np.array([each.law is LoadLaw.RESULTANT for each in contacts], dtype=bool),
             np.array([each.law is LoadLaw.SIGNED for each in contacts], dtype=bool),
             np.array([each.is_friction for each in contacts], dtype=bool),
         )
         return system, actions
 
-    def pair_actions(self, actions: Array, y: Array) -> dict[str, Array]:
-        """What contacts y (n, m) of every pair put on the coordinates of the links (n, links)."""
-        found: dict[str, Array] = {}
+    def pair_actions(self, actions: Array, y: Array) -> dict[str, LinkActions]:
+        """What contacts y (n, m) of every pair put on the coordinates of its links."""
+        totals: dict[str, Array] = {}
         for index, each in enumerate(self.contacts):
-            found[each.pair] = found.get(each.pair, 0.0) + actions[:, :, index] * y[:, index, None]
-        return found
+            totals[each.pair] = totals.get(each.pair, 0.0) + actions[:, :, index] * y[:, index, None]
+        columns = self.reactions.work.link_columns
+        return {
+            name: {
+                link: total[:, columns[link] : columns[link] + 3]
+                for link in self.reactions.moving_bodies(self.reactions.pairs[name])
+            }
+            for name, total in totals.items()
+        }
 
     def states(self, system: ContactSystem, senses: dict[str, Array], y: Array) -> dict[str, ContactState]:
         """How every pair rubs with contacts y (n, m)."""
@@ -252,7 +259,7 @@ class ContactRows:
         found = []
         for name, contact in self.reactions.contacts.items():
             pair, solver = self.reactions.pairs[name], self.reactions
-            action = solver.unit_force_on_pair(pair, contact, contact.separation_direction)[:, 0]
+            action = solver.on_coordinates(solver.unit_force_on_pair(pair, contact, contact.separation_direction))
             rows = solver.pair_rows[name]
             part = np.zeros((self.count, 2, solver.equilibrium_matrix.shape[2]))
             press = contact.pressure_tangent / solver.column_scale[:, rows]

@@ -135,7 +135,7 @@ class _HoldingEnds:
     def __init__(self, reactions: ReactionSolver, field: KinematicArrays):
         self.reactions, self.rows = reactions, ContactRows(reactions, field, at_rest=True)
         many = reactions.position_count
-        self.effort_row = reactions.balance.constraints.shape[1]
+        self.effort_row = reactions.equilibrium.inverse_rows(slice(reactions.row_count, reactions.row_count + 1))[:, 0]
         self.undetermined = ""
         without = reactions.solve()
         nothing = np.full(many, np.nan)
@@ -156,7 +156,7 @@ class _HoldingEnds:
     def _unit_senses(self) -> dict[str, Array]:
         """The senses of all pairs with the input at unit rate (n,): its row of the inverse is that motion."""
         reactions = self.reactions
-        motion = reactions.inverse[:, self.effort_row] * reactions.coordinate_scale
+        motion = self.effort_row * reactions.coordinate_scale
         rates = {name: self.rows.rates_along(name, motion) for name in self.rows.rubbing_pairs}
         most = np.abs(motion / reactions.coordinate_scale).max(axis=1, initial=0.0)
         units = {name: 1.0 if self.rows.is_length(name) else 1.0 / reactions.arm for name in rates}
@@ -178,8 +178,8 @@ class _HoldingEnds:
         """What the input supplies with contacts y (n, m)."""
         reactions = self.reactions
         off = np.einsum("nlm,nm->nl", actions, y) * reactions.coordinate_scale
-        force = np.einsum("nl,nl->n", reactions.inverse[:, self.effort_row], reactions.required_forces - off)
-        found: Array = force / reactions.column_scale[:, self.effort_row]
+        force = np.einsum("nl,nl->n", self.effort_row, reactions.required_forces - off)
+        found: Array = force / reactions.column_scale[:, reactions.row_count]
         return found
 
     def _widen(self, senses: dict[str, Array]) -> None:

@@ -48,7 +48,6 @@ class PairForces(Protocol):
     pair_rows: dict[str, slice]
     balance: VirtualWorkBalance
     column_scale: Array
-    equilibrium_matrix: Array
     arm: float
     position_count: int
 
@@ -95,7 +94,7 @@ def _strains(reactions: PairForces, forces: Array, compliance: Mapping[str, floa
 
 def _forced_by_misfits(reactions: PairForces, stiffness: Mapping[str, float]) -> Array:
     """The forces (n, forces, 1) with which pairs of a given stiffness resist their misfits."""
-    found = np.zeros((reactions.position_count, reactions.equilibrium_matrix.shape[2], 1))
+    found = np.zeros((*reactions.column_scale.shape, 1))
     for name, pair in reactions.pairs.items():
         rows = reactions.pair_rows[name]
         own = -stiffness[pair.entry_name()] * reactions.balance.openings[:, rows]
