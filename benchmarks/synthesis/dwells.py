@@ -85,7 +85,7 @@ def dwell_task(mechanism: planar.Mechanism, output: str) -> dict[str, Any]:
 def measure_function(mechanism: planar.Mechanism, output: str, time_limit: float = TIME) -> DwellResult:
     """A six-bar with this output, and its dwell measured round the turn of its file."""
     begun = process_time()
-    found = planar.synthesise(dwell_task(mechanism, output), many=3, time_limit=time_limit)
+    found = planar.synthesise(dwell_task(mechanism, output), many=3, timeout=time_limit)
     seconds = process_time() - begun
     name = f"{mechanism.name}, from {mechanism.inputs[0].pair} to {output}"
     if not found:

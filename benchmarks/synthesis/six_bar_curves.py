@@ -88,7 +88,7 @@ def measure(target: Shape, structure: str) -> ShapeResult:
 
 def _measure(target: Shape, structure: str, tasks: list[dict[str, Any]]) -> ShapeResult:
     begun = process_time()
-    searches = [planar.synthesise(task, many=1, time_limit=TIME / len(tasks)) for task in tasks]
+    searches = [planar.synthesise(task, many=1, timeout=TIME / len(tasks)) for task in tasks]
     seconds = process_time() - begun
     sound = [(found[0], task["wanted"][0]["point"]) for found, task in zip(searches, tasks, strict=True) if found]
     if not sound:

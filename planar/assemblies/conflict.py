@@ -14,6 +14,7 @@ from planar.assemblies.polynomial.completeness import Completeness
 from planar.document.first_argument import takes_mechanism
 from planar.foundation.errors import NoAnswer
 from planar.foundation.geometry import Vector
+from planar.foundation.time_limit import stops_in_time
 from planar.model.link_graph import pairs_farthest_first
 from planar.model.mechanism import Drive, Mechanism, replace_inputs
 from planar.model.pairs import MeasureKind, Pair
@@ -93,11 +94,18 @@ class Conflict:
 
 
 @takes_mechanism
-def conflict(mechanism: Mechanism, drives: Mapping[str, float] | Sequence[Drive] = ()) -> Conflict | None:
+@stops_in_time
+def conflict(
+    mechanism: Mechanism,
+    drives: Mapping[str, float] | Sequence[Drive] = (),
+    *,
+    timeout: float | None = None,  # noqa: ARG001 - of the decorator
+) -> Conflict | None:
     """The pairs and inputs that keep a mechanism from going together at its inputs; None where it goes together.
 
     None too where those in conflict join more than MOST moving links: they are too many to be told apart.
-    `drives` change inputs, as {pair: position} (rad or m). Raises NoAnswer where the inputs leave links free.
+    `drives` change inputs, as {pair: position} (rad or m). Raises NoAnswer where the inputs leave links free, and after
+    `timeout` s or a Ctrl-C, with the outcome "interrupted".
 
     >>> import planar
     >>> planar.conflict(planar.load("four-bar")) is None

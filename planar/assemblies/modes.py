@@ -22,6 +22,7 @@ from planar.foundation.errors import NoAnswer, Outcome
 from planar.foundation.geometry import Frame
 from planar.foundation.notebook_display import Displayable
 from planar.foundation.short_repr import short_repr
+from planar.foundation.time_limit import ComputationEnded, interrupted, time_is_over, time_limit
 from planar.model.link_shapes import LinkShape
 from planar.model.mechanism import Drive, Mechanism, NamedPoint, named_points, replace_inputs
 from planar.model.wording import count_phrase, join_all_names
@@ -39,11 +40,19 @@ MAX_PRINTED, MAX_PRINTED_POINTS = 5, 4
 
 
 @takes_mechanism
-def modes(mechanism: Mechanism, drives: Mapping[str, float] | Sequence[Drive] = (), *, certify: bool = True) -> Modes:
+def modes(
+    mechanism: Mechanism,
+    drives: Mapping[str, float] | Sequence[Drive] = (),
+    *,
+    certify: bool = True,
+    timeout: float | None = None,
+) -> Modes:
     """Every real assembly of a mechanism at its inputs; one beyond a stop is listed too, with the outcome "stop".
 
     `drives` change inputs, as {pair: position} (rad or m). With `certify` every assembly is proved by intervals, group
     after group: dimensions, inputs and the groups before it are taken as the floats they are. It needs python-flint.
+    With a `timeout` (s) the list is made at once, and ends after so long, or by a Ctrl-C, with the first assemblies and
+    the outcome "interrupted".
 
     Raises NoAnswer where inputs leave links free whatever the dimensions, BadInput where pairs may stay open.
 
@@ -59,7 +68,11 @@ def modes(mechanism: Mechanism, drives: Mapping[str, float] | Sequence[Drive] = 
     solver.refuse_misfit("the assemblies are not listed")
     moved = tuple(drives)
     solver = solver.with_inputs_of(replace_inputs(mechanism, moved)) if moved else solver
-    return Modes(solver, mechanism, moved, certify)
+    listed = Modes(solver, mechanism, moved, certify)
+    if timeout is not None:
+        with time_limit(timeout):
+            listed.read()
+    return listed
 
 
 class ModesBlock(NamedTuple):
@@ -88,6 +101,9 @@ class Modes(Displayable, Sequence["Mode"]):
     The list is made as it is read, one assembly after another. `len()` counts without listing: groups that do not
     depend on each other are multiplied, and groups that are joined to congruent positions are counted once. Where even
     that takes more than a few thousand groups, `total` is None, `len()` raises TypeError and `bound` is an upper bound.
+
+    A list that a time limit or a Ctrl-C ended has the first assemblies alone: its `outcome` is "interrupted", `reason`
+    says why, `total` is None and `len()` is how many are listed.
     """
 
     def __init__(self, solver: PositionSolver, mechanism: Mechanism, drives: tuple[Drive, ...], certify: bool):
@@ -99,9 +115,13 @@ class Modes(Displayable, Sequence["Mode"]):
         self._paths = self._tree.paths()
         self._ended = False
         self._listed: list[Mode] = []
+        self._interruption = ""
 
     def __repr__(self) -> str:
-        count = "more than are counted" if self.total is None else str(self.total)
+        if self._interruption:
+            count = f"{len(self._listed)} listed, {Outcome.INTERRUPTED}"
+        else:
+            count = "more than are counted" if self.total is None else str(self.total)
         return f"<Modes of {self.mechanism.name!r} {self._solver.describe_position()}: {count}>"
 
     def __str__(self) -> str:
@@ -155,6 +175,8 @@ class Modes(Displayable, Sequence["Mode"]):
         return self._list_up_to(1)
 
     def __len__(self) -> int:
+        if self._interruption:
+            return len(self._listed)
         if self.total is None:
             bound = "" if self.bound is None else f": up to {self.bound}"
             raise TypeError(f"there are more assemblies than are listed for their number{bound}; read them one by one")
@@ -163,7 +185,12 @@ class Modes(Displayable, Sequence["Mode"]):
     @property
     def total(self) -> int | None:
         """How many assemblies there are; None where that cannot be told by solving a few thousand groups."""
-        return len(self._listed) if self._ended else self._counted_total
+        if self._ended:
+            return len(self._listed)
+        try:
+            return None if self._interruption else self._counted_total
+        except ComputationEnded:
+            return None
 
     @cached_property
     def _counted_total(self) -> int | None:
@@ -189,8 +216,11 @@ class Modes(Displayable, Sequence["Mode"]):
 
         All are solved for that, the first few hundred certified; of more than a few thousand it is not known.
         """
-        if self._ended or self._tree.count(MAX_CERTIFIED_FOR_CLAIM) is not None:
-            return self._tree.complete
+        try:
+            if not self._interruption and (self._ended or self._tree.count(MAX_CERTIFIED_FOR_CLAIM) is not None):
+                return self._tree.complete
+        except ComputationEnded:
+            return Completeness.NOT
         return Completeness.NOT if self.total is None else self._uncertified_tree.complete
 
     @property
@@ -227,6 +257,8 @@ class Modes(Displayable, Sequence["Mode"]):
         for number, group in enumerate(self.groups, start=1):
             how.setdefault(group.method, []).append(number)
         told = [f"group{'s' * (len(of) > 1)} {_number_ranges(of)}: {method}" for method, of in how.items()]
+        if self._interruption:
+            told.insert(0, f"not all assemblies are listed, as {self._interruption}")
         if any(group.curve for group in self.groups):
             told.append(
                 "some links can move while the inputs are held: of each curve of assemblies that was found one place "
@@ -238,13 +270,28 @@ class Modes(Displayable, Sequence["Mode"]):
             told.append('nothing is certified: that needs python-flint (pip install "planar-linkages[modes]")')
         return tuple(told)
 
-    @cached_property
+    @property
+    def outcome(self) -> Outcome:
+        """How the list ended: solved, interrupted by a time limit or a Ctrl-C, or that there is no assembly."""
+        is_found = bool(self)
+        if self._interruption:
+            return Outcome.INTERRUPTED
+        return Outcome.SOLVED if is_found else self.refusal().outcome
+
+    @property
     def reason(self) -> str:
-        """Why there is no assembly; empty where there is one."""
-        return "" if self else self.refusal().reason
+        """Why there is no assembly, or why the list ended early; empty where neither is so."""
+        is_found = bool(self)
+        return self._interruption or ("" if is_found else self._refusal_reason)
+
+    @cached_property
+    def _refusal_reason(self) -> str:
+        return self.refusal().reason
 
     def refusal(self) -> NoAnswer:
         """The same to be raised, where there is no assembly."""
+        if self._interruption:
+            return interrupted(self._interruption, "before an assembly was reached")
         moving = () if self else self._tree.moving_links()
         if moving:
             return NoAnswer(
@@ -264,9 +311,17 @@ class Modes(Displayable, Sequence["Mode"]):
         """Every named point, and after which of the groups it stands (from 0; -1 where the inputs alone say so)."""
         return {name: level for name, (level, _, _) in self._solver.structure.point_locations.first_link.items()}
 
-    @cached_property
+    @property
     def nearest(self) -> Mode | None:
-        """The assembly that the sketch means, or to which it leads where inputs are moved; None where it is none."""
+        """The assembly that the sketch means, or to which it leads where inputs are moved; None where it is none, or
+        was not reached in time."""
+        try:
+            return self._nearest
+        except ComputationEnded:
+            return None
+
+    @cached_property
+    def _nearest(self) -> Mode | None:
         try:
             if self._drives:
                 state = solve(self._source_mechanism, self._drives)
@@ -281,11 +336,23 @@ class Modes(Displayable, Sequence["Mode"]):
         number = self._uncertified_tree.count_before(path, MAX_SOLVED_FOR_COUNT)
         return self._mode(None if number is None else number + 1, path)
 
+    def read(self) -> None:
+        """List all assemblies, as far as there is time."""
+        while self._list_up_to(len(self._listed) + 1):
+            pass
+
     def _list_up_to(self, number: int) -> bool:
         """Whether there are so many assemblies; they are listed up to there."""
         while len(self._listed) < number:
+            if not self._ended and not self._interruption:
+                self._interruption = time_is_over()
+            if self._interruption:
+                return False
             try:
                 path = next(self._paths, None)
+            except ComputationEnded:
+                self._interruption = time_is_over()
+                return False
             except BaseException:  # a list that was interrupted has not ended: it is taken up again where it was
                 self._paths = islice(self._tree.paths(), len(self._listed), None)
                 raise

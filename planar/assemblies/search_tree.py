@@ -14,6 +14,7 @@ from planar.equations.symbolic_equations import Block, slice_length
 from planar.foundation.angles import distances
 from planar.foundation.arrays import Array
 from planar.foundation.generic_numbers import generic_numbers
+from planar.foundation.time_limit import stop_if_over
 from planar.model.pairs import MeasureKind
 from planar.solving.assembly.block_assemblies import MEETING_COSINE_SQUARED, block_dependencies
 from planar.solving.newton import CLOSED_TOLERANCE, repeat_step
@@ -124,6 +125,7 @@ class AssemblyTree:
         key = z[self._dependencies[index]].tobytes()
         known = self._solved[index]
         if key not in known:
+            stop_if_over(f"before group {index + 1} of {len(self.stages)} was assembled")
             known[key] = _solve_block(self.setup, self.stages[index], z, self.certify)
         return known[key]
 

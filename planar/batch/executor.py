@@ -6,10 +6,12 @@ import os
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, ThreadPoolExecutor, wait
 from contextlib import suppress
+from contextvars import copy_context
 from numbers import Integral
 from typing import TypeVar
 
 from planar.foundation.errors import BadInput
+from planar.foundation.time_limit import within_time
 
 Task = TypeVar("Task")
 Result = TypeVar("Result")
@@ -63,7 +65,7 @@ def run_in_threads(
                 with suppress(StopIteration):
                     while len(running) < TASKS_PER_WORKER * threads:
                         k, task = next(waiting)
-                        running[pool.submit(function, k, task)] = k
+                        running[pool.submit(copy_context().run, function, k, task)] = k
                 if not running:
                     return
                 for future in wait(running, return_when=FIRST_COMPLETED).done:
@@ -80,10 +82,13 @@ def run_tasks(
     tasks: Iterable[tuple[int, Task]],
     run_here: Callable[[int, Task], Result],
 ) -> Iterator[tuple[int, Result]]:
-    """The results of numbered tasks as they come: by an executor if there is one, else in threads."""
+    """The results of numbered tasks as they come: by an executor if there is one, else in threads.
+
+    Where time is over no further task is begun.
+    """
     if executor is None:
-        return run_in_threads(threads, tasks, run_here)
-    return run_in_executor(executor, run_there, tasks, run_here)
+        return run_in_threads(threads, within_time(tasks), run_here)
+    return run_in_executor(executor, run_there, within_time(tasks), run_here)
 
 
 def run_in_executor(

@@ -9,6 +9,7 @@ import numpy as np
 
 from planar.foundation.errors import BadInput, NoAnswer, Outcome
 from planar.foundation.jets import value_and_rates
+from planar.foundation.time_limit import time_is_over
 from planar.model.link_shapes import PointName, PointPlacementError
 from planar.model.mechanism import Mechanism
 from planar.results.motion import Motion
@@ -109,6 +110,10 @@ def _run_on_grid(
 ) -> tuple[GridMotion, Array | None]:
     """A motion, and where its rows are; which of these are on a grid, or all where there is none."""
     status = np.zeros(steps + 1, dtype=np.int8)
+    reason = time_is_over()
+    if reason:
+        status[:] = OUTCOMES.index(Outcome.INTERRUPTED)
+        return GridMotion(None, 0, status, reason), None
     try:
         motion, position = run()
     except NoAnswer as problem:

@@ -38,6 +38,7 @@ from planar.batch.stores.store import BlockStore, SweepPlan, open_store
 from planar.document.first_argument import takes_mechanism
 from planar.dynamics.load_validation import check_loads
 from planar.foundation.errors import BadInput
+from planar.foundation.time_limit import report_progress, returns_part_in_time, time_is_over
 from planar.model.link_shapes import PointName
 from planar.model.mechanism import LARGEST_COUNTED_ANGLE, Mechanism
 from planar.model.run_arguments import check_number, check_steps
@@ -85,6 +86,7 @@ def sweep(  # many: the public signature
     dtype: DTypeLike = "float64",
     reduce: None = None,
     progress: Callable[[int, int], object] | None = None,
+    timeout: float | None = None,
 ) -> Sweep: ...
 @overload
 @takes_mechanism
@@ -114,8 +116,10 @@ def sweep(  # many: the public signature
     dtype: DTypeLike = "float64",
     reduce: Mapping[str, str | Reduction[Sweep]],
     progress: Callable[[int, int], object] | None = None,
+    timeout: float | None = None,
 ) -> ReducedSweep: ...
 @takes_mechanism
+@returns_part_in_time
 def sweep(  # many: the public signature; # long: its docstring
     mechanism: Mechanism,
     designs: Mapping[str, Any],
@@ -142,6 +146,7 @@ def sweep(  # many: the public signature; # long: its docstring
     dtype: DTypeLike = "float64",
     reduce: Mapping[str, str | Reduction[Sweep]] | None = None,
     progress: Callable[[int, int], object] | None = None,
+    timeout: float | None = None,  # noqa: ARG001 - of the decorator
 ) -> Sweep | ReducedSweep:
     """The motions of many designs of one mechanism, which differ in any numbers of its file.
 
@@ -185,6 +190,9 @@ def sweep(  # many: the public signature; # long: its docstring
     of any other result, as `BC.angle_extremes` or `A.effort_extremes`. Or they are functions that take a `Sweep` of a
     block's designs and give an array with an entry for each. Only what measures need is then solved, and the result is
     a `ReducedSweep`; not a number stands where a measure has nothing to go by.
+
+    After `timeout` s, or a Ctrl-C, designs that are not solved have NaN and the status "interrupted"; where a store has
+    the others NoAnswer is raised, and the same sweep goes on.
 
     Raises BadInput for a name that is not there, a range or a store that cannot be; WriteFailure, which is one, where a
     store finds no more room.
@@ -230,6 +238,7 @@ def sweep(  # many: the public signature; # long: its docstring
     plan = SweepPlan(whole, size, results, listed, duration)
     into = open_store(store, plan) if reductions is None else ReductionStore(plan)
     for done in _solve_blocks(into, threads, executor, reductions):
+        report_progress(done, many)
         if progress is not None:
             progress(done, many)
     found: Sweep | ReducedSweep = into.result()
@@ -243,7 +252,8 @@ def _solve_blocks(
     plan = into.plan
     parts = list(split_into_blocks(plan.design_count, into.block_size))
     whole = plan.all_designs
-    ready = sum(part.stop - part.start for k, part in enumerate(parts) if k in into.finished)
+    missing = {k: part for k, part in enumerate(parts) if k not in into.finished}
+    ready = plan.design_count - sum(part.stop - part.start for part in missing.values())
     if ready:
         yield ready
 
@@ -257,12 +267,17 @@ def _solve_blocks(
             return reduce_block(block, reductions.functions)
         return solve_result_block(block, into.output_array(parts[number]))
 
-    tasks = ((k, task(part)) for k, part in enumerate(parts) if k not in into.finished)
+    tasks = ((k, task(part)) for k, part in [*missing.items()])
     solve = solve_result_block if reductions is None else partial(reduce_block, reductions=reductions.functions)
     for k, done in run_tasks(min(threads, len(parts)), executor, solve, tasks, solve_here):
+        if not into.takes(done):
+            continue
         into.write_block(k, parts[k], done)
+        missing.pop(k)
         ready += parts[k].stop - parts[k].start
         yield ready
+    if missing:
+        into.leave_out(missing, time_is_over())
 
 
 def check_range(mechanism: Mechanism, steps: object, start: object, stop: object, pair: str | None) -> Mechanism:

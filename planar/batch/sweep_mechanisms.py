@@ -23,6 +23,7 @@ from planar.batch.mechanisms.parts import (
     PART_SIZE,
     PartRuns,
     check_inputs,
+    end_message,
     find_endings,
     part_messages,
     read_mechanisms,
@@ -36,6 +37,7 @@ from planar.batch.reductions.reduced_mechanisms import sweep_reduced
 from planar.batch.reductions.reduced_sweep import ReducedSweep, Reduction, result_type
 from planar.document.first_argument import MechanismSource
 from planar.foundation.errors import BadInput, Outcome
+from planar.foundation.time_limit import returns_part_in_time, time_is_over
 from planar.foundation.turns import take_turn
 from planar.model.mechanism import Mechanism, named_points, relative_motions, running_input_index
 from planar.model.pairs import MeasureKind as Measure
@@ -83,6 +85,7 @@ def sweep_each(  # many: the public signature
     dtype: DTypeLike = "float64",
     reduce: None = None,
     progress: Callable[[int, int], object] | None = None,
+    timeout: float | None = None,
 ) -> Each: ...
 @overload
 def sweep_each(  # many: the public signature
@@ -98,7 +101,9 @@ def sweep_each(  # many: the public signature
     dtype: DTypeLike = "float64",
     reduce: Mapping[str, str | Reduction[Each]],
     progress: Callable[[int, int], object] | None = None,
+    timeout: float | None = None,
 ) -> ReducedSweep: ...
+@returns_part_in_time
 def sweep_each(  # many: the public signature; # long: its docstring
     mechanisms: Iterable[MechanismSource | PinnedLinkages],
     steps: int = 200,
@@ -112,6 +117,7 @@ def sweep_each(  # many: the public signature; # long: its docstring
     dtype: DTypeLike = "float64",
     reduce: Mapping[str, str | Reduction[Each]] | None = None,
     progress: Callable[[int, int], object] | None = None,
+    timeout: float | None = None,  # noqa: ARG001 - of the decorator
 ) -> Each | ReducedSweep:
     """The motions of mechanisms of any structure, each as `planar.sweep` would have it as a single design.
 
@@ -142,6 +148,8 @@ def sweep_each(  # many: the public signature; # long: its docstring
     only so many are taken at a time as are being solved, and may hold `planar.pinned_linkages` among the others; the
     result is a `ReducedSweep`.
 
+    After `timeout` s, or a Ctrl-C, the result has the first mechanisms alone, and its `outcome` is "interrupted".
+
     Raises BadInput for what is no mechanism, a point that none has, an input that is not there, impossible steps.
 
     >>> import planar
@@ -159,10 +167,14 @@ def sweep_each(  # many: the public signature; # long: its docstring
     if isinstance(mechanisms, PinnedLinkages) and pair is None:
         parts += _sweep_linkages(mechanisms, wanted, runs)
     else:
-        parts += _sweep_list(read_mechanisms(mechanisms), wanted, runs)
+        mechanisms = read_mechanisms(mechanisms)
+        parts += _sweep_list(mechanisms, wanted, runs)
     general = [each for part in parts for each in part.others if each.general]
-    said = part_messages([find_endings(part) for part in parts], sum(map(len, parts)), len(general))
-    return Each(tuple(parts), sum(int(np.sum(each.status == 0)) for each in general), len(general), said)
+    done = sum(map(len, parts))
+    said = part_messages([find_endings(part) for part in parts], done, len(general))
+    reason = time_is_over() if done < len(mechanisms) else ""
+    positions = sum(int(np.sum(each.status == 0)) for each in general)
+    return Each(tuple(parts), positions, len(general), (*end_message(done, reason), *said), reason=reason)
 
 
 def _sweep_linkages(linkages: PinnedLinkages, request: SweepRequest, runs: PartRuns) -> Iterator[SweptPart]:
@@ -193,7 +205,7 @@ def _sweep_linkages(linkages: PinnedLinkages, request: SweepRequest, runs: PartR
     if values is None:
         yield from found
     elif found:
-        yield join_parts(found, values)
+        yield join_parts(found, values[: told.first[sum(map(len, found))]])
 
 
 def _sweep_list(mechanisms: list[Mechanism], request: SweepRequest, runs: PartRuns) -> Iterator[SweptPart]:
@@ -210,7 +222,7 @@ def _sweep_list(mechanisms: list[Mechanism], request: SweepRequest, runs: PartRu
         runs.tell(found, len(mechanisms))
         yield done
     for name in request.points or ():
-        if name in missing and mechanisms:
+        if name in missing and mechanisms and found == len(mechanisms):
             raise BadInput("points", f"no mechanism has a point {name!r:.60}")
 
 

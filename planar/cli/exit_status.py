@@ -15,13 +15,17 @@ from typing import Any, NoReturn, TextIO
 
 import click
 
-from planar.cli.streams import allow_every_letter, print_json
-from planar.foundation.errors import BadInput, MissingGlyphs, NoAnswer, Unknown, WriteFailure, join_names
+from planar.cli.streams import allow_every_letter, ended_early, is_ended_by_user, print_json
+from planar.foundation.errors import BadInput, MissingGlyphs, NoAnswer, Outcome, Unknown, WriteFailure, join_names
 
 NO_ANSWER, BAD_INPUT, NOT_WRITTEN, INTERRUPTED = 1, 2, 3, 130
 """Exit statuses; 0 is done, 130 what shells give for an interrupt from the keyboard."""
 CLOSED_PIPE_STATUS = 128 + 13
 """What a shell tells of programs that the closing of their pipe ends (SIGPIPE is signal 13), as by `| head`."""
+
+
+FOUND_BY_THEN = "what was found by then is reported; give more time for all of it"
+"""Of a result that a time limit, or Ctrl-C, ended early."""
 
 
 COMMAND_SYNONYMS = {
@@ -157,7 +161,17 @@ class CommandGroup(click.Group):
 
     def invoke(self, ctx: click.Context) -> Any:
         with _exit_with_status(), _report_missing_glyphs():
-            return super().invoke(ctx)
+            result = super().invoke(ctx)
+        reason = ended_early()
+        if reason:
+            _print_error(f"{Outcome.INTERRUPTED.value}: {reason}; {FOUND_BY_THEN}")
+            sys.exit(no_answer_status(Outcome.INTERRUPTED))
+        return result
+
+
+def no_answer_status(outcome: Outcome) -> int:
+    """The exit status of a result with an outcome other than solved: of one that Ctrl-C ended that of an interrupt."""
+    return INTERRUPTED if outcome is Outcome.INTERRUPTED and is_ended_by_user() else NO_ANSWER
 
 
 @contextmanager
@@ -171,7 +185,8 @@ def _exit_with_status() -> Iterator[None]:
     except (BadInput, Unknown) as problem:
         _exit_refused(str(problem), "bad input", str(problem), BAD_INPUT)
     except NoAnswer as problem:
-        _exit_refused(str(problem), problem.outcome.value, problem.reason, NO_ANSWER, problem.more)
+        status = no_answer_status(problem.outcome)
+        _exit_refused(str(problem), problem.outcome.value, problem.reason, status, problem.more)
     except KeyboardInterrupt as stopped:
         told = "; ".join(["stopped by the user before it was done", *map(str, stopped.args)])
         _exit_refused(f"interrupted: {told}", "interrupted", told, INTERRUPTED)

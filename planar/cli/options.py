@@ -6,17 +6,18 @@ import errno
 import os
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import AbstractContextManager, contextmanager, nullcontext
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import replace
 from pathlib import Path
+from threading import Timer
 from typing import TYPE_CHECKING, Any
 
 import click
 from click.core import ParameterSource
 
 from planar import __version__
-from planar.cli.exit_status import NO_ANSWER, CommandGroup
-from planar.cli.streams import print_json
+from planar.cli.exit_status import CommandGroup, no_answer_status
+from planar.cli.streams import TIME_LIMIT, print_json
 from planar.foundation.errors import BadInput, Outcome
 from planar.foundation.safe_files import is_existing
 
@@ -78,6 +79,10 @@ mode_option = click.option(
 
 SETTINGS = "planar.settings"
 """Where a command's context keeps what `--set` says."""
+
+
+PROGRESS_DELAY = 1.0
+"""s; what takes less shows no bar."""
 
 
 FRAME_NUMBER = "planar.frame_number"
@@ -221,22 +226,42 @@ steps_option = click.option(
 )
 
 
-timeout_option = click.option(
-    "--timeout", metavar="TIME", help="End after so long (5 s, 2 min), with what was found by then, as Ctrl-C does."
-)
+def timeout_option(command: Any) -> Any:
+    """The option that limits the time of a computation; `limited_time` follows it."""
+
+    def keep(context: click.Context, _: click.Parameter, timeout: str | None) -> None:
+        if timeout is None:
+            return
+        from planar.document import read_time
+        from planar.foundation.time_limit import TimeLimit
+
+        seconds = read_time(timeout, "--timeout")
+        if not seconds > 0.0:
+            raise BadInput("--timeout", f"a time above zero is wanted, not {timeout!r:.40}")
+        context.meta[TIME_LIMIT] = TimeLimit(seconds)
+
+    return click.option(
+        "--timeout",
+        metavar="TIME",
+        expose_value=False,
+        callback=keep,
+        help="End after so long (5 s, 2 min), with what was found by then, as Ctrl-C does.",
+    )(command)
 
 
 @contextmanager
-def limited_time(timeout: str | None) -> Iterator[None]:
-    """A context that ends what is computed in it after the time of `--timeout`. Raises BadInput."""
-    from planar.document import read_time
-    from planar.foundation.time_limit import time_limit
+def limited_time(description: str, returns_part: bool = False) -> Iterator[ProgressBar | None]:
+    """A context that ends what is computed in it after the time of `--timeout`, or by a Ctrl-C.
 
-    seconds = None if timeout is None else read_time(timeout, "--timeout")
-    if seconds is not None and not seconds > 0.0:
-        raise BadInput("--timeout", f"a time above zero is wanted, not {timeout!r:.40}")
-    with time_limit(seconds):
-        yield
+    Raises NoAnswer where something ended early, unless the context `returns_part`. On a terminal a bar shows how much
+    is done. A command that was ended so says it at its end, see `CommandGroup`.
+    """
+    from planar.foundation.time_limit import TimeLimit, limited_by
+
+    limit = click.get_current_context().meta.setdefault(TIME_LIMIT, TimeLimit(None))
+    with show_progress(description, transient=True) as bar, limited_by(limit, returns_part):
+        limit.progress = bar
+        yield bar
 
 
 def output_option(help: str, required: bool = False) -> Callable[[Any], Any]:  # noqa: A002
@@ -262,27 +287,48 @@ def refuse_options(names: Iterable[str], reason: str) -> None:
             raise BadInput(max(option.opts, key=len), reason)
 
 
-def show_status(description: str) -> AbstractContextManager[Any]:
-    """A sign on a terminal that work is under way."""
-    if not sys.stderr.isatty():
-        return nullcontext()
-    from rich.console import Console
+class ProgressBar:
+    """A bar of rich on the terminal: what is done, and how much of it."""
 
-    return Console(stderr=True, markup=False).status(description)
+    def __init__(self, description: str, transient: bool):
+        from rich.console import Console
+        from rich.progress import Progress
+
+        self.bar = Progress(console=Console(stderr=True, markup=False), transient=transient)
+        self.task = self.bar.add_task(description.replace("[", r"\["), total=None)
+
+    def __call__(self, done: float, total: float) -> None:
+        self.bar.update(self.task, completed=done, total=total)
+
+    def describe(self, description: str) -> None:
+        """Say what is being done."""
+        self.bar.update(self.task, description=description.replace("[", r"\["))
+
+
+def show_status(description: str) -> AbstractContextManager[ProgressBar | None]:
+    """A sign on a terminal that work is under way."""
+    return show_progress(description, transient=True)
 
 
 @contextmanager
-def show_progress(description: str, transient: bool = False) -> Iterator[Callable[[float, float], None] | None]:
-    """A bar on a terminal that shows how much of a long work is done; it may be gone when that is."""
+def show_progress(description: str, transient: bool = False) -> Iterator[ProgressBar | None]:
+    """A bar on a terminal that shows how much of a long work is done; it may be gone when that is.
+
+    It comes after `PROGRESS_DELAY`; there is none where stderr is no terminal.
+    """
     if not sys.stderr.isatty():
         yield None
         return
-    from rich.console import Console
-    from rich.progress import Progress
-
-    with Progress(console=Console(stderr=True, markup=False), transient=transient) as bar:
-        task = bar.add_task(description.replace("[", r"\["), total=None)
-        yield lambda done, total: bar.update(task, completed=done, total=total)
+    bar = ProgressBar(description, transient)
+    timer = Timer(PROGRESS_DELAY, bar.bar.start)
+    timer.daemon = True
+    timer.start()
+    try:
+        yield bar
+    finally:
+        timer.cancel()
+        timer.join()
+        bar.bar.stop()
 
 
 def parse_drives(mechanism: Mechanism, texts: tuple[str, ...]) -> tuple[Drive, ...]:
@@ -378,7 +424,7 @@ def report_motion(
             print_or_write(each, None)
     if motion.outcome is not Outcome.SOLVED:
         click.echo(f"planar: {motion.outcome.value}: {motion.reason}", err=True)
-        sys.exit(NO_ANSWER)
+        sys.exit(no_answer_status(motion.outcome))
 
 
 def _parse_position(mechanism: Mechanism, pair: str | None, text: str | None, option: str) -> float | None:

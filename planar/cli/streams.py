@@ -10,6 +10,10 @@ from typing import Any
 
 import click
 
+from planar.foundation.errors import Outcome
+
+TIME_LIMIT = "planar.time_limit"
+"""Where a command's context keeps the time limit of what it computes."""
 ERROR_HANDLER = "planar.plain_letters"
 PLAIN_LETTERS = {
     "α": "alpha",
@@ -56,9 +60,31 @@ def allow_every_letter() -> None:
 
 
 def print_json(value: Any, indent: int | None = None, allow_nan: bool = False) -> None:
-    """Print a JSON value; in other alphabets than that of Unicode in plain letters alone, which programs read alike."""
+    """Print a JSON value; in other alphabets than that of Unicode in plain letters alone, which programs read alike.
+
+    Of a computation that ended early it says so: `outcome` and `reason` are added to an object, a list stands in one.
+    """
+    reason = ended_early()
+    if reason:
+        value = dict(value) if isinstance(value, dict) else {"found": value}
+        if value.get("outcome") != Outcome.INTERRUPTED.value or not value.get("reason"):
+            value |= {"outcome": Outcome.INTERRUPTED.value, "reason": reason}
     plain = not (getattr(sys.stdout, "encoding", None) or "").lower().startswith("utf")
     click.echo(json.dumps(value, ensure_ascii=plain, indent=indent, allow_nan=allow_nan))
+
+
+def ended_early() -> str:
+    """Why what the command computes ended before it was done; empty where it did not."""
+    context = click.get_current_context(silent=True)
+    limit = None if context is None else context.meta.get(TIME_LIMIT)
+    return "" if limit is None else limit.ended_by
+
+
+def is_ended_by_user() -> bool:
+    """Whether it was Ctrl-C that ended it."""
+    context = click.get_current_context(silent=True)
+    limit = None if context is None else context.meta.get(TIME_LIMIT)
+    return limit is not None and limit.is_interrupted
 
 
 def _replace_letters(problem: UnicodeError) -> tuple[str, int]:

@@ -26,7 +26,7 @@ from planar.equations.mechanism_numbers import mechanism_size
 from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput, NoAnswer, Outcome
 from planar.foundation.short_repr import short_repr
-from planar.foundation.time_limit import time_is_over, time_limit
+from planar.foundation.time_limit import report_progress, returns_part_in_time, time_is_over
 from planar.model.mechanism import Input, Mechanism
 from planar.model.run_arguments import check_steps
 from planar.model.wording import join_all_names
@@ -97,6 +97,7 @@ class Simulation:
 
 
 @takes_mechanism
+@returns_part_in_time
 def simulate(
     mechanism: Mechanism,
     duration: float,
@@ -105,7 +106,7 @@ def simulate(
     *,
     moving: bool = False,
     tick: ProgressCallback | None = None,
-    timeout: float | None = None,
+    timeout: float | None = None,  # noqa: ARG001 - of the decorator
 ) -> Simulation:
     """The motion of a mechanism that is let go at the file's position, for a duration (s), in so many steps.
 
@@ -153,8 +154,7 @@ def simulate(
         if moving
         else replace(mechanism, inputs=tuple(_initial_input(each, kept) for each in mechanism.inputs))
     )
-    with time_limit(timeout):
-        return _SimulationRun(solve(started), kept, duration, steps).run(tick)
+    return _SimulationRun(solve(started), kept, duration, steps).run(tick)
 
 
 def _initial_input(given: Input, kept: Sequence[str]) -> Input:
@@ -289,9 +289,10 @@ class _SimulationRun:
                 solver.y, solver.f = y, self._state_rate(solver.t, y)
             if firm > CHANGE_POINT_REGULARITY:
                 good = [*good[-REMEMBERED_STEPS:], (at, y)]
+            report_progress(at, last)
             if tick is not None:
                 tick(at / last)
-            if time_is_over() and solver.status == "running":
+            if solver.status == "running" and time_is_over():
                 raise NoAnswer(Outcome.INTERRUPTED, time_is_over())
         return ""
 

@@ -10,6 +10,7 @@ import numpy as np
 from planar.foundation.arrays import Array
 from planar.foundation.geometry import Frame, Vector
 from planar.foundation.jets import value_and_rates
+from planar.foundation.time_limit import MORE_TIME, stop_if_over
 from planar.manufacture.plates import Place, convex_hull
 
 Rows = Array
@@ -47,6 +48,7 @@ def keep_apart(one: Body, other: Body, room: float, places: PlacesOf) -> bool:
     """
     still = np.array(other.corners, dtype=float)[None]
     for level in range(LEVELS):
+        stop_if_over("while the clearances of plates and pins were checked", f"{MORE_TIME}, or ask for fewer steps")
         rows = _seen_from(one, other, places, level)
         blocks = np.array_split(rows, -(-len(rows) // BLOCK))
         ways = np.concatenate([ways_apart(block, still) for block in blocks])

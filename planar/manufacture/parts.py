@@ -29,6 +29,7 @@ from planar.formats.drawn.drawn_mechanism import drawn_mechanism
 from planar.foundation.errors import BadInput, NoAnswer, join_names
 from planar.foundation.geometry import Frame
 from planar.foundation.safe_files import save_file
+from planar.foundation.time_limit import stops_in_time
 from planar.foundation.units import parse_unit
 from planar.manufacture.cam_plates import CamDrive, cam_drives, face_reach
 from planar.manufacture.clearances import places_over
@@ -159,6 +160,7 @@ def _scale_text(scale: float) -> str:
 
 
 @takes_mechanism
+@stops_in_time
 def parts(  # many: sizes of what is cut
     mechanism: Mechanism,
     *,
@@ -174,6 +176,7 @@ def parts(  # many: sizes of what is cut
     start: float | None = None,
     stop: float | None = None,
     pair: str | None = None,
+    timeout: float | None = None,  # noqa: ARG001 - of the decorator
 ) -> Parts:
     """The parts of a mechanism: a plate of this `thickness` for each link, gears, pins, spacers, sheets.
 
@@ -186,7 +189,8 @@ def parts(  # many: sizes of what is cut
     The run is that of `planar.cycle` from `start` to `stop` of the input at `pair`. Layers are found by the distances
     of all plates and pins at so many steps of it, and at up to 64 times as many where those leave it open whether
     something is met between positions. Raises BadInput for a pair that is none of plates, for a hole at no point, and
-    where a plate cannot be; NoAnswer where the mechanism does not run.
+    where a plate cannot be; NoAnswer where the mechanism does not run, and after `timeout` s or a Ctrl-C, with the
+    outcome "interrupted".
 
     >>> import planar
     >>> planar.parts("four-bar", thickness=0.003)

@@ -14,6 +14,7 @@ from planar.document.files import read_asset
 from planar.drawing.scheme.scene import plain_frames
 from planar.foundation.errors import BadInput, NoAnswer
 from planar.foundation.safe_files import make_folder, save_file
+from planar.foundation.time_limit import report_progress, within_time
 from planar.model.mechanism import Mechanism
 from planar.pages.data.dimension_numbers import DimensionNumbers
 from planar.pages.data.scheme_data import frames_of_rows, scheme_data
@@ -50,12 +51,13 @@ def write_gallery(
 ) -> tuple[Path, list[tuple[str, NoAnswer]]]:
     """Write a page for each mechanism under its name, and the index; gives the index's path.
 
-    Mechanisms that have no position to start from are left out and given back with the reason. `progress` is told
+    Mechanisms that have no position to start from are left out and given back with the reason; where time is over those
+    done by then alone are written. `progress` is told
     after each how many are done, of how many. Raises BadInput where the folder or a file cannot be written.
     """
     make_folder(folder)
     taken, shown, refused = {"index"}, [], []
-    for done, (name, mechanism) in enumerate(models, start=1):
+    for done, (name, mechanism) in enumerate(within_time(models), start=1):
         try:
             drawn = solved_mechanism(mechanism).completed_mechanism
             text, moving = page(drawn, back=PageLink("index.html", "All mechanisms")), small_picture_data(drawn)
@@ -63,6 +65,7 @@ def write_gallery(
             refused.append((name, problem))
             continue
         finally:
+            report_progress(done, len(models))
             if progress is not None:
                 progress(done, len(models))
         file = _unused_name(name, taken)

@@ -10,7 +10,7 @@ import numpy as np
 
 from planar.document.first_argument import takes_mechanism
 from planar.foundation.errors import BadInput, NoAnswer
-from planar.foundation.time_limit import time_limit
+from planar.foundation.time_limit import report_progress, returns_part_in_time
 from planar.model.mechanism import LARGEST_COUNTED_ANGLE, Mechanism
 from planar.model.run_arguments import check_number, check_steps
 from planar.model.wording import quote_names
@@ -26,6 +26,7 @@ MAX_DURATION = 1e6
 
 
 @takes_mechanism
+@returns_part_in_time
 # many: what callers may choose of a run; # long: the docstring
 def cycle(
     mechanism: Mechanism,
@@ -40,7 +41,7 @@ def cycle(
     duration: float | None = None,
     jerk: bool = False,
     progress: Progress | None = None,
-    timeout: float | None = None,
+    timeout: float | None = None,  # noqa: ARG001 - of the decorator
 ) -> Motion:
     """The motion of the assembly nearest to the sketch while one input runs from `start` to `stop` (rad or m).
 
@@ -93,31 +94,26 @@ def cycle(
     if is_timed:
         if any(ranged):
             raise BadInput("duration", "a run in time has no range of one input; give the one or the other")
-        return _explained_run(
-            known, pair, lambda: TimeRun(mechanism, branches, jerk).run(int(steps), duration), timeout
-        )
+        return _explained_run(known, pair, lambda: TimeRun(mechanism, branches, jerk).run(int(steps), duration))
     if circuit and (stop is not None or there_and_back):
         raise BadInput("circuit", "a circuit goes all round; it has no end to stop at, and comes back by itself")
 
     def run() -> Motion:
-        runner = RangeRun(mechanism, pair, branches, jerk, progress)
+        runner = RangeRun(mechanism, pair, branches, jerk, progress or report_progress)
         if circuit:
             return runner.run_circuit(int(steps), start)
         return runner.run_range(int(steps), start, stop, there_and_back)
 
-    return _explained_run(known, pair, run, timeout)
+    return _explained_run(known, pair, run)
 
 
-def _explained_run(
-    known: SolvedMechanism, pair: str | None, run: Callable[[], Motion], timeout: float | None
-) -> Motion:
-    """A run of `timeout` s at most; where no input can run from the position, `motion_refusal` says why.
+def _explained_run(known: SolvedMechanism, pair: str | None, run: Callable[[], Motion]) -> Motion:
+    """A run; where no input can run from the position, `motion_refusal` says why.
 
     Of a run in which every input stands still a remark says so.
     """
     try:
-        with time_limit(timeout):
-            motion = run()
+        motion = run()
     except NoAnswer as problem:
         raise known.motion_refusal(pair) or problem from None
     positions = [given.position for given in motion.inputs.values()]

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from functools import lru_cache
 from typing import NamedTuple
 
+from planar.foundation.time_limit import stop_if_over
 from planar.structures.canonical_form import Counts, Numbering, greatest_numberings
 
 
@@ -60,6 +61,7 @@ def contracted_graphs(loops: int, fractionated: bool) -> tuple[ContractedGraph, 
     while level:
         smaller: dict[tuple[int, ...], ContractedGraph] = {}
         for each in level.values():
+            stop_if_over(f"after {len(found)} contracted graphs")
             for drawn in _merge_each_edge(each, fractionated):
                 graph = canonical_graph(drawn)
                 smaller[(*graph.degrees, *graph.word)] = graph

@@ -12,6 +12,7 @@ import numpy as np
 from planar.batch.executor import run_tasks, thread_count
 from planar.batch.stores.store import is_folder_begun, reporting_write_errors
 from planar.foundation.errors import BadInput
+from planar.foundation.time_limit import report_progress, stop_if_over, stops_in_time
 from planar.model.mechanism import Mechanism
 from planar.model.pin_linkage import pinned
 from planar.model.run_arguments import check_steps, check_whole_number
@@ -48,6 +49,7 @@ class DataSetPlan(NamedTuple):
         return min(BLOCK_SIZE, self.linkages - block * BLOCK_SIZE)
 
 
+@stops_in_time
 def generate(  # many: the public signature
     store: str | Path,
     links: int = 8,
@@ -58,6 +60,7 @@ def generate(  # many: the public signature
     workers: int | None = None,
     executor: Executor | None = None,
     progress: Callable[[int, int], object] | None = None,
+    timeout: float | None = None,  # noqa: ARG001 - of the decorator
 ) -> LinkageSet:
     """A data set of random linkages of one degree of freedom, all structures alike, each with a crank that turns fully.
 
@@ -69,7 +72,8 @@ def generate(  # many: the public signature
     `store` is a folder ending in .zarr, which is written block by block. What is there already is kept: the same call
     goes on where it was interrupted. The same numbers and `seed` give the same linkages, in `workers` threads or by an
     `executor` of concurrent.futures' kind; `progress` is called with how many there are, and how many there will be.
-    Raises BadInput where the folder holds something else, and where Zarr is missing.
+    Raises BadInput where the folder holds something else, and where Zarr is missing; NoAnswer after `timeout` s or a
+    Ctrl-C, with the outcome "interrupted": the same call goes on.
 
     >>> import tempfile, planar
     >>> with tempfile.TemporaryDirectory() as folder:
@@ -94,8 +98,11 @@ def generate(  # many: the public signature
     ):
         made.write_block(block, linkages)
         done += plan.size(block)
+        report_progress(done, plan.linkages)
         if progress:
             progress(done, plan.linkages)
+    if done < plan.linkages:
+        stop_if_over(f"after {done} of {plan.linkages} linkages", "the same call goes on from there")
     return made
 
 

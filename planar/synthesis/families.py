@@ -22,6 +22,7 @@ import numpy as np
 
 from planar.foundation.arrays import Array, BoolArray, IntArray
 from planar.foundation.jets import TURN
+from planar.foundation.time_limit import time_is_over
 from planar.model.mechanism import links_counting_turns
 from planar.model.pairs import MeasureKind
 from planar.model.wording import count_phrase
@@ -476,7 +477,7 @@ class FamilySample(NamedTuple):
 
 class FamilySearch:
     """Samples the exact designs of one search, the same for the same `seed`; `say` is told what is done, and nothing
-    new is begun once `is_over`."""
+    new is begun once time is over."""
 
     def __init__(
         self,
@@ -484,9 +485,8 @@ class FamilySearch:
         count: int,
         seed: int,
         say: Callable[[str], None] = lambda _: None,
-        is_over: Callable[[], bool] = lambda: False,
     ):
-        self.search, self.count, self.say, self.is_over = search, count, say, is_over
+        self.search, self.count, self.say = search, count, say
         self.sampler, self.screen = MemberSampler(search, seed), MemberScreen(search)
         self.dimension = self.tried = self.met = 0
         self.members: list[ExactMembers] = []
@@ -503,7 +503,7 @@ class FamilySearch:
                 self._add(drawn)
                 basis.append(drawn)
                 self._recombine(join_members(basis))
-            if self._is_enough() or self._is_hopeless() or self.is_over() or (basis and not self.dimension):
+            if self._is_enough() or self._is_hopeless() or time_is_over() or (basis and not self.dimension):
                 break
         if self.tried and not self.dimension:
             self._keep_distinct()
@@ -525,7 +525,7 @@ class FamilySearch:
         if len(parts) < 2:
             return
         for _ in range(RECOMBINED_ROUNDS // DRAW_ROUNDS):
-            if self._is_enough() or self._is_hopeless() or self.is_over():
+            if self._is_enough() or self._is_hopeless() or time_is_over():
                 break
             combined = recombine(self.sampler, members, parts, RECOMBINATIONS)
             if len(combined.numbers):
@@ -538,7 +538,7 @@ class FamilySearch:
         best = np.argsort(violation, kind="stable")[:PARENTS]
         parents, violation = members.take(best), violation[best]
         for spread in SPREADS:
-            if self._is_enough() or self.is_over():
+            if self._is_enough() or time_is_over():
                 break
             self.say("members near those that lack least")
             starts = np.repeat(np.arange(len(violation)), CHILDREN)

@@ -6,13 +6,13 @@ import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from time import monotonic
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, overload
 
 import numpy as np
 
 from planar import __version__
 from planar.foundation.errors import BadInput, NoAnswer, PlanarError
+from planar.foundation.time_limit import ComputationEnded, returns_part_in_time, stop_if_over, time_is_over
 from planar.model.mechanism import Mechanism
 from planar.model.run_arguments import check_whole_number
 from planar.model.wording import amount
@@ -104,12 +104,10 @@ class TaskSearch:
         task: SynthesisTask,
         many: int,
         seed: int,
-        time_limit: float | None = None,
         folder: Path | None = None,
         progress: Callable[[SearchProgress], None] | None = None,
     ):
-        self.task, self.many, self.seed, self.time_limit = task, many, seed, time_limit
-        self.end = None if time_limit is None else monotonic() + time_limit
+        self.task, self.many, self.seed = task, many, seed
         self.folder = None if folder is None else SearchFolder(folder, task, _plan(many, seed))
         self.progress = progress
         self.count = None if isinstance(task.starts, ChainStart) else len(task.starts)
@@ -120,26 +118,27 @@ class TaskSearch:
         self.remarks: list[str] = []
         self.size = 1.0
         self.is_finished = False
+        self.ended_by = ""
+        "why time was over, where it was"
         self._at = "", 0, 0
         "the start, its number, and the round"
 
     def run(self) -> None:
         """Search every start, as far as the time goes."""
-        for number, start in enumerate(start_mechanisms(self.task), start=1):
-            if not self.add_start(start, number):
-                return
-        self.is_finished = True
-
-    def is_over(self) -> bool:
-        """Whether the time is up."""
-        return self.end is not None and monotonic() > self.end
+        try:
+            for number, start in enumerate(start_mechanisms(self.task), start=1):
+                self.add_start(start, number)
+        except ComputationEnded:
+            self.ended_by = time_is_over()
+        else:
+            self.is_finished = True
 
     def best_error(self, before: int = 0) -> float:
         """The least error of a sound design, of those that came after so many."""
         return min((design.error for design in self.sound[before:]), default=float("inf"))
 
-    def add_start(self, mechanism: Mechanism, number: int) -> bool:
-        """Search the designs of one start; whether that was finished."""
+    def add_start(self, mechanism: Mechanism, number: int) -> None:
+        """Search the designs of one start. Raises ComputationEnded."""
         search: DesignSearch | None = None
         before = len(self.sound)
         bests: list[float] = []
@@ -152,12 +151,11 @@ class TaskSearch:
                 self.remarks += remarks
                 self.sound += [design for design in designs if not design.defects]
                 self.rejected += [design for design in designs if design.defects]
-            elif self.is_over():
-                return False
             else:
+                self._stop_if_over()
                 search = self._begin(mechanism) if search is None else search
                 if search is None:
-                    return True
+                    return
                 self.size = search.size
                 self.starts[mechanism.name] = mechanism
                 if turn:
@@ -168,7 +166,6 @@ class TaskSearch:
                 bests.append(self.best_error(before))
             if self._is_settled(before, bests) if turn else len(self.sound) - before >= self.many:
                 break
-        return True
 
     def _begin(self, mechanism: Mechanism) -> DesignSearch | None:
         """The search of a start; None where it is none, which a remark says."""
@@ -187,11 +184,12 @@ class TaskSearch:
         """The designs that meet all exactly, where a start has numbers enough: these need no fit."""
         first = len(self.sound), len(self.rejected), len(self.remarks)
         if not count_freedom(self.task, search.mechanism).excess:
-            sample = FamilySearch(search, self.many, self.seed, lambda _: self._tell("exact"), self.is_over).run()
+            sample = FamilySearch(search, self.many, self.seed, lambda _: self._tell("exact")).run()
             self.remarks.append(f"{search.mechanism.name}: {sample.sentence}")
             self.sound += sample.designs
             self.rejected += sample.rejected
-        if self.folder is not None and not self.is_over():
+        self._stop_if_over()
+        if self.folder is not None:
             self._keep_round(search, 0, first)
 
     def _keep_round(self, search: DesignSearch, turn: int, first: tuple[int, int, int]) -> None:
@@ -256,12 +254,18 @@ class TaskSearch:
             judged(matches, keeps_turn=True, keeps_order=True)
 
     def _tell(self, stage: str) -> None:
-        """Say what is being done."""
+        """Say what is being done, and end it where time is over: exact designs once those drawn are judged."""
+        if stage != "exact":
+            self._stop_if_over()
         if self.progress is not None:
             start, number, turn = self._at
             best = self.best_error()
             share = best / self.size if self.task.wants_places else best
             self.progress(SearchProgress(start, number, self.count, turn, stage, best, share))
+
+    def _stop_if_over(self) -> None:
+        """End the search where time is over. Raises ComputationEnded."""
+        stop_if_over(f"at {self._place()}")
 
     def _worst_wanted(self, before: int) -> float:
         """The error beyond which a design does not come among the best of its start, before which so many were sound;
@@ -297,11 +301,13 @@ class TaskSearch:
 
     def _unfinished(self) -> str:
         """How far a search came that did not search every start."""
+        return f"{self.ended_by or 'the search was interrupted'} at {self._place()}: designs found by then are listed"
+
+    def _place(self) -> str:
+        """Where the search is."""
         start, number, turn = self._at
         stage = f"catalogue {turn} of {ROUNDS}" if turn else "exact designs"
-        where = f"start {number}{f' of {self.count}' if self.count else ''} ({start}), {stage}"
-        why = f"the time limit of {self.time_limit:g} s was up" if self.is_over() else "the search was interrupted"
-        return f"{why} at {where}: what is told was found till then"
+        return f"start {number}{f' of {self.count}' if self.count else ''} ({start}), {stage}"
 
 
 def _widest_range(task: SynthesisTask) -> float:
@@ -329,6 +335,7 @@ def synthesise(
     task: Mapping[str, Any] | str | os.PathLike[str] | SynthesisTask,
     *,
     complete: Literal[True],
+    timeout: float | None = None,
     progress: Callable[[SearchProgress], None] | None = None,
 ) -> CompleteSynthesis: ...
 @overload
@@ -338,17 +345,18 @@ def synthesise(
     complete: Literal[False] = False,
     many: int = 10,
     seed: int = 0,
-    time_limit: float | None = None,
+    timeout: float | None = None,
     folder: str | os.PathLike[str] | None = None,
     progress: Callable[[SearchProgress], None] | None = None,
 ) -> Synthesis: ...
+@returns_part_in_time
 def synthesise(
     task: Mapping[str, Any] | str | os.PathLike[str] | SynthesisTask,
     *,
     complete: bool = False,
     many: int = 10,
     seed: int = 0,
-    time_limit: float | None = None,
+    timeout: float | None = None,  # noqa: ARG001 - of the decorator
     folder: str | os.PathLike[str] | None = None,
     progress: Callable[[SearchProgress], None] | None = None,
 ) -> Synthesis:
@@ -357,19 +365,19 @@ def synthesise(
     `task` is a file, what stands in one as a dict, or a SynthesisTask. Of each start designs are drawn at random and
     run through their motions (kept on disk); those nearest to what is wanted, wherever, however large and however
     turned they are, are fitted by least squares on exact derivatives. `many` is how many designs are told; the same
-    `seed` gives the same ones. A search that has taken the `time_limit` (s) begins nothing new. In a `folder` what is
-    done is kept: the same call goes on where it was interrupted, or its time was up, to the same designs. `progress`
-    is told what is being done.
+    `seed` gives the same ones. After `timeout` s, or a Ctrl-C, the designs found by then are returned, with
+    `is_finished` False. In a `folder` what is done is kept: the same call goes on where it was interrupted to the same
+    designs. `progress` is told what is being done.
 
     Where a start can meet all that is wanted exactly, exact designs are sampled first, those that transmit best first.
 
     With `complete` all linkages of one start are found that meet exactly as much as it can meet, each certified where
-    python-flint is there; where numbers stay open, a sample of the family. `many`, `seed`, `time_limit` and `folder`
-    are not for that. For a kind of task that was never solved before, a test that these are all follows: `progress`
-    gets the list before, and a KeyboardInterrupt meanwhile returns it with `is_finished` False.
+    python-flint is there; where numbers stay open, a sample of the family. `many`, `seed` and `folder` are not for
+    that. For a kind of task that was never solved before, a test that these are all follows: `progress` gets the list
+    before, and where it is ended meanwhile the list is returned with `is_finished` False.
 
     Raises BadInput with the place in the task's file, for a folder that holds something else, and where no complete
-    list can be made.
+    list can be made; NoAnswer where one is ended before its designs are proved.
 
     >>> import planar
     >>> task = {"planar": 1, "units": {"length": "mm", "angle": "deg"}, "start": "four-bar", "wanted": [{"point": "E",
@@ -382,8 +390,8 @@ def synthesise(
     if complete:
         from planar.synthesis.exact.exact_synthesis import synthesise_all
 
-        if (many, seed, time_limit, folder) != (10, 0, None, None):
-            raise BadInput("complete", "a complete list is one, whole: leave many, seed, time_limit and folder out")
+        if (many, seed, folder) != (10, 0, None):
+            raise BadInput("complete", "a complete list is one, whole: leave many, seed and folder out")
         if progress is None:
             return synthesise_all(known)
         report = progress
@@ -395,7 +403,7 @@ def synthesise(
     check_whole_number("many", many, 1, 1000)
     check_whole_number("seed", seed, 0)
     _refuse_excess(known)
-    search = TaskSearch(known, many, seed, time_limit, None if folder is None else Path(folder), progress)
+    search = TaskSearch(known, many, seed, None if folder is None else Path(folder), progress)
     search.run()
     return search.result()
 

@@ -19,6 +19,7 @@ from planar.document.dimensions import Dimension, file_dimensions, find_dimensio
 from planar.document.first_argument import takes_mechanism
 from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput, NoAnswer, PlanarError, join_names
+from planar.foundation.time_limit import MORE_TIME, stop_if_over, stops_in_time
 from planar.model.mechanism import Mechanism
 from planar.model.wording import count_phrase
 
@@ -86,6 +87,7 @@ class Calibration:
 
 
 @takes_mechanism
+@stops_in_time
 def calibrate(  # many: what is measured, and how it is fitted
     mechanism: Mechanism,
     measured: Mapping[str, Any],
@@ -94,6 +96,7 @@ def calibrate(  # many: what is measured, and how it is fitted
     inputs: Mapping[str, Any] | None = None,
     deviations: Mapping[str, float] | None = None,
     loss: str = "linear",
+    timeout: float | None = None,  # noqa: ARG001 - of the decorator
 ) -> Calibration:
     """The numbers of a mechanism's file that fit best what was measured of it, by least squares on exact derivatives.
 
@@ -107,7 +110,8 @@ def calibrate(  # many: what is measured, and how it is fitted
     "soft_l1", "huber", "cauchy" (scipy.optimize.least_squares).
 
     The numbers of the file are where the search starts; the assembly is the file's. Raises BadInput, Unknown, and
-    NoAnswer where a sample cannot be reached by the mechanism.
+    NoAnswer where a sample cannot be reached by the mechanism, and after `timeout` s or a Ctrl-C, with the outcome
+    "interrupted".
 
     >>> import planar
     >>> motion = planar.cycle("crank-rocker", 24)
@@ -172,6 +176,10 @@ class _Fit:
     def samples(self, x: Array) -> FittedSamples | None:
         """The residuals at scaled numbers; None where there are none."""
         if self._last is None or not np.array_equal(self._last[0], x):
+            stop_if_over(
+                f"after {self.evaluations} evaluations of the residuals",
+                f"{MORE_TIME}, or give fewer free numbers or samples",
+            )
             self.evaluations += 1
             try:
                 self._last = (x.copy(), self.function.at(self.function.changed(x * self.scale)))

@@ -13,6 +13,7 @@ from planar.document.revised.changed_numbers import with_values
 from planar.foundation.arrays import Array, BoolArray, IntArray
 from planar.foundation.errors import NoAnswer
 from planar.foundation.jets import TURN
+from planar.foundation.time_limit import all_within_time
 from planar.model.mechanism import Mechanism
 from planar.results.motion import Motion
 from planar.solving.cycle import cycle
@@ -169,7 +170,7 @@ def without_dead_points(mechanism: Mechanism, measurement: Measurement) -> tuple
         return measurement, 0
     names = [each.pair for each in mechanism.inputs]
     lost = []
-    for k, position in enumerate(measurement.inputs):
+    for k, position in enumerate(all_within_time(measurement.inputs, "samples")):
         try:
             solve(mechanism, dict(zip(names, map(float, position), strict=True)))
         except NoAnswer as problem:

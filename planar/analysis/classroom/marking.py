@@ -14,6 +14,7 @@ from planar.analysis.classroom.variants import Variant, problem_variants
 from planar.document.answer_lists import AnswerList, HandedInValue, UnreadLine, read_answers
 from planar.document.first_argument import takes_mechanism
 from planar.foundation.errors import BadInput, join_names
+from planar.foundation.time_limit import stops_in_time
 from planar.foundation.units import UnitError, parse_unit
 from planar.model.file_units import unit_of_kind
 from planar.model.mechanism import PUBLISHED_QUANTITIES, Mechanism, PublishedValue
@@ -69,7 +70,14 @@ class Marks(NamedTuple):
 
 
 @takes_mechanism
-def mark_answers(mechanism: Mechanism, answers: AnswerList | str | Path, tolerance: float = READING_TOLERANCE) -> Marks:
+@stops_in_time
+def mark_answers(
+    mechanism: Mechanism,
+    answers: AnswerList | str | Path,
+    tolerance: float = READING_TOLERANCE,
+    *,
+    timeout: float | None = None,  # noqa: ARG001 - of the decorator
+) -> Marks:
     """The marks for a list of answers.
 
     `answers` is a CSV file: `seed 7`, the seed of `problem_variants`, in its first line, then the columns student,
@@ -77,7 +85,8 @@ def mark_answers(mechanism: Mechanism, answers: AnswerList | str | Path, toleran
     right within `tolerance` of the solved one's size, or within a fifth of that of the largest one of its kind, to
     whose scale a polygon is drawn: of vectors the size counts, of angular rates anticlockwise is above zero. A question
     that stands twice counts as it stands last; capitals and blanks of names do not count. Lines that cannot be read are
-    told in `unread`. Raises BadInput where the file is no such list.
+    told in `unread`. Raises BadInput where the file is no such list, NoAnswer after `timeout` s or a Ctrl-C, with the
+    outcome "interrupted".
 
     >>> import planar, tempfile, pathlib
     >>> path = pathlib.Path(tempfile.mkdtemp(), "answers.csv")

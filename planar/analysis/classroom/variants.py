@@ -13,6 +13,7 @@ from planar.document.dimensions import Dimension, file_dimensions
 from planar.document.first_argument import takes_mechanism
 from planar.document.revised.changed_numbers import with_values
 from planar.foundation.errors import BadInput, NoAnswer
+from planar.foundation.time_limit import MORE_TIME, all_within_time, stop_if_over, stops_in_time
 from planar.foundation.units import parse_unit
 from planar.model.file_units import FileUnits, unit_of_kind
 from planar.model.mechanism import Mechanism
@@ -49,14 +50,21 @@ class Variant(NamedTuple):
 
 
 @takes_mechanism
-def problem_variants(mechanism: Mechanism, count: int = 30, seed: int = 0) -> tuple[Variant, ...]:
+@stops_in_time
+def problem_variants(
+    mechanism: Mechanism,
+    count: int = 30,
+    seed: int = 0,
+    *,
+    timeout: float | None = None,  # noqa: ARG001 - of the decorator
+) -> tuple[Variant, ...]:
     """So many variants of a mechanism, no two alike; variant k of a seed is the same however many there are.
 
     Lengths of links and the inputs' positions and rates differ from the mechanism's own by `SPREAD` at most, and are
     round in its file's units. Each goes together as the mechanism does, clear of dead points.
 
     Raises BadInput where it has nothing to vary, or too few variants go together; NoAnswer where the mechanism itself
-    has no position.
+    has no position, and after `timeout` s or a Ctrl-C, with the outcome "interrupted".
 
     >>> import planar
     >>> [round(each.values["BC.length"], 6) for each in planar.problem_variants("four-bar", 3, seed=7)]
@@ -70,7 +78,7 @@ def problem_variants(mechanism: Mechanism, count: int = 30, seed: int = 0) -> tu
         raise BadInput("mechanism", "there is no length and no input to vary")
     found: list[Variant] = []
     known: set[tuple[float, ...]] = {tuple(each.value for each in varied)}
-    for number in range(1, count + 1):
+    for number in all_within_time(range(1, count + 1), "variants", f"{MORE_TIME}, or ask for fewer"):
         found.append(_draw_variant(base, varied, number, np.random.default_rng([seed, number]), known))
         known.add(tuple(found[-1].values.values()))
     return tuple(found)
@@ -95,6 +103,7 @@ def _draw_variant(
     sketch = tuple((name, float(at[0]), float(at[1])) for name, at in places)
     mechanism = replace(base.mechanism, sketch=sketch)
     for _ in range(MAX_TRIES):
+        stop_if_over(f"before variant {number} was drawn", f"{MORE_TIME}, or ask for fewer")
         values = {each.name: _draw_number(each, units, rng) for each in varied}
         if tuple(values.values()) in known:
             continue

@@ -15,6 +15,7 @@ from planar.document.first_argument import takes_mechanism
 from planar.dynamics.forces import Forces
 from planar.foundation.arrays import Array, BoolArray, IntArray
 from planar.foundation.errors import BadInput, Outcome, join_names
+from planar.foundation.time_limit import stops_in_time
 from planar.model.mechanism import Mechanism
 from planar.results.motion import Motion
 from planar.solving.cycle import cycle
@@ -101,11 +102,14 @@ Range = tuple[float, float, int] | tuple[float, float] | int | None
 
 
 @takes_mechanism
+@stops_in_time
 def force_map(
     mechanism: Mechanism,
     over: Mapping[str, Range] | Sequence[str],
     inertia: bool = True,
     friction: bool = True,
+    *,
+    timeout: float | None = None,  # noqa: ARG001 - of the decorator
 ) -> ForceMap:
     """Forces over a grid of positions of one or several inputs, with the worst cases.
 
@@ -117,7 +121,7 @@ def force_map(
     towards which dead point; dead points are looked for along the lines of the grid.
 
     Raises BadInput for another input or range, and more than a million positions; NoAnswer where none is reached or
-    nothing can move.
+    nothing can move, and after `timeout` s or a Ctrl-C, with the outcome "interrupted".
 
     >>> import planar
     >>> arm = planar.load("excavator-arm")

@@ -11,6 +11,7 @@ import numpy as np
 from planar.dynamics.forces import Forces, forces
 from planar.foundation.arrays import Array, BoolArray
 from planar.foundation.errors import NoAnswer
+from planar.foundation.time_limit import stop_if_over
 from planar.results.motion import Motion
 from planar.solving.assembly.nearest_assembly import Assembly
 from planar.solving.continuation.path import follow_samples
@@ -69,6 +70,7 @@ class GridForces:
             found[is_reached] = tried[is_reached]
             return found, is_reached
         for k in range(many):
+            stop_if_over("while the worst cases were refined")
             try:
                 way = follow_samples(self.solver, p, z[k], np.stack([start[k], u[k]]))
             except NoAnswer:

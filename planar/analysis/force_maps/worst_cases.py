@@ -22,6 +22,7 @@ from planar.dynamics.forces import Forces
 from planar.foundation.arrays import Array, IntArray
 from planar.foundation.errors import NoAnswer, Outcome, join_names
 from planar.foundation.short_repr import short_repr
+from planar.foundation.time_limit import all_within_time
 from planar.model.wording import amount
 from planar.solving.continuation.path import follow_samples
 from planar.solving.grids.input_grid import Border, InputGrid
@@ -265,7 +266,7 @@ class WorstCaseSearch:
     def _refine(self, tasks: Sequence[tuple[int, _Start]]) -> list[tuple[float, Array]]:
         """The greatest of quantities, by their numbers, near where each search starts, all at once: values, inputs."""
         searches = [_Search(quantity, start, self.step.copy()) for quantity, start in tasks]
-        for _ in range(REFINEMENTS if tasks else 0):
+        for _ in all_within_time(range(REFINEMENTS if tasks else 0), "refinements of the worst cases"):
             going = [each for each in searches if not self._is_outdone(each, searches)]
             try:
                 self._look_around(going)

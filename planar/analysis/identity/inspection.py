@@ -17,6 +17,7 @@ from planar.equations.mechanism_numbers import mechanism_size, shapes_of_links
 from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput, NoAnswer, Outcome, PlanarError
 from planar.foundation.short_repr import short_repr
+from planar.foundation.time_limit import stop_if_over, stops_in_time
 from planar.foundation.units import SI_UNITS
 from planar.model.file_units import RESULT_SI_UNITS, display_unit, is_customary
 from planar.model.link_graph import link_numbers, pair_labels_by_type, unconnected_links
@@ -89,8 +90,11 @@ class Inspection:
 
 
 @takes_mechanism
-def inspect(mechanism: Mechanism) -> Inspection:
+@stops_in_time
+def inspect(mechanism: Mechanism, *, timeout: float | None = None) -> Inspection:  # noqa: ARG001 - of the decorator
     """Everything that can be said of a mechanism before its motion is asked for.
+
+    Raises NoAnswer after `timeout` s or a Ctrl-C, with the outcome "interrupted".
 
     >>> import planar
     >>> planar.inspect(planar.load("four-bar")).names
@@ -202,6 +206,7 @@ def _describe_motions(mechanism: Mechanism) -> dict[str, str]:
         return {link.name: "fixed" if link.name == mechanism.frame else "stands still" for link in mechanism.links}
     runs: list[Motion] = []
     for given in mechanism.inputs:
+        stop_if_over(f"before the motion of the input at {given.pair!r} was followed")
         try:
             runs.append(_run_input(mechanism, given))
         except PlanarError:

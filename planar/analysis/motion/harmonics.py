@@ -15,6 +15,7 @@ from planar.equations.mechanism_numbers import mechanism_size, shapes_of_links
 from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput, NoAnswer, Outcome, Unknown, suggest_name_of_kinds
 from planar.foundation.short_repr import short_repr
+from planar.foundation.time_limit import stop_if_over, stops_in_time
 from planar.model.mechanism import Drive, Mechanism, relative_motions, replace_inputs
 from planar.model.pairs import MeasureKind
 from planar.results.motion import Motion
@@ -114,7 +115,15 @@ class Harmonics:
 
 
 @takes_mechanism
-def harmonics(mechanism: Mechanism, of: str, axis: str | None = None, pair: str | None = None) -> Harmonics:
+@stops_in_time
+def harmonics(
+    mechanism: Mechanism,
+    of: str,
+    axis: str | None = None,
+    pair: str | None = None,
+    *,
+    timeout: float | None = None,  # noqa: ARG001 - of the decorator
+) -> Harmonics:
     """The harmonics of a motion over a full turn of the crank.
 
     `of` is a slide, whose displacement is meant; with `axis` "x" or "y" a point; or a link or a turning pair, whose
@@ -125,7 +134,8 @@ def harmonics(mechanism: Mechanism, of: str, axis: str | None = None, pair: str 
     J. A. C. Weideman, The exponentially convergent trapezoidal rule, SIAM Review 56, 2014).
 
     Raises BadInput where there is nothing of that name, the input is a slide, or the motion does not repeat with every
-    turn of it (wheels may need several); NoAnswer where the input makes no full turn.
+    turn of it (wheels may need several); NoAnswer where the input makes no full turn,
+    and after `timeout` s or a Ctrl-C, with the outcome "interrupted".
 
     >>> import planar
     >>> planar.harmonics(planar.load("slider-crank"), "stroke").of
@@ -136,6 +146,7 @@ def harmonics(mechanism: Mechanism, of: str, axis: str | None = None, pair: str 
     kind = _quantity_kind(motion, of, axis)
     unit = mechanism_size(mechanism, shapes_of_links(mechanism)) if kind == "length" else 1.0
     while True:
+        stop_if_over(f"before {samples} positions of a turn were enough")
         values, turns = _periodic_values(motion, of, axis, running, kind)
         noise = ROUND_OFF * max(unit, float(np.abs(values).max()))
         mean, cosines, sines = _fourier_series(values, float(motion.inputs[running].position[0]))

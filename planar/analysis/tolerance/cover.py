@@ -15,6 +15,7 @@ from planar.analysis.tolerance.varied import Varied, mean_slopes, slope_bounds
 from planar.derivatives.enclosures import Enclosures, ParametricSystem
 from planar.derivatives.intervals import OVER, down, up
 from planar.foundation.arrays import Array, BoolArray, IntArray
+from planar.foundation.time_limit import MORE_TIME, stop_if_over
 
 TIGHT = 0.03
 """Of a band's width: boxes that go farther over what the first order tells are bisected, to be narrower."""
@@ -103,6 +104,10 @@ class Cover:
         """Bisect until all is proved, and as tight as it can be had. Raises Undecided, or what `doubt` raises."""
         todo: IntArray = np.arange(self.roots)
         while len(todo):
+            stop_if_over(
+                f"after {len(self.low)} boxes of deviations were enclosed",
+                f"{MORE_TIME}, or ask for narrower tolerances or a shorter motion",
+            )
             self._enclose(todo)
             assert self.found is not None
             failed = todo[~self.found.is_proved[todo]]

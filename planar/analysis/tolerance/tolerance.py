@@ -20,6 +20,7 @@ from planar.document.first_argument import takes_result
 from planar.dynamics.forces import Forces
 from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput, NoAnswer, Outcome, join_names
+from planar.foundation.time_limit import stops_in_time
 from planar.model.tolerances.tolerances import Tolerances
 from planar.results.motion import Motion, State
 
@@ -207,6 +208,7 @@ class ToleranceBand:
 
 
 @takes_result("State", "Motion", "Forces")
+@stops_in_time
 def tolerance(  # many: what is asked, of which tolerances, and how it is sampled; # long: its docstring
     source: State | Motion | Forces,
     of: str,
@@ -218,6 +220,7 @@ def tolerance(  # many: what is asked, of which tolerances, and how it is sample
     seed: int = 0,
     distribution: str = "normal",
     guaranteed: bool = False,
+    timeout: float | None = None,  # noqa: ARG001 - of the decorator
 ) -> ToleranceBand:
     """How far a result of a point, link, pair or input may be off by the tolerances of the mechanism.
 
@@ -230,7 +233,8 @@ def tolerance(  # many: what is asked, of which tolerances, and how it is sample
 
     The worst case adds |slope| t of all; the statistical one squares (root sum of squares: ASME Y14.5; K. W. Chase,
     A. R. Parkinson, Research in Engineering Design 3 (1991) 23). Raises Unknown, BadInput, and NoAnswer where there are
-    no derivatives at any position, or nothing can be guaranteed.
+    no derivatives at any position, or nothing can be guaranteed, and after `timeout` s or a Ctrl-C, with the outcome
+    "interrupted".
 
     >>> import planar
     >>> state = planar.solve(planar.load("slider-crank"))

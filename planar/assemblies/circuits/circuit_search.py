@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from itertools import islice, pairwise, takewhile
+from itertools import islice, pairwise
 from math import pi, remainder
 from typing import NamedTuple
 
@@ -182,8 +182,7 @@ class CircuitSearch:
         moved = (*self.standing_drives, Drive(self.pair, bare.position))
         solver = self.solver.with_inputs_of(replace_inputs(self.mechanism, moved))
         modes = Modes(solver, self.mechanism, moved, False)
-        in_time = takewhile(lambda _: not time_is_over(), modes)
-        listing = tuple(islice((mode for mode in in_time if solver.is_inside_stops(mode.z)), MAX_ASSEMBLIES + 1))
+        listing = tuple(islice((mode for mode in modes if solver.is_inside_stops(mode.z)), MAX_ASSEMBLIES + 1))
         whole = len(listing) <= MAX_ASSEMBLIES and not time_is_over()
         return ListedInterval(
             low, high, solver, listing[:MAX_ASSEMBLIES], whole, modes.complete is not Completeness.NOT

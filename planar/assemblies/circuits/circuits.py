@@ -12,12 +12,13 @@ import numpy as np
 from planar.assemblies.circuits.circuit_search import CircuitSearch, InputInterval, is_same_assembly
 from planar.assemblies.circuits.traced_circuit import Branch, TracedCircuit
 from planar.assemblies.modes import Mode
+from planar.assemblies.polynomial.completeness import Completeness
 from planar.document.first_argument import takes_mechanism
 from planar.foundation.angles import TURN, interval_offset
 from planar.foundation.arrays import Array
 from planar.foundation.errors import Outcome
 from planar.foundation.notebook_display import Displayable
-from planar.foundation.time_limit import time_limit
+from planar.foundation.time_limit import returns_part_in_time, time_is_over
 from planar.model.mechanism import (
     Drive,
     Mechanism,
@@ -38,7 +39,13 @@ TURN_TOLERANCE = 1e-12
 
 
 @takes_mechanism
-def circuits(mechanism: Mechanism, pair: str | None = None, *, timeout: float | None = None) -> Circuits:
+@returns_part_in_time
+def circuits(
+    mechanism: Mechanism,
+    pair: str | None = None,
+    *,
+    timeout: float | None = None,  # noqa: ARG001 - of the decorator
+) -> Circuits:
     """All circuits of a mechanism while one input runs, the others standing still.
 
     A circuit is a connected curve of positions, a branch a part of it without a dead point (T. Chase, J. Mirth,
@@ -57,8 +64,7 @@ def circuits(mechanism: Mechanism, pair: str | None = None, *, timeout: float | 
     # another position of the input may be assembled, and within the stops
     if problem is not None and problem.outcome not in (Outcome.CANNOT_BE_ASSEMBLED, Outcome.STOP):
         raise problem
-    with time_limit(timeout):
-        return Circuits(mechanism, mechanism.inputs[running_input_index(mechanism, pair)].pair)
+    return Circuits(mechanism, mechanism.inputs[running_input_index(mechanism, pair)].pair)
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,6 +133,7 @@ class Circuits(Displayable, Sequence[Circuit]):
         found = CircuitSearch(mechanism, pair).find_circuits()
         self.mechanism, self.pair = mechanism, pair
         self.complete, self.remarks = found.complete, found.remarks
+        self.reason = time_is_over() if found.complete is Completeness.NOT else ""
         self._is_sliding = solved_mechanism(mechanism).solver.is_sliding(pair)
         self._search_intervals = found.intervals
         placed = (
@@ -176,6 +183,11 @@ class Circuits(Displayable, Sequence[Circuit]):
 
     def __len__(self) -> int:
         return len(self._found)
+
+    @property
+    def outcome(self) -> Outcome:
+        """Whether the search came to its end: solved, else interrupted, for the `reason`."""
+        return Outcome.INTERRUPTED if self.reason else Outcome.SOLVED
 
     def __reduce__(self) -> tuple[Any, ...]:
         return circuits, (self.mechanism, self.pair)

@@ -17,6 +17,7 @@ import numpy as np
 
 from planar.assemblies.polynomial.isotropic_form import BlockPolynomials, IsotropicForm
 from planar.foundation.arrays import Array, BoolArray, ComplexArray, IntArray
+from planar.foundation.time_limit import stop_if_over
 
 FIRST_STEP = 0.05
 MIN_STEP = 1e-11
@@ -168,6 +169,7 @@ def track_paths(
     for _ in range(most_steps):
         if busy.size == 0:
             break
+        stop_if_over(f"after {len(V) - busy.size} of {len(V)} paths to complex solutions")
         t = way[busy]
         h = np.minimum(step[busy], 1.0 - t)
         ahead = np.where(h == 1.0 - t, 1.0, t + h)

@@ -14,6 +14,7 @@ from planar.batch.mechanisms.results import SweptPart
 from planar.document.files import as_mechanism
 from planar.document.first_argument import MechanismSource
 from planar.foundation.errors import BadInput
+from planar.foundation.time_limit import report_progress
 from planar.model.mechanism import Mechanism, running_input_index
 from planar.model.pin_linkage import PinnedMechanism
 from planar.model.pin_linkages import PinnedLinkages
@@ -35,6 +36,7 @@ class PartRuns(NamedTuple):
 
     def tell(self, done: int, many: int) -> None:
         """So many of so many are done."""
+        report_progress(done, many)
         if self.progress is not None:
             self.progress(done, many)
 
@@ -102,6 +104,11 @@ def find_endings(part: SweptPart) -> tuple[tuple[int, int, str], ...]:
     ]
     few = [each for each in part.others if each.reason and not each.status.any()]
     return (*found, *([(0, len(few), few[0].reason)] if few else []))
+
+
+def end_message(done: int, reason: str) -> tuple[str, ...]:
+    """That a sweep ended early after so many mechanisms, for a reason; nothing without one."""
+    return (f"{reason} after {count_phrase(done, 'mechanism')}: the others are left out",) if reason else ()
 
 
 def part_messages(endings: Iterable[Iterable[tuple[int, int, str]]], many: int, sent: int) -> tuple[str, ...]:

@@ -162,7 +162,8 @@ class Each(Sequence[Swept]):
     """Every mechanism of a sweep, in the order in which they were given; one is read when it is asked for.
 
     `general`: how many positions the general path solved, of how many mechanisms (`sent`). `remarks`: what there is to
-    say. `outcomes`: what the numbers of a status stand for.
+    say. `outcomes`: what the numbers of a status stand for. `reason` says why a time limit or a Ctrl-C ended the sweep
+    after the first mechanisms, which then are all; it is empty where none did.
     """
 
     _parts: tuple[SweptPart, ...]
@@ -170,12 +171,18 @@ class Each(Sequence[Swept]):
     sent: int
     remarks: tuple[str, ...]
     outcomes: tuple[Outcome, ...] = tuple(Outcome)
+    reason: str = ""
 
     __repr__ = short_repr
 
     def __len__(self) -> int:
         """How many mechanisms there are."""
         return sum(map(len, self._parts))
+
+    @property
+    def outcome(self) -> Outcome:
+        """Whether the sweep came to its end: solved, else interrupted; how a mechanism ended says its status."""
+        return Outcome.INTERRUPTED if self.reason else Outcome.SOLVED
 
     @overload
     def __getitem__(self, index: int) -> Swept: ...

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from operator import length_hint
 
@@ -10,12 +10,13 @@ import numpy as np
 
 from planar.batch.executor import in_order, run_tasks
 from planar.batch.mechanisms.linkage_groups import SweepRequest
-from planar.batch.mechanisms.parts import PartRuns, find_endings, part_messages, stream_parts
+from planar.batch.mechanisms.parts import PartRuns, end_message, find_endings, part_messages, stream_parts
 from planar.batch.mechanisms.results import Each, SweptPart
 from planar.batch.reductions.point_reductions import ResultReduction
 from planar.batch.reductions.reduced_sweep import ReducedBlock, ReducedSweep, Reduction, read_reductions, reduce_all
 from planar.document.first_argument import MechanismSource
 from planar.foundation.errors import BadInput
+from planar.foundation.time_limit import interrupted, time_is_over
 from planar.model.mechanism import Mechanism
 from planar.model.pin_linkages import PinnedLinkages
 
@@ -40,19 +41,30 @@ def sweep_reduced(
     solve_part = partial(_solve_and_reduce, solve=solve, request=request, reductions=wanted.functions, dtype=runs.dtype)
     blocks: list[ReducedBlock] = []
     done, missing = 0, set(points or ())
-    tasks = enumerate(stream_parts(mechanisms, request.pair))
+    taken = 0
+
+    def tasks() -> Iterator[tuple[int, list[Mechanism] | PinnedLinkages]]:
+        nonlocal taken
+        for part in stream_parts(mechanisms, request.pair):
+            taken += 1
+            yield taken - 1, part
+
     for block, there in in_order(
-        run_tasks(runs.threads, runs.executor, solve_part, tasks, lambda _, part: solve_part(part))
+        run_tasks(runs.threads, runs.executor, solve_part, tasks(), lambda _, part: solve_part(part))
     ):
         blocks.append(block)
         missing -= there
         done += len(block.status)
         runs.tell(done, max(done, length_hint(mechanisms, 0)))
+    reason = time_is_over() if taken > len(blocks) else ""
+    if reason and not blocks:
+        raise interrupted(reason, "before a mechanism was reduced")
     for name in points or ():
-        if name in missing and done:
+        if name in missing and done and not reason:
             raise BadInput("points", f"no mechanism has a point {name!r:.60}")
     sent = sum(block.general_designs for block in blocks)
-    return join_blocks(blocks, part_messages([block.endings for block in blocks], done, sent))
+    said = part_messages([block.endings for block in blocks], done, sent)
+    return join_blocks(blocks, (*end_message(done, reason), *said))
 
 
 def _solve_and_reduce(

@@ -21,9 +21,10 @@ from planar.batch.reductions.point_reductions import (
     ResultReduction,
 )
 from planar.batch.results import Sweep, SweepNotes
-from planar.batch.stores.store import BlockStore, MemoryStore, SweepPlan
+from planar.batch.stores.store import INTERRUPTED, BlockStore, MemoryStore, SweepPlan
 from planar.foundation.errors import BadInput, Outcome, suggest_name
 from planar.foundation.short_repr import short_repr
+from planar.foundation.time_limit import interrupted
 
 Array = np.ndarray
 Swept_ = TypeVar("Swept_")
@@ -209,6 +210,21 @@ class ReductionStore(BlockStore):
             whole[part] = values
         self.status[part] = done.status
         self.block_notes[number] = done.general_positions, done.general_designs, done.endings
+
+    def takes(self, done: SolvedDesigns | ReducedBlock) -> bool:
+        return True
+
+    def leave_out(self, parts: Mapping[int, slice], reason: str) -> None:
+        if not self.reduced:
+            raise interrupted(reason, "before a block of designs was reduced")
+        for name, values in self.reduced.items():
+            # what has no number that says so is written as one that has
+            self.reduced[name] = values if values.dtype.kind in "fc" else values.astype(float)
+        for number, part in parts.items():
+            for values in self.reduced.values():
+                values[part] = np.nan
+            self.status[part] = INTERRUPTED
+            self.block_notes[number] = 0, 0, ((INTERRUPTED, part.stop - part.start, reason),)
 
     def result(self) -> ReducedSweep:
         found = ReducedSweep(

@@ -19,8 +19,9 @@ from planar.batch.named_results.result_rows import POINT_QUANTITIES, RequestedRe
 from planar.batch.results import Sweep, SweepNotes
 from planar.codegen.aligned_arrays import allocate_aligned
 from planar.document.files import to_dict
-from planar.foundation.errors import BadInput
+from planar.foundation.errors import BadInput, Outcome
 from planar.foundation.safe_files import PARTIAL_FILE_NAME, write_error
+from planar.foundation.time_limit import interrupted
 
 Array = np.ndarray
 
@@ -30,6 +31,10 @@ ZARR_PARTIAL_SUFFIX = ".partial"
 """Ending of the files that Zarr has not written whole."""
 STORE_VERSION = 3
 """Of what stands in a store; raised where it is no longer that of stores of before."""
+
+
+INTERRUPTED = [*Outcome].index(Outcome.INTERRUPTED)
+"""What stands for that in a status."""
 
 
 class SweepPlan(NamedTuple):
@@ -107,6 +112,18 @@ class BlockStore(ABC):
     @abstractmethod
     def write_block(self, number: int, part: slice, done: SolvedDesigns) -> None:
         """A solved block, of these designs."""
+
+    def takes(self, done: SolvedDesigns) -> bool:
+        """Whether a block is kept: in a store that is gone on with, only one that no time limit ended."""
+        return all(code != INTERRUPTED for code, _, _ in done.endings)
+
+    def leave_out(self, parts: Mapping[int, slice], reason: str) -> None:
+        """Say that blocks are not solved, as a computation ended early. Raises NoAnswer."""
+        many = self.plan.design_count
+        done = many - sum(part.stop - part.start for part in parts.values())
+        raise interrupted(
+            reason, f"after {done} of {many} designs, which the store has", "the same sweep into this store goes on"
+        )
 
     @abstractmethod
     def result(self) -> Any:
@@ -232,6 +249,16 @@ class MemoryStore(BlockStore):
         self.stop_position[part] = done.stop_position
         self.inputs = _join_inputs(self.inputs, done.input, part, self.plan)
         self.block_notes[number] = done.general_positions, done.general_designs, done.endings
+
+    def takes(self, done: SolvedDesigns) -> bool:
+        return True
+
+    def leave_out(self, parts: Mapping[int, slice], reason: str) -> None:
+        for number, part in parts.items():
+            many = part.stop - part.start
+            self.out[:, :, part], self.status[part] = np.nan, INTERRUPTED
+            self.inputs = _join_inputs(self.inputs, np.full((many, self.status.shape[1]), np.nan), part, self.plan)
+            self.block_notes[number] = 0, 0, ((INTERRUPTED, many, reason),)
 
     def result(self) -> Sweep:
         assert self.inputs is not None

@@ -11,6 +11,7 @@ from planar.cli.options import (
     at_option,
     frame_number_option,
     json_option,
+    limited_time,
     load_model,
     main,
     mode_option,
@@ -23,8 +24,8 @@ from planar.cli.options import (
     refuse_overwriting,
     report_motion,
     run_motion,
-    show_status,
     steps_option,
+    timeout_option,
 )
 from planar.cli.streams import print_json
 from planar.foundation.errors import BadInput
@@ -40,6 +41,7 @@ if TYPE_CHECKING:
 @click.option("--input", "running", metavar="PAIR", help="The input that turns, where there are several.")
 @mode_option
 @json_option
+@timeout_option
 def harmonics(
     model: str,
     pairs: tuple[str, ...],
@@ -53,7 +55,7 @@ def harmonics(
     from planar.reports.tables.analytical import analytical_tables, record
 
     mechanism = load_model(model, mode)
-    with show_status(mechanism.name):
+    with limited_time(mechanism.name):
         found = analytical_routes(mechanism, pairs, points, running)
     if as_json:
         print_json(record(mechanism, found))
@@ -64,6 +66,7 @@ def harmonics(
 @main.command()
 @model_argument()
 @json_option
+@timeout_option
 @at_option
 @mode_option
 @frame_number_option
@@ -106,7 +109,7 @@ def centres(  # many: options of the command
     if whole:
         _report_paths(mechanism, names, as_json, output, course)
         return
-    with show_status(mechanism.name):
+    with limited_time(mechanism.name):
         found = all_centres(rest_position(mechanism, parse_drives(mechanism, at)))
     if as_json:
         print_json(record(found), indent=1)
@@ -133,7 +136,7 @@ def _report_paths(
     is_table = output is not None and output.suffix in SUFFIXES
     if output is not None and not is_table:
         check_writable(output.suffix)
-    with show_status(mechanism.name):
+    with limited_time(mechanism.name, returns_part=True):
         motion = run_motion(mechanism, **course)
         paths = [centre_path(motion, *two) for two in links]
     if is_table:

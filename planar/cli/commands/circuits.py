@@ -7,7 +7,7 @@ from pathlib import Path
 
 import click
 
-from planar.cli.exit_status import NO_ANSWER
+from planar.cli.exit_status import no_answer_status
 from planar.cli.options import (
     at_option,
     input_option,
@@ -20,7 +20,6 @@ from planar.cli.options import (
     print_or_write,
     read_model,
     refuse_overwriting,
-    show_status,
     timeout_option,
 )
 from planar.cli.streams import print_json
@@ -34,9 +33,7 @@ from planar.foundation.errors import BadInput
 @at_option
 @timeout_option
 @output_option("Write the tables to a .txt, .svg or .html file.")
-def circuits(
-    model: str, as_json: bool, pair: str | None, at: tuple[str, ...], timeout: str | None, output: Path | None
-) -> None:
+def circuits(model: str, as_json: bool, pair: str | None, at: tuple[str, ...], output: Path | None) -> None:
     """All circuits while an input runs, their branches, and where it goes together."""
     from planar.assemblies.circuits.circuits import circuits as all_circuits
     from planar.assemblies.modes import modes
@@ -46,7 +43,7 @@ def circuits(
         raise BadInput("-o", "tables go to a file or SI values are printed with --json; give one of the two")
     mechanism = read_model(model)
     refuse_overwriting(model, output)
-    with limited_time(timeout), show_status(f"{mechanism.name}: circuits"):
+    with limited_time(f"{mechanism.name}: circuits", returns_part=True):
         here = modes(mechanism, parse_drives(mechanism, at), certify=False)
         found = all_circuits(here.mechanism, pair)
         told = record(found, here) if as_json else table(found, here)
@@ -56,4 +53,4 @@ def circuits(
         print_or_write(told, output)
     if not here:
         click.echo(f"planar: {here.refusal()}", err=True)
-        sys.exit(NO_ANSWER)
+        sys.exit(no_answer_status(here.outcome))

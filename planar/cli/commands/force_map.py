@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from planar.cli.options import print_or_write, show_status
+from planar.cli.options import limited_time, print_or_write
 from planar.cli.streams import print_json
 from planar.foundation.errors import BadInput, join_names
 
@@ -23,7 +23,7 @@ def show_force_map(
     from planar.reports.tables.forces.forces_over_motion import force_series
 
     ranges = parse_ranges(mechanism, over, steps)
-    with show_status(f"{mechanism.name}: over {', '.join(ranges)}"):
+    with limited_time(f"{mechanism.name}: over {', '.join(ranges)}"):
         found = force_map(mechanism, ranges, *taken)
     if as_json:
         print_json(record(found))

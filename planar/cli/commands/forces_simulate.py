@@ -26,8 +26,6 @@ from planar.cli.options import (
     refuse_overwriting,
     report_motion,
     run_motion,
-    show_progress,
-    show_status,
     steps_option,
     timeout_option,
 )
@@ -44,6 +42,7 @@ ONE_DESTINATION = "results go to a file or are printed with --json; give one of 
 @main.command()
 @model_argument()
 @json_option
+@timeout_option
 @at_option
 @mode_option
 @frame_number_option
@@ -186,7 +185,7 @@ def _forces_at_position(
 
     moved = parse_drives(mechanism, at)
     load, effort = asked
-    with show_status(mechanism.name):
+    with limited_time(mechanism.name):
         state = solve(mechanism, moved)
         found, ratios = at_state(state, *taken), advantages(state)
         unknown = None if load is None else unknown_load(state, load, effort or 0.0, None, *taken)
@@ -223,7 +222,7 @@ def _forces_over_motion(
 
     if output is not None:
         check_writable(output.suffix)
-    with show_status(f"{mechanism.name}: {course['steps']} steps"):
+    with limited_time(f"{mechanism.name}: {course['steps']} steps", returns_part=True):
         motion = run_motion(mechanism, **course)
         found = over_motion(motion, *taken)
         fluctuation, radius, load, effort = asked
@@ -276,7 +275,6 @@ def simulate(
     moving: bool,
     diagrams: Path | None,
     of: tuple[str, ...],
-    timeout: str | None,
     output: Path | None,
 ) -> None:
     """The mechanism let go: its motion in time under loads, weights, springs and friction."""
@@ -294,10 +292,9 @@ def simulate(
         raise BadInput("--of", "this says what diagrams are of; say where to with --diagrams")
     if output is not None:
         check_writable(output.suffix)
-    with limited_time(timeout), show_progress(mechanism.name) as progress:
-        tick = None if progress is None else lambda done: progress(done, 1.0)
+    with limited_time(mechanism.name, returns_part=True):
         try:
-            found = let_go(mechanism, read_time(duration, "--duration"), steps, driven, moving=moving, tick=tick)
+            found = let_go(mechanism, read_time(duration, "--duration"), steps, driven, moving=moving)
         except BadInput as problem:
             raise (BadInput("--drive", problem.sentence) if problem.place == "driven" else problem) from None
     if diagrams is not None:

@@ -7,12 +7,14 @@ import click
 from planar.cli.options import (
     frame_number_option,
     json_option,
+    limited_time,
     main,
     model_argument,
     print_or_write,
     read_model,
     refuse_settings,
     show_status,
+    timeout_option,
 )
 from planar.cli.streams import print_json
 
@@ -20,13 +22,14 @@ from planar.cli.streams import print_json
 @main.command()
 @model_argument()
 @json_option
+@timeout_option
 @frame_number_option
 def inspect(model: str, as_json: bool) -> None:
     """What it is: links, pairs, chain, mobility, motions, names."""
     from planar.analysis.identity.inspection import inspect as inspected
 
     mechanism = read_model(model)
-    with show_status(mechanism.name):
+    with limited_time(mechanism.name):
         found = inspected(mechanism)
     if as_json:
         from dataclasses import asdict

@@ -10,6 +10,7 @@ import click
 from planar.cli.options import (
     input_option,
     json_option,
+    limited_time,
     main,
     model_argument,
     output_option,
@@ -17,10 +18,10 @@ from planar.cli.options import (
     print_or_write,
     read_model,
     refuse_overwriting,
-    show_status,
+    timeout_option,
 )
 from planar.cli.streams import print_json
-from planar.foundation.errors import BadInput
+from planar.foundation.errors import BadInput, Outcome
 
 if TYPE_CHECKING:
     from planar.assemblies.modes import Modes
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
 @main.command()
 @model_argument()
 @json_option
+@timeout_option
 @click.option(
     "--at",
     "at",
@@ -67,9 +69,11 @@ def modes(  # many: options of a command
         raise BadInput("--input", "without --circuits no input runs")
     mechanism = read_model(model)
     refuse_overwriting(model, output)
-    with show_status(f"{mechanism.name}: assemblies"):
+    with limited_time(f"{mechanism.name}: assemblies", returns_part=True):
         found = assemblies(mechanism, parse_drives(mechanism, at), certify=certify)
         if not found:
+            if found.outcome is Outcome.INTERRUPTED:
+                raise found.refusal()
             raise _explain_refusal(found, as_json, output)
         on = circuits(found.mechanism, pair) if circled else None
         told = record(found, limit, on) if as_json else table(found, limit, points, on)

@@ -12,6 +12,7 @@ from click.core import ParameterSource
 from planar.cli.options import (
     at_option,
     frame_number_option,
+    limited_time,
     load_model,
     main,
     mode_option,
@@ -22,8 +23,7 @@ from planar.cli.options import (
     refuse_overwriting,
     run_motion,
     scale_option,
-    show_progress,
-    show_status,
+    timeout_option,
 )
 from planar.foundation.errors import BadInput, join_names
 from planar.model.pairs import pair_types
@@ -134,6 +134,7 @@ def _single_name(option: str, names: tuple[str, ...], what: str) -> str | None:
 @_name_drawings
 @main.command()
 @model_argument()
+@timeout_option
 @frame_number_option
 @click.argument("what", type=click.Choice(DRAWINGS))
 @output_option("Write the drawing to a .png, .svg, .pdf or .dxf file.", required=True)
@@ -211,7 +212,7 @@ def plot(  # many: options of a command; # long: each has its line
     subject = None if what == "diagrams" else _single_name("--of", of, what)
     mechanism = load_model(model, mode, advice="")
     refuse_overwriting(model, output)
-    with show_status(f"{mechanism.name}: {what}"):
+    with limited_time(f"{mechanism.name}: {what}", returns_part=True):
         if what in MAP_DRAWINGS:
             from planar.analysis.force_maps.force_map import force_map
             from planar.cli.commands.force_map import parse_ranges
@@ -262,6 +263,7 @@ def plot(  # many: options of a command; # long: each has its line
 
 @main.command()
 @model_argument()
+@timeout_option
 @output_option("Write the moving picture to a .gif or .mp4 file.", required=True)
 @click.option("--point", "points", multiple=True, metavar="NAME", help="A point whose path is drawn as it moves.")
 @range_options
@@ -280,8 +282,8 @@ def animate(
 
     mechanism = load_model(model, mode, advice="")
     refuse_overwriting(model, output)
-    with show_progress(mechanism.name) as progress:
-        drawn.animate(_run_or_mechanism(mechanism, pair, start, stop), output, points or None, progress)
+    with limited_time(mechanism.name):
+        drawn.animate(_run_or_mechanism(mechanism, pair, start, stop), output, points or None)
 
 
 def _run_or_mechanism(

@@ -9,13 +9,14 @@ import click
 from planar.cli.exit_status import BAD_INPUT
 from planar.cli.options import (
     json_option,
+    limited_time,
     main,
     model_argument,
     output_option,
     print_or_write,
     read_model,
     refuse_overwriting,
-    show_progress,
+    timeout_option,
 )
 from planar.cli.streams import print_json
 from planar.document.answer_lists import MAX_VARIANT
@@ -27,6 +28,7 @@ PAGES = (".pdf",)
 @main.command()
 @model_argument()
 @json_option
+@timeout_option
 @click.option(
     "--vary", "count", type=click.IntRange(1, MAX_VARIANT), default=30, show_default=True, help="How many variants."
 )
@@ -53,7 +55,8 @@ def problem(model: str, as_json: bool, count: int, seed: int, output: Path | Non
     mechanism = read_model(model)
     for path in (output, answers):
         refuse_overwriting(model, path)
-    base, variants = solve(mechanism), problem_variants(mechanism, count, seed)
+    with limited_time(f"{mechanism.name}: variants"):
+        base, variants = solve(mechanism), problem_variants(mechanism, count, seed)
     if output is None and answers is None:
         from planar.reports.tables.classroom import variants_record, variants_tables
 
@@ -68,14 +71,16 @@ def problem(model: str, as_json: bool, count: int, seed: int, output: Path | Non
 
     for path, pages in ((output, problem_pages), (answers, answer_pages)):
         if path is not None:
-            with show_progress(f"{mechanism.name}: {path.name}", transient=True) as progress:
-                save_file(path, encode_sheets(pages(base, variants, seed, progress), path.suffix))
+            with limited_time(f"{mechanism.name}: {path.name}"):
+                drawn = pages(base, variants, seed)
+            save_file(path, encode_sheets(drawn, path.suffix))
 
 
 @main.command()
 @model_argument()
 @click.argument("answers", type=click.Path(exists=True, dir_okay=False, path_type=Path))
 @json_option
+@timeout_option
 @click.option(
     "--tolerance",
     type=click.FloatRange(0.0, 1.0),
@@ -94,7 +99,8 @@ def mark(model: str, answers: Path, as_json: bool, tolerance: float, output: Pat
     mechanism = read_model(model)
     refuse_overwriting(model, output)
     refuse_overwriting(str(answers), output, "the list of answers")
-    marks = mark_answers(mechanism, answers, tolerance)
+    with limited_time(f"{mechanism.name}: marks"):
+        marks = mark_answers(mechanism, answers, tolerance)
     if as_json:
         print_json(marks_record(marks))
     elif output is not None and output.suffix.lower() == ".csv":

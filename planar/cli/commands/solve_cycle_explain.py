@@ -26,7 +26,6 @@ from planar.cli.options import (
     report_motion,
     run_motion,
     scale_option,
-    show_progress,
     show_status,
     timeout_option,
 )
@@ -243,7 +242,6 @@ def cycle(
     asked: tuple[str, ...],
     output: Path | None,
     steps: int,
-    timeout: str | None,
     **course: Any,
 ) -> None:
     """The whole motion: position to position through the range of an input, or in time by the inputs' laws.
@@ -262,8 +260,8 @@ def cycle(
         from planar.reports.files.run_formats import check_writable
 
         check_writable(output.suffix)
-    with limited_time(timeout), show_progress(f"{mechanism.name}: {steps} steps", transient=True) as progress:
-        motion = run_motion(mechanism, steps, **course, jerk=jerk, progress=progress)
+    with limited_time(f"{mechanism.name}: {steps} steps", returns_part=True):
+        motion = run_motion(mechanism, steps, **course, jerk=jerk)
         if not as_json:
             motion.limits  # noqa: B018 - solved for while the sign is up
         told = {name: _answers(motion, name) for name in asked}

@@ -12,6 +12,7 @@ from planar.cli.options import (
     at_option,
     frame_number_option,
     input_option,
+    limited_time,
     load_model,
     main,
     mode_option,
@@ -21,8 +22,8 @@ from planar.cli.options import (
     read_model,
     refuse_overwriting,
     refuse_settings,
-    show_progress,
     show_status,
+    timeout_option,
 )
 from planar.foundation.errors import unknown_format_error
 
@@ -73,6 +74,7 @@ def view(
 
 @main.command()
 @model_argument("models", nargs=-1, metavar="[MODEL]...")
+@timeout_option
 @click.option(
     "-o",
     "output",
@@ -92,9 +94,9 @@ def gallery(models: tuple[str, ...], output: Path) -> None:
     named = models or tuple(map(str, model_files()))
     words = {PIPED: "piped"} | {model: "link" for model in named if model.startswith(LINK_PREFIX)}
     files = [words.get(model) or find_model_file(model).stem for model in named]
-    with show_progress(f"{len(files)} pages") as progress:
+    with limited_time(f"{len(files)} pages", returns_part=True):
         each = [(name, read_model(model)) for name, model in zip(files, named, strict=True)]
-        index, refused = write(each, output, progress)
+        index, refused = write(each, output)
     for name, problem in refused:
         click.echo(f"planar: {name}: {problem}", err=True)
     click.echo(str(index))

@@ -25,6 +25,7 @@ from planar.drawing.scheme.link_bodies import link_bodies
 from planar.drawing.scheme.link_strokes import body_marks
 from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput, unknown_format_error
+from planar.foundation.time_limit import all_within_time
 from planar.model.mechanism import Mechanism
 from planar.model.wording import amount
 from planar.results.motion import Motion
@@ -281,7 +282,7 @@ def _move_artist(artist: Any, mark: Outline) -> None:
 
 def _rendered_frames(script: AnimationScript, progress: Progress) -> Iterator[Pixels]:
     stage, total = _FrameCanvas(script), len(script.rows)
-    for index in range(total):
+    for index in all_within_time(range(total), "frames"):
         yield stage.draw_frame(index)
         progress(index + 1, total)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 from planar.analysis.classroom.questions import problem_questions, question_text, solve_question
@@ -22,6 +22,7 @@ from planar.drawing.output.solution_pages import (
 )
 from planar.drawing.paper.pens import require_matplotlib
 from planar.drawing.scheme.scheme import scheme
+from planar.foundation.time_limit import all_within_time
 from planar.model.file_units import display_unit
 from planar.model.mechanism import PUBLISHED_QUANTITIES, PublishedValue
 from planar.results.motion import State
@@ -32,12 +33,9 @@ if TYPE_CHECKING:
 FIGURE_SIZE = 115.0, 110.0
 """mm that the strokes of a problem's figure may take."""
 NAME_LINE = "_" * 40
-Progress = Callable[[float, float], None]
 
 
-def problem_pages(
-    base: State, variants: Sequence[Variant], seed: int, progress: Progress | None = None
-) -> list[Figure]:
+def problem_pages(base: State, variants: Sequence[Variant], seed: int) -> list[Figure]:
     """A page for each variant: what is given, what is to be found, the figure. Raises BadInput without matplotlib."""
     require_matplotlib()
     from matplotlib import rc_context
@@ -45,25 +43,21 @@ def problem_pages(
     questions = problem_questions(base)
     pages: list[Figure] = []
     with rc_context(MATPLOTLIB_SETTINGS):
-        for variant in variants:
+        for variant in all_within_time(variants, "pages"):
             pages += lay_out_pages(_problem_strips(variant, seed, questions))
-            if progress is not None:
-                progress(variant.number, len(variants))
     return pages
 
 
-def answer_pages(base: State, variants: Sequence[Variant], seed: int, progress: Progress | None = None) -> list[Figure]:
+def answer_pages(base: State, variants: Sequence[Variant], seed: int) -> list[Figure]:
     """The answers of all variants in tables, then the worked solution of each. Raises BadInput as `problem_pages`."""
     require_matplotlib()
     from matplotlib import rc_context
 
     with rc_context(MATPLOTLIB_SETTINGS):
         pages = lay_out_pages(_answer_strips(base, variants, seed))
-    for variant in variants:
+    for variant in all_within_time(variants, "solutions"):
         mechanism = variant.state.mechanism
         pages += solution_pages(variant.state, title=f"{mechanism.name}, variant {variant.number}")
-        if progress is not None:
-            progress(variant.number, len(variants))
     return pages
 
 

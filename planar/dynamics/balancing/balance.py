@@ -26,6 +26,7 @@ from planar.dynamics.forces import forces
 from planar.foundation.arrays import Array, BoolArray
 from planar.foundation.errors import BadInput, join_names
 from planar.foundation.short_repr import short_repr
+from planar.foundation.time_limit import MORE_TIME, all_within_time, stops_in_time
 from planar.model.mechanism import Mechanism
 from planar.results.motion import Motion
 from planar.solving.cycle import cycle
@@ -208,6 +209,7 @@ def _shares(motion: Motion, rows: BoolArray) -> Array:
 
 
 @takes_result("Mechanism", "Motion", "Motion")
+@stops_in_time
 # long: the docstring
 def balance(
     source: Mechanism | Motion,
@@ -217,6 +219,8 @@ def balance(
     measure: str = "greatest",
     about: str | None = None,
     of: str | None = None,
+    *,
+    timeout: float | None = None,  # noqa: ARG001 - of the decorator
 ) -> Balance:
     """The counterweights that make the shaking force, the shaking moment or the peak torque over a motion least.
 
@@ -228,7 +232,7 @@ def balance(
     form a cone, m I >= |m c|^2, so that the least is found for sure, with a bound below which no counterweight goes. Of
     the best the lightest are told. Discs of a given thickness form no convex set: of these the best are searched for.
     Raises BadInput where no link has a mass, nothing moves, a name or a limit is none, or the conic solver is not
-    installed (extra `balance`).
+    installed (extra `balance`); NoAnswer after `timeout` s or a Ctrl-C, with the outcome "interrupted".
 
     >>> import planar
     >>> found = planar.balance("two-stroke-engine", counterweights=["crank"])
@@ -273,18 +277,22 @@ def balance(
 
 
 @takes_result("Mechanism", "Motion", "Motion")
+@stops_in_time
 def balance_tradeoff(
     source: Mechanism | Motion,
     counterweights: Sequence[str] | Mapping[str, CounterweightLimit] | None = None,
     limit: CounterweightLimit | None = None,
     about: str | None = None,
     count: int = 9,
+    *,
+    timeout: float | None = None,  # noqa: ARG001 - of the decorator
 ) -> BalanceTradeoff:
     """The least greatest shaking moment for every greatest shaking force between the least of each (Pareto's curve).
 
     Arguments are those of `planar.balance`; `count` points at equal steps of the force, or one where
     the same counterweights are best for both. Raises BadInput as that does,
-    for fewer than two points, and for discs, which form no convex set.
+    for fewer than two points, and for discs, which form no convex set; NoAnswer after `timeout` s or a Ctrl-C, with the
+    outcome "interrupted".
 
     >>> import planar
     >>> curve = planar.balance_tradeoff("two-stroke-engine", ["crank", "rod"], count=3)
@@ -306,7 +314,8 @@ def balance_tradeoff(
     most = minimise_greatest(force, weights, [(moment, steady.value + TRADEOFF_SLACK * before[1])]).value
     found, values = [], []
     first = least + TRADEOFF_SLACK * before[0]
-    for level in np.linspace(first, most, count) if most > first else [first]:
+    levels = np.linspace(first, most, count) if most > first else np.array([first])
+    for level in all_within_time(levels, "points of the curve", f"{MORE_TIME}, or ask for fewer"):
         best = minimise_greatest(moment, weights, [(force, float(level))])
         values.append((mine[0].greatest(best.x), best.value, best.bound))
         found.append(weights.counterweights(weights.as_bodies(best.x), known.kinematics.axes))

@@ -9,6 +9,7 @@ import numpy as np
 from planar.dynamics.balancing.counterweights import CounterweightSet
 from planar.dynamics.balancing.optimum import Optimum, Response
 from planar.foundation.arrays import Array
+from planar.foundation.time_limit import all_within_time
 
 RANDOM_STARTS = 12
 """Starts beside that from the optimum of the convex hull."""
@@ -33,7 +34,7 @@ def search_discs(objective: Response, weights: CounterweightSet, hull: Optimum, 
     best: Array = nothing
     value = mine.greatest(nothing)
     scale = value or 1.0
-    for start in starts:
+    for start in all_within_time(starts, "searches for discs"):
         found = _improve(mine, start, discs, scale)
         reached = mine.greatest(found)
         if reached < value:

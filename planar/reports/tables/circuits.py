@@ -14,7 +14,6 @@ from planar.assemblies.circuits.circuits import Circuit, Circuits
 from planar.assemblies.circuits.traced_circuit import Branch
 from planar.assemblies.modes import Modes
 from planar.assemblies.selection import selection_words
-from planar.foundation.errors import Outcome
 from planar.foundation.units import parse_unit
 from planar.model.mechanism import relative_motions
 from planar.model.wording import amount, count_phrase, join_all_names
@@ -157,8 +156,8 @@ def record(circuits: Circuits, modes: Modes) -> dict[str, Any]:
 
     return {
         "mechanism": circuits.mechanism.name,
-        "outcome": (refused.outcome if refused else Outcome.SOLVED).value,
-        "reason": refused.reason if refused else "",
+        "outcome": (refused.outcome if refused else circuits.outcome).value,
+        "reason": refused.reason if refused else circuits.reason,
         "input": circuits.pair,
         "inputs": {given.pair: given.position for given in circuits.mechanism.inputs},
         "complete": circuits.complete.value,

@@ -60,6 +60,8 @@ def count_text(modes: Modes, listed_count: int) -> str:
     """How many assemblies there are, and how sure that is: 4 assemblies, complete."""
     bound = modes.bound
     most = "" if bound is None else f", {bound} at most"
+    if modes.outcome is Outcome.INTERRUPTED:
+        return f"at least {count_phrase(listed_count, 'assembly', 'assemblies')}{most}; {modes.outcome.value}"
     if modes.total is None:
         return f"more than {count_phrase(listed_count, 'assembly', 'assemblies')}{most}; {modes.complete.value}"
     beside = f" of {bound} complex solutions" if bound is not None and bound != modes.total else ""
@@ -199,7 +201,7 @@ def record(modes: Modes, limit: int, circuits: Circuits | None = None) -> dict[s
     near = modes.nearest
     return {
         "mechanism": modes.mechanism.name,
-        "outcome": Outcome.SOLVED.value,
+        "outcome": modes.outcome.value,
         "inputs": {given.pair: given.position for given in modes.mechanism.inputs},
         "assemblies": modes.total,
         "bound": modes.bound,

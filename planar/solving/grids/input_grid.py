@@ -14,6 +14,7 @@ import numpy as np
 
 from planar.foundation.arrays import Array, BoolArray, IntArray
 from planar.foundation.errors import NoAnswer, Outcome
+from planar.foundation.time_limit import MORE_TIME, report_progress, stop_if_over
 from planar.solving.checks.singular_values import MIN_REGULARITY
 from planar.solving.continuation.path import follow_samples, follow_straight
 from planar.solving.position import PositionSolver
@@ -48,6 +49,9 @@ class InputGrid:
         self._queue: deque[Node] = deque()
         self._start(z)
         while self._queue:
+            done, total = int(self.is_reached.sum()), self.is_reached.size
+            stop_if_over(f"after {done} of {total} positions", f"{MORE_TIME}, or ask for fewer positions")
+            report_progress(done, total)
             self._leave(self._queue.popleft())
 
     def inputs_at(self, node: Node) -> Array:

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from functools import cached_property
 from typing import Any
 
+from planar.foundation.time_limit import stop_if_over
 from planar.structures.chain import Chain
 from planar.structures.enumeration.pin_chains import Chains
 from planar.structures.general_position import GeneralPosition
@@ -53,7 +54,8 @@ class ChainsWithMultiplePins(Chains):
         All are had so, since a part that moves still moves where a link of a pin is pinned to one of its others alone.
         """
         found: set[tuple[Pin, ...]] = {chain.pins for chain in Chains(self.links, self.freedom, self.fractionated)}
-        for _ in range(self.multiple_pins):
+        for merged_count in range(self.multiple_pins):
+            stop_if_over(f"after pins were merged {merged_count} of {self.multiple_pins} times")
             merged = {canonical_pins(self.links, pins)[0] for each in found for pins in merged_pins(each)}
             found = {pins for pins in merged if has_movable_pins(self.links, pins)}
         return sorted(found, key=self._rank)

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from itertools import combinations
 from typing import Any
 
+from planar.foundation.time_limit import stop_if_over
 from planar.structures.chain import Chain
 from planar.structures.enumeration.pin_chains import Chains
 from planar.structures.general_position import GeneralPosition
@@ -67,6 +68,7 @@ class ChainsWithSlides(Chains):
         k = 0
         while True:
             if k == len(self._found):
+                stop_if_over(f"after {k} chains of pins")
                 chain = next(self._pin_chains, None)
                 if chain is None:
                     return

@@ -8,6 +8,7 @@ from typing import Any, overload
 import numpy as np
 
 from planar.foundation.arrays import Array
+from planar.foundation.time_limit import stop_if_over
 from planar.model.wording import count_phrase
 from planar.structures.chain import Chain
 from planar.structures.contracted_graphs import ContractedGraph, contracted_graphs
@@ -109,5 +110,6 @@ class Chains(Sequence[Chain]):
         """Each contracted graph with the binary links on its edges, made where they are not yet."""
         for index, graph in enumerate(self._graphs):
             if index == len(self._rows):
+                stop_if_over(f"after {index} of {len(self._graphs)} contracted graphs")
                 self._rows.append(distribute_binary_links(graph, self.links - len(graph.counts), self.freedom))
             yield graph, self._rows[index]

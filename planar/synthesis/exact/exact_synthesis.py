@@ -11,6 +11,7 @@ import numpy as np
 
 from planar.foundation.arrays import ComplexArray
 from planar.foundation.errors import BadInput
+from planar.foundation.time_limit import ComputationEnded, stop_if_over
 from planar.model.mechanism import Mechanism
 from planar.model.wording import count_phrase
 from planar.synthesis.design_search import DesignSearch
@@ -42,6 +43,8 @@ from planar.synthesis.task.synthesis_task import (
 
 SAME_POSE = 1e-9
 """Of the size, or of how far it is: a point that differs less is the same."""
+KEPT = "what was found of a random task is kept, and the same search goes on from there"
+"""Of a list that is ended before its designs are proved."""
 FAMILY_DESIGNS = 24
 """Designs that are listed of a family."""
 
@@ -53,11 +56,16 @@ def synthesise_all(
 ) -> CompleteSynthesis:
     """All linkages of a task's start that meet it exactly. Raises BadInput where there is no such list.
 
-    Where the trace test of a family is still to be made, the list goes to `show` before, and a KeyboardInterrupt
-    meanwhile leaves it as it is.
+    Where the trace test of a family is still to be made, the list goes to `show` before, and what ends
+    the test leaves it as it is.
     """
     mechanism = _single_start(task)
-    say = progress or (lambda _: None)
+    report = progress or (lambda _: None)
+
+    def say(stage: str) -> None:
+        stop_if_over(f"at this stage: {stage}", KEPT)
+        report(stage)
+
     try:
         problem = ExactProblem(task, mechanism)
     except BadInput:
@@ -74,7 +82,7 @@ def synthesise_all(
         show(result)
     try:
         tested = with_tested_records(solved, say)
-    except KeyboardInterrupt:
+    except (KeyboardInterrupt, ComputationEnded):
         return replace(result, is_finished=False)
     if any(len(one.x) != len(other.x) for one, other in zip(tested, solved, strict=True)):
         return _complete_list(problem, tested, say)

@@ -11,6 +11,7 @@ import click
 
 from planar.cli.options import (
     json_option,
+    limited_time,
     load_model,
     main,
     mode_option,
@@ -20,7 +21,7 @@ from planar.cli.options import (
     print_or_write,
     refuse_overwriting,
     run_motion,
-    show_status,
+    timeout_option,
 )
 from planar.cli.streams import print_json
 from planar.foundation.errors import BadInput, NoAnswer
@@ -36,6 +37,7 @@ if TYPE_CHECKING:
 @main.command()
 @model_argument()
 @json_option
+@timeout_option
 @mode_option
 @click.option(
     "--counterweights",
@@ -98,7 +100,7 @@ def balance(
         raise BadInput("-o", "the balanced mechanism is written to a .json file")
     links = None if counterweights is None else [each.strip() for each in counterweights.split(",")]
     limit = _limit(mechanism, mass, radius, disc)
-    with show_status(f"{mechanism.name}: balancing"):
+    with limited_time(f"{mechanism.name}: balancing"):
         conditions = balancing_conditions(mechanism, about)
         found = BalanceReport(conditions)
         if find_spec("clarabel") is not None:

@@ -9,6 +9,7 @@ import click
 
 from planar.cli.options import (
     json_option,
+    limited_time,
     load_model,
     main,
     mode_option,
@@ -16,7 +17,7 @@ from planar.cli.options import (
     output_option,
     print_or_write,
     refuse_overwriting,
-    show_status,
+    timeout_option,
 )
 from planar.cli.streams import print_json
 from planar.foundation.errors import BadInput, join_names, unknown_format_error
@@ -30,6 +31,7 @@ PICTURES = (".svg", ".pdf", ".png")
 @model_argument()
 @click.argument("measured", type=click.Path(exists=True, dir_okay=False, path_type=Path))
 @json_option
+@timeout_option
 @mode_option
 @click.option(
     "--free", multiple=True, metavar="NAME", help="A number that is sought; left out, all that the samples depend on."
@@ -81,7 +83,7 @@ def calibrate(  # many: options of the command
         refuse_overwriting(model, path)
         refuse_overwriting(str(measured), path, "the file of measurements")
     rows = read_measured_table(measured)
-    with show_status(f"{mechanism.name}: calibration"):
+    with limited_time(f"{mechanism.name}: calibration"):
         given = read_columns(mechanism, rows)
         exact = _read_deviations(mechanism, deviations, given.measured)
         inputs = None if untimed else given.inputs

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
-from planar.cli.options import json_option, main, print_or_write, show_progress, show_status
+from planar.cli.options import json_option, limited_time, main, print_or_write, show_progress, timeout_option
 from planar.cli.streams import print_json
 from planar.foundation.errors import BadInput
 from planar.foundation.safe_files import is_existing
 
 if TYPE_CHECKING:
+    from planar.structures.chain import Chain
     from planar.structures.enumeration.pin_chains import Chains
 
 PICTURES = (".svg", ".pdf", ".png")
@@ -55,6 +57,7 @@ MAX_CHAINS_LISTED = 250
     help="Draw them: an atlas in a folder, with an index; or sheets in a .pdf, .svg or .png file.",
 )
 @json_option
+@timeout_option
 def chains(  # many: options of the command
     links: int,
     freedom: int,
@@ -70,27 +73,49 @@ def chains(  # many: options of the command
     from planar.reports.tables.design.structures import record, table
     from planar.structures.enumeration.chains import chains as all_chains
 
-    found = all_chains(links, freedom, slides=slides, multiple_pins=multiple_pins, fractionated=not not_fractionated)
+    with limited_time(f"chains of {links} links", returns_part=True):
+        found = all_chains(
+            links, freedom, slides=slides, multiple_pins=multiple_pins, fractionated=not not_fractionated
+        )
+        listed = _list_in_time(found, None if as_json else limit)
+        count = len(listed) if as_json else _count_in_time(found)
     if output is not None:
-        _draw(found, limit, mechanisms, output)
+        _draw(found, listed[:limit], count, mechanisms, output)
     if as_json:
-        with show_status(f"chains of {links} links"):
-            records = [record(each, mechanisms) for each in found]
-        print_json(records)
+        print_json([record(each, mechanisms) for each in listed])
         return
-    with show_status(f"chains of {links} links"):
-        told = table(found, [*islice(found, limit)], mechanisms)
-    print_or_write(told, None)
+    print_or_write(table(found, listed, mechanisms, count), None)
 
 
-def _draw(found: Chains, limit: int, mechanisms: bool, output: Path) -> None:
+def _list_in_time(found: Chains, limit: int | None) -> list[Chain]:
+    """The first chains, as many as there is time for."""
+    from planar.foundation.time_limit import ComputationEnded, within_time
+
+    listed = []
+    with suppress(ComputationEnded):
+        for chain in within_time(islice(found, limit)):
+            listed.append(chain)
+    return listed
+
+
+def _count_in_time(found: Chains) -> int | None:
+    """How many chains there are; None where there is no time to count them."""
+    from planar.foundation.time_limit import ComputationEnded
+
+    try:
+        return len(found)
+    except ComputationEnded:
+        return None
+
+
+def _draw(found: Chains, shown: list[Chain], count: int | None, mechanisms: bool, output: Path) -> None:
     """The first chains on sheets, in a file where its name says so, else in a folder."""
     from planar import plot
     from planar.pages.chain_atlas import write_atlas
     from planar.structures.multiple_pins import joint_kinds_phrase
 
-    with show_status(f"chains of {found.links} links"):
-        shown, count = [*islice(found, limit)], len(found)
+    if not shown and count is None:
+        return
     if not shown:
         told = joint_kinds_phrase(found.slides, found.multiple_pins)
         raise BadInput("command line", f"of the chains of {found.links} links none{told} moves")

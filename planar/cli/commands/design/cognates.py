@@ -6,7 +6,16 @@ from pathlib import Path
 
 import click
 
-from planar.cli.options import json_option, load_model, main, mode_option, model_argument, print_or_write, show_status
+from planar.cli.options import (
+    json_option,
+    limited_time,
+    load_model,
+    main,
+    mode_option,
+    model_argument,
+    print_or_write,
+    timeout_option,
+)
 from planar.cli.streams import print_json
 from planar.foundation.errors import unknown_format_error
 
@@ -16,6 +25,7 @@ PICTURES = (".svg", ".pdf", ".png")
 @main.command()
 @model_argument()
 @json_option
+@timeout_option
 @mode_option
 @click.option("--of", "of", required=True, metavar="POINT", help="The point whose path is traced.")
 @click.option(
@@ -41,7 +51,7 @@ def cognates(model: str, as_json: bool, mode: int | None, of: str, drawing: Path
     if drawing is not None and drawing.suffix.lower() not in PICTURES:
         raise unknown_format_error(drawing.suffix, "a drawing", PICTURES)
     mechanism = load_model(model, mode)
-    with show_status(f"{mechanism.name}: cognates"):
+    with limited_time(f"{mechanism.name}: cognates"):
         found = find(mechanism, of)
     if output is not None:
         make_folder(output)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from planar.cli.options import main, show_progress, show_status
+from planar.cli.options import limited_time, main, show_progress, timeout_option
 from planar.foundation.errors import BadInput
 
 DATA_SET, FILE = ".zarr", ".json"
@@ -31,6 +31,7 @@ DATA_SET, FILE = ".zarr", ".json"
 )
 @click.option("--frame", type=int, metavar="LINK", help="Of one linkage: the link that is fixed.")
 @click.option("--drive", "drives", type=int, multiple=True, metavar="JOINT", help="Of one linkage: a driven joint.")
+@timeout_option
 @click.option("--seed", type=int, default=0, show_default=True, metavar="S", help="The same gives the same linkages.")
 @click.option(
     "-o",
@@ -72,7 +73,7 @@ def generate(  # many: options of the command
     from planar.structures.enumeration.chains import chains
     from planar.structures.multiple_pins import joint_kinds_phrase
 
-    with show_status("a linkage"):
+    with limited_time("a linkage"):
         found = chains(links, freedom, slides=slides, multiple_pins=multiple_pins)
         if not found:
             told = joint_kinds_phrase(slides, multiple_pins)

@@ -9,6 +9,7 @@ import click
 
 from planar.cli.options import (
     json_option,
+    limited_time,
     main,
     model_argument,
     output_option,
@@ -17,7 +18,7 @@ from planar.cli.options import (
     read_ends,
     read_model,
     refuse_overwriting,
-    show_status,
+    timeout_option,
 )
 from planar.cli.streams import print_json
 from planar.foundation.errors import BadInput
@@ -40,6 +41,7 @@ if TYPE_CHECKING:
 @click.option("--made-at", metavar="SCALE", help="The scale, as 1:5; left out, the largest that fits the sheet.")
 @range_options
 @json_option
+@timeout_option
 # many: sizes of what is cut
 def parts(
     model: str,
@@ -74,7 +76,7 @@ def parts(
         None if text is None else read_length(mechanism, text, option) for option, text in lengths.items()
     )
     first, last = read_ends(mechanism, pair, start, stop)
-    with show_status(f"{mechanism.name}: plates and layers"):
+    with limited_time(f"{mechanism.name}: plates and layers"):
         found = made(
             mechanism,
             thickness=thick,

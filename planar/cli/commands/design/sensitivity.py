@@ -10,6 +10,7 @@ import click
 from planar.cli.options import (
     at_option,
     json_option,
+    limited_time,
     load_model,
     main,
     mode_option,
@@ -21,7 +22,7 @@ from planar.cli.options import (
     refuse_options,
     refuse_overwriting,
     run_motion,
-    show_status,
+    timeout_option,
 )
 from planar.cli.streams import print_json
 from planar.foundation.errors import BadInput
@@ -34,6 +35,7 @@ if TYPE_CHECKING:
 @main.command()
 @model_argument()
 @json_option
+@timeout_option
 @at_option
 @mode_option
 @click.option("--of", "of", required=True, metavar="NAME", help="A point, a link, a pair or an input.")
@@ -71,7 +73,7 @@ def sensitivity(  # many: options of the command
 
     mechanism = load_model(model, mode)
     refuse_overwriting(model, output)
-    with show_status(f"{mechanism.name}: derivatives"):
+    with limited_time(f"{mechanism.name}: derivatives"):
         moving = run_motion(mechanism, **course) if whole else solve(mechanism, parse_drives(mechanism, at))
         found = derivatives(_forces(moving, static) if with_forces else moving, of)
         if result is not None and result not in found.slopes:

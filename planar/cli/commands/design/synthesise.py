@@ -11,9 +11,10 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 import click
 
-from planar.cli.exit_status import INTERRUPTED
-from planar.cli.options import json_option, main, print_or_write, show_progress, show_status
-from planar.cli.streams import print_json
+from planar.cli.exit_status import INTERRUPTED, no_answer_status
+from planar.cli.options import json_option, limited_time, main, print_or_write, show_progress, timeout_option
+from planar.cli.streams import ended_early, print_json
+from planar.foundation.errors import Outcome
 
 if TYPE_CHECKING:
     from planar.synthesis.exact.complete_synthesis import CompleteSynthesis
@@ -38,9 +39,7 @@ NOT_COUNTED = (
 @click.option(
     "--seed", type=click.IntRange(0), default=0, show_default=True, metavar="S", help="The same gives the same."
 )
-@click.option(
-    "--time", "seconds", type=click.FloatRange(0.0), metavar="SECONDS", help="Begin nothing new after so long."
-)
+@timeout_option
 @click.option(
     "-o",
     "output",
@@ -54,9 +53,7 @@ NOT_COUNTED = (
     "--complete", is_flag=True, help="All linkages that meet exactly as much as the start can, each certified."
 )
 @json_option
-def synthesise(
-    task: Path, many: int, seed: int, seconds: float | None, output: Path | None, complete: bool, as_json: bool
-) -> None:
+def synthesise(task: Path, many: int, seed: int, output: Path | None, complete: bool, as_json: bool) -> None:
     """The linkages that do best what a TASK wants: paths, poses or functions, of any structure."""
     from planar.reports.tables.design.synthesis import record, table
     from planar.synthesis.synthesise import TaskSearch, progress_words
@@ -67,14 +64,14 @@ def synthesise(
     is_sheet = output is not None and output.suffix.lower() in SHEET_SUFFIXES
     folder = None if is_sheet else output
     shown: list[CompleteSynthesis] = []
-    with show_status(f"{wanted.name}: designs") as status:
+    with limited_time(f"{wanted.name}: designs", returns_part=True) as bar:
 
         def show(done: SearchProgress) -> None:
             if done.result is not None and not as_json:
                 print_or_write(table(done.result, []), None)
                 shown.append(done.result)
-            if status is not None:
-                status.update(f"{wanted.name}: {done.stage if complete else progress_words(done, wanted)}")
+            if bar is not None:
+                bar.describe(f"{wanted.name}: {done.stage if complete else progress_words(done, wanted)}")
 
         ended_by: int | None = None
         found: Synthesis
@@ -85,9 +82,11 @@ def synthesise(
                 raise KeyboardInterrupt(KEPT) from None
             ended_by = None if found.is_finished else INTERRUPTED
         else:
-            search = TaskSearch(wanted, many, seed, seconds, folder, show)
+            search = TaskSearch(wanted, many, seed, folder, show)
             ended_by = _run(search)
             found = search.result()
+        if ended_early():
+            ended_by = no_answer_status(Outcome.INTERRUPTED)
     files: list[Path] = []
     if folder is not None:
         from planar.pages.design_gallery import design_files, write_designs
@@ -106,7 +105,8 @@ def synthesise(
             click.echo(f"planar: {NOT_COUNTED}", err=True)
             sys.exit(ended_by)
         goes_on = "; the same command goes on where it was" if folder is not None else "; with -o FOLDER it could go on"
-        click.echo(f"planar: interrupted: what was found till then is told{goes_on}", err=True)
+        why = f"{ended_early()}; " if ended_early() else ""
+        click.echo(f"planar: interrupted: {why}the designs found by then are listed{goes_on}", err=True)
         sys.exit(ended_by)
 
 

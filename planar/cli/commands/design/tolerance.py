@@ -11,6 +11,7 @@ import click
 from planar.cli.options import (
     at_option,
     json_option,
+    limited_time,
     load_model,
     main,
     mode_option,
@@ -22,7 +23,7 @@ from planar.cli.options import (
     refuse_options,
     refuse_overwriting,
     run_motion,
-    show_status,
+    timeout_option,
 )
 from planar.cli.streams import print_json
 from planar.foundation.errors import BadInput
@@ -34,6 +35,7 @@ LIMIT_RESULTS = {"stroke": "travel", "swing": "travel", "travel": "travel", "tim
 @main.command()
 @model_argument()
 @json_option
+@timeout_option
 @at_option
 @mode_option
 @click.option("--of", "of", required=True, metavar="NAME", help="A point, a link, a pair or an input.")
@@ -93,7 +95,7 @@ def tolerance(  # many: options of the command
     if lengths is not None:
         others["lengths"] = _read_deviation(lengths, "--lengths", "length", mechanism.units)
     refuse_overwriting(model, output)
-    with show_status(f"{mechanism.name}: tolerances"):
+    with limited_time(f"{mechanism.name}: tolerances"):
         moving = run_motion(mechanism, **course) if whole else solve(mechanism, parse_drives(mechanism, at))
         band = band_of(moving, of, others or None, result=named, samples=samples or 0, seed=seed, guaranteed=guaranteed)
         if limit is not None:

@@ -16,10 +16,11 @@ from planar.structures.enumeration.pin_chains import Chains
 from planar.structures.multiple_pins import joint_kinds_phrase
 
 
-def table(found: Chains, shown: Sequence[Chain], with_mechanisms: bool) -> RenderableType:
-    """The chains, how many there are, and on request the mechanisms that they make."""
+def table(found: Chains, shown: Sequence[Chain], with_mechanisms: bool, count: int | None) -> RenderableType:
+    """The first chains, how many there are (`count`, None where time was over before), and on request the mechanisms
+    that they make."""
     parted = sum(each.is_fractionated for each in shown)
-    whole = len(shown) == len(found)
+    whole = len(shown) == count
     if found.freedom == 1 or not whole:
         beside = ""
     elif found.fractionated:
@@ -27,8 +28,12 @@ def table(found: Chains, shown: Sequence[Chain], with_mechanisms: bool) -> Rende
     else:
         beside = ", fractionated ones left out"
     kinds = f"{found.links} links{joint_kinds_phrase(found.slides, found.multiple_pins)}"
-    many = count_phrase(len(found), "kinematic chain")
+    many = count_phrase(len(shown) if count is None else count, "kinematic chain")
+    if count is None:
+        many = f"at least {many}"
     head = Text(f"{many} of {kinds}, freedom {found.freedom}{beside}", style="bold")
+    if not shown and count is None:
+        return Group(head)
     if not shown:
         return Group(head, Text(), paragraphs([(" -", "with such joints some joint of each would not move")]))
     more = [name for name, is_there in (("pins", found.multiple_pins), ("slides", found.slides)) if is_there]
