@@ -211,8 +211,8 @@ def _join_rows(rows: Sequence[tuple[IntArray, Scalar]], count: int) -> Scalar:
         indices = [index for index, _ in rows]
         return type(jets[0])(*(_join_rows(list(zip(indices, part, strict=True)), count) for part in parts))
     joined = np.empty((count, max((np.shape(value)[-1] for _, value in rows if np.ndim(value)), default=1)))
-    for indices, value in rows:
-        joined[indices] = value
+    for index, value in rows:
+        joined[index] = value
     return joined
 
 

@@ -33,7 +33,7 @@ def rest_position(mechanism: Mechanism, drives: Sequence[Drive] = ()) -> State:
     residual = float(gaps.max(initial=0.0))
     if residual > solver.tolerance:
         raise refusals.not_closed(solver, solver.row_pairs[int(np.argmax(gaps))], residual)
-    w = solver.functions.coordinate_function(z, u, p).full().ravel()
+    w = solver.functions.coordinates(z, u, p)
     frames, own = frames_from_coordinates((w * solver.scale).tolist(), solver.column, solver.shapes, solver.pairs)
     solver.refuse_open_contact(frames, own)
     slopes = solver.functions.jacobians(z[None], u[None], p)
