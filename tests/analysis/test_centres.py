@@ -28,7 +28,7 @@ from planar.results.motion import State
 from planar.solving.position import solve
 from tests.builders import four_bar_document, slider_crank_document
 from tests.closed_forms import between, piston
-from tests.command import run
+from tests.command import run, written
 from tests.draws import covering, draws, first_cases
 from tests.known import MODELS, kinds_of_model, some_models, state_of
 from tests.known import found_centres as found
@@ -1018,3 +1018,15 @@ def test_centres_between_some_links_and_of_no_link(tmp_path):
     assert "I23" in written_text and "I13" not in written_text
     refused = run(tmp_path, "centres", "four-bar", "--link", "BC", "--cycle").refused(2)
     assert "with --cycle name a centre with --of" in refused
+
+
+def test_centres_of_too_many_links_are_refused_with_what_to_do(tmp_path):
+    document = chain.document(1000)
+    name = written(tmp_path, document)
+    refused = run(tmp_path, "centres", name).refused(2)
+    assert refused.startswith("links: all instantaneous centres of 1,000 links would take minutes; those of one link")
+    assert "instantaneous centres of 1,000" in run(tmp_path, "centres", name, "--link", "crank").refused(2)
+    assert "1,000 links" in run(tmp_path, "plot", name, "centres", "-o", "a.svg").refused(2)
+    assert "a page of 1,000 links" in run(tmp_path, "view", name, "-o", "a.html").refused(2)
+    with pytest.raises(BadInput, match="those of one link take seconds: --link frame"):
+        centres(planar.from_dict(chain.document(300)))

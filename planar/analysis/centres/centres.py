@@ -33,11 +33,11 @@ from planar.analysis.rate_ratios import LEAST_ERROR, LinkPoles, solve_link_poles
 from planar.analysis.vector_chains import VectorChains
 from planar.document.first_argument import takes_result
 from planar.foundation.arrays import Array, BoolArray
-from planar.foundation.errors import BadInput, Unknown
+from planar.foundation.errors import BadInput, Unknown, join_names
 from planar.foundation.notebook_display import Displayable
 from planar.foundation.short_repr import short_repr
 from planar.model.link_graph import link_numbers, number_separator
-from planar.model.mechanism import Mechanism, named_points
+from planar.model.mechanism import Mechanism, check_link_count, named_points
 from planar.results.motion import State
 from planar.solving.rest_position import rest_position
 
@@ -48,6 +48,8 @@ INFINITY_RATIO_AT_CROSSING = 1e-6
 INFINITY_RATIO = 1e-9
 """A centre whose w is this small beside x and y, in the mechanism's size, cannot be told from one at infinity."""
 
+MAX_LINKS_OF_ALL_CENTRES, MAX_LINKS_OF_SOME_CENTRES = 250, 600
+"""Of more links all centres, or those of some links, take minutes: the time grows with the cube of the links."""
 MAX_LINKS_OF_FULL_SEARCH = 40
 """Of mechanisms of more links only the centres of the chosen links and of the frame are searched for."""
 
@@ -145,7 +147,7 @@ def centres(position: State | Mechanism, links: str | Sequence[str] = ()) -> Cen
     position is assembled, so that it may stand where `solve` finds no velocities: on a dead point of its inputs or on
     a change point. `links` chooses: of one link all its centres, of several those between any two of them; the time
     of these grows with the number of links, that of all with its cube. Raises NoAnswer where it cannot be assembled,
-    BadInput for a link that there is not.
+    BadInput for a link that there is not, and for all centres of more than 250 links or some of more than 600.
 
     >>> import planar
     >>> sorted(each.name for each in planar.centres(planar.load("four-bar")))
@@ -153,15 +155,26 @@ def centres(position: State | Mechanism, links: str | Sequence[str] = ()) -> Cen
     >>> sorted(each.name for each in planar.centres(planar.load("four-bar"), "BC"))
     ['I12', 'I23', 'I24']
     """
-    mechanism = position if isinstance(position, Mechanism) else position.mechanism
+    chosen = chosen_links(position if isinstance(position, Mechanism) else position.mechanism, links)
+    search = _CentreSearch(rest_position(position) if isinstance(position, Mechanism) else position, chosen)
+    search.search()
+    return search.result()
+
+
+def chosen_links(mechanism: Mechanism, links: str | Sequence[str]) -> tuple[str, ...]:
+    """The links whose centres are asked for, none for all. Raises BadInput where that takes too long."""
     chosen = (links,) if isinstance(links, str) else tuple(dict.fromkeys(links))
     names = [link.name for link in mechanism.links]
     for link in chosen:
         if link not in names:
-            raise BadInput(link, f"there is no link of this name; links are {', '.join(names)}")
-    search = _CentreSearch(rest_position(position) if isinstance(position, Mechanism) else position, chosen)
-    search.search()
-    return search.result()
+            raise BadInput(link, f"there is no link of this name; links are {join_names(names)}")
+    if chosen:
+        remedy = f"mechanisms of up to {MAX_LINKS_OF_SOME_CENTRES} links have them"
+        check_link_count(mechanism, MAX_LINKS_OF_SOME_CENTRES, "instantaneous centres", remedy)
+    else:
+        remedy = f"those of one link take seconds: --link {names[0]}, or in Python centres(position, {names[0]!r})"
+        check_link_count(mechanism, MAX_LINKS_OF_ALL_CENTRES, "all instantaneous centres", remedy)
+    return chosen
 
 
 def is_chosen(two: Iterable[str], links: Collection[str]) -> bool:

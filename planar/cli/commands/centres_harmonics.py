@@ -100,6 +100,7 @@ def centres(  # many: options of the command
 ) -> None:
     """All instantaneous centres, with the lines of centres that show each; or their paths over the motion."""
     from planar.analysis.centres.centres import centres as all_centres
+    from planar.analysis.centres.centres import chosen_links
     from planar.reports.tables.centres import record, table
     from planar.solving.rest_position import rest_position
 
@@ -116,6 +117,7 @@ def centres(  # many: options of the command
     if whole:
         _report_paths(mechanism, names, as_json, output, course)
         return
+    chosen_links(mechanism, links)
     with show_status(mechanism.name):
         found = all_centres(rest_position(mechanism, parse_drives(mechanism, at)), links)
     if as_json:
