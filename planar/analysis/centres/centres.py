@@ -168,10 +168,9 @@ def chosen_links(mechanism: Mechanism, links: str | Sequence[str]) -> tuple[str,
     for link in chosen:
         if link not in names:
             raise BadInput(link, f"there is no link of this name; links are {join_names(names)}")
-    if chosen:
-        remedy = f"mechanisms of up to {MAX_LINKS_OF_SOME_CENTRES} links have them"
-        check_link_count(mechanism, MAX_LINKS_OF_SOME_CENTRES, "instantaneous centres", remedy)
-    else:
+    remedy = f"up to {MAX_LINKS_OF_SOME_CENTRES} links those of one link can be asked for"
+    check_link_count(mechanism, MAX_LINKS_OF_SOME_CENTRES, "instantaneous centres", remedy)
+    if not chosen:
         remedy = f"those of one link take seconds: --link {names[0]}, or in Python centres(position, {names[0]!r})"
         check_link_count(mechanism, MAX_LINKS_OF_ALL_CENTRES, "all instantaneous centres", remedy)
     return chosen
