@@ -23,6 +23,9 @@ SAME_POINT_TOLERANCE = 1e-6
 MAX_SOLVED_FOR_REMARK = 32
 """Dyads, or larger blocks by what they take, that are solved with every position for the sake of a remark."""
 
+MAX_LINKS_FOR_REMARK = 150
+"""Links of more than so many dyads, or larger blocks, whatever they are joined to."""
+
 
 def with_assembly_number(mechanism: Mechanism, advice: str = "") -> Mechanism:
     """The mechanism with a remark of which assembly the sketch means, where that is told within some milliseconds.
@@ -30,6 +33,8 @@ def with_assembly_number(mechanism: Mechanism, advice: str = "") -> Mechanism:
     `advice` says how another assembly is chosen, and ends the remark. Where there is nothing to choose, or the numbers
     are not sure, the mechanism as it is.
     """
+    if len(mechanism.links) > MAX_LINKS_FOR_REMARK:
+        return mechanism
     known = solved_mechanism(mechanism)
     stages = known.solver.equations.blocks
     if len(stages) > MAX_SOLVED_FOR_REMARK or known.solver.equations.open_rows:

@@ -16,8 +16,6 @@ from planar.equations.known_types import fingerprint
 from planar.foundation.printed_formula import PrintedFunction, compile_formula
 from planar.foundation.recorded_formula import RecordedFormula
 
-PARTS_OF_FRAME = 5
-"""x, y, cos, sin and angle of a frame are the arguments of a formula."""
 MAX_ELEMENTS = 1024
 
 

@@ -433,6 +433,13 @@ def find_slot_problem(mechanism: Mechanism) -> tuple[str, str] | None:
     return None
 
 
+def check_link_count(mechanism: Mechanism, maximum: int, subject: str, remedy: str) -> None:
+    """Raise BadInput where a mechanism has more links than `subject` can be computed of; `remedy` says what to do."""
+    count = len(mechanism.links)
+    if count > maximum:
+        raise BadInput("links", f"{subject} of {count:,} links would take minutes; {remedy}")
+
+
 def named_points(mechanism: Mechanism) -> tuple[NamedPoint, ...]:
     """Every point under its result name.
 

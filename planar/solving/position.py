@@ -363,7 +363,8 @@ class SolvedMechanism:
     """What is kept of a mechanism from one solution to the next."""
 
     def __init__(self, mechanism: Mechanism):
-        self._plain_solver = PositionSolver(mechanism)
+        self.plain_solver = PositionSolver(mechanism)
+        "by the constraints of the pairs alone"
         self._judgements: dict[str | None, NoAnswer | None] = {}
         self.range_ends: dict[Any, Any] = {}
         "the ends of the ranges of its inputs"
@@ -388,16 +389,20 @@ class SolvedMechanism:
         found = self._start[1]
         if isinstance(found, NoAnswer):
             return found
-        return self._plain_solver.unassembled(found)  # type: ignore[arg-type]  # an assembly is not refused
+        return self.plain_solver.unassembled(found)  # type: ignore[arg-type]  # an assembly is not refused
+
+    @cached_property
+    def nearest(self) -> Assembly | AssemblySearchFailure | NoAnswer:
+        """The assembly nearest to the sketch by the constraints of the pairs alone, or why there is none."""
+        try:
+            return self.plain_solver.nearest()
+        except NoAnswer as problem:
+            return problem
 
     @cached_property
     def _start(self) -> tuple[PositionSolver, Assembly | AssemblySearchFailure | NoAnswer]:
-        solver = self._plain_solver
-        try:
-            found = solver.nearest()
-        except NoAnswer as problem:
-            return solver, problem
-        if isinstance(found, AssemblySearchFailure):
+        solver, found = self.plain_solver, self.nearest
+        if not isinstance(found, Assembly):
             return solver, found
         regular = None if is_surely_regular(solver, found.z) else solver.regularized(found.z)
         if regular is not None:
@@ -415,7 +420,7 @@ class SolvedMechanism:
     @cached_property
     def completed_mechanism(self) -> Mechanism:
         """The mechanism; where its inputs leave links free, with further inputs that hold these as they are drawn."""
-        solver = self._plain_solver
+        solver = self.plain_solver
         if not any(block.is_free for block in solver.equations.blocks):
             return solver.mechanism
         from planar.solving.drawn_inputs import with_drawn_inputs  # few mechanisms have too few inputs
@@ -461,7 +466,7 @@ class SolvedMechanism:
     def _share_start(self, other: SolvedMechanism) -> None:
         """Take the start of the same mechanism with other rates, where this one has none yet."""
         if "_start" not in self.__dict__:
-            self.__dict__["_start"] = other.solver.with_inputs_of(self._plain_solver.mechanism), other._start[1]
+            self.__dict__["_start"] = other.solver.with_inputs_of(self.plain_solver.mechanism), other._start[1]
 
     def _judgement(self, pair: str | None) -> NoAnswer | None:
         """Why an input of this mechanism at rest cannot run; None where one can."""

@@ -16,6 +16,7 @@ from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 
 import planar
+from benchmarks import chain
 from planar.analysis.centres.centres import Centre, Centres, OpeningPairs, centres
 from planar.analysis.centres.two_directions import centre_of
 from planar.analysis.centres.velocities import links_by_centres, velocity_by_centres
@@ -27,7 +28,7 @@ from planar.results.motion import State
 from planar.solving.position import solve
 from tests.builders import four_bar_document, slider_crank_document
 from tests.closed_forms import between, piston
-from tests.command import run
+from tests.command import run, written
 from tests.draws import covering, draws, first_cases
 from tests.known import MODELS, kinds_of_model, some_models, state_of
 from tests.known import found_centres as found
@@ -984,3 +985,48 @@ def test_openings_are_counted_as_centres_become_known(seed):
             opening.add_known([pair])
             known[pair] = known[pair[::-1]] = 1
     assert opening.best_pair() is None
+
+
+def test_centres_of_one_link_are_those_among_all():
+    """Of many links only those of the link and of the frame are searched for, of few all."""
+    for state, link in ((state_of("slider-crank"), "rod"), (solve(planar.from_dict(chain.document(44))), "rocker5")):
+        every, some = centres(state), centres(state, link)
+        assert [centre.name for centre in every if link in centre.links] == sorted(
+            (centre.name for centre in some), key=[centre.name for centre in every].index
+        )
+        assert len(some) == len(every.numbers) - 1
+        for centre in some:
+            point, expected = centre.homogeneous, every[centre.links].homogeneous
+            assert np.linalg.norm(np.cross(point, expected / np.linalg.norm(expected))) < 1e-10
+        assert some.proof.routes < 1e-9
+        assert f"{len(some)} centres of {link} of" in remarks(some)[0]
+        with pytest.raises(Unknown, match=f"only centres of {link} were computed"):
+            some[tuple(name for name in every.numbers if name != link)[:2]]
+
+
+def test_centres_between_some_links_and_of_no_link(tmp_path):
+    state = state_of("four-bar")
+    assert [centre.links for centre in centres(state, ["BC", "AD"])] == [("BC", "AD")]
+    with pytest.raises(BadInput, match="there is no link of this name"):
+        centres(state, "AE")
+    listed = json.loads(run(tmp_path, "centres", "four-bar", "--link", "BC", "--json").done())
+    assert [centre["name"] for centre in listed["centres"]] == ["I12", "I23", "I24"] and listed["of"] == ["BC"]
+    text = run(tmp_path, "centres", "four-bar", "--link", "BC", "--link", "AD").done()
+    assert "I24" in text and "I13" not in text and "1 centre of BC and AD of 4 links" in text
+    run(tmp_path, "centres", "four-bar", "--link", "BC", "-o", "centres.txt").done()
+    written_text = (tmp_path / "centres.txt").read_text()
+    assert "I23" in written_text and "I13" not in written_text
+    refused = run(tmp_path, "centres", "four-bar", "--link", "BC", "--cycle").refused(2)
+    assert "with --cycle name a centre with --of" in refused
+
+
+def test_centres_of_too_many_links_are_refused_with_what_to_do(tmp_path):
+    document = chain.document(1000)
+    name = written(tmp_path, document)
+    refused = run(tmp_path, "centres", name).refused(2)
+    assert refused.startswith("links: instantaneous centres of 1,000 links would take minutes; up to 600 links")
+    assert "instantaneous centres of 1,000" in run(tmp_path, "centres", name, "--link", "crank").refused(2)
+    assert "1,000 links" in run(tmp_path, "plot", name, "centres", "-o", "a.svg").refused(2)
+    assert "a page of 1,000 links" in run(tmp_path, "view", name, "-o", "a.html").refused(2)
+    with pytest.raises(BadInput, match="those of one link take seconds: --link frame"):
+        centres(planar.from_dict(chain.document(300)))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations, islice
@@ -32,12 +32,12 @@ from planar.analysis.rate_equations import rate_equations as rates_of
 from planar.analysis.rate_ratios import LEAST_ERROR, LinkPoles, solve_link_poles
 from planar.analysis.vector_chains import VectorChains
 from planar.document.first_argument import takes_result
-from planar.foundation.arrays import Array
-from planar.foundation.errors import Unknown
+from planar.foundation.arrays import Array, BoolArray
+from planar.foundation.errors import BadInput, Unknown, join_names
 from planar.foundation.notebook_display import Displayable
 from planar.foundation.short_repr import short_repr
 from planar.model.link_graph import link_numbers, number_separator
-from planar.model.mechanism import Mechanism, named_points
+from planar.model.mechanism import Mechanism, check_link_count, named_points
 from planar.results.motion import State
 from planar.solving.rest_position import rest_position
 
@@ -47,6 +47,11 @@ INFINITY_RATIO_AT_CROSSING = 1e-6
 """As INFINITE, where motions cross."""
 INFINITY_RATIO = 1e-9
 """A centre whose w is this small beside x and y, in the mechanism's size, cannot be told from one at infinity."""
+
+MAX_LINKS_OF_ALL_CENTRES, MAX_LINKS_OF_SOME_CENTRES = 250, 600
+"""Of more links all centres, or those of some links, take minutes: the time grows with the cube of the links."""
+MAX_LINKS_OF_FULL_SEARCH = 40
+"""Of mechanisms of more links only the centres of the chosen links and of the frame are searched for."""
 
 
 @dataclass(frozen=True)
@@ -95,7 +100,7 @@ class CentreLine(NamedTuple):
 
 @dataclass(frozen=True)
 class Centres(Displayable):
-    """All n(n-1)/2 centres of a position, by two link names in any order."""
+    """All n(n-1)/2 centres of a position, or those of some links, by two link names in any order."""
 
     state: State
     numbers: Mapping[str, str]
@@ -107,6 +112,8 @@ class Centres(Displayable):
     "links that move as one in this position, in groups; at rest are those in one with the frame"
     branches: tuple[Mapping[str, Array], ...] = ()
     "at a change point, for each branch that crosses there, where the open centres by name lie on it: homogeneous (3,)"
+    links: tuple[str, ...] = ()
+    "of one link all its centres, of several those between any two of them; without any all"
 
     @cached_property
     def _by_links(self) -> dict[LinkPair, Centre]:
@@ -119,6 +126,9 @@ class Centres(Displayable):
         two = frozenset(links)
         if two in self._by_links:
             return self._by_links[two]
+        if two <= self.numbers.keys() and len(two) == 2:
+            chosen = ", ".join(self.links)
+            raise Unknown(f"only centres of {chosen} were computed, not that of {' and '.join(map(repr, links))}")
         raise Unknown(f"there are no links {' and '.join(map(repr, links))}; links are {', '.join(self.numbers)}")
 
     def __iter__(self) -> Iterator[Centre]:
@@ -129,21 +139,46 @@ class Centres(Displayable):
 
 
 @takes_result("State", "Mechanism")
-def centres(position: State | Mechanism) -> Centres:
+def centres(position: State | Mechanism, links: str | Sequence[str] = ()) -> Centres:
     """Every instantaneous centre of a position, from positions alone: Kennedy's theorem on what the pairs show.
 
     Where no two lines are known, one centre is taken from the linear equations round the loops, and lines serve again;
     where the mechanism can move in several ways it is that of the inputs' given rates. Of a mechanism only the
     position is assembled, so that it may stand where `solve` finds no velocities: on a dead point of its inputs or on
-    a change point. Raises NoAnswer where it cannot be assembled.
+    a change point. `links` chooses: of one link all its centres, of several those between any two of them; the time
+    of these grows with the number of links, that of all with its cube. Raises NoAnswer where it cannot be assembled,
+    BadInput for a link that there is not, and for all centres of more than 250 links or some of more than 600.
 
     >>> import planar
     >>> sorted(each.name for each in planar.centres(planar.load("four-bar")))
     ['I12', 'I13', 'I14', 'I23', 'I24', 'I34']
+    >>> sorted(each.name for each in planar.centres(planar.load("four-bar"), "BC"))
+    ['I12', 'I23', 'I24']
     """
-    found = _CentreSearch(rest_position(position) if isinstance(position, Mechanism) else position)
-    found.search()
-    return found.result()
+    chosen = chosen_links(position if isinstance(position, Mechanism) else position.mechanism, links)
+    search = _CentreSearch(rest_position(position) if isinstance(position, Mechanism) else position, chosen)
+    search.search()
+    return search.result()
+
+
+def chosen_links(mechanism: Mechanism, links: str | Sequence[str]) -> tuple[str, ...]:
+    """The links whose centres are asked for, none for all. Raises BadInput where that takes too long."""
+    chosen = (links,) if isinstance(links, str) else tuple(dict.fromkeys(links))
+    names = [link.name for link in mechanism.links]
+    for link in chosen:
+        if link not in names:
+            raise BadInput(link, f"there is no link of this name; links are {join_names(names)}")
+    remedy = f"up to {MAX_LINKS_OF_SOME_CENTRES} links those of one link can be asked for"
+    check_link_count(mechanism, MAX_LINKS_OF_SOME_CENTRES, "instantaneous centres", remedy)
+    if not chosen:
+        remedy = f"those of one link take seconds: --link {names[0]}, or in Python centres(position, {names[0]!r})"
+        check_link_count(mechanism, MAX_LINKS_OF_ALL_CENTRES, "all instantaneous centres", remedy)
+    return chosen
+
+
+def is_chosen(two: Iterable[str], links: Collection[str]) -> bool:
+    """Whether the centre of two links is among those of some links: of one all, of several those between them."""
+    return len(links) == 0 or (any if len(links) == 1 else all)(link in links for link in two)
 
 
 def extent(state: State) -> tuple[Array, float]:
@@ -157,11 +192,12 @@ class OpeningPairs:
     """How many centres would have two lines if that of two links were known, for all pairs of links while centres
     become known."""
 
-    def __init__(self, link_count: int):
+    def __init__(self, link_count: int, is_target: BoolArray | None = None):
+        """`is_target` (links, links): the pairs that are offered; by default all."""
         shape = (link_count, link_count)
         self.known_count = 0
         self._is_known, self._has_line = np.zeros(shape, dtype=int), np.zeros(shape, dtype=int)
-        self._is_open = np.triu(np.ones(shape, dtype=bool), 1)
+        self._is_open = np.triu(np.ones(shape, dtype=bool) if is_target is None else is_target, 1)
         "of links in their order: neither known nor excluded"
         self._opened = np.zeros(shape, dtype=int)
         "for links a and b how many others have a line with a and a known centre with b"
@@ -205,8 +241,8 @@ class OpeningPairs:
 class _CentreSearch:
     """The centres of one position while they are found."""
 
-    def __init__(self, state: State):
-        self.state = state
+    def __init__(self, state: State, chosen: tuple[str, ...] = ()):
+        self.state, self.chosen = state, chosen
         self.numbers = link_numbers(state.mechanism)
         self.links = sorted(self.numbers, key=lambda link: int(self.numbers[link]))
         self.middle, self.size = extent(state)
@@ -215,10 +251,23 @@ class _CentreSearch:
         self.chains = VectorChains(rates, named, self.size)
         self.motions = allowed_motions(state, self.middle, self.size)
         worst = MAX_MEETING_ERROR if self.motions.mobility <= 1 else MAX_ERROR_AT_CROSSING
-        self.construction = KennedyConstruction(self.links, primary_centres(rates, self.middle, self.size), worst)
+        self.targets = self._target_pairs()
+        primary = primary_centres(rates, self.middle, self.size)
+        self.construction = KennedyConstruction(self.links, primary, worst, self.targets)
         self.by_equations: dict[LinkPair, str] = {}
         self.as_one: set[LinkPair] = set()
         self.open_reason = ""
+
+    def _target_pairs(self) -> list[LinkPair] | None:
+        """The pairs of links whose centres are searched for; None for all.
+
+        Lines through centres of the frame and of a link locate nearly all other centres of the link. Where mechanisms
+        are small all are searched for, so that those of a link are derived as in the list of all.
+        """
+        if not self.chosen or len(self.links) <= MAX_LINKS_OF_FULL_SEARCH:
+            return None
+        ends = {*self.chosen, self.state.mechanism.frame}
+        return [frozenset((a, b)) for a in sorted(ends) for b in self.links if a != b]
 
     @property
     def found(self) -> dict[LinkPair, FoundCentre]:
@@ -229,8 +278,12 @@ class _CentreSearch:
         """All of them, as far as they are determined."""
         self.construction.find_all()
         moved: LinkPoles | None = None
-        opening = OpeningPairs(len(self.links))
         place = {link: index for index, link in enumerate(self.links)}
+        is_target = np.full((len(self.links), len(self.links)), self.targets is None)
+        for two in self.targets or ():
+            a, b = (place[link] for link in two)
+            is_target[a, b] = is_target[b, a] = True
+        opening = OpeningPairs(len(self.links), is_target)
         while True:
             opening.add_known(
                 [tuple(place[link] for link in two) for two in islice(self.found, opening.known_count, None)]
@@ -261,12 +314,18 @@ class _CentreSearch:
 
     def result(self) -> Centres:
         """The centres in metres, with names and derivations, and their proof."""
-        listed = [self._centre(two, order, one) for order, (two, one) in enumerate(self.found.items(), start=1)]
-        rest = [frozenset(two) for two in combinations(self.links, 2) if frozenset(two) not in self.found]
+        chosen = {two: one for two, one in self.found.items() if is_chosen(two, self.chosen)}
+        listed = [self._centre(two, order, one) for order, (two, one) in enumerate(chosen.items(), start=1)]
+        rest = [
+            frozenset(two)
+            for two in combinations(self.links, 2)
+            if frozenset(two) not in self.found and is_chosen(two, self.chosen)
+        ]
         listed += [self._undetermined_centre(two, order) for order, two in enumerate(rest, start=len(listed) + 1)]
         proof = prove_centres({two: one.at for two, one in self.found.items()}, self.links, self.motions)
         groups = links_moving_as_one(self.links, self.motions)
-        return Centres(self.state, self.numbers, tuple(listed), proof, groups, self._branch_centres(listed))
+        branches = self._branch_centres(listed)
+        return Centres(self.state, self.numbers, tuple(listed), proof, groups, branches, self.chosen)
 
     def _branch_centres(self, listed: Sequence[Centre]) -> tuple[dict[str, Array], ...]:
         """Where the open centres lie on each branch of a change point; links that move as one on it have none."""

@@ -8,7 +8,7 @@ meet.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from heapq import heappop, heappush
 from itertools import combinations
@@ -72,24 +72,36 @@ class KennedyConstruction:
     one of its links a single new line, which is met with the lines that this one had before.
     """
 
-    def __init__(self, links: Sequence[str], primary: PrimaryCentres, max_error: float = MAX_MEETING_ERROR):
+    def __init__(
+        self,
+        links: Sequence[str],
+        primary: PrimaryCentres,
+        max_error: float = MAX_MEETING_ERROR,
+        targets: Iterable[LinkPair] | None = None,
+    ):
+        """`targets`: pairs of links whose centres are searched for, beside those that pairs show; by default all."""
         self.links = tuple(links)
         self.found: dict[LinkPair, FoundCentre] = {}
         self._primary = primary
         self._max_error = max_error
         self._place = {link: index for index, link in enumerate(self.links)}
         self._pairs = [frozenset(two) for two in combinations(self.links, 2)]
+        if targets is not None:
+            included = {*targets, *primary.centres, *primary.normals}
+            self._pairs = [two for two in self._pairs if two in included]
         count, many = len(self._pairs), len(self.links)
         self._first = max((len(normals) for normals in primary.normals.values()), default=0)
         "lines through links come after those that pairs give"
-        self._number = np.zeros((many, many), dtype=int)
-        above = np.triu_indices(many, 1)
-        self._number[above] = self._number.T[above] = np.arange(count)
+        self._number = np.full((many, many), count)
+        "of a pair that is not searched for the last, which is never open"
+        for number, two in enumerate(self._pairs):
+            a, b = (self._place[link] for link in two)
+            self._number[a, b] = self._number[b, a] = number
         self._at = np.zeros((many, many, 3))
         self._error = np.full((many, many), np.inf)
         self._lines = np.zeros((count, self._first + many, 3))
         self._line_error = np.full((count, self._first + many), np.inf)
-        self._open = np.ones(count, dtype=bool)
+        self._open = np.arange(count + 1) < count
         self._best = np.full(count, np.inf)
         self._meeting_points = np.zeros((count, 3))
         self._meeting_lines = np.zeros((count, 2), dtype=int)

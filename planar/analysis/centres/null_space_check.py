@@ -133,8 +133,8 @@ def prove_centres(found: Mapping[LinkPair, Array], links: Sequence[str], motions
     kinds = np.array([place[stands.get(link, link)] for link in links], dtype=int)
     collinear = 0.0
     for first in range(len(links) - 2):
-        second, third = np.triu_indices(len(links) - first - 1, 1)
-        second, third = second + first + 1, third + first + 1
+        known = first + 1 + np.flatnonzero(np.isfinite(at[first, first + 1 :, 2]))
+        second, third = (known[index] for index in np.triu_indices(len(known), 1))
         apart = (kinds[second] != kinds[first]) | (kinds[third] != kinds[first])
         second, third = second[apart], third[apart]
         # of three links that are known; what is not a number is passed over
@@ -157,12 +157,14 @@ def prove_centres(found: Mapping[LinkPair, Array], links: Sequence[str], motions
 def links_moving_as_one(links: Sequence[str], motions: AllowedMotions) -> tuple[tuple[str, ...], ...]:
     """Links that move as one here whatever moves, in groups of two or more."""
     groups: list[list[str]] = []
-    for link in links:
-        for group in groups:
-            apart = motions.poles[link] - motions.poles[group[0]]
-            if np.linalg.norm(apart, axis=1).max(initial=0.0) <= motions.as_one_ratio:
-                group.append(link)
-                break
+    poles = np.array([motions.poles[link] for link in links])
+    firsts: list[int] = []
+    for index, link in enumerate(links):
+        apart = np.linalg.norm(poles[index] - poles[firsts], axis=-1).max(axis=-1, initial=0.0)
+        alike = np.flatnonzero(apart <= motions.as_one_ratio)
+        if alike.size:
+            groups[alike[0]].append(link)
         else:
             groups.append([link])
+            firsts.append(index)
     return tuple(tuple(group) for group in groups if len(group) > 1)

@@ -8,7 +8,6 @@ import numpy as np
 
 from planar.document.first_argument import takes_mechanism
 from planar.foundation.arrays import Array
-from planar.foundation.errors import NoAnswer
 from planar.model.link_graph import pairs_farthest_first
 from planar.model.mechanism import Mechanism
 from planar.model.wording import count_phrase, join_all_names
@@ -16,7 +15,7 @@ from planar.solving.assembly.nearest_assembly import Assembly, AssemblySearchFai
 from planar.solving.checks.singular_values import null_space, rank
 from planar.solving.diagnosis.redundancy import smallest_dependent_sets
 from planar.solving.full_constraints import FullConstraints, find_closed_position, motion_dimension
-from planar.solving.position import PositionSolver
+from planar.solving.position import PositionSolver, SolvedMechanism, solved_mechanism
 
 
 @dataclass(frozen=True)
@@ -45,11 +44,12 @@ def mobility(mechanism: Mechanism) -> Mobility:
     >>> planar.mobility(planar.load("four-bar")).finite
     1
     """
-    setup = PositionSolver(mechanism)
+    known = solved_mechanism(mechanism)
+    setup = known.plain_solver
     if setup.equations.open_rows:
         return _mobility_of_least_misfit(setup)
     constraints = FullConstraints(setup)
-    w, inputs = closed_position(setup, constraints), len(mechanism.inputs)
+    w, inputs = closed_position(known, constraints), len(mechanism.inputs)
     if inputs == gruebler(mechanism) > 0 and setup.functions.is_square:
         z = w[list(setup.equations.unknowns)]
         if setup.max_residual(z, setup.inputs.u) <= setup.tolerance and setup.is_surely_regular(z):
@@ -100,13 +100,9 @@ def mobility_at(constraints: FullConstraints, w: Array) -> Mobility:
     )
 
 
-def closed_position(solver: PositionSolver, constraints: FullConstraints) -> Array:
+def closed_position(known: SolvedMechanism, constraints: FullConstraints) -> Array:
     """A closed position w of a mechanism, the one of its inputs if they determine one. Raises NoAnswer."""
-    nearest: Assembly | AssemblySearchFailure | NoAnswer
-    try:
-        nearest = solver.nearest()
-    except NoAnswer as problem:
-        nearest = problem
+    solver, nearest = known.plain_solver, known.nearest
     if isinstance(nearest, Assembly):
         return solver.functions.coordinates(nearest.z, solver.inputs.u, solver.inputs.p)
     found = find_closed_position(constraints)

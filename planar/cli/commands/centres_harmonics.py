@@ -70,6 +70,13 @@ def harmonics(
 @at_option
 @mode_option
 @frame_number_option
+@click.option(
+    "--link",
+    "links",
+    multiple=True,
+    metavar="NAME",
+    help="Only the centres of this link with all others, of several links those between them. May be repeated.",
+)
 @click.option("--cycle", "whole", is_flag=True, help="The paths of centres over the whole motion.")
 @click.option(
     "--of",
@@ -88,6 +95,7 @@ def centres(  # many: options of the command
     as_json: bool,
     at: tuple[str, ...],
     mode: int | None,
+    links: tuple[str, ...],
     whole: bool,
     names: tuple[str, ...],
     output: Path | None,
@@ -95,11 +103,14 @@ def centres(  # many: options of the command
 ) -> None:
     """All instantaneous centres, with the lines of centres that show each; or their paths over the motion."""
     from planar.analysis.centres.centres import centres as all_centres
+    from planar.analysis.centres.centres import chosen_links
     from planar.reports.tables.centres import record, table
     from planar.solving.rest_position import rest_position
 
     if as_json and output is not None:
         raise BadInput("-o", "the table goes to a file or SI values are printed with --json; give one of the two")
+    if whole and links:
+        raise BadInput("--link", "this is for one position; with --cycle name a centre with --of")
     if whole and at:
         raise BadInput("--at", "a whole motion has no one position; say where it starts with --from")
     if not whole:
@@ -109,8 +120,9 @@ def centres(  # many: options of the command
     if whole:
         _report_paths(mechanism, names, as_json, output, course)
         return
+    chosen_links(mechanism, links)
     with limited_time(mechanism.name):
-        found = all_centres(rest_position(mechanism, parse_drives(mechanism, at)))
+        found = all_centres(rest_position(mechanism, parse_drives(mechanism, at)), links)
     if as_json:
         print_json(record(found), indent=1)
         return

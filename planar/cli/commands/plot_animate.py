@@ -237,6 +237,10 @@ def plot(  # many: options of a command; # long: each has its line
             )
             drawn.save(sheets, output)
             return
+        if what == "centres":
+            from planar.analysis.centres.centres import chosen_links
+
+            chosen_links(mechanism, ())  # a drawing shows the centres on whose lines others lie
         if what in POSITION_DRAWINGS:
             state = solve(mechanism, parse_drives(mechanism, at))
             figure = drawn.centres(state, scales, links) if what == "centres" else getattr(drawn, what)(state, scales)

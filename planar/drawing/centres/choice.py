@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from planar.analysis.centres.centres import Centre, Centres
+from planar.analysis.centres.centres import Centre, Centres, is_chosen
 from planar.foundation.errors import BadInput
 
 MAX_CENTRES, CROWDED_CENTRES = 28, 15
@@ -20,11 +20,10 @@ def choose_centres(found: Centres, links: str | Sequence[str] | None = None) -> 
     """
     if links:
         links = [links] if isinstance(links, str) else links
-        wanted = set(links)
         for link in links:
             if link not in found.numbers:
                 raise BadInput(link, f"there is no link of this name; links are {', '.join(found.numbers)}")
-        picked = [each for each in found if wanted & {*each.links} == (wanted if len(wanted) == 1 else {*each.links})]
+        picked = [each for each in found if is_chosen(each.links, set(links))]
         names = {name for each in picked for name in (each.name, *(n for line in each.lines for n in line.centres))}
         return tuple(each for each in found if each.name in names)
     frame = found.state.mechanism.frame

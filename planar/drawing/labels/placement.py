@@ -41,6 +41,11 @@ READ_ON_DISTANCE, READ_ON_COST = 10.0, 4.0
 """mm within which a figure that follows words in their line is read as theirs, and what that costs."""
 ACCEPTABLE_COST = 12.0
 """What the place of a letter costs at the most where nothing is wrong with it."""
+MAX_FAR_LABELS = 200
+"""Of more labels only places near by are looked at, without leaders, and labels that have no room there are left out:
+leaders of so many cross everything."""
+CROWDED_DISTANCES = (0.0, 1.6, 3.3)
+"""mm beyond `away` at which one of so many may stand."""
 MAX_SWEEPS, MAX_CHOICES = 5, 700
 """Rounds in which labels choose again, most drawings need two; and choices in all of them: very many choose once."""
 
@@ -53,6 +58,12 @@ class PlacedLabel(NamedTuple):
     leader: tuple[PaperPoint, PaperPoint] | None
 
 
+def count_labels(labels: Iterable[Label]) -> int:
+    """How many letters `place_labels` has to place, those of one spot joined."""
+    fitted = [fit_label(each) for each in labels if each.text.strip()]
+    return sum(each.side is not None for each in fitted) + len(_group_labels([e for e in fitted if e.side is None]))
+
+
 def place_labels(
     labels: Iterable[Label], marks: Iterable[Mark], obstacles: Sequence[Box] = ()
 ) -> tuple[PlacedLabel, ...]:
@@ -60,7 +71,7 @@ def place_labels(
 
     Letters of one size and slant at one spot are joined into one text, equal texts stand once. The same letters and
     marks give the same places. Boxes never overlap each other; strokes are crossed only where all room within some
-    40 mm is taken.
+    40 mm is taken. Of more than MAX_FAR_LABELS those that have no room near their spots are left out.
     """
     marks = list(marks)
     fitted = [fit_label(each) for each in labels if each.text.strip()]
@@ -75,6 +86,7 @@ def place_labels(
     return settled + tuple(
         PlacedLabel(letter, Box(*map(float, box)), _leader_line(letter, box, rims))
         for letter, box in zip(named, board.boxes, strict=True)
+        if not np.isnan(box[0])
     )
 
 
@@ -162,7 +174,10 @@ class _LabelPlacer:
         self.starts_with_digit = np.array([each.text[:1].isdigit() for each in letters])
         self.has_spaces = np.array([" " in each.text for each in letters])
         self.stages = [1] * len(letters)
-        self.candidates = [self._candidates(index, DISTANCE_STAGES[0]) for index in range(len(letters))]
+        self.is_crowded = len(letters) > MAX_FAR_LABELS
+        distances = CROWDED_DISTANCES if self.is_crowded else DISTANCE_STAGES[0]
+        self.stage_count = 1 if self.is_crowded else len(DISTANCE_STAGES)
+        self.candidates = [self._candidates(index, distances) for index in range(len(letters))]
         self.boxes = np.full((len(letters), 4), np.nan)
         self.leaders = np.full((len(letters), 4), np.nan)
         self.costs_paid = np.full(len(letters), np.inf)
@@ -320,14 +335,17 @@ class _LabelPlacer:
         """Put one letter where it costs least now, looking farther off while nothing good is found; that cost."""
         others = self._placed_indices(index)
         best, least = self._cheapest(index, self.candidates[index], others)
-        while least > ACCEPTABLE_COST and self.stages[index] < len(DISTANCE_STAGES):
+        while least > ACCEPTABLE_COST and self.stages[index] < self.stage_count:
             both = zip(
                 self.candidates[index], self._candidates(index, DISTANCE_STAGES[self.stages[index]]), strict=True
             )
             self.candidates[index] = _LabelCandidates(*(np.concatenate(each) for each in both)).ordered()
             self.stages[index] += 1
             best, least = self._cheapest(index, self.candidates[index], others)
-        self._place(index, self.candidates[index], best)
+        if self.is_crowded and least > ACCEPTABLE_COST:
+            self.boxes[index] = self.leaders[index] = np.nan
+        else:
+            self._place(index, self.candidates[index], best)
         return least
 
     def settle(self) -> None:
@@ -337,14 +355,14 @@ class _LabelPlacer:
         for index in order:
             self._choose(index)
         sweeps = min(MAX_SWEEPS, MAX_CHOICES // max(len(order), 1))
-        tries = min(len(order), MAX_CHOICES - sweeps * len(order))
+        tries = 0 if self.is_crowded else min(len(order), MAX_CHOICES - sweeps * len(order))
         for _ in range(sweeps):
             before = self.boxes.copy()
             for index in order:
                 if self._choose(index) > ACCEPTABLE_COST and tries > 0:
                     self._displace(index)
                     tries -= 1
-            if np.array_equal(before, self.boxes):
+            if np.array_equal(before, self.boxes, equal_nan=True):
                 break
         self._separate()
 

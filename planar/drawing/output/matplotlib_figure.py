@@ -8,13 +8,14 @@ from io import BytesIO
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from planar.drawing.labels.fonts import have_truetype_outlines, outlines_only, printable_text, quiet_font_logs
-from planar.drawing.labels.placement import PlacedLabel, place_labels
+from planar.drawing.labels.placement import MAX_FAR_LABELS, PlacedLabel, count_labels, place_labels
 from planar.drawing.labels.text_metrics import text_size, wrap_text
 from planar.drawing.output.matplotlib_marks import draw_labels, draw_mark, frame_window
 from planar.drawing.paper.pens import MM_PER_POINT, require_matplotlib
 from planar.drawing.paper.picture import Label, PaperPoint, Picture, extent
 from planar.drawing.paper.stroke_shapes import check_finite
 from planar.foundation.errors import BadInput, unknown_format_error
+from planar.model.wording import count_phrase
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -229,7 +230,13 @@ def lay_out_picture(picture: Picture, caption_width: float = MIN_CAPTION_WIDTH) 
     """A picture with its letters placed and the text below broken to its width, or to a greater one (mm)."""
     for mark in picture.marks:
         check_finite(mark)
-    letters = place_labels([mark for mark in picture.marks if isinstance(mark, Label)], picture.marks)
+    labels = [mark for mark in picture.marks if isinstance(mark, Label)]
+    letters = place_labels(labels, picture.marks)
+    notes = list(picture.notes)
+    left_out = count_labels(labels) - len(letters) if len(labels) > MAX_FAR_LABELS else 0
+    if left_out:
+        letters_text = f"{count_phrase(left_out, 'letter')} of {len(letters) + left_out}"
+        notes.append(f"{letters_text} left out: there is no room for them at this scale")
     strokes = [mark for mark in picture.marks if not isinstance(mark, Label)]
     corners = [*(picture.window or extent(strokes))] if strokes else []
     for each in letters:
@@ -239,7 +246,7 @@ def lay_out_picture(picture: Picture, caption_width: float = MIN_CAPTION_WIDTH) 
     high = max(x for x, _ in corners) + PICTURE_MARGIN, max(y for _, y in corners) + PICTURE_MARGIN
     room = max(high[0] - low[0], caption_width)
     text = [(line, TITLE_SIZE) for line in wrap_text(picture.title, TITLE_SIZE, room, heavy=True)]
-    text += [(line, NOTE_SIZE) for note in picture.notes for line in wrap_text(note, NOTE_SIZE, room)]
+    text += [(line, NOTE_SIZE) for note in notes for line in wrap_text(note, NOTE_SIZE, room)]
     return PictureCell(picture, letters, low, high, tuple(text))
 
 

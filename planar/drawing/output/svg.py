@@ -168,11 +168,12 @@ def _label_elements(letters: Sequence[Label], strokes: Sequence[Mark]) -> Iterab
             ]
         boxes = np.array([(x - wide / 2, y - tall / 2, x + wide / 2, y + tall / 2) for x, y in spots])
         costs = np.repeat(np.arange(len(LABEL_DISTANCES)), LABEL_DIRECTIONS)[: len(boxes)].astype(float)
+        region = np.concatenate([boxes[:, :2].min(axis=0), boxes[:, 2:].max(axis=0)])[None]
         if len(ends):
-            region = np.concatenate([boxes[:, :2].min(axis=0), boxes[:, 2:].max(axis=0)])[None]
             near = ends[nearby_pairs(region, bounds, 0.2)[1]]
             costs += 4.0 * np.maximum(lengths_inside_boxes(boxes[:, None], near[None], 0.2), 0.0).sum(axis=1)
-        for other in taken:
+        placed = np.array(taken).reshape(-1, 4)
+        for other in placed[nearby_pairs(region, placed, 0.0)[1]]:
             meets = (np.minimum(boxes[:, 2:], other[2:]) - np.maximum(boxes[:, :2], other[:2])).min(axis=1)
             costs += 40.0 * np.maximum(meets, 0.0)
         x, y = spots[int(np.argmin(costs))]

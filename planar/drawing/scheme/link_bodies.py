@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import chain, combinations
 from math import ceil, hypot, pi
@@ -79,6 +80,20 @@ def all_marks(mechanism: Mechanism, shapes: Mapping[str, LinkShape]) -> tuple[Dr
     return (*chain.from_iterable(marks), *spring_mass_marks(mechanism, shapes))
 
 
+def _marks_by_link(
+    marks: Iterable[DrawingMark | SpringMassMark],
+) -> defaultdict[str, list[DrawingMark | SpringMassMark]]:
+    """The marks in which the name of a link stands, in their order."""
+    by_link: defaultdict[str, list[DrawingMark | SpringMassMark]] = defaultdict(list)
+    for mark in marks:
+        texts = {
+            entry for part in mark for entry in (part if isinstance(part, tuple) else (part,)) if type(entry) is str
+        }
+        for text in texts:
+            by_link[text].append(mark)
+    return by_link
+
+
 def _curved_slot_mark(slot: CurvedSlot, mechanism: Mechanism, shapes: Mapping[str, LinkShape]) -> CurvedSlotMark:
     """How a curved slot is drawn in the link that has it."""
     centre_points = slot.pair.coincident_points()
@@ -122,7 +137,7 @@ def link_outlines(mechanism: Mechanism, shapes: Mapping[str, LinkShape]) -> dict
     where links share it. The corners have the order of the file, unless that crosses itself: then they are those of the
     convex hull.
     """
-    tolerance, marks = RELATIVE_TOLERANCE * largest_span(shapes), all_marks(mechanism, shapes)
+    tolerance, marks_of = RELATIVE_TOLERANCE * largest_span(shapes), _marks_by_link(all_marks(mechanism, shapes))
     named_in_file = {load.point for load in mechanism.loads} | {
         name for item in mechanism.published for name in (item.of, item.relative_to)
     }
@@ -134,6 +149,7 @@ def link_outlines(mechanism: Mechanism, shapes: Mapping[str, LinkShape]) -> dict
     }
     outlines = {}
     for link in mechanism.links:
+        marks = marks_of[link.name]
         used_places = [*_joint_points(link.name, marks), *_action_places(link.name, marks)]
         lines = [mark for mark in marks if isinstance(mark, LINE_MARKS) and mark.link == link.name]
         unused = {
@@ -207,7 +223,8 @@ def bodies_of_points(
     Lengths below `tolerance` are none. Numbers may be any that compare as numbers do, such as those that know
     how they depend on the dimensions.
     """
-    return {link: _link_body(link, own, marks, tolerance) for link, own in points.items()}
+    marks_of = _marks_by_link(marks)
+    return {link: _link_body(link, own, marks_of[link], tolerance) for link, own in points.items()}
 
 
 def largest_span(shapes: Mapping[str, LinkShape]) -> float:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from itertools import chain, combinations, islice
+from heapq import nsmallest
+from itertools import chain, combinations
 from typing import Any
 
 from planar.analysis.centres.centres import extent
@@ -76,7 +77,12 @@ def _third_links(links: Sequence[str], primary: PrimaryCentres) -> dict[tuple[st
         found, (one, other) = located.get(frozenset(two)), two
         first = {line.link for line in found.lines if line.link} if found else set()
         ranks = (first, shown[one] & shown[other], shown[one] ^ shown[other])
-        best = dict.fromkeys(third for rank in ranks for third in sorted(rank, key=place.__getitem__))
-        thirds = dict.fromkeys(chain(best, links))
-        chosen[two] = [*islice((third for third in thirds if third not in two), MAX_LINES)]
+        best = (nsmallest(MAX_LINES + 2, rank, key=place.__getitem__) for rank in ranks)
+        thirds: dict[str, None] = {}
+        for third in chain(*best, links):
+            if len(thirds) == MAX_LINES:
+                break
+            if third not in two:
+                thirds[third] = None
+        chosen[two] = [*thirds]
     return chosen

@@ -20,6 +20,7 @@ from planar.model.link_graph import link_numbers
 from planar.model.link_shapes import PointPlacementError
 from planar.model.mechanism import (
     Mechanism,
+    check_link_count,
     links_counting_turns,
     named_points,
     pair_misfits,
@@ -48,6 +49,8 @@ PROBE_RATIO = 0.02
 MAX_HALVINGS = 40
 MAX_ASSEMBLIES = 64
 """Assemblies that a page offers."""
+MAX_PAGE_LINKS = 400
+"""Of more links a page would be tens of megabytes, most of it their centres."""
 MAX_CACHED_PAGES = 16
 """Mechanisms whose data is kept: an answer, the page and a notebook's output ask for it one after the other."""
 
@@ -82,6 +85,7 @@ def _cached_page_data(mechanism: Mechanism) -> tuple[dict[str, Any], str]:
 # long: one record after the other, as the scripts read them
 def _computed_page_data(mechanism: Mechanism, z: np.ndarray | None) -> tuple[dict[str, Any], str]:
     """Compute the data of a page, and its functions."""
+    check_link_count(mechanism, MAX_PAGE_LINKS, "a page", "`planar plot` draws a mechanism of any size")
     known = solved_mechanism(mechanism)
     solver, z = known.solver, known.assembly.z if z is None else z
     e, program, state = solver.equations, solver.functions, rest_position(mechanism)

@@ -8,6 +8,7 @@ relative velocity along it. Where a link's joints lie about one another is that 
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
 from typing import Any
@@ -55,13 +56,13 @@ def polygon_data(mechanism: Mechanism, points: Mapping[str, Mapping[str, Any]]) 
         vertices.append({"letter": letter, "link": guide, "over": rider, "fixed": False})
     strokes = [_vector(vertices, own.get((rider, guide), POLE), place[rider]) for rider, guide in riders]
     shapes = shapes_of_links(mechanism)
+    carried: defaultdict[str, list[tuple[str, str]]] = defaultdict(list)
+    for name, members in named_points(mechanism):
+        for carrier, point in members:
+            if name in place:
+                carried[carrier].append((name, point))
     for link in (each.name for each in mechanism.links if each.name != frame):
-        members = {
-            place[name]: Vector(*map(float, shapes[link].position(point)))
-            for name, members in named_points(mechanism)
-            for carrier, point in members
-            if carrier == link and name in place
-        }
+        members = {place[name]: Vector(*map(float, shapes[link].position(point))) for name, point in carried[link]}
         joints = [each for each in members if len(points[vertices[each]["point"]]["links"]) > 1]
         guided = [number for (_, guide), number in own.items() if guide == link]
         strokes += (_vector(vertices, *ends, link) for ends in _vector_ends(vertices, members, joints, guided))

@@ -82,12 +82,12 @@ def file_answer(value: Any) -> tuple[dict[str, Any], Mechanism | None]:
 
 def loose_links(mechanism: Mechanism) -> list[str]:
     """The links that can still move while the inputs stand still; none where it cannot be assembled."""
-    solver = PositionSolver(mechanism)
-    if solver.equations.open_rows:
+    known = solved_mechanism(mechanism)
+    if known.plain_solver.equations.open_rows:
         return []
-    constraints = FullConstraints(solver)
+    constraints = FullConstraints(known.plain_solver)
     try:
-        place = closed_position(solver, constraints)
+        place = closed_position(known, constraints)
     except NoAnswer:
         return []
     drives = tuple(given.pair for given in mechanism.inputs)

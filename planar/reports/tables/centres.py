@@ -157,7 +157,10 @@ def remarks(centres: Centres) -> tuple[str, ...]:
     """Sentences: how many were found and how, which needed the equations, what is at rest, moves as one, or is open."""
     counts = Counter(centre.how for centre in centres)
     found = join_all_names([f"{counts[how]} {words}" for how, words in METHOD_WORDS.items() if counts[how]])
-    said = [f"{count_phrase(len(centres), 'centre')} of {count_phrase(len(centres.numbers), 'link')}: {found}"]
+    links = count_phrase(len(centres.numbers), "link")
+    if centres.links:
+        links = f"{join_all_names(centres.links)} of {links}"
+    said = [f"{count_phrase(len(centres), 'centre')} of {links}: {found}"]
     equations = [centre for centre in centres if centre.how == "equations"]
     if equations:
         taken = _choose_form(equations, "it was taken", "they were taken")
@@ -226,6 +229,7 @@ def record(centres: Centres) -> dict[str, Any]:
             }
             for centre in centres
         ],
+        **({"of": list(centres.links)} if centres.links else {}),
         "as_one": [list(group) for group in centres.as_one],
         "branches": [{name: _to_list(at) for name, at in branch.items()} for branch in centres.branches],
         "proof": centres.proof._asdict(),

@@ -7,6 +7,7 @@ since the residual of a flipped linkage is zero too, is `branch`.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from functools import cached_property
 from math import inf, isfinite, pi
 
 import numpy as np
@@ -20,9 +21,10 @@ from planar.equations.residuals import (
     input_residuals,
     pair_residuals,
 )
+from planar.equations.stacked_residuals import StackedCoordinates, StackedResiduals
 from planar.foundation.arrays import Array
-from planar.foundation.geometry import Frame, frame_term_sizes
-from planar.foundation.jets import Jet, Scalar, term_sizes
+from planar.foundation.geometry import Frame
+from planar.foundation.jets import Jet, Scalar
 from planar.model.link_shapes import LinkShape
 from planar.model.mechanism import Mechanism, relative_motions
 from planar.model.pairs import MeasureKind, Pair
@@ -34,6 +36,8 @@ NEGLIGIBLE_ERROR = 1e-7
 """Relative errors by round-off that are surely below this are neither looked for nor told."""
 MAX_RATE_ERROR = 1e-3
 """Angles (rad) and rates that may have greater relative errors are no answer: less than three digits are sure."""
+MIN_STACKED_PAIRS = 16
+"""From so many pairs on one position takes less time on arrays, pairs of equal formula together, than on floats."""
 SHORT_ARM = EPS / (NEGLIGIBLE_ERROR * 1e-2**2)
 """Sizes: where no link has a shorter arm and no block is nearer than 1e-2 to being singular, which backends keep clear
 of, rounding surely takes no more than that."""
@@ -81,26 +85,28 @@ class ResidualCheck:
         there.mechanism = mechanism
         return there
 
+    @cached_property
+    def _stacked(self) -> StackedResiduals:
+        return StackedResiduals(self.mechanism, self.relative_motions)
+
     def residuals(
         self, frames: Mapping[str, Frame], own: Mapping[str, Sequence[Array]], u: Array | None = None
     ) -> Array:
-        """How far every constraint is open (constraints, ...): lengths of the size, or rad; see `names`.
+        """How far every constraint is open (constraints, samples): lengths of the size, or rad; see `row_pairs`.
 
-        Frames with cos and sin made from their angles, floats or arrays alike. `u` (inputs, ...) are the positions
-        of the inputs, else the mechanism's own. What is not a number counts as infinitely open.
+        Frames with cos and sin made from their angles, floats or arrays (samples,). `u` (inputs, ...) are the
+        positions of the inputs, else the mechanism's own. What is not a number counts as infinitely open.
         """
-        gaps = [
-            np.abs(closing_error(left, kind)) / self._unit_of(kind)
-            for (_, kind), left in self._residuals(frames, own, u)
-        ]
-        if not gaps:
-            return np.zeros((0, 1))
+        positions = [given.position for given in self.mechanism.inputs] if u is None else u
+        coordinates = self._stacked.stack(frames, own, positions)
+        gaps = self._evaluate(coordinates)
         # the round-off of an angle, and of where its cos and sin put things, grows with the turns that it counts
-        counted = [np.abs(frame.angle) for frame in frames.values()]
-        counted += [np.abs(length) / self.unit for lengths in own.values() for length in lengths]
-        many = np.fmax.reduce(np.broadcast_arrays(2.0 * np.pi, *counted)) / (2.0 * np.pi)
-        many = np.where(np.isfinite(many), many, 1.0)
-        return np.nan_to_num(np.array(np.broadcast_arrays(*gaps)) / many, nan=np.inf, posinf=np.inf)
+        turns = coordinates.greatest_angle(self.unit) / (2.0 * pi)
+        with np.errstate(invalid="ignore"):  # of what is not finite
+            angles = self._stacked.is_angle
+            gaps[angles] = closing_error(gaps[angles], MeasureKind.ANGLE)
+            gaps = np.abs(gaps) / self._row_units / np.maximum(1.0, np.where(np.isfinite(turns), turns, 1.0))
+        return np.nan_to_num(gaps, nan=np.inf, posinf=np.inf)
 
     def greatest_residual(
         self, frames: Mapping[str, Frame], own: Mapping[str, Sequence[float]], u: Sequence[float]
@@ -109,6 +115,8 @@ class ResidualCheck:
 
         Raises ValueError, OverflowError or ZeroDivisionError where Python, other than numpy, has no number.
         """
+        if len(self.mechanism.pairs) >= MIN_STACKED_PAIRS:
+            return float(self.residuals(frames, own, np.array(u)).max(initial=0.0))  # type: ignore[arg-type]
         gaps = [
             abs(closing_error(left, kind)) / self._unit_of(kind) for (_, kind), left in self._residuals(frames, own, u)
         ]
@@ -143,37 +151,23 @@ class ResidualCheck:
         Of jets of arrays, an array. `inputs` are the inputs with their rates, else the mechanism's own.
         """
         u = [Jet(*given[1:4]) for given in self.mechanism.inputs] if inputs is None else inputs
-        sizes = {
-            name: frame
-            if frame.fixed
-            else frame_term_sizes(*(term_sizes(part) for part in (frame.x, frame.y, frame.angle)))
-            for name, frame in frames.items()
-        }
-        own_sizes = {name: [term_sizes(each) for each in values] for name, values in own.items()}
-        given = [term_sizes(each) for each in u]
-        both = zip(self._residuals(frames, own, u), self._residuals(sizes, own_sizes, given), strict=True)
-        closures = [(row.kind, left, whole) for (row, left), (_, whole) in both if isinstance(left, Jet)]
-        found: list[tuple[Array, str]] = []
-        for order in (1, 2):
-            # a velocity counts as one in an arc of the size: what turning leaves there but for rounding is none
-            speeds = [
-                (whole.parts[k] / self.unit) ** (order / k)
-                for kind, _, whole in closures
-                if kind is MeasureKind.LENGTH
-                for k in range(1, order + 1)
-            ]
-            carried = CARRIED_ROUNDING * np.maximum.reduce(np.broadcast_arrays(np.zeros(1), *speeds))
-            gaps = [
-                np.abs(left.parts[order]) / _row_scale(whole.parts[order], carried * self._unit_of(kind))
-                for kind, left, whole in closures
-            ]
-            if not gaps:
-                found.append((np.zeros(1), ""))
-                continue
-            part = np.nan_to_num(np.array(np.broadcast_arrays(*gaps)), nan=np.inf)
-            worst = int(np.argmax(part.reshape(len(closures), -1).max(axis=1)))
-            found.append((part.max(axis=0), self.row_pairs[worst]))
-        return found
+        coordinates = self._stacked.stack(frames, own, u)
+        rates = self._evaluate(coordinates)
+        if not isinstance(rates, Jet):
+            return [(np.zeros(1), "")] * 2
+        sizes = self._evaluate(coordinates.term_sizes())
+        units, lengths = self._row_units, self._stacked.is_length
+        worst_rates: list[tuple[Array, str]] = []
+        with np.errstate(all="ignore"):  # of what is not finite
+            for order in (1, 2):
+                # a velocity counts as one in an arc of the size: what turning leaves there but for rounding is none
+                speeds = [(sizes.parts[k][lengths] / self.unit) ** (order / k) for k in range(1, order + 1)]
+                carried = CARRIED_ROUNDING * np.max([speed.max(axis=0, initial=0.0) for speed in speeds], axis=0)
+                scale = _row_scale(sizes.parts[order], carried * units)
+                gaps = np.nan_to_num(np.abs(rates.parts[order]) / scale, nan=np.inf)
+                worst = int(np.argmax(gaps.max(axis=1, initial=0.0)))
+                worst_rates.append((gaps.max(axis=0), self.row_pairs[worst]))
+        return worst_rates
 
     def _greatest_rate(self, frames: Mapping[str, Frame], own: Mapping[str, Sequence[Jet]], order: int) -> Array:
         """The greatest rate of an order (lengths of the size), what a velocity makes of itself in an arc included.
@@ -188,6 +182,18 @@ class ResidualCheck:
         rates += [np.abs(jet.parts[order]) / self.unit for each in own.values() for jet in each]
         greatest = np.maximum.reduce(np.broadcast_arrays(*rates))
         return np.where(greatest == 0.0, 1.0, greatest)
+
+    def _evaluate(self, coordinates: StackedCoordinates) -> Scalar:
+        """The residuals (constraints, samples), an array or a jet; rows that may stay open count as closed."""
+        residuals = self._stacked.evaluate(coordinates, self.numbers)
+        for part in residuals.parts if isinstance(residuals, Jet) else (residuals,):
+            part[list(self.open_rows)] *= 0.0
+        return residuals
+
+    @property
+    def _row_units(self) -> Array:
+        """What residuals are judged in units of (constraints, 1)."""
+        return np.where(self._stacked.is_length, self.unit, 1.0)[:, None]
 
     def _unit_of(self, kind: MeasureKind) -> float:
         return self.unit if kind is MeasureKind.LENGTH else 1.0

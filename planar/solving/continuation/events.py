@@ -55,6 +55,11 @@ class WatchedOutputs(NamedTuple):
         """Position, first and second derivative by arc length of every output (outputs, 3), SI."""
         return pair_motions_at(self.setup, self.pairs, curve, point)
 
+    def output_rates_at(self, curve: SolutionCurve, point: CurvePoint, index: int) -> Array:
+        """The same of one output (3,)."""
+        rates: Array = pair_motions_at(self.setup, self.pairs[index : index + 1], curve, point)[0]
+        return rates
+
     def piece_end(self, curve: SolutionCurve, point: CurvePoint) -> _PieceEnd:
         """An end of a piece, with how the outputs move there."""
         return _PieceEnd(point, self.rates_at(curve, point))
@@ -149,7 +154,7 @@ def limits_until(
         if limit.of not in index:
             return direction * period.length * scale
         return (
-            float(watched.rates_at(tracker.curve, point._replace(y=point.y + period.growth))[index[limit.of], 0])
+            float(watched.output_rates_at(tracker.curve, point._replace(y=point.y + period.growth), index[limit.of])[0])
             - limit.value
         )
 
@@ -235,7 +240,7 @@ def limits_along(  # long: one kind of limit after the other
             still = STANDING_RATE * (setup.unit if output.input_kind is MeasureKind.LENGTH else 1.0)
             for x in _output_turning_points(watched, curve, piece, (before, after), k, still):
                 point = arc.point_at(curve, x)
-                yield noted("stroke end", output.name, point, float(watched.rates_at(curve, point)[k, 0]))
+                yield noted("stroke end", output.name, point, float(watched.output_rates_at(curve, point, k)[0]))
         for each in bifurcations_until(tracker, last)[passed:]:
             if not (each.passed.is_start or np.array_equal(each.passed.bifurcation.y, arc.after.y)):
                 break  # farther on: a walk that has gone its whole way knows them all
@@ -270,7 +275,7 @@ def _output_turning_points(
     sense = 1.0 if piece.last > piece.first else -1.0
 
     def rate(x: float) -> float:
-        return float(watched.rates_at(curve, arc.point_at(curve, x))[k, 1])
+        return float(watched.output_rates_at(curve, arc.point_at(curve, x), k)[1])
 
     if max(abs(g0), abs(g1)) < still:
         return

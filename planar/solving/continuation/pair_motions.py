@@ -21,7 +21,8 @@ def pair_motions_at(setup: PreparedMechanism, pairs: Sequence[Pair], curve: Solu
     rates, second = curve.widen_direction(point.tangent), curve.widen_direction(point.curvature)
     moving = setup.functions.kinematics(curve.unknowns_and_inputs(point.y), rates, second, curve.p)
     parts = np.stack([moving.w, moving.w1, moving.w2], axis=1) * setup.scale[:, None]
-    frames, own = frames_from_coordinates(
-        [Jet(*each) for each in parts.tolist()], setup.column, setup.shapes, setup.pairs
-    )
+    bodies = dict.fromkeys(link for pair in pairs for link in pair.bodies)
+    joined = {pair.name: setup.pairs[pair.name] for pair in pairs if pair.name in setup.pairs}
+    jets = [Jet(*each) for each in parts.tolist()]
+    frames, own = frames_from_coordinates(jets, setup.column, bodies, joined)
     return np.array([value_and_rates(pair.input_position_at(setup.shapes, frames, own)) for pair in pairs], dtype=float)
