@@ -280,9 +280,9 @@ class _CentreSearch:
         moved: LinkPoles | None = None
         place = {link: index for index, link in enumerate(self.links)}
         is_target = np.full((len(self.links), len(self.links)), self.targets is None)
-        for two in self.targets or ():
-            a, b = (place[link] for link in two)
-            is_target[a, b] = is_target[b, a] = True
+        for target in self.targets or ():
+            first, second = (place[link] for link in target)
+            is_target[first, second] = is_target[second, first] = True
         opening = OpeningPairs(len(self.links), is_target)
         while True:
             opening.add_known(

@@ -57,12 +57,14 @@ def polygon_data(mechanism: Mechanism, points: Mapping[str, Mapping[str, Any]]) 
     strokes = [_vector(vertices, own.get((rider, guide), POLE), place[rider]) for rider, guide in riders]
     shapes = shapes_of_links(mechanism)
     carried: defaultdict[str, list[tuple[str, str]]] = defaultdict(list)
-    for name, members in named_points(mechanism):
-        for carrier, point in members:
-            if name in place:
-                carried[carrier].append((name, point))
+    for named in named_points(mechanism):
+        for carrier, link_point in named.members:
+            if named.name in place:
+                carried[carrier].append((named.name, link_point))
     for link in (each.name for each in mechanism.links if each.name != frame):
-        members = {place[name]: Vector(*map(float, shapes[link].position(point))) for name, point in carried[link]}
+        members = {
+            place[name]: Vector(*map(float, shapes[link].position(link_point))) for name, link_point in carried[link]
+        }
         joints = [each for each in members if len(points[vertices[each]["point"]]["links"]) > 1]
         guided = [number for (_, guide), number in own.items() if guide == link]
         strokes += (_vector(vertices, *ends, link) for ends in _vector_ends(vertices, members, joints, guided))
