@@ -11,10 +11,10 @@ import planar
 from benchmarks.exact_makers import KINDS
 from planar.foundation.jets import value_and_rates
 from planar.reports.tables.design.synthesis import table
+from planar.synthesis.exact import exact_synthesis
 from planar.synthesis.exact.exact_linkage import evaluate
 from planar.synthesis.exact.relations.exact_problem import ExactProblem
 from planar.synthesis.exact.relations.polynomials import Polynomial
-from planar.synthesis.exact import exact_synthesis
 from planar.synthesis.exact.tracking import ball_paths, generic_solutions, member_solutions
 from planar.synthesis.exact.tracking.ball_paths import certify_member, follow_in_balls
 from planar.synthesis.exact.tracking.family_names import name_family

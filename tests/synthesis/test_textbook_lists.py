@@ -69,7 +69,7 @@ def signs_of_lengths(seed):
 @pytest.mark.parametrize("seed", covering(range(8), signs_of_lengths))
 def test_three_pairs_are_met_by_freudensteins_lengths_with_their_signs(seed):
     """F. Freudenstein, Trans. ASME 77, 1955: K1 cos(psi) - K2 cos(phi) + K3 = cos(phi - psi), linear in K."""
-    phi, psi, crank, rocker, coupler_squared = freudenstein_pairs(seed)
+    phi, psi, crank, _, coupler_squared = freudenstein_pairs(seed)
     coupler = np.sqrt(coupler_squared)
     wanted = {"from": "A", "to": "D", "pairs": np.stack([phi, psi], axis=1).tolist(), "absolute": True}
     found = planar.synthesise(task(wanted), complete=True)

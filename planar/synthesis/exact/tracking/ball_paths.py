@@ -29,7 +29,6 @@ from planar.synthesis.exact.relations.exact_numbers import ExactNumber
 from planar.synthesis.exact.relations.family import Family, Member
 from planar.synthesis.exact.relations.unknowns import NumberKind
 
-
 NumberBalls = list[list[list[Any]]]
 """The numbers of a member as balls: (parts, entries, numbers and their conjugates)."""
 
