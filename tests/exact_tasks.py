@@ -1,5 +1,8 @@
 """Tasks of exact synthesis that several test files take, and the rows of their unknowns."""
 
+import json
+from functools import cache
+
 import planar
 from planar.synthesis.exact.relations.exact_problem import ExactProblem
 from planar.synthesis.task.starts import start_mechanisms
@@ -27,6 +30,12 @@ def five_poses():
 
 
 def family_of(value):
-    wanted = planar.read_task(value)
+    """The first component of a task; made once, since nothing of it can be changed."""
+    return _component_of(json.dumps(value))
+
+
+@cache
+def _component_of(text):
+    wanted = planar.read_task(json.loads(text))
     (component, *_) = ExactProblem(wanted, next(iter(start_mechanisms(wanted)))).components
     return component

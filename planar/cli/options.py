@@ -419,7 +419,7 @@ def report_motion(
         if output is not None:
             from planar.foundation.safe_files import save_file
 
-            save_file(output, encode_run(motion, output.suffix, more, facts()))
+            save_file(output, encode_run(motion, output.suffix, more, facts))
         for each in tables():
             print_or_write(each, None)
     if motion.outcome is not Outcome.SOLVED:

@@ -113,16 +113,14 @@ def test_tables_say_in_feet_and_inches_what_they_say_in_si(
     seen: list[FittedTable] = []
     draw = FittedTable.__rich_console__
     monkeypatch.setattr(FittedTable, "__rich_console__", lambda self, *more: (seen.append(self), draw(self, *more))[1])
-    si = planar.to_dict(replace(planar.from_dict(whole), units=FileUnits("m", "deg")))
-    found = []
-    for name in (inches, written(tmp_path, si, "si.json")):
-        seen.clear()
-        told = run(tmp_path, command, name, *options, COLUMNS="80").done()
-        assert not metric_words(told) or name != inches
-        found.append([quantity for table in seen for quantity in quantities(table)])
-    ours, theirs = found
+    assert not metric_words(run(tmp_path, command, inches, *options, COLUMNS="80").done())
     if command in ("problem", "explain"):  # other numbers are round in other units; numbers stand in sentences
         return
+    ours = [quantity for table in seen for quantity in quantities(table)]
+    seen.clear()
+    si = planar.to_dict(replace(planar.from_dict(whole), units=FileUnits("m", "deg")))
+    run(tmp_path, command, written(tmp_path, si, "si.json"), *options, COLUMNS="80").done()
+    theirs = [quantity for table in seen for quantity in quantities(table)]
     assert [place for place, _ in ours] == [place for place, _ in theirs]
     assert len(ours) > 5 or command in ("modes", "circuits", "centres")
     for (place, one), (_, other) in zip(ours, theirs, strict=True):

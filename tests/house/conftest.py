@@ -5,7 +5,7 @@ from importlib import import_module
 import pytest
 
 from tests.draws import SEARCH
-from tests.small_searches import SMALL_SEARCH
+from tests.small_searches import SHORT_FITS, SMALL_SEARCHES
 
 FAMILY_DESIGNS = 4
 """Designs that are listed of a family."""
@@ -17,7 +17,8 @@ COARSE_MAPS: dict[str, dict[str, object]] = {
 LESS: dict[str, dict[str, object]] = {
     **COARSE_MAPS,
     "planar.synthesis.exact.exact_synthesis": {"FAMILY_DESIGNS": FAMILY_DESIGNS},
-    "planar.synthesis.synthesise": SMALL_SEARCH,
+    **SMALL_SEARCHES,
+    **SHORT_FITS,
 }
 """Numbers of modules, and what they are here."""
 COARSE: dict[str, dict[str, object]] = {

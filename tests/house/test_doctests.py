@@ -3,7 +3,6 @@
 import doctest
 import inspect
 import re
-from functools import wraps
 from importlib import import_module
 from pathlib import Path
 
@@ -11,6 +10,7 @@ import pytest
 
 import planar
 from planar.guide.reference import class_entries
+from tests.remembered import remembered
 
 FUNCTIONS = [name for name in planar.__all__ if inspect.isroutine(getattr(planar, name))]
 ENTRIES = class_entries()
@@ -24,20 +24,6 @@ def computed_once():
         for name in ("force_map", "simulate", "synthesise"):
             patch.setattr(planar, name, remembered(getattr(planar, name)))
         yield
-
-
-def remembered(function):
-    """The function, which remembers its results by its arguments; one that reports progress is called each time."""
-    results = {}
-
-    @wraps(function)
-    def call(*args, **named):
-        key = repr((args, named))
-        if key not in results or "progress" in named:
-            results[key] = function(*args, **named)
-        return results[key]
-
-    return call
 
 
 @pytest.mark.parametrize("name", FUNCTIONS)

@@ -14,6 +14,7 @@ from planar.synthesis.task.starts import start_mechanisms
 from planar.synthesis.task.wanted_results import entry_misses, resting_misses
 from tests.draws import covering, first_cases
 from tests.known import MODELS
+from tests.small_searches import set_small_searches
 
 UNITS = {"length": "mm", "angle": "deg"}
 STARTS = [("four-bar", "E"), ("slider-crank", "E"), ("whitworth", "D"), ("klann-leg", "foot")]
@@ -25,9 +26,9 @@ CUT_SQUARE = [[-1, -2], [3, -2], [3, 3], [1, 0.5], [-1, 3]]
 @pytest.fixture
 def few_designs(monkeypatch):
     """A small catalogue, which is enough for tasks as easy as these."""
+    set_small_searches(monkeypatch)
     monkeypatch.setattr("planar.synthesis.synthesise.DRAWS", 1000)
-    monkeypatch.setattr("planar.synthesis.synthesise.MATCHES", 20)
-    monkeypatch.setattr("planar.synthesis.synthesise.ROUNDS", 1)
+    monkeypatch.setattr("planar.synthesis.synthesise.MATCHES", 10)
 
 
 def task(start, *wanted, **more):
@@ -272,7 +273,8 @@ def test_more_than_can_be_met_exactly_is_refused_with_both_counts():
         ({"transmission": 89.99}, ("the transmission angle of 89.99 deg: the best design reaches", "deg less")),
     ],
 )
-def test_a_refusal_names_the_demand_and_how_near_designs_come(few_designs, demand, words):
+def test_a_refusal_names_the_demand_and_how_near_designs_come(few_designs, monkeypatch, demand, words):
+    monkeypatch.setattr("planar.synthesis.fitting.design_fit.MAX_STEPS", 30)  # how near they come does not matter
     wanted = {"point": "E", "through": [[0, 0], [20, 12], [42, 15]], "in_order": True}
     found = planar.synthesise(task("slider-crank", wanted, demands=["whole turn", demand]), many=1)
     assert not len(found)

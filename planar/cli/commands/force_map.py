@@ -31,7 +31,7 @@ def show_force_map(
     if output is not None and output.suffix in (".csv", ".npz", ".parquet"):
         from planar.foundation.safe_files import save_file
 
-        save_file(output, encode_run(found.motion, output.suffix, force_series(found.forces), {}))
+        save_file(output, encode_run(found.motion, output.suffix, force_series(found.forces)))
         output = None
     print_or_write(table(found), output)
 

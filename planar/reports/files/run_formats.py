@@ -30,15 +30,18 @@ def check_writable(suffix: str) -> None:
 
 
 def encode_run(
-    motion: Motion, suffix: str, more: Iterable[ReportedSeries] = (), facts: Mapping[str, Any] = _NO_FACTS
+    motion: Motion,
+    suffix: str,
+    more: Iterable[ReportedSeries] = (),
+    facts: Callable[[], Mapping[str, Any]] = dict,
 ) -> bytes:
-    """The run, and what more is told of it, in the format that a file's suffix names. Raises BadInput.
+    """The run and further series in the format that a file's suffix names. Raises BadInput.
 
-    What is `said` of all of it together is for JSON.
+    `facts` of the run as a whole are in JSON alone, and are computed only for it.
     """
     check_writable(suffix)
     if suffix.lower() == ".json":
-        return _encode_json(motion, more, facts)
+        return _encode_json(motion, more, facts())
     return _FORMATS[suffix.lower()](motion, more)
 
 

@@ -120,19 +120,18 @@ class FirstContact:
         is_peak = (heights >= np.roll(heights, 1, axis=1)) & (heights > np.roll(heights, -1, axis=1))
         rows, spacing = np.arange(len(angle)), float(np.diff(self._samples).max())
         peaks = np.where(is_peak, heights, -np.inf)
-        tops = []
-        for _ in range(CANDIDATES):  # of tops of samples the true ones may have another order
-            top = np.argmax(peaks, axis=1)
-            is_top = np.isfinite(peaks[rows, top])
-            height, at, slope = (np.full(len(angle), each) for each in (-np.inf, np.nan, np.nan))
-            if is_top.any():
-                at[is_top], slope[is_top] = self._polish(angle[is_top], self._samples[top[is_top]], 1.5 * spacing)
-                height[is_top] = np.nan_to_num(self._lift_of(angle[is_top], at[is_top]), nan=-np.inf)
-            tops.append((height, at, slope))
-            peaks[rows, top] = -np.inf
-        best = np.argmax(np.stack([height for height, *_ in tops]), axis=0)
-        at, slope = (np.stack([top[k] for top in tops])[best, rows] for k in (1, 2))
-        return at, slope
+        tops, is_top = np.zeros((CANDIDATES, len(angle)), int), np.zeros((CANDIDATES, len(angle)), bool)
+        for k in range(CANDIDATES):  # of tops of samples the true ones may have another order
+            tops[k] = np.argmax(peaks, axis=1)
+            is_top[k] = np.isfinite(peaks[rows, tops[k]])
+            peaks[rows, tops[k]] = -np.inf
+        height, at, slope = (np.full(tops.shape, value) for value in (-np.inf, np.nan, np.nan))
+        if is_top.any():
+            angles = np.broadcast_to(angle, tops.shape)[is_top]
+            at[is_top], slope[is_top] = self._polish(angles, self._samples[tops[is_top]], 1.5 * spacing)
+            height[is_top] = np.nan_to_num(self._lift_of(angles, at[is_top]), nan=-np.inf)
+        best = np.argmax(height, axis=0)
+        return at[best, rows], slope[best, rows]
 
     def _face_rates(self, angle: Array, at: Array) -> ContactRates:
         first, by_angle = self._along(angle, at, 1.0, 0.0)

@@ -287,16 +287,17 @@ def _coarse(length: float) -> int:
 def _make_pieces(contact: FirstContact, motion: ContactMotion, first: float, start: Array, stop: Array) -> _Pieces:
     """Polynomials between angles from the first; jumps have their contacts before and after."""
     step = stop - start
-    ways = [contact.parameters(first + angle) for angle in (start, stop)]
+    offsets = np.stack([start, stop, *(start + part * step for part in COMPARED_PARTS)])
+    angles = (first + offsets).ravel()
+    parameters = contact.parameters(angles).reshape(offsets.shape)
     for angle, before, after in zip(motion.jump_angles - first, motion.before, motion.after, strict=True):
-        ways[0] = np.where(start == angle, after, ways[0])
-        ways[1] = np.where((stop == angle) | (stop == angle + 2.0 * pi), before, ways[1])
-    ends = [contact.rates(first + angle, way) for angle, way in zip((start, stop), ways, strict=True)]
-    scaled = [np.stack([rates.lift, rates.first * step, rates.second * step * step]) for rates in ends]
+        parameters[0] = np.where(start == angle, after, parameters[0])
+        parameters[1] = np.where((stop == angle) | (stop == angle + 2.0 * pi), before, parameters[1])
+    rates = contact.rates(angles, parameters.ravel())
+    lift, velocity, acceleration = (rate.reshape(offsets.shape) for rate in rates)
+    scaled = [np.stack([lift[end], velocity[end] * step, acceleration[end] * step * step]) for end in (0, 1)]
     found, off = _hermite_coefficients(*scaled), np.zeros_like(start)
-    for part in COMPARED_PARTS:
-        at = first + start + part * step
-        wanted = contact.rates(at, contact.parameters(at)).lift
+    for part, wanted in zip(COMPARED_PARTS, lift[2:], strict=True):
         off = np.maximum(off, np.abs(sum(found[k] * part**k for k in range(6)) - wanted))
     return _Pieces(start, stop, found, off)
 

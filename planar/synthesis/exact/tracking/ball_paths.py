@@ -29,26 +29,21 @@ from planar.synthesis.exact.relations.exact_numbers import ExactNumber
 from planar.synthesis.exact.relations.family import Family, Member
 from planar.synthesis.exact.relations.unknowns import NumberKind
 
+NumberBalls = list[list[list[Any]]]
+"""The numbers of a member as balls: (parts, entries, numbers and their conjugates)."""
+
 
 class MemberInBalls:
-    """The equations of a member, or of one a part `back` of the way from it to another; of a task's numbers as its file
-    has them."""
+    """The equations of a member whose numbers are balls."""
 
-    def __init__(self, family: Family, member: Member, other: Member | None = None, back: float = 0.0):
+    def __init__(self, family: Family, numbers: NumberBalls):
         self.parts: list[tuple[Any, list[list[Any]]]] = []
         given: list[Any] = []
-        for k, (part, numbers) in enumerate(zip(family.parts, member.parts, strict=True)):
-            exact = None if member.exact is None else member.exact[k]
-            rows = []
-            for entry in range(part.entry_count):
-                here = _number_balls(part.kinds, numbers[entry], None if exact is None else exact[entry])
-                if other is not None and back:
-                    there = _number_balls(part.kinds, other.parts[k][entry], None)
-                    here = [a + back * (b - a) for a, b in zip(here, there, strict=True)]
-                rows.append(_symbol_values(part.kinds, here))
+        for k, (part, entries) in enumerate(zip(family.parts, numbers, strict=True)):
+            rows = [_symbol_values(part.kinds, entry) for entry in entries]
             if k == 0:
                 given = rows[0]
-            self.parts.append((part.rows, [given] if k == 0 else [[*given, *own] for own in rows]))
+            self.parts.append((part.rows, [given] if k == 0 else [[*given, *row] for row in rows]))
 
     def __call__(self, w: Sequence[Any]) -> tuple[list[Any], list[list[Any]]]:
         """The rows and their Jacobian at a box of balls."""
@@ -62,6 +57,30 @@ class MemberInBalls:
                 f += own
                 slope += own_slope
         return f, slope
+
+
+def member_balls(family: Family, member: Member) -> NumberBalls:
+    """The numbers of a member as balls; those of a task as its file has them."""
+    return [
+        [
+            _number_balls(part.kinds, numbers[entry], None if member.exact is None else member.exact[k][entry])
+            for entry in range(part.entry_count)
+        ]
+        for k, (part, numbers) in enumerate(zip(family.parts, member.parts, strict=True))
+    ]
+
+
+def _balls_between(begin: NumberBalls, end: NumberBalls, remainder: float) -> NumberBalls:
+    """The numbers at a position on the straight path from one member to another, a part of which remains."""
+    if not remainder:
+        return end
+    return [
+        [
+            [b + remainder * (a - b) for a, b in zip(first, last, strict=True)]
+            for first, last in zip(*entries, strict=True)
+        ]
+        for entries in zip(begin, end, strict=True)
+    ]
 
 
 def _number_balls(kinds: Sequence[NumberKind], numbers: ComplexArray, exact: Sequence[ExactNumber] | None) -> list[Any]:
@@ -109,8 +128,9 @@ def follow_in_balls(family: Family, begin: Member, x: ComplexArray, end: Member,
     end; infinite where a path goes to infinity, no numbers where it does not come to an end."""
     found = np.full_like(x, np.nan)
     with ball_precision():
+        first, last = (member_balls(family, member) for member in (Member(begin.parts), end))
         for k, own in enumerate(x):
-            w, is_end = _follow_path(family, begin, [ball(complex(each)) for each in own], end, left)
+            w, is_end = _follow_path(family, first, [ball(complex(each)) for each in own], last, left)
             if is_end:
                 found[k] = [complex(value) for value in w]
             elif _greatest(w) > FAR:
@@ -122,9 +142,11 @@ def _greatest(w: Sequence[Any]) -> float:
     return max((abs(complex(value)) for value in w), default=0.0)
 
 
-def _follow_path(family: Family, begin: Member, w: list[Any], end: Member, left: float) -> tuple[list[Any], bool]:
+def _follow_path(
+    family: Family, begin: NumberBalls, w: list[Any], end: NumberBalls, left: float
+) -> tuple[list[Any], bool]:
     """The last point of the path from a solution, and whether that is its end; none where it was lost before."""
-    first = _corrected(MemberInBalls(family, end, begin, left), w)[0]
+    first = _corrected(MemberInBalls(family, _balls_between(begin, end, left)), w)[0]
     if first is None:
         return [], False
     points = [(left, first)]
@@ -135,7 +157,7 @@ def _follow_path(family: Family, begin: Member, w: list[Any], end: Member, left:
         if is_over or step < LEAST_STEP:
             return (points[-1][1] if is_over else []), False
         here = left * (1.0 - step) if step < 0.5 else 0.0
-        at, off = _corrected(MemberInBalls(family, end, begin, here), _predicted(points, here))
+        at, off = _corrected(MemberInBalls(family, _balls_between(begin, end, here)), _predicted(points, here))
         if at is not None:
             if not here:
                 return at, True
@@ -162,10 +184,12 @@ def _corrected(equations: MemberInBalls, w: list[Any]) -> tuple[list[Any] | None
 def _predicted(points: Sequence[tuple[float, list[Any]]], here: float) -> list[Any]:
     """The polynomial through points, elsewhere (Lagrange); with all digits, as far out the rounding of a double in one
     unknown moves another one by more than the step does."""
+    places = [place for place, _ in points]
+    distances = [ball(here) - place for place in places]
     weights = []
-    for k, (one, _) in enumerate(points):
-        others = [other for n, (other, _) in enumerate(points) if n != k]
-        weights.append(prod([(ball(here) - other) / (ball(one) - other) for other in others], start=ball(1.0)))
+    for k, place in enumerate(map(ball, places)):
+        numerator = prod([distance for n, distance in enumerate(distances) if n != k], start=ball(1.0))
+        weights.append(numerator / prod([place - other for n, other in enumerate(places) if n != k], start=ball(1.0)))
     entries = zip(*(w for _, w in points), strict=True)
     return [sum((weight * each for weight, each in zip(weights, own, strict=True)), ball(0.0)).mid() for own in entries]
 
@@ -187,7 +211,7 @@ class ExactCertificates(NamedTuple):
 def certify_member(family: Family, member: Member, x: ComplexArray) -> ExactCertificates:
     """What is proved of solutions x (solutions, unknowns) of a real member, whose numbers are the floats they are."""
     with ball_precision():
-        equations = MemberInBalls(family, member)
+        equations = MemberInBalls(family, member_balls(family, member))
         proved, real = np.zeros(len(x), dtype=bool), np.zeros(len(x), dtype=bool)
         half = np.full(len(x), np.inf)
         exact = x.copy()
