@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -359,6 +360,7 @@ def synthesise(
     timeout: float | None = None,  # noqa: ARG001 - of the decorator
     folder: str | os.PathLike[str] | None = None,
     progress: Callable[[SearchProgress], None] | None = None,
+    time_limit: float | None = None,
 ) -> Synthesis:
     """The linkages that do best what a task wants, each judged by the general path.
 
@@ -386,6 +388,9 @@ def synthesise(
     >>> found[0].greatest_miss < 1e-5, found[0].defects
     (True, ())
     """
+    if time_limit is not None:
+        warnings.warn("synthesise: the argument 'time_limit' is called 'timeout' now", DeprecationWarning, stacklevel=3)
+        return synthesise(task, many=many, seed=seed, timeout=time_limit, folder=folder, progress=progress)
     known = read_task(task)
     if complete:
         from planar.synthesis.exact.exact_synthesis import synthesise_all

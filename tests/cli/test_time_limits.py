@@ -8,6 +8,7 @@ import signal
 import click
 import pytest
 
+import planar
 from planar.cli import main
 from planar.cli.streams import TIME_LIMIT
 from planar.foundation import time_limit
@@ -148,3 +149,13 @@ def test_enough_time_changes_nothing(tmp_path):
     for name in ("chains", "modes", "inspect", "problem"):
         words = (name, *COMMANDS[name], "--json")
         assert run(tmp_path, *words, "--timeout", "100 h").done() == run(tmp_path, *words).done()
+
+
+def test_the_former_names_of_the_time_limit_of_a_search_still_work(tmp_path):
+    points = [[4 * k, 12 * (k % 5) - k * k / 4] for k in range(12)]
+    task = {"planar": 1, "start": "slider-crank", "wanted": [{"point": "E", "through": points}]}
+    with pytest.warns(DeprecationWarning, match="'timeout' now"):
+        assert not planar.synthesise(task, many=2, time_limit=1e-9).is_finished
+    (tmp_path / "task.json").write_text(json.dumps(task))
+    ended = run(tmp_path, "synthesise", "task.json", "--time", "1e-9")
+    assert (ended.status, "--time is called --timeout now" in ended.err) == (1, True)

@@ -13,7 +13,7 @@ import click
 
 from planar.cli.exit_status import INTERRUPTED, no_answer_status
 from planar.cli.options import json_option, limited_time, main, print_or_write, show_progress, timeout_option
-from planar.cli.streams import ended_early, print_json
+from planar.cli.streams import TIME_LIMIT, ended_early, print_json
 from planar.foundation.errors import Outcome
 
 if TYPE_CHECKING:
@@ -33,6 +33,16 @@ NOT_COUNTED = (
 """Of a list whose trace test is interrupted."""
 
 
+def _keep_former_option(context: click.Context, _: click.Parameter, seconds: float | None) -> None:
+    """The former name of `--timeout`, in seconds."""
+    if seconds is None:
+        return
+    from planar.foundation.time_limit import TimeLimit
+
+    click.echo("planar: --time is called --timeout now", err=True)
+    context.meta[TIME_LIMIT] = TimeLimit(seconds)
+
+
 @main.command()
 @click.argument("task", type=click.Path(path_type=Path))
 @click.option("--many", type=click.IntRange(1, 1000), default=10, show_default=True, metavar="N", help="Designs.")
@@ -40,6 +50,9 @@ NOT_COUNTED = (
     "--seed", type=click.IntRange(0), default=0, show_default=True, metavar="S", help="The same gives the same."
 )
 @timeout_option
+@click.option(
+    "--time", type=click.FloatRange(0.0, min_open=True), hidden=True, expose_value=False, callback=_keep_former_option
+)
 @click.option(
     "-o",
     "output",
