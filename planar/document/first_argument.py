@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import wraps
+from inspect import unwrap
 from os import PathLike
 from typing import Any, Concatenate, Literal, ParamSpec, Protocol, TypeVar, overload
 
@@ -79,7 +80,7 @@ def takes_result(*classes: str) -> Any:
 
 
 def _with_first(function: Any, resolve: Callable[[Any], Any]) -> Any:
-    first = function.__code__.co_varnames[0]
+    first = unwrap(function).__code__.co_varnames[0]
 
     @wraps(function)
     def call(*args: Any, **named: Any) -> Any:

@@ -115,7 +115,7 @@ class StackedResiduals:
 
     def evaluate(self, coordinates: StackedCoordinates, numbers: PairValues) -> Scalar:
         """The residuals (constraints, samples), an array or a jet of arrays; not finite where they are undefined."""
-        size = max(1, MAX_STACKED_NUMBERS // coordinates.sample_count)
+        size = max(1, MAX_STACKED_NUMBERS // max(1, coordinates.sample_count))
         residuals: list[tuple[IntArray, Scalar]] = []
         with np.errstate(all="ignore"):
             for group in self._groups:

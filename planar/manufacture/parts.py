@@ -189,8 +189,7 @@ def parts(  # many: sizes of what is cut
     The run is that of `planar.cycle` from `start` to `stop` of the input at `pair`. Layers are found by the distances
     of all plates and pins at so many steps of it, and at up to 64 times as many where those leave it open whether
     something is met between positions. Raises BadInput for a pair that is none of plates, for a hole at no point, and
-    where a plate cannot be; NoAnswer where the mechanism does not run, and after `timeout` s or a Ctrl-C, with the
-    outcome "interrupted".
+    where a plate cannot be; NoAnswer where the mechanism does not run, and after `timeout` s or a Ctrl-C.
 
     >>> import planar
     >>> planar.parts("four-bar", thickness=0.003)

@@ -7,6 +7,9 @@ from math import ceil, floor, pi, tan
 from planar.manufacture.involute import ADDENDUM, DEDENDUM
 from planar.manufacture.plates import Vertex
 
+ROUNDING = 1e-9
+"""Of a pitch: a tooth that lacks less is whole."""
+
 
 def rack_outline(
     span: tuple[float, float], module: float, pressure_angle: float, offset: float, backlash: float, depth: float
@@ -19,7 +22,8 @@ def rack_outline(
     pitch, steep = pi * module, tan(pressure_angle)
     half = pitch / 4.0 - backlash / 2.0
     high, deep = min(ADDENDUM * module, half / steep), min(DEDENDUM * module, (pitch / 2.0 - half) / steep)
-    first, last = ceil((span[0] - offset) / pitch + 0.5), floor((span[1] - offset) / pitch - 0.5)
+    start, end = ((place - offset) / pitch for place in span)
+    first, last = ceil(start + 0.5 - ROUNDING), floor(end - 0.5 + ROUNDING)
     found: list[Vertex] = [(span[0], -depth, 0.0), (span[1], -depth, 0.0), (span[1], -deep, 0.0)]
     for number in range(last, first - 1, -1):
         middle = offset + number * pitch

@@ -706,7 +706,7 @@ def test_an_option_that_takes_one_value_is_refused_when_it_is_repeated(tmp_path:
 def test_an_option_that_a_drawing_does_not_use_is_refused_by_name(tmp_path: Path) -> None:
     """The refusal and the help of `plot` name the same drawings."""
     options = {word: option for name, option in COMMAND_OPTIONS if name == "plot" for word in option.opts}
-    assert {*options} - {*OPTION_USES} == {"-o", "--set"}
+    assert {*options} - {*OPTION_USES} == {"-o", "--set", "--timeout"}
     for word, use in OPTION_USES.items():
         named = re.search(r"(Not for|For) ([^.]*)[.]", options[word].help or "")
         assert named is not None, word

@@ -222,6 +222,7 @@ def test_every_option_stands_on_a_page_and_every_option_of_a_page_is_one():
         name
         for each in main.load_commands().values()
         for part in each.params
+        if not getattr(part, "hidden", False)
         for name in (*part.opts, *part.secondary_opts)
     }
     known = {name for name in known if name.startswith("--")}
