@@ -65,73 +65,82 @@ class RecordedNumber:
     def __init__(self, instructions: InstructionList[Any], number: int):
         self.instructions, self.number = instructions, number
 
-    def _record(self, operation: str, *operands: Scalar) -> RecordedNumber:
-        numbers = (number_of(operand, self.instructions) for operand in operands)
-        return RecordedNumber(self.instructions, self.instructions.add(operation, *numbers))
+    def _record(self, operation: str, other: Scalar) -> RecordedNumber:
+        """The number of an operation of this number and another."""
+        instructions = self.instructions
+        return RecordedNumber(instructions, instructions.add(operation, self.number, number_of(other, instructions)))
+
+    def _record_after(self, operation: str, other: Scalar) -> RecordedNumber:
+        """The same of the other and this one."""
+        instructions = self.instructions
+        return RecordedNumber(instructions, instructions.add(operation, number_of(other, instructions), self.number))
+
+    def _apply(self, function: str) -> RecordedNumber:
+        return RecordedNumber(self.instructions, self.instructions.add(function, self.number))
 
     def __add__(self, other: Scalar) -> RecordedNumber:
-        return self._record("add", self, other)
+        return self._record("add", other)
 
     __radd__ = __add__
 
     def __neg__(self) -> RecordedNumber:
-        return self._record("neg", self)
+        return self._apply("neg")
 
     def __sub__(self, other: Scalar) -> RecordedNumber:
-        return self._record("sub", self, other)
+        return self._record("sub", other)
 
     def __rsub__(self, other: Scalar) -> RecordedNumber:
-        return self._record("sub", other, self)
+        return self._record_after("sub", other)
 
     def __mul__(self, other: Scalar) -> RecordedNumber:
-        return self._record("mul", self, other)
+        return self._record("mul", other)
 
     __rmul__ = __mul__
 
     def __truediv__(self, other: Scalar) -> RecordedNumber:
-        return self._record("div", self, other)
+        return self._record("div", other)
 
     def __rtruediv__(self, other: Scalar) -> RecordedNumber:
-        return self._record("div", other, self)
+        return self._record_after("div", other)
 
     def __pow__(self, exponent: Scalar) -> RecordedNumber:
-        return self._record("pow", self, exponent)
+        return self._record("pow", exponent)
 
     def __abs__(self) -> RecordedNumber:
-        return self._record("abs", self)
+        return self._apply("abs")
 
     def __lt__(self, other: Scalar) -> RecordedNumber:
-        return self._record("less", self, other)
+        return self._record("less", other)
 
     def __gt__(self, other: Scalar) -> RecordedNumber:
-        return self._record("less", other, self)
+        return self._record_after("less", other)
 
     def __le__(self, other: Scalar) -> RecordedNumber:
-        return self._record("most", self, other)
+        return self._record("most", other)
 
     def __ge__(self, other: Scalar) -> RecordedNumber:
-        return self._record("most", other, self)
+        return self._record_after("most", other)
 
     def cos(self) -> RecordedNumber:
-        return self._record("cos", self)
+        return self._apply("cos")
 
     def sin(self) -> RecordedNumber:
-        return self._record("sin", self)
+        return self._apply("sin")
 
     def tan(self) -> RecordedNumber:
-        return self._record("tan", self)
+        return self._apply("tan")
 
     def sqrt(self) -> RecordedNumber:
-        return self._record("sqrt", self)
+        return self._apply("sqrt")
 
     def floor(self) -> RecordedNumber:
-        return self._record("floor", self)
+        return self._apply("floor")
 
     def arctan2(self, x: Scalar) -> RecordedNumber:
-        return self._record("atan2", self, x)
+        return self._record("atan2", x)
 
     def __rarctan2__(self, y: Scalar) -> RecordedNumber:
-        return self._record("atan2", y, self)
+        return self._record_after("atan2", y)
 
 
 def number_of(value: Scalar, instructions: InstructionList[Any]) -> int:
@@ -149,10 +158,12 @@ def record_formula(formula: Callable[[Sequence[RecordedNumber]], Sequence[Scalar
 def formula_of_results(instructions: InstructionList[int], results: Sequence[int]) -> RecordedFormula:
     """The formula of some values of a list, without what they do not need."""
     required = required_values(instructions, results)
-    numbers = {number: place for place, number in enumerate(required)}
-    needed = (instructions.instructions[number] for number in required)
-    renumbered = (value._replace(operands=tuple(numbers[k] for k in value.operands)) for value in needed)
-    return RecordedFormula(tuple(renumbered), tuple(numbers[result] for result in results))
+    places = {number: place for place, number in enumerate(required)}
+    renumbered: list[Instruction[int]] = []
+    for number in required:
+        operation, operands, constant, key = instructions.instructions[number]
+        renumbered.append(Instruction(operation, tuple([places[operand] for operand in operands]), constant, key))
+    return RecordedFormula(tuple(renumbered), tuple([places[result] for result in results]))
 
 
 _FUNCTIONS: dict[str, Callable[..., Scalar]] = {
