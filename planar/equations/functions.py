@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import cached_property, lru_cache
-from typing import Any, NamedTuple, TypeVar, cast
+from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -61,9 +61,6 @@ SAMPLES_PER_EVALUATION = 64.0
 """Samples that take as long as one evaluation takes whatever their number."""
 RUN_NEWTON_STEPS = 4
 """Unrolled steps of a position within a run: from a start a degree or so away, four square the error away."""
-
-
-Kept = TypeVar("Kept", bound=ca.Function | None)
 
 
 class EquationRates(NamedTuple):
@@ -125,18 +122,15 @@ class EquationFunctions:
         """Evaluate by functions of the whole from now on."""
         self._evaluation_count = MANY_EVALUATIONS + 1.0
 
-    def kept(self, name: str, make: Callable[[], Kept]) -> Kept:
+    def kept(self, name: str, make: Callable[[], ca.Function]) -> ca.Function:
         """What `make` makes of this structure, from the disk where it is kept there by this name."""
         text = None if self._texts is None else self._texts.take(name)
-        if text == "":  # what cannot be made
-            return cast("Kept", None)
-        found = read_function(text)
-        if found is not None:
-            return cast("Kept", found)
-        made = make()
-        if self._texts is not None:
-            self._texts.add(name, made.serialize if made is not None else str)
-        return made
+        function = read_function(text)
+        if function is None:
+            function = make()
+            if self._texts is not None:
+                self._texts.add(name, function.serialize)
+        return function
 
     def block_function(self, block: Block) -> ca.Function:
         """(z, u, p) -> F of this block (rows,) and its Jacobian in the block's own unknowns (rows, unknowns)."""
