@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planar.equations.block_types import MAX_BLOCK_TYPES, BlockTypeKey, block_equations
-from planar.equations.closed_form_assemblies import POLISHING_STEPS, ArrayFunction, ClosedFormAssemblies
+from planar.equations.closed_form_assemblies import ArrayFunction, ClosedFormAssemblies
 from planar.equations.known_types import known_text
 from planar.equations.linear import solve_vectors
 from planar.foundation.angles import wrap_angle
@@ -126,9 +126,7 @@ class BlockTypeFunctions:
         samples: Array = min(both, key=lambda values: distance(values[0]) if np.isfinite(values[0]).all() else np.inf)
         steps = np.diff(samples[:, is_angle], axis=0, prepend=z[None, is_angle])
         samples[:, is_angle] = z[is_angle] + np.cumsum(wrap_angle(steps), axis=0)
-        for _ in range(POLISHING_STEPS):
-            residuals, columns = self.closing.evaluate_batch(len(known), samples, known, numbers)
-            samples = samples - solve_vectors(columns.swapaxes(-1, -2), residuals[:, 0])
+        self.assemblies.polish(samples, known, numbers)
         return samples
 
     def _run_newton(self, z: Array, known: Array, numbers: Array) -> Array:

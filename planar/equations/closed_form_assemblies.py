@@ -6,6 +6,7 @@ from typing import Protocol
 
 import numpy as np
 
+from planar.equations.linear import solve_vectors
 from planar.foundation.arrays import Array
 
 POLISHING_STEPS = 2
@@ -56,10 +57,7 @@ class ClosedFormAssemblies:
         for assembly in both:
             tried = z.copy()
             tried[:, self._unknowns] = assembly
-            for _ in range(POLISHING_STEPS):
-                residuals, columns = self._closing.evaluate_batch(len(z), tried, u, p)
-                with np.errstate(all="ignore"):
-                    tried[:, self._unknowns] -= solve_two(columns, residuals[:, 0])
+            self.polish(tried, u, p)
             residual = np.abs(self._closing.evaluate_batch(len(z), tried, u, p)[0][:, 0]).max(axis=1)
             # the greatest of what is left open does not see what is not a number
             is_defined = np.isfinite(tried[:, self._unknowns]).all(axis=1)
@@ -67,9 +65,9 @@ class ClosedFormAssemblies:
             assemblies.append(tried[:, self._unknowns])
         return np.array(assemblies), greatest, coalescence
 
-
-def solve_two(columns: Array, right_side: Array) -> Array:
-    """The solutions (positions, 2) of systems of two unknowns by their columns (positions, 2, 2), by the adjugate."""
-    (a, c), (b, d) = columns[:, 0].T, columns[:, 1].T
-    first, second = right_side.T
-    return np.stack([d * first - b * second, a * second - c * first], axis=1) / (a * d - b * c)[:, None]
+    def polish(self, z: Array, u: Array, p: Array) -> None:
+        """Carry the block's unknowns in z (designs, unknowns) to round-off."""
+        for _ in range(POLISHING_STEPS):
+            residuals, columns = self._closing.evaluate_batch(len(z), z, u, p)
+            with np.errstate(all="ignore"):  # what is not there is not a number
+                z[:, self._unknowns] -= solve_vectors(columns.swapaxes(-1, -2), residuals[:, 0])

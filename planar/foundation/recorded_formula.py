@@ -6,6 +6,8 @@ from collections.abc import Callable, Sequence
 from math import floor
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from planar.foundation.instruction_list import Instruction, InstructionList, required_values
 from planar.foundation.jets import Scalar, atan2, cos, sin, sqrt, tan
 
@@ -166,6 +168,12 @@ def formula_of_results(instructions: InstructionList[int], results: Sequence[int
     return RecordedFormula(tuple(renumbered), tuple([places[result] for result in results]))
 
 
+def _floor(value: Scalar) -> Scalar:
+    if isinstance(value, float):
+        return float(floor(value))
+    return value.floor() if hasattr(value, "floor") else np.floor(value)
+
+
 _FUNCTIONS: dict[str, Callable[..., Scalar]] = {
     "add": lambda a, b: a + b,
     "sub": lambda a, b: a - b,
@@ -174,14 +182,14 @@ _FUNCTIONS: dict[str, Callable[..., Scalar]] = {
     "pow": lambda a, b: a**b,
     "neg": lambda a: -a,
     "abs": abs,
-    "less": lambda a, b: a < b,
-    "most": lambda a, b: a <= b,
+    "less": lambda a, b: 1.0 * (a < b),
+    "most": lambda a, b: 1.0 * (a <= b),
     "not": lambda a: 1.0 - a,
     "where": lambda a, b: a * b,
     "cos": cos,
     "sin": sin,
     "tan": tan,
     "sqrt": sqrt,
-    "floor": lambda a: a.floor() if hasattr(a, "floor") else floor(a),
+    "floor": _floor,
     "atan2": atan2,
 }

@@ -126,7 +126,7 @@ def test_friction_is_the_same_by_both(monkeypatch):
     assert sparse.friction.keys() == dense.friction.keys() != set()
     for name, each in dense.friction.items():
         assert sparse.friction[name].effort == pytest.approx(each.effort, rel=1e-9)
-    assert sparse.frictionless is not None
+    assert_alike(sparse.frictionless, dense.frictionless)
 
 
 def test_links_held_more_than_once_are_named_alike_by_both(monkeypatch):

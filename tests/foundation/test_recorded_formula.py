@@ -7,6 +7,7 @@ import pytest
 from planar.foundation.geometry import Frame
 from planar.foundation.instruction_list import Instruction
 from planar.foundation.jets import atan2, cos, sign_of, sin, sqrt, tan, value_between, within_turn
+from planar.foundation.printed_formula import MAX_INTERPRETED_CALLS, FormulaFunction
 from planar.foundation.recorded_formula import RecordedFormula, record_formula
 from planar.model.pairs import pair_types
 
@@ -67,3 +68,16 @@ def test_the_formulas_of_every_pair_type_are_recorded(sample):
     result, expected = (part.full() for part in both(np.array(values, float)[:, None] + aside))
     np.testing.assert_array_equal(result, expected)
     assert np.isfinite(expected).all()
+
+
+def test_a_formula_of_floats_and_arrays_says_the_same_before_and_after_it_is_printed():
+    formula = record_formula(every_operation, 2)
+    count = len(formula.results)
+    function = FormulaFunction(formula, (1, 1), ((1, count),))
+    a, b = np.random.default_rng(0).uniform(0.3, 2.0, (2, 7, 1))
+    expected = np.array(
+        [[float(np.asarray(value)) for value in formula.evaluate([*x, *y])] for x, y in zip(a, b, strict=True)]
+    )
+    for _ in range(2 * MAX_INTERPRETED_CALLS):
+        np.testing.assert_allclose(function.evaluate_batch(7, a, b)[0][:, 0], expected, rtol=1e-14)
+        np.testing.assert_allclose(function(a[0], b[0])[0][0], expected[0], rtol=1e-14)
