@@ -1,8 +1,9 @@
 """Makes the file of known elements and block types: of all models, and of the samples of every pair type."""
 
 from planar.equations import element_placement
-from planar.equations.block_type_functions import derive_block_type
-from planar.equations.block_types import place_blocks
+from planar.equations.block_motion import derive_block_motion
+from planar.equations.block_type_functions import MAX_FORMULA_UNKNOWNS, derive_block_type, motion_fingerprint
+from planar.equations.block_types import block_equations, place_blocks, place_input_coordinates
 from planar.equations.element_derivation import derive_element
 from planar.equations.known_types import KNOWN_TYPES_FILE
 from planar.equations.mechanism_numbers import equation_structure
@@ -23,9 +24,14 @@ def known_texts() -> dict[str, str]:
     element_placement.element_of_key = recording
     try:
         for mechanism in MODELS.values():
-            for placed in place_blocks(build_equations(equation_structure(mechanism))):
-                if placed is not None and placed.key.fingerprint not in texts:
-                    texts[placed.key.fingerprint] = derive_block_type(placed.key).as_text()
+            equations = build_equations(equation_structure(mechanism))
+            for placed in (*place_blocks(equations), *place_input_coordinates(equations)):
+                if placed is not None and motion_fingerprint(placed.key) not in texts:
+                    key, block = placed.key, block_equations(placed.key)
+                    if key.unknown_count:
+                        texts[key.fingerprint] = derive_block_type(key).as_text()
+                    if block.is_square and key.unknown_count <= MAX_FORMULA_UNKNOWNS:
+                        texts[motion_fingerprint(key)] = derive_block_motion(block).as_text()
     finally:
         element_placement.element_of_key = element_of_key
     return texts

@@ -9,6 +9,7 @@ import numpy as np
 import planar
 from benchmarks.linkages import Linkage
 from benchmarks.ways.trial import CRANK, Array, Trial
+from planar.equations.acceptance import InputSamples
 from planar.model.mechanism import Drive, replace_inputs
 from planar.results.motion import Motion, State
 from planar.solving.continuation.path import follow_samples, follow_to
@@ -40,9 +41,9 @@ class Turn:
         return follow_samples(self.solver, self.numbers, self.start, self.u).z
 
     def bare(self) -> Array:
-        """z by one call of the run's program alone."""
-        found = self.solver.functions.run_samples(self.start, self.u[1:], self.numbers)
-        return np.vstack([self.start, found])
+        """z block after block at all samples, with what is judged of them by one evaluation."""
+        way = InputSamples(self.u, np.ones_like(self.u), np.zeros_like(self.u))
+        return self.solver.acceptance.run(self.start, way, self.solver.acceptance_scales)[0]
 
     def rates(self, z: Array) -> tuple[Array, Array, Array]:
         """z with its first and second rates: two calls of the program and two small systems a sample, ungated."""

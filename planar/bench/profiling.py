@@ -24,6 +24,15 @@ SWEEP_PARTS: dict[FunctionKey, str] = {
 """Functions of a sweep, and what they do; the time of one that another calls is not the other's."""
 
 
+CYCLE_PARTS: dict[FunctionKey, str] = {
+    ("equations", "acceptance.py", "_move"): "computing blocks",
+    ("equations", "constraint_check.py", "judge"): "the residual check",
+    ("continuation", "path.py", "_follow_general"): "following the curve",
+    ("runs", "range_run.py", "_find_range_end"): "finding the ends of the range",
+}
+"""The same of a cycle."""
+
+
 class CallProfile(NamedTuple):
     """Seconds of a task; and of every function called in it, with all that it calls and without, and by whom."""
 
@@ -48,31 +57,28 @@ def profile_first_call(task: Callable[[], Any]) -> tuple[float, float]:
 
 def profile_sweep(task: Callable[[], Any]) -> tuple[float, dict[str, float]]:
     """Seconds of a sweep, and its parts, each as a share of the whole."""
-    found = profile_call(task)
-    parts = {place: found.total_seconds.get(place, 0.0) for place in SWEEP_PARTS}
-    for place in SWEEP_PARTS:
-        for caller, seconds in found.callers.get(place, {}).items():
-            within = _enclosing_part(found, caller)
-            if within is not None:
-                parts[within] -= seconds
-    shares = {SWEEP_PARTS[place]: max(0.0, time) / found.seconds for place, time in parts.items() if time > 0.0}
-    shares["reading designs and writing results"] = max(0.0, 1.0 - sum(shares.values()))
-    return found.seconds, shares
+    return _profile_parts(task, SWEEP_PARTS, "reading designs and writing results")
 
 
 def profile_cycle(task: Callable[[], Any]) -> dict[str, float]:
     """The parts of a cycle, each as a share of the whole."""
+    return _profile_parts(task, CYCLE_PARTS, "the rest")[1]
+
+
+def _profile_parts(
+    task: Callable[[], Any], part_names: dict[FunctionKey, str], rest: str
+) -> tuple[float, dict[str, float]]:
+    """Seconds of a task, and the shares of functions and of the rest in it."""
     found = profile_call(task)
-    # what is called through casadi's buffers counts to the function that calls it
-    share = sum(found.own_seconds.get(place, 0.0) for place in (CASADI_KEY, *BUFFERED_CALLS)) / found.seconds
-    return {"in casadi": share, "in Python and numpy": 1.0 - share}
-
-
-CASADI_KEY: FunctionKey = ("casadi",)
-BUFFERED_CALLS: tuple[FunctionKey, ...] = (
-    ("equations", "casadi_call.py", "__call__"),
-    ("equations", "casadi_call.py", "evaluate_batch"),
-)
+    parts = {place: found.total_seconds.get(place, 0.0) for place in part_names}
+    for place in part_names:
+        for caller, seconds in found.callers.get(place, {}).items():
+            within = _enclosing_part(found, caller, part_names)
+            if within is not None:
+                parts[within] -= seconds
+    shares = {part_names[place]: max(0.0, time) / found.seconds for place, time in parts.items() if time > 0.0}
+    shares[rest] = max(0.0, 1.0 - sum(shares.values()))
+    return found.seconds, shares
 
 
 def profile_call(task: Callable[[], Any]) -> CallProfile:
@@ -91,12 +97,12 @@ def profile_call(task: Callable[[], Any]) -> CallProfile:
     return found
 
 
-def _enclosing_part(found: CallProfile, place: FunctionKey) -> FunctionKey | None:
-    """The part of a sweep in which a function is called, if it is in one."""
+def _enclosing_part(found: CallProfile, place: FunctionKey, part_names: dict[FunctionKey, str]) -> FunctionKey | None:
+    """The part in which a function is called, if it is in one."""
     seen, waiting = {place}, [place]
     while waiting:
         here = waiting.pop(0)
-        if here in SWEEP_PARTS:
+        if here in part_names:
             return here
         more = set(found.callers.get(here, ())) - seen
         seen |= more
@@ -105,8 +111,8 @@ def _enclosing_part(found: CallProfile, place: FunctionKey) -> FunctionKey | Non
 
 
 def _function_key(code: Any) -> FunctionKey:
-    """(folder, file, function) of Python's functions; of others the library, where it shows."""
+    """(folder, file, function) of Python's functions."""
     if isinstance(code, str):
-        return CASADI_KEY if "casadi" in code else ("other",)
+        return ("other",)
     folder, _, name = code.co_filename.replace("\\", "/").rpartition("/")
     return folder.rpartition("/")[2], name, code.co_name

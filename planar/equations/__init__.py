@@ -21,7 +21,8 @@ closes modulo a turn, or one in which whole turns count.
 An *element* is the formula of a pair as a list of instructions, derived once for all pairs of the same formula; the
 equations of a mechanism are its elements, placed by indices. A *block type* is derived once for all blocks whose
 equations are the same. Both are instruction lists, printed as Python for floats and arrays; those of all models are
-kept with the package. Functions of a whole structure are derived only where it is evaluated often.
+kept with the package. Functions of a whole structure are derived only where its equations as a whole are evaluated
+several times.
 
 coordinates           what stands in w, and the frames of links that it makes
 mechanism_numbers     structure, size and numbers p of a mechanism
@@ -35,9 +36,12 @@ elimination           coordinates that enter rows with constant factors are solv
 symbolic_equations    structure, unknowns, rows and blocks; z, u, p, w, F as casadi expressions where they are needed
 assembled_equations   F, w, rates and Jacobians from the elements by index arrays, at any number of samples
 block_types           blocks by their own equations, placed by indices
-block_type_functions  residuals, coordinates, closed form and runs of a block type
+block_type_functions  residuals, coordinates, closed form, motion and runs of a block type
+block_motion          the coordinates of a block type with their rates, and how regular it is
+large_block_motion    the same of a block of many unknowns
 placed_blocks         the functions of block types, called with z, u and p of the whole
 rates                 time derivatives of expressions in y, and of the unknowns
 functions             F, w, rates and Jacobians by elements, or as compiled functions of the whole, kept on disk
-acceptance            all that a position has to pass, as one compiled function
+constraint_check      every constraint with its rates by its pair's own formula, pairs of equal formula together
+acceptance            positions and runs computed block after block, and all that they have to pass
 """

@@ -8,7 +8,7 @@ these and on which later rests depend.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -20,9 +20,9 @@ from planar.equations.elimination import EliminationRow
 from planar.equations.sparse_matrices import SparsePattern
 from planar.foundation.angles import wrap_angle
 from planar.foundation.arrays import Array, IntArray
-from planar.foundation.jets import Scalar, cos, sin
+from planar.foundation.jets import cos, sin
 from planar.foundation.printed_formula import PrintedFunction
-from planar.foundation.recorded_formula import RecordedFormula
+from planar.foundation.recorded_formula import RecordedFormula, elementwise
 
 MAX_KEPT_NUMBERS = 10**6
 """Numbers of an evaluation that is kept."""
@@ -139,12 +139,6 @@ def _call(function: PrintedFunction, formula: RecordedFormula, arguments: Sequen
             return function(*arguments)
     values = [formula.evaluate(instance) for instance in zip(*(argument[0] for argument in arguments), strict=True)]
     return [np.array(instances, dtype=object) for instances in zip(*values, strict=True)]
-
-
-def _elementwise(function: Callable[[Scalar], Scalar], values: Array) -> Array:
-    """A function of every number of an array, recorded ones too."""
-    called: Callable[[Array], Array] = np.frompyfunc(function, 1, 1) if values.dtype == object else function
-    return called(values)
 
 
 class _Stage(NamedTuple):
@@ -272,20 +266,23 @@ class AssembledEquations:
         for placed, first_slope in zip(self._elimination.elements, self._first_slope, strict=True):
             for stage in {level_of_row(row) for row in placed.rows}:
                 by_stage[stage].setdefault(placed.element, []).append((placed, first_slope))
+        terms: list[list[tuple[int, list[tuple[int, int]]]]] = [[] for _ in range(count)]
+        for row, slopes in enumerate(self._row_slopes):
+            if slopes:
+                terms[level_of_row(row)].append((row, slopes))
+        self._columns_after_stage: list[list[int]] = [[] for _ in range(count)]
+        for column, value in early.items():
+            if value:
+                self._columns_after_stage[value - 1].append(column)
         self._find_trigonometric_columns()
-        self._stages = []
-        for stage, elements in enumerate(by_stage):
-            rows = [row for row in range(self._rest_count) if level_of_row(row) == stage]
-            terms = [(row, self._row_slopes[row]) for row in rows if self._row_slopes[row]]
-            columns = [column for column, value in early.items() if value == stage + 1]
-            self._stages.append(
-                _Stage(
-                    [self._group(element, places) for element, places in elements.items()],
-                    _products(terms),
-                    _combinations((column, self._coordinate_sums[column]) for column in columns),
-                )
+        self._stages = [
+            _Stage(
+                [self._group(element, places) for element, places in elements.items()],
+                _products(stage_terms),
+                _combinations((column, self._coordinate_sums[column]) for column in columns),
             )
-        self._early_columns = early
+            for elements, stage_terms, columns in zip(by_stage, terms, self._columns_after_stage, strict=True)
+        ]
 
     def _find_trigonometric_columns(self) -> None:
         """The entries of s whose cosines and sines are needed."""
@@ -348,7 +345,7 @@ class AssembledEquations:
         sines = values[:, self._state_count + angle_count : first_number]
         for stage in self._stages:
             angles = state[:, self._angles]
-            cosines[:], sines[:] = _elementwise(cos, angles), _elementwise(sin, angles)
+            cosines[:], sines[:] = elementwise(cos, angles), elementwise(sin, angles)
             for group in stage.groups:
                 group.evaluate(values, x[:, self._y_count :], slopes)
             stage.coordinates.set_in(state, x)
@@ -368,7 +365,7 @@ class AssembledEquations:
 
     def _residuals(self, x: Array) -> Array:
         residuals = self._sums(self._all_residuals, x, self._row_count)
-        residuals[:, self._angle_rows] = _elementwise(wrap_angle, residuals[:, self._angle_rows])
+        residuals[:, self._angle_rows] = elementwise(wrap_angle, residuals[:, self._angle_rows])
         return residuals
 
     def residuals_and_jacobians(self, z: Array, u: Array, p: Array) -> AssembledJacobians:
@@ -463,12 +460,11 @@ class AssembledEquations:
                     rest_count += 1
                 rest_entries[int(row)] = entries
             sums: list[tuple[int, dict[int, float]]] = []
-            for column, stage_number in self._early_columns.items():
-                if stage_number == number + 1:
-                    constant, varying = self._expand(self._coordinate_sums[column], rest_entries)
-                    sources = {**constant, **varying}
-                    places = add_state(column, {source: constant.get(source, 0.0) for source in sources})
-                    sums += [(places[source], parts) for source, parts in varying.items()]
+            for column in self._columns_after_stage[number]:
+                constant, varying = self._expand(self._coordinate_sums[column], rest_entries)
+                sources = {**constant, **varying}
+                places = add_state(column, {source: constant.get(source, 0.0) for source in sources})
+                sums += [(places[source], parts) for source, parts in varying.items()]
             steps.append((_products(terms), _combinations(sums)))
         return _RestPlan(np.array(constants), rest_count, steps, rest_entries)
 

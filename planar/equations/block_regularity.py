@@ -3,36 +3,6 @@
 from __future__ import annotations
 
 import casadi as ca
-import numpy as np
-
-from planar.equations.elimination import stack_expressions
-from planar.equations.rates import UnknownRates
-from planar.equations.symbolic_equations import slice_length
-
-
-def regular_distances(rates: UnknownRates, along: ca.SX) -> tuple[ca.SX, ca.SX]:
-    """The least singular value of any block, and how far along a direction of y each block is regular (blocks,).
-
-    The distances have the sign of the block's determinant: on one branch it stays the same, and of two assemblies that
-    a dead point brings together one has the other.
-    """
-    least, distances = ca.SX(1.0), []
-    for block, jacobian in zip(rates.equations.blocks, rates.jacobians, strict=True):
-        if not slice_length(block.unknowns):
-            distances.append(ca.SX(np.inf))
-            continue
-        value, distance = _regular_distance(jacobian, rates.y, along)
-        least = ca.fmin(least, value)
-        distances.append(distance)
-    return least, stack_expressions(distances)
-
-
-def greatest_entry(values: ca.SX) -> ca.SX:
-    """The greatest of a column of numbers from zero on."""
-    found = ca.SX(0.0)
-    for value in ca.vertsplit(values) if values.numel() else []:
-        found = ca.fmax(found, value)
-    return found
 
 
 def regularity_bound(block: ca.SX, row_scale: ca.SX, column_floor: ca.SX) -> ca.SX:
@@ -103,9 +73,13 @@ def reduce_to_triangle(matrix: ca.SX) -> tuple[ca.SX, ca.SX]:
     return ca.vertcat(*(ca.horzcat(*row) for row in rows)), sign
 
 
-def _regular_distance(block: ca.SX, y: ca.SX, direction: ca.SX) -> tuple[ca.SX, ca.SX]:
+def regular_distance(block: ca.SX, y: ca.SX, direction: ca.SX) -> tuple[ca.SX, ca.SX]:
     """No more than the least singular value of a block, columns of one size, and how far along a direction it is one at
-    least (Weyl), see `solving.checks.branch_check`."""
+    least (Weyl), see `solving.checks.branch_check`.
+
+    The distance has the sign of the block's determinant: on one branch it stays the same, and of two assemblies that a
+    dead point brings together one has the other.
+    """
     change = ca.reshape(ca.jtimes(ca.vec(block), y, direction), block.shape)
     sizes = ca.horzcat(*(ca.norm_2(block[:, k]) for k in range(block.size2())))
     whole = ca.repmat(sizes, block.size1(), 1)

@@ -9,12 +9,12 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable
 from functools import cached_property, lru_cache
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
 from planar.equations.block_types import MAX_BLOCK_TYPES, BlockTypeKey, block_equations
-from planar.equations.closed_form_assemblies import ArrayFunction, ClosedFormAssemblies
+from planar.equations.closed_form_assemblies import SETTLED_STEP, ArrayFunction, ClosedFormAssemblies
 from planar.equations.known_types import known_text
 from planar.equations.linear import solve_vectors
 from planar.foundation.angles import wrap_angle
@@ -24,10 +24,19 @@ from planar.foundation.printed_formula import FormulaFunction
 from planar.foundation.recorded_formula import RecordedFormula, RecordedNumber, formula_of_results, number_of
 from planar.model.pairs import MeasureKind
 
-SETTLED_STEP = 1e-9
-"""rad or sizes: after a shorter step of Newton's method the next one is round-off."""
 MAX_RUN_STEPS = 6
 """Steps of Newton's method at a position of a run."""
+
+
+MAX_FORMULA_UNKNOWNS = 12
+"""Unknowns of a block: the formula of the motion of a larger one would be too long."""
+
+
+class BlockMotionFunction(Protocol):
+    """The motion of a block type."""
+
+    def evaluate_entries(self, count: int, *arguments: Array) -> Array:
+        """See `FormulaFunction.evaluate_entries`."""
 
 
 class BlockTypeFormulas(NamedTuple):
@@ -90,15 +99,41 @@ def derive_block_type(key: BlockTypeKey) -> BlockTypeFormulas:
 class BlockTypeFunctions:
     """The functions (unknowns, known coordinates, numbers) of a block type."""
 
-    def __init__(self, key: BlockTypeKey, formulas: BlockTypeFormulas):
-        counts = key.unknown_count, len(key.known_kinds), key.number_count
-        rows = len(key.row_kinds)
-        self.closing: ArrayFunction = FormulaFunction(formulas.closing, counts, ((1, rows), (key.unknown_count, rows)))
-        "F (1, rows) and the columns of its Jacobian (unknowns, rows)"
-        self.coordinates: ArrayFunction = FormulaFunction(formulas.coordinates, counts, ((1, len(key.own_kinds)),))
-        "its own coordinates (1, coordinates)"
-        self._formulas, self._counts = formulas, counts
-        self._is_angle = np.array([kind is not MeasureKind.LENGTH for kind, _ in key.own_kinds[: counts[0]]], bool)
+    def __init__(self, key: BlockTypeKey):
+        self._key = key
+        self._counts = key.unknown_count, len(key.known_kinds), key.number_count
+        self._is_angle = np.array(
+            [kind is not MeasureKind.LENGTH for kind, _ in key.own_kinds[: key.unknown_count]], bool
+        )
+
+    @cached_property
+    def _formulas(self) -> BlockTypeFormulas:
+        text = known_text(self._key.fingerprint)
+        return derive_block_type(self._key) if text is None else BlockTypeFormulas.from_text(text)
+
+    @cached_property
+    def closing(self) -> ArrayFunction:
+        """F (1, rows) and the columns of its Jacobian (unknowns, rows)."""
+        rows = len(self._key.row_kinds)
+        return FormulaFunction(self._formulas.closing, self._counts, ((1, rows), (self._counts[0], rows)))
+
+    @cached_property
+    def coordinates(self) -> ArrayFunction:
+        """Its own coordinates (1, coordinates)."""
+        return FormulaFunction(self._formulas.coordinates, self._counts, ((1, len(self._key.own_kinds)),))
+
+    @cached_property
+    def motion(self) -> BlockMotionFunction:
+        """(unknowns, known coordinates with first and second rates, numbers, row scale, column floor): see
+        `block_motion`."""
+        unknowns, known, numbers = self._counts
+        if unknowns > MAX_FORMULA_UNKNOWNS:
+            from planar.equations.large_block_motion import LargeBlockMotion  # few blocks are so large
+
+            return LargeBlockMotion(block_equations(self._key))
+        formula = block_motion_formula(self._key)
+        counts = unknowns, known, known, known, numbers, len(self._key.row_kinds), unknowns
+        return FormulaFunction(formula, counts, ((1, len(formula.results)),))
 
     @cached_property
     def assemblies(self) -> ClosedFormAssemblies | None:
@@ -116,14 +151,16 @@ class BlockTypeFunctions:
     def _run_form(self, z: Array, known: Array, numbers: Array) -> Array:
         """The assembly in closed form that is the nearer to z at the first sample."""
         assert self.assemblies is not None
-        both, _ = self.assemblies.evaluate_batch(np.repeat(z[None], len(known), axis=0), known, numbers)
-        is_angle = self._is_angle
+        form, is_angle = self.assemblies.form, self._is_angle
 
-        def distance(values: Array) -> float:
-            move = values - z
-            return float(np.abs(np.where(is_angle, wrap_angle(move), move)).max(initial=0.0))
+        def distance(sign: float) -> float:
+            move = form(z, known[0], numbers, np.array([sign]))[0][0] - z
+            size = np.abs(np.where(is_angle, wrap_angle(move), move)).max(initial=0.0)
+            return float(size) if np.isfinite(size) else np.inf
 
-        samples: Array = min(both, key=lambda values: distance(values[0]) if np.isfinite(values[0]).all() else np.inf)
+        sign = np.array([min((1.0, -1.0), key=distance)])
+        starts = np.repeat(z[None], len(known), axis=0)
+        samples: Array = form.evaluate_batch(len(known), starts, known, numbers, sign)[0][:, 0]
         steps = np.diff(samples[:, is_angle], axis=0, prepend=z[None, is_angle])
         samples[:, is_angle] = z[is_angle] + np.cumsum(wrap_angle(steps), axis=0)
         self.assemblies.polish(samples, known, numbers)
@@ -146,8 +183,22 @@ class BlockTypeFunctions:
         return samples
 
 
+def motion_fingerprint(key: BlockTypeKey) -> str:
+    """What tells the motion of a type from all other formulas."""
+    return f"{key.fingerprint} motion"
+
+
+def block_motion_formula(key: BlockTypeKey) -> RecordedFormula:
+    """The motion of a block type, known or derived."""
+    text = known_text(motion_fingerprint(key))
+    if text is not None:
+        return RecordedFormula.from_text(text)
+    from planar.equations.block_motion import derive_block_motion  # most types are known
+
+    return derive_block_motion(block_equations(key))
+
+
 @lru_cache(maxsize=MAX_BLOCK_TYPES)
 def block_type_functions(key: BlockTypeKey) -> BlockTypeFunctions:
     """The functions of a block type, known or derived."""
-    text = known_text(key.fingerprint)
-    return BlockTypeFunctions(key, derive_block_type(key) if text is None else BlockTypeFormulas.from_text(text))
+    return BlockTypeFunctions(key)

@@ -6,7 +6,7 @@ own equations need: its unknowns, the coordinates of earlier blocks and inputs n
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterable, Sequence
+from collections.abc import Container, Hashable, Iterable, Sequence
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -74,6 +74,25 @@ def place_blocks(e: ConstraintEquations) -> tuple[PlacedBlock | None, ...]:
     return tuple(placer.place(block, columns_of_level[block.block_index]) for block in e.blocks)
 
 
+def place_input_coordinates(e: ConstraintEquations) -> tuple[PlacedBlock | None, ...]:
+    """The coordinates that follow from the inputs alone as blocks without unknowns, one for each link or pair, in an
+    order in which they can be computed."""
+    if e.elimination is None:
+        return ()
+    placer = _BlockPlacer(e, e.elimination)
+    groups: list[list[int]] = []
+    for column, _ in e.elimination.solved:
+        if e.known_after_block[column] < 0:
+            if not groups or e.coordinates[groups[-1][-1]].owner != e.coordinates[column].owner:
+                groups.append([])
+            groups[-1].append(column)
+    return tuple(placer.place(INPUT_BLOCK, columns) for columns in groups)
+
+
+INPUT_BLOCK = Block(slice(0, 0), slice(0, 0), (), (), False, 0)
+"""What stands for a block where nothing is unknown."""
+
+
 class _BlockPlacer:
     def __init__(self, e: ConstraintEquations, elimination: Elimination):
         self._equations, self._elimination = e, elimination
@@ -91,52 +110,70 @@ class _BlockPlacer:
             return None
         residual_lines = [elimination.lines[row] for row in e.row_indices[block.rows]]
         solved_lines = [self._line_of[column] for column in solved]
-        local = {column: k for k, column in enumerate(own)}
-        known: list[int] = []
-
-        def index(column: int) -> int:
-            if column not in local:
-                local[column] = len(local)
-                known.append(column)
-            return local[column]
-
-        numbers: list[int] = []
-        local_rows: dict[int, int] = {}
-        local_elements = []
-        for placed in self._elements_of((*solved_lines, *residual_lines)):
-            taken = placed.element.arguments.numbers
-            number_of = {k: len(numbers) + place for place, k in enumerate(taken)}
-            numbers += [placed.numbers[k] for k in taken]
-            for row in placed.rows:
-                local_rows[row] = len(local_rows)
-            used = _used_coordinates(placed.element)
-            coordinates = tuple(index(column) if k in used else -1 for k, column in enumerate(placed.coordinates))
-            local_elements.append(
-                (placed.element, coordinates, tuple(number_of.get(k, -1) for k in range(len(placed.numbers))))
-            )
+        local = _LocalIndices(own)
+        elements = self._place_elements((*solved_lines, *residual_lines), local, block.block_index)
+        if elements is None:
+            return None
 
         def terms(line: EliminationRow) -> tuple[Hashable, Hashable]:
             return (
-                tuple((index(column), factor) for column, factor in line.factors.items()),
-                tuple((local_rows[row], multiplier) for row, multiplier in line.multipliers.items()),
+                tuple((local.of_column(column), factor) for column, factor in line.factors.items()),
+                tuple((local.rows[row], multiplier) for row, multiplier in line.multipliers.items()),
             )
 
-        solved_terms = tuple((local[column], *terms(line)) for column, line in zip(solved, solved_lines, strict=True))
+        own_lines = zip(solved, solved_lines, strict=True)
+        solved_terms = tuple((local.of_column(column), *terms(line)) for column, line in own_lines)
         residual_terms = tuple(terms(line) for line in residual_lines)
-        level = block.block_index
-        if any(column < len(e.coordinates) and e.known_after_block[column] >= level for column in known):
+        if any(self._is_behind(column, block.block_index) for column in local.known):
             return None
         key = BlockTypeKey(
-            tuple(local_elements),
+            elements,
             solved_terms,
             residual_terms,
             tuple(row.kind for row in e.rows[block.rows]),
             tuple((e.coordinates[column].kind, e.coordinates[column].of_link) for column in own),
             len(unknowns),
-            tuple(self._kind_of(column) for column in known),
-            len(numbers),
+            tuple(self._kind_of(column) for column in local.known),
+            len(local.numbers),
         )
-        return PlacedBlock(key, np.array(known, dtype=int), np.array(numbers, dtype=int), np.array(own, dtype=int))
+        return PlacedBlock(key, *(np.array(indices, dtype=int) for indices in (local.known, local.numbers, own)))
+
+    def _place_elements(
+        self, lines: Sequence[EliminationRow], local: _LocalIndices, level: int
+    ) -> tuple[tuple[Element, tuple[int, ...], tuple[int, ...]], ...] | None:
+        """The elements of lines by local indices; None where they need what is not known ahead of a block."""
+        needed_rows = {row for line in lines for row in line.multipliers}
+        first_input = len(self._equations.coordinates)
+        elements = []
+        for placed in self._elements_of(lines):
+            taken = placed.element.arguments.numbers
+            number_of = {k: len(local.numbers) + place for place, k in enumerate(taken)}
+            local.numbers += [placed.numbers[k] for k in taken]
+            for row in placed.rows:
+                local.rows[row] = len(local.rows)
+            used = _used_coordinates(placed.element)
+            # of rows that are not needed here it does not matter what is put in
+            stand_ins = {
+                k
+                for k in used
+                if placed.coordinates[k] not in local.places and self._is_behind(placed.coordinates[k], level)
+            }
+            if stand_ins and not (
+                self._equations.input_kinds and stand_ins.isdisjoint(_coordinates_of_rows(placed, needed_rows))
+            ):
+                return None
+            coordinates = tuple(
+                local.of_column(first_input if k in stand_ins else column) if k in used else -1
+                for k, column in enumerate(placed.coordinates)
+            )
+            elements.append(
+                (placed.element, coordinates, tuple(number_of.get(k, -1) for k in range(len(placed.numbers))))
+            )
+        return tuple(elements)
+
+    def _is_behind(self, column: int, level: int) -> bool:
+        """Whether a coordinate is not known ahead of a block of this level."""
+        return column < len(self._equations.coordinates) and self._equations.known_after_block[column] >= level
 
     def _elements_of(self, lines: Sequence[EliminationRow]) -> Iterable[PlacedElement]:
         """The elements whose rests stand in lines, each once."""
@@ -152,6 +189,29 @@ class _BlockPlacer:
 def _used_coordinates(element: Element) -> set[int]:
     """The local coordinates that the rest of an element depends on."""
     return set().union(*element.nonlinear, element.arguments.coordinates)
+
+
+class _LocalIndices:
+    """Indices of a block's own: coordinates, its own ones first, then those that it takes as known; rows, numbers."""
+
+    def __init__(self, own: Sequence[int]):
+        self.places = {column: k for k, column in enumerate(own)}
+        self.known: list[int] = []
+        self.rows: dict[int, int] = {}
+        self.numbers: list[int] = []
+
+    def of_column(self, column: int) -> int:
+        """That of a coordinate or input by its index in (w, u)."""
+        if column not in self.places:
+            self.places[column] = len(self.places)
+            self.known.append(column)
+        return self.places[column]
+
+
+def _coordinates_of_rows(placed: PlacedElement, rows: Container[int]) -> set[int]:
+    """The local coordinates on which the rests of some rows depend."""
+    needed = (columns for row, columns in zip(placed.rows, placed.element.nonlinear, strict=True) if row in rows)
+    return set().union(*needed)
 
 
 @lru_cache(maxsize=MAX_BLOCK_TYPES)

@@ -11,6 +11,8 @@ from planar.foundation.arrays import Array
 
 POLISHING_STEPS = 2
 """Newton's steps that carry a closed form to round-off."""
+SETTLED_STEP = 1e-9
+"""rad or sizes: after a shorter step of Newton's method the next one is round-off."""
 
 
 class ArrayFunction(Protocol):
@@ -31,13 +33,13 @@ class ClosedFormAssemblies:
     """
 
     def __init__(self, unknowns: slice, form: ArrayFunction, closing: ArrayFunction, has_changing_arm: bool):
-        self._unknowns, self._form, self._closing = unknowns, form, closing
+        self._unknowns, self.form, self._closing = unknowns, form, closing
         self.has_changing_arm = has_changing_arm
 
     def evaluate_batch(self, z: Array, u: Array, p: Array) -> tuple[list[Array], Array]:
         """Both (positions, unknowns), not polished, and how near they are to where they meet (positions,), at z
         (positions, unknowns), u and p alike."""
-        results = [self._form.evaluate_batch(len(z), z, u, p, np.array([sign])) for sign in (1.0, -1.0)]
+        results = [self.form.evaluate_batch(len(z), z, u, p, np.array([sign])) for sign in (1.0, -1.0)]
         return [assembly[:, 0] for assembly, _ in results], results[0][1][:, 0, 0]
 
     def __call__(self, z: Array, u: Array, p: Array) -> tuple[list[Array], float, float]:
@@ -70,4 +72,7 @@ class ClosedFormAssemblies:
         for _ in range(POLISHING_STEPS):
             residuals, columns = self._closing.evaluate_batch(len(z), z, u, p)
             with np.errstate(all="ignore"):  # what is not there is not a number
-                z[:, self._unknowns] -= solve_vectors(columns.swapaxes(-1, -2), residuals[:, 0])
+                moves = solve_vectors(columns.swapaxes(-1, -2), residuals[:, 0])
+                z[:, self._unknowns] -= moves
+                if not (np.abs(moves) > SETTLED_STEP).any():
+                    break

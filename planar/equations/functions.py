@@ -6,7 +6,7 @@ derive them takes many times as long as to read them.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import cached_property, lru_cache
 from typing import Any, NamedTuple
 
@@ -14,16 +14,16 @@ import casadi as ca
 import numpy as np
 
 from planar.equations.assembled_equations import AssembledEquations
-from planar.equations.block_type_functions import SETTLED_STEP, BlockTypeFunctions, block_type_functions
+from planar.equations.block_motion import function_with_cse
+from planar.equations.block_type_functions import BlockTypeFunctions, block_type_functions
 from planar.equations.block_types import PlacedBlock, place_blocks
 from planar.equations.casadi_call import (
     BufferedFunction,
-    RunFunction,
     read_function,
 )
 from planar.equations.closed_form_assemblies import ClosedFormAssemblies
 from planar.equations.elimination import stack_expressions
-from planar.equations.linear import solve_arrays, solve_linear, solve_vectors
+from planar.equations.linear import solve_linear, solve_vectors
 from planar.equations.mechanism_numbers import equation_structure, structure_fingerprint
 from planar.equations.placed_blocks import (
     BlockAssemblyCall,
@@ -40,7 +40,7 @@ from planar.equations.symbolic_equations import (
     build_equations,
     slice_length,
 )
-from planar.foundation.arrays import Array, greatest_size
+from planar.foundation.arrays import Array
 from planar.foundation.kept_texts import KeptTexts
 from planar.foundation.printed_formula import FormulaFunction
 from planar.foundation.private_cache import PrivateCache
@@ -51,12 +51,8 @@ MAX_CACHED_STRUCTURES = 256
 
 KEPT_EQUATIONS = PrivateCache("equations", ".equations", b"planar equations\n", 128 * 2**20)
 """Functions of structures, as casadi writes them; those of one take from 0.1 to 1 MB."""
-MAX_UNROLLED_UNKNOWNS = 12
-"""Unknowns of a block whose steps of Newton's method are unrolled: expressions of a larger one would be too long."""
 MAX_ELEMENT_EVALUATIONS = 16.0
 """Evaluations by elements that take about as long as it takes to derive simple functions of a whole structure."""
-MANY_EVALUATIONS = 250.0
-"""The same of all its functions."""
 SAMPLES_PER_EVALUATION = 64.0
 """Samples that take as long as one evaluation takes whatever their number."""
 RUN_NEWTON_STEPS = 4
@@ -95,8 +91,7 @@ class EquationFunctions:
     """The equations of one structure as functions of arrays; `texts` is where derived ones are kept.
 
     They are evaluated by elements and block types, which are derived once for all structures. From a structure that is
-    evaluated several times casadi functions of the whole are derived, and from one that is evaluated often those that
-    take long to derive, unless its unknowns are many.
+    evaluated several times casadi functions of the whole are derived, unless its unknowns are many.
     """
 
     def __init__(self, equations: ConstraintEquations, texts: KeptTexts | None = None):
@@ -113,14 +108,9 @@ class EquationFunctions:
         is_compiled = self._evaluation_count > MAX_ELEMENT_EVALUATIONS and not self.is_sparse
         return None if is_compiled else self.equations.assembled
 
-    @property
-    def is_often_evaluated(self) -> bool:
-        """Whether functions pay that take long to derive."""
-        return self._evaluation_count > MANY_EVALUATIONS and not self.is_sparse
-
     def compile(self) -> None:
         """Evaluate by functions of the whole from now on."""
-        self._evaluation_count = MANY_EVALUATIONS + 1.0
+        self._evaluation_count = MAX_ELEMENT_EVALUATIONS
 
     def kept(self, name: str, make: Callable[[], ca.Function]) -> ca.Function:
         """What `make` makes of this structure, from the disk where it is kept there by this name."""
@@ -166,11 +156,12 @@ class EquationFunctions:
 
     def _functions_of_type(self, block: Block) -> BlockTypeFunctions | None:
         """The functions of a block's type; None for one that has none."""
-        placed = self._placed_blocks[block.block_index]
+        placed = self.placed_blocks[block.block_index]
         return None if placed is None else block_type_functions(placed.key)
 
     @cached_property
-    def _placed_blocks(self) -> tuple[PlacedBlock | None, ...]:
+    def placed_blocks(self) -> tuple[PlacedBlock | None, ...]:
+        """The types of all blocks; None for one that has none."""
         return place_blocks(self.equations)
 
     @cached_property
@@ -179,7 +170,7 @@ class EquationFunctions:
         types = map(self._functions_of_type, self.equations.blocks)
         calls = [None if functions is None else functions.coordinates for functions in types]
         assert self.equations.assembled is not None
-        return KnownCoordinates(self.equations, self.equations.assembled, self._placed_blocks, calls)
+        return KnownCoordinates(self.equations, self.equations.assembled, self.placed_blocks, calls)
 
     def block_assemblies(self, block: Block) -> BlockAssemblyCall | None:
         """Both assemblies of a block; None for one without a closed form."""
@@ -398,57 +389,6 @@ class EquationFunctions:
             open_ += [left] if slice_length(block.unknowns) else []
         return stack_expressions(now), stack_expressions(open_)
 
-    def run_samples(self, z: Array, u: Array, p: Array) -> Array:
-        """The unknowns at every sample of inputs u (samples, inputs), each from the one before, the first from z."""
-        if not len(u):
-            return np.empty((0, len(z)))
-        self._elements(RUN_NEWTON_STEPS * len(u))
-        elements = self.equations.assembled
-        if self.is_often_evaluated or elements is None:
-            return self._run_function(z, u, p)
-        if any(slice_length(block.unknowns) > MAX_UNROLLED_UNKNOWNS for block in self.equations.blocks):
-            return self._run_whole(elements, z, u, p)
-        return self._run_blocks(elements, z, u, p)
-
-    def _run_blocks(self, elements: AssembledEquations, z: Array, u: Array, p: Array) -> Array:
-        """The same block after block, each at all samples."""
-        samples: Array = np.repeat(z[None], len(u), axis=0)
-        # what follows from the inputs alone is right whatever the unknowns are
-        states: Array = np.hstack([elements.coordinates(samples, u, p), u])
-        for block, placed in zip(self.equations.blocks, self._placed_blocks, strict=True):
-            if not slice_length(block.unknowns):
-                continue
-            if placed is None:
-                return self._run_whole(elements, z, u, p)
-            by_type = block_type_functions(placed.key)
-            known, numbers = states[:, placed.known], p[placed.numbers]
-            samples[:, block.unknowns] = own = by_type.run(z[block.unknowns], known, numbers)
-            (coordinates,) = by_type.coordinates.evaluate_batch(len(u), own, known, numbers)
-            states[:, placed.coordinates] = coordinates[:, 0]
-        return samples
-
-    def _run_whole(self, elements: AssembledEquations, z: Array, u: Array, p: Array) -> Array:
-        """The same, each from where the rates of the one before lead."""
-        samples: Array = np.empty((len(u), len(z)))
-        step: Array = np.zeros(len(z))
-        for k, inputs in enumerate(u):
-            z = z + step
-            for _ in range(RUN_NEWTON_STEPS):
-                residuals, entries = elements.residuals_and_jacobians(z[None], inputs[None], p)
-                slopes, drives = self._split_entries(entries[0])
-                solution = solve_arrays(slopes, np.column_stack([residuals[0], drives]))
-                z = z - solution[:, 0]
-                if not greatest_size(solution[:, 0]) > SETTLED_STEP:
-                    break
-            samples[k] = z
-            if k + 1 < len(u):
-                step = -solution[:, 1:] @ (u[k + 1] - inputs)
-        return samples
-
-    @cached_property
-    def _run_function(self) -> RunFunction:
-        return RunFunction(self.newton_function)
-
     @kept_function
     def _jacobian_function(self) -> ca.Function:
         e = self.equations
@@ -492,17 +432,6 @@ class EquationFunctions:
     def is_square(self) -> bool:
         """Whether every block has as many constraints as unknowns."""
         return self.equations.is_square
-
-
-MAX_CSE_NODES = 30_000
-"""Of expressions in which what stands in several places is looked for: the time for that grows faster than they do, and
-what it saves is little."""
-
-
-def function_with_cse(name: str, given: Sequence[ca.SX], wanted: Sequence[ca.SX]) -> ca.Function:
-    """A function in which what stands in several places is computed once, as far as it is not too long."""
-    is_short = sum(ca.n_nodes(each) for each in wanted) <= MAX_CSE_NODES
-    return ca.Function(name, given, ca.cse(list(wanted)) if is_short else list(wanted))
 
 
 def equation_functions(mechanism: Mechanism) -> EquationFunctions:

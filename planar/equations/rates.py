@@ -82,14 +82,15 @@ class UnknownRates:
         count = self.equations.z.numel()
         if not count:
             return ca.SX(0, 1)
-        names, values = [rates[count:]], [input_rates]
+        # of one symbol an empty part has another shape than an empty column
+        names, values = ([rates[count:]], [input_rates]) if input_rates.numel() else ([], [])
         for block, jacobian in zip(self.equations.blocks, self.jacobians, strict=True):
             if slice_length(block.unknowns):
                 # later unknowns may stand in the expression, but cancel
                 ahead = rates[block.unknowns.start : count]
                 rest = ca.substitute(residual_rate[block.rows], ahead, ca.SX.zeros(ahead.numel()))
                 names.append(rates[block.unknowns])
-                values.append(-self._solve(jacobian, rest))
+                values.append(ca.densify(-self._solve(jacobian, rest)))
         return ca.substitute_inplace(names, values, [rates[:count]])[1][0]
 
 

@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import casadi as ca
 
+from planar.equations.block_motion import function_with_cse
 from planar.equations.casadi_call import BufferedFunction
-from planar.equations.functions import function_with_cse
 from planar.equations.rates import rate_symbols, time_derivatives
 from planar.equations.symbolic_equations import ConstraintEquations
 from planar.foundation.arrays import Array

@@ -55,9 +55,11 @@ class StackedCoordinates(NamedTuple):
         return StackedCoordinates(sizes, _term_sizes(own), _term_sizes(inputs))
 
 
-class _PairGroup(NamedTuple):
+class PairGroup(NamedTuple):
     """Pairs whose residuals, or positions as inputs, are computed together by the formula of one of them."""
 
+    key: Hashable
+    "equal where the formula is"
     pair: Pair
     is_input: bool
     is_moving: tuple[bool, ...]
@@ -70,7 +72,7 @@ class _PairGroup(NamedTuple):
     rows: IntArray
     "(constraints, pairs)"
 
-    def parts(self, size: int) -> Iterator[_PairGroup]:
+    def parts(self, size: int) -> Iterator[PairGroup]:
         """Groups of at most so many of its pairs."""
         for start in range(0, len(self.names), size):
             part = slice(start, start + size)
@@ -94,7 +96,7 @@ class StackedResiduals:
         inputs = tuple(motions[given.pair] for given in mechanism.inputs)
         self._moving = tuple(link.name for link in mechanism.links if link.name != mechanism.frame)
         self._pairs = mechanism.pairs
-        self._groups = _pair_groups(tuple(mechanism.pairs), inputs, self._moving)
+        self._groups = pair_groups(tuple(mechanism.pairs), inputs, self._moving)
         kinds = [kind for pair in mechanism.pairs for kind in pair.residual_kinds]
         self._pair_row_count = len(kinds)
         kinds += [pair.input_kind for pair in inputs]
@@ -128,7 +130,8 @@ class StackedResiduals:
         return _join_rows(residuals, len(self.is_length))
 
 
-def _pair_groups(pairs: tuple[Pair, ...], inputs: tuple[Pair, ...], moving: tuple[str, ...]) -> tuple[_PairGroup, ...]:
+def pair_groups(pairs: tuple[Pair, ...], inputs: tuple[Pair, ...], moving: tuple[str, ...]) -> tuple[PairGroup, ...]:
+    """Pairs, then inputs, of a mechanism with these moving links, that are computed together."""
     try:
         hash(pairs)
     except TypeError:  # made in Python, of lists
@@ -136,7 +139,7 @@ def _pair_groups(pairs: tuple[Pair, ...], inputs: tuple[Pair, ...], moving: tupl
     return _cached_groups(pairs, inputs, moving)
 
 
-def _make_groups(pairs: tuple[Pair, ...], inputs: tuple[Pair, ...], moving: tuple[str, ...]) -> tuple[_PairGroup, ...]:
+def _make_groups(pairs: tuple[Pair, ...], inputs: tuple[Pair, ...], moving: tuple[str, ...]) -> tuple[PairGroup, ...]:
     links = {link: k for k, link in enumerate(moving)}
     own: dict[str, range] = {}
     own_count = 0
@@ -154,17 +157,18 @@ def _make_groups(pairs: tuple[Pair, ...], inputs: tuple[Pair, ...], moving: tupl
         key = recorded_pair_formula(pair, is_input, is_moving, *counts), is_input, is_moving, counts
         members.setdefault(key, []).append((pair, is_input, is_moving, rows))
     groups = []
-    for group in members.values():
+    for formula, group in members.items():
         pair, is_input, is_moving, _ = group[0]
         groups.append(
-            _PairGroup(
+            PairGroup(
+                formula,
                 pair,
                 is_input,
                 is_moving,
                 tuple(each.name for each, *_ in group),
-                _columns([[links[link] for link in each.bodies if link in links] for each, *_ in group]),
-                _columns([own.get(each.name, ()) for each, *_ in group]),
-                _columns([rows for *_, rows in group]),
+                index_columns([[links[link] for link in each.bodies if link in links] for each, *_ in group]),
+                index_columns([own.get(each.name, ()) for each, *_ in group]),
+                index_columns([rows for *_, rows in group]),
             )
         )
     return tuple(groups)
@@ -173,7 +177,7 @@ def _make_groups(pairs: tuple[Pair, ...], inputs: tuple[Pair, ...], moving: tupl
 _cached_groups = lru_cache(maxsize=MAX_CACHED_GROUPINGS)(_make_groups)
 
 
-def _columns(indices: Sequence[Sequence[int]]) -> IntArray:
+def index_columns(indices: Sequence[Sequence[int]]) -> IntArray:
     """Indices (pairs, entries) as columns (entries, pairs)."""
     columns: IntArray = np.array([list(row) for row in indices], dtype=int).reshape(len(indices), -1).T
     return columns

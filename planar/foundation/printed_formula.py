@@ -132,9 +132,9 @@ class FormulaFunction:
         self, formula: RecordedFormula, argument_counts: Sequence[int], shapes: Sequence[tuple[int, int]]
     ) -> None:
         self.formula, self.argument_counts, self.shapes = formula, tuple(argument_counts), tuple(shapes)
-        sizes = [columns * rows for columns, rows in shapes]
+        self._sizes = [columns * rows for columns, rows in shapes]
         self._call_count = 0
-        self._slices = [slice(sum(sizes[:k]), sum(sizes[: k + 1])) for k in range(len(sizes))]
+        self._slices = [slice(sum(self._sizes[:k]), sum(self._sizes[: k + 1])) for k in range(len(shapes))]
 
     @cached_property
     def source(self) -> str:
@@ -182,19 +182,25 @@ class FormulaFunction:
         values = np.array(self.values(*(argument.tolist() for argument in arguments)))
         return [values[part].reshape(shape) for part, shape in zip(self._slices, self.shapes, strict=True)]
 
+    def evaluate_entries(self, count: int, *arguments: Array) -> Array:
+        """All results, one after the other (results, positions); arguments (entries, positions), or (entries,) for all
+        positions alike, which may be arrays of recorded numbers."""
+        if count <= MAX_FLOAT_POSITIONS or any(argument.dtype == object for argument in arguments):
+            positions = [
+                [(argument if argument.ndim == 1 else argument[:, k]).tolist() for argument in arguments]
+                for k in range(count)
+            ]
+            if any(argument.dtype == object for argument in arguments):
+                columns: Array = np.empty((count, sum(self._sizes)), dtype=object)
+                columns[:] = [self._interpret(position) for position in positions]
+                return columns.T
+            return np.array([self.values(*position) for position in positions], dtype=float).reshape(count, -1).T
+        results: Array = np.empty((sum(self._sizes), count))
+        for row, value in zip(results, self._array_values(arguments), strict=True):
+            row[:] = value
+        return results
+
     def evaluate_batch(self, count: int, *arguments: Array) -> list[Array]:
         """The results (positions, columns, rows); arguments (positions, entries), or (entries,) for all alike."""
-        if count <= MAX_FLOAT_POSITIONS:
-            positions = [self(*(each if each.ndim == 1 else each[k] for each in arguments)) for k in range(count)]
-            return [
-                np.array([results[place] for results in positions]).reshape(count, *shape)
-                for place, shape in enumerate(self.shapes)
-            ]
-        values = self._array_values([argument.T for argument in arguments])
-        results: list[Array] = []
-        for part, shape in zip(self._slices, self.shapes, strict=True):
-            result: Array = np.empty((count, part.stop - part.start))
-            for k, value in enumerate(values[part]):
-                result[:, k] = value
-            results.append(result.reshape(count, *shape))
-        return results
+        results = self.evaluate_entries(count, *(argument.T for argument in arguments)).T
+        return [results[:, part].reshape(count, *shape) for part, shape in zip(self._slices, self.shapes, strict=True)]

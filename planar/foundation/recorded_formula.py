@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from math import floor
+from math import floor, isnan
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from planar.foundation.arrays import Array
 from planar.foundation.instruction_list import Instruction, InstructionList, required_values
-from planar.foundation.jets import Scalar, atan2, cos, sin, sqrt, tan
+from planar.foundation.jets import Jet, Scalar, atan2, cos, sin, sqrt, tan
 
 
 class RecordedFormula(NamedTuple):
@@ -67,12 +68,14 @@ class RecordedNumber:
     def __init__(self, instructions: InstructionList[Any], number: int):
         self.instructions, self.number = instructions, number
 
-    def _record(self, operation: str, other: Scalar) -> RecordedNumber:
+    def record(self, operation: str, other: Scalar) -> RecordedNumber:
         """The number of an operation of this number and another."""
+        if isinstance(other, Jet):
+            return NotImplemented  # type: ignore[no-any-return]  # to Python
         instructions = self.instructions
         return RecordedNumber(instructions, instructions.add(operation, self.number, number_of(other, instructions)))
 
-    def _record_after(self, operation: str, other: Scalar) -> RecordedNumber:
+    def record_after(self, operation: str, other: Scalar) -> RecordedNumber:
         """The same of the other and this one."""
         instructions = self.instructions
         return RecordedNumber(instructions, instructions.add(operation, number_of(other, instructions), self.number))
@@ -81,7 +84,7 @@ class RecordedNumber:
         return RecordedNumber(self.instructions, self.instructions.add(function, self.number))
 
     def __add__(self, other: Scalar) -> RecordedNumber:
-        return self._record("add", other)
+        return self.record("add", other)
 
     __radd__ = __add__
 
@@ -89,39 +92,39 @@ class RecordedNumber:
         return self._apply("neg")
 
     def __sub__(self, other: Scalar) -> RecordedNumber:
-        return self._record("sub", other)
+        return self.record("sub", other)
 
     def __rsub__(self, other: Scalar) -> RecordedNumber:
-        return self._record_after("sub", other)
+        return self.record_after("sub", other)
 
     def __mul__(self, other: Scalar) -> RecordedNumber:
-        return self._record("mul", other)
+        return self.record("mul", other)
 
     __rmul__ = __mul__
 
     def __truediv__(self, other: Scalar) -> RecordedNumber:
-        return self._record("div", other)
+        return self.record("div", other)
 
     def __rtruediv__(self, other: Scalar) -> RecordedNumber:
-        return self._record_after("div", other)
+        return self.record_after("div", other)
 
     def __pow__(self, exponent: Scalar) -> RecordedNumber:
-        return self._record("pow", exponent)
+        return self.record("pow", exponent)
 
     def __abs__(self) -> RecordedNumber:
         return self._apply("abs")
 
     def __lt__(self, other: Scalar) -> RecordedNumber:
-        return self._record("less", other)
+        return self.record("less", other)
 
     def __gt__(self, other: Scalar) -> RecordedNumber:
-        return self._record_after("less", other)
+        return self.record_after("less", other)
 
     def __le__(self, other: Scalar) -> RecordedNumber:
-        return self._record("most", other)
+        return self.record("most", other)
 
     def __ge__(self, other: Scalar) -> RecordedNumber:
-        return self._record_after("most", other)
+        return self.record_after("most", other)
 
     def cos(self) -> RecordedNumber:
         return self._apply("cos")
@@ -139,10 +142,10 @@ class RecordedNumber:
         return self._apply("floor")
 
     def arctan2(self, x: Scalar) -> RecordedNumber:
-        return self._record("atan2", x)
+        return self.record("atan2", x)
 
     def __rarctan2__(self, y: Scalar) -> RecordedNumber:
-        return self._record_after("atan2", y)
+        return self.record_after("atan2", y)
 
 
 def number_of(value: Scalar, instructions: InstructionList[Any]) -> int:
@@ -174,6 +177,67 @@ def _floor(value: Scalar) -> Scalar:
     return value.floor() if hasattr(value, "floor") else np.floor(value)
 
 
+def _number_or_recorded(operation: str, of_numbers: Callable[[Scalar, Scalar], Scalar]) -> Callable[..., Scalar]:
+    """An operation that is no operator of Python, on numbers and arrays or recorded."""
+
+    def apply(a: Scalar, b: Scalar) -> Scalar:
+        if type(a) is RecordedNumber:
+            return a.record(operation, b)
+        return b.record_after(operation, a) if type(b) is RecordedNumber else of_numbers(a, b)
+
+    return apply
+
+
+def _least(a: Scalar, b: Scalar) -> Scalar:
+    if type(a) is type(b) is float:
+        return a if a <= b or isnan(b) else b
+    return np.fmin(a, b)
+
+
+def _greatest(a: Scalar, b: Scalar) -> Scalar:
+    if type(a) is type(b) is float:
+        return a if a >= b or isnan(b) else b
+    return np.fmax(a, b)
+
+
+def _where(condition: Scalar, value: Scalar) -> Scalar:
+    if type(condition) is float:
+        return value if condition else 0.0
+    return np.where(condition, value, 0.0) if isinstance(condition, np.ndarray | np.generic) else condition * value
+
+
+def elementwise(function: Callable[[Scalar], Scalar], values: Array) -> Array:
+    """A function of every number of an array, recorded ones too."""
+    called: Callable[[Array], Array] = np.frompyfunc(function, 1, 1) if values.dtype == object else function
+    return called(values)
+
+
+least_of = _number_or_recorded("minnum", _least)
+"""The lesser of two, of which one may not be a number."""
+greatest_of = _number_or_recorded("maxnum", _greatest)
+"""The greater of two, of which one may not be a number."""
+
+
+def least_entries(values: Array) -> Array:
+    """The least along the first axis, recorded ones too; infinity of none."""
+    return _reduced(values, np.fmin, least_of, np.inf)
+
+
+def greatest_entries(values: Array) -> Array:
+    """The greatest along the first axis of what is zero or more, recorded ones too; zero of none."""
+    return _reduced(values, np.fmax, greatest_of, 0.0)
+
+
+def _reduced(values: Array, of_arrays: np.ufunc, of_two: Callable[..., Scalar], start: float) -> Array:
+    if values.dtype != object:
+        reduced: Array = of_arrays.reduce(values, axis=0, initial=start)
+        return reduced
+    result: Array = np.full(values.shape[1:], start, dtype=object)
+    for row in values:
+        result = np.frompyfunc(of_two, 2, 1)(row, result)
+    return result
+
+
 _FUNCTIONS: dict[str, Callable[..., Scalar]] = {
     "add": lambda a, b: a + b,
     "sub": lambda a, b: a - b,
@@ -185,7 +249,9 @@ _FUNCTIONS: dict[str, Callable[..., Scalar]] = {
     "less": lambda a, b: 1.0 * (a < b),
     "most": lambda a, b: 1.0 * (a <= b),
     "not": lambda a: 1.0 - a,
-    "where": lambda a, b: a * b,
+    "where": _number_or_recorded("where", _where),
+    "minnum": least_of,
+    "maxnum": greatest_of,
     "cos": cos,
     "sin": sin,
     "tan": tan,

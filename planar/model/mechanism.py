@@ -365,9 +365,10 @@ def pair_misfits(
     pairs: Sequence[Pair], shapes: Mapping[str, LinkShape], units: FileUnits
 ) -> Iterator[tuple[Pair, str]]:
     """Pairs that do not go with the others, each with a sentence."""
-    for pair in pairs:
+    every = tuple(pairs)
+    for pair in every:
         wrong = pair.find_misfit(
-            pairs, shapes, lambda value: f"{parse_unit(units.length).from_si(value):.6g} {units.length}"
+            every, shapes, lambda value: f"{parse_unit(units.length).from_si(value):.6g} {units.length}"
         )
         if wrong is not None:
             yield pair, wrong

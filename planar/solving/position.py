@@ -94,8 +94,8 @@ def solve(mechanism: Mechanism, drives: Mapping[str, float] | Sequence[Drive] = 
 class PositionSolver(PreparedMechanism):
     """Solves positions of one mechanism.
 
-    What is needed only where compiled functions do not settle a position (the reasons of refusals, singular positions,
-    rates and their accuracy) is imported there: it is slow to load beside what most positions take.
+    What is needed only where the acceptance test does not settle a position (the reasons of refusals, singular
+    positions, rates and their accuracy) is imported there: it is slow to load beside what most positions take.
     """
 
     def find_assembly(self) -> Assembly:
@@ -283,11 +283,11 @@ class PositionSolver(PreparedMechanism):
         return InputRates(s.u[None], s.u1[None], s.u2[None], 0.0 * s.u[None])
 
     def _fast_state(self, z: Array, remarks: tuple[str, ...]) -> State | None:
-        """The state by compiled functions alone, where they find nothing to look at."""
+        """The state by the acceptance test alone, where that finds nothing to look at."""
         found = fast_position(self, z)
         if found is None:
             return None
-        frames, own = lazy_frames(self, found.coordinate_rates)
+        frames, own = lazy_frames(self, found.coordinate_rates.T)
         mobility = len(self.inputs.u)
         return State(self.mechanism, mobility, found.residual, remarks, frames, own, self.shapes)
 

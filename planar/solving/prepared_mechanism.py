@@ -25,7 +25,7 @@ from planar.solving.checks.residual_check import ResidualCheck
 from planar.solving.structure import mechanism_structure
 
 if TYPE_CHECKING:
-    from planar.equations.acceptance import AcceptanceFunctions
+    from planar.equations.acceptance import AcceptanceFunctions, Scales
     from planar.solving.stops import MetStop, PairStops
 
 ZERO_POSITION = 1e-14
@@ -93,7 +93,7 @@ class PreparedMechanism:
         """The same with more constraints, which hold wherever its own do on the motion; see `solving.deflation`."""
         there = object.__new__(type(self))
         there.__dict__.update(self.__dict__)
-        for name in ("row_scale", "min_column_scale", "_block_reaches"):
+        for name in ("row_scale", "min_column_scale", "_block_reaches", "acceptance_scales"):
             there.__dict__.pop(name, None)
         there.functions, there.equations = program, program.equations
         return there
@@ -179,8 +179,15 @@ class PreparedMechanism:
 
     @property
     def acceptance(self) -> AcceptanceFunctions | None:
-        """What judges positions in compiled functions, for the structures that have it."""
+        """What computes and judges positions block after block, for the structures that have it."""
         return None if self.is_deflated else self.structure.acceptance
+
+    @cached_property
+    def acceptance_scales(self) -> Scales:
+        """The numbers by which positions are judged."""
+        from planar.equations.acceptance import Scales
+
+        return Scales(self.inputs.p, self.row_scale, self.min_column_scale)
 
     @cached_property
     def row_scale(self) -> Array:

@@ -54,9 +54,7 @@ class MechanismStructure:
 
     @property
     def acceptance(self) -> AcceptanceFunctions | None:
-        """What judges positions in compiled functions, for the structures that have it."""
-        if not self.functions.is_often_evaluated:
-            return None
+        """What computes and judges positions block after block, for the structures that have it."""
         return self._acceptance if self._acceptance.is_available else None
 
     @cached_property

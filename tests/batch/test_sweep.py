@@ -15,7 +15,7 @@ from planar.batch.reference_design import reference_design
 from planar.document import files
 from planar.document.dimensions import link_lengths
 from planar.foundation.errors import BadInput, NoAnswer, Outcome
-from planar.solving.checks.branch_check import BranchCheck
+from planar.solving.checks.branch_check import accept_steps
 from planar.solving.position import PositionSolver
 from tests.builders import block_slider_crank, designs_around, four_bar
 from tests.checks import ORDERS
@@ -185,8 +185,10 @@ def test_a_flipped_linkage_is_closed_and_does_not_pass():
     z, other = (each.find_assembly().z for each in (solver, flipped))
     u = solver.inputs.u
     near = planar.solving.continuation.path.follow_to(solver, solver.inputs.p, z, u, u + 0.02)
-    branches = BranchCheck(solver.functions, solver.inputs.p)
-    accepted = [branches.accept_steps(np.stack([z, after]), np.stack([u, u + 0.02])) for after in (near, other)]
+    accepted = [
+        accept_steps(solver.acceptance, np.stack([z, after]), np.stack([u, u + 0.02]), solver.acceptance_scales)
+        for after in (near, other)
+    ]
     assert [each.tolist() for each in accepted] == [[True], [False]]
 
 

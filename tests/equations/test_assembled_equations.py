@@ -91,22 +91,10 @@ def test_types_of_blocks_say_what_functions_of_the_whole_say(stem):
             np.testing.assert_allclose(a[1], b[1], rtol=1e-9, atol=1e-9)
 
 
-@pytest.mark.parametrize("stem", SQUARE)
-def test_runs_block_after_block_are_those_of_functions_of_the_whole(stem):
-    solver = PositionSolver(MODELS[stem])
-    by_types, compiled = EquationFunctions(equations_of(stem)), of_expressions(equations_of(stem))
-    z, u, p = solver.find_assembly().z, solver.inputs.u, solver.inputs.p
-    assert by_types.run_samples(z, u[None][:0], p).shape == (0, len(z))
-    steps = u + np.linspace(0.01, 0.1, 10)[:, None] * np.random.default_rng(0).uniform(0.5, 1.0, len(u))
-    np.testing.assert_allclose(
-        by_types.run_samples(z, steps, p), compiled.run_samples(z, steps, p), rtol=1e-9, atol=1e-9
-    )
-
-
 def test_equal_blocks_share_one_type():
     equations = build_equations(equation_structure(planar.from_dict(lift_document(4))))
     functions = EquationFunctions(equations)
-    keys = [placed.key for placed in functions._placed_blocks if placed is not None and placed.key.unknown_count]
+    keys = [placed.key for placed in functions.placed_blocks if placed is not None and placed.key.unknown_count]
     assert len(set(keys)) < len(keys)
 
 

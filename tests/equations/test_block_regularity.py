@@ -5,10 +5,9 @@ import numpy as np
 import pytest
 
 import planar
-from planar.equations.acceptance import AcceptanceResult
+from planar.equations.acceptance import InputSamples
 from planar.equations.block_regularity import reduce_to_triangle, regularity_bound
-from planar.solving.position import PositionSolver, solved_mechanism
-from tests.known import MODELS
+from planar.solving.position import PositionSolver
 
 
 @pytest.mark.parametrize("size", [3, 5, 8])
@@ -74,7 +73,6 @@ def test_assemblies_beside_each_other_have_other_signs_in_a_block_of_six_unknown
     for seed in (3, 4, 9):
         mechanism = all_but_a_parallelogram(seed)
         solver, start = PositionSolver(mechanism), mechanism.inputs[0].position
-        solver.functions.compile()
         e, p = solver.equations, solver.inputs.p
         assert e.z.numel() == 6
         motion = planar.cycle(mechanism, 2000, start, start + 2.0 * np.pi)
@@ -84,9 +82,11 @@ def test_assemblies_beside_each_other_have_other_signs_in_a_block_of_six_unknown
         at = motion.inputs["Q"].position[:, None]
         assert solver.acceptance is not None
 
-        def sign(z, u, judged=solver.acceptance, s=solver, p=p):
-            found = judged.position(z, 0.0 * u + 1.0, u, 0.0 * u, 0.0 * u, p, s.row_scale, s.min_column_scale)
-            return np.sign(found[3].ravel()[-1])
+        def sign(z, u, judged=solver.acceptance, s=solver):
+            found = judged.judge(
+                z[None], InputSamples(u[None], 0.0 * u[None] + 1.0, 0.0 * u[None]), s.acceptance_scales
+            )
+            return np.sign(found.distances[0, -1])
 
         signs = [sign(*each) for each in zip(z[:-1:40], at[:-1:40], strict=True)]
         assert len(set(signs)) == 1
@@ -115,15 +115,3 @@ def test_a_matrix_that_loses_a_column_on_the_way_is_singular_and_not_unknown(mat
     block = ca.SX.sym("block", *entries.shape)
     bound = regularity_bound(block, ca.SX.ones(len(entries)), ca.SX.ones(len(entries)) * 1e-9)
     assert float(ca.Function("bound", [block], [bound])(entries)) == pytest.approx(0.0, abs=1e-12)
-
-
-@pytest.mark.parametrize("stem", ["whitworth", "double-butterfly", "geared-five-bar"])
-def test_the_function_for_regularity_alone_says_what_that_of_a_position_says(stem):
-    found = solved_mechanism(MODELS[stem])
-    solver, given = found.solver, found.solver.inputs
-    solver.functions.compile()
-    scales = given.p, solver.row_scale, solver.min_column_scale
-    verdict = solver.acceptance.position(found.assembly.z, given.u1, given.u, given.u1, given.u2, *scales)[1]
-    alone = solver.acceptance.regularity(found.assembly.z, given.u, *scales)[0][0, 0]
-    assert 0.0 < alone < 1.0
-    assert AcceptanceResult(*verdict[0]).regularity == pytest.approx(alone, rel=1e-12)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import pytest
 
 import planar
-from planar.equations import acceptance, functions, mechanism_numbers
+from planar.equations import functions, mechanism_numbers
 from planar.equations.functions import KEPT_EQUATIONS, EquationFunctions, equation_functions
 from planar.equations.mechanism_numbers import equation_structure, structure_fingerprint
 from planar.foundation import kept_texts, private_cache
@@ -48,14 +48,12 @@ def in_a_new_process(mechanism) -> EquationFunctions:
     return found
 
 
-def texts_of(program: EquationFunctions, mechanism) -> list[str | None]:
-    """All that `solve` and `cycle` take of a structure, as casadi writes it."""
-    judged = acceptance.AcceptanceFunctions(equation_structure(mechanism), program)
-    e, found = program.equations, [program.kinematics_function, program.coordinate_function, program._residual_function]
-    found += map(program.block_function, e.blocks)
-    if judged.is_available:
-        found += [program.newton_function, judged._position, judged.corrected_position.function]
-        found.append(judged.step_check.function)
+def texts_of(program: EquationFunctions) -> list[str | None]:
+    """The functions of the whole of a structure, as casadi writes them."""
+    found = [program.kinematics_function, program.coordinate_function, program._residual_function]
+    found += map(program.block_function, program.equations.blocks)
+    if program.is_square:
+        found.append(program.newton_function)
     return [each.serialize() for each in found]
 
 
@@ -66,16 +64,16 @@ def files(place):
 @pytest.mark.parametrize("name", first_cases(MODELS, 4))
 def test_what_is_read_is_what_was_derived_to_the_last_digit(name, place, derived):
     mechanism = planar.load(name)
-    first = texts_of(in_a_new_process(mechanism), mechanism)
+    first = texts_of(in_a_new_process(mechanism))
     count = len(derived)
     assert count
-    assert texts_of(in_a_new_process(mechanism), mechanism) == first
+    assert texts_of(in_a_new_process(mechanism)) == first
     assert len(derived) == count
     assert len(files(place)) == 1
     # what is derived again is the same, too
     again = EquationFunctions(in_a_new_process(mechanism).equations)
     again.compile()
-    assert texts_of(again, mechanism) == first
+    assert texts_of(again) == first
 
 
 def coordinates_in_a_new_process(mechanism):
@@ -109,16 +107,16 @@ def test_a_damaged_file_is_not_read_and_replaced(where, place, derived):
 
 def test_a_text_that_casadi_does_not_read_is_made_again(place, derived):
     mechanism = planar.load("slider-crank")
-    first = texts_of(in_a_new_process(mechanism), mechanism)
+    first = texts_of(in_a_new_process(mechanism))
     write_added_texts()
     (path,) = files(place)
     KEPT_EQUATIONS.write(
         path.stem, json.dumps(dict.fromkeys(json.loads(KEPT_EQUATIONS.read(path.stem)), "other")).encode()
     )
     count = len(derived)
-    assert texts_of(in_a_new_process(mechanism), mechanism) == first
+    assert texts_of(in_a_new_process(mechanism)) == first
     assert len(derived) == 2 * count
-    assert texts_of(in_a_new_process(mechanism), mechanism) == first
+    assert texts_of(in_a_new_process(mechanism)) == first
     assert len(derived) == 2 * count
 
 

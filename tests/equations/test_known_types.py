@@ -28,7 +28,7 @@ def test_texts_give_back_what_they_were_made_of(monkeypatch):
             element.nonlinear,
             element.arguments,
         )
-    for placed in EquationFunctions(equations)._placed_blocks:
+    for placed in EquationFunctions(equations).placed_blocks:
         formulas = derive_block_type(placed.key)
         assert BlockTypeFormulas.from_text(formulas.as_text()) == formulas
 

@@ -266,7 +266,7 @@ def test_the_command_that_solves_loads_few_modules(tmp_path, monkeypatch):
     code = "from planar.cli import main; main(['solve', '000-P1'], standalone_mode=False)"
     loaded = loaded_by(code)
     assert not loaded & {"scipy", "networkx", "llvmlite", "pint", "matplotlib", "numpy.random", "difflib"}
-    rare = {"solving.continuation.path", "solving.diagnosis.refusals", "equations.acceptance", "model.input_laws"}
+    rare = {"solving.continuation.path", "solving.diagnosis.refusals", "model.input_laws"}
     assert not loaded & {f"planar.{name}" for name in (*rare, "cli.commands.modes")}
     own, beside = ({name for name in loaded if name.startswith("planar.") == is_own} for is_own in (True, False))
     floor = loaded_by("import numpy, casadi, click, rich.console, rich.table")

@@ -6,10 +6,11 @@ import pytest
 from planar.document import files
 from planar.foundation.errors import NoAnswer, Outcome
 from planar.solving import position
-from planar.solving.checks.branch_check import BranchCheck, is_move_allowed
+from planar.solving.checks.branch_check import accept_steps, is_move_allowed
 from planar.solving.continuation.path import follow_samples, follow_to
 from planar.solving.position import PositionSolver
 from planar.solving.rates import sample_rates
+from tests.acceptance import spoil_runs
 from tests.builders import four_bar_document
 
 CRANK = four_bar_document(0.3, 0.9, 0.7, 1.0, 0.8, omega=2.0, alpha=1.0, sketch={"C": [0.9, 0.7]})
@@ -45,10 +46,10 @@ def test_a_step_to_the_flipped_assembly_is_refused_though_its_residual_is_zero(s
     on = follow_to(solver, solver.inputs.p, z, u, ahead)
     off = mirrored(PositionSolver(files.from_dict(CRANK | {"inputs": [{"pair": "A", "position": 0.81}]})), on)
     inputs = np.array([u, ahead])
-    branch = BranchCheck(solver.functions, solver.inputs.p)
     for after, keeps in ((on, True), (off, False)):
         assert np.all(solver.max_residuals(np.array([z, after]), inputs) < solver.tolerance)
-        assert branch.accept_steps(np.array([z, after]), inputs).tolist() == [keeps]
+        steps = accept_steps(solver.acceptance, np.array([z, after]), inputs, solver.acceptance_scales)
+        assert steps.tolist() == [keeps]
 
 
 def test_followed_samples_are_on_the_branch_and_the_flipped_ones_are_another_branch(solver):
@@ -56,11 +57,10 @@ def test_followed_samples_are_on_the_branch_and_the_flipped_ones_are_another_bra
     inputs = circle(solver)
     first = follow_samples(solver, solver.inputs.p, solver.find_assembly().z, inputs).z
     second = follow_samples(solver, solver.inputs.p, mirrored(solver, first[0]), inputs).z
-    branch = BranchCheck(solver.functions, solver.inputs.p)
     for samples in (first, second):
-        assert branch.accept_steps(samples, inputs).all()
+        assert accept_steps(solver.acceptance, samples, inputs, solver.acceptance_scales).all()
     crossed = np.where(np.arange(len(inputs))[:, None] % 2, first, second)
-    assert not branch.accept_steps(crossed, inputs).any()
+    assert not accept_steps(solver.acceptance, crossed, inputs, solver.acceptance_scales).any()
 
 
 def test_a_run_whose_program_flips_half_way_is_put_right_and_counted(solver, monkeypatch):
@@ -68,17 +68,13 @@ def test_a_run_whose_program_flips_half_way_is_put_right_and_counted(solver, mon
     honest = follow_samples(solver, solver.inputs.p, z, inputs)
     assert honest.general_count == 0
 
-    real = solver.functions.run_samples
-
-    def flipping(start, u, p):
-        found = real(start, u, p)
+    def flip(found, u):
         for k in range(len(u)):
             if inputs[30, 0] <= u[k, 0] < inputs[34, 0]:
                 other = CRANK | {"inputs": [{"pair": "A", "position": float(u[k, 0])}]}
                 found[k] = mirrored(PositionSolver(files.from_dict(other)), found[k])
-        return found
 
-    monkeypatch.setattr(solver.functions, "run_samples", flipping)
+    spoil_runs(solver, monkeypatch, flip)
     fooled = follow_samples(solver, solver.inputs.p, z, inputs)
     assert 4 <= fooled.general_count <= 6  # those that were flipped, and what lies on the same arc of the curve
     turns = (fooled.z - honest.z) / (2 * np.pi)
@@ -97,15 +93,12 @@ def test_a_finite_wrong_answer_from_the_program_does_not_get_out(solver, spoil):
 def test_samples_with_a_wrong_or_missing_value_go_to_the_general_path(solver, monkeypatch):
     z, inputs = solver.find_assembly().z, circle(solver)
     honest = follow_samples(solver, solver.inputs.p, z, inputs)
-    real = solver.functions.run_samples
 
-    def spoiled(start, u, p):
-        found = real(start, u, p)
+    def spoil(found, u):
         found[u[:, 0] == inputs[50, 0], 0] += 1e-6
         found[u[:, 0] == inputs[70, 0], 1] = np.nan
-        return found
 
-    monkeypatch.setattr(solver.functions, "run_samples", spoiled)
+    spoil_runs(solver, monkeypatch, spoil)
     found = follow_samples(solver, solver.inputs.p, z, inputs)
     assert found.general_count == 2
     np.testing.assert_allclose(found.z, honest.z, atol=1e-12)

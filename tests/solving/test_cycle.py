@@ -9,7 +9,7 @@ import pytest
 import planar
 from planar.document import files
 from planar.foundation.errors import BadInput, NoAnswer, Outcome
-from planar.solving.checks.branch_check import BranchCheck
+from planar.solving.checks import branch_check
 from planar.solving.position import PositionSolver
 from planar.solving.runs import samples as motion_rows
 from tests.builders import block_slider_crank, four_bar
@@ -382,17 +382,18 @@ def test_the_branch_that_comes_back_from_a_limit_is_told_apart_by_its_way_and_it
             z = np.array([[beta[0][0], phi[0][0]], [beta[k][1], phi[k][1]]])
             z -= TURN * np.round((z - base) / TURN)
             assert np.all(solver.max_residuals(z, theta[:, None]) < solver.tolerance)
-            yield bool(BranchCheck(solver.functions, solver.inputs.p).accept_steps(z, theta[:, None])[0])
+            steps = branch_check.accept_steps(solver.acceptance, z, theta[:, None], solver.acceptance_scales)
+            yield bool(steps[0])
 
     own, other = np.transpose([list(judged(seed)) for seed in range(40)])
     assert own.sum() > 20
     assert not other.any()
-    for name in ("_keeps_direction", "_keeps_signs"):
+    for name in ("keep_direction", "keep_signs"):
         with monkeypatch.context() as without:
-            without.setattr(BranchCheck, name, lambda self, *given: True)
+            without.setattr(branch_check, name, lambda *given: True)
             assert not any(list(judged(seed))[1] for seed in range(40))
-    monkeypatch.setattr(BranchCheck, "_keeps_direction", lambda self, *given: True)
-    monkeypatch.setattr(BranchCheck, "_keeps_signs", lambda self, *given: True)
+    monkeypatch.setattr(branch_check, "keep_direction", lambda *given: True)
+    monkeypatch.setattr(branch_check, "keep_signs", lambda *given: True)
     assert sum(list(judged(seed))[1] for seed in range(40))
 
 

@@ -1,4 +1,4 @@
-"""What is kept from one solution to the next, and compiled functions that judge, against the general path."""
+"""What is kept from one solution to the next, and what is judged block after block, against the general path."""
 
 import pickle
 from dataclasses import replace
@@ -8,16 +8,16 @@ import numpy as np
 import pytest
 
 import planar
-from benchmarks import chain
-from planar.equations import acceptance
-from planar.equations.casadi_call import CHUNK_SIZES, BufferedFunction, RunFunction
-from planar.equations.functions import MAX_CACHED_STRUCTURES, EquationFunctions, equation_functions
+from planar.equations import acceptance, block_motion, block_type_functions
+from planar.equations.casadi_call import CHUNK_SIZES, BufferedFunction
+from planar.equations.functions import MAX_CACHED_STRUCTURES, EquationFunctions
 from planar.model.mechanism import Drive, replace_inputs
 from planar.solving import position
 from planar.solving.assembly.block_assemblies import BlockAssemblies
 from planar.solving.continuation import fast_path, path
 from planar.solving.continuation.fast_path import fast_position, fast_run
 from planar.solving.position import PositionSolver, SolvedMechanism
+from tests.acceptance import spoil_runs
 from tests.builders import four_bar
 from tests.closed_forms import between
 
@@ -35,13 +35,6 @@ MODELS = (
 
 def mechanism(theta=1.0, lengths=ROCKER):
     return four_bar(*lengths, theta)
-
-
-def compiled(mechanism):
-    """A solver whose functions of the whole are derived from the start."""
-    solver = PositionSolver(mechanism)
-    solver.functions.compile()
-    return solver
 
 
 def turn(solver, rows=91):
@@ -63,26 +56,14 @@ def test_a_called_function_tells_of_many_positions_what_it_tells_of_each(many):
     assert called(at[0], fixed)[0] is not called(at[0], fixed)[0]
 
 
-@pytest.mark.parametrize("many", [0, 1, CHUNK_SIZES[-1] + 1, CHUNK_SIZES[0] + 2 * CHUNK_SIZES[-1] + 3])
-def test_a_chained_function_goes_on_from_where_it_was(many):
-    z, u, p = (ca.SX.sym(name) for name in "zup")
-    chained = RunFunction(ca.Function("f", [z, u, p], [0.5 * z + p * u]))
-    u = np.random.default_rng(0).normal(size=(many, 1))
-    state, wanted = 0.3, []
-    for each in u[:, 0]:
-        state = 0.5 * state + 2.0 * each
-        wanted.append(state)
-    np.testing.assert_allclose(chained(np.array([0.3]), u, np.array([2.0]))[:, 0], wanted, rtol=1e-14)
-
-
 @pytest.mark.parametrize("name", MODELS)
-def test_the_compiled_path_tells_what_the_general_one_does(name, monkeypatch):
+def test_the_quick_path_tells_what_the_general_one_does(name, monkeypatch):
     model = planar.load(name)
     quick = planar.solve(model), planar.cycle(model, 60)
     monkeypatch.setattr(position, "fast_position", lambda *_: None)
     monkeypatch.setattr(path, "fast_run", lambda *_: None)
     monkeypatch.setattr("planar.solving.runs.range_run.fast_run", lambda *_: None)
-    slow = compiled(model).state(compiled(model).find_assembly().z), planar.cycle(model, 60)
+    slow = PositionSolver(model).state(PositionSolver(model).find_assembly().z), planar.cycle(model, 60)
     for one, other in zip(quick, slow, strict=True):
         assert one.remarks == other.remarks
         for point, parts in other.points.items():
@@ -93,8 +74,8 @@ def test_the_compiled_path_tells_what_the_general_one_does(name, monkeypatch):
     assert (quick[0].mobility, quick[1].outcome, quick[1].reason) == (1, slow[1].outcome, slow[1].reason)
 
 
-def test_a_run_is_told_by_compiled_functions_alone_where_nothing_is_near():
-    solver = compiled(mechanism())
+def test_a_run_is_told_block_after_block_where_nothing_is_near():
+    solver = PositionSolver(mechanism())
     u, u1, u2 = turn(solver)
     found = path.follow_samples(solver, solver.inputs.p, solver.find_assembly().z, u, (), (u1, u2))
     assert found.general_count == 0
@@ -103,51 +84,45 @@ def test_a_run_is_told_by_compiled_functions_alone_where_nothing_is_near():
 
 
 def test_a_course_ends_before_a_row_that_has_flipped(monkeypatch):
-    solver, other = compiled(mechanism()), compiled(four_bar(*ROCKER, 1.0, -1))
-    z, flipped = solver.find_assembly().z, other.find_assembly().z
+    solver = PositionSolver(mechanism())
+    z, flipped = (each.find_assembly().z for each in (solver, PositionSolver(four_bar(*ROCKER, 1.0, -1))))
     u, u1, u2 = turn(solver)
     assert len(fast_run(solver, z, u, u1, u2).z) == len(u)
-    real = solver.functions.run_samples
+    other = fast_run(solver, flipped, u, u1, u2).z
 
-    def flipping(start, inputs, p):
-        found = real(start, inputs, p)
-        found[29:] = real(flipped, inputs, p)[29:]
-        return found
+    def flip(found, inputs):
+        found[29:] = other[30:]
 
-    monkeypatch.setattr(solver.functions, "run_samples", flipping)
+    spoil_runs(solver, monkeypatch, flip)
     assert len(fast_run(solver, z, u, u1, u2).z) == 30
 
 
 @pytest.mark.parametrize("spoil", [1e-6, np.nan])
 def test_a_course_ends_before_a_row_that_is_open(monkeypatch, spoil):
-    solver = compiled(mechanism())
+    solver = PositionSolver(mechanism())
     u, u1, u2 = turn(solver)
-    real = solver.functions.run_samples
 
-    def spoiled(start, inputs, p):
-        found = real(start, inputs, p)
+    def open_pin(found, inputs):
         found[40, 1] += spoil
-        return found
 
-    monkeypatch.setattr(solver.functions, "run_samples", spoiled)
+    spoil_runs(solver, monkeypatch, open_pin)
     assert len(fast_run(solver, solver.find_assembly().z, u, u1, u2).z) == 41
 
 
 @pytest.mark.parametrize("order", ["first", "second"])
-def test_wrong_rates_of_a_compiled_function_do_not_pass(order, monkeypatch):
-    solver = compiled(mechanism())
+def test_wrong_rates_of_a_block_type_do_not_pass(order, monkeypatch):
+    solver = PositionSolver(mechanism())
     z = solver.find_assembly().z
     assert fast_position(solver, z) is not None
-    real = getattr(acceptance.UnknownRates, order)
-    monkeypatch.setattr(acceptance.UnknownRates, order, lambda self, *given: real(self, *given) * (1.0 + 1e-7))
+    real = getattr(block_motion.UnknownRates, order)
+    monkeypatch.setattr(block_motion.UnknownRates, order, lambda self, *given: real(self, *given) * (1.0 + 1e-7))
+    monkeypatch.setattr(block_type_functions, "known_text", lambda _: None)
+    monkeypatch.setattr(acceptance, "block_type_functions", block_type_functions.BlockTypeFunctions)
     wrong = acceptance.AcceptanceFunctions(solver.structure.mechanism, EquationFunctions(solver.equations))
-    wrong.functions.compile()
     monkeypatch.setattr(solver.structure, "_acceptance", wrong)
     assert fast_position(solver, z) is None
     s = solver.inputs
-    told = acceptance.AcceptanceResult(
-        *wrong.position(z, s.u1, s.u, s.u1, s.u2, s.p, solver.row_scale, solver.min_column_scale)[1][0]
-    )
+    _, told = wrong.position(z, acceptance.InputSamples(s.u, s.u1, s.u2), solver.acceptance_scales)
     assert (told.velocity_error > 1e-9, told.acceleration_error > 1e-9) == (order == "first", order == "second")
 
 
@@ -155,7 +130,7 @@ def test_a_position_beside_a_dead_point_is_left_to_the_general_path():
     """B, C and D all but in line: the crank of a triple rocker stands next to its limit."""
     lengths = (1.0, 0.8, 0.7, 0.9)
     limit = between(1.0, 0.9, 1.5)
-    near, far = (compiled(four_bar(*lengths, limit - gap)) for gap in (1e-8, 0.3))
+    near, far = (PositionSolver(four_bar(*lengths, limit - gap)) for gap in (1e-8, 0.3))
     assert fast_position(far, far.find_assembly().z) is not None
     assert fast_position(near, near.find_assembly().z) is None
 
@@ -242,7 +217,7 @@ def test_frames_are_placed_when_they_are_asked_for():
 
 @pytest.mark.parametrize("name", CLOSED)
 def test_both_assemblies_in_closed_form_are_those_that_newtons_method_finds(name, monkeypatch):
-    setup = compiled(planar.load(name))
+    setup = PositionSolver(planar.load(name))
     z, seen = setup.find_assembly().z, 0
     for stage in setup.equations.blocks:
         quick = BlockAssemblies(setup)._closed_form(stage, z)
@@ -258,11 +233,3 @@ def test_both_assemblies_in_closed_form_are_those_that_newtons_method_finds(name
             assert one[1:] == pytest.approx(other[1:], abs=1e-10)
         seen += 1
     assert seen
-
-
-def test_instructions_of_a_row_grow_with_its_links():
-    def instructions(links):
-        made = equation_functions(planar.from_dict(chain.document(links)))
-        return made.newton_function.n_instructions()
-
-    assert instructions(40) < 2.2 * instructions(20)

@@ -41,6 +41,29 @@ CENTRE_DISTANCE_TOLERANCE = 1e-6
 """Centres are where the radii put them within this part of their distance: dimensions in files are rounded."""
 
 
+PinsOfLinks = Mapping[str, Sequence[Mapping[str, str]]]
+"""Of every link the pins that it is in, each with the points of its links."""
+_last_pins: list[tuple[Sequence[Pair], PinsOfLinks]] = []
+"""Those of the pairs that were last asked about: every wheel of a mechanism asks about the same."""
+
+
+def _pins_of_links(pairs: Sequence[Pair]) -> PinsOfLinks:
+    """The pins of all links; a pin of n links is several pairs."""
+    for known, pins_of_links in _last_pins:
+        if known is pairs:
+            return pins_of_links
+    pins: dict[str, dict[str, str]] = {}
+    for pair in pairs:
+        pins.setdefault(pair.entry_name(), {}).update(pair.coincident_points())
+    of_links: dict[str, list[Mapping[str, str]]] = {}
+    for pin in pins.values():
+        for link in pin:
+            of_links.setdefault(link, []).append(pin)
+    if isinstance(pairs, tuple):  # which cannot change
+        _last_pins[:] = [(pairs, of_links)]
+    return of_links
+
+
 @dataclass(frozen=True)
 class WheelPair(Pair):
     """Two wheels whose angles a and b against the carrier obey b - b0 = ratio (a - a0); the angles count turns.
@@ -176,10 +199,7 @@ class WheelPair(Pair):
 
     def _centre_pin(self, wheel: str, beside: Sequence[Pair]) -> Mapping[str, str] | None:
         """The points of links in the pin in which a wheel turns in the carrier."""
-        pins: dict[str, dict[str, str]] = {}
-        for pair in beside:  # a pin of n links is several pairs
-            pins.setdefault(pair.entry_name(), {}).update(pair.coincident_points())
-        return next((pin for pin in pins.values() if wheel in pin and self.carrier in pin), None)
+        return next((pin for pin in _pins_of_links(beside).get(wheel, ()) if self.carrier in pin), None)
 
     def _centre_pins(self, beside: Sequence[Pair]) -> list[Mapping[str, str]] | None:
         """Those of both wheels; None where one of them is not pinned to the carrier."""

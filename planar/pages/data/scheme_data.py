@@ -42,6 +42,7 @@ from planar.model.pairs import Pair
 from planar.model.pairs.symbols import DrawingMark
 from planar.pages.data.dimension_numbers import DimensionNumber, DimensionNumbers, DrawingNumbers
 from planar.results.motion import Motion
+from planar.solving.continuation.fast_path import fast_run
 from planar.solving.continuation.path import follow_samples
 from planar.solving.position import PositionSolver, solved_mechanism
 
@@ -161,11 +162,10 @@ def _followed_samples(solver: PositionSolver, z: Array, samples: Array, through:
     """
     p, places, reached = solver.inputs.p, samples[STEP_PARTS::STEP_PARTS], 0
     found: Array = np.empty((0, z.size))
-    if solver.functions.is_square:
-        every = solver.functions.run_samples(z, samples[1:], p)
-        closed = solver.max_residuals(every, samples[1:]) <= solver.tolerance
-        reached = (len(closed) if closed.all() else int(np.argmin(closed))) // STEP_PARTS
-        found = every[STEP_PARTS - 1 :: STEP_PARTS][:reached]
+    run = fast_run(solver, z, samples, np.zeros_like(samples), np.zeros_like(samples))
+    if run is not None and len(run.z):
+        found = run.z[STEP_PARTS::STEP_PARTS]
+        reached = len(found)
     if through and reached < len(places):
         ahead = samples[reached * STEP_PARTS :: STEP_PARTS]
         with suppress(NoAnswer):

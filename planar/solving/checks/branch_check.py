@@ -1,96 +1,87 @@
-"""The branch check: do two positions of a run lie on one branch, and on no other?"""
+"""The branch check: do two positions of a run lie on one branch, and on no other?
+
+Two positions lie on one branch if every unknown has moved as its rates allow, and if no block can have been singular
+between. A Jacobian stays regular until it has changed by its least singular value (Weyl), so least value over rate of
+change is a distance in which nothing happens: a step must be shorter than those at its two ends together. So a change
+point, where branches cross, is not passed within a step, whichever sign the determinant has beyond it and however the
+rates there agree.
+"""
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING, NamedTuple
+
 import numpy as np
 
-from planar.equations.functions import EquationFunctions
-from planar.equations.linear import solve_arrays
-from planar.equations.sparse_matrices import SparseMatrices
-from planar.foundation.arrays import Array, BoolArray
-from planar.solving.checks.singular_values import (
-    DIFFERENCE_STEP,
-    SINGULAR_DISTANCE_RATIO,
-    column_norms,
-    least_singular_values,
-    singular_distance,
-)
+from planar.foundation.arrays import Array, BoolArray, IntArray
+from planar.solving.checks.singular_values import SINGULAR_DISTANCE_RATIO
 
-ZERO_SINGULAR_VALUE = 1e-6
-"""A least singular value that is zero: on the singular position itself it is what rounding left."""
+if TYPE_CHECKING:
+    from planar.equations.acceptance import AcceptanceFunctions, Scales
 
 
-class BranchCheck:
-    """Judges the steps of runs of one program, with one set of numbers p.
+class StepEnds(NamedTuple):
+    """What is known at one end of each step: the rates of the unknowns, as moves over the whole step (steps, unknowns),
+    and how far, in steps, each block is from where it could be singular, with the sign of its determinant (steps,
+    blocks)."""
 
-    Two positions lie on one branch if every unknown has moved as its rates allow, and if no block can have been
-    singular between. A Jacobian stays regular until it has changed by its least singular value (Weyl), so least value
-    over rate of change is a distance in which nothing happens: a step must be shorter than those at its two ends
-    together. So a change point, where branches cross, is not passed within a step, whichever sign the determinant has
-    beyond it and however the rates there agree.
+    rates: Array
+    distances: Array
+
+
+def accept_steps(functions: AcceptanceFunctions, z: Array, u: Array, scales: Scales) -> BoolArray:
+    """For each step of a run, z (samples, unknowns) and u (samples, inputs), whether it keeps to its branch."""
+    way = np.diff(u, axis=0)
+    before, after = (step_ends(functions, z[part], u[part], way, scales) for part in (slice(-1), slice(1, None)))
+    return keep_branch(np.diff(z, axis=0), before, after, np.sum(way * way, axis=1), functions.block_starts)
+
+
+def step_ends(functions: AcceptanceFunctions, z: Array, u: Array, way: Array, scales: Scales) -> StepEnds:
+    """What is known at positions z (steps, unknowns) and u (steps, inputs) of steps by `way` (steps, inputs)."""
+    from planar.equations.acceptance import InputSamples
+
+    judged = functions.judge(z, InputSamples(u, way, np.zeros_like(way)), scales)
+    return StepEnds(judged.coordinate_rates[:, 1, list(functions.equations.unknowns)], judged.distances)
+
+
+def keep_branch(
+    moves: Array,
+    before: StepEnds,
+    after: StepEnds,
+    squares: Array,
+    block_starts: IntArray,
+    ratio: float = SINGULAR_DISTANCE_RATIO,
+) -> BoolArray:
+    """For each step, by the moves of its unknowns (steps, unknowns), whether it keeps to its branch; of its inputs the
+    sums of squares (steps,). `ratio` says how many steps its ends together have to be from where a block is singular.
     """
+    if not moves.shape[1]:
+        return np.ones(len(moves), dtype=bool)
+    with np.errstate(all="ignore"):  # what is not a number is no more than anything
+        is_far = (np.abs(before.distances) + np.abs(after.distances)).min(axis=1) > ratio
+        smooth = is_move_allowed(moves, before.rates, after.rates).all(axis=1)
+        return smooth & is_far & keep_signs(before, after) & keep_direction(before, after, squares, block_starts)
 
-    def __init__(self, program: EquationFunctions, p: Array):
-        self.functions, self.p = program, p
 
-    def accept_steps(self, z: Array, u: Array) -> Array:
-        """For each step of a run, z (samples, unknowns) and u (samples, inputs), whether it keeps to the branch."""
-        slopes, drives = self.functions.jacobians(z, u, self.p)
-        gains = -solve_arrays(slopes, drives)
-        way = np.diff(u, axis=0)
-        before, after = ((gain @ way[:, :, None])[..., 0] for gain in (gains[:-1], gains[1:]))
-        smooth = np.all(is_move_allowed(np.diff(z, axis=0), before, after), axis=1)
-        smooth &= self._keeps_direction(before, after, way)
-        first = self._singular_distances(z[:-1], u[:-1], slopes[:-1], before, way)
-        second = self._singular_distances(z[1:], u[1:], slopes[1:], after, way)
-        return smooth & self._keeps_signs(slopes) & np.all(first + second > SINGULAR_DISTANCE_RATIO, axis=1)
+def keep_signs(before: StepEnds, after: StepEnds) -> BoolArray:
+    """For each step whether the determinant of every block keeps its sign.
 
-    def _keeps_signs(self, slopes: Array | SparseMatrices) -> Array:
-        """For each step whether the determinant of every block keeps its sign (steps,).
+    Of two assemblies that come near to each other before a dead point each has another one, so that no step leads from
+    one to the other, however alike they are.
+    """
+    kept: BoolArray = (np.signbit(before.distances) == np.signbit(after.distances)).all(axis=1)
+    return kept
 
-        Of two assemblies that come near to each other before a dead point each has another one, so that no step leads
-        from one to the other, however alike they are.
-        """
-        keeps = np.ones(len(slopes) - 1, dtype=bool)
-        for stage in self.functions.equations.blocks:
-            own = slopes[:, stage.rows, stage.unknowns]
-            if own.size and own.shape[1] == own.shape[2]:
-                signs = np.linalg.slogdet(own)[0]
-                keeps &= signs[:-1] * signs[1:] >= 0.0
-        return keeps
 
-    def _keeps_direction(self, before: Array, after: Array, input_step: Array) -> Array:
-        """For each step whether every block goes on as it came (steps,): less than a right angle between the tangents.
+def keep_direction(before: StepEnds, after: StepEnds, squares: Array, block_starts: IntArray) -> BoolArray:
+    """For each step whether every block goes on as it came: less than a right angle between the tangents.
 
-        Beside a limit both ends of a step may be closed, and any move allowed by rates that grow beyond all bounds
-        there; but on the branch that comes back from the limit they have the other sign.
-        """
-        both, straight = before * after, np.sum(input_step * input_step, axis=1)
-        turns = [np.sum(both[:, stage.unknowns], axis=1) for stage in self.functions.equations.blocks]
-        return (
-            np.all([turn + straight >= 0.0 for turn in turns], axis=0)
-            if turns
-            else np.ones(len(input_step), dtype=bool)
-        )
-
-    def _singular_distances(
-        self, z: Array, u: Array, slopes: Array | SparseMatrices, rates: Array, input_step: Array
-    ) -> Array:
-        """How far each block is from where it could be singular (samples, blocks), in steps of rates and way."""
-        pace = np.maximum(np.max(np.abs(np.hstack([rates, input_step])), axis=1, initial=0.0), 1e-300)[:, None]
-        nudge = DIFFERENCE_STEP / np.maximum(pace, DIFFERENCE_STEP)
-        moved, _ = self.functions.jacobians(z + nudge * rates, u + nudge * input_step, self.p)
-        distances = np.full((len(z), len(self.functions.equations.blocks)), np.inf)
-        for index, stage in enumerate(self.functions.equations.blocks):
-            here, there = (each[:, stage.rows, stage.unknowns] for each in (slopes, moved))
-            if here.size:
-                # columns of one size, so that a small link counts as much as a large one
-                sizes = column_norms(here, 1e-300)[:, None]
-                change = np.linalg.norm((there - here) / sizes, axis=(1, 2)) / nudge[:, 0]
-                least = least_singular_values(here / sizes)
-                # on the singular position itself rates are rounding, and say nothing of how it changes
-                distances[:, index] = np.where(least < ZERO_SINGULAR_VALUE, 0.0, singular_distance(least, change))
-        return np.nan_to_num(distances, nan=0.0, posinf=np.inf)
+    Beside a limit both ends of a step may be closed, and any move allowed by rates that grow beyond all bounds there;
+    but on the branch that comes back from the limit they have the other sign.
+    """
+    turns = np.add.reduceat(before.rates * after.rates, block_starts, axis=1).min(axis=1)
+    onwards: BoolArray = turns + squares >= 0.0
+    return onwards
 
 
 def is_move_allowed(move: Array, before: Array, after: Array) -> BoolArray:

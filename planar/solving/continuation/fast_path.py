@@ -1,4 +1,4 @@
-"""The fast path along straight input paths: compiled functions alone, as far as every position is surely regular."""
+"""The fast path: positions and runs computed and judged block after block, as far as they are surely regular."""
 
 from __future__ import annotations
 
@@ -7,15 +7,15 @@ from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
 
+from planar.equations.acceptance import InputSamples, Scales
 from planar.equations.functions import EquationFunctions
-from planar.foundation.arrays import Array, BoolArray, IntArray
-from planar.solving.checks.branch_check import is_move_allowed
+from planar.foundation.arrays import Array, BoolArray
+from planar.solving.checks.branch_check import StepEnds, keep_branch, step_ends
 from planar.solving.checks.residual_check import CONTACT_TOLERANCE, EPS, NEGLIGIBLE_ERROR
-from planar.solving.checks.singular_values import SINGULAR_DISTANCE_RATIO
 from planar.solving.prepared_mechanism import PositionInputs, PreparedMechanism
 
 if TYPE_CHECKING:
-    from planar.equations.acceptance import AcceptanceFunctions, AcceptanceResult
+    from planar.equations.acceptance import AcceptanceFunctions, AcceptanceResult, JudgedPositions
     from planar.solving.stops import PairStops
 
 MIN_FAST_REGULARITY = 1e-3
@@ -30,39 +30,43 @@ STRAIGHT_TOLERANCE = 1e-12
 """rad or sizes: inputs that are no further from a straight way are on it."""
 STEP_LENGTH = 0.125
 """rad or sizes that the fastest input moves from one kept position to the next."""
+STRIDES_AT_ONCE = 8
+"""Kept positions that are computed together, so that each depends on the way alone."""
 MAX_DIRECTIONS = 8
 MAX_STORED_NUMBERS, MIN_STORED_POSITIONS = 20_000, 128
 """Numbers that are kept of positions along one way, and positions that are kept however many numbers they have."""
 
 
-class FastPosition:
-    """A position that is surely sound, with its rates."""
+class FastPosition(NamedTuple):
+    """A position that is surely sound, with its rates (3, coordinates), and what its worst constraint leaves open."""
 
-    __slots__ = ("coordinate_rates", "residual")
-
-    def __init__(self, parts: Array, residual: float):
-        self.coordinate_rates, self.residual = parts, residual
+    coordinate_rates: Array
+    residual: float
 
 
 def fast_position(setup: PreparedMechanism, z: Array) -> FastPosition | None:
-    """The position with its rates (coordinates, orders), if it is surely sound."""
-    judged = setup.acceptance
-    if judged is None:
+    """The position with its rates, if it is surely sound."""
+    if setup.acceptance is None:
         return None
     s = setup.inputs
-    parts, verdict, _, _ = judged.position(z, s.u1, s.u, s.u1, s.u2, s.p, setup.row_scale, setup.min_column_scale)
-    told = judged.result(verdict[0].tolist())
-    passed = _is_accepted(setup, told) and told.regularity >= MIN_FAST_REGULARITY
-    return FastPosition(parts.T, told.residual) if passed else None
+    parts, judged = setup.acceptance.position(z, InputSamples(s.u, s.u1, s.u2), setup.acceptance_scales)
+    passed = isfinite(judged.finite_sum) and (
+        judged.residual <= setup.tolerance
+        and max(judged.velocity_error, judged.acceleration_error) <= 1e3 * setup.tolerance
+        and judged.contact_gap <= CONTACT_TOLERANCE
+        and judged.regularity >= MIN_FAST_REGULARITY
+        and EPS * judged.rounding_amplification <= NEGLIGIBLE_ERROR
+    )
+    return FastPosition(parts, judged.residual) if passed else None
 
 
 def is_surely_regular(setup: PreparedMechanism, z: Array) -> bool:
     """Whether every block is surely determined at a position."""
     if setup.acceptance is None:
         return False
-    s = setup.inputs
-    regularity = setup.acceptance.regularity(z, s.u, s.p, setup.row_scale, setup.min_column_scale)[0]
-    return bool(regularity[0, 0] >= MIN_FAST_REGULARITY)
+    u, rest = setup.inputs.u, np.zeros_like(setup.inputs.u)
+    judged = setup.acceptance.position(z, InputSamples(u, rest, rest), setup.acceptance_scales)[1]
+    return judged.regularity >= MIN_FAST_REGULARITY
 
 
 class FastSamples(NamedTuple):
@@ -98,14 +102,14 @@ def concatenate_samples(first: FastSamples | None, second: FastSamples | None) -
 
 
 class FastSolver(Protocol):
-    """What a run in compiled functions needs of a solver."""
+    """What a quick run needs of a solver."""
 
     functions: EquationFunctions
     inputs: PositionInputs
 
     @property
     def acceptance(self) -> AcceptanceFunctions | None:
-        """What judges positions in compiled functions."""
+        """What computes and judges positions block after block."""
 
     @property
     def stops(self) -> PairStops | None:
@@ -119,87 +123,105 @@ class FastSolver(Protocol):
         """What the residual check lets pass."""
 
     @property
-    def row_scale(self) -> Array:
-        """What every row of a Jacobian is divided by (rows,)."""
-
-    @property
-    def min_column_scale(self) -> Array:
-        """What the column of every unknown could be at best (unknowns,)."""
+    def acceptance_scales(self) -> Scales:
+        """The numbers of a mechanism by which positions are judged."""
 
 
 class FastRun(NamedTuple):
-    """The first rows of a run, all of them surely sound: unknowns (rows, unknowns), coordinates with their rates (rows,
-    3, coordinates), and what the worst constraint leaves open."""
+    """The first rows of a run, all of them closed and on one branch: unknowns (rows, unknowns), coordinates with their
+    rates (rows, 3, coordinates), which rows are surely sound with these, and what the worst constraint leaves open."""
 
     z: Array
     coordinate_rates: Array
+    is_sure: BoolArray
     residual: float
 
 
 def fast_run(setup: FastSolver, z: Array, u: Array, u1: Array, u2: Array) -> FastRun | None:
-    """A run along a straight way of inputs (rows, inputs) with rates u1, u2 from the unknowns of its first row, as far
-    as it is surely sound: both checks, rates, contacts. None for what is no such run."""
-    judged, p = setup.acceptance, setup.inputs.p
-    if judged is None or not u.size:
+    """A run of inputs (rows, inputs) with rates u1, u2 from the unknowns of its first row, as far as its rows are
+    closed and keep to the branch. None for a structure that is not computed block after block."""
+    functions, scales = setup.acceptance, setup.acceptance_scales
+    if functions is None or not u.size:
         return None
-    steps = u[1:] - u[:-1]
-    sizes = np.abs(steps).max(axis=1, initial=0.0)
-    most = int(np.argmax(sizes))
-    axis = steps[most] / sizes[most] if sizes[most] > 0.0 else np.ones(u.shape[1])
-    square = float(axis @ axis)
-    gone = steps @ axis / square
-    if np.abs(steps - gone[:, None] * axis).max(initial=0.0) > STRAIGHT_TOLERANCE:
-        return None
-    found = np.concatenate([z[None], setup.functions.run_samples(z, u[1:], p)])
-    settled, parts, verdict, ways, distances = judged.corrected_position.evaluate_batch(
-        len(u), found, axis, u, u1, u2, p, setup.row_scale, setup.min_column_scale
-    )
-    settled = settled[:, 0]
-    told = judged.result(verdict[:, 0].T)
-    # what is not a number is not below anything
-    fine = told.residual <= setup.tolerance
-    fine &= np.isfinite(told.finite_sum)
-    fine &= np.maximum(told.velocity_error, told.acceleration_error) <= 1e3 * setup.tolerance
-    fine &= told.contact_gap <= CONTACT_TOLERANCE
-    fine &= told.regularity >= MIN_FAST_REGULARITY
-    fine &= EPS * told.rounding_amplification <= NEGLIGIBLE_ERROR
-    if z.size:
-        with np.errstate(invalid="ignore", over="ignore"):
-            fine[1:] &= _keeps_branch(judged.block_starts, settled, gone, ways[:, 0], distances[:, 0], square)
+    way = _straight_way(u)
+    along = None if way is None else _along(way.axis, u1, u2)
+    rest = np.zeros_like(u)
+    if way is not None and along is not None:
+        settled, judged = functions.run(z, InputSamples(u, np.broadcast_to(way.axis, u.shape), rest), scales)
+        w, w1, w2 = judged.coordinate_rates.transpose(1, 0, 2)
+        first, second = along
+        parts = np.stack([w, w1 * first, w2 * first * first + w1 * second], axis=1)
+        ends = _ends_along(functions, judged, way.gone)
+    else:
+        settled, judged = functions.run(z, InputSamples(u, u1, u2), scales)
+        parts, steps = judged.coordinate_rates, np.diff(u, axis=0)
+        ends = (
+            step_ends(functions, settled[:-1], u[:-1], steps, scales),
+            step_ends(functions, settled[1:], u[1:], steps, scales),
+        )
+    told = judged.result
+    with np.errstate(all="ignore"):
+        fine = (told.residual <= setup.tolerance) & np.isfinite(told.finite_sum)
+    squares = np.sum(np.diff(u, axis=0) ** 2, axis=1)
+    fine[1:] &= keep_branch(np.diff(settled, axis=0), *ends, squares, functions.block_starts)
     if setup.stops is not None:
         from planar.solving.stops import MAX_SURE_MOVE  # few mechanisms have stops
 
         fine &= setup.stops.sure_rows(setup.stop_positions(settled, u), settled)
-        fine[1:] &= sizes <= MAX_SURE_MOVE
+        fine[1:] &= np.abs(np.diff(u, axis=0)).max(axis=1, initial=0.0) <= MAX_SURE_MOVE
     many = len(fine) if fine.all() else int(np.argmin(fine))
-    return FastRun(settled[:many], parts[:many], float(told.residual[:many].max(initial=0.0)))
+    is_sure = _is_sure(told, setup.tolerance)[:many]
+    residual = float(told.residual[:many].max(initial=0.0))
+    return FastRun(settled[:many], parts[:many], is_sure, residual)
 
 
-def _is_accepted(setup: PreparedMechanism, verdict: AcceptanceResult[float]) -> bool:
-    tolerance = setup.tolerance
-    return (
-        verdict.residual <= tolerance
-        and isfinite(verdict.finite_sum)
-        and verdict.velocity_error <= 1e3 * tolerance
-        and verdict.acceleration_error <= 1e3 * tolerance
-        and verdict.contact_gap <= CONTACT_TOLERANCE
-        and EPS * verdict.rounding_amplification <= NEGLIGIBLE_ERROR
-    )
+class _StraightWay(NamedTuple):
+    """The axis (inputs,) of a run along a straight line, and how far each step goes along it (steps,)."""
+
+    axis: Array
+    gone: Array
 
 
-def _keeps_branch(starts: IntArray, z: Array, gone: Array, rates: Array, distances: Array, square: float) -> BoolArray:
-    """For each step of a run whether it keeps to its branch; see `branch`.
+def _straight_way(u: Array) -> _StraightWay | None:
+    """The straight way of inputs (rows, inputs); None where it is none."""
+    steps = np.diff(u, axis=0)
+    sizes = np.abs(steps).max(axis=1, initial=0.0)
+    if not sizes.any():
+        return _StraightWay(np.ones(u.shape[1]), sizes)
+    most = int(np.argmax(sizes))
+    axis = steps[most] / sizes[most]
+    gone = steps @ axis / (axis @ axis)
+    is_straight = np.abs(steps - gone[:, None] * axis).max() <= STRAIGHT_TOLERANCE
+    return _StraightWay(axis, gone) if is_straight else None
 
-    Steps have `gone` (steps,) along the axis of the inputs; rates `ways` (rows, unknowns) and distances (rows, blocks)
-    are along it too, with the signs of the blocks' determinants.
-    """
+
+def _along(axis: Array, u1: Array, u2: Array) -> tuple[Array, Array] | None:
+    """First and second rates of inputs as multiples (rows, 1) of an axis; None where they are none."""
+    first, second = ((rates @ axis / (axis @ axis))[:, None] for rates in (u1, u2))
+    is_along = np.array_equal(u1, first * axis) and np.array_equal(u2, second * axis)
+    return (first, second) if is_along else None
+
+
+def _ends_along(functions: AcceptanceFunctions, judged: JudgedPositions, gone: Array) -> tuple[StepEnds, StepEnds]:
+    """What is known at both ends of steps so far along the axis by which positions were judged."""
+    rates, distances = judged.coordinate_rates[:, 1, list(functions.equations.unknowns)], judged.distances
     step = gone[:, None]
-    before, after = rates[:-1] * step, rates[1:] * step
-    turns = np.add.reduceat(before * after, starts, axis=1).min(axis=1) + gone * gone * square
-    far = np.abs(distances)
-    safe = (far[:-1] + far[1:]).min(axis=1) > SINGULAR_DISTANCE_RATIO * np.abs(gone)
-    safe &= (np.signbit(distances[:-1]) == np.signbit(distances[1:])).all(axis=1)
-    return (turns >= 0.0) & safe & is_move_allowed(z[1:] - z[:-1], before, after).all(axis=1)
+    with np.errstate(all="ignore"):  # a step to the same place
+        return (
+            StepEnds(rates[:-1] * step, distances[:-1] / np.abs(step)),
+            StepEnds(rates[1:] * step, distances[1:] / np.abs(step)),
+        )
+
+
+def _is_sure(told: AcceptanceResult[Array], tolerance: float) -> BoolArray:
+    """Which positions are surely sound with their rates."""
+    with np.errstate(all="ignore"):  # what is not a number is not below anything
+        fine = np.maximum(told.velocity_error, told.acceleration_error) <= 1e3 * tolerance
+        fine &= told.contact_gap <= CONTACT_TOLERANCE
+        fine &= told.regularity >= MIN_FAST_REGULARITY
+        fine &= EPS * told.rounding_amplification <= NEGLIGIBLE_ERROR
+        fine &= (told.residual <= tolerance) & np.isfinite(told.finite_sum)
+    return fine
 
 
 class StraightPathCache:
@@ -232,28 +254,27 @@ class StraightPathCache:
             if len(self._kept) >= MAX_DIRECTIONS:
                 self._kept.clear()
             kept = self._kept[key] = {0: self.z}
-        known = many
-        while known not in kept:
-            known -= 1
-        for k in range(known, many):
-            z = kept[k]
-            if z is None:
-                return None
-            kept[k + 1] = self._take_step(z, self.start + k * STEP_LENGTH * axis, STEP_LENGTH * axis)
-        z, here = kept[many], self.start + many * STEP_LENGTH * axis
-        return None if z is None else self._take_step(z, here, stop - here)
+        known = max(kept)
+        while known < many and (z := kept[known]) is not None:
+            strides = np.arange(known, min(known + STRIDES_AT_ONCE, self.max_positions) + 1)
+            found = self._walk(z, strides * STEP_LENGTH, axis)
+            kept.update(zip(strides.tolist(), found, strict=True))
+            known = int(strides[-1])
+        z = kept.get(many)
+        return None if z is None else self._walk(z, np.array([many * STEP_LENGTH, reach]), axis)[1]
 
-    def _take_step(self, z: Array, u: Array, step: Array) -> Array | None:
-        judged = self.setup.acceptance
-        assert judged is not None
-        after, verdict = judged.step_check(z, u, step, self.setup.inputs.p)
-        told = judged.step_result(verdict[0].tolist())
-        passed = (
-            told.residual <= self.setup.tolerance
-            and isfinite(told.finite_sum)
-            and told.deviation <= 1.0
-            and told.forward_product >= 0.0
-            and told.regular_distance > MIN_SINGULAR_DISTANCE_RATIO
-            and told.least_singular_value > MIN_SINGULAR_VALUE
-        )
-        return after[0] if passed else None
+    def _walk(self, z: Array, places: Array, axis: Array) -> list[Array | None]:
+        """The unknowns at places along an axis, from those at the first as far as each step is surely sound."""
+        functions = self.setup.acceptance
+        assert functions is not None
+        u = self.start + places[:, None] * axis
+        motion = InputSamples(u, np.broadcast_to(axis, u.shape), np.zeros_like(u))
+        found, judged = functions.run(z, motion, self.setup.acceptance_scales)
+        told, gone = judged.result, np.diff(places)
+        fine = (told.residual <= self.setup.tolerance) & np.isfinite(told.finite_sum)
+        fine &= told.least_singular_value > MIN_SINGULAR_VALUE
+        ends, squares = _ends_along(functions, judged, gone), gone * gone * (axis @ axis)
+        ratio = MIN_SINGULAR_DISTANCE_RATIO
+        fine[1:] &= keep_branch(np.diff(found, axis=0), *ends, squares, functions.block_starts, ratio)
+        count = len(fine) if fine.all() else int(np.argmin(fine))
+        return [*found[:count], *[None] * (len(found) - count)]

@@ -9,11 +9,8 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from planar.equations.functions import EquationFunctions
-from planar.equations.linear import solve_vectors
 from planar.foundation.arrays import Array
 from planar.foundation.errors import NoAnswer, TrackingEnd
-from planar.solving.checks.branch_check import BranchCheck
 from planar.solving.continuation.fast_path import STRAIGHT_TOLERANCE, FastSamples, FastSolver, fast_run
 from planar.solving.continuation.path_pieces import (
     BranchRates,
@@ -183,8 +180,8 @@ def follow_samples(
 ) -> FollowedSamples:
     """The unknowns at every sample of a run of inputs u (samples, inputs), from those of the first.
 
-    The whole run is one call of the compiled program; every sample then passes both checks, and from
-    one that does not the general path goes on until the compiled program can take over again. With first and second
+    The whole run is computed block after block, each at all samples; every sample then passes both checks, and from
+    one that does not the general path goes on until the quick one can take over again. With first and second
     `rates` of the inputs the run tells those of its samples as well, so far as they are surely sound. What the general
     path does is counted in `work`.
     """
@@ -225,7 +222,7 @@ class _SamplesFollower:
             first, last = done, min(done + window, samples)
             run, rest = (self.z, self.u), slice(done - 1, last)
             beside = done - 1 in self.branch_rates
-            done = _solve_compiled(self.solver, self.p, run, rest, self.rates, self.fast_samples, beside)
+            done = _solve_quickly(self.solver, run, rest, self.rates, self.fast_samples, beside)
             # of what comes after a sample that did not pass no more is tried than has passed before
             window = max(MIN_WINDOW, 2 * (done - first))
             if done > first:
@@ -239,7 +236,7 @@ class _SamplesFollower:
         return FollowedSamples(z, self.general_count, stopped, last_position, self.branch_rates, passed, nearby, known)
 
     def _follow_general(self, done: int) -> tuple[int, NoAnswer | None]:
-        """Samples from one on by the general path, until the compiled program can be tried again: how many are known
+        """Samples from one on by the general path, until the quick one can be tried again: how many are known
         then, and why there are no more."""
         at_once = next(self._places, None)
         if self.follower is None or at_once is None:
@@ -291,9 +288,8 @@ class _FastSamplesBuffer:
         return FastSamples(self.parts[:samples], self.sure[:samples], self.open)
 
 
-def _solve_compiled(
+def _solve_quickly(
     solver: PathSolver,
-    p: Array,
     samples: tuple[Array, Array],
     rest: slice,
     rates: tuple[Array, Array] | None,
@@ -304,32 +300,19 @@ def _solve_compiled(
     gate; how many are known then. Of a first one `beside` a change point more is known than can be read off its slope.
     """
     (found, u), first = samples, rest.start
-    sure = fast_run(solver, found[first], u[rest], *(each[rest] for each in rates)) if rates is not None else None
-    if sure is not None and told is not None:
-        through = len(sure.z)
-        if not through:
-            return first + 1
-        same = slice(first + beside, first + through)
-        found[same] = sure.z[beside:]
-        told.parts[same], told.sure[same] = sure.coordinate_rates[beside:], True
-        told.open = max(told.open, sure.residual)
-        return first + through
-    accepted = accepted_samples(solver, p, found[first], u[rest])
-    if accepted is None:
+    still = np.zeros_like(u[rest])
+    run = fast_run(
+        solver, found[first], u[rest], *((still, still) if rates is None else (each[rest] for each in rates))
+    )
+    through = 0 if run is None else len(run.z)
+    if run is None or not through:
         return first + 1
-    found[first + 1 : first + len(accepted)] = accepted[1:]
-    return first + len(accepted)
-
-
-def accepted_samples(solver: PathSolver, p: Array, z: Array, u: Array) -> Array | None:
-    """The unknowns at the first inputs u (samples, inputs) that pass both checks, from those of the first; None where
-    samples cannot be tried at once."""
-    if not solver.functions.is_square or solver.stops is not None:
-        return None  # between samples a stop may be met
-    samples = np.concatenate([z[None], solver.functions.run_samples(z, u[1:], p)])
-    count = 1 + _count_accepted(solver, p, samples, u)
-    samples[1:count] = _correct_once(solver.functions, p, samples[1:count], u[1:count])
-    return samples[:count]
+    same = slice(first + beside, first + through)
+    found[same] = run.z[beside:]
+    if told is not None:
+        told.parts[same], told.sure[same] = run.coordinate_rates[beside:], run.is_sure[beside:]
+        told.open = max(told.open, run.residual)
+    return first + through
 
 
 def _straight_follower(
@@ -354,23 +337,3 @@ def path_end_refusal(solver: PathSolver, trip: PathFollower) -> NoAnswer:
     """Why a trip goes no further."""
     u, ending = trip.end_inputs
     return solver.end_refusal(u, trip.point, ending)
-
-
-def _count_accepted(solver: PathSolver, p: Array, z: Array, u: Array) -> int:
-    """How many samples after the first pass both checks, up to the first that does not."""
-    closed = solver.max_residuals(z, u) <= solver.tolerance
-    whole = len(closed) if closed.all() else int(np.argmin(closed))
-    if whole < 2:
-        return 0
-    keeps = BranchCheck(solver.functions, p).accept_steps(z[:whole], u[:whole])
-    return len(keeps) if keeps.all() else int(np.argmin(keeps))
-
-
-def _correct_once(program: EquationFunctions, p: Array, z: Array, u: Array) -> Array:
-    """Regular samples after one more of Newton's corrections: beside a change point the gate leaves room for an error
-    in their unknowns, which grows with every rate."""
-    if not z.size:
-        return z
-    none = np.zeros((len(z), z.shape[1] + u.shape[1]))
-    there = program.kinematics(np.hstack([z, u]), none, none, p)
-    return z - solve_vectors(there.jacobian, there.F)

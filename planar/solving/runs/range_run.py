@@ -13,7 +13,7 @@ from planar.foundation.time_limit import time_is_over
 from planar.model.wording import join_all_names
 from planar.results.motion import Motion
 from planar.solving.continuation.fast_path import FastSamples, fast_run
-from planar.solving.continuation.path import FollowedSamples, PathFollower, accepted_samples, follow_samples, follow_to
+from planar.solving.continuation.path import FollowedSamples, PathFollower, follow_samples, follow_to
 from planar.solving.continuation.path_pieces import BranchRates, bifurcations_until
 from planar.solving.continuation.predictor_corrector import (
     SHOWN_SLIDE_EXTENT,
@@ -179,12 +179,13 @@ class RangeRun(RunningInput):
         # from within to the limits: from a limit two branches lead inwards
         grid = np.linspace(low.position, high.position, steps + 1)
         inner = grid[1:-1]
-        down, up = self._follow_from_file(inner[inner < here][::-1]), self._follow_from_file(inner[inner >= here])
-        for part in (down, up):
+        below, above = inner[inner < here][::-1], inner[inner >= here]
+        down, up = self._follow_from_file(below), self._follow_from_file(above)
+        for part, places in ((down, below), (up, above)):
             if part.stopped is not None and len(part.z) < 2:
                 raise self._stop_reason(part, part.stopped)
             if part.stopped is not None:
-                return self._with_stop_row(drop_first(part), self.input_rates(inner[: len(part.z)]))
+                return self._with_stop_row(drop_first(part), self.input_rates(places[: len(part.z)]))
         found = splice_runs(down, up)
         local = {row + 1: each for row, each in found.branch_rates.items()}
         known = found.fast_samples and found.fast_samples.padded(1, 1)
@@ -197,18 +198,15 @@ class RangeRun(RunningInput):
         places = np.linspace(here, here + 2.0 * pi, steps + 1)
         given = self.input_rates(places)
         sure = fast_run(self.solver, self.assembly.z, *given[:3])
-        if sure is not None and len(sure.z) == steps + 1 and not self.with_jerk:
+        if sure is not None and len(sure.z) == steps + 1 and sure.is_sure.all() and not self.with_jerk:
             return RunSamples(
-                sure.z,
-                given,
-                fast_samples=FastSamples(sure.coordinate_rates, np.ones(steps + 1, dtype=bool), sure.residual),
+                sure.z, given, fast_samples=FastSamples(sure.coordinate_rates, sure.is_sure, sure.residual)
             )
-        known = accepted_samples(self.solver, self.p, self.assembly.z, given.u) if sure is None else sure.z
-        if known is not None and len(known) <= steps:
+        if sure is not None and len(sure.z) <= steps:
             # walking tells it sooner than a run would
             end = (
-                self._end_beyond(known, places)
-                if self.solver.functions.is_sparse
+                self._end_beyond(sure.z, places)
+                if self.solver.functions.is_sparse and len(sure.z)
                 else self._find_range_end(self.assembly.z, here, 1.0, 2.0 * pi)
             )
             if end.ending is not None:
@@ -272,9 +270,9 @@ class RangeRun(RunningInput):
         if self.solver.functions.is_sparse:
             places = here + sign * np.linspace(0.0, far, RANGE_SAMPLES)
             u = np.array([self.inputs_at(place) for place in places])
-            accepted = accepted_samples(self.solver, self.p, z, u)
-            if accepted is not None:
-                return self._end_beyond(accepted, places)
+            found = fast_run(self.solver, z, u, np.zeros_like(u), np.zeros_like(u))
+            if found is not None and len(found.z):
+                return self._end_beyond(found.z, places)
         return self._find_range_end(z, here, sign, far)
 
     def _end_beyond(self, samples: Array, places: Array) -> _RangeEnd:
