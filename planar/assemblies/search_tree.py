@@ -16,7 +16,7 @@ from planar.foundation.arrays import Array
 from planar.foundation.generic_numbers import generic_numbers
 from planar.foundation.time_limit import stop_if_over
 from planar.model.pairs import MeasureKind
-from planar.solving.assembly.block_assemblies import MEETING_COSINE_SQUARED, block_dependencies
+from planar.solving.assembly.block_assemblies import MEETING_COSINE_SQUARED, block_dependencies, is_out_of_reach
 from planar.solving.newton import CLOSED_TOLERANCE, repeat_step
 from planar.solving.prepared_mechanism import PreparedMechanism
 
@@ -386,4 +386,4 @@ def _dyad_roots(setup: PreparedMechanism, stage: Block, z: Array) -> BlockRoots 
     both, left, bend = form(z, setup.inputs.u, setup.inputs.p)
     if bend < MEETING_COSINE_SQUARED and left <= CLOSED_TOLERANCE:
         return _uncertified_roots(np.array(both), 2, "in closed form")
-    return _uncertified_roots(np.zeros((0, 2)), 2, "in closed form") if bend > 2.0 - MEETING_COSINE_SQUARED else None
+    return _uncertified_roots(np.zeros((0, 2)), 2, "in closed form") if is_out_of_reach(bend) else None

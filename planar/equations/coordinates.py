@@ -29,7 +29,7 @@ def coordinate_columns(coordinates: Iterable[Coordinate]) -> dict[tuple[str, str
 
 
 def frames_from_coordinates(
-    w: Sequence[Scalar] | Array,
+    w: Sequence[Scalar] | Mapping[int, Scalar] | Array,
     column: Mapping[tuple[str, str], int],
     links: Iterable[str],
     pairs: Mapping[str, Pair],

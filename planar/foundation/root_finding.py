@@ -9,6 +9,8 @@ import numpy as np
 
 MAX_EVALUATIONS = 80
 """Bisection alone needs 52 for a root to round-off."""
+SHORT_STEP = 1e-8
+"""Of Newton's method, as a part of the place or of one: its square is round-off."""
 PARTS_LOOKED_AT = np.linspace(0.05, 0.95, 19)
 """Parts of a way at which what has one sign at both ends may have the other."""
 TOUCH_TOLERANCE = 1e-12
@@ -45,6 +47,34 @@ def find_root(function: Callable[[float], float], lower: float, upper: float) ->
             part = fa / (fb - fa) * fc / (fb - fc) + (c - a) / (b - a) * fa / (fc - fa) * fb / (fc - fb)
         part = min(1.0 - least, max(least, part))
     return best
+
+
+def find_root_by_slope(
+    function: Callable[[float], tuple[float, float]], ends: tuple[float, float], values: tuple[float, float]
+) -> float:
+    """A zero of a function that gives its value and its slope, between two ends where its `values` differ in sign.
+
+    Newton's method, by halves where that leaves what is known to hold the zero. After a short step the next one is
+    round-off, as each squares what is left.
+    """
+    (low, high), (of_low, of_high) = ends, values
+    x = low + (high - low) * of_low / (of_low - of_high)
+    for _ in range(MAX_EVALUATIONS):
+        value, slope = function(x)
+        if value * of_low > 0.0:
+            low = x
+        else:
+            high = x
+        after = x - value / slope if slope else x
+        is_within = min(low, high) <= after <= max(low, high)
+        if value == 0.0 or (is_within and slope and abs(after - x) <= SHORT_STEP * max(abs(x), 1.0)):
+            return after
+        if not is_within or not slope:
+            after = 0.5 * (low + high)
+        if abs(high - low) <= 2.0 * ulp(max(abs(x), 1.0)):
+            break
+        x = after
+    return x
 
 
 def lowest_on_cubic(start: tuple[float, float], end: tuple[float, float]) -> tuple[float, float]:

@@ -1,9 +1,11 @@
 """Random linkages of up to twelve moving links, in any loops, of turning and sliding pairs, built closed."""
 
 import numpy as np
+import pytest
 from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 
+import planar
 from planar.document import files
 from planar.dynamics.forces import forces
 from planar.foundation.errors import NoAnswer, Outcome
@@ -176,3 +178,28 @@ def test_turning_and_shifting_the_whole_turns_and_shifts_every_result(seed, link
         np.testing.assert_allclose(twin.position, moved(point.position), atol=1e-9)
         np.testing.assert_allclose(twin.velocity, rotation @ point.velocity, atol=1e-8 * scale)
         np.testing.assert_allclose(twin.acceleration, rotation @ point.acceleration, atol=1e-8 * scale)
+
+
+def test_links_that_hold_each_other_twice_are_not_called_open_by_round_off():
+    """The closed form of two of their links divides by nothing, and says nothing of whether they can be joined."""
+    with pytest.raises(NoAnswer) as refused:
+        planar.solve(files.from_dict(random_linkage(2991, 8).value))
+    assert refused.value.outcome is Outcome.TOO_FEW_INPUTS
+
+
+@pytest.mark.parametrize(("seed", "links", "higher"), [(2815, 7, 0.3), (92, 9, 0.5)])
+def test_slides_that_go_out_without_an_end_meet_no_dead_point_there(seed, links, higher):
+    mechanism = files.from_dict(random_linkage(seed, links, 0.0, higher).value)
+    first = mechanism.inputs[0]
+    motion = planar.cycle(mechanism, 30, first.position, first.position + 0.6, pair=first.pair)
+    assert motion.outcome is Outcome.BRANCH_LOST
+    assert "slide out without an end" in motion.reason
+
+
+def test_a_last_row_without_rates_does_not_take_those_of_the_others():
+    mechanism = files.from_dict(random_linkage(2650, 5, 0.0, 0.5).value)
+    start = mechanism.inputs[0].position
+    motion = planar.cycle(mechanism, 30, start, start + 0.6)
+    assert motion.outcome is Outcome.BRANCH_LOST
+    rates = next(iter(motion.points.values())).velocity
+    assert np.isfinite(rates[:-1]).all()

@@ -29,7 +29,7 @@ from planar.model.mechanism import (
 )
 from planar.results.motion import Motion
 from planar.solving.cycle import cycle
-from planar.solving.position import solved_mechanism
+from planar.solving.position import PositionSolver, solved_mechanism
 from planar.solving.prepared_mechanism import PreparedMechanism
 
 END_MARGIN = 1e-6
@@ -214,7 +214,7 @@ class Circuits(Displayable, Sequence[Circuit]):
 
     def of(self, mode: Mode) -> tuple[Circuit, Branch] | None:
         """The circuit and the branch on which an assembly lies, at any position of the input."""
-        solver = solved_mechanism(mode.mechanism).solver
+        solver = PositionSolver(mode.mechanism)
         unknowns = mode.z * solver.scale[list(solver.equations.unknowns)]
         position = next(given.position for given in mode.mechanism.inputs if given.pair == self.pair)
         for each in self._found:

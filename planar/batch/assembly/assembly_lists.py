@@ -17,7 +17,7 @@ from planar.equations.linear import solve_vectors
 from planar.equations.symbolic_equations import Block, slice_length
 from planar.foundation.errors import BadInput, NoAnswer
 from planar.model.link_shapes import PointPlacementError
-from planar.solving.assembly.block_assemblies import MEETING_COSINE_SQUARED
+from planar.solving.assembly.block_assemblies import MEETING_COSINE_SQUARED, is_out_of_reach
 from planar.solving.newton import CLOSED_TOLERANCE
 
 Array = np.ndarray
@@ -90,7 +90,7 @@ def _list_dyads(reference: ReferenceDesign, p: Array, u: Array, fit: Array) -> t
         if way is not None and not isinstance(way, bool):
             both, left, bend = way.of_designs(z.T, own_u, own_p)
             joins = (bend < MEETING_COSINE_SQUARED) & (left <= CLOSED_TOLERANCE)
-            decided[design[~(joins | (bend > 2.0 - MEETING_COSINE_SQUARED))]] = False
+            decided[design[~(joins | is_out_of_reach(bend))]] = False
             z, design = np.repeat(z[:, joins], 2, axis=1), np.repeat(design[joins], 2)
             z[block.unknowns] = both[:, joins].transpose(2, 1, 0).reshape(slice_length(block.unknowns), -1)
         elif slice_length(block.unknowns):

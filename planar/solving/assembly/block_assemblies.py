@@ -14,6 +14,7 @@ from planar.equations.symbolic_equations import Block, slice_length
 from planar.foundation.angles import distances, wrap_angle
 from planar.foundation.arrays import Array
 from planar.foundation.geometry import Vector
+from planar.foundation.jets import Scalar
 from planar.model.pairs import MeasureKind
 from planar.solving.assembly.sketch_start import turn_between
 from planar.solving.newton import CLOSED_TOLERANCE, NewtonResult, ResidualFunction, damped_newton, polish_root
@@ -59,6 +60,12 @@ class BlockAssembly(NamedTuple):
     slides_behind: int
     height: float
     slides_ahead: float
+
+
+def is_out_of_reach(coalescence: Scalar) -> Scalar:
+    """Whether a block surely has no assembly, by how near the two of its closed form are to where they meet. Infinity
+    says that the form divides by nothing: what holds the block is not known then."""
+    return (coalescence > 2.0 - MEETING_COSINE_SQUARED) & (coalescence < np.inf)
 
 
 class BlockAssemblies:
@@ -170,7 +177,7 @@ class BlockAssemblies:
         if function is None:
             return None
         found, left, bend = function(z, self.u, self.p)
-        if bend > 2.0 - MEETING_COSINE_SQUARED:
+        if is_out_of_reach(bend):
             return []
         # what is not a number is not below anything
         if not (bend < MEETING_COSINE_SQUARED and left <= CLOSED_TOLERANCE):

@@ -11,7 +11,7 @@ import numpy as np
 from planar.equations.coordinates import frames_from_coordinates
 from planar.foundation.arrays import Array
 from planar.foundation.errors import TrackingEnd
-from planar.foundation.root_finding import find_root, lowest_on_cubic
+from planar.foundation.root_finding import find_root, find_root_by_slope, lowest_on_cubic
 from planar.model.pairs import MeasureKind, Pair
 from planar.results.records import Limit
 from planar.solving.continuation.change_point_remarks import change_point_remark
@@ -232,14 +232,15 @@ def limits_along(  # long: one kind of limit after the other
     for piece in parts:
         arc = piece.arc
         if before is None or arc.is_exact:
-            before = watched.piece_end(curve, arc.point_at(curve, piece.first))
+            before = watched.piece_end(curve, arc.point_at(curve, piece.first, False))
         after = watched.piece_end(
-            curve, piece.dead_point or (arc.after if piece.last == arc.ends[1] else arc.point_at(curve, piece.last))
+            curve,
+            piece.dead_point or (arc.after if piece.last == arc.ends[1] else arc.point_at(curve, piece.last, False)),
         )
         for k, output in enumerate(watched.pairs):
             still = STANDING_RATE * (setup.unit if output.input_kind is MeasureKind.LENGTH else 1.0)
             for x in _output_turning_points(watched, curve, piece, (before, after), k, still):
-                point = arc.point_at(curve, x)
+                point = arc.point_at(curve, x, False)
                 yield noted("stroke end", output.name, point, float(watched.output_rates_at(curve, point, k)[0]))
         for each in bifurcations_until(tracker, last)[passed:]:
             if not (each.passed.is_start or np.array_equal(each.passed.bifurcation.y, arc.after.y)):
@@ -274,8 +275,10 @@ def _output_turning_points(
     (_, g0, s0), (_, g1, s1) = (end.output_rates[k] for end in ends)
     sense = 1.0 if piece.last > piece.first else -1.0
 
-    def rate(x: float) -> float:
-        return float(watched.output_rates_at(curve, arc.point_at(curve, x), k)[1])
+    def rate_and_slope(x: float) -> tuple[float, float]:
+        point = arc.point_at(curve, x, False)
+        _, rate, second = watched.output_rates_at(curve, point, k)
+        return float(rate), float(second / (arc.axis @ point.tangent))
 
     if max(abs(g0), abs(g1)) < still:
         return
@@ -289,15 +292,16 @@ def _output_turning_points(
     g0 = none * s0 if abs(g0) < none and is_dead_point(ends[0].point) else g0
     g1 = -none * s1 if abs(g1) < none and is_dead_point(ends[1].point) else g1
     if g0 * g1 < 0.0:
-        yield find_root(rate, piece.first, piece.last)
+        yield find_root_by_slope(rate_and_slope, (piece.first, piece.last), (g0, g1))
     elif g0 * s0 < 0.0 < g1 * s1 and g0 * g1 > 0.0:
         # both ends go one way, but the output may have gone back in between
         gone, up = abs(piece.last - piece.first), float(np.sign(g0))
         least, part = lowest_on_cubic((up * g0, up * s0 * gone), (up * g1, up * s1 * gone))
         middle = piece.first + sense * part * gone
-        if least < 0.0 and up * rate(middle) < -still:
-            yield find_root(rate, piece.first, middle)
-            yield find_root(rate, middle, piece.last)
+        turned = rate_and_slope(middle)[0] if least < 0.0 else 0.0
+        if up * turned < -still:
+            yield find_root_by_slope(rate_and_slope, (piece.first, middle), (g0, turned))
+            yield find_root_by_slope(rate_and_slope, (middle, piece.last), (turned, g1))
 
 
 def _name_stroke_ends(

@@ -50,6 +50,8 @@ MAX_ARCS = 5_000
 """Arcs that are walked for one answer; a turn of a usual linkage has some fifty."""
 NEAR_SLIDE_EXTENT = 4.0
 """Lengths of the size: where a slide is farther out than this, steps along it grow with how far it is."""
+MAX_TURNING_EXTENT = 1e5
+"""Sizes: where slides are farther out, inputs turn back by rounding alone."""
 SHOWN_SLIDE_EXTENT = 100.0
 """Lengths of the size, or times the greatest number of a pair: so far out a slide is shown that goes out without an
 end."""
@@ -197,6 +199,9 @@ class CurveTracker:
                 self._last_search_distance = np.inf
             out = self._slide_extent(here.y)
             after = None if out > farthest else self._next_point()
+            if after is not None and out > MAX_TURNING_EXTENT and here.input_rate * after.input_rate <= 0.0:
+                self.limit, self.ending = float(here.y[-1]), TrackingEnd.ENDLESS
+                return
             if after is None:
                 self.limit = (
                     _input_limit(here, int(np.argmax(np.abs(here.y[:-1]) * self._is_length)))

@@ -95,11 +95,12 @@ class ImplicitCurve:
         change: Array = self.jacobian(y + DIFFERENCE_STEP * direction) @ direction - self.jacobian(y) @ direction
         return change / DIFFERENCE_STEP
 
-    def point_at(self, y: Array, towards: Array) -> CurvePoint:
-        """The point at y, its tangent less than a right angle from a direction."""
+    def point_at(self, y: Array, towards: Array, with_distance: bool = True) -> CurvePoint:
+        """The point at y, its tangent less than a right angle from a direction; its regular distance is not a number
+        where it is not asked for."""
         slope = self.jacobian(y)
         if isinstance(slope, SparseMatrices):
-            point = self._sparse_point_at(y, towards, slope)
+            point = self._sparse_point_at(y, towards, slope, with_distance)
             if point is not None:
                 return point
             slope = np.asarray(slope)
@@ -113,7 +114,8 @@ class ImplicitCurve:
                 tangent /= size
                 system[many] = tangent
                 bend = _solve_shortest(system, append_number(-self.second_derivative(y, tangent), 0.0))
-                return CurvePoint(y, tangent, bend, self._regular_distance(y, tangent, slope, least))
+                distance = self._regular_distance(y, tangent, slope, least) if with_distance else np.nan
+                return CurvePoint(y, tangent, bend, distance)
         u, s, vt = np.linalg.svd(slope)
         tangent = vt[many] if vt[many] @ towards >= 0.0 else -vt[many]
         kept = s[:many] > ZERO_SINGULAR_VALUE * max(s[0], 1.0) if many else np.zeros(0, dtype=bool)
@@ -121,7 +123,9 @@ class ImplicitCurve:
         bend = -vt[:many].T @ np.where(kept, along / np.where(kept, s[:many], 1.0), 0.0)
         return CurvePoint(y, tangent, bend, self._regular_distance(y, tangent, slope, least))
 
-    def _sparse_point_at(self, y: Array, towards: Array, slope: SparseMatrices) -> CurvePoint | None:
+    def _sparse_point_at(
+        self, y: Array, towards: Array, slope: SparseMatrices, with_distance: bool
+    ) -> CurvePoint | None:
         """The same of many unknowns; None where all singular values have to be looked at."""
         try:
             bordered = BorderedJacobian(slope, towards)
@@ -133,7 +137,8 @@ class ImplicitCurve:
             return None
         tangent = bordered.tangent
         bend = bordered.step(-self.second_derivative(y, tangent), tangent)
-        return CurvePoint(y, tangent, bend, self._sparse_regular_distance(y, bordered, sizes, least))
+        distance = self._sparse_regular_distance(y, bordered, sizes, least) if with_distance else np.nan
+        return CurvePoint(y, tangent, bend, distance)
 
     def _sparse_regular_distance(self, y: Array, bordered: BorderedJacobian, sizes: Array, least: float) -> float:
         """The same as `_regular_distance`."""
@@ -346,11 +351,11 @@ class Arc(NamedTuple):
         found = curve.correct(rough, self.axis)
         return rough if found is None else found
 
-    def point_at(self, curve: SolutionCurve, x: float) -> CurvePoint:
-        """The point of the curve so far along the axis, with its tangent."""
+    def point_at(self, curve: SolutionCurve, x: float, with_distance: bool = True) -> CurvePoint:
+        """The point of the curve so far along the axis, with its tangent; see `ImplicitCurve.point_at`."""
         y = self.curve_coordinates(curve, x)
         if not self.is_exact:
-            return curve.point_at(y, self.before.tangent)
+            return curve.point_at(y, self.before.tangent, with_distance)
         first, second = self.polynomial(x, 1), self.polynomial(x, 2)
         speed = float(np.linalg.norm(first))
         tangent = first / speed

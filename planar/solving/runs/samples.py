@@ -145,7 +145,7 @@ def build_motion(
         parts, residual = list(told.coordinate_rates.transpose(1, 0, 2)), told.residual
     elif told is not None:
         rest = np.flatnonzero(~told.is_sure)
-        looked_at, residual, remarks = _checked_rates(solver, run.select(rest), with_jerk)
+        looked_at, residual, remarks = _checked_rates(solver, run.select(rest), with_jerk, bool(told.is_sure.any()))
         whole = told.coordinate_rates.copy()
         whole[rest] = np.stack(looked_at, axis=1)
         parts, residual = list(whole.transpose(1, 0, 2)), max(residual, told.residual)
@@ -200,8 +200,9 @@ class _CheckedRates(NamedTuple):
     remarks: tuple[str, ...] = ()
 
 
-def _checked_rates(solver: PositionSolver, run: RunSamples, with_jerk: bool) -> _CheckedRates:
-    """Rows by the general path; rates that cannot be believed are not numbers, unless none can: then NoAnswer."""
+def _checked_rates(solver: PositionSolver, run: RunSamples, with_jerk: bool, is_part: bool = False) -> _CheckedRates:
+    """Rows by the general path; rates that cannot be believed are not numbers, unless none can: then NoAnswer. The rows
+    may be a part of a run whose other rows have rates."""
     z, given = run.z, run.inputs
     gaps = solver.residuals(z, given.u)
     residual = float(gaps.max(initial=0.0))
@@ -216,7 +217,7 @@ def _checked_rates(solver: PositionSolver, run: RunSamples, with_jerk: bool) -> 
         # where the input turns back, no velocity of the rest goes with one of the input
         part[list(run.dead_points)] = np.nan
     if doubt is not None:
-        remarks += _remove_inexact_rates(solver, given, parts, doubt)
+        remarks += _remove_inexact_rates(solver, given, parts, doubt, is_part)
     frames, own = lazy_frames(solver, parts[:3])
     determined = ~np.isnan(parts[1]).any(axis=1) if parts[1].size else np.ones(len(z), dtype=bool)
     inputs = [_input_motion(solver, given, index) for index in range(len(solver.mechanism.inputs))]
@@ -228,7 +229,7 @@ def _checked_rates(solver: PositionSolver, run: RunSamples, with_jerk: bool) -> 
             continue
         row = int(np.argmax(of_rows))
         at = f"at {solver.describe_inputs(given.u[row])}"
-        if wrong[determined].all():
+        if wrong[determined].all() and not is_part:
             raise refusals.broken_rates(solver, what, pair, float(of_rows[row]), at)
         for part in parts[1:]:
             part[wrong] = np.nan
@@ -256,7 +257,7 @@ def _undetermined_remark(solver: PositionSolver, run: RunSamples, w1: Array) -> 
 
 
 def _remove_inexact_rates(
-    solver: PositionSolver, given: InputRates, parts: list[Array], doubt: AccuracyDoubts
+    solver: PositionSolver, given: InputRates, parts: list[Array], doubt: AccuracyDoubts, is_part: bool
 ) -> tuple[str, ...]:
     """What to say of rows of which rounding leaves few digits; the rates of those with too few taken away.
 
@@ -267,7 +268,8 @@ def _remove_inexact_rates(
         worst = int(np.argmax(np.where(lost, np.nan_to_num(doubt.errors.greatest, nan=np.inf), 0.0)))
         places = ~(doubt.errors.position <= MAX_RATE_ERROR)
         some = doubt.rows[lost]
-        if places.any() or len(some) == int((~np.isnan(parts[1]).any(axis=1)).sum()):
+        rows_with_rates = int((~np.isnan(parts[1]).any(axis=1)).sum())
+        if places.any() or (len(some) == rows_with_rates and not is_part):
             k = int(np.argmax(places)) if places.any() else worst
             raise doubt.refusal(solver, k, f"at {solver.describe_inputs(given.u[doubt.rows[k]])}")
         for part in parts[1:]:
