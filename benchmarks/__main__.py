@@ -15,7 +15,7 @@ from benchmarks.comparison import compare
 from benchmarks.compiling import compilings
 from benchmarks.contests import contests
 from benchmarks.curves import against_designs, against_links
-from benchmarks.growth import FAR, LINKS, grow, grow_far
+from benchmarks.growth import growths
 from benchmarks.imports import costs
 from benchmarks.linkages import LINKAGES, Linkage
 from benchmarks.long import long
@@ -43,8 +43,7 @@ def main() -> None:
         DESIGNS: against_designs,
         ROW: against_links,
         **{linkage.name: _compare(linkage) for linkage in LINKAGES},
-        "links": lambda: tables.growth(grow(links) for links in LINKS),
-        "many links": lambda: tables.far(map(grow_far, FAR)),
+        "growth": lambda: tables.growth(growths()),
         LONG: long,
         CODE: compilings,
         COLD: cold_starts,

@@ -1,119 +1,119 @@
-"""How the time of each step of solving grows with the number of links."""
+"""How the time of what users call grows with the number of links, of kinds of linkages that can be of any length.
+
+Each is done in a mechanism of its own, so that nothing is known of it: a first `solve`, a first and a second `cycle`,
+`forces` of a position, `simulate`.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from itertools import pairwise
-from time import perf_counter
-
-import numpy as np
+from functools import partial
+from time import process_time
+from typing import Any
 
 import planar
-from benchmarks import chain
-from benchmarks.comparison import error
-from benchmarks.timing import best
-from benchmarks.ways.trial import CRANK
-from planar.equations.functions import EquationFunctions
-from planar.equations.mechanism_numbers import equation_structure
-from planar.equations.symbolic_equations import build_equations
-from planar.solving.continuation.path import follow_samples
-from planar.solving.position import PositionSolver
-from planar.solving.structure import mechanism_structure
+from benchmarks.long import STRUCTURES
 
-Array = np.ndarray
-
-LINKS = (4, 10, 20, 40)
+LINKS = (10, 100, 1_000)
+MANY_LINKS = 10_000
+"""Only a run goes so far."""
+STEPS = 72
+"""Of a run."""
+SIMULATED_STEPS = 4
+WHEEL_RADIUS = 0.5
 
 
 @dataclass(frozen=True)
 class Growth:
-    """Seconds of each step for one number of links, and the greatest errors of the last rocker (see `error`).
+    """Processor time (s) of a linkage of so many links; None for what was not done.
 
-    `equations`: the mechanism to its equations; `program`: these to the program of a run; `assembly`: the sketch to an
-    assembly; `position`: a known assembly to a gated state with its rates; `run`: a position of a gated run of a turn.
+    A first `solve` and a first `cycle` of it, a second one, `forces` of a position whose structure is known, and a step
+    of `simulate`. `residual` is what the worst constraint of the run leaves open, in sizes.
     """
 
+    kind: str
     links: int
-    equations: float
-    program: float
-    assembly: float
-    position: float
-    position_error: float
-    run: float
-    run_error: float
+    solve: float
+    cycle: float
+    cycle_again: float
+    residual: float
+    forces: float | None = None
+    simulate: float | None = None
+
+    def per_link(self) -> tuple[float | None, ...]:
+        """Seconds a link, and of runs a link and position."""
+        positions = self.links * (STEPS + 1)
+        parts = (self.solve, self.links), (self.cycle, positions), (self.cycle_again, positions)
+        parts += (self.forces, self.links), (self.simulate, self.links)
+        return tuple(None if seconds is None else seconds / by for seconds, by in parts)
 
 
-@dataclass(frozen=True)
-class Far:
-    """Seconds of the steps for many links, each done once."""
-
-    links: int
-    parsing: float
-    equations: float
-    assembly: float
-    position: float
-    run: float
-    inspection: float
-
-
-FAR = (100, 400, 1000)
-"""Numbers of links."""
-FAR_STEPS = 72
-"""Of a run."""
-
-
-def grow_far(links: int) -> Far:
-    """Time a long row of four-bars, once."""
-    taken = [perf_counter()]
-
-    def done() -> None:
-        taken.append(perf_counter())
-
-    mechanism = planar.from_dict(chain.document(links))
-    done()
-    mechanism_structure(mechanism)
-    done()
-    solver = PositionSolver(mechanism)
-    z = solver.find_assembly().z
-    done()
-    solver.state(z)
-    done()
-    planar.cycle(mechanism, FAR_STEPS)
-    done()
-    planar.inspect(mechanism)
-    done()
-    return Far(links, *(after - before for before, after in pairwise(taken)))
+def gear_train(links: int) -> dict[str, Any]:
+    """Wheels of one size in a line, each in mesh with the next, the first of which is driven."""
+    names = [f"w{k}" for k in range(links - 1)]
+    pairs: list[dict[str, Any]] = [{"turning": f"O{k}"} for k in range(links - 1)]
+    pairs += [
+        {"gear": f"g{k}", "links": names[k - 1 : k + 1], "radii": [WHEEL_RADIUS] * 2} for k in range(1, links - 1)
+    ]
+    return {
+        "planar": 1,
+        "units": {"length": "m", "angle": "rad"},
+        "frame": "frame",
+        "links": {
+            "frame": {"points": {f"O{k}": [2.0 * WHEEL_RADIUS * k, 0.0] for k in range(links - 1)}},
+            **{name: {"points": {f"O{k}": [0.0, 0.0]}} for k, name in enumerate(names)},
+        },
+        "pairs": pairs,
+        "inputs": [{"pair": "O0", "position": 0.7, "velocity": 1.0}],
+    }
 
 
-def grow(links: int) -> Growth:
-    """Time a row of four-bars."""
-    mechanism = planar.from_dict(chain.document(links))
-    solver = PositionSolver(mechanism)
-    z, u, p = solver.find_assembly().z, CRANK[:, None], solver.inputs.p
-    steps = len(u) - 1
-    equations = build_equations(equation_structure(mechanism))
-    times = best(
-        {
-            "equations": lambda: build_equations(equation_structure(mechanism)),
-            "program": lambda: EquationFunctions(equations).newton_function,
-            "assembly": solver.find_assembly,
-            "position": lambda: solver.state(z),
-            "run": lambda: follow_samples(solver, p, z, u),
-        }
-    )
-    exact = np.array(chain.motion(np, links, CRANK.astype(np.longdouble)))[..., None]
-    rocker = chain.last_rocker(links)
-    column = solver.column[rocker, "angle"]
-    found = solver.functions.coordinate_function(follow_samples(solver, p, z, u).z.T, u.T, p).full()[column]
-    state = solver.state(z).link(rocker)
-    rates = np.array([state.angle, state.angular_velocity, state.angular_acceleration])
-    return Growth(
-        links=links,
-        equations=times["equations"],
-        program=times["program"],
-        assembly=times["assembly"],
-        position=times["position"],
-        position_error=error(rates[:, None, None], exact[:, :1], [True], exact),
-        run=times["run"] / steps,
-        run_error=error(found[None, :, None], exact[:1], [True], exact),
-    )
+def linkage(kind: str, links: int) -> dict[str, Any]:
+    """The file of a linkage of bars."""
+    pinned = STRUCTURES[kind](links)
+    return planar.to_dict(planar.pinned(pinned.places, pinned.bars, pinned.frame, 0))
+
+
+KINDS: dict[str, Callable[[int], dict[str, Any]]] = {
+    **{kind: partial(linkage, kind) for kind in STRUCTURES},
+    "trains of gears": gear_train,
+}
+
+
+def with_masses(document: dict[str, Any]) -> dict[str, Any]:
+    """Every link with a mass at its first point."""
+    moving = {name: link for name, link in document["links"].items() if name != document["frame"]}
+    at = {name: (link.get("ends") or list(link["points"]))[0] for name, link in moving.items()}
+    return document | {"masses": [{"link": name, "mass": 1.0, "inertia": 0.1, "at": at[name]} for name in moving]}
+
+
+def grow(kind: str, links: int, with_forces: bool = True) -> Growth:
+    """Time one linkage."""
+    mechanism = planar.from_dict(with_masses(KINDS[kind](links)))
+    solved, _ = _time(lambda: planar.solve(mechanism))
+    first, motion = _time(lambda: planar.cycle(mechanism, STEPS))
+    again, _ = _time(lambda: planar.cycle(mechanism, STEPS))
+    forces = simulated = None
+    if with_forces:
+        state = planar.solve(mechanism)
+        planar.forces(state)
+        forces, _ = _time(lambda: planar.forces(state))
+        planar.simulate(mechanism, 1e-3, 1)
+        seconds, _ = _time(lambda: planar.simulate(mechanism, 1e-2, SIMULATED_STEPS))
+        simulated = seconds / SIMULATED_STEPS
+    return Growth(kind, len(mechanism.links), solved, first, again, motion.residual, forces, simulated)
+
+
+def growths() -> Iterator[Growth]:
+    """All kinds, up to many links."""
+    for kind in KINDS:
+        for links in LINKS:
+            yield grow(kind, links)
+        yield grow(kind, MANY_LINKS, with_forces=False)
+
+
+def _time(task: Callable[[], Any]) -> tuple[float, Any]:
+    start = process_time()
+    result = task()
+    return process_time() - start, result

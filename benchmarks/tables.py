@@ -14,7 +14,7 @@ from benchmarks.comparison import Row
 from benchmarks.compiling import Compiling
 from benchmarks.contests import Result
 from benchmarks.curves import Curve
-from benchmarks.growth import Far, Growth
+from benchmarks.growth import Growth
 from benchmarks.imports import Cost
 from benchmarks.long import Long
 from benchmarks.processes import Process
@@ -76,50 +76,27 @@ def curves(title: str, measured: Iterable[Curve]) -> RenderableType:
     return table
 
 
-def far(measured: Iterable[Far]) -> RenderableType:
-    """The steps of solving for many links, each done once."""
-    table = _table(
-        "long rows of four-bars, once each",
-        "links",
-        "file",
-        "equations",
-        "assembly",
-        "a position with rates",
-        "a run of 72 steps",
-        "inspection",
-    )
-    for each in measured:
-        steps = (each.parsing, each.equations, each.assembly, each.position, each.run, each.inspection)
-        table.add_row(str(each.links), *map(time, steps))
-    return table
-
-
 def growth(measured: Iterable[Growth]) -> RenderableType:
-    """Time against the number of links; ratios to the fewest."""
-    measured = tuple(measured)
+    """Processor time a link, of runs a link and position, against the number of links; ratios to the fewest."""
     table = _table(
-        "rows of four-bars: time against the number of links (and its ratio to the first line)",
+        "processor time a link, of runs a link and position (and its ratio to the first line of the kind)",
+        "linkage",
         "links",
-        "equations",
-        "program of a run",
-        "assembly",
-        "a position with rates",
-        "greatest error",
-        "a position of a run",
-        "greatest error",
+        "first solve",
+        "first cycle",
+        "cycle again",
+        "forces",
+        "simulate, a step",
+        "greatest residual",
     )
-    first = measured[0]
+    first: dict[str, tuple[float | None, ...]] = {}
     for each in measured:
-        table.add_row(
-            str(each.links),
-            _step(each.equations, first.equations),
-            _step(each.program, first.program),
-            _step(each.assembly, first.assembly),
-            _step(each.position, first.position),
-            _error(each.position_error),
-            _step(each.run, first.run),
-            _error(each.run_error),
-        )
+        fewest = first.setdefault(each.kind, each.per_link())
+        shown = [
+            "" if seconds is None or least is None else _step(seconds, least)
+            for seconds, least in zip(each.per_link(), fewest, strict=True)
+        ]
+        table.add_row(each.kind, f"{each.links:,}", *shown, _error(each.residual))
     return table
 
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -24,6 +24,11 @@ from planar.foundation.jets import cos, sin
 from planar.foundation.printed_formula import PrintedFunction
 from planar.foundation.recorded_formula import RecordedFormula, elementwise
 
+if TYPE_CHECKING:
+    from scipy.sparse import csr_matrix
+
+MAX_DENSE_SIZE = 60
+"""Unknowns and inputs up to which all entries of their derivatives are written."""
 MAX_KEPT_NUMBERS = 10**6
 """Numbers of an evaluation that is kept."""
 
@@ -53,6 +58,17 @@ class _Combinations(NamedTuple):
         """Set the results in target (..., entries) from x (..., entries)."""
         if len(self.results):
             target[..., self.results] = np.add.reduceat(self.coefficients * x[..., self.sources], self.starts, axis=-1)
+
+    def matrix(self, shape: tuple[int, int]) -> csr_matrix:
+        """The matrix (results, x) of the sums."""
+        rows = np.repeat(self.results, np.diff(self.starts, append=len(self.sources)))
+        return _sparse_matrix(shape, self.coefficients, rows, self.sources)
+
+
+def _sparse_matrix(shape: tuple[int, int], values: Array, rows: IntArray, columns: IntArray) -> csr_matrix:
+    from scipy.sparse import csr_matrix  # few mechanisms are so large
+
+    return csr_matrix((values, (rows, columns)), shape=shape)
 
 
 def _starts(lengths: Iterable[int]) -> IntArray:
@@ -84,6 +100,11 @@ class _Products(NamedTuple):
         if len(self.results):
             products = a[..., self.left] * b[..., self.right]
             target[..., self.results] = np.add.reduceat(products, self.starts, axis=-1)
+
+    def matrix(self, shape: tuple[int, int], a: Array) -> csr_matrix:
+        """The matrix (results, b) of the sums for one sample of a."""
+        rows = np.repeat(self.results, np.diff(self.starts, append=len(self.left)))
+        return _sparse_matrix(shape, a[self.left], rows, self.right)
 
 
 def _products(terms: Sequence[tuple[int, Sequence[tuple[int, int]]]]) -> _Products:
@@ -379,11 +400,50 @@ class AssembledEquations:
             evaluation.jacobian_entries = self._jacobian_plan.entries(evaluation.slopes)
         return evaluation.jacobian_entries
 
-    def coordinate_jacobians(self, z: Array, u: Array, p: Array) -> Array:
-        """The entries of dw/dy by `coordinate_pattern` at samples (samples, entries)."""
+    def derivatives(self, z: Array, u: Array, p: Array) -> list[Array | csr_matrix]:
+        """dF/dy, and below it dw/dy (rows and coordinates, y), at each sample: what is asked once of a structure, so
+        that no plan of entries is made for it."""
         slopes = self._evaluate(z, u, p, True).slopes
         assert slopes is not None
-        return self._coordinate_plan.entries(slopes)
+        return [self._derivatives_at(each) for each in slopes]
+
+    def _derivatives_at(self, slopes: Array) -> Array | csr_matrix:
+        y_count, states, rests = self._y_count, self._state_count, self._rest_count
+        if y_count <= MAX_DENSE_SIZE:
+            rates = self._rates(slopes[None], np.eye(y_count), None)[0]
+            sums = (self._all_residuals, self._row_count), (self._all_coordinates, self._coordinate_count)
+            return np.hstack([self._sums(combinations, rates, count) for combinations, count in sums]).T
+        of_x = states, y_count + rests
+        inputs = range(self._coordinate_count, states)
+        start = _combinations((column, self._state_sums[column]) for column in (*self._start_columns, *inputs))
+        of_states = start.matrix(of_x)[:, :y_count]
+        nowhere = np.zeros(0, dtype=int)
+        of_rests = _sparse_matrix((rests, y_count), np.zeros(0), nowhere, nowhere)
+        for stage in self._stages:
+            of_rests = of_rests + stage.rest_rates.matrix((rests, states), slopes) @ of_states
+            sums = stage.coordinates.matrix(of_x)
+            of_states = of_states + sums[:, :y_count] + sums[:, y_count:] @ of_rests
+        wanted = _combinations(enumerate((*self._residual_sums, *self._coordinate_sums)))
+        sums = wanted.matrix((self._row_count + self._coordinate_count, y_count + rests))
+        return sums[:, :y_count] + sums[:, y_count:] @ of_rests
+
+    def _rates(self, slopes: Array, y_rates: Array, bending: Array | None) -> tuple[Array, Array]:
+        """The rates of x and of s for those of y (samples, y); `bending` (samples, rests) is what the rests' second
+        rates owe to first ones."""
+        samples, split = len(y_rates), len(self._unknowns)
+        x_rates: Array = np.zeros((samples, self._y_count + self._rest_count), y_rates.dtype)
+        x_rates[:, : self._y_count] = y_rates
+        state_rates: Array = np.zeros((samples, self._state_count), y_rates.dtype)
+        state_rates[:, self._coordinate_count :] = y_rates[:, split:]
+        self._start_coordinates.set_in(state_rates, x_rates)
+        rest_rates = x_rates[:, self._y_count :]
+        for stage in self._stages:
+            stage.rest_rates.set_in(rest_rates, slopes, state_rates)
+            if bending is not None:
+                rows = stage.rest_rates.results
+                rest_rates[:, rows] += bending[:, rows]
+            stage.coordinates.set_in(state_rates, x_rates)
+        return x_rates, state_rates
 
     def kinematics(self, y: Array, y1: Array, y2: Array, p: Array) -> tuple[Array, Array, Array]:
         """F (samples, 3, rows) and w (samples, 3, coordinates) with their first and second rates, and the entries of
@@ -395,17 +455,7 @@ class AssembledEquations:
         residuals, coordinates = [self._residuals(x)], [self._sums(self._all_coordinates, x, self._coordinate_count)]
         bending: Array = np.zeros((samples, self._rest_count))
         for order, rates in enumerate((y1, y2), 1):
-            x_rates: Array = np.zeros_like(x)
-            x_rates[:, : self._y_count] = rates
-            state_rates: Array = np.zeros((samples, self._state_count))
-            state_rates[:, self._coordinate_count :] = rates[:, split:]
-            self._start_coordinates.set_in(state_rates, x_rates)
-            rest_rates = x_rates[:, self._y_count :]
-            for stage in self._stages:
-                stage.rest_rates.set_in(rest_rates, slopes, state_rates)
-                rows = stage.rest_rates.results
-                rest_rates[:, rows] += bending[:, rows]
-                stage.coordinates.set_in(state_rates, x_rates)
+            x_rates, state_rates = self._rates(slopes, rates, bending if order == 2 else None)
             residuals.append(self._sums(self._all_residuals, x_rates, self._row_count))
             coordinates.append(self._sums(self._all_coordinates, x_rates, self._coordinate_count))
             if order == 1:
@@ -421,11 +471,6 @@ class AssembledEquations:
     def pattern(self) -> SparsePattern:
         """Where the entries of dF/dy stand."""
         return self._jacobian_plan.pattern
-
-    @property
-    def coordinate_pattern(self) -> SparsePattern:
-        """Where the entries of dw/dy stand."""
-        return self._coordinate_plan.pattern
 
     @cached_property
     def _rest_plan(self) -> _RestPlan:
@@ -481,10 +526,11 @@ class AssembledEquations:
                     parts[entry] = parts.get(entry, 0.0) + value
         return constant, varying
 
-    def _plan(self, all_sums: Sequence[Mapping[int, float]]) -> _JacobianPlan:
+    @cached_property
+    def _jacobian_plan(self) -> _JacobianPlan:
         plan = self._rest_plan
         entries: list[tuple[int, int, float, dict[int, float]]] = []
-        for row, sums in enumerate(all_sums):
+        for row, sums in enumerate(self._residual_sums):
             constant, varying = self._expand(sums, plan.rest_entries)
             entries += [
                 (column, row, constant.get(column, 0.0), varying.get(column, {})) for column in {**constant, **varying}
@@ -493,19 +539,11 @@ class AssembledEquations:
         columns = np.array([entry[0] for entry in entries], dtype=int)
         first = np.searchsorted(columns, np.arange(self._y_count + 1))
         pattern = SparsePattern(
-            (len(all_sums), self._y_count), np.array([entry[1] for entry in entries], dtype=np.int32), first
+            (len(self._residual_sums), self._y_count), np.array([entry[1] for entry in entries], dtype=np.int32), first
         )
         return _JacobianPlan(
             pattern, np.array([entry[2] for entry in entries]), _combinations(enumerate(e[3] for e in entries)), plan
         )
-
-    @cached_property
-    def _jacobian_plan(self) -> _JacobianPlan:
-        return self._plan(self._residual_sums)
-
-    @cached_property
-    def _coordinate_plan(self) -> _JacobianPlan:
-        return self._plan(self._coordinate_sums)
 
 
 class _RestPlan(NamedTuple):

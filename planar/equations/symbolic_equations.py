@@ -313,15 +313,13 @@ def _assembled_equations_of(structure: _EliminatedStructure) -> ConstraintEquati
     )
     ends = np.cumsum([unknown_count, elimination.input_count, elimination.number_count])
     z, u, p = np.split(generic_numbers(2, int(ends[-1])), ends[:2], axis=1)
-    residual_entries = assembled.residuals_and_jacobians(z, u, p).entries
-    moved: list[set[int]] = []
-    for pattern, entries in (
-        (assembled.pattern, residual_entries),
-        (assembled.coordinate_pattern, assembled.coordinate_jacobians(z, u, p)),
-    ):
-        count = pattern.first[unknown_count]
-        places = pattern.rows[:count].tolist(), pattern.columns[:count].tolist()
-        moved += _moving_columns(pattern.shape[0], *places, entries[:, :count])
+    with np.errstate(all="ignore"):
+        one, other = (abs(each[:, :unknown_count]) for each in assembled.derivatives(z, u, p))
+        # what grew beyond all numbers, along a long train of wheels, is more than rounding
+        sizes = one + other
+        rows, columns = sizes.nonzero()
+        entries = np.asarray(sizes[rows, columns]).ravel()
+    moved = _moving_columns(sizes.shape[0], rows.tolist(), columns.tolist(), entries[None])
 
     def make_expressions() -> ConstraintExpressions:
         return _without_idle_unknowns(_expressions_of(structure, {}), moved)
@@ -523,7 +521,7 @@ def _moving_unknowns(expressions: ConstraintExpressions) -> list[set[int]]:
 def _moving_columns(row_count: int, rows: Sequence[int], columns: Sequence[int], entries: Array) -> list[set[int]]:
     """For every row the columns whose entries (places, entries) are more than rounding at random places."""
     moving: list[set[int]] = [set() for _ in range(row_count)]
-    is_moving = np.abs(entries).sum(axis=0) > MIN_MOVING_SLOPE
+    is_moving = ~(np.abs(entries).sum(axis=0) <= MIN_MOVING_SLOPE)
     for row, column, is_one in zip(rows, columns, is_moving.tolist(), strict=True):
         if is_one:
             moving[row].add(column)

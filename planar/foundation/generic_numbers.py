@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import log
 from random import Random  # numpy's takes longer to load than a small mechanism to solve
 
 import numpy as np
@@ -12,6 +13,8 @@ LEAST, GREATEST = 0.5, 2.0
 
 
 def generic_numbers(*shape: int, seed: int = 0) -> Array:
-    """Numbers about one, spread at random."""
+    """Numbers about one, spread at random, of which products are about one as well."""
     draw = Random(seed).uniform
-    return np.array([draw(LEAST, GREATEST) for _ in range(int(np.prod(shape)))], dtype=float).reshape(shape)
+    powers = [draw(log(LEAST), log(GREATEST)) for _ in range(int(np.prod(shape)))]
+    numbers: Array = np.exp(np.array(powers, dtype=float))
+    return numbers.reshape(shape)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import planar
+from planar.equations import assembled_equations
 from planar.equations.functions import EquationFunctions
 from planar.equations.mechanism_numbers import equation_structure
 from planar.equations.sparse_matrices import SparseMatrices
@@ -48,7 +49,7 @@ def test_every_pair_type_is_in_a_model_that_is_compared():
 
 
 @pytest.mark.parametrize("stem", COMPARED)
-def test_elements_say_what_expressions_of_the_whole_say(stem):
+def test_elements_say_what_expressions_of_the_whole_say(stem, monkeypatch):
     equations = equations_of(stem)
     assembled, compiled = equations.assembled, of_expressions(equations)
     z, u, p = random_place(equations, 3)
@@ -64,8 +65,12 @@ def test_elements_say_what_expressions_of_the_whole_say(stem):
     np.testing.assert_allclose(jacobian, both, rtol=1e-10, atol=1e-10)
     np.testing.assert_array_equal(assembled.residuals_and_jacobians(z, u, p).entries, entries)
     slope = ca.Function("slope", [equations.z, equations.u, equations.p], [ca.jacobian(equations.w, equations.y)])
-    moved = np.asarray(SparseMatrices(assembled.coordinate_pattern, assembled.coordinate_jacobians(z, u, p)))
-    np.testing.assert_allclose(moved[1], slope(z[1], u[1], p).full(), rtol=1e-10, atol=1e-10)
+    moved = slope(z[1], u[1], p).full()
+    for limit in (0, 10**6):  # by sparse matrices, and by dense ones
+        monkeypatch.setattr(assembled_equations, "MAX_DENSE_SIZE", limit)
+        derivative = assembled.derivatives(z, u, p)[1]
+        found = derivative if limit else derivative.toarray()
+        np.testing.assert_allclose(found, np.vstack([both[1], moved]), rtol=1e-10, atol=1e-10)
     np.testing.assert_allclose(assembled.coordinates(z, u, p), coordinates[:, 0], rtol=1e-12)
     assert assembled.kinematics(y[:0], y1[:0], y2[:0], p)[0].shape == (0, 3, len(equations.rows))
 
