@@ -19,6 +19,7 @@ from planar.dynamics.sparse_equilibrium import (
 )
 from planar.equations.sparse_matrices import MAX_DENSE_UNKNOWNS, SparseMatrices
 from planar.foundation.arrays import Array
+from planar.foundation.time_limit import all_within_time
 
 
 class Equilibrium:
@@ -93,4 +94,4 @@ class Equilibrium:
     def _systems(self) -> list[SparseSystem | DenseSystem]:
         """The equations of every position, where the matrix is sparse."""
         assert isinstance(self.matrix, SparseMatrices)
-        return [sparse_system(self.matrix[k]) for k in range(len(self.matrix))]
+        return [sparse_system(self.matrix[k]) for k in all_within_time(range(len(self.matrix)), "positions")]

@@ -41,6 +41,7 @@ from planar.foundation.arrays import Array, IntArray
 from planar.foundation.errors import BadInput, NoAnswer, Outcome
 from planar.foundation.notebook_display import Displayable
 from planar.foundation.short_repr import short_repr
+from planar.foundation.time_limit import stop_if_over, stops_in_time
 from planar.model.mechanism import Mechanism
 from planar.results.motion import Motion, State
 
@@ -187,7 +188,14 @@ class Forces(Displayable):
 
 
 @takes_result("State", "Motion")
-def forces(moving: State | Motion, inertia: bool = True, friction: bool = True) -> Forces:
+@stops_in_time
+def forces(
+    moving: State | Motion,
+    inertia: bool = True,
+    friction: bool = True,
+    *,
+    timeout: float | None = None,  # noqa: ARG001 - of the decorator
+) -> Forces:
     """What inputs and pairs must supply against loads, weights, springs, friction and the links' inertia.
 
     A position has its own rates, and of loads that vary with time those at t = 0. `inertia=False` leaves it out:
@@ -195,12 +203,13 @@ def forces(moving: State | Motion, inertia: bool = True, friction: bool = True) 
     where the links are held more than once, what rigid bodies do not tell is NaN and named. Raises BadInput where a
     load, spring or mass is none of this mechanism's; NoAnswer where there are more inputs than freedoms, where no
     forces in the pairs balance the links, as at a dead point, and where friction jams it (of a motion such rows are
-    NaN).
+    NaN); and after `timeout` s, or a Ctrl-C, with the outcome "interrupted".
 
     >>> import planar
     >>> list(planar.forces(planar.solve(planar.load("four-bar"))).reactions)
     ['A', 'B', 'C', 'D']
     """
+    stop_if_over("before any forces were found")
     mechanism = moving.mechanism
     check_loads(mechanism)
     state = moving if isinstance(moving, State) else None

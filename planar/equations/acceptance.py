@@ -182,7 +182,7 @@ class AcceptanceFunctions:
         of_angles = np.stack([0.0 * size + 1.0, size])
         result: AcceptanceResult[Array] = AcceptanceResult(
             greatest_entries(np.concatenate([np.abs(motion.open_rows), closed.residual[None]])),
-            coordinates.sum(axis=(0, 1)) + motion.open_rows.sum(axis=0) + (regularity + least).sum(axis=0),
+            coordinates.sum(axis=(0, 1)) + closed.finite_sum + (regularity + least).sum(axis=0),
             closed.velocity_error,
             closed.acceleration_error,
             closed.contact_gap,

@@ -34,6 +34,7 @@ class ConstraintJudgement(NamedTuple):
     """What is judged at samples (samples,): see `AcceptanceResult`."""
 
     residual: Array
+    finite_sum: Array
     velocity_error: Array
     acceleration_error: Array
     contact_gap: Array
@@ -102,6 +103,7 @@ class ConstraintCheck:
         return self._judgement(rows, gaps, motion, frames)
 
     def _judgement(self, rows: Array, gaps: list[Array], motion: Array, frames: Array) -> ConstraintJudgement:
+        finite_sum = rows[:ORDERS].sum(axis=(0, 1))
         left = rows[0]
         left[self._angles] = closing_error(left[self._angles], MeasureKind.ANGLE)
         counted = np.concatenate([np.abs(frames[0, 4]), np.abs(motion[0, self._own])])
@@ -119,7 +121,7 @@ class ConstraintCheck:
             of_arcs = greatest_entries(np.concatenate([coordinates[2], frames[1, 4] * frames[1, 4]]))
             scales = np.stack([0.0 * residual + 1.0, _nonzero(greatest), _nonzero(of_arcs)])
             contact = greatest_entries(np.concatenate([np.abs(gap) / scales for gap in gaps]))
-        return ConstraintJudgement(residual, velocity, acceleration, contact)
+        return ConstraintJudgement(residual, finite_sum, velocity, acceleration, contact)
 
 
 def _nonzero(scale: Array) -> Array:

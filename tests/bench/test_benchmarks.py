@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import planar
-from benchmarks import by_planar, compiling, dyadic, long, peers, speed_page
+from benchmarks import by_planar, compiling, dyadic, growth, long, peers, speed_page
 from benchmarks.contests import Contest, Result
 from benchmarks.curves import Curve
 from benchmarks.limit import LANES, compiled
@@ -254,3 +254,11 @@ def test_the_page_on_speed_has_the_other_tables_too():
     assert "| triads | 5 ns | not waited for | 0e+00 |" in text
     assert "| four-bar | 10 ms | 40 ms | 2 ms |" in text
     assert "| `python -c pass` | 100 ms | 1 |" in text
+
+
+@pytest.mark.parametrize("kind", growth.KINDS)
+def test_linkages_of_any_length_are_solved_and_run(kind):
+    measured = growth.grow(kind, 10)
+    assert measured.links == 10
+    assert 0.0 <= measured.residual < 1e-13
+    assert all(seconds is not None and seconds > 0.0 for seconds in measured.per_link())

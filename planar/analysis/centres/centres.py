@@ -36,6 +36,7 @@ from planar.foundation.arrays import Array, BoolArray
 from planar.foundation.errors import BadInput, Unknown, join_names
 from planar.foundation.notebook_display import Displayable
 from planar.foundation.short_repr import short_repr
+from planar.foundation.time_limit import stop_if_over, stops_in_time
 from planar.model.link_graph import link_numbers, number_separator
 from planar.model.mechanism import Mechanism, check_link_count, named_points
 from planar.results.motion import State
@@ -139,7 +140,13 @@ class Centres(Displayable):
 
 
 @takes_result("State", "Mechanism")
-def centres(position: State | Mechanism, links: str | Sequence[str] = ()) -> Centres:
+@stops_in_time
+def centres(
+    position: State | Mechanism,
+    links: str | Sequence[str] = (),
+    *,
+    timeout: float | None = None,  # noqa: ARG001 - of the decorator
+) -> Centres:
     """Every instantaneous centre of a position, from positions alone: Kennedy's theorem on what the pairs show.
 
     Where no two lines are known, one centre is taken from the linear equations round the loops, and lines serve again;
@@ -147,7 +154,8 @@ def centres(position: State | Mechanism, links: str | Sequence[str] = ()) -> Cen
     position is assembled, so that it may stand where `solve` finds no velocities: on a dead point of its inputs or on
     a change point. `links` chooses: of one link all its centres, of several those between any two of them; the time
     of these grows with the number of links, that of all with its cube. Raises NoAnswer where it cannot be assembled,
-    BadInput for a link that there is not, and for all centres of more than 250 links or some of more than 600.
+    or after `timeout` s, or a Ctrl-C, with the outcome "interrupted"; BadInput for a link that there is not, for all
+    centres of more than 250 links and for some of more than 600.
 
     >>> import planar
     >>> sorted(each.name for each in planar.centres(planar.load("four-bar")))
@@ -285,6 +293,7 @@ class _CentreSearch:
             is_target[first, second] = is_target[second, first] = True
         opening = OpeningPairs(len(self.links), is_target)
         while True:
+            stop_if_over(f"after {len(self.found)} centres")
             opening.add_known(
                 [tuple(place[link] for link in two) for two in islice(self.found, opening.known_count, None)]
             )

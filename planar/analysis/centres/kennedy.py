@@ -17,6 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planar.foundation.arrays import Array
+from planar.foundation.time_limit import stop_if_over
 
 ROUNDING = 1e-15
 """How exact a centre is that a pair shows."""
@@ -131,6 +132,7 @@ class KennedyConstruction:
             _, number, error = heappop(self._heap)
             if not self._open[number] or error > self._least_error(number):
                 continue  # found since, or bettered
+            stop_if_over(f"after {len(self.found)} centres")
             self.add_centre(self._pairs[number], self._best_centre(number))
 
     def count_lines(self, two: LinkPair) -> int:

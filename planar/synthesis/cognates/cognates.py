@@ -16,6 +16,7 @@ from planar.document.writer import write_mechanism
 from planar.foundation.angles import wrap_angle
 from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput, NoAnswer, Outcome, PlanarError
+from planar.foundation.time_limit import all_within_time, stop_if_over, stops_in_time
 from planar.model.mechanism import Drive, Input, Mechanism, named_points, relative_motions, replace_inputs
 from planar.model.pairs import MeasureKind, Pair
 from planar.model.wording import count_phrase
@@ -267,7 +268,13 @@ class Cognates(Sequence[Cognate]):
 
 
 @takes_mechanism
-def cognates(mechanism: Mechanism, point: str) -> Cognates:
+@stops_in_time
+def cognates(
+    mechanism: Mechanism,
+    point: str,
+    *,
+    timeout: float | None = None,  # noqa: ARG001 - of the decorator
+) -> Cognates:
     """The linkages with as many links in which a point traces the path that `point` traces.
 
     Of a four-bar all three of S. Roberts and P. L. Chebyshev, of a slider-crank both, of larger linkages all that come
@@ -277,7 +284,8 @@ def cognates(mechanism: Mechanism, point: str) -> Cognates:
     acceleration it starts in any case.
 
     Raises Unknown for a point that is not there, BadInput where there is no cognate, as of a point on a crank, in a
-    parallelogram, or at a pin of the coupler; and what `planar.solve` and `planar.cycle` raise.
+    parallelogram, or at a pin of the coupler; what `planar.solve` and `planar.cycle` raise; and NoAnswer with the
+    outcome "interrupted" after `timeout` s, or a Ctrl-C.
 
     >>> import planar
     >>> found = planar.cognates("four-bar", "E")
@@ -293,7 +301,7 @@ def cognates(mechanism: Mechanism, point: str) -> Cognates:
     names = CognateNames(mechanism, posed)
     own = tuple(CognateInput(drive.pair, drive.pair, True, 1.0, False) for drive in mechanism.inputs)
     written = []
-    for number, other in enumerate(others, 1):
+    for number, other in enumerate(all_within_time(others, "cognates"), 1):
         writer = WrittenCognate(state, other, tracer, tracer_point, names.pin_names(other, number))
         written.append(_written(writer, motion, f"{mechanism.name}, cognate {number}", name))
     path: Array = cycle(mechanism, PATH_STEPS, pair=mechanism.inputs[0].pair).point(name).position
@@ -322,6 +330,7 @@ def _search(
     """All linkages that exchanges lead to, and the reasons why there are not more."""
     found, refused = [posed], list[Refusal]()
     for one in found:
+        stop_if_over(f"after {len(found) - 1} cognates")
         changes, reasons = exchanges(one, mechanism, tracer)
         refused += reasons
         for change in changes:
