@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from math import isfinite
-from typing import TYPE_CHECKING, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -50,14 +49,7 @@ def fast_position(setup: PreparedMechanism, z: Array) -> FastPosition | None:
         return None
     s = setup.inputs
     parts, judged = setup.acceptance.position(z, InputSamples(s.u, s.u1, s.u2), setup.acceptance_scales)
-    passed = isfinite(judged.finite_sum) and (
-        judged.residual <= setup.tolerance
-        and max(judged.velocity_error, judged.acceleration_error) <= 1e3 * setup.tolerance
-        and judged.contact_gap <= CONTACT_TOLERANCE
-        and judged.regularity >= MIN_FAST_REGULARITY
-        and EPS * judged.rounding_amplification <= NEGLIGIBLE_ERROR
-    )
-    return FastPosition(parts, judged.residual) if passed else None
+    return FastPosition(parts, judged.residual) if _is_sure(judged, setup.tolerance) else None
 
 
 def is_surely_regular(setup: PreparedMechanism, z: Array) -> bool:
@@ -160,8 +152,8 @@ def fast_run(setup: FastSolver, z: Array, u: Array, u1: Array, u2: Array) -> Fas
             step_ends(functions, settled[1:], u[1:], steps, scales),
         )
     told = judged.result
-    with np.errstate(all="ignore"):
-        fine = (told.residual <= setup.tolerance) & np.isfinite(told.finite_sum)
+    with np.errstate(all="ignore"):  # of what is not finite
+        fine, is_sure = _is_closed(told, setup.tolerance), _is_sure(told, setup.tolerance)
     squares = np.sum(np.diff(u, axis=0) ** 2, axis=1)
     fine[1:] &= keep_branch(np.diff(settled, axis=0), *ends, squares, functions.block_starts)
     if setup.stops is not None:
@@ -170,9 +162,8 @@ def fast_run(setup: FastSolver, z: Array, u: Array, u1: Array, u2: Array) -> Fas
         fine &= setup.stops.sure_rows(setup.stop_positions(settled, u), settled)
         fine[1:] &= np.abs(np.diff(u, axis=0)).max(axis=1, initial=0.0) <= MAX_SURE_MOVE
     many = len(fine) if fine.all() else int(np.argmin(fine))
-    is_sure = _is_sure(told, setup.tolerance)[:many]
     residual = float(told.residual[:many].max(initial=0.0))
-    return FastRun(settled[:many], parts[:many], is_sure, residual)
+    return FastRun(settled[:many], parts[:many], is_sure[:many], residual)
 
 
 class _StraightWay(NamedTuple):
@@ -213,15 +204,22 @@ def _ends_along(functions: AcceptanceFunctions, judged: JudgedPositions, gone: A
         )
 
 
-def _is_sure(told: AcceptanceResult[Array], tolerance: float) -> BoolArray:
-    """Which positions are surely sound with their rates."""
-    with np.errstate(all="ignore"):  # what is not a number is not below anything
-        fine = np.maximum(told.velocity_error, told.acceleration_error) <= 1e3 * tolerance
-        fine &= told.contact_gap <= CONTACT_TOLERANCE
-        fine &= told.regularity >= MIN_FAST_REGULARITY
-        fine &= EPS * told.rounding_amplification <= NEGLIGIBLE_ERROR
-        fine &= (told.residual <= tolerance) & np.isfinite(told.finite_sum)
-    return fine
+def _is_sure(told: AcceptanceResult[Any], tolerance: float) -> Any:
+    """Whether a position, or which of many, are surely sound with their rates."""
+    return (
+        _is_closed(told, tolerance)
+        & (told.velocity_error <= 1e3 * tolerance)
+        & (told.acceleration_error <= 1e3 * tolerance)
+        & (told.contact_gap <= CONTACT_TOLERANCE)
+        & (told.regularity >= MIN_FAST_REGULARITY)
+        & (EPS * told.rounding_amplification <= NEGLIGIBLE_ERROR)
+    )
+
+
+def _is_closed(told: AcceptanceResult[Any], tolerance: float) -> Any:
+    """Whether every constraint is closed, and everything a number."""
+    # what is not finite is not equal to itself, less itself
+    return (told.residual <= tolerance) & (told.finite_sum - told.finite_sum == 0.0)
 
 
 class StraightPathCache:
@@ -271,8 +269,8 @@ class StraightPathCache:
         motion = InputSamples(u, np.broadcast_to(axis, u.shape), np.zeros_like(u))
         found, judged = functions.run(z, motion, self.setup.acceptance_scales)
         told, gone = judged.result, np.diff(places)
-        fine = (told.residual <= self.setup.tolerance) & np.isfinite(told.finite_sum)
-        fine &= told.least_singular_value > MIN_SINGULAR_VALUE
+        with np.errstate(all="ignore"):  # of what is not finite
+            fine = _is_closed(told, self.setup.tolerance) & (told.least_singular_value > MIN_SINGULAR_VALUE)
         ends, squares = _ends_along(functions, judged, gone), gone * gone * (axis @ axis)
         ratio = MIN_SINGULAR_DISTANCE_RATIO
         fine[1:] &= keep_branch(np.diff(found, axis=0), *ends, squares, functions.block_starts, ratio)
