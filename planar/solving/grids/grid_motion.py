@@ -22,7 +22,7 @@ def motion_at_inputs(solver: PositionSolver, assembly: Assembly, z: Array, u: Ar
     s = solver.inputs
     rates = (np.broadcast_to(rate, u.shape).copy() for rate in (s.u1, s.u2, np.zeros_like(s.u)))
     run = RunSamples(z, InputRates(u, *rates))
-    return build_motion(solver, assembly, run, False, None)
+    return build_motion(solver, solver.remarks(assembly), run, False, None)
 
 
 def motion_over_input(mechanism: Mechanism, positions: Array) -> Motion:

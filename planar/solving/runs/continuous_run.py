@@ -38,8 +38,8 @@ class ContinuousRun:
     def __init__(self, motion: Motion):
         self.motion = motion
         self.name = motion.running_input
-        known = solved_mechanism(motion.mechanism)
-        self.solver, self.assembly = known.solver, known.assembly
+        self.known = solved_mechanism(motion.mechanism)
+        self.solver = self.known.solver
         self.scale = np.array([_input_scale(self.solver, name) for name in motion.inputs])
         position = motion.inputs[self.name].position
         steps = np.diff(position)
@@ -104,7 +104,7 @@ class ContinuousRun:
         time = None if self.motion.time is None else places
         forks = () if self.motion.course is None else self.motion.course.fork_positions
         path = _PathAtPlaces(frozenset(local), forks, z, self.motion)
-        motion = build_motion(self.solver, self.assembly, run, False, path, time)
+        motion = build_motion(self.solver, self.known.remarks, run, False, path, time)
         if len(motion) < len(places):  # a pair that may stay open does so by too much
             raise NoAnswer(motion.outcome, motion.reason)
         return motion

@@ -112,12 +112,13 @@ class RangeRun(RunningInput):
         ends = (0, *dead) if whole.starts_at_dead_point else tuple(dead[:-1])
         given = self.input_rates(np.array(places), np.array(senses))
         found = RunSamples(np.array(z), given, ends, local, bifurcations_until(walk), tuple(walk.nearby))
-        return build_motion(self.solver, self.assembly, found, self.with_jerk, RangeLimits(self, found, (whole, walk)))
+        limits = RangeLimits(self, found, (whole, walk))
+        return build_motion(self.solver, self.known.remarks, found, self.with_jerk, limits)
 
     def _to_motion(self, found: RunSamples, back: bool) -> Motion:
         if back:
             found = join_runs(found, reverse_run(found)._replace(passed=(), nearby=()))
-        return build_motion(self.solver, self.assembly, found, self.with_jerk, RangeLimits(self, found, None))
+        return build_motion(self.solver, self.known.remarks, found, self.with_jerk, RangeLimits(self, found, None))
 
     def _run(self, steps: int, first: float, last: float) -> RunSamples:
         grid = np.linspace(first, last, steps + 1)

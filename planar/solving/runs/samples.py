@@ -15,7 +15,6 @@ from planar.model.mechanism import Drive, replace_inputs
 from planar.model.wording import count_phrase
 from planar.results.motion import FollowedPath, Motion
 from planar.results.records import InputMotion, ThirdRates
-from planar.solving.assembly.nearest_assembly import Assembly
 from planar.solving.checks.residual_check import MAX_RATE_ERROR
 from planar.solving.continuation.change_point_remarks import change_point_remarks
 from planar.solving.continuation.fast_path import FastSamples, concatenate_samples
@@ -129,13 +128,13 @@ def reverse_run(run: RunSamples) -> RunSamples:
 
 def build_motion(
     solver: PositionSolver,
-    assembly: Assembly,
+    assembly_remarks: tuple[str, ...],
     run: RunSamples,
     with_jerk: bool,
     course: FollowedPath | None,
     time: Array | None = None,
 ) -> Motion:
-    """The motion; raises NoAnswer where the gate does not let it pass."""
+    """The motion, with what there is to say of its assembly; raises NoAnswer where the gate does not let it pass."""
     if solver.equations.open_rows:
         run = _rows_within_misfit(solver, run)
         time = time if time is None else time[: len(run.z)]
@@ -159,7 +158,7 @@ def build_motion(
         outcome=run.outcome,
         reason=run.reason,
         residual=residual,
-        remarks=(*solver.remarks(assembly), *change_point_remarks(solver, run.passed, run.nearby), *remarks),
+        remarks=(*assembly_remarks, *change_point_remarks(solver, run.passed, run.nearby), *remarks),
         frames=frames,
         own=own,
         shapes=solver.shapes,

@@ -28,11 +28,11 @@ class TimeRun:
     """All inputs of a mechanism at once, in time."""
 
     def __init__(self, mechanism: Mechanism, branches: Sequence[int], third: bool):
-        known = solved_mechanism(mechanism)
-        self.solver = known.solver
+        self.known = solved_mechanism(mechanism)
+        self.solver = self.known.solver
         self.branches, self.with_jerk = tuple(branches), third
         self.scale = np.array([self.solver.unit if self.solver.is_sliding(g.pair) else 1.0 for g in mechanism.inputs])
-        self.assembly = known.assembly
+        self.assembly = self.known.assembly
 
     def run(self, steps: int, duration: float | None) -> Motion:
         """The run from the start of the laws to the end of the longest, or for a duration (s)."""
@@ -63,7 +63,7 @@ class TimeRun:
                 fast_samples=sure,
             )
             time = np.append(time, last)
-        return build_motion(self.solver, self.assembly, told, self.with_jerk, _TimeCourse(self, told, time), time)
+        return build_motion(self.solver, self.known.remarks, told, self.with_jerk, _TimeCourse(self, told, time), time)
 
     def _dead_point_time(self, found: FollowedSamples, given: InputRates, time: Array) -> float | None:
         """When a run comes to its dead point (s). Of several inputs that move there at once no time is told: between
