@@ -28,10 +28,10 @@ from planar.foundation.recorded_formula import (
 )
 from planar.model.mechanism import Mechanism
 
-CALLS_BEFORE_FUSING = 40
-"""Calls at one position that take about as long as it takes to make one formula of all blocks and pairs, and print it.
-"""
-MAX_FUSED_BLOCKS = 24
+INSTRUCTIONS_PER_CALL = 8
+"""Instructions of blocks that are made one formula, with the checks of their pairs, and printed in the time that such a
+formula saves in a call at one position."""
+MAX_FUSED_INSTRUCTIONS = 6_000
 
 Judged = TypeVar("Judged")
 """A float of one position, an array of many."""
@@ -121,7 +121,7 @@ class AcceptanceFunctions:
     def position(self, z: Array, given: InputSamples, scales: Scales) -> tuple[Array, AcceptanceResult[float]]:
         """Coordinates with their rates (3, coordinates) at unknowns z (unknowns,), and what is judged of them."""
         self._call_count += 1
-        if self._call_count > CALLS_BEFORE_FUSING and self._can_be_fused:
+        if self._call_count > self._calls_before_fusing:
             values = self._fused_position.values(*(each.tolist() for each in (z, *given, *scales)))
             split = len(values) - len(AcceptanceResult._fields)
             return np.array(values[:split]).reshape(ORDERS, -1), AcceptanceResult(*values[split:])
@@ -193,9 +193,12 @@ class AcceptanceFunctions:
         return JudgedPositions(coordinates.transpose(2, 0, 1), result, distances.T)
 
     @cached_property
-    def _can_be_fused(self) -> bool:
-        are_formulas = all(isinstance(of_type.motion, FormulaFunction) for *_, of_type in self._blocks)
-        return are_formulas and len(self._blocks) <= MAX_FUSED_BLOCKS
+    def _calls_before_fusing(self) -> float:
+        """After how many calls at one position a formula of all blocks and pairs pays."""
+        motions = [of_type.motion for *_, of_type in self._blocks]
+        counts = [len(each.formula.instructions) for each in motions if isinstance(each, FormulaFunction)]
+        can_be_fused = len(counts) == len(motions) and sum(counts) <= MAX_FUSED_INSTRUCTIONS
+        return sum(counts) / INSTRUCTIONS_PER_CALL if can_be_fused else np.inf
 
     @cached_property
     def _fused_position(self) -> FormulaFunction:
