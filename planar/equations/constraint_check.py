@@ -12,7 +12,7 @@ import numpy as np
 from planar.equations.coordinates import FRAME_PARTS, Coordinate, coordinate_columns
 from planar.equations.pair_formulas import PARTS_OF_FRAME, pair_formula
 from planar.equations.residuals import CARRIED_ROUNDING, closing_error
-from planar.equations.stacked_residuals import PairGroup, index_columns, pair_groups
+from planar.equations.stacked_residuals import MAX_STACKED_NUMBERS, PairGroup, index_columns, pair_groups
 from planar.foundation.arrays import Array, IntArray
 from planar.foundation.geometry import GROUND, Frame, frame_term_sizes
 from planar.foundation.jets import Jet, Scalar, TermSizes, cos, sin, term_sizes, value_and_rates
@@ -25,8 +25,6 @@ ORDERS = 3
 """A value, its first and its second rate."""
 RESULTS_OF_ROW = ORDERS + 2
 """What a constraint leaves open with its rates, then the sizes of the terms of the two rates."""
-MAX_STACKED_NUMBERS = 2**14
-"""Numbers (pairs times samples) of an array that is computed with: larger ones are computed in parts."""
 MAX_RECORDED_CHECKS = 1024
 
 
