@@ -100,12 +100,15 @@ class AcceptanceFunctions:
     def __init__(self, structure: Mechanism, functions: EquationFunctions):
         self.structure, self.equations = structure, functions.equations
         e = self.equations
-        placed = list(zip(e.blocks, functions.placed_blocks, strict=True)) if functions.is_square else []
-        placed = [(INPUT_BLOCK, each) for each in place_input_coordinates(e)] + placed
-        self.is_available = (
-            functions.is_square and e.elimination is not None and all(each is not None for _, each in placed)
-        )
-        self._placed: list[tuple[Block, PlacedBlock]] = [(block, each) for block, each in placed if each is not None]
+        blocks = [(INPUT_BLOCK, placed) for placed in place_input_coordinates(e)]
+        if functions.is_square:
+            blocks += zip(e.blocks, functions.placed_blocks, strict=True)
+        self._placed: list[tuple[Block, PlacedBlock]] = [
+            (block, placed) for block, placed in blocks if placed is not None
+        ]
+        self.is_available = functions.is_square and e.elimination is not None and len(self._placed) == len(blocks)
+        self.unknown_columns = np.array(e.unknowns, dtype=int)
+        "the coordinates that are the unknowns"
         self.block_starts = np.array([block.unknowns.start for block in e.blocks], dtype=int)
         self._call_count = 0
 
@@ -122,23 +125,23 @@ class AcceptanceFunctions:
         """Coordinates with their rates (3, coordinates) at unknowns z (unknowns,), and what is judged of them."""
         self._call_count += 1
         if self._call_count > self._calls_before_fusing:
-            values = self._fused_position.values(*(each.tolist() for each in (z, *given, *scales)))
+            values = self._fused_position.values(*(argument.tolist() for argument in (z, *given, *scales)))
             split = len(values) - len(AcceptanceResult._fields)
             return np.array(values[:split]).reshape(ORDERS, -1), AcceptanceResult(*values[split:])
-        judged = self.judge(z[None], InputSamples(*(each[None] for each in given)), scales)
-        return judged.coordinate_rates[0], AcceptanceResult(*(float(each[0]) for each in judged.result))
+        judged = self.judge(z[None], InputSamples(*(rates[None] for rates in given)), scales)
+        return judged.coordinate_rates[0], AcceptanceResult(*(float(values[0]) for values in judged.result))
 
     def judge(self, z: Array, given: InputSamples, scales: Scales) -> JudgedPositions:
         """Judge samples z (samples, unknowns)."""
         with np.errstate(all="ignore"):  # what is not defined is not a number, and is not accepted
-            return self._judge(self._move(np.array([each.T for each in given]), scales, z=z.T), scales)
+            return self._judge(self._move(np.array([rates.T for rates in given]), scales, z=z.T), scales)
 
     def run(self, z: Array, given: InputSamples, scales: Scales) -> tuple[Array, JudgedPositions]:
         """The unknowns at samples of inputs (samples, unknowns), on the branch of z (unknowns,) at the first, and what
         is judged of them."""
         with np.errstate(all="ignore"):
-            motion = self._move(np.array([each.T for each in given]), scales, start=z)
-            return motion.entries[0, list(self.equations.unknowns)].T, self._judge(motion, scales)
+            motion = self._move(np.array([rates.T for rates in given]), scales, start=z)
+            return motion.entries[0, self.unknown_columns].T, self._judge(motion, scales)
 
     def _move(self, u: Array, scales: Scales, z: Array | None = None, start: Array | None = None) -> _BlockMotion:
         """All blocks one after the other, each at all samples: from inputs with their rates (3, inputs, samples), at
@@ -196,7 +199,7 @@ class AcceptanceFunctions:
     def _calls_before_fusing(self) -> float:
         """After how many calls at one position a formula of all blocks and pairs pays."""
         motions = [of_type.motion for *_, of_type in self._blocks]
-        counts = [len(each.formula.instructions) for each in motions if isinstance(each, FormulaFunction)]
+        counts = [len(motion.formula.instructions) for motion in motions if isinstance(motion, FormulaFunction)]
         can_be_fused = len(counts) == len(motions) and sum(counts) <= MAX_FUSED_INSTRUCTIONS
         return sum(counts) / INSTRUCTIONS_PER_CALL if can_be_fused else np.inf
 
@@ -213,7 +216,7 @@ class AcceptanceFunctions:
         arguments[:] = [RecordedNumber(instructions, instructions.add_input(place)) for place in range(sum(counts))]
         z, u, u1, u2, *scales = np.split(arguments, np.cumsum(counts)[:-1])
         judged = self.judge(z[None], InputSamples(u[None], u1[None], u2[None]), Scales(*scales))
-        results = [*judged.coordinate_rates.reshape(-1), *(each[0] for each in judged.result)]
+        results = [*judged.coordinate_rates.reshape(-1), *(values[0] for values in judged.result)]
         formula = formula_of_results(instructions, [number_of(result, instructions) for result in results])
         return FormulaFunction(formula, counts, ((1, len(results)),))
 

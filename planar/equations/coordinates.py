@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 from planar.foundation.arrays import Array
@@ -33,15 +33,13 @@ def frames_from_coordinates(
     column: Mapping[tuple[str, str], int],
     links: Iterable[str],
     pairs: Mapping[str, Pair],
-    make_frame: Callable[..., Frame] = frame_at,
 ) -> tuple[dict[str, Frame], dict[str, tuple[Scalar, ...]]]:
     """Frames of links and own coordinates of pairs from w, whose entries may be of any arithmetic.
 
-    `column` says where a part stands in w; a link without a place there is the frame. `make_frame` makes a frame of
-    x, y and angle.
+    `column` says where a part stands in w; a link without a place there is the frame.
     """
     frames = {
-        link: make_frame(*(w[column[link, part]] for part in FRAME_PARTS)) if (link, "x") in column else GROUND
+        link: frame_at(*(w[column[link, part]] for part in FRAME_PARTS)) if (link, "x") in column else GROUND
         for link in links
     }
     own = {name: tuple(w[column[name, part]] for part, _ in pair.coordinate_kinds) for name, pair in pairs.items()}

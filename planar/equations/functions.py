@@ -358,7 +358,13 @@ class EquationFunctions:
         """
         e = self.equations
         z, u, p = (ca.SX.sym(name, each.numel()) for name, each in (("z", e.z), ("u", e.u), ("p", e.p)))
-        return function_with_cse("advance", [z, u, p], [self.newton_expressions(z, u, p, RUN_NEWTON_STEPS)[0]])
+        unknowns = ca.vertsplit(z) if z.numel() else []
+        for block in e.blocks:
+            for _ in range(RUN_NEWTON_STEPS if slice_length(block.unknowns) else 0):
+                left, slope = self.block_function(block)(ca.vertcat(*unknowns), u, p)
+                after = ca.vertcat(*unknowns[block.unknowns]) - solve_linear(slope, left)
+                unknowns[block.unknowns] = ca.vertsplit(after)
+        return function_with_cse("advance", [z, u, p], [stack_expressions(unknowns)])
 
     def correct_samples(self, z: Array, u: Array, p: Array) -> Array:
         """The same at samples z (samples, unknowns), u and p alike, each by itself."""
@@ -374,20 +380,6 @@ class EquationFunctions:
     @cached_property
     def _newton_call(self) -> BufferedFunction:
         return BufferedFunction(self.newton_function)
-
-    def newton_expressions(self, z: ca.SX, u: ca.SX, p: ca.SX, steps: int = 1) -> tuple[ca.SX, ca.SX]:
-        """Unknowns after so many of Newton's steps, block after block, and the residuals before the last (rows,).
-
-        For structures as `newton_function` takes.
-        """
-        open_ = []
-        now = ca.vertsplit(z) if z.numel() else []
-        for block in self.equations.blocks:
-            for _ in range(steps if slice_length(block.unknowns) else 0):
-                left, slope = self.block_function(block)(ca.vertcat(*now), u, p)
-                now[block.unknowns] = ca.vertsplit(ca.vertcat(*now[block.unknowns]) - solve_linear(slope, left))
-            open_ += [left] if slice_length(block.unknowns) else []
-        return stack_expressions(now), stack_expressions(open_)
 
     @kept_function
     def _jacobian_function(self) -> ca.Function:

@@ -185,12 +185,13 @@ class FormulaFunction:
     def evaluate_entries(self, count: int, *arguments: Array) -> Array:
         """All results, one after the other (results, positions); arguments (entries, positions), or (entries,) for all
         positions alike, which may be arrays of recorded numbers."""
-        if count <= MAX_FLOAT_POSITIONS or any(argument.dtype == object for argument in arguments):
+        is_recorded = any(argument.dtype == object for argument in arguments)
+        if count <= MAX_FLOAT_POSITIONS or is_recorded:
             positions = [
                 [(argument if argument.ndim == 1 else argument[:, k]).tolist() for argument in arguments]
                 for k in range(count)
             ]
-            if any(argument.dtype == object for argument in arguments):
+            if is_recorded:
                 columns: Array = np.empty((count, sum(self._sizes)), dtype=object)
                 columns[:] = [self._interpret(position) for position in positions]
                 return columns.T

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple, Self
 
 import numpy as np
 
+from planar.equations.acceptance import AcceptanceFunctions, Scales
 from planar.equations.coordinates import frames_from_coordinates
 from planar.equations.functions import EquationFunctions
 from planar.equations.mechanism_numbers import pair_numbers_from, shapes_of_links, size_from_extents
@@ -25,7 +26,6 @@ from planar.solving.checks.residual_check import ResidualCheck
 from planar.solving.structure import mechanism_structure
 
 if TYPE_CHECKING:
-    from planar.equations.acceptance import AcceptanceFunctions, Scales
     from planar.solving.stops import MetStop, PairStops
 
 ZERO_POSITION = 1e-14
@@ -185,8 +185,6 @@ class PreparedMechanism:
     @cached_property
     def acceptance_scales(self) -> Scales:
         """The numbers by which positions are judged."""
-        from planar.equations.acceptance import Scales
-
         return Scales(self.inputs.p, self.row_scale, self.min_column_scale)
 
     @cached_property

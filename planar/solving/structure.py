@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from functools import cached_property, lru_cache
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
+from planar.equations.acceptance import AcceptanceFunctions, acceptance_functions
 from planar.equations.coordinates import coordinate_columns
 from planar.equations.functions import MAX_CACHED_STRUCTURES, EquationFunctions, equation_functions
 from planar.foundation.errors import BadInput
@@ -21,9 +22,6 @@ from planar.model.mechanism import (
     relative_motions,
 )
 from planar.model.pairs import MeasureKind, Pair
-
-if TYPE_CHECKING:
-    from planar.equations.acceptance import AcceptanceFunctions
 
 
 class PointLocations(NamedTuple):
@@ -59,8 +57,6 @@ class MechanismStructure:
 
     @cached_property
     def _acceptance(self) -> AcceptanceFunctions:
-        from planar.equations.acceptance import acceptance_functions  # most mechanisms are solved a few times
-
         return acceptance_functions(self.mechanism)
 
     @cached_property

@@ -21,7 +21,6 @@ from planar.dynamics.lagrangian import LagrangianFunctions
 from planar.equations.coordinates import FRAME_PARTS, frames_from_coordinates
 from planar.equations.residuals import input_positions, pair_residuals
 from planar.foundation.errors import BadInput, NoAnswer, Outcome, Unknown
-from planar.foundation.geometry import frame_at
 from planar.model.link_shapes import link_shape
 from planar.model.mechanism import relative_motions
 from tests.builders import four_bar, slider_crank
@@ -310,7 +309,7 @@ def fifty_digit_frames(mechanism, state, arb, changed):
     pairs, links = {pair.name: pair for pair in mechanism.pairs}, [link.name for link in mechanism.links]
     place: list[Any] = [arb(value) for value in q]
     for _ in range(6):
-        frames, own = frames_from_coordinates(place, columns, links, pairs, frame_at)
+        frames, own = frames_from_coordinates(place, columns, links, pairs)
         left = [value for _, value in pair_residuals(changed.pairs, frames, numbers, own)]
         left += [
             at - given.position
@@ -321,7 +320,7 @@ def fifty_digit_frames(mechanism, state, arb, changed):
             for k, each in enumerate(place)
         ]
         place = [arb(each.mid()) for each in place]
-    frames, _ = frames_from_coordinates(place, columns, links, pairs, frame_at)
+    frames, _ = frames_from_coordinates(place, columns, links, pairs)
     return frames, shapes
 
 

@@ -9,15 +9,13 @@ rates there agree.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
+from planar.equations.acceptance import AcceptanceFunctions, InputSamples, Scales
 from planar.foundation.arrays import Array, BoolArray, IntArray
 from planar.solving.checks.singular_values import SINGULAR_DISTANCE_RATIO
-
-if TYPE_CHECKING:
-    from planar.equations.acceptance import AcceptanceFunctions, Scales
 
 
 class StepEnds(NamedTuple):
@@ -38,10 +36,8 @@ def accept_steps(functions: AcceptanceFunctions, z: Array, u: Array, scales: Sca
 
 def step_ends(functions: AcceptanceFunctions, z: Array, u: Array, way: Array, scales: Scales) -> StepEnds:
     """What is known at positions z (steps, unknowns) and u (steps, inputs) of steps by `way` (steps, inputs)."""
-    from planar.equations.acceptance import InputSamples
-
     judged = functions.judge(z, InputSamples(u, way, np.zeros_like(way)), scales)
-    return StepEnds(judged.coordinate_rates[:, 1, list(functions.equations.unknowns)], judged.distances)
+    return StepEnds(judged.coordinate_rates[:, 1, functions.unknown_columns], judged.distances)
 
 
 def keep_branch(

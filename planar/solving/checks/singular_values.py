@@ -46,19 +46,6 @@ def column_norms(jacobians: Array, least: float | Array) -> Array:
     return np.maximum(np.sqrt(np.add.reduce(jacobians * jacobians, axis=-2)), least)
 
 
-def least_singular_values(jacobians: Array) -> Array:
-    """The least singular value of each matrix (many, rows, columns), zero where columns are more than rows."""
-    if jacobians.shape[1:] == (2, 2):
-        # of two by two in closed form: the two have the determinant as product and the norm as sum of squares
-        det = np.abs(jacobians[:, 0, 0] * jacobians[:, 1, 1] - jacobians[:, 0, 1] * jacobians[:, 1, 0])
-        norm = np.sum(jacobians * jacobians, axis=(1, 2))
-        greatest = np.sqrt(0.5 * (norm + np.sqrt(np.maximum(norm * norm - 4.0 * det * det, 0.0))))
-        return det / np.maximum(greatest, 1e-300)
-    if jacobians.shape[1] < jacobians.shape[2]:
-        return np.zeros(len(jacobians))
-    return np.linalg.svd(jacobians, compute_uv=False)[:, -1]
-
-
 def singular_distance(least: Array | float, change: Array | np.floating[Any]) -> Array:
     """How far a matrix keeps its rank: until it has changed by its least singular value (Weyl's inequality).
 

@@ -6,15 +6,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
 
-from planar.equations.acceptance import InputSamples, Scales
-from planar.equations.functions import EquationFunctions
+from planar.equations.acceptance import AcceptanceFunctions, AcceptanceResult, InputSamples, JudgedPositions, Scales
 from planar.foundation.arrays import Array, BoolArray
 from planar.solving.checks.branch_check import StepEnds, keep_branch, step_ends
 from planar.solving.checks.residual_check import CONTACT_TOLERANCE, EPS, NEGLIGIBLE_ERROR
-from planar.solving.prepared_mechanism import PositionInputs, PreparedMechanism
+from planar.solving.prepared_mechanism import PreparedMechanism
 
 if TYPE_CHECKING:
-    from planar.equations.acceptance import AcceptanceFunctions, AcceptanceResult, JudgedPositions
     from planar.solving.stops import PairStops
 
 MIN_FAST_REGULARITY = 1e-3
@@ -96,9 +94,6 @@ def concatenate_samples(first: FastSamples | None, second: FastSamples | None) -
 class FastSolver(Protocol):
     """What a quick run needs of a solver."""
 
-    functions: EquationFunctions
-    inputs: PositionInputs
-
     @property
     def acceptance(self) -> AcceptanceFunctions | None:
         """What computes and judges positions block after block."""
@@ -135,35 +130,46 @@ def fast_run(setup: FastSolver, z: Array, u: Array, u1: Array, u2: Array) -> Fas
     functions, scales = setup.acceptance, setup.acceptance_scales
     if functions is None or not u.size:
         return None
-    way = _straight_way(u)
+    way, steps = _straight_way(u), np.diff(u, axis=0)
     along = None if way is None else _along(way.axis, u1, u2)
-    rest = np.zeros_like(u)
     if way is not None and along is not None:
-        settled, judged = functions.run(z, InputSamples(u, np.broadcast_to(way.axis, u.shape), rest), scales)
+        samples, judged = _run_along(functions, z, u, way.axis, scales)
         w, w1, w2 = judged.coordinate_rates.transpose(1, 0, 2)
         first, second = along
-        parts = np.stack([w, w1 * first, w2 * first * first + w1 * second], axis=1)
+        coordinate_rates = np.stack([w, w1 * first, w2 * first * first + w1 * second], axis=1)
         ends = _ends_along(functions, judged, way.gone)
     else:
-        settled, judged = functions.run(z, InputSamples(u, u1, u2), scales)
-        parts, steps = judged.coordinate_rates, np.diff(u, axis=0)
+        samples, judged = functions.run(z, InputSamples(u, u1, u2), scales)
+        coordinate_rates = judged.coordinate_rates
         ends = (
-            step_ends(functions, settled[:-1], u[:-1], steps, scales),
-            step_ends(functions, settled[1:], u[1:], steps, scales),
+            step_ends(functions, samples[:-1], u[:-1], steps, scales),
+            step_ends(functions, samples[1:], u[1:], steps, scales),
         )
-    told = judged.result
+    result = judged.result
     with np.errstate(all="ignore"):  # of what is not finite
-        fine, is_sure = _is_closed(told, setup.tolerance), _is_sure(told, setup.tolerance)
-    squares = np.sum(np.diff(u, axis=0) ** 2, axis=1)
-    fine[1:] &= keep_branch(np.diff(settled, axis=0), *ends, squares, functions.block_starts)
+        accepted, is_sure = _is_closed(result, setup.tolerance), _is_sure(result, setup.tolerance)
+    squares = np.sum(steps * steps, axis=1)
+    accepted[1:] &= keep_branch(np.diff(samples, axis=0), *ends, squares, functions.block_starts)
     if setup.stops is not None:
         from planar.solving.stops import MAX_SURE_MOVE  # few mechanisms have stops
 
-        fine &= setup.stops.sure_rows(setup.stop_positions(settled, u), settled)
-        fine[1:] &= np.abs(np.diff(u, axis=0)).max(axis=1, initial=0.0) <= MAX_SURE_MOVE
-    many = len(fine) if fine.all() else int(np.argmin(fine))
-    residual = float(told.residual[:many].max(initial=0.0))
-    return FastRun(settled[:many], parts[:many], is_sure[:many], residual)
+        accepted &= setup.stops.sure_rows(setup.stop_positions(samples, u), samples)
+        accepted[1:] &= np.abs(steps).max(axis=1, initial=0.0) <= MAX_SURE_MOVE
+    count = _count_first(accepted)
+    residual = float(result.residual[:count].max(initial=0.0))
+    return FastRun(samples[:count], coordinate_rates[:count], is_sure[:count], residual)
+
+
+def _run_along(
+    functions: AcceptanceFunctions, z: Array, u: Array, axis: Array, scales: Scales
+) -> tuple[Array, JudgedPositions]:
+    """A run of inputs along an axis, judged while they move along it evenly."""
+    return functions.run(z, InputSamples(u, np.broadcast_to(axis, u.shape), np.zeros_like(u)), scales)
+
+
+def _count_first(accepted: BoolArray) -> int:
+    """How many of the first rows are accepted, up to the first that is not."""
+    return len(accepted) if accepted.all() else int(np.argmin(accepted))
 
 
 class _StraightWay(NamedTuple):
@@ -195,7 +201,7 @@ def _along(axis: Array, u1: Array, u2: Array) -> tuple[Array, Array] | None:
 
 def _ends_along(functions: AcceptanceFunctions, judged: JudgedPositions, gone: Array) -> tuple[StepEnds, StepEnds]:
     """What is known at both ends of steps so far along the axis by which positions were judged."""
-    rates, distances = judged.coordinate_rates[:, 1, list(functions.equations.unknowns)], judged.distances
+    rates, distances = judged.coordinate_rates[:, 1, functions.unknown_columns], judged.distances
     step = gone[:, None]
     with np.errstate(all="ignore"):  # a step to the same place
         return (
@@ -204,22 +210,22 @@ def _ends_along(functions: AcceptanceFunctions, judged: JudgedPositions, gone: A
         )
 
 
-def _is_sure(told: AcceptanceResult[Any], tolerance: float) -> Any:
+def _is_sure(result: AcceptanceResult[Any], tolerance: float) -> Any:
     """Whether a position, or which of many, are surely sound with their rates."""
     return (
-        _is_closed(told, tolerance)
-        & (told.velocity_error <= 1e3 * tolerance)
-        & (told.acceleration_error <= 1e3 * tolerance)
-        & (told.contact_gap <= CONTACT_TOLERANCE)
-        & (told.regularity >= MIN_FAST_REGULARITY)
-        & (EPS * told.rounding_amplification <= NEGLIGIBLE_ERROR)
+        _is_closed(result, tolerance)
+        & (result.velocity_error <= 1e3 * tolerance)
+        & (result.acceleration_error <= 1e3 * tolerance)
+        & (result.contact_gap <= CONTACT_TOLERANCE)
+        & (result.regularity >= MIN_FAST_REGULARITY)
+        & (EPS * result.rounding_amplification <= NEGLIGIBLE_ERROR)
     )
 
 
-def _is_closed(told: AcceptanceResult[Any], tolerance: float) -> Any:
+def _is_closed(result: AcceptanceResult[Any], tolerance: float) -> Any:
     """Whether every constraint is closed, and everything a number."""
     # what is not finite is not equal to itself, less itself
-    return (told.residual <= tolerance) & (told.finite_sum - told.finite_sum == 0.0)
+    return (result.residual <= tolerance) & (result.finite_sum - result.finite_sum == 0.0)
 
 
 class StraightPathCache:
@@ -255,8 +261,8 @@ class StraightPathCache:
         known = max(kept)
         while known < many and (z := kept[known]) is not None:
             strides = np.arange(known, min(known + STRIDES_AT_ONCE, self.max_positions) + 1)
-            found = self._walk(z, strides * STEP_LENGTH, axis)
-            kept.update(zip(strides.tolist(), found, strict=True))
+            samples = self._walk(z, strides * STEP_LENGTH, axis)
+            kept.update(zip(strides.tolist(), samples, strict=True))
             known = int(strides[-1])
         z = kept.get(many)
         return None if z is None else self._walk(z, np.array([many * STEP_LENGTH, reach]), axis)[1]
@@ -265,14 +271,13 @@ class StraightPathCache:
         """The unknowns at places along an axis, from those at the first as far as each step is surely sound."""
         functions = self.setup.acceptance
         assert functions is not None
-        u = self.start + places[:, None] * axis
-        motion = InputSamples(u, np.broadcast_to(axis, u.shape), np.zeros_like(u))
-        found, judged = functions.run(z, motion, self.setup.acceptance_scales)
-        told, gone = judged.result, np.diff(places)
+        u, scales = self.start + places[:, None] * axis, self.setup.acceptance_scales
+        samples, judged = _run_along(functions, z, u, axis, scales)
+        result, gone = judged.result, np.diff(places)
         with np.errstate(all="ignore"):  # of what is not finite
-            fine = _is_closed(told, self.setup.tolerance) & (told.least_singular_value > MIN_SINGULAR_VALUE)
+            accepted = _is_closed(result, self.setup.tolerance) & (result.least_singular_value > MIN_SINGULAR_VALUE)
         ends, squares = _ends_along(functions, judged, gone), gone * gone * (axis @ axis)
         ratio = MIN_SINGULAR_DISTANCE_RATIO
-        fine[1:] &= keep_branch(np.diff(found, axis=0), *ends, squares, functions.block_starts, ratio)
-        count = len(fine) if fine.all() else int(np.argmin(fine))
-        return [*found[:count], *[None] * (len(found) - count)]
+        accepted[1:] &= keep_branch(np.diff(samples, axis=0), *ends, squares, functions.block_starts, ratio)
+        count = _count_first(accepted)
+        return [*samples[:count], *[None] * (len(samples) - count)]
