@@ -63,7 +63,7 @@ def turns(swept: Swept, steps: int) -> list[Entry]:
     at = solver.shapes[link].position(swept.point)
 
     def read(found: Array) -> Array:
-        x, y, angle = solver.functions.coordinate_function(found.T, u.T, p).full()[columns]
+        x, y, angle = solver.functions.coordinates(found, u, p).T[columns]
         c, s = np.cos(angle), np.sin(angle)
         return np.stack([x * solver.unit + c * at.x - s * at.y, y * solver.unit + s * at.x + c * at.y])[..., None]
 

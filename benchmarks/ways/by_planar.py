@@ -65,7 +65,7 @@ class Turn:
 
     def answers(self, z: Array) -> Array:
         """The linkage's answers (1, samples, 2) at z."""
-        w = self.solver.functions.coordinate_function(z.T, self.u.T, self.numbers).full()
+        w = self.solver.functions.coordinates(z, self.u, self.numbers).T
         return (w[self._columns].T * self._scale)[None]
 
     def answers_with_rates(self, found: tuple[Array, Array, Array]) -> Array:

@@ -1,1 +1,1 @@
-"""Casadi functions as instruction lists, and what is written of them: LLVM IR and its machine code, JavaScript."""
+"""What is written of instruction lists: Python, LLVM IR and its machine code."""

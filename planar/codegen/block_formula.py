@@ -8,9 +8,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from planar.codegen.printed_formula import PrintedFunction, compile_numpy
 from planar.foundation.arrays import Array
 from planar.foundation.instruction_list import Instruction, InstructionList, required_values
-from planar.foundation.printed_formula import PrintedFunction, compile_numpy
 
 
 class FormulaInput(NamedTuple):

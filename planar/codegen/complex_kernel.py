@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from planar.codegen.instructions import check_length
+from planar.codegen.printed_formula import compile_numpy
 from planar.foundation.arrays import ComplexArray
 from planar.foundation.instruction_list import InstructionList, UnsupportedOperation, required_values
-from planar.foundation.printed_formula import compile_numpy
 
 LANES = 8
 """Columns that are computed at once; the arrays have a multiple of so many."""

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from typing import Any
 
-from planar.foundation.instruction_list import InstructionList, UnsupportedOperation
+from planar.foundation.instruction_list import Instructions, UnsupportedOperation
 
 LLVM_OPERATIONS = {"add": "fadd", "sub": "fsub", "mul": "fmul", "div": "fdiv"}
 LLVM_INTRINSICS = {"sqrt": "sqrt", "abs": "fabs", "floor": "floor"}
 LLVM_COMPARISONS = {"less": "olt", "most": "ole"}
 """What gives 1 where it is true, else 0."""
-LIBRARY_ARGUMENT_COUNTS = {"cos": 1, "sin": 1, "atan": 1, "atan2": 2}
+LIBRARY_ARGUMENT_COUNTS = {"cos": 1, "sin": 1, "tan": 1, "atan": 1, "atan2": 2, "pow": 2}
 """What is called lane by lane, and how many arguments it has."""
 STACK_ALIGNMENT = 64
 """Bytes: so that each vector that a function keeps on it lies in one line of the cache. Else the widest lie over two
@@ -27,8 +26,10 @@ KEEP_ORDER = 'call void asm sideeffect "", ""() nounwind willreturn memory(inacc
 class IRWriter:
     """Instructions one after the other, with fresh names."""
 
-    def __init__(self, lanes: int):
+    def __init__(self, lanes: int, contracts: bool = True):
+        """`contracts`: whether a product and a sum may be rounded once."""
         self.lanes, self.count, self.load_count = lanes, 0, 0
+        self._flags = "contract " if contracts else ""
         self.lines: list[str] = []
         self._ahead: list[str] = []
         self._sections = [self.lines]
@@ -69,7 +70,7 @@ class IRWriter:
         return f"splat (double {_double_literal(value)})"
 
     def binary(self, what: str, a: str, b: str) -> str:
-        return self.add_instruction(f"{LLVM_OPERATIONS[what]} contract {self.vector} {a}, {b}")
+        return self.add_instruction(f"{LLVM_OPERATIONS[what]} {self._flags}{self.vector} {a}, {b}")
 
     def call_intrinsic(self, what: str, *of: str) -> str:
         args = ", ".join(f"{self.vector} {each}" for each in of)
@@ -249,7 +250,7 @@ class IRWriter:
         )
 
     def write_values(
-        self, listing: InstructionList[Any], order: Sequence[int], names: dict[int, str], inputs: Mapping[int, str]
+        self, listing: Instructions, order: Sequence[int], names: dict[int, str], inputs: Mapping[int, str]
     ) -> None:
         """Write values in an order; `names` grows by theirs, those of inputs are known."""
         for each in order:
@@ -270,6 +271,10 @@ class IRWriter:
             elif value.operation in LLVM_COMPARISONS:
                 is_true = self.compare(LLVM_COMPARISONS[value.operation], *of)
                 names[each] = self.select(is_true, self.constant(1.0), self.constant(0.0))
+            elif value.operation == "not":
+                names[each] = self.binary("sub", self.constant(1.0), of[0])
+            elif value.operation == "where":
+                names[each] = self.select_or_zero(self.compare("une", of[0], self.constant(0.0)), of[1])
             elif value.operation in LLVM_INTRINSICS:
                 names[each] = self.call_intrinsic(LLVM_INTRINSICS[value.operation], *of)
             else:

@@ -10,6 +10,7 @@ from typing import Generic, NamedTuple, TypeVar
 
 import numpy as np
 
+from planar.codegen.printed_formula import FormulaFunction
 from planar.equations.block_type_functions import BlockTypeFunctions, block_type_functions
 from planar.equations.block_types import INPUT_BLOCK, PlacedBlock, place_input_coordinates
 from planar.equations.constraint_check import ORDERS, ConstraintCheck
@@ -17,14 +18,12 @@ from planar.equations.functions import MAX_CACHED_STRUCTURES, EquationFunctions,
 from planar.equations.mechanism_numbers import equation_structure
 from planar.equations.symbolic_equations import Block, slice_length
 from planar.foundation.arrays import Array
-from planar.foundation.instruction_list import InstructionList
-from planar.foundation.printed_formula import FormulaFunction
 from planar.foundation.recorded_formula import (
-    RecordedNumber,
     formula_of_results,
     greatest_entries,
     least_entries,
     number_of,
+    recorded_arguments,
 )
 from planar.model.mechanism import Mechanism
 
@@ -211,10 +210,7 @@ class AcceptanceFunctions:
         rows, inputs = len(e.rows), len(e.input_kinds)
         assert e.elimination is not None
         counts = len(e.unknowns), inputs, inputs, inputs, e.elimination.number_count, rows, len(e.unknowns)
-        instructions: InstructionList[int] = InstructionList()
-        arguments = np.empty(sum(counts), dtype=object)
-        arguments[:] = [RecordedNumber(instructions, instructions.add_input(place)) for place in range(sum(counts))]
-        z, u, u1, u2, *scales = np.split(arguments, np.cumsum(counts)[:-1])
+        instructions, (z, u, u1, u2, *scales) = recorded_arguments(counts)
         judged = self.judge(z[None], InputSamples(u[None], u1[None], u2[None]), Scales(*scales))
         results = [*judged.coordinate_rates.reshape(-1), *(values[0] for values in judged.result)]
         formula = formula_of_results(instructions, [number_of(result, instructions) for result in results])

@@ -15,13 +15,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from planar.codegen.printed_formula import PrintedFunction
 from planar.equations.elements import Element, PlacedElement
 from planar.equations.elimination import EliminationRow
 from planar.equations.sparse_matrices import SparsePattern
 from planar.foundation.angles import wrap_angle
 from planar.foundation.arrays import Array, IntArray
 from planar.foundation.jets import cos, sin
-from planar.foundation.printed_formula import PrintedFunction
 from planar.foundation.recorded_formula import RecordedFormula, elementwise
 
 if TYPE_CHECKING:

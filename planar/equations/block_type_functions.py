@@ -7,21 +7,20 @@ closed form. Those of known types are read, see `known_types`.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable
 from functools import cached_property, lru_cache
 from typing import NamedTuple, Protocol
 
 import numpy as np
 
+from planar.codegen.printed_formula import FormulaFunction
 from planar.equations.block_types import MAX_BLOCK_TYPES, BlockTypeKey, block_equations
 from planar.equations.closed_form_assemblies import SETTLED_STEP, ArrayFunction, ClosedFormAssemblies
 from planar.equations.known_types import known_text
 from planar.equations.linear import solve_vectors
+from planar.equations.structure_formulas import StructureFormulas
 from planar.foundation.angles import wrap_angle
 from planar.foundation.arrays import Array, greatest_size
-from planar.foundation.instruction_list import InstructionList
-from planar.foundation.printed_formula import FormulaFunction
-from planar.foundation.recorded_formula import RecordedFormula, RecordedNumber, formula_of_results, number_of
+from planar.foundation.recorded_formula import RecordedFormula
 from planar.model.pairs import MeasureKind
 
 MAX_RUN_STEPS = 6
@@ -69,28 +68,11 @@ def derive_block_type(key: BlockTypeKey) -> BlockTypeFormulas:
     from planar.equations.closed_form import closed_form_formula  # most types are known
 
     equations = block_equations(key)
-    assembled = equations.assembled
-    assert assembled is not None
-    instructions: InstructionList[int] = InstructionList()
-    counts = assembled.argument_counts
-    arguments = np.empty(sum(counts), dtype=object)
-    arguments[:] = [RecordedNumber(instructions, instructions.add_input(place)) for place in range(sum(counts))]
-    z, u, p = np.split(arguments, np.cumsum(counts)[:2])
-
-    def formula_of(values: Iterable[object]) -> RecordedFormula:
-        return formula_of_results(instructions, [number_of(value, instructions) for value in values])
-
-    residuals, entries = assembled.residuals_and_jacobians(z[None], u[None], p)
-    jacobian: list[object] = [0.0] * (len(z) * len(residuals[0]))
-    pattern = assembled.pattern
-    for row, column, entry in zip(pattern.rows, pattern.columns, entries[0], strict=True):
-        if column < len(z):
-            jacobian[column * len(residuals[0]) + row] = entry
-    coordinates = formula_of(assembled.coordinates(z[None], u[None], p)[0])
+    formulas = StructureFormulas(equations)
     form = closed_form_formula(equations, equations.blocks[0])
     return BlockTypeFormulas(
-        formula_of([*residuals[0], *jacobian]),
-        coordinates,
+        formulas.block_function(equations.blocks[0]).formula,
+        formulas.coordinate_function.formula,
         form and form.formula,
         form is not None and form.has_changing_arm,
     )

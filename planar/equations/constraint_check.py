@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from planar.codegen.printed_formula import FormulaFunction
 from planar.equations.coordinates import FRAME_PARTS, Coordinate, coordinate_columns
 from planar.equations.pair_formulas import PARTS_OF_FRAME, pair_formula
 from planar.equations.residuals import CARRIED_ROUNDING, closing_error
@@ -16,7 +17,6 @@ from planar.equations.stacked_residuals import MAX_STACKED_NUMBERS, PairGroup, i
 from planar.foundation.arrays import Array, IntArray
 from planar.foundation.geometry import GROUND, Frame, frame_term_sizes
 from planar.foundation.jets import Jet, Scalar, TermSizes, cos, sin, term_sizes, value_and_rates
-from planar.foundation.printed_formula import FormulaFunction
 from planar.foundation.recorded_formula import RecordedNumber, elementwise, greatest_entries, record_formula
 from planar.model.mechanism import Mechanism, relative_motions
 from planar.model.pairs import MeasureKind

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
+from planar.codegen.printed_formula import PrintedFunction, compile_formula
 from planar.equations.known_types import fingerprint
-from planar.foundation.printed_formula import PrintedFunction, compile_formula
 from planar.foundation.recorded_formula import RecordedFormula
 
 MAX_ELEMENTS = 1024

@@ -102,6 +102,13 @@ class ConstraintEquations:
         is_angle = [row.kind is MeasureKind.ANGLE for row in self.rows]
         return AssembledEquations(self.elimination, self.unknowns, self.row_indices, is_angle)
 
+    @property
+    def argument_counts(self) -> tuple[int, int, int]:
+        """How many entries z, u and p have."""
+        if self.elimination is not None:
+            return len(self.unknowns), self.elimination.input_count, self.elimination.number_count
+        return self.z.numel(), self.u.numel(), self.p.numel()
+
     @cached_property
     def expressions(self) -> ConstraintExpressions:
         """F and w, and what they are made of."""

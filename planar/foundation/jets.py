@@ -149,11 +149,44 @@ class Jet:
     def __rarctan2__(self, y: Scalar) -> Jet:
         return Jet(*self._derivatives_of(y)).arctan2(self)
 
+    def __pow__(self, exponent: float) -> Jet:
+        """The rate is exponent a^(exponent - 1) a'."""
+        a = self.parts
+        if len(a) == 1:
+            return Jet(a[0] ** exponent)
+        rate = exponent * Jet(*a[:-1]) ** (exponent - 1.0) * Jet(*a[1:])
+        return Jet(a[0] ** exponent, *rate.parts)
+
+    def tan(self) -> Jet:
+        c, s = self._cos_sin_derivatives()
+        return Jet(*s) / Jet(*c)
+
+    def __abs__(self) -> Jet:
+        sized: Jet = self * sign_of(self)
+        return sized
+
+    def floor(self) -> Scalar:
+        """A step has no rates."""
+        value = _value_of(self)
+        return value.floor() if _is_symbol(value) else np.floor(value)
+
+    def __lt__(self, other: Scalar) -> Scalar:
+        """Comparisons are of values alone."""
+        return _value_of(self) < _value_of(other)
+
+    def __le__(self, other: Scalar) -> Scalar:
+        return _value_of(self) <= _value_of(other)
+
+    def __gt__(self, other: Scalar) -> Scalar:
+        return _value_of(self) > _value_of(other)
+
+    def __ge__(self, other: Scalar) -> Scalar:
+        return _value_of(self) >= _value_of(other)
+
     def _cos_sin_derivatives(self) -> tuple[list[Scalar], list[Scalar]]:
         """Derivatives of cos and sin: c' = -s a', s' = c a', expanded by Leibniz."""
         a = self.parts
-        is_symbol = hasattr(a[0], "is_symbolic")
-        c, s = ([a[0].cos()], [a[0].sin()]) if is_symbol else ([np.cos(a[0])], [np.sin(a[0])])
+        c, s = [cos(a[0])], [sin(a[0])]
         for n in range(1, len(a)):
             terms = [(comb(n - 1, k) * a[n - k], k) for k in range(n)]
             c.append(-sum(w * s[k] for w, k in terms))
@@ -165,6 +198,11 @@ class Jet:
 
     def sin(self) -> Jet:
         return Jet(*self._cos_sin_derivatives()[1])
+
+
+def _value_of(number: Scalar) -> Scalar:
+    """The value of a number, which may be a jet of jets."""
+    return _value_of(number.parts[0]) if isinstance(number, Jet) else number
 
 
 class TermSizes(Jet):
@@ -232,7 +270,7 @@ def value_between(x: Scalar, low: Scalar | None, high: Scalar | None, value: Sca
         return value
     if isinstance(value, Jet):
         return Jet(*(value_between(x, low, high, part) for part in value.parts))
-    x, low, high = (each.parts[0] if isinstance(each, Jet) else each for each in (x, low, high))
+    x, low, high = map(_value_of, (x, low, high))
     if any(map(_is_symbol, (x, low, high, value))):
         # flags are numbers, 0 or 1, whose derivative is none
         is_below = 1.0 if high is None else x < high

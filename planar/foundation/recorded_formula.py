@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from planar.foundation.arrays import Array
-from planar.foundation.instruction_list import Instruction, InstructionList, required_values
+from planar.foundation.instruction_list import Instruction, InstructionList, Instructions, required_values
 from planar.foundation.jets import Jet, Scalar, atan2, cos, sin, sqrt, tan
 
 
@@ -30,6 +30,10 @@ class RecordedFormula(NamedTuple):
             else:
                 values.append(_FUNCTIONS[operation](*[values[k] for k in operands]))
         return [values[k] for k in self.results]
+
+    def part(self, part: slice) -> RecordedFormula:
+        """The formula of some of its results."""
+        return formula_of_results(self, self.results[part])
 
     def as_text(self) -> str:
         """The formula in one line: its instructions, each with its operands, then the numbers of its results."""
@@ -153,6 +157,14 @@ def number_of(value: Scalar, instructions: InstructionList[Any]) -> int:
     return value.number if type(value) is RecordedNumber else instructions.add_constant(value)
 
 
+def recorded_arguments(counts: Sequence[int]) -> tuple[InstructionList[int], list[Array]]:
+    """An empty list of instructions, and arguments of a formula, of so many entries each, that record in it."""
+    instructions: InstructionList[int] = InstructionList()
+    arguments = np.empty(sum(counts), dtype=object)
+    arguments[:] = [RecordedNumber(instructions, instructions.add_input(place)) for place in range(sum(counts))]
+    return instructions, np.split(arguments, np.cumsum(counts)[:-1])
+
+
 def record_formula(formula: Callable[[Sequence[RecordedNumber]], Sequence[Scalar]], count: int) -> RecordedFormula:
     """Record a formula of `count` arguments."""
     instructions: InstructionList[int] = InstructionList()
@@ -160,13 +172,13 @@ def record_formula(formula: Callable[[Sequence[RecordedNumber]], Sequence[Scalar
     return formula_of_results(instructions, [number_of(result, instructions) for result in results])
 
 
-def formula_of_results(instructions: InstructionList[int], results: Sequence[int]) -> RecordedFormula:
+def formula_of_results(formula: Instructions, results: Sequence[int]) -> RecordedFormula:
     """The formula of some values of a list, without what they do not need."""
-    required = required_values(instructions, results)
+    required = required_values(formula, results)
     places = {number: place for place, number in enumerate(required)}
     renumbered: list[Instruction[int]] = []
     for number in required:
-        operation, operands, constant, key = instructions.instructions[number]
+        operation, operands, constant, key = formula.instructions[number]
         renumbered.append(Instruction(operation, tuple([places[operand] for operand in operands]), constant, key))
     return RecordedFormula(tuple(renumbered), tuple([places[result] for result in results]))
 
@@ -238,6 +250,28 @@ def _reduced(values: Array, of_arrays: np.ufunc, of_two: Callable[..., Scalar], 
     return result
 
 
+_where_of_numbers = _number_or_recorded("where", _where)
+
+
+def where(condition: Scalar, value: Scalar) -> Scalar:
+    """A value where a condition, 0 or 1, holds, else nothing."""
+    if isinstance(value, Jet):
+        return Jet(*(where(condition, part) for part in value.parts))
+    return _where_of_numbers(condition, value)
+
+
+def _choice_of_two(of_numbers: Callable[[Scalar, Scalar], Scalar], is_least: bool) -> Callable[..., Scalar]:
+    """The lesser or the greater of two, of which jets may be some."""
+
+    def choose(a: Scalar, b: Scalar) -> Scalar:
+        if not isinstance(a, Jet) and not isinstance(b, Jet):
+            return of_numbers(a, b)
+        is_first = 1.0 * (a <= b if is_least else b <= a)
+        return where(is_first, a) + where(1.0 - is_first, b)
+
+    return choose
+
+
 _FUNCTIONS: dict[str, Callable[..., Scalar]] = {
     "add": lambda a, b: a + b,
     "sub": lambda a, b: a - b,
@@ -249,9 +283,9 @@ _FUNCTIONS: dict[str, Callable[..., Scalar]] = {
     "less": lambda a, b: 1.0 * (a < b),
     "most": lambda a, b: 1.0 * (a <= b),
     "not": lambda a: 1.0 - a,
-    "where": _number_or_recorded("where", _where),
-    "minnum": least_of,
-    "maxnum": greatest_of,
+    "where": where,
+    "minnum": _choice_of_two(least_of, True),
+    "maxnum": _choice_of_two(greatest_of, False),
     "cos": cos,
     "sin": sin,
     "tan": tan,

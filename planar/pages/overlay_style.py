@@ -10,7 +10,6 @@ from typing import Any
 import casadi as ca
 
 from planar.analysis.centres.centrodes import AS_ONE_RATIO, INFINITY_RATIO, STANDSTILL_RATIO
-from planar.codegen.javascript import write_javascript
 from planar.drawing.centres.centres import (
     ARROW_LENGTH,
     ARROW_MARGIN,
@@ -31,6 +30,7 @@ from planar.drawing.paper.scales import DECIMAL_STEPS, DEGREE_STEPS, ROUND_SLACK
 from planar.drawing.paper.stroke_shapes import LINE_END_IN_HEAD, head_length, head_of_length
 from planar.drawing.polygons.polygon import FEW_POLE_LETTERS, MAX_POLE_LETTERS, POLE_RADIUS
 from planar.drawing.scheme.symbol_table import INPUT_ARC_RADII
+from planar.pages.javascript import write_javascript
 
 POWERS = range(-15, 19)
 """Of ten, between which round values are offered."""

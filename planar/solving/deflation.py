@@ -2,8 +2,8 @@
 
 Two pins of one body in two parallel slots leave it only a translation, but to first order it may turn as well, in every
 position. The slope of such constraints has less rank than unknowns on the whole curve of positions, which Newton's
-method and continuation cannot bear. But the curve is also that on which the slope keeps this lower rank: with the
-minors that vanish there as further constraints it is regular. (A. Leykin, J. Verschelde, A. Zhao, Newton's method with
+method and continuation cannot bear. But the curve is also that on which the slope keeps this lower rank: with that as
+further constraints it is regular. (A. Leykin, J. Verschelde, A. Zhao, Newton's method with
 deflation for isolated singularities, Theor. Comp. Sci. 359, 2006; J. Hauenstein, C. Wampler, Isosingular sets and
 deflation, Found. Comput. Math. 13, 2013.)
 """
@@ -15,17 +15,15 @@ from collections.abc import Sequence
 import numpy as np
 
 from planar.equations.functions import EquationFunctions
-from planar.equations.minors import LowRankBlock, add_minors, constraint_dependencies
+from planar.equations.rank_conditions import LowRankBlock, constraint_dependencies, with_rank_conditions
 from planar.equations.symbolic_equations import Block
 from planar.foundation.arrays import Array
 from planar.solving.checks.singular_values import MIN_REGULARITY, column_norms, null_space, rank
 from planar.solving.newton import correct, shortest_step
 from planar.solving.prepared_mechanism import PreparedMechanism
 
-MAX_MINOR_RANK = 12
-"""Rank from which on minors would be expressions too long."""
-MAX_MINORS = 24
-"""Minors of one block; constraints that need more lack so much rank that something is free."""
+MAX_CONDITIONS = 24
+"""Conditions of one block; constraints that need more lack so much rank that something is free."""
 PROBE_DISTANCE = 1e-2
 """rad, or lengths of the size: how far along the motion it is looked whether the rank is as low."""
 PROBE_COUNT = 4
@@ -33,16 +31,16 @@ MAX_CORRECTIONS, CLOSED_TOLERANCE = 12, 1e-10
 
 
 def deflate(setup: PreparedMechanism, weak: Sequence[Block], z: Array) -> tuple[EquationFunctions, Array] | None:
-    """The program in which blocks that are singular at z, and all along the motion, have the minors that vanish there
-    as constraints too; and z by it. None where they are singular in this position alone, or something is free.
+    """The program in which blocks that are singular at z, and all along the motion, keep this rank
+    as a constraint too; and z by it. None where they are singular in this position alone, or something is free.
     """
     y = np.concatenate([z, setup.inputs.u])
     for with_earlier in (False, True):
-        blocks = {stage.block_index: _minor_block(setup, stage, z, with_earlier) for stage in weak}
+        blocks = {stage.block_index: _low_rank_block(setup, stage, z, with_earlier) for stage in weak}
         known = {level: block for level, block in blocks.items() if block is not None}
         if len(known) < len(blocks):
             continue
-        program = add_minors(setup.functions, known)
+        program = with_rank_conditions(setup.functions, known)
         there = _correct(setup, program, y, z.size)
         if there is not None and _holds_along_motion(setup, program, there):
             return program, there[: z.size]
@@ -50,7 +48,7 @@ def deflate(setup: PreparedMechanism, weak: Sequence[Block], z: Array) -> tuple[
 
 
 def _holds_along_motion(setup: PreparedMechanism, program: EquationFunctions, y: Array) -> bool:
-    """Whether only the motions that inputs can make are left, and the minors vanish wherever these lead.
+    """Whether only the motions that inputs can make are left, and the rank is as low wherever these lead.
 
     So many ways at first order as inputs are there on their dead points too.
     """
@@ -83,7 +81,7 @@ def _correct(setup: PreparedMechanism, program: EquationFunctions, y: Array, fre
     return np.concatenate([found, held]) if gap <= CLOSED_TOLERANCE else None
 
 
-def _minor_block(setup: PreparedMechanism, stage: Block, z: Array, with_earlier: bool) -> LowRankBlock | None:
+def _low_rank_block(setup: PreparedMechanism, stage: Block, z: Array, with_earlier: bool) -> LowRankBlock | None:
     """The low-rank part of a block's constraints, with those on which it rests if wanted; None of full rank."""
     columns_of = constraint_dependencies(setup.functions)
     stages = [stage]
@@ -99,8 +97,8 @@ def _minor_block(setup: PreparedMechanism, stage: Block, z: Array, with_earlier:
     least = np.concatenate([setup.min_column_scale, np.ones(len(setup.inputs.u))])[many]
     sizes = column_norms(own, least)
     held = rank(own / sizes, MIN_REGULARITY, unit=1.0)
-    too_many = (len(rows) - held) * (len(many) - held) > MAX_MINORS
-    if held == min(own.shape) or held >= MAX_MINOR_RANK or too_many:
+    too_many = (len(rows) - held) * (len(many) - held) > MAX_CONDITIONS
+    if held == min(own.shape) or too_many:
         return None
     return LowRankBlock(tuple(rows), tuple(many), setup.row_scale[rows], sizes, held)
 

@@ -45,7 +45,7 @@ def constraints_at(value):
     """All constraints of a mechanism and its coordinates in the file's position."""
     solver = PositionSolver(value)
     z = solver.find_assembly().z
-    w = solver.functions.coordinate_function(z, solver.inputs.u, solver.inputs.p).full().ravel()
+    w = solver.functions.coordinates(z, solver.inputs.u, solver.inputs.p)
     return FullConstraints(solver), w
 
 

@@ -198,7 +198,7 @@ def test_what_is_open_by_the_pairs_own_formulas_does_not_pass():
     u = np.repeat(solver.inputs.u[:, None], 3, axis=1)
     z[0, 1] += 1e-9
     p[-1, 2] += 1e-9
-    w = solver.functions.coordinate_function(z, u, p).full()
+    w = solver.functions.coordinates(z.T, u.T, p.T).T
     left = DesignResidualCheck(solver.residual_check, solver.mechanism, solver.functions, p).worst_residual(w, u)
     assert (left <= solver.tolerance).tolist() == [True, False, False]
 

@@ -15,11 +15,10 @@ from planar.batch.march.llvm.runner import LLVMRunner
 from planar.batch.march.numpy import runner as numpy_runner
 from planar.batch.march.numpy.runner import NumpyRunner
 from planar.batch.reference_design import reference_design
-from planar.codegen import instructions, llvm_compile
+from planar.codegen import instructions, llvm_compile, printed_formula
 from planar.codegen.aligned_arrays import allocate_aligned
 from planar.codegen.instructions import MAX_INSTRUCTIONS, CosSin, expand_angle_sums
 from planar.equations.mechanism_numbers import equation_structure
-from planar.foundation import printed_formula
 from planar.foundation.errors import BadInput, Outcome
 from planar.foundation.instruction_list import InstructionList, UnsupportedOperation
 from planar.model.mechanism import named_points

@@ -11,6 +11,7 @@ import planar
 from planar.equations import assembled_equations
 from planar.equations.functions import EquationFunctions
 from planar.equations.mechanism_numbers import equation_structure
+from planar.equations.rates import rate_symbols, time_derivatives
 from planar.equations.sparse_matrices import SparseMatrices
 from planar.equations.symbolic_equations import build_equations
 from planar.model.pairs import pair_types
@@ -125,3 +126,27 @@ def test_what_is_not_defined_at_a_place_is_not_a_number():
     few, many = (form.of_designs(z[:count], u[:count], 0.0 * p) for count in (1, 7))
     assert np.isnan(few[0]).any()
     np.testing.assert_array_equal(np.isnan(few[0]), np.isnan(many[0][:, :1]))
+
+
+@pytest.mark.parametrize("stem", COMPARED)
+def test_what_is_carried_out_on_jets_is_what_casadi_derives(stem):
+    e = equations_of(stem)
+    functions = EquationFunctions(e)
+    z, u, p = random_place(e, 3)
+    y = np.hstack([z, u])
+    y1, y2, y3 = np.random.default_rng(2).normal(size=(3, *y.shape))
+    both, symbols = ca.vertcat(e.F, e.w), rate_symbols(e.y, 3)
+    rates = time_derivatives(both, e.y, *symbols)
+    slopes = [ca.jacobian(each, e.y) for each in (both, *rates[:2])]
+    sizes = ca.mtimes(ca.fabs(ca.jacobian(both, e.p)), ca.fabs(e.p)) + ca.mtimes(ca.fabs(slopes[0]), ca.fabs(e.y))
+    derived = ca.Function("derived", [e.y, *symbols, e.p], [rates[2], sizes, *slopes])
+    third = np.hstack(functions.third_rates(y, y1, y2, y3, p))
+    terms = functions.rounding_terms(y, y1, y2, p)
+    for k in range(len(y)):
+        expected = [each.full() for each in derived(y[k], y1[k], y2[k], y3[k], p)]
+        for values, of_casadi in zip((third[k], terms.term_sum[k]), expected, strict=False):
+            np.testing.assert_allclose(values, of_casadi[:, 0], rtol=1e-9, atol=1e-9 * (1.0 + np.abs(of_casadi).max()))
+        for values, of_casadi in zip(terms[2:], expected[2:], strict=True):
+            np.testing.assert_allclose(values[k], of_casadi, rtol=1e-9, atol=1e-9 * (1.0 + np.abs(of_casadi).max()))
+        change = functions.jacobian_changes(y[k], y1[k : k + 1], p)[0]
+        np.testing.assert_allclose(change, expected[3][: len(change)], rtol=1e-9, atol=1e-9)

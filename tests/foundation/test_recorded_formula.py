@@ -4,10 +4,10 @@ import casadi as ca
 import numpy as np
 import pytest
 
+from planar.codegen.printed_formula import MAX_INTERPRETED_CALLS, FormulaFunction
 from planar.foundation.geometry import Frame
 from planar.foundation.instruction_list import Instruction
 from planar.foundation.jets import atan2, cos, sign_of, sin, sqrt, tan, value_between, within_turn
-from planar.foundation.printed_formula import MAX_INTERPRETED_CALLS, FormulaFunction
 from planar.foundation.recorded_formula import RecordedFormula, record_formula
 from planar.model.pairs import pair_types
 

@@ -18,10 +18,11 @@ from planar.model.pairs import pair_types
 ROOT = Path(planar.__file__).parent
 FLOORS = (
     {"foundation"},
+    {"codegen"},
     {"model"},
     {"formats"},
     {"equations", "results", "document"},
-    {"solving", "codegen"},
+    {"solving"},
     {"dynamics", "assemblies"},
     {"derivatives"},
     {"batch"},
@@ -56,7 +57,7 @@ LIBRARIES = {
         "structures",
         "synthesis",
     },
-    "casadi": {"assemblies", "batch", "codegen", "derivatives", "dynamics", "equations", "pages", "synthesis"},
+    "casadi": {"assemblies", "batch", "derivatives", "dynamics", "equations", "pages", "synthesis"},
     "networkx": {"model", "structures"},
     "clarabel": {"dynamics"},
     "threadpoolctl": {"foundation"},

@@ -123,7 +123,7 @@ def test_a_place_on_the_side_of_a_link_lies_in_its_line_unless_alt_is_held(sheet
     sheet.click(place + 30 * way)
     sheet.window.keyboard.up("Alt")
     first, second = sheet.file()["links"]["AB"]["points"].values()
-    assert first[1] == 0
+    assert first[1] == pytest.approx(0, abs=1e-9)
     assert first[0] == pytest.approx(36.7, abs=step / 10)
     assert first[0] / step * 10 == pytest.approx(round(first[0] / step * 10), abs=1e-9)
     assert second == pytest.approx([66.7, off], abs=off / 2)

@@ -8,12 +8,12 @@ import casadi as ca
 import numpy as np
 
 from planar.batch.march.kernel import KernelEquations, KernelInstructions, Operand
+from planar.codegen.printed_formula import PrintedFunction, compile_numpy
 from planar.equations.linear import solve_by_elimination
 from planar.equations.rates import block_jacobian
 from planar.equations.symbolic_equations import Block
 from planar.foundation.arrays import ComplexArray
 from planar.foundation.instruction_list import UnsupportedOperation, required_values
-from planar.foundation.printed_formula import PrintedFunction, compile_numpy
 from planar.model.pairs import MeasureKind
 
 ANALYTIC_OPERATIONS = frozenset({"input", "const", "add", "sub", "mul", "div", "neg", "cos", "sin"})

@@ -18,8 +18,8 @@ from planar.batch.closed_form.joined_blocks import (
 )
 from planar.batch.march.backend import DesignBatch
 from planar.batch.march.kernel import KernelBlock, KernelEquations, KernelInstructions, Operand
+from planar.codegen.printed_formula import PrintedFunction, compile_numpy
 from planar.foundation.instruction_list import UnsupportedOperation, required_values
-from planar.foundation.printed_formula import PrintedFunction, compile_numpy
 
 Array = np.ndarray
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import casadi as ca
 import numpy as np
 
-from planar.codegen.javascript import write_javascript
 from planar.equations.coordinates import frames_from_coordinates
 from planar.equations.rates import first_and_second_rates
 from planar.foundation.errors import Outcome
@@ -13,6 +12,7 @@ from planar.foundation.jets import Jet
 from planar.model.link_shapes import LinkShape
 from planar.model.mechanism import Mechanism, links_counting_turns, relative_motions
 from planar.model.pairs import MeasureKind
+from planar.pages.javascript import write_javascript
 from planar.reports.columns import run_columns
 from planar.results.motion import Motion
 from planar.results.records import InputMotion

@@ -9,12 +9,12 @@ from typing import Any
 
 import casadi as ca
 
-from planar.codegen.javascript import write_javascript
 from planar.document.dimensions import change_dimension, link_lengths
 from planar.equations.elimination import stack_expressions
 from planar.equations.mechanism_numbers import shapes_of_links
 from planar.foundation.geometry import Vector
 from planar.model.mechanism import Mechanism
+from planar.pages.javascript import write_javascript
 
 
 @total_ordering

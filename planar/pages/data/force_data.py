@@ -9,7 +9,6 @@ from typing import Any
 import casadi as ca
 
 from planar.analysis.motion.mechanical_advantage import loaded_outputs
-from planar.codegen.javascript import write_javascript
 from planar.document.dimensions import change_dimension
 from planar.drawing.forces.action_arrows import ActionSymbol, action_symbols, reaction_symbols
 from planar.dynamics.forces import forces
@@ -26,6 +25,7 @@ from planar.pages.data.action_parameters import action_parameters, parameter_dat
 from planar.pages.data.balance_rows import BalanceRows
 from planar.pages.data.dimension_numbers import DimensionNumbers
 from planar.pages.data.friction_data import contact_data
+from planar.pages.javascript import write_javascript
 from planar.reports.tables.forces.position_forces import undetermined_sentences
 from planar.results.motion import State
 

@@ -11,7 +11,6 @@ import numpy as np
 from planar.analysis.centres.centrodes import usual_links
 from planar.assemblies.circuits.circuits import Circuits, circuits
 from planar.assemblies.modes import Mode, modes
-from planar.codegen.javascript import write_javascript
 from planar.document.dimensions import Dimension, change_dimension
 from planar.drawing.scheme.link_bodies import outline_point_names
 from planar.equations.mechanism_numbers import scale_lengths, shapes_of_links
@@ -39,6 +38,7 @@ from planar.pages.data.scheme_data import motion_positions, scheme_data
 from planar.pages.data.stop_data import stop_data, stop_position_function
 from planar.pages.data.tolerance_data import tolerance_data
 from planar.pages.data.unit_data import unit_choices, unit_data
+from planar.pages.javascript import write_javascript
 from planar.solving.position import PositionSolver, solve, solved_mechanism
 from planar.solving.rest_position import rest_position
 
@@ -164,13 +164,14 @@ def _computed_page_data(mechanism: Mechanism, z: np.ndarray | None) -> tuple[dic
     }
     acting = force_data(numbers, mechanism, state, solver.unit)
     data["forces"] = acting and acting[0]
+    formulas = program.formulas.recorded
     functions = [
         numbers.to_javascript(),
         drawing.to_javascript(),
-        write_javascript("positions", program.coordinate_function),
-        write_javascript("kinematics", program.kinematics_function),
+        write_javascript("positions", formulas.coordinate_function),
+        write_javascript("kinematics", formulas.dense_kinematics_function),
     ]
-    functions += [write_javascript(f"closing{k}", program.block_function(stage)) for k, stage in enumerate(e.blocks)]
+    functions += [write_javascript(f"closing{k}", formulas.block_function(stage)) for k, stage in enumerate(e.blocks)]
     functions.append(reported_function(mechanism, solver, numbers.d, numbers.shapes))
     functions.append(stop_position_function(solver, numbers.d, numbers.shapes))
     stages = ",".join(f"closing{k}" for k in range(len(e.blocks)))

@@ -7,9 +7,9 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from planar.codegen.javascript import write_javascript
 from planar.equations.coordinates import frames_from_coordinates
 from planar.model.link_shapes import LinkShape
+from planar.pages.javascript import write_javascript
 from planar.solving.position import PositionSolver
 
 

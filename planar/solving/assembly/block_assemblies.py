@@ -9,7 +9,7 @@ import numpy as np
 
 from planar.equations.coordinates import frames_from_coordinates
 from planar.equations.functions import EquationFunctions
-from planar.equations.minors import constraint_dependencies
+from planar.equations.rank_conditions import constraint_dependencies
 from planar.equations.symbolic_equations import Block, slice_length
 from planar.foundation.angles import distances, wrap_angle
 from planar.foundation.arrays import Array

@@ -181,12 +181,11 @@ def _step_to_lower_rank(curve: SolutionCurve, y: Array, constraints: _Decomposit
     else:
         closing = -right[regular].T @ ((left[:, regular].T @ residual) / values[regular])
     forms, defects = [], []
-    for weights in left_null.T:
-        slopes = curve.weighted_hessian_products(y, weights, null)
+    if not left_null.shape[1]:
+        return closing
+    for weights, slopes in zip(left_null.T, curve.weighted_hessian_products(y, left_null, null), strict=True):
         forms.append(slopes @ null)
         defects.append(weights @ jacobian @ null + slopes @ closing)
-    if not forms:
-        return closing
     along = np.linalg.lstsq(np.concatenate(forms), -np.concatenate(defects), rcond=1e-12)[0]
     return closing + null @ along
 
@@ -199,8 +198,7 @@ class _BranchConditions:
         self.u, self.s, self.vt = np.linalg.svd(curve.jacobian(y))
         self.rank = int(np.sum(self.s > EXACT_SINGULAR_TOLERANCE * max(self.s[0], 1.0)))
         self.null, self.left_null = self.vt[self.rank :].T, self.u[:, self.rank :]
-        forms = [curve.weighted_hessian_products(y, rows, self.null) @ self.null for rows in self.left_null.T]
-        self.forms = np.array(forms).reshape(-1, *2 * [self.null.shape[1]])
+        self.forms = curve.weighted_hessian_products(y, self.left_null, self.null) @ self.null
 
     def branch_along(self, c: Array) -> CurvePoint | None:
         """The way with tangent null c and its second derivative; None where the third order leaves it open."""

@@ -191,11 +191,6 @@ class SolutionCurve(ImplicitCurve):
         """A direction along the curve, as one of unknowns and inputs."""
         return np.concatenate([direction[:-1], direction[-1] * self.input_direction])
 
-    def narrow_columns(self, matrix: Array) -> Array:
-        """A matrix whose columns belong to unknowns and inputs, as one whose columns belong to y."""
-        many = len(matrix[0]) - len(self.input_direction) if matrix.size else 0
-        return np.hstack([matrix[:, :many], matrix[:, many:] @ self.input_direction[:, None]])
-
     def residuals_and_jacobian(self, y: Array) -> tuple[Array, Array | SparseMatrices]:
         """F (rows,) and J (rows, n + 1)."""
         left, slope = self.functions.residuals_and_jacobian(y[:-1], self.inputs(y), self.p)
@@ -214,22 +209,21 @@ class SolutionCurve(ImplicitCurve):
         wide = self.widen_direction(direction)
         return self.functions.kinematics(self.unknowns_and_inputs(y), wide, 0.0 * wide, self.p).F2
 
-    def weighted_hessian(self, y: Array, weights: Array) -> Array:
-        """The second derivatives (n + 1, n + 1) of the sum of the rows of F, each times its weight (rows,)."""
-        hessian = self.functions.weighted_hessian(self.unknowns_and_inputs(y), weights, self.p)
-        return self.narrow_columns(self.narrow_columns(hessian).T)
-
     def weighted_hessian_products(self, y: Array, weights: Array, directions: Array) -> Array:
-        """The same times directions (n + 1, k), as rows (k, n + 1); of many unknowns by differences of the Jacobian."""
+        """The second derivatives of sums of the rows of F, each times its weight (rows, sums), times directions
+        (n + 1, k): (sums, k, n + 1); of many unknowns by differences of the Jacobian."""
         if not self.functions.is_sparse:
-            products: Array = directions.T @ self.weighted_hessian(y, weights)
-            return products
-        rows = []
+            wide = np.array([self.widen_direction(direction) for direction in directions.T])
+            changes = self.functions.jacobian_changes(self.unknowns_and_inputs(y), wide, self.p)
+            of_inputs = changes.shape[2] - len(self.input_direction)
+            along = changes[..., of_inputs:] @ self.input_direction[:, None]
+            return (weights.T @ np.concatenate([changes[..., :of_inputs], along], axis=2)).swapaxes(0, 1)
+        products = []
         for direction in directions.T:
             step = DIFFERENCE_STEP * direction
-            ahead, behind = (weights @ self.jacobian(place) for place in (y + step, y - step))
-            rows.append((ahead - behind) / (2.0 * DIFFERENCE_STEP))
-        return np.array(rows)
+            ahead, behind = (weights.T @ self.jacobian(place) for place in (y + step, y - step))
+            products.append((ahead - behind) / (2.0 * DIFFERENCE_STEP))
+        return np.array(products).swapaxes(0, 1)
 
     def is_closed(self, y: Array) -> bool:
         """Whether a point passes the residual check."""

@@ -7,7 +7,6 @@ from typing import NamedTuple
 import numpy as np
 
 from planar.equations.linear import inverse_arrays
-from planar.equations.rounding_errors import rounding_terms
 from planar.foundation.arrays import Array, BoolArray, IntArray
 from planar.foundation.errors import NoAnswer, Outcome
 from planar.model.pairs import MeasureKind
@@ -151,7 +150,7 @@ def rate_errors(setup: PreparedMechanism, y: Array, y1: Array, y2: Array) -> Rat
 def _rate_errors(setup: PreparedMechanism, y: Array, y1: Array, y2: Array) -> RateErrors:
     e = setup.equations
     rows, unknowns = len(e.rows), len(e.unknowns)
-    found = rounding_terms(e, y, y1, y2, setup.inputs.p)
+    found = setup.functions.rounding_terms(y, y1, y2, setup.inputs.p)
     slope, first, second = (
         np.abs(each) for each in (found.jacobian, found.first_rate_jacobian, found.second_rate_jacobian)
     )

@@ -19,9 +19,9 @@ from planar.batch.march.kernel import (
 from planar.batch.march.numpy.systems import newton_step, stack_values
 from planar.batch.march.prediction import MAX_TURN_PER_STEP, PREDICTOR_ORDER, extrapolation_weights
 from planar.batch.march.regularity import LEAST_KERNEL_REGULARITY, LEAST_START_REGULARITY, least_regularity
+from planar.codegen.printed_formula import PrintedFunction, compile_numpy
 from planar.equations.linear import solve_vectors
 from planar.foundation.instruction_list import UnsupportedOperation, required_values
-from planar.foundation.printed_formula import PrintedFunction, compile_numpy
 
 Array = np.ndarray
 OperandArrays = dict[Operand, Any]

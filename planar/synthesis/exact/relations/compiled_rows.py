@@ -10,10 +10,10 @@ import casadi as ca
 import numpy as np
 
 from planar.codegen.complex_kernel import LANES, ComplexKernel
+from planar.codegen.printed_formula import PrintedFunction, compile_numpy
 from planar.equations.generic_evaluation import inline_function
 from planar.foundation.arrays import Array, ComplexArray
 from planar.foundation.instruction_list import InstructionList
-from planar.foundation.printed_formula import PrintedFunction, compile_numpy
 from planar.synthesis.exact.relations.elimination import EntryRows
 
 

@@ -1,17 +1,21 @@
-"""Instruction lists as Python source: the same values for floats and for arrays of any shape, one statement each."""
+"""Instruction lists as Python source, for floats and for arrays of any shape; what is often used as machine code."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cached_property
-from typing import Any
+from importlib.util import find_spec
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from planar.foundation.arrays import Array
 from planar.foundation.instruction_list import Instructions, UnsupportedOperation, required_values
 from planar.foundation.recorded_formula import RecordedFormula
+
+if TYPE_CHECKING:
+    from planar.codegen.formula_kernel import FormulaKernel
 
 OPERATORS = {"add": "+", "sub": "-", "mul": "*", "div": "/"}
 COMPARISONS = {"less": "<", "most": "<="}
@@ -46,6 +50,12 @@ MAX_INTERPRETED_CALLS = 12
 """Calls that take less time, the formula's instructions carried out one by one, than printing it."""
 MAX_FLOAT_POSITIONS = 5
 """So few positions take less time one by one, by floats, than by arrays."""
+NUMPY_INSTRUCTION_TIME, NUMPY_NUMBER_TIME = 1e-6, 1e-9
+"""Seconds that an instruction takes on arrays, whatever their length, and for a number of them."""
+MIN_COMPILED_TIME, COMPILED_TIME_PER_INSTRUCTION = 0.03, 3e-4
+"""Seconds that a formula is computed by numpy before its machine code is made, which takes about as long."""
+MAX_COMPILED_INSTRUCTIONS = 4_000
+"""Longer ones take too long to compile."""
 PrintedFunction = Callable[..., tuple[Any, ...]]
 """Arrays, or numbers, of the operands in their order, to the values that are wanted."""
 
@@ -134,6 +144,8 @@ class FormulaFunction:
         self.formula, self.argument_counts, self.shapes = formula, tuple(argument_counts), tuple(shapes)
         self._sizes = [columns * rows for columns, rows in shapes]
         self._call_count = 0
+        self._array_time = 0.0
+        self._kernels: dict[tuple[bool, ...], FormulaKernel] = {}
         self._slices = [slice(sum(self._sizes[:k]), sum(self._sizes[: k + 1])) for k in range(len(shapes))]
 
     @cached_property
@@ -195,11 +207,35 @@ class FormulaFunction:
                 columns: Array = np.empty((count, sum(self._sizes)), dtype=object)
                 columns[:] = [self._interpret(position) for position in positions]
                 return columns.T
-            return np.array([self.values(*position) for position in positions], dtype=float).reshape(count, -1).T
+            columns = np.array([self.values(*position) for position in positions], dtype=float)
+            return columns.reshape(count, sum(self._sizes)).T
+        kernel = self._kernel(count, arguments)
+        if kernel is not None:
+            return kernel(count, arguments)
         results: Array = np.empty((sum(self._sizes), count))
         for row, value in zip(results, self._array_values(arguments), strict=True):
             row[:] = value
         return results
+
+    def _kernel(self, count: int, arguments: Sequence[Array]) -> FormulaKernel | None:
+        """The formula's machine code, once what numpy took for it is more than compiling takes; None before."""
+        instructions = len(self.formula.instructions)
+        self._array_time += instructions * (NUMPY_INSTRUCTION_TIME + count * NUMPY_NUMBER_TIME)
+        if self._array_time < MIN_COMPILED_TIME + instructions * COMPILED_TIME_PER_INSTRUCTION:
+            return None
+        if instructions > MAX_COMPILED_INSTRUCTIONS or find_spec("llvmlite") is None:
+            self._array_time = -np.inf
+            return None
+        varies = tuple(argument.ndim > 1 for argument in arguments)
+        if varies not in self._kernels:
+            from planar.codegen.formula_kernel import compile_kernel  # llvmlite takes long to load
+
+            try:
+                self._kernels[varies] = compile_kernel(self.formula, self.argument_counts, varies)
+            except UnsupportedOperation:
+                self._array_time = -np.inf
+                return None
+        return self._kernels[varies]
 
     def evaluate_batch(self, count: int, *arguments: Array) -> list[Array]:
         """The results (positions, columns, rows); arguments (positions, entries), or (entries,) for all alike."""

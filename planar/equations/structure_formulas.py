@@ -1,0 +1,260 @@
+"""The equations of one structure as recorded formulas of all elements one after the other.
+
+What is derived of them, rates and derivatives along directions, is computed by carrying the same instructions out on
+jets.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from functools import cached_property
+from itertools import chain
+from typing import NamedTuple
+
+import numpy as np
+
+from planar.codegen.printed_formula import FormulaFunction
+from planar.equations.assembled_equations import AssembledEquations, AssembledJacobians
+from planar.equations.closed_form_assemblies import ArrayFunction
+from planar.equations.sparse_matrices import SparsePattern
+from planar.equations.symbolic_equations import Block, ConstraintEquations
+from planar.foundation.arrays import Array
+from planar.foundation.instruction_list import Instruction
+from planar.foundation.jets import Jet, Scalar, value_and_rates
+from planar.foundation.recorded_formula import (
+    RecordedFormula,
+    formula_of_results,
+    number_of,
+    recorded_arguments,
+)
+
+
+class RecordedEquations(NamedTuple):
+    """Equations as formulas of (z, u, p), one after the other."""
+
+    closing: RecordedFormula
+    "-> F (rows,), then the entries of dF/dy by the pattern"
+    coordinates: RecordedFormula
+    "-> w (coordinates,)"
+    pattern: SparsePattern
+    "where the entries of dF/dy stand"
+
+
+def record_equations(assembled: AssembledEquations) -> RecordedEquations:
+    """The equations as elements evaluate them."""
+    instructions, (z, u, p) = recorded_arguments(assembled.argument_counts)
+
+    def formula_of(values: Iterable[Scalar]) -> RecordedFormula:
+        return formula_of_results(instructions, [number_of(value, instructions) for value in values])
+
+    residuals, entries = assembled.residuals_and_jacobians(z[None], u[None], p)
+    coordinates = assembled.coordinates(z[None], u[None], p)
+    return RecordedEquations(formula_of([*residuals[0], *entries[0]]), formula_of(coordinates[0]), assembled.pattern)
+
+
+def _derive_equations(e: ConstraintEquations) -> RecordedEquations:
+    """Those that no elements stand for: of the position of least misfit."""
+    import casadi as ca  # few structures have such equations
+
+    from planar.equations.elimination import stack_expressions
+    from planar.equations.generic_evaluation import recorded_function
+
+    sparsity = e.jacobian.sparsity()
+    entries = [e.jacobian.nz[k] for k in range(e.jacobian.nnz())]
+    pattern = SparsePattern(e.jacobian.shape, np.array(sparsity.row(), dtype=int), np.array(sparsity.colind()))
+    closing, coordinates = (
+        recorded_function(ca.Function("formula", [e.z, e.u, e.p], [ca.densify(values)]))
+        for values in (ca.vertcat(e.F, stack_expressions(entries)), e.w)
+    )
+    return RecordedEquations(closing, coordinates, pattern)
+
+
+class RoundingTerms(NamedTuple):
+    """What carries round-off from numbers to F and w, one after the other (samples, rows and coordinates)."""
+
+    value: Array
+    term_sum: Array
+    "the sum of the sizes of all numbers in them, each by its slope: a part of it is lost where all are rounded by it"
+    jacobian: Array
+    "by y = (z, u), (samples, rows and coordinates, y)"
+    first_rate_jacobian: Array
+    "the Jacobian of the first rates, alike"
+    second_rate_jacobian: Array
+    "the Jacobian of the second rates"
+
+
+class StructureFormulas:
+    """The equations of one structure as formulas; evaluated as by `AssembledEquations`."""
+
+    def __init__(self, equations: ConstraintEquations):
+        assembled = equations.assembled
+        recorded = _derive_equations(equations) if assembled is None else record_equations(assembled)
+        self._closing, self._coordinates, self.pattern = recorded
+        self._rows, self._coordinate_count = len(equations.rows), len(equations.coordinates)
+        self._y_count = self.pattern.shape[1]
+        self._counts = equations.argument_counts
+        self.unknown_count = self._counts[0]
+
+    @property
+    def recorded(self) -> StructureFormulas:
+        """The same as formulas that can be printed."""
+        return self
+
+    @cached_property
+    def _residuals(self) -> RecordedFormula:
+        return self._closing.part(slice(0, self._rows))
+
+    @cached_property
+    def _entries(self) -> RecordedFormula:
+        """The entries of dF/dy."""
+        return self._closing.part(slice(self._rows, None))
+
+    @cached_property
+    def closing(self) -> FormulaFunction:
+        """(z, u, p) -> F (rows,), then the entries of dF/dy."""
+        return FormulaFunction(self._closing, self._counts, ((1, len(self._closing.results)),))
+
+    @cached_property
+    def coordinate_function(self) -> FormulaFunction:
+        """(z, u, p) -> w (1, coordinates)."""
+        return FormulaFunction(self._coordinates, self._counts, ((1, self._coordinate_count),))
+
+    @cached_property
+    def kinematics_function(self) -> FormulaFunction:
+        """(y, y1, y2, p) -> F and w with their first and second rates (3, F and w), then the entries of dF/dy."""
+        counts = *(3 * [self._y_count]), self._counts[-1]
+        instructions, (y, y1, y2, p) = recorded_arguments(counts)
+        of_rates = [*map(Jet, y, y1, y2), *p]
+        both = *self._residuals.evaluate(of_rates), *self._coordinates.evaluate(of_rates)
+        orders = zip(*map(value_and_rates, both), strict=True)
+        entries = self._entries.evaluate([*y, *p])
+        results = [number_of(value, instructions) for value in (*chain.from_iterable(orders), *entries)]
+        return FormulaFunction(formula_of_results(instructions, results), counts, ((1, len(results)),))
+
+    def coordinates(self, z: Array, u: Array, p: Array) -> Array:
+        """w (samples, coordinates) at z (samples, unknowns), u and p (numbers,) or alike."""
+        return self.coordinate_function.evaluate_entries(len(z), z.T, u.T, p.T).T
+
+    def residuals_and_jacobians(self, z: Array, u: Array, p: Array) -> AssembledJacobians:
+        """F and the entries of dF/dy by the pattern at samples."""
+        values = self.closing.evaluate_entries(len(z), z.T, u.T, p.T).T
+        return AssembledJacobians(values[:, : self._rows], values[:, self._rows :])
+
+    def kinematics(self, y: Array, y1: Array, y2: Array, p: Array) -> tuple[Array, Array, Array]:
+        """F (samples, 3, rows) and w (samples, 3, coordinates) with their first and second rates, and the entries of
+        dF/dy."""
+        values = self.kinematics_function.evaluate_entries(len(y), y.T, y1.T, y2.T, p.T).T
+        split = 3 * (self._rows + self._coordinate_count)
+        both = values[:, :split].reshape(len(y), 3, -1)
+        return both[..., : self._rows], both[..., self._rows :], values[:, split:]
+
+    def _rate_function(self, formula: RecordedFormula, order: int) -> FormulaFunction:
+        """(y, y1, ..., p) -> the time derivatives of that order of a formula's results, from y and as many rates."""
+        counts = *([self._y_count] * (order + 1)), self._counts[-1]
+        instructions, (*rates, p) = recorded_arguments(counts)
+        results = formula.evaluate([*map(Jet, *rates), *p])
+        numbers = [number_of(each.parts[order] if isinstance(each, Jet) else 0.0, instructions) for each in results]
+        return FormulaFunction(formula_of_results(instructions, numbers), counts, ((1, len(numbers)),))
+
+    @cached_property
+    def _third_residual_rates(self) -> FormulaFunction:
+        return self._rate_function(self._residuals, 3)
+
+    @cached_property
+    def _third_coordinate_rates(self) -> FormulaFunction:
+        return self._rate_function(self._coordinates, 3)
+
+    @cached_property
+    def _entry_rates(self) -> FormulaFunction:
+        return self._rate_function(self._entries, 1)
+
+    def third_residual_rates(self, rates: Sequence[Array], p: Array) -> Array:
+        """The third time derivatives of F (samples, rows), from y and its first to third rates, each (samples, y)."""
+        return self._third_residual_rates.evaluate_entries(len(rates[0]), *(each.T for each in rates), p).T
+
+    def third_coordinate_rates(self, rates: Sequence[Array], p: Array) -> Array:
+        """The same of w (samples, coordinates)."""
+        return self._third_coordinate_rates.evaluate_entries(len(rates[0]), *(each.T for each in rates), p).T
+
+    def jacobian_rates(self, rates: Sequence[Array], p: Array) -> Array:
+        """dF/dy and as many of its time derivatives as y has, (orders, samples, rows, y), from y and its rates, each
+        (samples, y)."""
+        arguments = [*(Jet(*(each[:, k] for each in rates)) for k in range(self._y_count)), *p.tolist()]
+        jacobians: Array = np.zeros((len(rates), len(rates[0]), *self.pattern.shape))
+        entries = self._entries.evaluate(arguments)
+        for row, column, entry in zip(self.pattern.rows, self.pattern.columns, entries, strict=True):
+            if isinstance(entry, Jet):
+                for order, value in enumerate(entry.parts):
+                    jacobians[order, :, row, column] = value
+            else:
+                jacobians[0, :, row, column] = entry
+        return jacobians
+
+    def jacobian_changes(self, y: Array, directions: Array, p: Array) -> Array:
+        """How dF/dy (rows, y) at y (y,), or places (k, y), changes along directions (k, y): (k, rows, y)."""
+        changes: Array = np.zeros((len(directions), *self.pattern.shape))
+        entries = self._entry_rates.evaluate_entries(len(directions), y.T, directions.T, p)
+        changes[:, self.pattern.rows, self.pattern.columns] = entries.T
+        return changes
+
+    def rounding_terms(self, y: Array, y1: Array, y2: Array, p: Array) -> RoundingTerms:
+        """What carries round-off at samples y = (z, u) with first and second rates, each (samples, y)."""
+        count, values = self._y_count, p.tolist()
+
+        def both(arguments: Sequence[Scalar]) -> list[Scalar]:
+            return [*self._residuals.evaluate(arguments), *self._coordinates.evaluate(arguments)]
+
+        # in time, and of y by every entry of it
+        units = np.eye(count)[:, None]
+        of_y = [
+            Jet(Jet(y[:, [k]], unit), Jet(y1[:, [k]], 0.0 * unit), Jet(y2[:, [k]], 0.0 * unit))
+            for k, unit in enumerate(units)
+        ]
+        slopes: Array = np.zeros((3, len(y), self._rows + self._coordinate_count, count))
+        value: Array = np.zeros(slopes.shape[1:3])
+        for row, result in enumerate(both([*of_y, *values])):
+            orders = result.parts if isinstance(result, Jet) else (result,)
+            for order, part in enumerate(orders):
+                if isinstance(part, Jet):
+                    slopes[order, :, row] = part.parts[1]
+            first = orders[0].parts[0] if isinstance(orders[0], Jet) else orders[0]
+            value[:, row] = np.broadcast_to(first, (len(y), 1))[:, 0]
+        of_p = [Jet(number, unit) for number, unit in zip(values, np.eye(len(p))[:, None], strict=True)]
+        term_sum = np.abs(slopes[0]) @ np.abs(y)[..., None]
+        for row, result in enumerate(both([*(y[:, [k]] for k in range(count)), *of_p])):
+            if isinstance(result, Jet):
+                term_sum[:, row] += np.abs(np.broadcast_to(result.parts[1], (len(y), len(p)))) @ np.abs(p)[:, None]
+        return RoundingTerms(value, term_sum[..., 0], *slopes)
+
+    def block_call(self, block: Block) -> ArrayFunction:
+        """(z, u, p) -> F of a block (1, rows), and the columns of its Jacobian in its own unknowns (unknowns, rows)."""
+        return self.block_function(block)
+
+    def block_function(self, block: Block) -> FormulaFunction:
+        """The formula of `block_call`."""
+        rows, unknowns = (range(part.start, part.stop) for part in (block.rows, block.unknowns))
+        formula = self._with_dense_entries(self._closing, self._closing.results[block.rows], rows, unknowns)
+        return FormulaFunction(formula, self._counts, ((1, len(rows)), (len(unknowns), len(rows))))
+
+    @property
+    def dense_kinematics_function(self) -> FormulaFunction:
+        """`kinematics_function` with all columns of dF/dy (y, rows) in place of its entries."""
+        function, shape = self.kinematics_function, self.pattern.shape
+        split = 3 * (self._rows + self._coordinate_count)
+        results = function.formula.results[:split]
+        formula = self._with_dense_entries(function.formula, results, *map(range, shape))
+        return FormulaFunction(formula, function.argument_counts, ((3, split // 3), shape[::-1]))
+
+    def _with_dense_entries(
+        self, formula: RecordedFormula, results: Sequence[int], rows: range, columns: range
+    ) -> RecordedFormula:
+        """Some results of a formula whose last ones are the entries of dF/dy, and behind them columns of a part of it,
+        every entry of them written."""
+        zero = len(formula.instructions)
+        dense = np.full((len(columns), len(rows)), zero)
+        entries = formula.results[len(formula.results) - len(self.pattern.rows) :]
+        for row, column, entry in zip(self.pattern.rows, self.pattern.columns, entries, strict=True):
+            if row in rows and column in columns:
+                dense[column - columns.start, row - rows.start] = entry
+        with_zero = RecordedFormula((*formula.instructions, Instruction("const")), (*results, *dense.ravel().tolist()))
+        return with_zero.part(slice(None))
