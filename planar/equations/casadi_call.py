@@ -1,4 +1,4 @@
-"""Compiled casadi functions, read from texts, and called on arrays as they lie in memory, at one position or many."""
+"""Compiled casadi functions, called on arrays as they lie in memory, at one position or many."""
 
 from __future__ import annotations
 
@@ -17,14 +17,6 @@ CHUNK_SIZES = (256, 32, 8)
 MAX_MAPPED_ENTRIES = 20_000
 """Entries of a function's results: one of more is called for one position after the other, since to make a call of
 many positions takes long, and room."""
-
-
-def read_function(text: str | None) -> ca.Function | None:
-    """A function as casadi wrote it; None where there is none, or this build of casadi writes them otherwise."""
-    try:
-        return None if text is None else ca.Function.deserialize(text)
-    except RuntimeError:
-        return None
 
 
 def formula_text(rows: ca.SX, *symbols: ca.SX) -> str:

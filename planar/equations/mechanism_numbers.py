@@ -3,20 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from hashlib import sha256
 
-import casadi as ca
 import numpy as np
 
 from planar.foundation.arrays import Array
 from planar.foundation.jets import Scalar
-from planar.foundation.private_cache import source_stamp
 from planar.model.link_shapes import Link, LinkShape, link_shape, shape_extent
 from planar.model.mechanism import Input, Mechanism, relative_motions
 from planar.model.pairs import MeasureKind, Pair
-
-EQUATION_ROOMS = ("equations", "foundation", "model")
-"""The rooms whose files say what is derived of a structure."""
 
 
 def equation_structure(mechanism: Mechanism) -> Mechanism:
@@ -33,17 +27,6 @@ def equation_structure(mechanism: Mechanism) -> Mechanism:
         )
         object.__setattr__(mechanism, "_equation_structure", found)
     return found
-
-
-def structure_fingerprint(structure: Mechanism) -> str | None:
-    """Of a structure and all that its equations depend on; None where a pair's formulas are not of planar's files."""
-    stamp, own = source_stamp(EQUATION_ROOMS), f"{Pair.__module__.rpartition('.')[0]}."
-    if stamp is None or not all(type(pair).__module__.startswith(own) for pair in structure.pairs):
-        return None
-    inputs, links = [given.pair for given in structure.inputs], [link.name for link in structure.links]
-    parts = (structure.frame, links, inputs, structure.pairs, structure.closes_within)
-    told = (stamp, ca.CasadiMeta.version(), repr(parts))
-    return sha256("\0".join(told).encode()).hexdigest()
 
 
 def shapes_of_links(mechanism: Mechanism) -> dict[str, LinkShape]:

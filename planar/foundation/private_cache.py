@@ -15,7 +15,6 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
-from functools import cache
 from hashlib import sha256
 from pathlib import Path
 
@@ -139,31 +138,6 @@ class PrivateCache:
                 if PARTIAL_FILE_NAME.fullmatch(path.name) or (read_private(path) or b"").startswith(self.header):
                     path.unlink(missing_ok=True)
                 whole -= size
-
-
-@cache
-def source_stamp(rooms: tuple[str, ...]) -> str | None:
-    """The version of planar, and size and time of every file of some rooms; None where they are not files.
-
-    In a fingerprint it keeps apart what versions make, and what is made between two changes of one.
-    """
-    from planar import __version__
-
-    top = Path(__file__).parents[1]
-    try:
-        return "\n".join([__version__, *(each for room in rooms for each in _file_stamps(str(top / room)))])
-    except OSError:
-        return None
-
-
-def _file_stamps(folder: str) -> Iterator[str]:
-    with os.scandir(folder) as found:
-        for entry in sorted(found, key=lambda each: each.name):
-            if entry.is_dir():
-                yield from _file_stamps(entry.path)
-            elif entry.name.endswith(".py"):
-                known = entry.stat()
-                yield f"{entry.name} {known.st_size} {known.st_mtime_ns}"
 
 
 def _checksum(key: str, content: bytes) -> bytes:

@@ -15,10 +15,9 @@ from planar.batch.reference_design import reference_design
 from planar.document import files
 from planar.document.dimensions import link_lengths
 from planar.foundation.errors import BadInput, NoAnswer, Outcome
-from planar.solving.checks.branch_check import accept_steps
 from planar.solving.position import PositionSolver
 from tests.builders import block_slider_crank, designs_around, four_bar
-from tests.checks import ORDERS
+from tests.checks import ORDERS, accept_steps
 from tests.closed_forms import PARALLELOGRAM, ROCKER, TRIPLE, TURN, coupler, rates, rocker
 from tests.draws import draws, part
 from tests.known import MODELS

@@ -6,12 +6,13 @@ import pytest
 from planar.document import files
 from planar.foundation.errors import NoAnswer, Outcome
 from planar.solving import position
-from planar.solving.checks.branch_check import accept_steps, is_move_allowed
+from planar.solving.checks.branch_check import is_move_allowed
 from planar.solving.continuation.path import follow_samples, follow_to
 from planar.solving.position import PositionSolver
 from planar.solving.rates import sample_rates
 from tests.acceptance import spoil_runs
 from tests.builders import four_bar_document
+from tests.checks import accept_steps
 
 CRANK = four_bar_document(0.3, 0.9, 0.7, 1.0, 0.8, omega=2.0, alpha=1.0, sketch={"C": [0.9, 0.7]})
 

@@ -13,7 +13,7 @@ from planar.solving.checks import branch_check
 from planar.solving.position import PositionSolver
 from planar.solving.runs import samples as motion_rows
 from tests.builders import block_slider_crank, four_bar
-from tests.checks import passes_residual_check, same_angles
+from tests.checks import accept_steps, passes_residual_check, same_angles
 from tests.closed_forms import PARALLELOGRAM, ROCKER, TRIPLE, TURN, between, coupler, rates, rocker
 from tests.command import run
 from tests.draws import part
@@ -382,7 +382,7 @@ def test_the_branch_that_comes_back_from_a_limit_is_told_apart_by_its_way_and_it
             z = np.array([[beta[0][0], phi[0][0]], [beta[k][1], phi[k][1]]])
             z -= TURN * np.round((z - base) / TURN)
             assert np.all(solver.max_residuals(z, theta[:, None]) < solver.tolerance)
-            steps = branch_check.accept_steps(solver.acceptance, z, theta[:, None], solver.acceptance_scales)
+            steps = accept_steps(solver.acceptance, z, theta[:, None], solver.acceptance_scales)
             yield bool(steps[0])
 
     own, other = np.transpose([list(judged(seed)) for seed in range(40)])

@@ -27,13 +27,6 @@ class StepEnds(NamedTuple):
     distances: Array
 
 
-def accept_steps(functions: AcceptanceFunctions, z: Array, u: Array, scales: Scales) -> BoolArray:
-    """For each step of a run, z (samples, unknowns) and u (samples, inputs), whether it keeps to its branch."""
-    way = np.diff(u, axis=0)
-    before, after = (step_ends(functions, z[part], u[part], way, scales) for part in (slice(-1), slice(1, None)))
-    return keep_branch(np.diff(z, axis=0), before, after, np.sum(way * way, axis=1), functions.block_starts)
-
-
 def step_ends(functions: AcceptanceFunctions, z: Array, u: Array, way: Array, scales: Scales) -> StepEnds:
     """What is known at positions z (steps, unknowns) and u (steps, inputs) of steps by `way` (steps, inputs)."""
     judged = functions.judge(z, InputSamples(u, way, np.zeros_like(way)), scales)
