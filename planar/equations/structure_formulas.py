@@ -17,7 +17,7 @@ from planar.codegen.printed_formula import FormulaFunction
 from planar.equations.assembled_equations import AssembledEquations, AssembledJacobians
 from planar.equations.closed_form_assemblies import ArrayFunction
 from planar.equations.sparse_matrices import SparsePattern
-from planar.equations.symbolic_equations import Block, ConstraintEquations
+from planar.equations.symbolic_equations import Block, ConstraintEquations, slice_length
 from planar.foundation.arrays import Array
 from planar.foundation.instruction_list import Instruction
 from planar.foundation.jets import Jet, Scalar, value_and_rates
@@ -232,9 +232,10 @@ class StructureFormulas:
 
     def block_function(self, block: Block) -> FormulaFunction:
         """The formula of `block_call`."""
-        rows, unknowns = (range(part.start, part.stop) for part in (block.rows, block.unknowns))
-        formula = self._with_dense_entries(self._closing, self._closing.results[block.rows], rows, unknowns)
-        return FormulaFunction(formula, self._counts, ((1, len(rows)), (len(unknowns), len(rows))))
+        rows, unknowns = slice_length(block.rows), slice_length(block.unknowns)
+        residuals = self._closing.results[block.rows]
+        formula = self._with_dense_entries(self._closing, residuals, block.rows, block.unknowns)
+        return FormulaFunction(formula, self._counts, ((1, rows), (unknowns, rows)))
 
     @property
     def dense_kinematics_function(self) -> FormulaFunction:
@@ -242,19 +243,19 @@ class StructureFormulas:
         function, shape = self.kinematics_function, self.pattern.shape
         split = 3 * (self._rows + self._coordinate_count)
         results = function.formula.results[:split]
-        formula = self._with_dense_entries(function.formula, results, *map(range, shape))
+        formula = self._with_dense_entries(function.formula, results, slice(0, shape[0]), slice(0, shape[1]))
         return FormulaFunction(formula, function.argument_counts, ((3, split // 3), shape[::-1]))
 
     def _with_dense_entries(
-        self, formula: RecordedFormula, results: Sequence[int], rows: range, columns: range
+        self, formula: RecordedFormula, results: Sequence[int], rows: slice, columns: slice
     ) -> RecordedFormula:
         """Some results of a formula whose last ones are the entries of dF/dy, and behind them columns of a part of it,
         every entry of them written."""
-        zero = len(formula.instructions)
-        dense = np.full((len(columns), len(rows)), zero)
-        entries = formula.results[len(formula.results) - len(self.pattern.rows) :]
-        for row, column, entry in zip(self.pattern.rows, self.pattern.columns, entries, strict=True):
-            if row in rows and column in columns:
-                dense[column - columns.start, row - rows.start] = entry
-        with_zero = RecordedFormula((*formula.instructions, Instruction("const")), (*results, *dense.ravel().tolist()))
+        dense = np.full((rows.stop - rows.start, columns.stop - columns.start), len(formula.instructions))
+        entries, places = self.pattern.block_entries(rows, columns)
+        first = len(formula.results) - len(self.pattern.rows)
+        dense.reshape(-1)[places] = np.array(formula.results, dtype=int)[first + entries]
+        with_zero = RecordedFormula(
+            (*formula.instructions, Instruction("const")), (*results, *dense.T.ravel().tolist())
+        )
         return with_zero.part(slice(None))
