@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from math import isnan
 from typing import Any
@@ -75,7 +75,7 @@ class Cursor:
                 for key in value:
                     if not isinstance(key, str):
                         raise each.error_at(None, f"keys are texts, but here is {type(key).__name__} {key!r:.40}")
-                    replace(each, path=each.place_of(key))._check_printable(key)
+                    Cursor(value, each.place_of(key))._check_printable(key)
                 waiting += reversed([each[key] for key in value])
             elif isinstance(value, list):
                 waiting += reversed(list(each.items()))
@@ -103,7 +103,7 @@ class Cursor:
         if key not in self.fields():
             near = suggest_spelling(key, self.value, "is written {!r} the key meant?", 0.75)
             raise self.error_at(None, f"the key {key!r} is missing{near}")
-        return replace(self, value=self.value[key], path=self.place_of(key), other_keys=())
+        return Cursor(self.value[key], self.place_of(key), self.context)
 
     def object_at(self, key: str) -> Cursor:
         found = self[key]
@@ -120,7 +120,7 @@ class Cursor:
         if not isinstance(self.value, list):
             raise self.error_at(None, f"a list [...] is wanted here, not {describe_value(self.value)}")
         for index, value in enumerate(self.value):
-            yield replace(self, value=value, path=f"{self.path}[{index}]")
+            yield Cursor(value, f"{self.path}[{index}]", self.context, self.other_keys)
 
     def list_items(self, key: str) -> tuple[Cursor, ...]:
         return tuple(self[key].items()) if self.has(key) else ()

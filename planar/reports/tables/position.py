@@ -24,23 +24,25 @@ from planar.reports.number_format import (
     precision_text,
 )
 from planar.results.motion import Motion, State
-from planar.results.records import RelativeState
+from planar.results.records import PointState, RelativeState
 
 
 def solution_tables(
     state: State, comparisons: Iterable[Comparison], relatives: Mapping[str, RelativeState] | None = None
 ) -> RenderableType:
     """A solved position: links, points, pairs, relative motions, and the published values beside the solved ones."""
+    points = state.points
+    scales = _kind_scales(state, points)
     parts: list[RenderableType] = [
         _state_heading(state),
         Text(),
-        _links_table(state),
-        _points_table(state),
-        _pair_tables(state),
+        _links_table(state, scales),
+        _points_table(state, points, scales),
+        _pair_tables(state, scales),
     ]
     if state.misfits:
         parts.append(misfit_table(state))
-    parts += [_relative_table(text, each, state) for text, each in (relatives or {}).items()]
+    parts += [_relative_table(text, each, state, scales) for text, each in (relatives or {}).items()]
     comparisons = tuple(comparisons)
     if comparisons:
         parts.append(published_table(comparisons, state.mechanism.units))
@@ -85,16 +87,16 @@ def _state_heading(state: State) -> RenderableType:
     return Group(*lines)
 
 
-def kind_scales(state: State) -> dict[str, float]:
+def _kind_scales(state: State, named_points: Mapping[str, PointState]) -> dict[str, float]:
     """By kinds of quantity the greatest size (SI) of a position: what is round-off of it is printed as 0."""
     points, links = state.scales_of_points, state.scales_of_links
-    size = max((float(np.hypot(*point.position)) for point in state.points.values()), default=1.0) or 1.0
+    size = max((float(np.hypot(*point.position)) for point in named_points.values()), default=1.0) or 1.0
     rates = {"velocity": points[0], "acceleration": points[1]}
     turning = {"angular velocity": links[0], "angular acceleration": links[1]}
     return {"length": size, "angle": 1.0, **rates, **turning}
 
 
-def _links_table(state: State) -> FittedTable:
+def _links_table(state: State, scales: Mapping[str, float]) -> FittedTable:
     units = state.mechanism.units
     table = plain_table(
         "Links",
@@ -103,7 +105,6 @@ def _links_table(state: State) -> FittedTable:
         column_heading("ang. velocity", "angular velocity", units),
         (column_heading("ang. acceleration", "angular acceleration", units), "sense"),
     )
-    scales = kind_scales(state)
     for name, link in state.links.items():
         if name != state.mechanism.frame:
             table.add_row(
@@ -116,7 +117,7 @@ def _links_table(state: State) -> FittedTable:
     return table
 
 
-def _points_table(state: State) -> FittedTable:
+def _points_table(state: State, points: Mapping[str, PointState], scales: Mapping[str, float]) -> FittedTable:
     units = state.mechanism.units
     at = column_heading("at", "angle", units)
     table = plain_table(
@@ -128,8 +129,6 @@ def _points_table(state: State) -> FittedTable:
         "sense",
     )
     length, velocity, acceleration = (display_unit(kind, units)[1] for kind in ("length", "velocity", "acceleration"))
-    points = state.points
-    scales = kind_scales(state)
     for name, point in points.items():
         placed = (
             format_number(length.from_si(float(each) if abs(each) > 1e-13 * scales["length"] else 0.0))
@@ -145,11 +144,11 @@ def _points_table(state: State) -> FittedTable:
     return table
 
 
-def _pair_tables(state: State) -> RenderableType:
+def _pair_tables(state: State, scales: Mapping[str, float]) -> RenderableType:
     kinds: dict[type[Pair], list[Pair]] = {}
     for pair in relative_motions(state.mechanism).values():
         kinds.setdefault(type(pair), []).append(pair)
-    tables, units, scales = [], state.mechanism.units, kind_scales(state)
+    tables, units = [], state.mechanism.units
     for kind, pairs in kinds.items():
         titles = [
             column_heading(name.replace("_", " ").replace("angular", "ang."), of, units)
@@ -177,7 +176,7 @@ def misfit_table(moving: State | Motion) -> FittedTable:
     return table
 
 
-def _relative_table(text: str, relative: RelativeState, state: State) -> RenderableType:
+def _relative_table(text: str, relative: RelativeState, state: State, scales: Mapping[str, float]) -> RenderableType:
     """How one point moves against another, part by part."""
     point, other = text.split(",")[:2]
     units = state.mechanism.units
@@ -194,7 +193,6 @@ def _relative_table(text: str, relative: RelativeState, state: State) -> Rendera
         "  Coriolis": ("acceleration", relative.coriolis),
         "  by sliding ": ("acceleration", relative.sliding_acceleration),
     }
-    scales = kind_scales(state)
     for name, (kind, part) in parts.items():
         measure, of = display_unit(kind, units)
         size, direction = _polar_cells(part, of, units, scales[kind])
