@@ -21,7 +21,7 @@ def compile_kernel(formula: RecordedFormula, argument_counts: Sequence[int], var
     """The machine code of a formula; which of its arguments vary from position to position. Raises
     UnsupportedOperation."""
     run = compile_function(_write_ir(formula, argument_counts, varies), "run", "int", "int", *["array"] * 3)
-    varying_count = sum(count for count, own in zip(argument_counts, varies, strict=True) if own)
+    varying_count = sum(count for count, is_varying in zip(argument_counts, varies, strict=True) if is_varying)
     still_count = sum(argument_counts) - varying_count
     result_count = len(formula.results)
 
@@ -29,8 +29,8 @@ def compile_kernel(formula: RecordedFormula, argument_counts: Sequence[int], var
         stride = -(-count // LANES) * LANES
         varying, still = np.empty((varying_count, stride)), np.empty(still_count)
         row = place = 0
-        for argument, own in zip(arguments, varies, strict=True):
-            if own:
+        for argument, is_varying in zip(arguments, varies, strict=True):
+            if is_varying:
                 varying[row : row + len(argument), :count] = argument
                 row += len(argument)
             else:
@@ -53,15 +53,15 @@ def _write_ir(formula: RecordedFormula, argument_counts: Sequence[int], varies: 
     writer.write_label("entry")
     places: list[tuple[bool, int]] = []
     rows = [0, 0]
-    for count, own in zip(argument_counts, varies, strict=True):
-        places += [(own, rows[own] + k) for k in range(count)]
-        rows[own] += count
+    for count, is_varying in zip(argument_counts, varies, strict=True):
+        places += [(is_varying, rows[is_varying] + k) for k in range(count)]
+        rows[is_varying] += count
     inputs: dict[int, str] = {}
     bases: dict[int, str] = {}
     keys = [(number, value.key) for number, value in enumerate(formula.instructions) if value.key is not None]
     for number, key in keys:
-        own, place = places[key]
-        if own:
+        is_varying, place = places[key]
+        if is_varying:
             bases[number] = writer.add_instruction(f"mul i64 %stride, {place}")
         else:
             one = writer.add_instruction(f"load double, ptr {writer.double_pointer('%still', str(place))}")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cached_property, lru_cache
 from typing import NamedTuple
 
@@ -182,14 +183,17 @@ class EquationFunctions:
         input_jacobian: Array = both[..., slice(None), slice(self._unknown_count, None)]
         return SparseMatrices(of_unknowns, entries[..., : len(of_unknowns.rows)]), input_jacobian
 
-    def third_rates(self, y: Array, y1: Array, y2: Array, y3: Array, p: Array) -> tuple[Array, Array]:
-        """The third time derivatives of F (samples, rows) and of w (samples, coordinates); y (samples, y) alike."""
-        rates = y, y1, y2, y3
-        return self.formulas.third_residual_rates(rates, p), self.formulas.third_coordinate_rates(rates, p)
+    def third_residual_rates(self, rates: Sequence[Array], p: Array) -> Array:
+        """The third time derivatives of F (samples, rows), from y and its first to third rates, of (samples, y)."""
+        return self.formulas.third_residual_rates(rates, p)
+
+    def third_coordinate_rates(self, rates: Sequence[Array], p: Array) -> Array:
+        """The same of w (samples, coordinates)."""
+        return self.formulas.third_coordinate_rates(rates, p)
 
     def third_rate_remainder(self, y: Array, y1: Array, y2: Array, p: Array) -> Array:
         """The third time derivative of F (rows,), that of y left out."""
-        return self.formulas.third_residual_rates((y[None], y1[None], y2[None], 0.0 * y[None]), p)[0]
+        return self.third_residual_rates((y[None], y1[None], y2[None], 0.0 * y[None]), p)[0]
 
     def jacobian_changes(self, y: Array, directions: Array, p: Array) -> Array:
         """How dF/dy (rows, y) at y (y,) changes along directions (k, y): (k, rows, y)."""

@@ -14,6 +14,7 @@ import numpy as np
 from planar.equations.assembled_equations import AssembledJacobians
 from planar.equations.closed_form_assemblies import ArrayFunction
 from planar.equations.functions import MAX_CACHED_STRUCTURES, EquationFunctions
+from planar.equations.large_block_motion import DIFFERENCE_STEP
 from planar.equations.residuals import ConstraintRow
 from planar.equations.sparse_matrices import SparseMatrices, SparsePattern
 from planar.equations.structure_formulas import RoundingTerms, StructureFormulas
@@ -24,15 +25,14 @@ from planar.model.pairs import MeasureKind
 if TYPE_CHECKING:
     import casadi as ca
 
-DIFFERENCE_STEP = 1e-6
 CIRCLE_POINTS, CIRCLE_RADIUS = 32, 0.25
 """Of a circle in complex time: powers that are taken for others on so many points are too small to be seen."""
 SMALLEST_CHANGE = 1e-12
 
 
 class LowRankBlock(NamedTuple):
-    """A part of the Jacobian of all constraints: its rows, its columns (of unknowns, then inputs), what each row and
-    each column is divided by, and its rank."""
+    """A part of the Jacobian of all constraints: its rows, its columns (of unknowns, then inputs), what rows and
+    columns are divided by, and its rank."""
 
     rows: tuple[int, ...]
     columns: tuple[int, ...]
@@ -163,6 +163,11 @@ class ConditionedEquations(StructureFormulas):
         ]
         return np.stack(minors, axis=-1)
 
+    def _condition_rates(self, rates: Sequence[Array], p: Array) -> Array:
+        """The conditions and their rates (orders, samples, conditions) from y and its rates, of (samples, y)."""
+        jacobians = [self._base.jacobian_rate(rates[: order + 1], p) for order in range(len(rates))]
+        return self._conditions(np.stack(jacobians))
+
     def _with_conditions(self, y: Array, p: Array) -> AssembledJacobians:
         """F with conditions (samples, rows), and the entries of dF/dy, at y (samples, y)."""
         samples, count = y.shape
@@ -182,13 +187,13 @@ class ConditionedEquations(StructureFormulas):
     def kinematics(self, y: Array, y1: Array, y2: Array, p: Array) -> tuple[Array, Array, Array]:
         """As `StructureFormulas.kinematics`."""
         residuals, coordinates, _ = self._base.kinematics(y, y1, y2, p)
-        conditions = self._conditions(self._base.jacobian_rates((y, y1, y2), p)).swapaxes(0, 1)
+        conditions = self._condition_rates((y, y1, y2), p).swapaxes(0, 1)
         rows = np.concatenate([residuals, conditions], axis=2)[..., self._order]
         return rows, coordinates, self._with_conditions(y, p).entries
 
     def third_residual_rates(self, rates: Sequence[Array], p: Array) -> Array:
         """As `StructureFormulas.third_residual_rates`."""
-        conditions = self._conditions(self._base.jacobian_rates(rates, p))[3]
+        conditions = self._condition_rates(rates, p)[3]
         return np.hstack([self._base.third_residual_rates(rates, p), conditions])[:, self._order]
 
     def third_coordinate_rates(self, rates: Sequence[Array], p: Array) -> Array:
@@ -199,7 +204,7 @@ class ConditionedEquations(StructureFormulas):
         """As `StructureFormulas.jacobian_changes`, from second rates along sums and differences of directions."""
         units, many = np.eye(len(y)), len(directions)
         sums = (directions[:, None] + sign * units for sign in (1.0, -1.0))
-        rates = np.concatenate([each.reshape(-1, len(y)) for each in sums])
+        rates = np.concatenate([ways.reshape(-1, len(y)) for ways in sums])
         places = np.repeat(y[None], len(rates), axis=0)
         second = self.kinematics(places, rates, 0.0 * rates, p)[0][:, 2]
         ahead, behind = second.reshape(2, many, len(y), -1)
@@ -211,8 +216,8 @@ class ConditionedEquations(StructureFormulas):
         rows = len(self._order) - sum(part.condition_count for part in self._parts)
         samples, count = y.shape
         steps = np.tile(np.concatenate([np.eye(count), -np.eye(count)]) * DIFFERENCE_STEP, (samples, 1))
-        places, first, second = (np.repeat(each, 2 * count, axis=0) for each in (y, y1, y2))
-        conditions = self._conditions(self._base.jacobian_rates((places + steps, first, second), p))
+        places, first, second = (np.repeat(rate, 2 * count, axis=0) for rate in (y, y1, y2))
+        conditions = self._condition_rates((places + steps, first, second), p)
         ahead, behind = conditions.reshape(3, samples, 2, count, -1).transpose(2, 0, 1, 4, 3)
         slopes = (ahead - behind) / (2.0 * DIFFERENCE_STEP)
 

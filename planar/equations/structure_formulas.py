@@ -152,8 +152,10 @@ class StructureFormulas:
         """(y, y1, ..., p) -> the time derivatives of that order of a formula's results, from y and as many rates."""
         counts = *([self._y_count] * (order + 1)), self._counts[-1]
         instructions, (*rates, p) = recorded_arguments(counts)
-        results = formula.evaluate([*map(Jet, *rates), *p])
-        numbers = [number_of(each.parts[order] if isinstance(each, Jet) else 0.0, instructions) for each in results]
+        jets = formula.evaluate([*map(Jet, *rates), *p])
+        constant_part = 0.0 if order else 1.0
+        results = [jet.parts[order] if isinstance(jet, Jet) else constant_part * jet for jet in jets]
+        numbers = [number_of(result, instructions) for result in results]
         return FormulaFunction(formula_of_results(instructions, numbers), counts, ((1, len(numbers)),))
 
     @cached_property
@@ -164,38 +166,33 @@ class StructureFormulas:
     def _third_coordinate_rates(self) -> FormulaFunction:
         return self._rate_function(self._coordinates, 3)
 
-    @cached_property
-    def _entry_rates(self) -> FormulaFunction:
-        return self._rate_function(self._entries, 1)
-
     def third_residual_rates(self, rates: Sequence[Array], p: Array) -> Array:
-        """The third time derivatives of F (samples, rows), from y and its first to third rates, each (samples, y)."""
-        return self._third_residual_rates.evaluate_entries(len(rates[0]), *(each.T for each in rates), p).T
+        """The third time derivatives of F (samples, rows), from y and its first to third rates, of (samples, y)."""
+        return self._third_residual_rates.evaluate_entries(len(rates[0]), *(rate.T for rate in rates), p).T
 
     def third_coordinate_rates(self, rates: Sequence[Array], p: Array) -> Array:
         """The same of w (samples, coordinates)."""
-        return self._third_coordinate_rates.evaluate_entries(len(rates[0]), *(each.T for each in rates), p).T
+        return self._third_coordinate_rates.evaluate_entries(len(rates[0]), *(rate.T for rate in rates), p).T
 
-    def jacobian_rates(self, rates: Sequence[Array], p: Array) -> Array:
-        """dF/dy and as many of its time derivatives as y has, (orders, samples, rows, y), from y and its rates, each
-        (samples, y)."""
-        arguments = [*(Jet(*(each[:, k] for each in rates)) for k in range(self._y_count)), *p.tolist()]
-        jacobians: Array = np.zeros((len(rates), len(rates[0]), *self.pattern.shape))
-        entries = self._entries.evaluate(arguments)
-        for row, column, entry in zip(self.pattern.rows, self.pattern.columns, entries, strict=True):
-            if isinstance(entry, Jet):
-                for order, value in enumerate(entry.parts):
-                    jacobians[order, :, row, column] = value
-            else:
-                jacobians[0, :, row, column] = entry
-        return jacobians
+    @cached_property
+    def _entry_rates(self) -> dict[int, FormulaFunction]:
+        """The time derivatives of the entries of dF/dy by their order, as far as they were wanted."""
+        return {}
+
+    def jacobian_rate(self, rates: Sequence[Array], p: Array) -> Array:
+        """The time derivative of dF/dy (samples, rows, y) of the order of the last rate, from y and its rates, of
+        (samples, y), or y (y,) for all samples."""
+        order, samples = len(rates) - 1, len(rates[-1])
+        if order not in self._entry_rates:
+            self._entry_rates[order] = self._rate_function(self._entries, order)
+        jacobian: Array = np.zeros((samples, *self.pattern.shape))
+        entries = self._entry_rates[order].evaluate_entries(samples, *(rate.T for rate in rates), p)
+        jacobian[:, self.pattern.rows, self.pattern.columns] = entries.T
+        return jacobian
 
     def jacobian_changes(self, y: Array, directions: Array, p: Array) -> Array:
         """How dF/dy (rows, y) at y (y,), or places (k, y), changes along directions (k, y): (k, rows, y)."""
-        changes: Array = np.zeros((len(directions), *self.pattern.shape))
-        entries = self._entry_rates.evaluate_entries(len(directions), y.T, directions.T, p)
-        changes[:, self.pattern.rows, self.pattern.columns] = entries.T
-        return changes
+        return self.jacobian_rate((y, directions), p)
 
     def rounding_terms(self, y: Array, y1: Array, y2: Array, p: Array) -> RoundingTerms:
         """What carries round-off at samples y = (z, u) with first and second rates, each (samples, y)."""

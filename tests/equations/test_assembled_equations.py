@@ -140,7 +140,8 @@ def test_what_is_carried_out_on_jets_is_what_casadi_derives(stem):
     slopes = [ca.jacobian(each, e.y) for each in (both, *rates[:2])]
     sizes = ca.mtimes(ca.fabs(ca.jacobian(both, e.p)), ca.fabs(e.p)) + ca.mtimes(ca.fabs(slopes[0]), ca.fabs(e.y))
     derived = ca.Function("derived", [e.y, *symbols, e.p], [rates[2], sizes, *slopes])
-    third = np.hstack(functions.third_rates(y, y1, y2, y3, p))
+    rates_of_y = y, y1, y2, y3
+    third = np.hstack([functions.third_residual_rates(rates_of_y, p), functions.third_coordinate_rates(rates_of_y, p)])
     terms = functions.rounding_terms(y, y1, y2, p)
     for k in range(len(y)):
         expected = [each.full() for each in derived(y[k], y1[k], y2[k], y3[k], p)]

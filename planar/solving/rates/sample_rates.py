@@ -85,8 +85,8 @@ def sample_rates(
     found = program.kinematics(y, y1, y2, p)
     parts, sure = [found.w, found.w1, found.w2], np.flatnonzero(strong)
     if with_jerk:
-        z3 = solved(program.third_rates(y, y1, y2, whole(none, inputs.u3), p)[0], 3)
-        parts.append(program.third_rates(y, y1, y2, whole(z3, inputs.u3), p)[1])
+        z3 = solved(program.third_residual_rates((y, y1, y2, whole(none, inputs.u3)), p), 3)
+        parts.append(program.third_coordinate_rates((y, y1, y2, whole(z3, inputs.u3)), p))
     for part in parts[1:]:
         part[weak] = np.nan
     found_doubts = (
