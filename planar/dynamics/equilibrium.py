@@ -28,9 +28,12 @@ class Equilibrium:
     `matrix` is a dense array, or sparse where unknowns are many.
     """
 
-    def __init__(self, matrices: SparseMatrices):
+    def __init__(self, matrices: SparseMatrices, rank_tolerances: Array | None = None):
+        """Of the greatest singular value, the part below which others count as zero (n,), by default one for all."""
         is_sparse = min(matrices.pattern.shape) > MAX_DENSE_UNKNOWNS
         self.matrix: Array | SparseMatrices = matrices if is_sparse else np.asarray(matrices)
+        count = len(matrices.values)
+        self._rank_tolerances = np.full(count, RANK_TOLERANCE) if rank_tolerances is None else rank_tolerances
 
     def solve(self, right_sides: Array) -> Array:
         """E^-1 b (n, forces, k), or those of least squares, for b (n, links, k)."""
@@ -83,9 +86,9 @@ class Equilibrium:
                 regular = np.linalg.slogdet(matrix)[0] != 0.0
                 inverse[regular] = np.linalg.inv(matrix[regular])
             sizes = [np.linalg.norm(each, axis=(1, 2)) for each in (matrix, inverse)]
-            weak = ~regular | (sizes[0] * sizes[1] >= 1.0 / RANK_TOLERANCE)
+            weak = ~regular | (sizes[0] * sizes[1] >= 1.0 / self._rank_tolerances)
         if weak.any():
-            inverse[weak], spare = pseudo_inverses(matrix[weak])
+            inverse[weak], spare = pseudo_inverses(matrix[weak], self._rank_tolerances[weak])
             ways = np.zeros((count, forces, spare.shape[2]))
             ways[weak] = spare
         return inverse, ways
@@ -94,4 +97,7 @@ class Equilibrium:
     def _systems(self) -> list[SparseSystem | DenseSystem]:
         """The equations of every position, where the matrix is sparse."""
         assert isinstance(self.matrix, SparseMatrices)
-        return [sparse_system(self.matrix[k]) for k in all_within_time(range(len(self.matrix)), "positions")]
+        return [
+            sparse_system(self.matrix[k], float(self._rank_tolerances[k]))
+            for k in all_within_time(range(len(self.matrix)), "positions")
+        ]

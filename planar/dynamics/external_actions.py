@@ -1,7 +1,7 @@
 """Everything that acts on links from outside, and their inertia, as forces at places and couples.
 
-By the mechanics of vectors alone, from positions, velocities and accelerations: what the balance of virtual work found
-is held against it.
+By the mechanics of vectors alone, from positions, velocities and accelerations. Numbers of the mechanism may be arrays
+(n,), one for each position.
 """
 
 from __future__ import annotations
@@ -19,7 +19,6 @@ from planar.foundation.arrays import Array
 from planar.foundation.geometry import Frame, Vector
 from planar.foundation.jets import value_and_rates
 from planar.foundation.short_repr import short_repr
-from planar.model.link_shapes import LinkShape
 from planar.model.loads import COINCIDENCE_TOLERANCE, Load, Spring
 from planar.model.mechanism import relative_motions
 from planar.results.kinematic_result import KinematicResult
@@ -46,12 +45,19 @@ class ExternalAction(NamedTuple):
 class KinematicArrays:
     """The positions of a state or a motion (n), with rates, as arrays."""
 
-    def __init__(self, moving: KinematicResult, shapes: Mapping[str, LinkShape]):
-        self.moving, self.shapes = moving, shapes
+    def __init__(self, moving: KinematicResult, size: float | None = None, at_rest: bool = False):
+        """`size` is the mechanism's, needed where its numbers are arrays; `at_rest` leaves all rates out."""
+        self.moving, self.shapes, self.at_rest = moving, moving.shapes, at_rest
         self.mechanism = moving.mechanism
+        self._size = size
         parts = [np.size(part) for frame in moving.frames.values() for part in value_and_rates(frame.angle)]
         self.position_count = max(parts, default=1)
         self._known: dict[str, Array] = {}
+
+    @cached_property
+    def size(self) -> float:
+        """The mechanism's size (m)."""
+        return mechanism_size(self.mechanism, self.shapes) if self._size is None else self._size
 
     def frame(self, link: str) -> Frame:
         """A link's axes at every position, rates left out."""
@@ -86,22 +92,42 @@ class KinematicArrays:
     def _frame_rates(self, link: str) -> Array:
         """The five numbers of a link's axes, and their two rates (3, 5, n)."""
         if link not in self._known:
-            found = np.empty((3, 5, self.position_count))
+            rates: Array = np.zeros((3, 5, self.position_count))
             for k, part in enumerate(self.moving.frames[link][:5]):
-                for rate, value in enumerate(value_and_rates(part)[:3]):
-                    found[rate, k] = value
-            self._known[link] = found
+                for rate, value in enumerate(value_and_rates(part)[: 1 if self.at_rest else 3]):
+                    rates[rate, k] = value
+            self._known[link] = rates
         return self._known[link]
 
 
 def collect_actions(field: KinematicArrays, time: Array | None, efforts: Array, inertia: bool) -> list[ExternalAction]:
     """All that acts, the inputs' efforts (n, inputs) among it, and the inertia of the links where wanted."""
-    found = [*_load_actions(field, time), *_weight_actions(field)]
-    for number, spring in enumerate(field.mechanism.springs, start=1):
-        found += _spring_actions(field, spring, f"spring {number}")
+    actions = passive_actions(field, action_factors(field, time))
     for given, effort in zip(field.mechanism.inputs, efforts.T, strict=True):
-        found += _effort_actions(field, "input", given.pair, given.pair, effort)
-    return found + (list(_inertia_actions(field)) if inertia else [])
+        actions += effort_actions(field, "input", given.pair, effort)
+    return actions + (list(inertia_actions(field)) if inertia else [])
+
+
+def action_factors(field: KinematicArrays, time: Array | None) -> Array:
+    """The factors of the loads at the positions of the inputs, or at times (n, loads)."""
+    inputs = {given.pair: _input_positions(field, given.pair) for given in field.mechanism.inputs}
+    return load_factors(field.mechanism, inputs, time, field.position_count)
+
+
+def passive_actions(field: KinematicArrays, factors: Array, spring_turns: Array | None = None) -> list[ExternalAction]:
+    """Loads, multiplied by factors (n, loads), weights, and springs with their dampers.
+
+    `spring_turns` (springs, n) are the turns of torsional springs, by default those of the first position: see
+    `LinkCoordinates.initial_spring_turns`.
+    """
+    actions: list[ExternalAction] = []
+    for load, factor in zip(field.mechanism.loads, factors.T, strict=True):
+        actions += actions_of_load(field, load, factor)
+    actions += _weight_actions(field)
+    for number, spring in enumerate(field.mechanism.springs):
+        turns = None if spring_turns is None else spring_turns[number]
+        actions += _spring_actions(field, spring, f"spring {number + 1}", turns)
+    return actions
 
 
 class ActionVelocities(NamedTuple):
@@ -128,13 +154,6 @@ def action_powers(field: KinematicArrays, all_of: Sequence[ExternalAction], velo
     return np.array(rows).reshape(len(all_of), field.position_count)
 
 
-def _load_actions(field: KinematicArrays, time: Array | None) -> Iterator[ExternalAction]:
-    inputs = {given.pair: _input_positions(field, given.pair) for given in field.mechanism.inputs}
-    by = load_factors(field.mechanism, inputs, time, field.position_count)
-    for load, factor in zip(field.mechanism.loads, by.T, strict=True):
-        yield from actions_of_load(field, load, factor)
-
-
 def actions_of_load(field: KinematicArrays, load: Load, factor: Array) -> Iterator[ExternalAction]:
     """What one load does to each link on which it acts, multiplied by a factor (n,)."""
     none = np.zeros((field.position_count, 2))
@@ -143,7 +162,7 @@ def actions_of_load(field: KinematicArrays, load: Load, factor: Array) -> Iterat
         place = field.shapes[link].position(point)
         force = Vector(*load.force)
         turned = field.frame(load.axes).rotate_to_world(force) if load.axes is not None else force
-        wide = np.stack(np.broadcast_arrays(*turned, factor)[:2], axis=-1) * factor[:, None]
+        wide = np.stack([factor * turned.x, factor * turned.y], axis=-1)
         yield ExternalAction("load", load.point, link, field.point_rates(link, place), wide, none[:, 0])
     if load.link is not None and load.torque is not None:
         yield ExternalAction(
@@ -151,12 +170,12 @@ def actions_of_load(field: KinematicArrays, load: Load, factor: Array) -> Iterat
         )
     if load.points is not None and load.effort is not None:
         line = _point_line(field, load.points)
-        yield from line.actions("load", load.target, load.effort * factor[:, None] * line.unit)
+        yield from line.actions("load", load.target, (load.effort * factor)[:, None] * line.unit)
     if load.pair is not None and load.effort is not None:
-        yield from _effort_actions(field, "load", load.pair, load.pair, load.effort * factor)
+        yield from effort_actions(field, "load", load.pair, load.effort * factor)
 
 
-def _effort_actions(field: KinematicArrays, kind: str, name: str, pair: str, effort: Array) -> list[ExternalAction]:
+def effort_actions(field: KinematicArrays, kind: str, pair: str, effort: Array) -> list[ExternalAction]:
     """What drives a pair, on the one link and on the other."""
     way = relative_motions(field.mechanism)[pair].effort_action(field.frames, field.shapes)
     found = []
@@ -169,7 +188,7 @@ def _effort_actions(field: KinematicArrays, kind: str, name: str, pair: str, eff
         if way.point is not None and way.direction is not None:
             at = np.stack(np.broadcast_arrays(*way.point, effort)[:2], axis=-1)
             force, couple = np.stack([each * sense * effort for each in way.direction], axis=-1), 0.0 * effort
-        found.append(ExternalAction(kind, name, link, at, force, couple))
+        found.append(ExternalAction(kind, pair, link, at, force, couple))
     return found
 
 
@@ -181,40 +200,37 @@ def _input_positions(field: KinematicArrays, pair: str) -> Array:
 
 
 def _weight_actions(field: KinematicArrays) -> Iterator[ExternalAction]:
-    gravity = np.array(field.mechanism.gravity)
-    if not gravity.any():
+    gravity = field.mechanism.gravity
+    if not any(np.any(part) for part in gravity):
         return
     for mass in field.mechanism.masses:
         place = field.shapes[mass.link].position(mass.at)
-        weight = np.tile(mass.mass * gravity, (field.position_count, 1))
-        yield ExternalAction(
-            "weight",
-            f"weight of {mass.link}",
-            mass.link,
-            field.point_rates(mass.link, place),
-            weight,
-            0.0 * weight[:, 0],
-        )
+        weight = np.empty((field.position_count, 2))
+        for k, part in enumerate(gravity):
+            weight[:, k] = mass.mass * part
+        at = field.point_rates(mass.link, place)
+        yield ExternalAction("weight", f"weight of {mass.link}", mass.link, at, weight, 0.0 * weight[:, 0])
 
 
-def _inertia_actions(field: KinematicArrays) -> Iterator[ExternalAction]:
+def inertia_actions(field: KinematicArrays) -> Iterator[ExternalAction]:
     """D'Alembert's forces: minus mass times acceleration, at the centre of mass."""
     for mass in field.mechanism.masses:
         place = field.shapes[mass.link].position(mass.at)
-        force = -mass.mass * field.point_rates(mass.link, place, 2)
+        force = -np.reshape(mass.mass, (-1, 1)) * field.point_rates(mass.link, place, 2)
         couple = -mass.inertia * field.angle_rates(mass.link, 2)
-        yield ExternalAction(
-            "inertia", f"inertia of {mass.link}", mass.link, field.point_rates(mass.link, place), force, couple
-        )
+        at = field.point_rates(mass.link, place)
+        yield ExternalAction("inertia", f"inertia of {mass.link}", mass.link, at, force, couple)
 
 
-def _spring_actions(field: KinematicArrays, spring: Spring, name: str) -> list[ExternalAction]:
+def _spring_actions(field: KinematicArrays, spring: Spring, name: str, turns: Array | None) -> list[ExternalAction]:
     """A spring with its damper on both its ends: it pulls where it is longer than free, or grows."""
     first, second = spring.ends
     if spring.is_torsional:
         angle = field.angle_rates(second, 0) - field.angle_rates(first, 0)
-        start = angle[0] - (spring.free if abs(spring.free) <= np.pi else 0.0)
-        wound = angle - 2.0 * np.pi * np.round(start / (2.0 * np.pi)) - spring.free
+        if turns is None:
+            start = angle[0] - (spring.free if abs(spring.free) <= np.pi else 0.0)
+            turns = 2.0 * np.pi * np.round(start / (2.0 * np.pi))
+        wound = angle - turns - spring.free
         couple = spring.stiffness * wound + spring.damping * (field.angle_rates(second) - field.angle_rates(first))
         none = np.zeros((field.position_count, 2))
         return [
@@ -222,12 +238,13 @@ def _spring_actions(field: KinematicArrays, spring: Spring, name: str) -> list[E
             for link, sense in ((first, 1.0), (second, -1.0))
         ]
     line = _point_line(field, spring.ends)
-    pull = spring.stiffness * (line.places[1] - line.places[0])
-    if spring.free:
-        pull = pull - spring.stiffness * spring.free * line.unit
-    if spring.damping:
-        rate = [field.point_rates(*end, 1) for end in line.ends]
-        pull = pull + spring.damping * ((rate[1] - rate[0]) * line.unit).sum(axis=1)[:, None] * line.unit
+    pull = np.reshape(spring.stiffness, (-1, 1)) * (line.places[1] - line.places[0])
+    if np.any(spring.free):
+        pull = pull - np.reshape(spring.stiffness * spring.free, (-1, 1)) * line.unit
+    if np.any(spring.damping):
+        velocities = [field.point_rates(*end, 1) for end in line.ends]
+        growth = ((velocities[1] - velocities[0]) * line.unit).sum(axis=1)
+        pull = pull + (spring.damping * growth)[:, None] * line.unit
     return line.actions("spring", name, -pull)
 
 
@@ -254,5 +271,5 @@ def _point_line(field: KinematicArrays, points: tuple[str, str]) -> _PointLine:
     places = [field.point_rates(*end, 0) for end in ends]
     apart = places[1] - places[0]
     distance = np.hypot(*apart.T)
-    coincide = distance <= COINCIDENCE_TOLERANCE * mechanism_size(field.mechanism, field.shapes)
+    coincide = distance <= COINCIDENCE_TOLERANCE * field.size
     return _PointLine(ends, places, apart / np.where(coincide, np.nan, distance)[:, None])

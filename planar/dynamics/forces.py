@@ -35,7 +35,6 @@ from planar.dynamics.reactions import (
 )
 from planar.dynamics.sharing.least_work import Wrench, yielding_power
 from planar.dynamics.virtual_velocities import has_length_motion, refuse_surplus_inputs, unit_rate_state
-from planar.dynamics.virtual_work import balance_function
 from planar.equations.mechanism_numbers import mechanism_size
 from planar.foundation.arrays import Array, IntArray
 from planar.foundation.errors import BadInput, NoAnswer, Outcome
@@ -255,7 +254,7 @@ class _LinkEquilibrium:
 
     def __init__(self, moving: State | Motion, time: Array | None, inertia: bool):
         self.moving, self.time, self.inertia = moving, time, inertia
-        self.field = KinematicArrays(moving, balance_function(moving.mechanism).work.shapes)
+        self.field = KinematicArrays(moving)
         self.reactions = fill_balance(self.field, time, inertia)
 
     def forces(self, solved: ForceSolution, contacts: Mapping[str, ContactState] | None = None) -> Forces:
@@ -350,7 +349,7 @@ def _second_route_error(
     """
     worst, others = None, [each for each in all_of if each.kind != "input"]
     for given, effort in zip(state.mechanism.inputs, supplied, strict=True):
-        unit = KinematicArrays(unit_rate_state(state, given.pair), state.shapes)
+        unit = KinematicArrays(unit_rate_state(state, given.pair))
         moved = action_velocities(unit, others)
         lost = [-pair_heat(unit, each) for each in rubbing]
         parts = np.concatenate([action_powers(unit, others, moved), np.array(lost).reshape(-1, 1)])

@@ -10,50 +10,37 @@ inputs, whose drives are D q',
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from functools import cached_property, lru_cache
 
 import casadi as ca
 import numpy as np
 
+from planar.dynamics.link_coordinates import LinkCoordinates
 from planar.dynamics.load_attachment import Attachment, attachments
 from planar.equations.coordinates import FRAME_PARTS, frames_from_coordinates
 from planar.equations.elimination import stack_expressions
 from planar.equations.mechanism_numbers import mechanism_size, shapes_of_links
 from planar.equations.residuals import input_positions, pair_residuals, scalars
-from planar.foundation.arrays import Array
 from planar.foundation.geometry import Vector
-from planar.foundation.jets import Scalar, value_and_rates
+from planar.foundation.jets import Scalar
 from planar.model.loads import COINCIDENCE_TOLERANCE, Load, Mass, Spring
 from planar.model.mechanism import Mechanism, relative_motions
-from planar.results.kinematic_result import KinematicResult
 
 
-class LagrangianFunctions:
+class LagrangianFunctions(LinkCoordinates):
     """The functions of one mechanism."""
 
     def __init__(self, mechanism: Mechanism, unit: float | None = None):
         """Dimensions may be symbols; then `unit` is the mechanism's size (m)."""
-        self.mechanism = mechanism
+        super().__init__(mechanism)
         self.shapes = shapes_of_links(mechanism)
         self.size = mechanism_size(mechanism, self.shapes) if unit is None else unit
-        self.links = tuple(link.name for link in mechanism.links if link.name != mechanism.frame)
-        self.link_columns = {link: 3 * k for k, link in enumerate(self.links)}
         self.relative_motions = relative_motions(mechanism)
         self.attachments = attachments(mechanism)
-        own = {pair.name: len(pair.coordinate_kinds) for pair in mechanism.pairs}
-        self.link_coordinate_count = 3 * len(self.links)
-        self.q, self.q1, self.q2 = (
-            ca.SX.sym(name, self.link_coordinate_count + sum(own.values())) for name in ("q", "q1", "q2")
-        )
+        self.q, self.q1, self.q2 = (ca.SX.sym(name, self.coordinate_count) for name in ("q", "q1", "q2"))
         self.factors = ca.SX.sym("f", len(mechanism.loads))
         self.spring_turns = ca.SX.sym("t", len(mechanism.springs))
-        self.own_slices: dict[str, slice] = {}
-        "of every pair: its own coordinates"
-        at = self.link_coordinate_count
-        for name, count in own.items():
-            self.own_slices[name] = slice(at, at + count)
-            at += count
         columns = {(link, part): at + k for link, at in self.link_columns.items() for k, part in enumerate(FRAME_PARTS)}
         for pair in mechanism.pairs:
             first = self.own_slices[pair.name].start
@@ -65,33 +52,6 @@ class LagrangianFunctions:
             pair.name: pair.measure([self.shapes[link] for link in pair.bodies])
             for pair in (*mechanism.pairs, *self.relative_motions.values())
         }
-
-    def initial_spring_turns(self, q: Array, springs: Sequence[Spring] | None = None) -> Array:
-        """The whole turns (rad) by which links stand apart whose torsional springs do not count them (springs, ...).
-
-        Nothing says in a file how often links have turned: where they stand at coordinates q the spring is wound up the
-        least, but for a free angle beyond half a turn, which is off the angle between -pi and pi. Coordinates may be
-        arrays (coordinates, n), and the numbers of `springs` then too.
-        """
-        found = np.zeros((len(self.mechanism.springs), *np.shape(q)[1:]))
-        for number, spring in enumerate(self.mechanism.springs if springs is None else springs):
-            if spring.is_torsional:
-                first, second = (
-                    q[self.link_columns[link] + 2] if link in self.link_columns else 0.0 for link in spring.ends
-                )
-                near = np.where(np.abs(spring.free) <= np.pi, spring.free, 0.0)
-                found[number] = 2.0 * np.pi * np.round((second - first - near) / (2.0 * np.pi))
-        return found
-
-    def coordinates(self, moving: KinematicResult) -> tuple[Array, Array, Array]:
-        """The coordinates of a state or a motion with their two rates (n, coordinates)."""
-        values = [getattr(moving.frames[link], part) for link in self.links for part in FRAME_PARTS]
-        values += [each for pair in self.mechanism.pairs for each in moving.own.get(pair.name, ())]
-        parts = [value_and_rates(value)[:3] for value in values]
-        many = max((np.size(part) for each in parts for part in each), default=1)
-        found = np.array([[np.broadcast_to(part, (many,)) for part in each] for each in parts], dtype=float)
-        places, first, second = found.reshape(-1, 3, many).transpose(1, 2, 0)
-        return places, first, second
 
     @cached_property
     def residuals(self) -> ca.SX:

@@ -14,10 +14,10 @@ from typing import NamedTuple
 import numpy as np
 
 from planar.dynamics.equilibrium import Equilibrium
-from planar.dynamics.external_actions import KinematicArrays
-from planar.dynamics.load_variation import load_factors
+from planar.dynamics.external_actions import KinematicArrays, action_factors
 from planar.dynamics.sharing.least_work import Wrench, share_by_least_work
-from planar.dynamics.virtual_work import BalanceFunction, VirtualWorkBalance, balance_function
+from planar.dynamics.sparse_equilibrium import RANK_TOLERANCE
+from planar.dynamics.virtual_work import BalanceEquations, VirtualWorkBalance, balance_equations
 from planar.equations.sparse_matrices import SparseMatrices, SparsePattern
 from planar.foundation.arrays import Array, BoolArray
 from planar.foundation.geometry import Vector
@@ -29,6 +29,8 @@ WHEEL_LOAD_TOLERANCE = 1e-7
 """What takes efforts, or is not held, by more than this beside a force of one is no way in which wheels load pairs."""
 BALANCE_TOLERANCE = 1e-8
 """Links that stay out of balance by more than this part of the greatest force are not held by any."""
+RANK_TOLERANCE_AT_SINGULAR_POSITIONS = 1e-6
+"""In place of `RANK_TOLERANCE` where rates do not follow: such a position is known to the root of round-off."""
 LinkActions = Mapping[str, Array]
 """What acts on the coordinates x, y, angle of links (n, 3), by link."""
 
@@ -57,18 +59,20 @@ class ForceSolution(NamedTuple):
 class ReactionSolver:
     """One mechanism at n positions, its balance filled in."""
 
-    def __init__(self, balancing: BalanceFunction, balance: VirtualWorkBalance, field: KinematicArrays):
-        self.work, self.pair_rows, self.balance = balancing.work, balancing.pair_rows, balance
+    def __init__(self, equations: BalanceEquations, balance: VirtualWorkBalance, field: KinematicArrays):
+        self.work, self.pair_rows, self.balance = equations, equations.pair_rows, balance
         self.mechanism, self.field = field.mechanism, field
         self.pairs = {pair.name: pair for pair in field.mechanism.pairs}
         self.position_count = len(balance.loads)
         self.frames = field.frames
-        self.shapes, self.arm = field.shapes, self.work.size
+        self.shapes, self.arm = field.shapes, field.size
         self.coordinate_scale = np.tile([1.0, 1.0, 1.0 / self.arm], len(self.work.links))
-        self.row_count = balancing.row_count
+        self.row_count = equations.row_count
         matrices = self._scaled_matrices()
         self.column_scale = matrices.column_norms(1e-300)  # (n, forces)
-        self.equilibrium = Equilibrium(matrices.divide_columns(self.column_scale))
+        has_rates = np.isfinite(self.work.coordinates(field.moving)[1]).all(axis=1)
+        tolerances = np.where(has_rates, RANK_TOLERANCE, RANK_TOLERANCE_AT_SINGULAR_POSITIONS)
+        self.equilibrium = Equilibrium(matrices.divide_columns(self.column_scale), tolerances)
 
     def _scaled_matrices(self) -> SparseMatrices:
         """What forces of one in the rows of the pairs and in the inputs do to the scaled coordinates of the links
@@ -298,17 +302,7 @@ def bearing_point(pair: Pair) -> tuple[str, str] | None:
     return next(iter(pair.coincident_points()[1:] or ((rides[0],) if rides else ())), None)
 
 
-def fill_balance(field: KinematicArrays, time: Array | None, inertia: bool, at_rest: bool = False) -> ReactionSolver:
-    """The balance of every position of a state or a motion, as it moves or as if it stood still there."""
-    moving = field.moving
-    equations = balance_function(moving.mechanism)
-    body = equations.work
-    inputs = {name: np.broadcast_to(each.position, (field.position_count,)) for name, each in moving.inputs.items()}
-    q, q1, q2 = body.coordinates(moving)
-    if at_rest:
-        q1, q2 = np.zeros_like(q1), np.zeros_like(q2)
-    factors = load_factors(moving.mechanism, inputs, time, field.position_count)
-    balance = equations.evaluate(q, q1, q2, factors, body.initial_spring_turns(q[0]))
-    if not inertia:
-        balance = balance._replace(inertia=np.zeros_like(balance.inertia))
-    return ReactionSolver(equations, balance, field)
+def fill_balance(field: KinematicArrays, time: Array | None, inertia: bool) -> ReactionSolver:
+    """The balance of every position of a state or a motion."""
+    equations = balance_equations(field.mechanism)
+    return ReactionSolver(equations, equations.balance(field, action_factors(field, time), inertia), field)

@@ -180,7 +180,9 @@ class _SimulationRun:
         self.work = lagrangian_functions(self.mechanism)
         q, q1, _ = (each[0] for each in self.work.coordinates(start))
         unit = mechanism_size(self.mechanism, self.work.shapes)
-        self.phases = make_phases(self.work, self.driven, unit, self.work.initial_spring_turns(q), q)
+        self.phases = make_phases(
+            self.work, self.driven, unit, self.work.initial_spring_turns(q, self.mechanism.springs), q
+        )
         self.coordinate_count = len(q)
         q, q1 = self.equations.project(0.0, q, q1)
         self.initial_state = np.concatenate([q, q1, np.zeros(1 + len(self.phases.record.pairs))])

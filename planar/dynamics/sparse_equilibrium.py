@@ -60,10 +60,10 @@ class SparseSystem:
 class DenseSystem:
     """E f = b by the singular values of a dense matrix."""
 
-    def __init__(self, matrix: Array):
+    def __init__(self, matrix: Array, rank_tolerance: float):
         """`matrix` (links, forces); where not all of it is a number nothing of the result is."""
         if np.isfinite(matrix).all():
-            inverses, ways = pseudo_inverses(matrix[None])
+            inverses, ways = pseudo_inverses(matrix[None], np.array([rank_tolerance]))
             self._inverse, self.null_space = inverses[0], ways[0]
         else:
             self._inverse, self.null_space = np.full(matrix.shape[::-1], np.nan), np.zeros((matrix.shape[1], 0))
@@ -77,29 +77,29 @@ class DenseSystem:
         return np.asarray(self._inverse.T @ right_sides)
 
 
-def sparse_system(matrix: SparseMatrices) -> SparseSystem | DenseSystem:
+def sparse_system(matrix: SparseMatrices, rank_tolerance: float) -> SparseSystem | DenseSystem:
     """The equations of one matrix (links, forces), by its factors where its rank can be told from these."""
     links, forces = matrix.shape
     if not np.isfinite(matrix.values).all():
-        return DenseSystem(np.asarray(matrix))
+        return DenseSystem(np.asarray(matrix), rank_tolerance)
     if links == forces:
         factors = factorised(matrix.single, is_ordered=False)
         if factors is not None:
             system = SparseSystem(factors, np.zeros((links, 0)), np.zeros((forces, 0)))
-            if matrix.greatest_singular_value_bound() * system.inverse_norm() < ESTIMATE_MARGIN / RANK_TOLERANCE:
+            if matrix.greatest_singular_value_bound() * system.inverse_norm() < ESTIMATE_MARGIN / rank_tolerance:
                 return system
     products = matrix.single @ matrix.single.T
     greatest = norm_by_powers(lambda left: products @ left, links) / NORM_SAFETY
     for count in BORDER_COUNTS:
         if count > min(links, forces):
             break
-        system_of_lower_rank = _bordered_system(matrix, greatest, count)
+        system_of_lower_rank = _bordered_system(matrix, greatest, count, rank_tolerance)
         if system_of_lower_rank is not None:
             return system_of_lower_rank
-    return DenseSystem(np.asarray(matrix))
+    return DenseSystem(np.asarray(matrix), rank_tolerance)
 
 
-def _bordered_system(matrix: SparseMatrices, greatest: float, count: int) -> SparseSystem | None:
+def _bordered_system(matrix: SparseMatrices, greatest: float, count: int, rank_tolerance: float) -> SparseSystem | None:
     """The equations bordered by all vectors of singular values that count as zero, fewer than `count` beside those that
     follow from the shape; None where there may be more."""
     links, forces = matrix.shape
@@ -117,7 +117,7 @@ def _bordered_system(matrix: SparseMatrices, greatest: float, count: int) -> Spa
         moved = factors.solve(units[0])[:forces], factors.solve(units[1], trans="T")[:links]
         right, left = (np.linalg.qr(each)[0] for each in moved)
     turned, values, back = np.linalg.svd(left.T @ (matrix @ right))
-    rank = int(np.sum(values > RANK_TOLERANCE * greatest))
+    rank = int(np.sum(values > rank_tolerance * greatest))
     if not rank:
         return None
     left, right = left @ turned[:, rank:], right @ back[rank:].T
@@ -125,13 +125,14 @@ def _bordered_system(matrix: SparseMatrices, greatest: float, count: int) -> Spa
     if factors is None:
         return None
     system = SparseSystem(factors, left, right)
-    return system if system.inverse_norm() * greatest < 1.0 / RANK_TOLERANCE else None
+    return system if system.inverse_norm() * greatest < 1.0 / rank_tolerance else None
 
 
-def pseudo_inverses(matrices: Array) -> tuple[Array, Array]:
-    """What gives least squares (n, forces, links), and null spaces (n, forces, ways), by singular values."""
+def pseudo_inverses(matrices: Array, rank_tolerances: Array) -> tuple[Array, Array]:
+    """What gives least squares (n, forces, links), and null spaces (n, forces, ways), by singular values; those below
+    such parts (n,) of the greatest count as zero."""
     u, s, v = np.linalg.svd(matrices)
-    strong = s > RANK_TOLERANCE * s[:, :1]
+    strong = s > rank_tolerances[:, None] * s[:, :1]
     few, back = s.shape[1], v.transpose(0, 2, 1)
     inverse = back[:, :, :few] * np.where(strong, 1.0 / np.where(strong, s, 1.0), 0.0)[:, None]
     spare = np.ones((len(matrices), back.shape[2]), dtype=bool)

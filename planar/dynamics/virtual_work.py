@@ -2,18 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from functools import lru_cache
 from typing import NamedTuple
 
-import casadi as ca
 import numpy as np
 
-from planar.dynamics.lagrangian import LagrangianFunctions
-from planar.equations.casadi_call import BufferedFunction
-from planar.equations.elimination import stack_expressions
+from planar.dynamics.external_actions import (
+    ExternalAction,
+    KinematicArrays,
+    effort_actions,
+    inertia_actions,
+    passive_actions,
+)
+from planar.dynamics.link_coordinates import LinkCoordinates
+from planar.equations.element_placement import ElementPlacement
+from planar.equations.elements import Element, PlacedElement
 from planar.equations.residuals import wrapped_residual
 from planar.equations.sparse_matrices import SparseMatrices, SparsePattern
 from planar.foundation.arrays import Array, IntArray
+from planar.foundation.jets import Scalar
 from planar.model.mechanism import Input, Mechanism
 from planar.model.pairs import MeasureKind, Pair
 
@@ -34,138 +42,171 @@ class VirtualWorkBalance(NamedTuple):
     openings: Array
 
 
-class _PairSlopes(NamedTuple):
-    """Where the derivatives of one pair's residuals stand among those of all pairs.
+class _PairGroup(NamedTuple):
+    """Pairs of one element. Indices (pairs, ...): `coordinates` in q, `numbers` in p, their `rows` among those of all
+    constraints, own coordinates eliminated, and the `entries` there (pairs, rows, coordinates of links)."""
 
-    `residuals` are its rows, `slopes` its entries (residuals, coordinates of its links and then its own), row after
-    row; `entries` are those of its `rows` in the constraints.
-    """
+    element: Element
+    kinds: tuple[MeasureKind, ...]
+    coordinates: IntArray
+    numbers: IntArray
+    rows: IntArray
+    entries: IntArray
 
-    residuals: slice
-    slopes: slice
-    rows: slice
-    entries: slice
-    own_count: int
+    def evaluate(self, q: Array, p: Array) -> tuple[Array, Array]:
+        """The residuals (n, pairs, residuals) of all constraints and their derivatives (n, pairs, residuals,
+        coordinates)."""
+        element, taken = self.element, self.element.arguments
+        coordinates = q[:, self.coordinates]
+        angles = coordinates[..., 2 : 3 * element.body_count : 3]
+        arguments = [
+            *(coordinates[..., k] for k in taken.coordinates),
+            *(np.cos(angles[..., k]) for k in taken.cosines),
+            *(np.sin(angles[..., k]) for k in taken.sines),
+            *(p[:, self.numbers[:, k]] for k in taken.numbers),
+        ]
+        with np.errstate(all="ignore"):  # what is not defined is not a number
+            rests = element.slopes_function(*arguments)
+        slopes: Array = np.zeros((*coordinates.shape[:2], element.row_count, element.coordinate_count))
+        for row, factors in enumerate(element.factors):
+            for column, factor in factors.items():
+                slopes[..., row, column] = factor
+        residuals = slopes @ coordinates[..., None]  # the linear parts, so far
+        residuals[..., 0] += np.stack(
+            [np.broadcast_to(rest, coordinates.shape[:2]) for rest in rests[: element.row_count]], axis=-1
+        )
+        for (row, column), slope in zip(element.slope_entries, rests[element.row_count :], strict=True):
+            slopes[..., row, column] += slope
+        return residuals[..., 0], slopes
 
 
-class BalanceFunction:
-    """The function of one mechanism that fills a balance in.
+class BalanceEquations(LinkCoordinates):
+    """The balance of one structure: which links each pair, input and action is about, and where that stands."""
 
-    `dimensions` are the symbols that stand in the mechanism for numbers of its file.
-    """
-
-    def __init__(self, work: LagrangianFunctions, dimensions: ca.SX | None = None):
-        self.work, self.link_coordinate_count = work, work.link_coordinate_count
+    def __init__(self, mechanism: Mechanism):
+        super().__init__(mechanism)
         self.pair_rows: dict[str, slice] = {}
         "of every pair: its rows of the constraints"
-        first = 0
-        for pair in work.mechanism.pairs:
-            self.pair_rows[pair.name] = slice(first, first + len(pair.residual_kinds) - len(pair.coordinate_kinds))
-            first = self.pair_rows[pair.name].stop
-        self.row_count = first
-        # efforts act by their places: how a pair's own coordinates follow those of its links is not unique
-        drives = ca.vertcat(
-            ca.SX(0, work.q.numel()), *(work.unit_effort_on_links(given.pair).T for given in work.mechanism.inputs)
+        self.row_count = 0
+        number_columns: dict[str, range] = {}
+        number_count = 0
+        for pair in mechanism.pairs:
+            first = self.row_count
+            self.row_count += len(pair.residual_kinds) - len(pair.coordinate_kinds)
+            self.pair_rows[pair.name] = slice(first, self.row_count)
+            number_columns[pair.name] = range(number_count, number_count + len(pair.number_kinds))
+            number_count += len(pair.number_kinds)
+        self._place_pairs(
+            ElementPlacement(
+                {link: range(first, first + 3) for link, first in self.link_columns.items()},
+                {name: range(own.start, own.stop) for name, own in self.own_slices.items()},
+                number_columns,
+            )
         )
-        openings = stack_expressions(
-            wrapped_residual(value, kind) * (1.0 if kind is MeasureKind.LENGTH else work.size**2)
-            for value, kind in zip(ca.vertsplit(work.residuals), self._residual_kinds(), strict=True)
-        )
-        slopes, drives = ca.jacobian(work.residuals, work.q), ca.sparsify(drives)
-        self._place_slopes(*(np.array(each, dtype=int) for each in slopes.sparsity().get_triplet()))
-        self._drive_entries = drives.sparsity().get_triplet()
-        outputs = [ca.vec(slopes).nz[:], ca.vec(drives).nz[:], work.total_action_on_links, work.inertia, openings]
-        arguments = [
-            work.q,
-            work.q1,
-            work.q2,
-            work.factors,
-            work.spring_turns,
-            ca.SX(0, 1) if dimensions is None else dimensions,
+
+    def _place_pairs(self, placement: ElementPlacement) -> None:
+        """Group the pairs by their elements, and lay out the entries of the constraints, row after row."""
+        pattern_rows: list[int] = []
+        first_entries = [0]
+        members: dict[tuple[Element, tuple[MeasureKind, ...]], list[tuple[PlacedElement, slice, IntArray]]] = {}
+        for pair in self.mechanism.pairs:
+            placed, rows, columns = placement.residual_of(pair, 0), self.pair_rows[pair.name], self._columns_of(pair)
+            places = {column: k for k, column in enumerate(columns)}
+            of_links = [places[column] for column in placed.coordinates[: 3 * placed.element.body_count]]
+            entries = [
+                [len(pattern_rows) + row * len(columns) + place for place in of_links]
+                for row in range(rows.stop - rows.start)
+            ]
+            pattern_rows += columns * (rows.stop - rows.start)
+            first_entries += [first_entries[-1] + len(columns) * (k + 1) for k in range(rows.stop - rows.start)]
+            key = placed.element, tuple(pair.residual_kinds)
+            members.setdefault(key, []).append((placed, rows, np.array(entries, dtype=int)))
+        self._groups = [
+            _PairGroup(
+                element,
+                kinds,
+                np.array([placed.coordinates for placed, _, _ in group], dtype=int),
+                np.array([placed.numbers for placed, _, _ in group], dtype=int).reshape(len(group), -1),
+                np.array([range(rows.start, rows.stop) for _, rows, _ in group], dtype=int),
+                np.array([entries for _, _, entries in group]).reshape(len(group), -1, 3 * element.body_count),
+            )
+            for (element, kinds), group in members.items()
         ]
-        self._called = BufferedFunction(ca.Function("balance", arguments, [ca.densify(each) for each in outputs]))
+        shape = self.link_coordinate_count, self.row_count
+        self.pattern = SparsePattern(shape, np.array(pattern_rows, dtype=int), np.array(first_entries, dtype=int))
 
-    def _residual_kinds(self) -> list[MeasureKind]:
-        return [kind for pair in self.work.mechanism.pairs for kind in pair.residual_kinds]
-
-    def columns_of_pair(self, pair: Pair) -> list[int]:
+    def _columns_of(self, pair: Pair) -> list[int]:
         """The coordinates of the links that a pair joins."""
-        firsts = sorted({self.work.link_columns[link] for link in pair.bodies if link in self.work.link_columns})
+        firsts = sorted({self.link_columns[link] for link in pair.bodies if link in self.link_columns})
         return [first + k for first in firsts for k in range(3)]
 
-    def _place_slopes(self, residual_rows: IntArray, coordinates: IntArray) -> None:
-        """Place the derivatives of all residuals by the coordinates, pair after pair, and those of the constraints."""
-        self._pair_slopes: list[_PairSlopes] = []
-        places: dict[tuple[int, int], int] = {}
-        pattern_rows: list[int] = []
-        first_residual = first_slope = 0
-        for pair in self.work.mechanism.pairs:
-            own, rows = self.work.own_slices[pair.name], self.pair_rows[pair.name]
-            columns, own_count = self.columns_of_pair(pair), own.stop - own.start
-            residuals = slice(first_residual, first_residual + len(pair.residual_kinds))
-            local = [*columns, *range(own.start, own.stop)]
-            pairs = ((row, column) for row in range(residuals.start, residuals.stop) for column in local)
-            places |= {each: first_slope + k for k, each in enumerate(pairs)}
-            slopes = slice(first_slope, first_slope + len(pair.residual_kinds) * len(local))
-            entries = slice(len(pattern_rows), len(pattern_rows) + (rows.stop - rows.start) * len(columns))
-            pattern_rows += columns * (rows.stop - rows.start)
-            self._pair_slopes.append(_PairSlopes(residuals, slopes, rows, entries, own_count))
-            first_residual, first_slope = residuals.stop, slopes.stop
-        self._slope_count = first_slope
-        self._slope_places = np.array(
-            [places[each] for each in zip(residual_rows.tolist(), coordinates.tolist(), strict=True)], dtype=int
-        )
-        widths = [len(self.columns_of_pair(pair)) for pair in self.work.mechanism.pairs for _ in self._row_range(pair)]
-        firsts = np.concatenate([[0], np.cumsum(np.array(widths, dtype=int))])
-        self.pattern = SparsePattern((self.link_coordinate_count, self.row_count), np.array(pattern_rows, int), firsts)
-
-    def _row_range(self, pair: Pair) -> range:
-        return range(self.pair_rows[pair.name].start, self.pair_rows[pair.name].stop)
-
-    def evaluate(
-        self, q: Array, q1: Array, q2: Array, factors: Array, wound: Array, dimensions: Array | None = None
+    def balance(
+        self, field: KinematicArrays, factors: Array, inertia: bool, spring_turns: Array | None = None
     ) -> VirtualWorkBalance:
-        """Everything at coordinates with their rates (n, coordinates), each alike; factors of the loads (n, loads),
-        `wound` as `LagrangianFunctions.initial_spring_turns` gives it, (springs,) or (n, springs), and `dimensions`
-        (n, dimensions), where there are any."""
-        count, numbers = len(q), np.zeros(0) if dimensions is None else dimensions
-        parts = self._called.evaluate_batch(count, q, q1, q2, factors, wound, numbers)
-        nonzeros, drives, loads, inertia, gaps = (each[:, 0] for each in parts)
-        slopes: Array = np.zeros((count, self._slope_count))
-        slopes[:, self._slope_places] = nonzeros
-        constraints: Array = np.zeros((count, len(self.pattern.rows)))
-        openings: Array = np.zeros((count, self.row_count))
-        for pair in self._pair_slopes:
-            pair_slopes, opening = slopes[:, pair.slopes], gaps[:, pair.residuals]
-            if pair.own_count:
-                pair_slopes = pair_slopes.reshape(count, opening.shape[1], -1)
-                # what remains to hold the links is square to what the pair's own coordinates do
-                basis = np.linalg.qr(pair_slopes[..., -pair.own_count :], mode="complete")[0]
-                basis = basis.transpose(0, 2, 1)[:, pair.own_count :]
-                pair_slopes = (basis @ pair_slopes[..., : -pair.own_count]).reshape(count, -1)
-                opening = (basis @ opening[:, :, None])[:, :, 0]
-            constraints[:, pair.entries] = pair_slopes
-            openings[:, pair.rows] = opening
-        of_links = self.link_coordinate_count
-        directions: Array = np.zeros((count, len(self.work.mechanism.inputs), q.shape[1]))
-        directions[:, self._drive_entries[0], self._drive_entries[1]] = drives
+        """The balance at positions (n) with factors of the loads (n, loads).
+
+        `spring_turns` (springs, n) are those of `initial_spring_turns`, by default those of the first position.
+        """
+        q, _, _ = self.coordinates(field.moving)
+        if spring_turns is None:
+            spring_turns = np.repeat(self.initial_spring_turns(q[0], field.mechanism.springs)[:, None], len(q), axis=1)
+        count = len(q)
+        directions: Array = np.zeros((count, len(self.mechanism.inputs), self.link_coordinate_count))
+        for k, given in enumerate(self.mechanism.inputs):
+            directions[:, k] = self._on_links(field, effort_actions(field, "input", given.pair, np.ones(count)))
+        constraints, openings = self._constraints(q, self._pair_numbers(field, count), field.size)
         return VirtualWorkBalance(
-            SparseMatrices(self.pattern, constraints),
-            directions[..., :of_links],
-            loads[:, :of_links],
-            inertia[:, :of_links],
+            constraints,
+            directions,
+            self._on_links(field, passive_actions(field, factors, spring_turns)),
+            -self._on_links(field, inertia_actions(field) if inertia else ()),
             openings,
         )
 
+    def _pair_numbers(self, field: KinematicArrays, count: int) -> Array:
+        """The numbers of all pairs (n, numbers), in m and rad."""
+        numbers: list[Scalar] = []
+        for pair in field.mechanism.pairs:
+            numbers += pair.measure([field.shapes[link] for link in pair.bodies])
+        return np.array([np.broadcast_to(number, (count,)) for number in numbers]).reshape(len(numbers), count).T
 
-def balance_function(mechanism: Mechanism) -> BalanceFunction:
-    """The function of a mechanism, kept for the next time, wherever its inputs then stand and however fast they run."""
+    def _constraints(self, q: Array, p: Array, size: float) -> tuple[SparseMatrices, Array]:
+        """What forces of one in the rows of pairs put on the links, and by how much these are open (n, rows)."""
+        entries: Array = np.zeros((len(q), len(self.pattern.rows)))
+        openings: Array = np.zeros((len(q), self.row_count))
+        for group in self._groups:
+            residuals, slopes = group.evaluate(q, p)
+            for k, kind in enumerate(group.kinds):
+                if kind is not MeasureKind.LENGTH:
+                    residuals[..., k] = wrapped_residual(residuals[..., k], kind) * size**2
+            of_links = 3 * group.element.body_count
+            if own_count := slopes.shape[-1] - of_links:
+                # what remains to hold the links is square to what the pair's own coordinates do
+                basis = np.linalg.qr(slopes[..., of_links:], mode="complete")[0]
+                basis = np.swapaxes(basis, -1, -2)[..., own_count:, :]
+                slopes, residuals = basis @ slopes, (basis @ residuals[..., None])[..., 0]
+            for body in range(0, of_links, 3):  # a link may be two bodies of a pair
+                entries[:, group.entries[..., body : body + 3]] += slopes[..., body : body + 3]
+            openings[:, group.rows] = residuals
+        return SparseMatrices(self.pattern, entries), openings
+
+    def _on_links(self, field: KinematicArrays, actions: Iterable[ExternalAction]) -> Array:
+        """What forces and couples put on the coordinates of the links (n, links)."""
+        total: Array = np.zeros((field.position_count, self.link_coordinate_count))
+        for action in actions:
+            if action.link in self.link_columns:
+                first, frame = self.link_columns[action.link], field.frame(action.link)
+                x, y = action.force.T
+                total[:, first] += x
+                total[:, first + 1] += y
+                total[:, first + 2] += (action.at[:, 0] - frame.x) * y - (action.at[:, 1] - frame.y) * x + action.couple
+        return total
+
+
+def balance_equations(mechanism: Mechanism) -> BalanceEquations:
+    """The equations of a mechanism, kept for the next time, wherever its links then stand and whatever acts."""
     inputs = tuple(Input(given.pair, 0.0) for given in mechanism.inputs)
-    loads = tuple(load._replace(varies=None) for load in mechanism.loads)
-    acted_on = mechanism.links, mechanism.pairs, inputs, loads, mechanism.springs, mechanism.masses, mechanism.gravity
-    return _cached_balance_function(Mechanism("", mechanism.frame, *acted_on))
+    return _cached_balance_equations(Mechanism("", mechanism.frame, mechanism.links, mechanism.pairs, inputs))
 
 
-@lru_cache(maxsize=32)
-def _cached_balance_function(mechanism: Mechanism) -> BalanceFunction:
-    return BalanceFunction(LagrangianFunctions(mechanism))
+_cached_balance_equations = lru_cache(maxsize=32)(BalanceEquations)

@@ -6,8 +6,6 @@ from collections.abc import Sequence
 from collections.abc import Set as AbstractSet
 from typing import NamedTuple
 
-import casadi as ca
-
 
 class BlockIndices(NamedTuple):
     """Constraints and coordinates that are solved together: `rows` close them, given all earlier blocks.
@@ -24,12 +22,12 @@ def decompose_blocks(rows: Sequence[AbstractSet[int]], columns: int) -> tuple[Bl
     """Split constraints into blocks, in an order in which they can be solved.
 
     `rows[i]` holds the columns (coordinates) on which constraint i depends. Dulmage and Mendelsohn: a maximum matching
-    parts the whole into an over-, a well- and an under-determined part, and the strong components of the matched
-    columns are the smallest blocks (A. Pothen, C.-J. Fan, ACM Trans. Math. Softw. 16, 1990; both steps as in
-    T. Davis' CSparse, which casadi carries). What a constraint left unmatched reaches stays one block, with more rows
-    than columns, and comes first; columns left unmatched come last, and what rests on them is free.
+    separates an over-, a well- and an under-determined part, and the strong components of the matched columns are the
+    smallest blocks (A. Pothen, C.-J. Fan, ACM Trans. Math. Softw. 16, 1990). All that an unmatched constraint reaches
+    stays one block, with more rows than columns, and comes first; unmatched columns come last, and what rests on them
+    is free.
     """
-    row_of = _maximum_matching(rows, columns)
+    row_of = _maximum_matching(rows)
     loose = tuple(column for column in range(columns) if column not in row_of)
     matched = set(row_of.values())
     surplus = [row for row in range(len(rows)) if row not in matched]
@@ -71,24 +69,69 @@ def _overdetermined_parts(
     return parts
 
 
-def _maximum_matching(rows: Sequence[AbstractSet[int]], columns: int) -> dict[int, int]:
-    """A maximum matching: the row of every matched column."""
-    pattern = ca.Sparsity.triplet(
-        len(rows), columns, [row for row, held in enumerate(rows) for _ in held], [c for held in rows for c in held]
-    )
-    _, p, q, _, _, coarse_rows, coarse_columns = pattern.btf()
-    # unmatched rows come first, then three parts in which rows and columns stand in matched order, then loose columns
-    return dict(zip(q[: coarse_columns[3]], p[coarse_rows[1] :], strict=True))
+def _maximum_matching(rows: Sequence[AbstractSet[int]]) -> dict[int, int]:
+    """A maximum matching: the row of every matched column (I. S. Duff's MC21, ACM Trans. Math. Softw. 7, 1981)."""
+    row_of: dict[int, int] = {}
+    for first_row in range(len(rows)):
+        visited: set[int] = set()
+        path: list[tuple[int, int]] = []  # rows, and the columns that they take from the row after them
+        row = first_row
+        candidates = {first_row: iter(rows[first_row])}
+        while True:
+            free_column = next((column for column in rows[row] if column not in row_of), None)
+            if free_column is not None:
+                for matched_row, column in [*path, (row, free_column)]:
+                    row_of[column] = matched_row
+                break
+            column = next((column for column in candidates[row] if column not in visited), -1)
+            if column >= 0:
+                visited.add(column)
+                path.append((row, column))
+                row = row_of[column]
+                candidates[row] = iter(rows[row])
+            elif path:
+                row, _ = path.pop()
+            else:
+                break
+    return row_of
 
 
 def _strong_components(rows: Sequence[AbstractSet[int]], row_of: dict[int, int]) -> list[list[int]]:
-    """The strong components of the matched columns, each after those whose values its rows need."""
-    order = sorted(row_of)
-    index = {column: position for position, column in enumerate(order)}
-    needs = [(index[column], index[other]) for column in order for other in rows[row_of[column]] if other in index]
-    pattern = ca.Sparsity.triplet(len(order), len(order), [a for a, _ in needs], [b for _, b in needs])
-    blocks, p, starts = pattern.scc()
-    return [sorted(order[k] for k in p[starts[b] : starts[b + 1]]) for b in reversed(range(blocks))]
+    """The strong components of the matched columns, each after those whose values its rows need (R. Tarjan, 1972)."""
+    components: list[list[int]] = []
+    visit_order: dict[int, int] = {}
+    lowest: dict[int, int] = {}  # the earliest column that can be reached and belongs to no component
+    open_columns: list[int] = []
+    assigned: set[int] = set()
+    for root in sorted(row_of):
+        if root in visit_order:
+            continue
+        visit_order[root] = lowest[root] = len(visit_order)
+        open_columns.append(root)
+        path = [(root, iter(rows[row_of[root]]))]
+        while path:
+            column, needs = path[-1]
+            for other in needs:
+                if other in assigned or other not in row_of:
+                    continue
+                if other in visit_order:
+                    lowest[column] = min(lowest[column], visit_order[other])
+                    continue
+                visit_order[other] = lowest[other] = len(visit_order)
+                open_columns.append(other)
+                path.append((other, iter(rows[row_of[other]])))
+                break
+            else:
+                path.pop()
+                if path:
+                    lowest[path[-1][0]] = min(lowest[path[-1][0]], lowest[column])
+                if lowest[column] == visit_order[column]:
+                    component = [open_columns.pop()]
+                    while component[-1] != column:
+                        component.append(open_columns.pop())
+                    assigned.update(component)
+                    components.append(sorted(component))
+    return components
 
 
 def _underdetermined_columns(

@@ -8,9 +8,15 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
-import casadi as ca
+from planar.foundation.lazy_module import LazyModule
+
+if TYPE_CHECKING:
+    import casadi as ca
+else:
+    ca = LazyModule("casadi")  # known types of elements and blocks do without expressions
+
 
 CANCELLATION_TOLERANCE = 1e-12
 """A factor below this part of those that it was made of is what rounding left of zero."""

@@ -7,12 +7,18 @@ have to make; a rate that cancels it is minus what is returned.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
-import casadi as ca
 import numpy as np
 
 from planar.equations.sparse_matrices import SparseMatrices
 from planar.foundation.arrays import Array
+from planar.foundation.lazy_module import LazyModule
+
+if TYPE_CHECKING:
+    import casadi as ca
+else:
+    ca = LazyModule("casadi")  # known types of elements and blocks do without expressions
 
 MAX_CRAMER_UNKNOWNS = 4
 """More unknowns are not solved by determinants."""

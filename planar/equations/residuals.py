@@ -8,15 +8,21 @@ mechanism, then that of its inputs.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
-import casadi as ca
+import numpy as np
 
 from planar.foundation.angles import wrap_angle
 from planar.foundation.geometry import Frame
 from planar.foundation.jets import Scalar, cos, sin
+from planar.foundation.lazy_module import LazyModule
 from planar.model.mechanism import Mechanism, relative_motions
 from planar.model.pairs import MeasureKind, Pair
+
+if TYPE_CHECKING:
+    import casadi as ca
+else:
+    ca = LazyModule("casadi")  # known types of elements and blocks do without expressions
 
 CARRIED_ROUNDING = 1e-3
 """The rates of a constraint are judged by its own terms, and by this part of the greatest speed anywhere: some rounding
@@ -36,9 +42,9 @@ class ConstraintRow(NamedTuple):
 
 def scalars(values: ca.SX | Sequence[Scalar]) -> Sequence[Scalar]:
     """The entries of a column, one by one."""
-    if isinstance(values, ca.SX):
-        return ca.vertsplit(values) if values.numel() else []
-    return values
+    if isinstance(values, Sequence | np.ndarray):
+        return values
+    return ca.vertsplit(values) if values.numel() else []
 
 
 def split_pair_numbers(pairs: Iterable[Pair], p: ca.SX | Sequence[Scalar]) -> dict[str, list[Scalar]]:

@@ -8,9 +8,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
-import casadi as ca
 import numpy as np
 
 from planar.equations.assembled_equations import AssembledEquations, Elimination
@@ -31,13 +30,17 @@ from planar.equations.elimination import (
 from planar.equations.residuals import ConstraintRow, wrapped_residual
 from planar.foundation.arrays import Array
 from planar.foundation.generic_numbers import generic_numbers
+from planar.foundation.lazy_module import LazyModule
 from planar.model.mechanism import Mechanism, relative_motions
 from planar.model.pairs import MeasureKind, Pair
 
+if TYPE_CHECKING:
+    import casadi as ca
+else:
+    ca = LazyModule("casadi")  # known types of elements and blocks do without expressions
+
 MIN_MOVING_SLOPE = 1e-12
 """An entry of a Jacobian at random places, unknowns of about one, that is greater than rounding."""
-PIECEWISE_OPERATIONS = frozenset((ca.OP_FLOOR, ca.OP_LT, ca.OP_LE))
-"""What formulas that are put together of pieces have in them."""
 
 
 class Block(NamedTuple):
@@ -548,6 +551,6 @@ def is_piecewise_in(expression: ca.SX, symbols: ca.SX) -> bool:
             depends[out[0]] = False
         elif code != ca.OP_OUTPUT:
             depends[out[0]] = any(depends[each] for each in of)
-            if depends[out[0]] and code in PIECEWISE_OPERATIONS:
+            if depends[out[0]] and code in (ca.OP_FLOOR, ca.OP_LT, ca.OP_LE):
                 return True
     return False

@@ -302,12 +302,12 @@ def test_where_three_assemblies_of_a_triad_meet_they_are_one_found_to_the_cube_r
     e = setup.equations
     platforms = [e.coordinates[column].owner for column in e.unknowns].index("platform")
     # turned by phi, and moved by phi^2 a as the second order asks, the squares of the legs are off by c phi^3 along
-    # n, which no move mends; they are rounded by the last digit of twice their length times the largest coordinate
+    # n, which no move mends; they are rounded by the last digits of twice their length times the largest coordinate
     arms, lengths = (1.0 + np.array(legs))[:, None] * r, np.linalg.norm(ends - pins, axis=1)
     a = np.linalg.lstsq(2.0 * arms, np.array(legs) * np.sum(r * r, axis=1), rcond=None)[0]
     n = np.linalg.svd(arms.T)[2][-1]
     c = abs(n @ (2.0 * np.stack([-r[:, 1], r[:, 0]], axis=1) @ a))
-    rounded = 2.0 * np.finfo(float).eps * np.abs(n) @ (2.0 * lengths * np.abs(pins).max())
+    rounded = 4.0 * np.finfo(float).eps * np.abs(n) @ (2.0 * lengths * np.abs(pins).max())
     assert abs(found.real[found.double][0, platforms]) <= (rounded / c) ** (1.0 / 3.0)
 
 

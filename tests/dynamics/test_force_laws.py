@@ -9,12 +9,17 @@ from itertools import product
 from math import cos, sin
 from typing import Any
 
+import casadi as ca
 import numpy as np
 import pytest
+import scipy.linalg
 
 import planar
+from planar.dynamics.external_actions import KinematicArrays
 from planar.dynamics.forces import Forces
+from planar.dynamics.lagrangian import LagrangianFunctions
 from planar.dynamics.virtual_velocities import has_length_motion
+from planar.dynamics.virtual_work import balance_equations
 from planar.foundation.errors import NoAnswer
 from planar.model.file_units import FileUnits
 from planar.model.loads import Load, Mass, Spring
@@ -282,3 +287,31 @@ def test_a_mechanism_of_another_size_balances_alike(number, size):
         np.testing.assert_allclose(again.couple / (mass * length**2), each.couple, atol=1e-8 * scale)
     assert found.undetermined == other.undetermined
     assert other.proof.equilibrium is None or other.proof.equilibrium < EXACT
+
+
+@numbered
+def test_the_balance_is_that_of_the_energies(number):
+    """What acts, inertia, pairs and inputs by vectors and elements, against derivatives of energies and residuals."""
+    _, mechanism, state = linkages()[number]
+    work = LagrangianFunctions(mechanism)
+    constraints, directions = ca.jacobian(work.residuals, work.q), ca.jacobian(work.input_positions, work.q)
+    arguments = [work.q, work.q1, work.q2, work.factors, work.spring_turns]
+    results = [constraints, directions, work.total_action_on_links, work.inertia]
+    q, q1, q2 = (rows[0] for rows in work.coordinates(state))
+    turns = work.initial_spring_turns(q, mechanism.springs)
+    derived = ca.Function("balance", arguments, results)(q, q1, q2, np.ones(len(mechanism.loads)), turns)
+    slopes, drives, loads, inertia = (np.array(result) for result in derived)
+    field = KinematicArrays(state)
+    equations = balance_equations(mechanism)
+    balance = equations.balance(field, np.ones((1, len(mechanism.loads))), inertia=True)
+    count = equations.link_coordinate_count
+    for result, expected in ((balance.loads, loads), (balance.inertia, inertia)):
+        np.testing.assert_allclose(result[0], expected[:count, 0], atol=EXACT * np.abs(expected).max())
+    if slopes.shape[1] == count:  # pairs without coordinates of their own
+        np.testing.assert_allclose(np.asarray(balance.constraints)[0], slopes.T, atol=EXACT * np.abs(slopes).max())
+        np.testing.assert_allclose(balance.input_directions[0], drives, atol=EXACT * np.abs(drives).max())
+    else:  # what the pairs hold is square to each motion that they allow
+        free = scipy.linalg.null_space(slopes)
+        allowed = np.asarray(balance.constraints)[0].T @ free[:count]
+        np.testing.assert_allclose(allowed, 0.0, atol=EXACT * np.abs(slopes).max())
+        assert np.linalg.matrix_rank(balance.constraints[0]) == np.linalg.matrix_rank(slopes) - slopes.shape[1] + count

@@ -372,7 +372,7 @@ def test_so_it_does_for_the_guides_slots_and_meshes_of_random_linkages(seed):
         for pair in state.mechanism.pairs
     )
     state = planar.solve(replace(state.mechanism, pairs=pairs))
-    field = KinematicArrays(state, state.shapes)
+    field = KinematicArrays(state)
     rows = ContactRows(fill_balance(field, np.zeros(1), True), field)
     if not rows.rubbing_pairs or not rows.is_determined().all() or len(rows.contacts) > 7:
         pytest.skip("nothing rubs, or it is not determined")

@@ -731,7 +731,8 @@ def test_a_file_that_stands_at_a_dead_point_can_be_moved_off_it():
     assert found["stood"] == pytest.approx(dead, abs=CLOSE)
     assert found["at"] == pytest.approx(dead - 0.2, abs=1e-5)
     value["inputs"][0]["position"] = f"{found['at']!r} rad"
-    state = planar.solve(planar.from_dict(value | {"sketch": dict(found["points"])}))
+    sketch = {name: [1000.0 * part for part in position] for name, position in found["points"]}
+    state = planar.solve(planar.from_dict(value | {"sketch": sketch}))
     near([at for _, at in found["points"]], [state.point(name).position for name, _ in found["points"]], 0.4)
 
 

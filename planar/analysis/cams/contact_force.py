@@ -97,7 +97,7 @@ def _row_intervals(motion: Motion, chosen: Array) -> tuple[tuple[float, float], 
 
 
 def _contact_at_rows(forces: Forces, pair: ProfiledPair) -> ContactForce:
-    field = KinematicArrays(forces.moving, forces.moving.shapes)
+    field = KinematicArrays(forces.moving)
     contact = pair.tooth_contact(field.frames, field.shapes, forces.mechanism.pairs)
     assert contact is not None
     acting = np.atleast_2d(np.asarray(forces.reactions[pair.name].force, dtype=float))

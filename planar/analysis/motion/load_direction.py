@@ -68,7 +68,7 @@ class LoadDirection(NamedTuple):
         return np.full_like(rate, np.nan), rate, second_rate
 
     def _rates(self, moving: State | Motion) -> tuple[Array, Array]:
-        load, field = self.load, KinematicArrays(moving, moving.shapes)
+        load, field = self.load, KinematicArrays(moving)
         if load.point is not None and load.force is not None:
             link, point = field.attachments[load.point][:2]
             velocity, acceleration = _point_rates(field, link, point)[1:]

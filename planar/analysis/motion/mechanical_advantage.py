@@ -162,7 +162,7 @@ class _AdvantagesOverInput:
 
     def _load_rate(self, unit_load: Load, along: str) -> _OutputRate:
         """The power of a load of one (N, N m), at unit rate of the input."""
-        field = KinematicArrays(self.state, self.state.shapes)
+        field = KinematicArrays(self.state)
         actions = list(actions_of_load(field, unit_load, np.ones(1)))
         value = float(action_powers(field, actions, action_velocities(field, actions)).sum())
 

@@ -2,26 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
-from functools import lru_cache
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 
-import casadi as ca
 import numpy as np
 
 from planar.batch.design_arrays import design_variables, values_of_design, with_design_values
 from planar.batch.named_results.design_frames import DesignFrames
-from planar.document.dimensions import Dimension, change_dimension
 from planar.dynamics.external_actions import KinematicArrays
-from planar.dynamics.lagrangian import LagrangianFunctions
 from planar.dynamics.load_variation import load_factors
 from planar.dynamics.reaction_solver import ReactionSolver
-from planar.dynamics.virtual_work import BalanceFunction
+from planar.dynamics.virtual_work import balance_equations
 from planar.equations.mechanism_numbers import mechanism_size, shapes_of_links
 from planar.foundation.geometry import Frame
 from planar.foundation.jets import Jet, Scalar
 from planar.model.link_shapes import LinkShape
-from planar.model.mechanism import Input, Mechanism
+from planar.model.mechanism import Mechanism
 from planar.model.pairs.base import Pair
 from planar.results.kinematic_result import KinematicResult
 
@@ -29,8 +25,6 @@ Array = np.ndarray
 
 MAX_CHUNK_POSITIONS = 4096
 """Positions whose forces are found at once."""
-SECTIONS_THAT_ACT = ("links", "pairs", "loads", "springs", "masses", "gravity")
-"""Of the file: what the balance depends on."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -48,54 +42,21 @@ class DesignPositions(KinematicResult):
     steps: Array
 
 
-class DesignBalance:
-    """The balance of a mechanism's designs, with symbols for those numbers of its file in which they differ."""
-
-    def __init__(self, mechanism: Mechanism, names: Sequence[str]):
-        known = design_variables(mechanism)
-        self.mechanism = mechanism
-        self.dimensions = [each for each in (known[name] for name in names) if _acts(each)]
-        symbols = ca.SX.sym("d", len(self.dimensions))
-        bare = replace(
-            mechanism,
-            inputs=tuple(Input(given.pair, 0.0) for given in mechanism.inputs),
-            loads=tuple(load._replace(varies=None) for load in mechanism.loads),
-        )
-        for k, each in enumerate(self.dimensions):
-            bare = change_dimension(bare, each, symbols[k])
-        size = mechanism_size(mechanism, shapes_of_links(mechanism))
-        self.function = BalanceFunction(LagrangianFunctions(bare, size), symbols)
-
-    def solver(
-        self, frames: DesignFrames, positions: DesignPositions, values: Mapping[str, Array]
-    ) -> tuple[ReactionSolver, KinematicArrays]:
-        """The balance at positions, of designs with these values (designs,) by name."""
-        work, field = self.function.work, KinematicArrays(positions, positions.shapes)
-        q, q1, q2 = work.coordinates(positions)
-        at = positions.steps, positions.designs
-        inputs = {name: np.broadcast_to(each, frames.design_shape)[at] for name, each in frames.inputs.items()}
-        time = None if frames.time is None else frames.time[positions.steps]
-        factors = load_factors(positions.mechanism, inputs, time, len(q))
-        wound = self._wound_springs(frames, values)[:, positions.designs].T
-        numbers = np.array([values[each.name][positions.designs] for each in self.dimensions]).reshape(-1, len(q)).T
-        return ReactionSolver(self.function, self.function.evaluate(q, q1, q2, factors, wound, numbers), field), field
-
-    def _wound_springs(self, frames: DesignFrames, values: Mapping[str, Array]) -> Array:
-        """The turns (rad) of torsional springs that are not counted, by where designs start (springs, designs)."""
-        q = np.zeros((self.function.link_coordinate_count, frames.design_shape[1]))
-        for link, first in self.function.work.link_columns.items():
-            q[first + 2] = frames.angles[link][0]
-        return self.function.work.initial_spring_turns(q, with_design_values(self.mechanism, values).springs)
-
-
-def _acts(dimension: Dimension) -> bool:
-    return dimension.path[0] in SECTIONS_THAT_ACT and "varies" not in dimension.address
-
-
-@lru_cache(maxsize=16)
-def design_balance(mechanism: Mechanism, names: tuple[str, ...]) -> DesignBalance:
-    """The balance of a mechanism's designs, kept: a worker solves many blocks of one sweep."""
-    return DesignBalance(mechanism, names)
+def design_reaction_solver(
+    mechanism: Mechanism, frames: DesignFrames, positions: DesignPositions, values: Mapping[str, Array]
+) -> ReactionSolver:
+    """The balance at positions of a mechanism's designs, which have these values (designs,) by name."""
+    equations = balance_equations(mechanism)
+    field = KinematicArrays(positions, mechanism_size(mechanism, shapes_of_links(mechanism)))
+    at = positions.steps, positions.designs
+    inputs = {name: np.broadcast_to(value, frames.design_shape)[at] for name, value in frames.inputs.items()}
+    time = None if frames.time is None else frames.time[positions.steps]
+    factors = load_factors(positions.mechanism, inputs, time, field.position_count)
+    q: Array = np.zeros((equations.link_coordinate_count, frames.design_shape[1]))
+    for link, first in equations.link_columns.items():
+        q[first + 2] = frames.angles[link][0]
+    turns = equations.initial_spring_turns(q, with_design_values(mechanism, values).springs)
+    return ReactionSolver(equations, equations.balance(field, factors, True, turns[:, positions.designs]), field)
 
 
 def position_chunks(

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from planar.batch.named_results.design_forces import design_balance, position_chunks
+from planar.batch.named_results.design_forces import design_reaction_solver, position_chunks
 from planar.batch.named_results.design_frames import DesignFrames
 from planar.batch.named_results.result_rows import RequestedResults
 from planar.dynamics.friction.frictional_forces import solve_with_friction
@@ -34,9 +34,9 @@ def find_forces(
     found: Found = {("effort", name): np.full((1, *shape), np.nan) for name in results.efforts}
     found |= {("reaction", name): np.full((2, *shape), np.nan) for name in results.reactions}
     found |= {("reaction_couple", name): np.full((1, *shape), np.nan) for name in results.reactions}
-    balance = design_balance(mechanism, tuple(values))
     for positions in position_chunks(mechanism, frames, values, is_solved):
-        reactions, field = balance.solver(frames, positions, values)
+        reactions = design_reaction_solver(mechanism, frames, positions, values)
+        field = reactions.field
         solved = solve_with_friction(reactions, field)
         at = slice(None), positions.steps, positions.designs
         supplied = input_efforts(solved)[0]

@@ -12,7 +12,7 @@ from functools import lru_cache
 import numpy as np
 
 from planar.batch.design_arrays import design_variables
-from planar.batch.named_results.design_forces import DesignBalance, design_balance, position_chunks
+from planar.batch.named_results.design_forces import design_reaction_solver, position_chunks
 from planar.batch.named_results.design_frames import DesignFrames
 from planar.dynamics.external_actions import KinematicArrays
 from planar.dynamics.reaction_solver import ForceSolution, ReactionSolver
@@ -57,16 +57,16 @@ class OutputLink:
         found = np.full(frames.design_shape, np.nan)
         own = design_variables(self.mechanism)  # numbers of loads, springs and masses are not there
         known = {name: value for name, value in values.items() if name in own}
-        balance = design_balance(self.mechanism, tuple(known))
         for positions in position_chunks(self.mechanism, frames, known, is_solved):
-            reactions, field = balance.solver(frames, positions, known)
-            found[positions.steps, positions.designs] = self._angles_at(balance, reactions, field)
+            reactions = design_reaction_solver(self.mechanism, frames, positions, known)
+            found[positions.steps, positions.designs] = self._angles_at(reactions)
         return found
 
-    def _angles_at(self, balance: DesignBalance, reactions: ReactionSolver, field: KinematicArrays) -> Array:
+    def _angles_at(self, reactions: ReactionSolver) -> Array:
+        field = reactions.field
         way, count = self._slide_direction(field), field.position_count
-        load = np.zeros((count, balance.function.link_coordinate_count))
-        first = balance.function.work.link_columns[self.link]
+        load = np.zeros((count, reactions.work.link_coordinate_count))
+        first = reactions.work.link_columns[self.link]
         if self.slides:
             load[:, first : first + 2] = way
         else:

@@ -249,7 +249,7 @@ def _lateral_force(forces: Forces, pair: Pair) -> Array:
     motion, force = forces.moving, np.asarray(forces.reactions[pair.name].force)
     marks = pair.drawing_marks(motion.shapes, motion.mechanism.pairs)
     guide = next(mark for mark in marks if isinstance(mark, GuideMark))
-    way = KinematicArrays(motion, motion.shapes).frame(guide.link).rotate_to_world(guide.direction)
+    way = KinematicArrays(motion).frame(guide.link).rotate_to_world(guide.direction)
     left = np.stack(np.broadcast_arrays(-way.y, way.x, np.zeros(len(force)))[:2], axis=-1)
     lateral: Array = (force * left).sum(axis=1)
     return lateral

@@ -30,7 +30,7 @@ def frame_load(motion: Motion, about: Array) -> FrameLoad | None:
     """
     found = forces(motion, friction=False)
     frame, arm = motion.mechanism.frame, mechanism_size(motion.mechanism, motion.shapes)
-    many = KinematicArrays(motion, motion.shapes).position_count
+    many = KinematicArrays(motion).position_count
     parts = []
     for pair in found.reactions.values():
         if frame in pair.links and pair.at is None:

@@ -57,7 +57,7 @@ class LinkKinematics:
         """Loads and springs have no part in it."""
         bare = replace(motion, mechanism=replace(motion.mechanism, loads=(), springs=()))
         self.motion = motion
-        self.reactions: ReactionSolver = fill_balance(KinematicArrays(bare, motion.shapes), None, inertia=False)
+        self.reactions: ReactionSolver = fill_balance(KinematicArrays(bare), None, inertia=False)
         self.field = self.reactions.field
         self.axes = link_axes(motion.mechanism, motion.shapes)
 

@@ -7,7 +7,6 @@ import numpy as np
 from planar.dynamics.external_actions import KinematicArrays
 from planar.dynamics.friction.contact_rows import ContactRows
 from planar.dynamics.reaction_solver import fill_balance
-from planar.dynamics.virtual_work import balance_function
 from planar.foundation.errors import BadInput
 from planar.model.wording import quote_names
 from planar.results.motion import State
@@ -17,7 +16,7 @@ def check_determined_friction(state: State) -> None:
     """Raise BadInput where the forces that friction follows are not determined, as links are held more than once."""
     if not any(pair.has_friction for pair in state.mechanism.pairs):
         return
-    field = KinematicArrays(state, balance_function(state.mechanism).work.shapes)
+    field = KinematicArrays(state)
     rows = ContactRows(fill_balance(field, np.zeros(1), inertia=False), field)
     if not rows.is_determined().all():
         raise BadInput(

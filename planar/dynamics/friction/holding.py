@@ -15,7 +15,7 @@ from planar.dynamics.friction.single_solution import has_single_solution, solve_
 from planar.dynamics.load_validation import check_loads
 from planar.dynamics.reaction_solver import ReactionSolver, fill_balance
 from planar.dynamics.virtual_velocities import refuse_surplus_inputs
-from planar.dynamics.virtual_work import balance_function
+from planar.dynamics.virtual_work import balance_equations
 from planar.foundation.arrays import Array, BoolArray
 from planar.foundation.errors import BadInput
 from planar.foundation.notebook_display import Displayable
@@ -87,8 +87,8 @@ def holding(moving: State | Motion, load: str | None = None, effort: float = 0.0
     if isinstance(moving, State):
         refuse_surplus_inputs(moving)
     time = moving.time if isinstance(moving, Motion) else np.zeros(1)
-    field = KinematicArrays(moving, balance_function(mechanism).work.shapes)
-    balanced = fill_balance(field, time, inertia=False, at_rest=True)
+    field = KinematicArrays(moving, at_rest=True)
+    balanced = fill_balance(field, time, inertia=False)
     if load is not None:
         balanced = _with_unknown_load(balanced, field, time, _load_index(mechanism, load), effort)
     ends = _HoldingEnds(balanced, field)
@@ -122,11 +122,11 @@ def _with_unknown_load(
     assert isinstance(moving, State | Motion)
     loads = moving.mechanism.loads
     without = replace(moving, mechanism=replace(moving.mechanism, loads=loads[:index] + loads[index + 1 :]))
-    rest = fill_balance(KinematicArrays(without, field.shapes), time, inertia=False, at_rest=True).balance.loads
+    rest = fill_balance(KinematicArrays(without, at_rest=True), time, inertia=False).balance.loads
     push = balanced.balance.loads - rest
     driven = rest + balanced.balance.input_directions[:, 0] * effort
     changed = balanced.balance._replace(loads=driven, input_directions=push[:, None])
-    return ReactionSolver(balance_function(moving.mechanism), changed, field)
+    return ReactionSolver(balance_equations(moving.mechanism), changed, field)
 
 
 class _HoldingEnds:

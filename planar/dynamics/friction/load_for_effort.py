@@ -15,7 +15,7 @@ from planar.dynamics.external_actions import KinematicArrays
 from planar.dynamics.friction.frictional_forces import solve_friction
 from planar.dynamics.reaction_solver import ReactionSolver, fill_balance
 from planar.dynamics.reactions import input_efforts
-from planar.dynamics.virtual_work import VirtualWorkBalance, balance_function
+from planar.dynamics.virtual_work import VirtualWorkBalance, balance_equations
 from planar.foundation.arrays import Array
 from planar.foundation.short_repr import short_repr
 from planar.model.mechanism import Mechanism
@@ -40,11 +40,11 @@ class LoadWithFriction:
     """
 
     def __init__(self, moving: State | Motion, doubled: Mechanism, column: int, inertia: bool):
-        equations = balance_function(moving.mechanism)
+        equations = balance_equations(moving.mechanism)
         time = moving.time if isinstance(moving, Motion) else np.zeros(1)
         self.equations, self.column = equations, column
-        self.field = KinematicArrays(moving, equations.work.shapes)
-        more = KinematicArrays(replace(moving, mechanism=doubled), equations.work.shapes)
+        self.field = KinematicArrays(moving)
+        more = KinematicArrays(replace(moving, mechanism=doubled))
         self.own = fill_balance(self.field, time, inertia).balance
         twice = fill_balance(more, time, inertia).balance
         self.loads, self.inertia = twice.loads - self.own.loads, twice.inertia - self.own.inertia

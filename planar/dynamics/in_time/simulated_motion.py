@@ -51,5 +51,5 @@ def simulated_motion(
     )
     u = np.array([each.position for each in inputs.values()]).reshape(len(inputs), len(time))
     still = {name: [each.parts[0] for each in values] for name, values in own.items()}
-    gaps = PositionSolver(mechanism).residual_check.residuals(KinematicArrays(motion, work.shapes).frames, still, u)
+    gaps = PositionSolver(mechanism).residual_check.residuals(KinematicArrays(motion).frames, still, u)
     return replace(motion, residual=float(np.max(gaps, initial=0.0)))

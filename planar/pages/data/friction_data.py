@@ -45,8 +45,7 @@ def contact_data(rows: BalanceRows, state: State) -> Iterator[dict[str, Any]]:
 
 def _still_pairs(state: State) -> set[str]:
     """The pairs that move neither now nor next, while others do."""
-    shapes = {link: state.shapes[link] for link in state.shapes}
-    field = KinematicArrays(state, shapes)
+    field = KinematicArrays(state)
     senses = ContactRows(fill_balance(field, None, inertia=False), field).senses()
     if not any(sense.any() for sense in senses.values()):
         return set()

@@ -44,7 +44,8 @@ def free_links(setup: PreparedMechanism) -> NoAnswer:
     if jam is not None:
         return jam
     stages = [stage for stage in setup.equations.blocks if stage.is_free]
-    links = list(dict.fromkeys(link for stage in stages for link in stage.links))
+    free = {link for stage in stages for link in stage.links}
+    links = [link.name for link in setup.mechanism.links if link.name in free]
     ways = sum(slice_length(stage.unknowns) - slice_length(stage.rows) for stage in stages)
     inputs = len(setup.mechanism.inputs)
     forgotten = _missing_pairs(setup, links)

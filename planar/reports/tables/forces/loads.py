@@ -31,7 +31,7 @@ class ActionMotion(NamedTuple):
 
 def actions_with_motion(forces: Forces, inertia: bool) -> list[ActionMotion]:
     """Of a position: the links' inertia, or everything else but the inputs."""
-    field = KinematicArrays(forces.moving, forces.moving.shapes)
+    field = KinematicArrays(forces.moving)
     asked = [each for each in forces.acting if each.kind == "inertia"] if inertia else forces.loads
     return [
         ActionMotion(each, field.velocity_at(each.link, each.at[None])[0], float(field.angle_rates(each.link)[0]))

@@ -1,0 +1,61 @@
+"""The coordinates q of links: x, y and angle of every moving link, then those of the pairs' own (m, rad)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from planar.equations.coordinates import FRAME_PARTS
+from planar.foundation.arrays import Array
+from planar.foundation.jets import value_and_rates
+from planar.model.loads import Spring
+from planar.model.mechanism import Mechanism
+from planar.results.kinematic_result import KinematicResult
+
+
+class LinkCoordinates:
+    """The places of links and pairs in q, of one mechanism."""
+
+    def __init__(self, mechanism: Mechanism):
+        self.mechanism = mechanism
+        self.links = tuple(link.name for link in mechanism.links if link.name != mechanism.frame)
+        self.link_columns = {link: len(FRAME_PARTS) * k for k, link in enumerate(self.links)}
+        self.link_coordinate_count = len(FRAME_PARTS) * len(self.links)
+        self.own_slices: dict[str, slice] = {}
+        "of every pair: its own coordinates"
+        self.coordinate_count = self.link_coordinate_count
+        for pair in mechanism.pairs:
+            first = self.coordinate_count
+            self.coordinate_count += len(pair.coordinate_kinds)
+            self.own_slices[pair.name] = slice(first, self.coordinate_count)
+
+    def initial_spring_turns(self, q: Array, springs: Sequence[Spring]) -> Array:
+        """The whole turns (rad) by which links stand apart whose torsional springs do not count them (springs, ...).
+
+        Nothing says in a file how often links have turned: where they stand at coordinates q the spring is wound up the
+        least, but for a free angle beyond half a turn, which is off the angle between -pi and pi. Coordinates may be
+        arrays (coordinates, n), and the numbers of `springs` then too.
+        """
+        turns = np.zeros((len(springs), *np.shape(q)[1:]))
+        for number, spring in enumerate(springs):
+            if spring.is_torsional:
+                first, second = (
+                    q[self.link_columns[link] + 2] if link in self.link_columns else 0.0 for link in spring.ends
+                )
+                near = np.where(np.abs(spring.free) <= np.pi, spring.free, 0.0)
+                turns[number] = 2.0 * np.pi * np.round((second - first - near) / (2.0 * np.pi))
+        return turns
+
+    def coordinates(self, moving: KinematicResult) -> tuple[Array, Array, Array]:
+        """The coordinates of a state or a motion with their two rates (n, coordinates)."""
+        values = [getattr(moving.frames[link], part) for link in self.links for part in FRAME_PARTS]
+        values += [value for pair in self.mechanism.pairs for value in moving.own.get(pair.name, ())]
+        parts = [value_and_rates(value)[:3] for value in values]
+        count = max((np.size(part) for rates in parts for part in rates), default=1)
+        rates_of_all: Array = np.empty((3, count, len(parts)))
+        for column, rates in enumerate(parts):
+            for order, part in enumerate(rates):
+                rates_of_all[order, :, column] = part
+        positions, first, second = rates_of_all
+        return positions, first, second
