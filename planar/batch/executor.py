@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, ThreadPoolExecutor, wait
 from contextlib import suppress
 from contextvars import copy_context
+from itertools import chain, islice
 from numbers import Integral
 from typing import TypeVar
 
@@ -53,11 +54,13 @@ def run_in_threads(
 
     Whatever a task raises is raised here.
     """
-    if threads == 1:
-        for k, task in tasks:
+    waiting = iter(tasks)
+    first_tasks = list(islice(waiting, 2 if threads > 1 else 0))
+    waiting = chain(first_tasks, waiting)
+    if len(first_tasks) < 2:  # one task needs no thread of its own
+        for k, task in waiting:
             yield k, function(k, task)
         return
-    waiting = iter(tasks)
     running: dict[Future[Result], int] = {}
     with ThreadPoolExecutor(threads, thread_name_prefix="planar") as pool:
         try:

@@ -266,6 +266,11 @@ def _solve_some(mechanisms: Sequence[Mechanism], request: SweepRequest) -> Swept
     }
     if not layouts:
         return SweptList(tuple(solve_by_blocks(mechanisms, request)))
+    if len(layouts) == len(mechanisms) == 1:
+        kept = mechanisms[0].__dict__  # what is found of one linkage serves its next run
+        if "_linkages" not in kept:
+            kept["_linkages"] = PinnedLinkages.from_layouts(list(layouts.values()))
+        return _solve_linkages(kept["_linkages"], request)
     pinned = _solve_linkages(PinnedLinkages.from_layouts(list(layouts.values())), request)
     if len(layouts) == len(mechanisms):
         return pinned

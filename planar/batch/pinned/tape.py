@@ -15,8 +15,6 @@ from planar.solving.checks.residual_check import EPS, NEGLIGIBLE_ERROR, SHORT_AR
 
 Array = np.ndarray
 
-MAX_BARS = 64
-"""Bars of a linkage; longer ones are parted by themselves."""
 SMALLEST_SIZE, LARGEST_SIZE = 1e-50, 1e50
 """m: squares and products of lengths between these are numbers."""
 
@@ -89,7 +87,7 @@ def make_tape(linkages: PinnedLinkages) -> PinTape:
     pairs += np.diff(linkages.first_frame_pin)
     steps, known = _find_steps(linkages, entry_bar, entry_pin, is_fixed)
     unit, reach = _sizes(linkages, entry_bar, entry_pin)
-    odd = (bar_counts > MAX_BARS) | (2 * pairs + 1 != 3 * bar_counts)
+    odd = 2 * pairs + 1 != 3 * bar_counts
     odd |= ~((unit > SMALLEST_SIZE) & (unit < LARGEST_SIZE))
     odd[pin_owner[~known]] = True
     p, arm = _numbers(linkages, steps, pin_owner, unit, is_fixed)
@@ -127,19 +125,36 @@ def _find_steps(linkages: PinnedLinkages, entry_bar: Array, entry_pin: Array, is
     known[at] = True
     found = [(pivot[of], pivot[of], at, of, of)]
     pin, other, bar = _pairs_on_bars(linkages, entry_bar, entry_pin)
-    while len(pin):
-        rest = np.flatnonzero(~known[pin])
-        pin, other, bar = pin[rest], other[rest], bar[rest]
-        held = np.flatnonzero(known[other])
+    # the pairs by the other pin: each level looks at those of the pins of the level before
+    by_other = _stable_order(other)
+    starts = np.searchsorted(other[by_other], np.arange(len(known) + 1))
+    held_count, first_held = np.zeros(len(known), dtype=np.int64), np.zeros(len(known), dtype=np.int64)
+    newly_known = np.flatnonzero(known)
+    while len(newly_known):
+        counts = starts[newly_known + 1] - starts[newly_known]
+        ends = counts.cumsum()
+        held = by_other[np.arange(ends[-1]) + (starts[newly_known] - ends + counts).repeat(counts)]
+        held = held[~known[pin[held]]]
+        held.sort()  # in the order of their pins
         at = pin[held]
-        # sorted by pin, so that the two stand side by side
-        alike = np.concatenate([[False], at[1:] == at[:-1], [False, False]])
-        of_two = np.flatnonzero(alike[1:-1] & ~alike[:-2] & ~alike[2:])
-        if not len(of_two):
-            break
-        one, two = held[of_two], held[of_two + 1]
-        found.append((other[one], other[two], pin[one], bar[one], bar[two]))
-        known[pin[one]] = True
+        is_first = np.ones(len(at), dtype=bool)
+        np.not_equal(at[1:], at[:-1], out=is_first[1:])
+        (begins,) = is_first.nonzero()
+        own = np.empty_like(begins)
+        own[:-1], own[-1:] = begins[1:] - begins[:-1], len(held) - begins[-1:]
+        at, one = at[begins], held[begins]
+        total = held_count[at] + own
+        earlier = first_held[at]
+        held_count[at], first_held[at] = total, one
+        (of_two,) = (total == 2).nonzero()
+        one, earlier, begins = one[of_two], earlier[of_two], begins[of_two]
+        is_later = own[of_two] == 1  # beside one of an earlier level
+        two = np.where(is_later, earlier, held[begins + 1 - is_later])
+        one, two = np.minimum(one, two), np.maximum(one, two)
+        newly_known = pin[one]
+        known[newly_known] = True
+        if len(one):
+            found.append((other[one], other[two], newly_known, bar[one], bar[two]))
     level = np.repeat(np.arange(len(found)), [len(each[2]) for each in found])
     first, second, placed, a, b = (np.concatenate(parts) for parts in zip(*found, strict=True))
     # the first of the given pins moves
