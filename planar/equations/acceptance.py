@@ -14,6 +14,7 @@ from planar.codegen.printed_formula import FormulaFunction
 from planar.equations.block_type_functions import BlockTypeFunctions, block_type_functions
 from planar.equations.block_types import INPUT_BLOCK, PlacedBlock, place_input_coordinates
 from planar.equations.constraint_check import ORDERS, ConstraintCheck
+from planar.equations.coordinates import coordinate_columns
 from planar.equations.functions import MAX_CACHED_STRUCTURES, EquationFunctions, equation_functions
 from planar.equations.mechanism_numbers import equation_structure
 from planar.equations.symbolic_equations import Block, slice_length
@@ -118,7 +119,7 @@ class AcceptanceFunctions:
 
     @cached_property
     def _check(self) -> ConstraintCheck:
-        return ConstraintCheck(self.structure, self.equations.coordinates)
+        return ConstraintCheck(self.structure, coordinate_columns(self.equations.coordinates))
 
     def position(self, z: Array, given: InputSamples, scales: Scales) -> tuple[Array, AcceptanceResult[float]]:
         """Coordinates with their rates (3, coordinates) at unknowns z (unknowns,), and what is judged of them."""

@@ -1,31 +1,37 @@
-"""The residual check on samples of positions with their rates, in lengths of the size: every constraint by its pair's
-own formula, which is recorded together with its rates and the sizes of its terms, pairs of equal formula at once."""
+"""The residual check on samples of positions, with their rates or without, in lengths of the size.
+
+Every constraint is judged by its pair's own formula, which is recorded together with its rates and the sizes of its
+terms; pairs of equal formula are computed at once, on arrays with a row for each pair.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Sequence
+from collections.abc import Hashable, Iterator, Mapping, Sequence
+from functools import cached_property, lru_cache
 from math import pi
 from typing import NamedTuple
 
 import numpy as np
 
 from planar.codegen.printed_formula import FormulaFunction
-from planar.equations.coordinates import FRAME_PARTS, Coordinate, coordinate_columns
-from planar.equations.pair_formulas import PARTS_OF_FRAME, pair_formula
+from planar.equations.coordinates import FRAME_PARTS
+from planar.equations.pair_formulas import PARTS_OF_FRAME, pair_formula, recorded_pair_formula
 from planar.equations.residuals import CARRIED_ROUNDING, closing_error
-from planar.equations.stacked_residuals import MAX_STACKED_NUMBERS, PairGroup, index_columns, pair_groups
 from planar.foundation.arrays import Array, IntArray
 from planar.foundation.geometry import GROUND, Frame, frame_term_sizes
 from planar.foundation.jets import Jet, Scalar, TermSizes, cos, sin, term_sizes, value_and_rates
 from planar.foundation.recorded_formula import RecordedNumber, elementwise, greatest_entries, record_formula
 from planar.model.mechanism import Mechanism, relative_motions
-from planar.model.pairs import MeasureKind
+from planar.model.pairs import MeasureKind, Pair
 
 ORDERS = 3
 """A value, its first and its second rate."""
 RESULTS_OF_ROW = ORDERS + 2
 """What a constraint leaves open with its rates, then the sizes of the terms of the two rates."""
 MAX_RECORDED_CHECKS = 1024
+MAX_STACKED_NUMBERS = 2**14
+"""Numbers (pairs times samples) of an array that is computed with: larger ones are computed in parts."""
+MAX_CACHED_GROUPINGS = 64
 
 
 class ConstraintJudgement(NamedTuple):
@@ -38,25 +44,105 @@ class ConstraintJudgement(NamedTuple):
     contact_gap: Array
 
 
-class _PlacedGroup(NamedTuple):
+class ConstraintRows(NamedTuple):
+    """What constraints leave open at samples, with the frames (orders, 5, links, samples) that it was computed from.
+
+    `rows` (orders, constraints, samples): the values, and with rates the first and the second of them; then `sizes` (2,
+    constraints, samples) are those of the terms of the two rates. `gaps` of contacts (orders, samples), each by its
+    pair.
+    """
+
+    rows: Array
+    sizes: Array
+    gaps: list[tuple[str, Array]]
+    frames: Array
+
+
+class _PairGroup(NamedTuple):
+    """Pairs whose residuals, or positions as inputs, are computed together by the formula of one of them."""
+
+    key: Hashable
+    "equal where the formula is"
+    pair: Pair
+    is_input: bool
+    is_moving: tuple[bool, ...]
+    "whether a body moves"
+    names: tuple[str, ...]
+    bodies: IntArray
+    "(moving bodies, pairs): indices of links"
+    own: IntArray
+    "(own coordinates, pairs)"
+    rows: IntArray
+    "(constraints, pairs)"
+
+    def record(self, orders: int) -> FormulaFunction:
+        """The formula for values alone (1), or with both rates and the sizes of their terms (3), recorded once."""
+        key = self.key, type(self.pair), orders
+        check = _RECORDED_CHECKS.get(key)
+        if check is None:
+            if len(_RECORDED_CHECKS) >= MAX_RECORDED_CHECKS:
+                _RECORDED_CHECKS.clear()
+            check = _RECORDED_CHECKS[key] = _record_check(self, orders)
+        return check
+
+
+_RECORDED_CHECKS: dict[Hashable, FormulaFunction] = {}
+
+
+class _PlacedGroup:
     """Pairs of equal formula: of (w, u) the `own` coordinates (own, pairs), `inputs` (pairs,), of p the `numbers`."""
 
-    check: FormulaFunction
-    bodies: IntArray
-    own: IntArray
-    numbers: IntArray
-    inputs: IntArray
-    rows: IntArray
+    def __init__(self, group: _PairGroup, own: IntArray, numbers: IntArray, inputs: IntArray):
+        self.group, self.own, self.numbers, self.inputs = group, own, numbers, inputs
+        self.bodies, self.rows = group.bodies, group.rows
+
+    @cached_property
+    def check(self) -> FormulaFunction:
+        """With rates."""
+        return self.group.record(ORDERS)
+
+    @cached_property
+    def value_check(self) -> FormulaFunction:
+        """Of values alone."""
+        return self.group.record(1)
+
+    def parts(self, samples: int) -> Iterator[slice]:
+        """The pairs, so many at a time that arrays stay small."""
+        size = max(1, MAX_STACKED_NUMBERS // samples)
+        for first in range(0, self.rows.shape[1], size):
+            yield slice(first, first + size)
+
+    def evaluate(self, part: slice, frames: Array, motion: Array, p: Array) -> tuple[Array, Array]:
+        """What the constraints of some pairs leave open (results, constraints, pairs, samples), and the gaps of
+        contacts (gaps, orders, pairs, samples)."""
+        orders, samples = motion.shape[0], motion.shape[-1]
+        shape = self.rows[:, part].shape[1], samples
+        positions = shape[0] * samples
+
+        def entries(values: Array) -> Array:
+            return values.reshape(-1, positions)
+
+        arguments = [entries(frames[:, :, body[part]]) for body in self.bodies]
+        arguments += [entries(motion[:, self.own[:, part]]), entries(motion[:, self.inputs[part]])]
+        numbers = p[self.numbers[:, part]]
+        arguments.append(entries(numbers if p.ndim > 1 else np.repeat(numbers[..., None], samples, axis=-1)))
+        check = self.value_check if orders == 1 else self.check
+        results = check.evaluate_entries(positions, *arguments)
+        count = 1 if orders == 1 else RESULTS_OF_ROW
+        split = count * len(self.rows)
+        return results[:split].reshape(count, len(self.rows), *shape), results[split:].reshape(-1, orders, *shape)
 
 
 class ConstraintCheck:
-    """The constraints of one structure, of coordinates w and inputs u with their rates."""
+    """The constraints of one structure, of coordinates w and inputs u with their rates.
 
-    def __init__(self, mechanism: Mechanism, coordinates: Sequence[Coordinate]):
+    `column` says where in w the parts of links and the pairs' own coordinates stand; the inputs come after them.
+    """
+
+    def __init__(self, mechanism: Mechanism, column: Mapping[tuple[str, str], int]):
         motions = relative_motions(mechanism)
         inputs = tuple(motions[given.pair] for given in mechanism.inputs)
         links = tuple(link.name for link in mechanism.links if link.name != mechanism.frame)
-        column = coordinate_columns(coordinates)
         self._frame_columns = np.array([[column[link, part] for link in links] for part in FRAME_PARTS], dtype=int)
         self._frame_columns = self._frame_columns.reshape(len(FRAME_PARTS), -1)
         own_columns = [column[pair.name, part] for pair in mechanism.pairs for part, _ in pair.coordinate_kinds]
@@ -71,55 +157,125 @@ class ConstraintCheck:
         kinds += [pair.input_kind for pair in inputs]
         self._lengths = np.flatnonzero([kind is MeasureKind.LENGTH for kind in kinds])
         self._angles = np.flatnonzero([kind is MeasureKind.ANGLE for kind in kinds])
-        self._row_count, self._coordinate_count = len(kinds), len(coordinates)
+        self._row_count, self._coordinate_count = len(kinds), len(column)
         self._groups = [
             _PlacedGroup(
-                _recorded_check(group),
-                group.bodies,
+                group,
                 self._own[group.own],
                 # the relative motion of an input that no pair stands for has no numbers, nor does its formula need any
-                index_columns([numbers.get(name, [0] * len(group.pair.number_kinds)) for name in group.names]),
-                len(coordinates) + group.rows[0] - pair_row_count if group.is_input else np.zeros(0, dtype=int),
-                group.rows,
+                _index_columns([numbers.get(name, [0] * len(group.pair.number_kinds)) for name in group.names]),
+                len(column) + group.rows[0] - pair_row_count if group.is_input else np.zeros(0, dtype=int),
             )
-            for group in pair_groups(tuple(mechanism.pairs), inputs, links)
+            for group in _pair_groups(tuple(mechanism.pairs), inputs, links)
         ]
 
-    def judge(self, motion: Array, p: Array) -> ConstraintJudgement:
-        """Judge samples of (w, u) with their rates (3, entries, samples); p (numbers,)."""
-        frames = _frames(motion[:, self._frame_columns])
-        samples = motion.shape[-1]
-        rows: Array = np.zeros((RESULTS_OF_ROW, self._row_count, samples), dtype=motion.dtype)
-        gaps: list[Array] = []
-        for group in self._groups:
-            size = max(1, MAX_STACKED_NUMBERS // samples)
-            for first in range(0, group.rows.shape[1], size):
-                part = slice(first, first + size)
-                results, of_contacts = _evaluate(group, part, frames, motion, p)
-                rows[:, group.rows[:, part]] = results
-                gaps += of_contacts
-        return self._judgement(rows, gaps, motion, frames)
+    def evaluate(self, motion: Array, p: Array) -> ConstraintRows:
+        """What samples of (w, u) leave open, alone (1, entries, samples) or with their rates (3, entries, samples).
 
-    def _judgement(self, rows: Array, gaps: list[Array], motion: Array, frames: Array) -> ConstraintJudgement:
-        finite_sum = rows[:ORDERS].sum(axis=(0, 1))
-        left = rows[0]
-        left[self._angles] = closing_error(left[self._angles], MeasureKind.ANGLE)
-        counted = np.concatenate([np.abs(frames[0, 4]), np.abs(motion[0, self._own])])
-        residual = greatest_entries(np.abs(left)) / _at_least_one(greatest_entries(counted) / (2.0 * pi))
+        p are the numbers (numbers,), or (numbers, samples) where they differ.
+        """
+        orders, samples = motion.shape[0], motion.shape[-1]
+        frames = _frames(motion[:, self._frame_columns])
+        rows: Array = np.zeros((1 if orders == 1 else RESULTS_OF_ROW, self._row_count, samples), dtype=motion.dtype)
+        gaps: list[tuple[str, Array]] = []
+        for group in self._groups if samples else ():
+            for part in group.parts(samples):
+                rows[:, group.rows[:, part]], of_contacts = group.evaluate(part, frames, motion, p)
+                names = group.group.names[part]
+                gaps += [(names[k], gap[:, k]) for gap in of_contacts for k in range(len(names))]
+        rows[0, self._angles] = closing_error(rows[0, self._angles], MeasureKind.ANGLE)
+        return ConstraintRows(rows[:orders], rows[orders:], gaps, frames)
+
+    def judge(self, motion: Array, p: Array) -> ConstraintJudgement:
+        """Judge samples of (w, u) with their rates (3, entries, samples)."""
+        evaluated = self.evaluate(motion, p)
+        residual = greatest_entries(self.residuals(evaluated, motion))
+        velocity, acceleration = map(greatest_entries, self.rate_errors(evaluated))
+        contact: Array = 0.0 * residual
+        if evaluated.gaps:
+            scales = self.contact_scales(evaluated, motion)
+            contact = greatest_entries(np.concatenate([np.abs(gap) / scales for _, gap in evaluated.gaps]))
+        return ConstraintJudgement(residual, evaluated.rows.sum(axis=(0, 1)), velocity, acceleration, contact)
+
+    def residuals(self, evaluated: ConstraintRows, motion: Array) -> Array:
+        """How far constraints are open (constraints, samples), beside the turns that angles count.
+
+        The round-off of an angle, and of where its cos and sin put things, grows with them.
+        """
+        counted = np.concatenate([np.abs(evaluated.frames[0, 4]), np.abs(motion[0, self._own])])
+        return np.abs(evaluated.rows[0]) / _at_least_one(greatest_entries(counted) / (2.0 * pi))
+
+    def rate_errors(self, evaluated: ConstraintRows) -> tuple[Array, Array]:
+        """How far first and second rates break constraints, as parts of their terms (constraints, samples)."""
         # a velocity counts as one in an arc of the size: what turning leaves there but for rounding is none
-        first, second = rows[ORDERS], rows[ORDERS + 1]
+        first, second = evaluated.sizes
         speed = greatest_entries(first[self._lengths])
         of_second = greatest_entries(np.concatenate([second[self._lengths], (speed * speed)[None]]))
-        velocity = greatest_entries(np.abs(rows[1]) / _nonzero(first + CARRIED_ROUNDING * speed))
-        acceleration = greatest_entries(np.abs(rows[2]) / _nonzero(second + CARRIED_ROUNDING * of_second))
-        contact: Array = 0.0 * residual
-        if gaps:
-            coordinates = np.abs(motion[:, : self._coordinate_count])
-            greatest = greatest_entries(coordinates[1])
-            of_arcs = greatest_entries(np.concatenate([coordinates[2], frames[1, 4] * frames[1, 4]]))
-            scales = np.stack([0.0 * residual + 1.0, _nonzero(greatest), _nonzero(of_arcs)])
-            contact = greatest_entries(np.concatenate([np.abs(gap) / scales for gap in gaps]))
-        return ConstraintJudgement(residual, finite_sum, velocity, acceleration, contact)
+        return (
+            np.abs(evaluated.rows[1]) / _nonzero(first + CARRIED_ROUNDING * speed),
+            np.abs(evaluated.rows[2]) / _nonzero(second + CARRIED_ROUNDING * of_second),
+        )
+
+    def contact_scales(self, evaluated: ConstraintRows, motion: Array) -> Array:
+        """What gaps of contacts and their rates are parts of (3, samples)."""
+        coordinates = np.abs(motion[:, : self._coordinate_count])
+        greatest = greatest_entries(coordinates[1])
+        arcs = evaluated.frames[1, 4] * evaluated.frames[1, 4]
+        of_arcs = greatest_entries(np.concatenate([coordinates[2], arcs]))
+        return np.stack([0.0 * greatest + 1.0, _nonzero(greatest), _nonzero(of_arcs)])
+
+
+def _pair_groups(pairs: tuple[Pair, ...], inputs: tuple[Pair, ...], moving: tuple[str, ...]) -> tuple[_PairGroup, ...]:
+    """Pairs, then inputs, of a mechanism with these moving links, that are computed together."""
+    try:
+        hash(pairs)
+    except TypeError:  # made in Python, of lists
+        return _make_groups(pairs, inputs, moving)
+    return _cached_groups(pairs, inputs, moving)
+
+
+def _make_groups(pairs: tuple[Pair, ...], inputs: tuple[Pair, ...], moving: tuple[str, ...]) -> tuple[_PairGroup, ...]:
+    links = {link: k for k, link in enumerate(moving)}
+    own: dict[str, range] = {}
+    own_count = 0
+    for pair in pairs:
+        own[pair.name] = range(own_count, own_count + len(pair.coordinate_kinds))
+        own_count += len(pair.coordinate_kinds)
+    members: dict[Hashable, list[tuple[Pair, bool, tuple[bool, ...], range]]] = {}
+    row = 0
+    for k, pair in enumerate((*pairs, *inputs)):
+        is_input = k >= len(pairs)
+        rows = range(row, row + (1 if is_input else len(pair.residual_kinds)))
+        row = rows.stop
+        is_moving = tuple(link in links for link in pair.bodies)
+        counts = len(own.get(pair.name, ())), len(pair.number_kinds)
+        key = recorded_pair_formula(pair, is_input, is_moving, *counts), is_input, is_moving, counts
+        members.setdefault(key, []).append((pair, is_input, is_moving, rows))
+    groups = []
+    for formula, group in members.items():
+        pair, is_input, is_moving, _ = group[0]
+        groups.append(
+            _PairGroup(
+                formula,
+                pair,
+                is_input,
+                is_moving,
+                tuple(each.name for each, *_ in group),
+                _index_columns([[links[link] for link in each.bodies if link in links] for each, *_ in group]),
+                _index_columns([own.get(each.name, ()) for each, *_ in group]),
+                _index_columns([rows for *_, rows in group]),
+            )
+        )
+    return tuple(groups)
+
+
+_cached_groups = lru_cache(maxsize=MAX_CACHED_GROUPINGS)(_make_groups)
+
+
+def _index_columns(indices: Sequence[Sequence[int]]) -> IntArray:
+    """Indices (pairs, entries) as columns (entries, pairs)."""
+    columns: IntArray = np.array([list(row) for row in indices], dtype=int).reshape(len(indices), -1).T
+    return columns
 
 
 def _nonzero(scale: Array) -> Array:
@@ -132,59 +288,32 @@ def _at_least_one(values: Array) -> Array:
 
 
 def _frames(coordinates: Array) -> Array:
-    """x, y, cos, sin and angle of links with their rates (3, 5, links, samples), from x, y and angle of them."""
-    angle, first, second = coordinates[:, 2]
+    """x, y, cos, sin and angle of links with their rates (orders, 5, links, samples), from x, y and angle of them.
+
+    cos and sin are made afresh from the angle.
+    """
+    angle = coordinates[0, 2]
     cosine, sine = elementwise(cos, angle), elementwise(sin, angle)
-    square = first * first
-    frames: Array = np.empty((ORDERS, PARTS_OF_FRAME, *angle.shape), dtype=coordinates.dtype)
+    frames: Array = np.empty((len(coordinates), PARTS_OF_FRAME, *angle.shape), dtype=coordinates.dtype)
     frames[:, :2], frames[:, 4] = coordinates[:, :2], coordinates[:, 2]
     frames[0, 2], frames[0, 3] = cosine, sine
-    frames[1, 2], frames[1, 3] = -sine * first, cosine * first
-    frames[2, 2], frames[2, 3] = -sine * second - cosine * square, cosine * second - sine * square
+    if len(coordinates) == ORDERS:
+        first, second = coordinates[1:, 2]
+        square = first * first
+        frames[1, 2], frames[1, 3] = -sine * first, cosine * first
+        frames[2, 2], frames[2, 3] = -sine * second - cosine * square, cosine * second - sine * square
     return frames
 
 
-def _evaluate(group: _PlacedGroup, part: slice, frames: Array, motion: Array, p: Array) -> tuple[Array, list[Array]]:
-    """What the constraints of some pairs of a group leave open (results, constraints, pairs, samples), and their
-    contact gaps (3, samples)."""
-    samples = motion.shape[-1]
-    shape = group.rows[:, part].shape[1], samples
-    positions = shape[0] * samples
-
-    def entries(values: Array) -> Array:
-        return values.reshape(-1, positions)
-
-    arguments = [entries(frames[:, :, body[part]]) for body in group.bodies]
-    arguments += [entries(motion[:, group.own[:, part]]), entries(motion[:, group.inputs[part]])]
-    arguments.append(entries(np.repeat(p[group.numbers[:, part], None], samples, axis=-1)))
-    results = group.check.evaluate_entries(positions, *arguments)
-    split = RESULTS_OF_ROW * len(group.rows)
-    rows = results[:split].reshape(RESULTS_OF_ROW, len(group.rows), *shape)
-    gaps = results[split:].reshape(-1, ORDERS, *shape)
-    return rows, [gap[:, k] for gap in gaps for k in range(shape[0])]
-
-
-_RECORDED_CHECKS: dict[Hashable, FormulaFunction] = {}
-
-
-def _recorded_check(group: PairGroup) -> FormulaFunction:
-    """The check of a group's formula, recorded once."""
-    key = group.key, type(group.pair)
-    check = _RECORDED_CHECKS.get(key)
-    if check is None:
-        if len(_RECORDED_CHECKS) >= MAX_RECORDED_CHECKS:
-            _RECORDED_CHECKS.clear()
-        check = _RECORDED_CHECKS[key] = _record_check(group)
-    return check
-
-
-def _record_check(group: PairGroup) -> FormulaFunction:
-    pair, is_input = group.pair, group.is_input
-    counts = [ORDERS * PARTS_OF_FRAME] * len(group.bodies)
-    counts += [ORDERS * len(group.own), ORDERS * is_input, len(pair.number_kinds)]
+def _record_check(group: _PairGroup, orders: int) -> FormulaFunction:
+    pair, is_input, has_rates = group.pair, group.is_input, orders == ORDERS
+    counts = [orders * PARTS_OF_FRAME] * len(group.bodies)
+    counts += [orders * len(group.own), orders * is_input, len(pair.number_kinds)]
     ends = np.cumsum(counts)
 
     def jets(entries: Sequence[RecordedNumber], sizes: bool) -> list[Scalar]:
+        if not has_rates:
+            return list(entries)
         values = [Jet(*entries[k :: len(entries) // ORDERS]) for k in range(len(entries) // ORDERS)]
         return [term_sizes(value) for value in values] if sizes else values
 
@@ -208,6 +337,8 @@ def _record_check(group: PairGroup) -> FormulaFunction:
             return [value - position for value, position in zip(residuals, positions, strict=True)], own
 
         residuals, own = values(False)
+        if not has_rates:
+            return residuals
         terms, _ = values(True)
         rows = [[*value_and_rates(value)] for value in residuals]
         sizes = [value.parts[1:] if isinstance(value, TermSizes) else (0.0, 0.0) for value in terms]

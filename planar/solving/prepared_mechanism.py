@@ -278,14 +278,7 @@ class PreparedMechanism:
 
     def max_residual(self, z: Array, u: Array) -> float:
         """The same at one position, z (unknowns,) and u (inputs,)."""
-        if self.equations.open_rows:
-            return float(self.max_residuals(z[None], u[None])[0])
-        w = (self.functions.coordinates(z, u, self.inputs.p) * self.scale).tolist()
-        try:
-            frames, own = frames_from_coordinates(w, self.column, self.shapes, self.pairs)
-            return self.residual_check.greatest_residual(frames, own, (u * self._input_scale).tolist())
-        except (ValueError, OverflowError, ZeroDivisionError):  # numpy has numbers for more
-            return float(self.max_residuals(z[None], u[None])[0])
+        return float(self.max_residuals(z[None], u[None])[0])
 
     def describe_position(self) -> str:
         """The file's own position in words: at A = 60 deg."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from copy import copy
 from typing import NamedTuple
 
 import numpy as np
@@ -15,7 +14,6 @@ from planar.equations.coordinates import coordinate_columns, frames_from_coordin
 from planar.equations.functions import EquationFunctions, EquationRates
 from planar.equations.linear import solve_arrays, solve_vectors
 from planar.equations.mechanism_numbers import mechanism_size, shapes_of_links
-from planar.equations.residuals import split_pair_numbers
 from planar.foundation.geometry import Frame, Vector
 from planar.foundation.jets import Jet, Scalar
 from planar.model.mechanism import Mechanism
@@ -66,12 +64,7 @@ class DesignResidualCheck:
 
     def __init__(self, residual_check: ResidualCheck, mechanism: Mechanism, functions: EquationFunctions, p: Array):
         self.mechanism, self.functions = mechanism, functions
-        self.residual_check = copy(residual_check)
-        self.residual_check.unit = 1.0
-        self.residual_check.numbers = {**split_pair_numbers(mechanism.pairs, list(p))}
-        # a pin of many links has motions between links that no pair of its own joins
-        for given in mechanism.inputs:
-            self.residual_check.numbers.setdefault(given.pair, tuple(residual_check.numbers[given.pair]))
+        self.residual_check = residual_check.of_designs(p)
         self.column = coordinate_columns(functions.equations.coordinates)
         self.links = [link.name for link in mechanism.links]
         self.pairs = {pair.name: pair for pair in mechanism.pairs}
