@@ -31,7 +31,7 @@ from planar.model.mechanism import Mechanism
 INSTRUCTIONS_PER_CALL = 8
 """Instructions of blocks that are made one formula, with the checks of their pairs, and printed in the time that such a
 formula saves in a call at one position."""
-MAX_FUSED_INSTRUCTIONS = 6_000
+MAX_FUSED_INSTRUCTIONS = 4_000
 
 Judged = TypeVar("Judged")
 """A float of one position, an array of many."""
@@ -56,6 +56,9 @@ class AcceptanceResult(NamedTuple, Generic[Judged]):
     "no more than the least singular value of any block, columns of one size"
     rounding_amplification: Judged
     "by how much, at most, round-off is greater in the rates, see `solving.rates.accuracy`"
+
+
+RESULT_COUNT = len(AcceptanceResult._fields)
 
 
 class InputSamples(NamedTuple):
@@ -126,8 +129,8 @@ class AcceptanceFunctions:
         self._call_count += 1
         if self._call_count > self._calls_before_fusing:
             values = self._fused_position.values(*(argument.tolist() for argument in (z, *given, *scales)))
-            split = len(values) - len(AcceptanceResult._fields)
-            return np.array(values[:split]).reshape(ORDERS, -1), AcceptanceResult(*values[split:])
+            split = ORDERS * len(self.equations.coordinates)
+            return np.array(values[:split]).reshape(ORDERS, -1), AcceptanceResult(*values[split : split + RESULT_COUNT])
         judged = self.judge(z[None], InputSamples(*(rates[None] for rates in given)), scales)
         return judged.coordinate_rates[0], AcceptanceResult(*(float(values[0]) for values in judged.result))
 
@@ -139,9 +142,39 @@ class AcceptanceFunctions:
     def run(self, z: Array, given: InputSamples, scales: Scales) -> tuple[Array, JudgedPositions]:
         """The unknowns at samples of inputs (samples, unknowns), on the branch of z (unknowns,) at the first, and what
         is judged of them."""
+        self._call_count += 1
         with np.errstate(all="ignore"):
+            if self._call_count > self._calls_before_fusing:
+                samples = self._solve_run(z, given.u, scales.p)
+                return samples, self._judge_by_one_formula(samples, given, scales)
             motion = self._move(np.array([rates.T for rates in given]), scales, start=z)
             return motion.entries[0, self.unknown_columns].T, self._judge(motion, scales)
+
+    def _solve_run(self, start: Array, u: Array, p: Array) -> Array:
+        """The unknowns at samples of inputs u (samples, inputs), block after block, on the branch of `start`."""
+        count = len(self.equations.coordinates)
+        entries: Array = np.empty((len(u), count + u.shape[1]))
+        entries[:, count:] = u
+        last = self._blocks[-1][0]
+        for block, placed, of_type in self._blocks:
+            known, numbers = entries[:, placed.known], p[placed.numbers]
+            own = known[:, :0]
+            if slice_length(block.unknowns):
+                own = of_type.run(start[block.unknowns], known, numbers)
+                entries[:, self.unknown_columns[block.unknowns]] = own
+            if block is not last:  # nothing follows from its coordinates
+                entries[:, placed.coordinates] = of_type.coordinates.evaluate_batch(len(u), own, known, numbers)[0][
+                    :, 0
+                ]
+        return entries[:, self.unknown_columns]
+
+    def _judge_by_one_formula(self, z: Array, given: InputSamples, scales: Scales) -> JudgedPositions:
+        """Judge samples z (samples, unknowns) by the formula of all blocks and pairs."""
+        values = self._fused_position.evaluate_entries(len(z), z.T, *(rates.T for rates in given), *scales)
+        split = ORDERS * len(self.equations.coordinates)
+        rates = values[:split].reshape(ORDERS, -1, len(z)).transpose(2, 0, 1)
+        result = AcceptanceResult(*values[split : split + RESULT_COUNT])
+        return JudgedPositions(rates, result, values[split + RESULT_COUNT :].T)
 
     def _move(self, u: Array, scales: Scales, z: Array | None = None, start: Array | None = None) -> _BlockMotion:
         """All blocks one after the other, each at all samples: from inputs with their rates (3, inputs, samples), at
@@ -205,8 +238,8 @@ class AcceptanceFunctions:
 
     @cached_property
     def _fused_position(self) -> FormulaFunction:
-        """(z, u, u1, u2, p, row scale, column floor) -> coordinates with their rates, and what is judged: the formulas
-        of all blocks and pairs one after the other."""
+        """(z, u, u1, u2, p, row scale, column floor) -> coordinates with their rates, what is judged, and distances:
+        the formulas of all blocks and pairs one after the other."""
         e = self.equations
         rows, inputs = len(e.rows), len(e.input_kinds)
         assert e.elimination is not None
@@ -214,6 +247,7 @@ class AcceptanceFunctions:
         instructions, (z, u, u1, u2, *scales) = recorded_arguments(counts)
         judged = self.judge(z[None], InputSamples(u[None], u1[None], u2[None]), Scales(*scales))
         results = [*judged.coordinate_rates.reshape(-1), *(values[0] for values in judged.result)]
+        results += list(judged.distances[0])
         formula = formula_of_results(instructions, [number_of(result, instructions) for result in results])
         return FormulaFunction(formula, counts, ((1, len(results)),))
 
