@@ -12,7 +12,7 @@ from planar.batch.closed_form.own_ranges import run_between_limits
 from planar.batch.dead_point_tracking import DEAD_POINT_MARGIN, FollowedDesigns, follow_to_dead_points
 from planar.batch.design_arrays import values_of_design, with_design_values
 from planar.batch.design_stops import DesignStops, StepRunner
-from planar.batch.general_path import OUTCOMES, DesignQuestion, solve_design
+from planar.batch.general_path import OUTCOMES, DesignQuestion
 from planar.batch.initial_assembly import find_assemblies, given_assemblies
 from planar.batch.march.backend import (
     DesignBatch,
@@ -141,10 +141,13 @@ class DesignBlockSolver:
         code[failed] = status_code(Outcome.CANNOT_BE_ASSEMBLED)
         if any(self.reference.point_member(name)[0] == self.reference.mechanism.frame for name in block.points):
             erase_from_steps(out, solved)
-        # no wider than steps are counted: of all positions
-        counter = np.min_scalar_type(-block.steps - 2)
-        status = (np.arange(block.steps + 1).astype(counter) >= solved.astype(counter)[:, None]).view(np.int8)
-        status *= code[:, None]
+        if code.any():
+            # no wider than steps are counted: of all positions
+            counter = np.min_scalar_type(-block.steps - 2)
+            status = (np.arange(block.steps + 1).astype(counter) >= solved.astype(counter)[:, None]).view(np.int8)
+            status *= code[:, None]
+        else:
+            status = np.zeros((self.design_count, block.steps + 1), dtype=np.int8)
         inputs = self._input_positions(same)
         self.endings = {
             int(each): (int(np.sum(code == each)), self._question(int(np.argmax(code == each)), inputs))
@@ -168,17 +171,18 @@ class DesignBlockSolver:
 
     def _question(self, index: int, inputs: Array) -> DesignQuestion:
         """A design, and the range that it is to run."""
-        block = self.block
-        mechanism = with_design_values(self.reference.mechanism, values_of_design(block.designs, index))
+        block, mechanism, values = self.block, self.reference.mechanism, values_of_design(self.block.designs, index)
         if block.assemblies is not None:
-            mechanism = self.reference.with_sketch_of(mechanism, block.assemblies[:, index], self.u[:, index])
+            design = with_design_values(mechanism, values)
+            mechanism = self.reference.with_sketch_of(design, block.assemblies[:, index], self.u[:, index])
+            values = {}
         grid = None if self.has_own_range else inputs if inputs.ndim == 1 else inputs[index]
         ends = (block.start, block.stop) if grid is None else (float(grid[0]), float(grid[-1]))
-        return DesignQuestion(mechanism, self.reference.pair, grid, block.steps, ends)
+        return DesignQuestion(mechanism, values, self.reference.pair, grid, block.steps, ends)
 
     def _solve_alone(self, index: int, out: Array, status: Array, inputs: Array) -> None:
         """Solve a design by the general path."""
-        told = solve_design(*self._question(index, inputs), self.block.points, self.block.rates)
+        told = self._question(index, inputs).solve(self.block.points, self.block.rates)
         out[:, :, index], status[index], self.dead_point[index] = told.out, told.status, told.dead_point
         self.stop_position[index] = told.stop_position
         if self.has_own_range:

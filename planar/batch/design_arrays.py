@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,8 +12,10 @@ from planar.document.dimensions import (
     Dimension,
     change_dimension,
     file_dimensions,
+    replace_value,
 )
 from planar.foundation.errors import BadInput, suggest_name
+from planar.model.link_shapes import Link
 from planar.model.mechanism import LARGEST_COUNTED_ANGLE, Mechanism
 
 Array = np.ndarray
@@ -71,9 +74,16 @@ def _read_values(name: str, given: Any, known: Mapping[str, Dimension]) -> Array
 def with_design_values(mechanism: Mechanism, values: Mapping[str, Any]) -> Mechanism:
     """The mechanism with these numbers, or arrays of them, in place of its own."""
     known = design_variables(mechanism)
+    links: dict[int, Link] = {}  # made anew once, whatever number of theirs is changed
     for name, value in values.items():
-        mechanism = change_dimension(mechanism, known[name], value)
-    return mechanism
+        section, index, *rest = known[name].address
+        if section == "links" and isinstance(index, int):
+            links[index] = replace_value(links.get(index, mechanism.links[index]), tuple(rest), value)
+        else:
+            mechanism = change_dimension(mechanism, known[name], value)
+    if not links:
+        return mechanism
+    return replace(mechanism, links=tuple(links.get(index, link) for index, link in enumerate(mechanism.links)))
 
 
 def values_of_design(values: Mapping[str, Array], index: int) -> dict[str, float]:

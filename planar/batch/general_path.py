@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 import numpy as np
 
+from planar.batch.design_arrays import with_design_values
 from planar.foundation.errors import BadInput, NoAnswer, Outcome
 from planar.foundation.jets import value_and_rates
 from planar.foundation.time_limit import time_is_over
@@ -39,16 +40,21 @@ class SolvedDesign(NamedTuple):
 
 
 class DesignQuestion(NamedTuple):
-    """A design of which it is asked why it ends: the arguments of `solve_design`; as text the answer."""
+    """A design by its numbers, and the arguments of `solve_design`; as text the sentence that says why it ends."""
 
     mechanism: Mechanism
+    values: Mapping[str, float]
     pair: str
     grid: Array | None
     steps: int
     range: tuple[float | None, float | None]
 
+    def solve(self, points: tuple[PointName, ...], rates: bool) -> SolvedDesign:
+        """See `solve_design`."""
+        return solve_design(with_design_values(self.mechanism, self.values), *self[2:], points, rates)
+
     def __str__(self) -> str:
-        return str(solve_design(*self, (), False).message)
+        return str(self.solve((), False).message)
 
 
 def solve_design(

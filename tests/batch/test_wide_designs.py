@@ -135,7 +135,6 @@ def test_sentences_are_made_when_they_are_read(monkeypatch):
         return solve_design(*arguments)
 
     monkeypatch.setattr("planar.batch.general_path.solve_design", counted)
-    monkeypatch.setattr("planar.batch.block.solve_design", counted)
     found = planar.sweep(four_bar(CRANK, COUPLER, ROCKER, GROUND, FIRST), random_four_bars(100)[1], 200, rates=False)
     assert not asked
     dead, open_ = found.remarks[::-1]
