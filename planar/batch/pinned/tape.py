@@ -125,36 +125,36 @@ def _find_steps(linkages: PinnedLinkages, entry_bar: Array, entry_pin: Array, is
     known[at] = True
     found = [(pivot[of], pivot[of], at, of, of)]
     pin, other, bar = _pairs_on_bars(linkages, entry_bar, entry_pin)
-    # the pairs by the other pin: each level looks at those of the pins of the level before
-    by_other = _stable_order(other)
-    starts = np.searchsorted(other[by_other], np.arange(len(known) + 1))
-    held_count, first_held = np.zeros(len(known), dtype=np.int64), np.zeros(len(known), dtype=np.int64)
+    counts_of = np.bincount(pin, minlength=len(known))
+    starts = counts_of.cumsum() - counts_of
+    held_count, earlier_pin, earlier_bar = (np.zeros(len(known), dtype=np.int64) for _ in range(3))
     newly_known = np.flatnonzero(known)
     while len(newly_known):
-        counts = starts[newly_known + 1] - starts[newly_known]
-        ends = counts.cumsum()
-        held = by_other[np.arange(ends[-1]) + (starts[newly_known] - ends + counts).repeat(counts)]
-        held = held[~known[pin[held]]]
-        held.sort()  # in the order of their pins
-        at = pin[held]
-        is_first = np.ones(len(at), dtype=bool)
-        np.not_equal(at[1:], at[:-1], out=is_first[1:])
+        # the pins beside those of the level before, each as often as it is held
+        counts = counts_of[newly_known]
+        stops = counts.cumsum()
+        own = np.arange(stops[-1]) + (starts[newly_known] + counts - stops).repeat(counts)
+        held = other[own]
+        (rest,) = (~known[held]).nonzero()
+        rest = rest[_stable_order(held[rest])]
+        held, by, on = held[rest], pin[own[rest]], bar[own[rest]]
+        is_first = np.ones(len(held), dtype=bool)
+        np.not_equal(held[1:], held[:-1], out=is_first[1:])
         (begins,) = is_first.nonzero()
-        own = np.empty_like(begins)
-        own[:-1], own[-1:] = begins[1:] - begins[:-1], len(held) - begins[-1:]
-        at, one = at[begins], held[begins]
-        total = held_count[at] + own
-        earlier = first_held[at]
-        held_count[at], first_held[at] = total, one
-        (of_two,) = (total == 2).nonzero()
-        one, earlier, begins = one[of_two], earlier[of_two], begins[of_two]
-        is_later = own[of_two] == 1  # beside one of an earlier level
-        two = np.where(is_later, earlier, held[begins + 1 - is_later])
-        one, two = np.minimum(one, two), np.maximum(one, two)
-        newly_known = pin[one]
-        known[newly_known] = True
-        if len(one):
-            found.append((other[one], other[two], newly_known, bar[one], bar[two]))
+        held = held[begins]
+        times = np.empty_like(begins)
+        times[:-1], times[-1:] = begins[1:] - begins[:-1], len(by) - begins[-1:]
+        held_count[held] += times
+        (of_two,) = (held_count[held] == 2).nonzero()
+        placed, begin = held[of_two], begins[of_two]
+        is_alone = times[of_two] == 1  # beside one of an earlier level
+        second = begin + 1 - is_alone
+        one_pin, one_bar = np.where(is_alone, (earlier_pin[placed], earlier_bar[placed]), (by[begin], on[begin]))
+        earlier_pin[held], earlier_bar[held] = by[begins], on[begins]
+        known[placed] = True
+        newly_known = placed
+        if len(placed):
+            found.append((one_pin, by[second], placed, one_bar, on[second]))
     level = np.repeat(np.arange(len(found)), [len(each[2]) for each in found])
     first, second, placed, a, b = (np.concatenate(parts) for parts in zip(*found, strict=True))
     # the first of the given pins moves
