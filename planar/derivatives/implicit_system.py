@@ -21,6 +21,7 @@ import numpy as np
 
 from planar.equations.casadi_call import BufferedFunction
 from planar.foundation.arrays import Array, BoolArray
+from planar.foundation.time_limit import all_within_time, stop_if_over
 
 SINGULAR = 1e-9
 """A singular value below this part of the greatest is none."""
@@ -80,7 +81,7 @@ class ImplicitSystem:
         step = max(1, MAX_CHUNK_NUMBERS // (size * size))
         constants = np.zeros((len(parameters), 0)) if constants is None else constants
         found = []
-        for first in range(0, len(parameters), step):
+        for first in all_within_time(range(0, len(parameters), step), "parts of the positions"):
             rows = slice(first, first + step)
             here = [each[rows] for each in (*values, parameters, constants)]
             linear = self.linearise(here)
@@ -102,6 +103,7 @@ class ImplicitSystem:
         """The derivative of the sum of results (see `weighed_results`) times their weights (n, results) at each of n
         positions, in the parameters (n, parameters), and where there is none (n,): one transposed solution, for however
         many."""
+        stop_if_over("before the positions were linearised")
         constants = np.zeros((len(parameters), 0)) if constants is None else constants
         given = [*values, parameters, constants]
         of_results = weighed.evaluate_batch(len(parameters), *given, weights)

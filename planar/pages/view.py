@@ -14,6 +14,7 @@ from planar.foundation.geometry import frame_at
 from planar.foundation.jets import Jet, Scalar
 from planar.foundation.notebook_display import Displayable
 from planar.foundation.safe_files import save_file
+from planar.foundation.time_limit import stop_if_over, stops_in_time
 from planar.model.mechanism import Drive, Mechanism, replace_inputs, running_input_index
 from planar.pages.data.wanted_data import apply_task
 from planar.pages.notebook import must_carry_scripts, output_html
@@ -30,12 +31,14 @@ MAX_LISTED_ASSEMBLIES = 12
 
 
 @takes_result("Mechanism", "State", "Motion")
+@stops_in_time
 def view(
     shown: Mechanism | State | Motion,
     path: str | Path | None = None,
     *,
     task: TaskSource | None = None,
     pair: str | None = None,
+    timeout: float | None = None,  # noqa: ARG001 - of the decorator
 ) -> Path:
     """Write the page of a mechanism, of a position, or of a motion, which keeps its range.
 
@@ -45,8 +48,9 @@ def view(
     at the unit rate of the input that runs, and the page says so. The page of a structure, and of a mechanism without
     inputs as it is drawn, says that nothing moves it. Returns the file's path.
 
-    Raises NoAnswer where the mechanism has no position to start from, BadInput where the file cannot be
-    written, the task is none of this mechanism, or there is no input at `pair`.
+    Raises NoAnswer where the mechanism has no position to start from, and after `timeout` s, or a Ctrl-C, with the
+    outcome "interrupted"; BadInput where the file cannot be written, the task is none of this mechanism, or there is no
+    input at `pair`.
 
     >>> import planar
     >>> from tempfile import mkdtemp
@@ -55,6 +59,7 @@ def view(
     """
     if not isinstance(shown, Mechanism | State | Motion):
         raise BadInput("view", f"a Mechanism, a State or a Motion is wanted, not {type(shown).__name__}")
+    stop_if_over("before the page was begun")
     text = page_of(shown, None if task is None else read_task(task), pair)
     if path is not None:
         save_file(Path(path), text)

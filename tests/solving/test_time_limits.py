@@ -57,12 +57,14 @@ CASES = {
     "forces": lambda _, **o: planar.forces(planar.cycle("balanced-lamp", 12), **o),
     "force_map": lambda _, **o: planar.force_map("excavator-arm", {"boom cylinder": (2.4, 2.6, 5)}, False, **o),
     "generate": generated,
+    "gradient": lambda _, **o: planar.gradient(planar.cycle("slider-crank", 12), {"stroke": 13 * [1.0]}, **o),
     "harmonics": lambda _, **o: planar.harmonics("slider-crank", "stroke", **o),
     "inspect": lambda _, **o: planar.inspect("four-bar", **o),
     "mark_answers": marked,
     "modes": lambda _, **o: planar.modes("watt-six-bar", certify=False, **o),
     "parts": lambda _, **o: planar.parts("four-bar", **o),
     "problem_variants": lambda _, **o: planar.problem_variants("four-bar", 4, seed=7, **o),
+    "sensitivity": lambda _, **o: planar.sensitivity(planar.cycle("slider-crank", 12), "stroke", **o),
     "simulate": lambda _, **o: planar.simulate("door-closer", 1.0, 20, **o),
     "sweep": lambda _, **o: planar.sweep("crank-rocker", {"coupler.length": FORTY}, 12, "B", block=10, workers=1, **o),
     "sweep_each": lambda _, **o: planar.sweep_each(["four-bar", "slider-crank"] * 3, 12, workers=1, **o),
@@ -70,6 +72,7 @@ CASES = {
     "tolerance": lambda _, **o: planar.tolerance(
         planar.solve("slider-crank"), "stroke", {"rod.length": "0.1 mm"}, guaranteed=True, **o
     ),
+    "view": lambda folder, **o: planar.view("four-bar", folder / "page.html", **o),
 }
 
 

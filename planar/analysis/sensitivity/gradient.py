@@ -12,13 +12,20 @@ from planar.document.first_argument import takes_result
 from planar.dynamics.forces import Forces
 from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput, NoAnswer, Outcome, join_names
+from planar.foundation.time_limit import stops_in_time
 from planar.results.motion import Motion, State
 
 Weights = Mapping[str, Any]
 
 
 @takes_result("State", "Motion", "Forces")
-def gradient(result: State | Motion | Forces, weights: Weights) -> dict[str, float]:
+@stops_in_time
+def gradient(
+    result: State | Motion | Forces,
+    weights: Weights,
+    *,
+    timeout: float | None = None,  # noqa: ARG001 - of the decorator
+) -> dict[str, float]:
     """The derivatives of a weighed sum of results, by the name of each number of the file (SI).
 
     `weights` by the name of a point, link, pair or input: an array for what is told of it first, as (n, 2) for the
@@ -27,8 +34,8 @@ def gradient(result: State | Motion | Forces, weights: Weights) -> dict[str, flo
     many numbers the file has (A. Griewank, A. Walther, Evaluating Derivatives, SIAM 2008). Numbers that cannot change
     alone are NaN (see `Sensitivity.tied`).
 
-    Raises Unknown for another name, BadInput for weights that do not fit, and NoAnswer where a position with a weight
-    has no derivatives.
+    Raises Unknown for another name, BadInput for weights that do not fit; NoAnswer where a position with a weight has
+    no derivatives, and after `timeout` s, or a Ctrl-C, with the outcome "interrupted".
 
     >>> import planar
     >>> motion = planar.cycle(planar.load("slider-crank"), 12)

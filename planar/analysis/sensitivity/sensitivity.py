@@ -23,6 +23,7 @@ from planar.dynamics.forces import Forces
 from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput, NoAnswer, Outcome, join_names
 from planar.foundation.short_repr import short_repr
+from planar.foundation.time_limit import stops_in_time
 from planar.model.link_shapes import shape_extent
 from planar.results.motion import Motion, State
 
@@ -154,13 +155,19 @@ class Sensitivity:
 
 
 @takes_result("State", "Motion", "Forces")
-def sensitivity(result: State | Motion | Forces, of: str) -> Sensitivity:
+@stops_in_time
+def sensitivity(
+    result: State | Motion | Forces,
+    of: str,
+    *,
+    timeout: float | None = None,  # noqa: ARG001 - of the decorator
+) -> Sensitivity:
     """The derivatives of what a result tells of a point, a link, a pair or an input, in every number of the file.
 
     Exact but for rounding, by one linear solution a position; see `Sensitivity`. Raises Unknown where there is nothing
-    of that name, NoAnswer at a dead point or change point, where there are no derivatives, and BadInput of forces
-    with friction where these are not determined or a contact is about to bear another way, and of a linkage that closes
-    within a misfit.
+    of that name; NoAnswer at a dead point or change point, where there are no derivatives, and after `timeout` s, or a
+    Ctrl-C, with the outcome "interrupted"; BadInput of forces with friction where these are not determined or a contact
+    is about to bear another way, and of a linkage that closes within a misfit.
 
     >>> import planar
     >>> state = planar.solve(planar.load("slider-crank"))

@@ -15,6 +15,7 @@ from planar.document.dimensions import Dimension, change_dimension
 from planar.drawing.scheme.link_bodies import outline_point_names
 from planar.equations.mechanism_numbers import scale_lengths, shapes_of_links
 from planar.equations.symbolic_equations import slice_length
+from planar.foundation.time_limit import stop_if_over
 from planar.model.link_graph import link_numbers
 from planar.model.link_shapes import PointPlacementError
 from planar.model.mechanism import (
@@ -86,6 +87,7 @@ def _cached_page_data(mechanism: Mechanism) -> tuple[dict[str, Any], str]:
 def _computed_page_data(mechanism: Mechanism, z: np.ndarray | None) -> tuple[dict[str, Any], str]:
     """Compute the data of a page, and its functions."""
     check_link_count(mechanism, MAX_PAGE_LINKS, "a page", "`planar plot` draws a mechanism of any size")
+    stop_if_over("before the mechanism was solved")
     known = solved_mechanism(mechanism)
     solver, z = known.solver, known.assembly.z if z is None else z
     e, program, state = solver.equations, solver.functions, rest_position(mechanism)
@@ -162,6 +164,7 @@ def _computed_page_data(mechanism: Mechanism, z: np.ndarray | None) -> tuple[dic
         "stops": stop_data(solver),
         "sizes": len(numbers.values),
     }
+    stop_if_over("before the forces of the page were set up")
     acting = force_data(numbers, mechanism, state, solver.unit)
     data["forces"] = acting and acting[0]
     formulas = program.formulas.recorded
