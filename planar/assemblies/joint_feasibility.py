@@ -12,7 +12,7 @@ from planar.foundation.arrays import Array
 from planar.model.mechanism import pair_entries
 from planar.model.pairs import MeasureKind, Pair
 from planar.solving.assembly.sketch_start import sketch_coordinates
-from planar.solving.full_constraints import COMPLEX_STEP, FullConstraints
+from planar.solving.full_constraints import FullConstraints
 from planar.solving.newton import damped_newton
 from planar.solving.prepared_mechanism import PreparedMechanism
 
@@ -128,7 +128,7 @@ class _PartialConstraints:
         driven = [member for member in members if member.is_input]
         self.constraints = FullConstraints(setup, pairs)
         self.drives = tuple(member.name for member in driven)
-        self.drive_positions = np.array([joining.inputs[member] for member in driven])[:, None]
+        self.drive_positions = np.array([joining.inputs[member] for member in driven])
         self.is_angle = np.array(
             [setup.relative_motions[name].input_kind is MeasureKind.ANGLE for name in self.drives], dtype=bool
         )
@@ -149,21 +149,9 @@ class _PartialConstraints:
 
     def residuals_and_jacobian(self, own: Array) -> tuple[Array, Array]:
         """What own coordinates (starts, columns) leave open (starts, rows), and its slope (starts, rows, columns)."""
-        starts, columns = own.shape
-        nudged = np.repeat(own.astype(complex), columns, axis=0) + np.tile(
-            1j * COMPLEX_STEP * np.eye(columns), (starts, 1)
-        )
-        slope = np.imag(self._residuals(nudged)) / COMPLEX_STEP
-        return self._residuals(own).T, slope.reshape(len(slope), starts, columns).transpose(1, 0, 2)
-
-    def _residuals(self, own: Array) -> Array:
-        """(rows, many) at coordinates (many, columns)."""
-        w = np.zeros((self.coordinate_count, len(own)), dtype=own.dtype)
-        w[self.columns] = own.T
-        gaps = self.constraints.residuals(w)
-        if not self.drives:
-            return gaps
-        drives = self.constraints.relative_positions(self.drives, w) - self.drive_positions
-        if not np.iscomplexobj(drives):
-            drives[self.is_angle] = wrap_angle(drives[self.is_angle])
-        return np.concatenate([gaps, drives])
+        w: Array = np.zeros((len(own), self.coordinate_count))
+        w[:, self.columns] = own
+        residuals, jacobian = self.constraints.residuals_and_jacobian(w, self.drives, self.drive_positions)
+        angles = np.flatnonzero(self.is_angle) + residuals.shape[1] - len(self.drives)
+        residuals[:, angles] = wrap_angle(residuals[:, angles])
+        return residuals, jacobian[..., self.columns]

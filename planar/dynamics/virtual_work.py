@@ -16,6 +16,7 @@ from planar.dynamics.external_actions import (
     passive_actions,
 )
 from planar.dynamics.link_coordinates import LinkCoordinates
+from planar.equations.element_groups import ElementGroup, group_elements
 from planar.equations.element_placement import ElementPlacement
 from planar.equations.elements import Element, PlacedElement
 from planar.equations.residuals import wrapped_residual
@@ -43,41 +44,13 @@ class VirtualWorkBalance(NamedTuple):
 
 
 class _PairGroup(NamedTuple):
-    """Pairs of one element. Indices (pairs, ...): `coordinates` in q, `numbers` in p, their `rows` among those of all
-    constraints, own coordinates eliminated, and the `entries` there (pairs, rows, coordinates of links)."""
+    """Pairs of one element, all alike in what their rows are: their `rows` (pairs, ...) among those of the constraints,
+    own coordinates eliminated, and the `entries` there (pairs, rows, coordinates of links)."""
 
-    element: Element
+    placed: ElementGroup
     kinds: tuple[MeasureKind, ...]
-    coordinates: IntArray
-    numbers: IntArray
     rows: IntArray
     entries: IntArray
-
-    def evaluate(self, q: Array, p: Array) -> tuple[Array, Array]:
-        """The residuals (n, pairs, residuals) of all constraints and their derivatives (n, pairs, residuals,
-        coordinates)."""
-        element, taken = self.element, self.element.arguments
-        coordinates = q[:, self.coordinates]
-        angles = coordinates[..., 2 : 3 * element.body_count : 3]
-        arguments = [
-            *(coordinates[..., k] for k in taken.coordinates),
-            *(np.cos(angles[..., k]) for k in taken.cosines),
-            *(np.sin(angles[..., k]) for k in taken.sines),
-            *(p[:, self.numbers[:, k]] for k in taken.numbers),
-        ]
-        with np.errstate(all="ignore"):  # what is not defined is not a number
-            rests = element.slopes_function(*arguments)
-        slopes: Array = np.zeros((*coordinates.shape[:2], element.row_count, element.coordinate_count))
-        for row, factors in enumerate(element.factors):
-            for column, factor in factors.items():
-                slopes[..., row, column] = factor
-        residuals = slopes @ coordinates[..., None]  # the linear parts, so far
-        residuals[..., 0] += np.stack(
-            [np.broadcast_to(rest, coordinates.shape[:2]) for rest in rests[: element.row_count]], axis=-1
-        )
-        for (row, column), slope in zip(element.slope_entries, rests[element.row_count :], strict=True):
-            slopes[..., row, column] += slope
-        return residuals[..., 0], slopes
 
 
 class BalanceEquations(LinkCoordinates):
@@ -121,17 +94,13 @@ class BalanceEquations(LinkCoordinates):
             first_entries += [first_entries[-1] + len(columns) * (k + 1) for k in range(rows.stop - rows.start)]
             key = placed.element, tuple(pair.residual_kinds)
             members.setdefault(key, []).append((placed, rows, np.array(entries, dtype=int)))
-        self._groups = [
-            _PairGroup(
-                element,
-                kinds,
-                np.array([placed.coordinates for placed, _, _ in group], dtype=int),
-                np.array([placed.numbers for placed, _, _ in group], dtype=int).reshape(len(group), -1),
-                np.array([range(rows.start, rows.stop) for _, rows, _ in group], dtype=int),
-                np.array([entries for _, _, entries in group]).reshape(len(group), -1, 3 * element.body_count),
-            )
-            for (element, kinds), group in members.items()
-        ]
+        self._groups: list[_PairGroup] = []
+        for (element, kinds), group in members.items():
+            (placed_group,) = group_elements(placed for placed, _, _ in group)
+            group_rows = np.array([range(rows.start, rows.stop) for _, rows, _ in group], dtype=int)
+            group_entries = np.array([entries for _, _, entries in group])
+            group_entries = group_entries.reshape(len(group), -1, 3 * element.body_count)
+            self._groups.append(_PairGroup(placed_group, kinds, group_rows, group_entries))
         shape = self.link_coordinate_count, self.row_count
         self.pattern = SparsePattern(shape, np.array(pattern_rows, dtype=int), np.array(first_entries, dtype=int))
 
@@ -175,11 +144,11 @@ class BalanceEquations(LinkCoordinates):
         entries: Array = np.zeros((len(q), len(self.pattern.rows)))
         openings: Array = np.zeros((len(q), self.row_count))
         for group in self._groups:
-            residuals, slopes = group.evaluate(q, p)
+            residuals, slopes = group.placed.evaluate(q, p)
             for k, kind in enumerate(group.kinds):
                 if kind is not MeasureKind.LENGTH:
                     residuals[..., k] = wrapped_residual(residuals[..., k], kind) * size**2
-            of_links = 3 * group.element.body_count
+            of_links = 3 * group.placed.element.body_count
             if own_count := slopes.shape[-1] - of_links:
                 # what remains to hold the links is square to what the pair's own coordinates do
                 basis = np.linalg.qr(slopes[..., of_links:], mode="complete")[0]

@@ -1,28 +1,30 @@
 """All constraints of a mechanism in all its coordinates, nothing eliminated: what its pairs hold, inputs or not.
 
-Lengths are divided by the mechanism's size. Columns by the complex step, so the pairs' own formulas are the only ones:
-W. Squire, G. Trapp, Using Complex Variables to Estimate Derivatives of Real Functions, SIAM Review 40, 1998.
+Lengths are divided by the mechanism's size.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from functools import cached_property
 
 import numpy as np
 
-from planar.equations.coordinates import frames_from_coordinates
+from planar.equations.coordinates import FRAME_PARTS, frames_from_coordinates
+from planar.equations.element_groups import ElementGroup, group_elements
+from planar.equations.element_placement import ElementPlacement
 from planar.equations.mechanism_numbers import scaled_pair_numbers
-from planar.equations.residuals import ConstraintRow, input_positions, pair_residuals, wrapped_residual
+from planar.equations.residuals import ConstraintRow, input_positions, pair_residuals
+from planar.foundation.angles import wrap_angle
 from planar.foundation.arrays import Array
 from planar.foundation.geometry import Frame
 from planar.foundation.jets import Scalar
-from planar.model.pairs import Pair
+from planar.model.pairs import MeasureKind, Pair
 from planar.solving.assembly.sketch_start import sketch_coordinates
 from planar.solving.checks.singular_values import null_space
 from planar.solving.newton import damped_newton
 from planar.solving.prepared_mechanism import PreparedMechanism
 
-COMPLEX_STEP = 1e-30
 CLOSED_TOLERANCE = 1e-10
 NEAR_DAMPING = 1e-6
 """Of first steps: what is looked for is near by."""
@@ -44,17 +46,14 @@ class FullConstraints:
         self.pairs = tuple(setup.mechanism.pairs if pairs is None else pairs)
         self.coordinates = setup.equations.coordinates
         self.pair_of_row = tuple(pair.name for pair in self.pairs for _ in pair.residual_kinds)
+        kinds = [kind for pair in self.pairs for kind in pair.residual_kinds]
+        self._angle_rows = np.flatnonzero([kind is MeasureKind.ANGLE for kind in kinds])
         self._numbers = {
             pair.name: scaled_pair_numbers(pair, setup.shapes, setup.unit)
             for pair in (*self.pairs, *setup.relative_motions.values())
         }
-
-    def residuals(self, w: Array) -> Array:
-        """What every constraint leaves open (rows,), of w (coordinates, many) of each (rows, many)."""
-        # a complex step goes by no arc, and needs none
-        stepped = np.iscomplexobj(w)
-        left = [value if stepped else wrapped_residual(value, row.kind) for row, value in self.row_residuals(w)]
-        return np.array(np.broadcast_arrays(*left)) if left else np.zeros((0, *w.shape[1:]))
+        self._groups: dict[tuple[str, ...], list[ElementGroup]] = {}
+        "of all pairs, by the relative motions whose positions follow in the rows"
 
     def row_residuals(self, w: Array | Sequence[Scalar]) -> Iterator[tuple[ConstraintRow, Scalar]]:
         """The residual of every constraint, with its row, at coordinates of any arithmetic; angles with their turns."""
@@ -63,7 +62,7 @@ class FullConstraints:
 
     def jacobian(self, w: Array) -> Array:
         """(rows, coordinates)"""
-        return self._residuals_and_jacobian(w, (), np.zeros(0))[1]
+        return self.residuals_and_jacobian(w)[1]
 
     def relative_positions(self, names: tuple[str, ...], w: Array) -> Array:
         """The drives of these relative motions (names,)."""
@@ -71,7 +70,7 @@ class FullConstraints:
 
     def relative_jacobian(self, names: tuple[str, ...], w: Array) -> Array:
         """(names, coordinates)"""
-        return _derivatives(self._relative_positions(names, _complex_steps(w)), w.shape)[1]
+        return self.residuals_and_jacobian(w, names)[1][len(self.pair_of_row) :]
 
     def _relative_positions(self, names: tuple[str, ...], w: Array) -> list[Array]:
         frames, own = self._frames_and_own(w)
@@ -80,10 +79,17 @@ class FullConstraints:
     def points_and_jacobian(self, members: Sequence[tuple[str, str]], w: Array) -> tuple[Array, Array]:
         """Where points (link, point) are, x and y of each (2 points,), in sizes, and the Jacobian (2 points,
         coordinates)."""
-        frames, _ = self._frames_and_own(_complex_steps(w))
+        frames, _ = self._frames_and_own(w)
         shapes, scale = self.setup.shapes, 1.0 / self.setup.unit
-        places = [frames[link].to_world(shapes[link].points[point] * scale) for link, point in members]
-        return _derivatives([part for place in places for part in place], w.shape)
+        places: Array = np.empty(2 * len(members))
+        jacobian: Array = np.zeros((2 * len(members), len(w)))
+        for row, (link, point) in enumerate(members):
+            arm = frames[link].rotate_to_world(shapes[link].points[point] * scale)
+            places[2 * row : 2 * row + 2] = frames[link].x + arm.x, frames[link].y + arm.y
+            if (link, "x") in self.setup.column:
+                columns = [self.setup.column[link, part] for part in FRAME_PARTS]
+                jacobian[2 * row : 2 * row + 2, columns] = (1.0, 0.0, -arm.y), (0.0, 1.0, arm.x)
+        return places, jacobian
 
     def _frames_and_own(self, w: Array | Sequence[Scalar]) -> tuple[dict[str, Frame], dict[str, tuple[Scalar, ...]]]:
         return frames_from_coordinates(w, self.setup.column, self.setup.shapes, self.setup.pairs)
@@ -98,40 +104,60 @@ class FullConstraints:
         """The same from several starts (starts, coordinates) at once."""
         targets = np.zeros(len(held)) if positions is None else positions
         result = damped_newton(
-            lambda w: self._residuals_and_jacobian(w, held, targets), starts, CLOSED_TOLERANCE, NEAR_DAMPING
+            lambda w: self.residuals_and_jacobian(w, held, targets), starts, CLOSED_TOLERANCE, NEAR_DAMPING
         )
         return [w if converged else None for w, converged in zip(result.unknowns, result.converged, strict=True)]
 
-    def _residuals_and_jacobian(self, w: Array, held: tuple[str, ...], positions: Array) -> tuple[Array, Array]:
+    def residuals_and_jacobian(
+        self, w: Array, held: tuple[str, ...] = (), positions: Array | float = 0.0
+    ) -> tuple[Array, Array]:
         """Residuals (..., rows) and Jacobian (..., rows, coordinates) of the pairs, then of relative motions that are
         held, at positions w (..., coordinates)."""
-        frames, own = self._frames_and_own(_complex_steps(w))
-        motions = [self.setup.relative_motions[name] for name in held]
-        rows = list(pair_residuals(self.pairs, frames, self._numbers, own))
-        reached = input_positions(motions, frames, self._numbers, own)
-        values, jacobian = _derivatives([*(value for _, value in rows), *reached], w.shape)
-        pairs = [wrapped_residual(value, row.kind) for (row, _), value in zip(rows, values, strict=False)]
-        drives = [value - position for value, position in zip(values[len(rows) :], positions, strict=True)]
-        residuals = np.array([*pairs, *drives]).reshape(values.shape)
-        return np.moveaxis(residuals, 0, -1), np.moveaxis(jacobian, 0, -2)
+        flat = w.reshape(-1, w.shape[-1])
+        pair_rows, row_count = len(self.pair_of_row), len(self.pair_of_row) + len(held)
+        residuals: Array = np.zeros((len(flat), row_count))
+        jacobian: Array = np.zeros((len(flat), row_count, w.shape[-1]))
+        for group in self._groups_with(held):
+            values, slopes = group.evaluate(flat, self._p)
+            residuals[:, group.rows] = values
+            for column, coordinates in enumerate(group.coordinates.T):  # a link may be two bodies of a pair
+                jacobian[:, group.rows, coordinates[:, None]] += slopes[..., column]
+        residuals[:, pair_rows:] -= positions
+        residuals[:, self._angle_rows] = wrap_angle(residuals[:, self._angle_rows])
+        return residuals.reshape(*w.shape[:-1], row_count), jacobian.reshape(*w.shape[:-1], row_count, w.shape[-1])
 
+    @cached_property
+    def _p(self) -> Array:
+        """The numbers of all pairs and relative motions (1, numbers)."""
+        return np.array([[number for numbers in self._numbers.values() for number in numbers]], dtype=float)
 
-def _complex_steps(w: Array) -> Array:
-    """Each coordinate of w (..., coordinates) with a step in one coordinate after the other: (coordinates, all)."""
-    stepped: Array = w[..., None] + 1j * COMPLEX_STEP * np.eye(w.shape[-1])
-    return np.moveaxis(stepped, -2, 0).reshape(w.shape[-1], w.size)
+    def _groups_with(self, held: tuple[str, ...]) -> list[ElementGroup]:
+        groups = self._groups.get(held)
+        if groups is None:
+            placed, row = [], 0
+            for pair in self.pairs:
+                placed.append(self._placement.residual_of(pair, row))
+                row += len(pair.residual_kinds)
+            motions = [self.setup.relative_motions[name] for name in held]
+            placed += [self._placement.input_position_of(motion, row + k) for k, motion in enumerate(motions)]
+            groups = self._groups[held] = group_elements(placed)
+        return groups
 
-
-def _derivatives(values: Sequence[Array], shape: tuple[int, ...]) -> tuple[Array, Array]:
-    """Values (rows, ...) and their derivatives (rows, ..., coordinates), of what complex steps of w made of them.
-
-    `shape` is that of w (..., coordinates).
-    """
-    stepped = np.empty((len(values), int(np.prod(shape))), dtype=complex)
-    for row, value in zip(stepped, values, strict=True):
-        row[:] = value
-    stepped = stepped.reshape(len(values), *shape)
-    return stepped[..., :1].real.sum(axis=-1), stepped.imag / COMPLEX_STEP
+    @cached_property
+    def _placement(self) -> ElementPlacement:
+        column, numbers, count = self.setup.column, dict[str, range](), 0
+        for name, values in self._numbers.items():
+            numbers[name] = range(count, count + len(values))
+            count += len(values)
+        moving = [link for link in self.setup.shapes if (link, "x") in column]
+        return ElementPlacement(
+            {link: [column[link, part] for part in FRAME_PARTS] for link in moving},
+            {
+                name: [column[name, part] for part, _ in pair.coordinate_kinds]
+                for name, pair in self.setup.pairs.items()
+            },
+            numbers,
+        )
 
 
 def random_step(free: Array, rng: np.random.Generator, length: float) -> Array:

@@ -20,7 +20,7 @@ from planar.model.wording import join_all_names
 from planar.results.kinematic_result import KinematicResult
 from planar.results.motion import Motion, State
 from planar.solving.checks.singular_values import SINGULAR_TOLERANCE
-from planar.solving.full_constraints import COMPLEX_STEP, FullConstraints
+from planar.solving.full_constraints import FullConstraints
 from planar.solving.prepared_mechanism import PreparedMechanism
 
 BALANCE_TOLERANCE = 1e-7
@@ -276,16 +276,8 @@ class _DrivenOutput:
         return np.stack(np.broadcast_arrays(*map(np.atleast_1d, values))) / self.prepared.scale[:, None]
 
     def _jacobians(self, w: Array) -> Array:
-        """The slopes of all constraints and drives (n, rows, coordinates), by the complex step."""
-        many = w.shape[1]
-        nudged = (
-            np.repeat(w[:, :, None].astype(complex), w.shape[0], axis=2)
-            + 1j * COMPLEX_STEP * np.eye(w.shape[0])[:, None]
-        )
-        flat = nudged.reshape(w.shape[0], -1)
-        gaps = np.broadcast_to(self.constraints.residuals(flat), (len(self.constraints.pair_of_row), flat.shape[1]))
-        rows = np.concatenate([gaps, self.constraints.relative_positions(self.inputs, flat)])
-        return (np.imag(rows) / COMPLEX_STEP).reshape(len(rows), many, w.shape[0]).transpose(1, 0, 2)
+        """The slopes of all constraints and drives (n, rows, coordinates)."""
+        return self.constraints.residuals_and_jacobian(w.T, self.inputs)[1]
 
 
 def _value(value: object) -> Array:
