@@ -61,20 +61,22 @@ def _null_combinations(rows: Array) -> Array:
     return vectors[int(np.sum(values > ZERO_COMPONENT)) :].T
 
 
-def find_jammed_inputs(setup: PreparedMechanism) -> tuple[list[str], list[str]] | None:
+def find_jammed_inputs(setup: PreparedMechanism, w: Array | None = None) -> tuple[list[str], list[str]] | None:
     """Inputs that no motion of the pairs can move while others can: their names, and the links that are free.
 
-    None where the mechanism cannot be joined, or every input moves.
+    At a closed position w and beside it, or at one that is looked for. None where the mechanism cannot be joined, or
+    every input moves.
     """
     names = tuple(given.pair for given in setup.mechanism.inputs)
-    places = _closed_positions(setup) if names else ()
+    places = _closed_positions(setup, w) if names else ()
     if not places:
         return None
     constraints = FullConstraints(setup)
     moves = np.zeros(len(names))
-    for w in places:
-        free = null_space(constraints.jacobian(w))
-        moves = np.maximum(moves, np.abs(constraints.relative_jacobian(names, w) @ free).max(axis=1, initial=0.0))
+    for place in places:
+        free = null_space(constraints.jacobian(place))
+        rates = np.abs(constraints.relative_jacobian(names, place) @ free)
+        moves = np.maximum(moves, rates.max(axis=1, initial=0.0))
     fast = [name for name, move in zip(names, moves, strict=True) if move < 100.0 * ZERO_COMPONENT]
     if not fast or not free.size:
         return None
@@ -159,12 +161,13 @@ def find_conflicting_inputs(setup: PreparedMechanism) -> tuple[tuple[str, ...], 
     return smallest_dependent_sets(together, names, lambda name: [other for other in names if other != name])
 
 
-def _closed_positions(setup: PreparedMechanism) -> tuple[Array, ...]:
-    """A closed position, at the inputs if that can be, and one beside it, which is like most; none if none is found."""
+def _closed_positions(setup: PreparedMechanism, w: Array | None = None) -> tuple[Array, ...]:
+    """A closed position, w or one at the inputs if that can be, and one beside it, which is like most; none if none is
+    found."""
     if len(setup.equations.coordinates) > MAX_COORDINATES:
         return ()
     constraints = FullConstraints(setup)
-    w = find_closed_position(constraints)
+    w = find_closed_position(constraints) if w is None else w
     if w is None:
         return ()
     free = null_space(constraints.jacobian(w))

@@ -107,9 +107,9 @@ def _all_links(links: Sequence[str]) -> dict[str, list[str]]:
     return {"links": list(links)} if len(links) > MAX_NAMES_LISTED + 1 else {}
 
 
-def always_free(setup: PreparedMechanism, links: Sequence[str]) -> NoAnswer:
-    """Links that stay free while others hold each other more than once."""
-    jam = jammed_inputs(setup)
+def always_free(setup: PreparedMechanism, links: Sequence[str], w: Array | None = None) -> NoAnswer:
+    """Links that stay free while others hold each other more than once, at a closed position w if one is known."""
+    jam = jammed_inputs(setup, w)
     if jam is not None:
         return jam
     return NoAnswer(
@@ -121,11 +121,11 @@ def always_free(setup: PreparedMechanism, links: Sequence[str]) -> NoAnswer:
     )
 
 
-def jammed_inputs(setup: PreparedMechanism) -> NoAnswer | None:
-    """Inputs at pairs that the others hold fast, while something else is free."""
+def jammed_inputs(setup: PreparedMechanism, w: Array | None = None) -> NoAnswer | None:
+    """Inputs at pairs that the others hold fast, while something else is free; w as for `always_free`."""
     from planar.solving.diagnosis.redundancy import find_jammed_inputs
 
-    found = find_jammed_inputs(setup)
+    found = find_jammed_inputs(setup, w)
     if found is None:
         return None
     names, links = found

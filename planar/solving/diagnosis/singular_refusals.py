@@ -48,6 +48,8 @@ def determined_mobility(setup: PreparedMechanism, z: np.ndarray, motion: Equatio
 
         free = count_motions(setup, motion.w)
         always = any(is_always_singular(setup, block, z) for block in weak) if free is None else free > inputs
-        return refusals.always_free(setup, links) if always else refusals.change_point(setup, links, mobility, z)
+        return (
+            refusals.always_free(setup, links, motion.w) if always else refusals.change_point(setup, links, mobility, z)
+        )
 
     raise SingularPosition(refused) if mobility == inputs + 1 else refused()
