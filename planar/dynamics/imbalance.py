@@ -12,14 +12,14 @@ from planar.solving.position import solved_mechanism
 
 def explain_imbalance(reactions: ReactionSolver) -> str:
     """Why reactions are not told at positions of a motion at which nothing balances the links."""
-    loose = explain_loose_links(reactions.work.mechanism)
+    loose = explain_loose_links(reactions.mechanism)
     return f"no forces in the pairs balance the links there{f': {loose}' if loose else ', as at a dead point'}"
 
 
 def imbalance_refusal(reactions: ReactionSolver) -> NoAnswer:
     """That nothing balances the links at a position."""
-    loose = explain_loose_links(reactions.work.mechanism)
-    told = quote_names([given.pair for given in reactions.work.mechanism.inputs])
+    loose = explain_loose_links(reactions.mechanism)
+    told = quote_names([given.pair for given in reactions.mechanism.inputs])
     why = f": {loose}" if loose else f", which the inputs at {told} cannot hold; move the input"
     return NoAnswer(Outcome.DEAD_POINT, f"no forces in the pairs balance the links here{why}")
 

@@ -19,11 +19,12 @@ from planar.dynamics.link_coordinates import LinkCoordinates
 from planar.equations.element_groups import ElementGroup, group_elements
 from planar.equations.element_placement import ElementPlacement
 from planar.equations.elements import Element, PlacedElement
+from planar.equations.mechanism_numbers import equation_structure
 from planar.equations.residuals import wrapped_residual
 from planar.equations.sparse_matrices import SparseMatrices, SparsePattern
 from planar.foundation.arrays import Array, IntArray
 from planar.foundation.jets import Scalar
-from planar.model.mechanism import Input, Mechanism
+from planar.model.mechanism import Mechanism
 from planar.model.pairs import MeasureKind, Pair
 
 
@@ -173,9 +174,9 @@ class BalanceEquations(LinkCoordinates):
 
 
 def balance_equations(mechanism: Mechanism) -> BalanceEquations:
-    """The equations of a mechanism, kept for the next time, wherever its links then stand and whatever acts."""
-    inputs = tuple(Input(given.pair, 0.0) for given in mechanism.inputs)
-    return _cached_balance_equations(Mechanism("", mechanism.frame, mechanism.links, mechanism.pairs, inputs))
+    """The equations of a mechanism, kept for all of its structure: wherever links stand, however long they are, and
+    whatever acts."""
+    return _cached_balance_equations(equation_structure(mechanism))
 
 
 _cached_balance_equations = lru_cache(maxsize=32)(BalanceEquations)

@@ -163,9 +163,8 @@ class AcceptanceFunctions:
                 own = of_type.run(start[block.unknowns], known, numbers)
                 entries[:, self.unknown_columns[block.unknowns]] = own
             if block is not last:  # nothing follows from its coordinates
-                entries[:, placed.coordinates] = of_type.coordinates.evaluate_batch(len(u), own, known, numbers)[0][
-                    :, 0
-                ]
+                (coordinates,) = of_type.coordinates.evaluate_batch(len(u), own, known, numbers)
+                entries[:, placed.coordinates] = coordinates[:, 0]
         return entries[:, self.unknown_columns]
 
     def _judge_by_one_formula(self, z: Array, given: InputSamples, scales: Scales) -> JudgedPositions:

@@ -113,7 +113,7 @@ class FullConstraints:
     ) -> tuple[Array, Array]:
         """Residuals (..., rows) and Jacobian (..., rows, coordinates) of the pairs, then of relative motions that are
         held, at positions w (..., coordinates)."""
-        flat = w.reshape(-1, w.shape[-1])
+        flat = w.reshape(int(np.prod(w.shape[:-1])), w.shape[-1])
         pair_rows, row_count = len(self.pair_of_row), len(self.pair_of_row) + len(held)
         residuals: Array = np.zeros((len(flat), row_count))
         jacobian: Array = np.zeros((len(flat), row_count, w.shape[-1]))
