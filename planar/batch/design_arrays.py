@@ -74,7 +74,7 @@ def _read_values(name: str, given: Any, known: Mapping[str, Dimension]) -> Array
 def with_design_values(mechanism: Mechanism, values: Mapping[str, Any]) -> Mechanism:
     """The mechanism with these numbers, or arrays of them, in place of its own."""
     known = design_variables(mechanism)
-    links: dict[int, Link] = {}  # made anew once, whatever number of theirs is changed
+    links: dict[int, Link] = {}  # each is replaced once, however many of its numbers change
     for name, value in values.items():
         section, index, *rest = known[name].address
         if section == "links" and isinstance(index, int):

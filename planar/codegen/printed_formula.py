@@ -17,9 +17,27 @@ from planar.foundation.recorded_formula import RecordedFormula
 if TYPE_CHECKING:
     from planar.codegen.formula_kernel import FormulaKernel
 
-OPERATORS = {"add": "+", "sub": "-", "mul": "*", "div": "/"}
-COMPARISONS = {"less": "<", "most": "<="}
-"""What gives 1 where it is true, else 0."""
+PYTHON_OPERATIONS = {
+    "add": "{} + {}",
+    "sub": "{} - {}",
+    "mul": "{} * {}",
+    "div": "{} / {}",
+    "less": "1.0 * ({} < {})",
+    "most": "1.0 * ({} <= {})",
+    "neg": "-{}",
+    "not": "1.0 - {}",
+    "sqrt": "sqrt({})",
+    "abs": "abs({})",
+    "cos": "cos({})",
+    "sin": "sin({})",
+    "tan": "tan({})",
+    "atan2": "atan2({}, {})",
+    "minnum": "minnum({}, {})",
+    "maxnum": "maxnum({}, {})",
+    "floor": "floor({})",
+    "pow": "pow({}, {})",
+    "where": "where({}, {})",
+}
 NUMPY_FUNCTIONS: Mapping[str, Callable[..., Any]] = {
     "sqrt": np.sqrt,
     "abs": np.abs,
@@ -80,7 +98,9 @@ def write_python(
         if operation == "const":
             names[number] = f"({constant!r})"
             continue
-        expression = _expression(operation, [names[operand] for operand in operands])
+        expression = write_operation(
+            PYTHON_OPERATIONS, operation, [names[operand] for operand in operands], "on arrays"
+        )
         unused = dict.fromkeys(operand for operand in operands if last_use[operand] == number)
         free += [names[operand] for operand in unused if names[operand][0] == "r"]
         if not free:
@@ -117,18 +137,14 @@ def compile_formula(formula: RecordedFormula, argument_count: int) -> PrintedFun
     return compile_source(write_python(formula, formula.results, names, [f"x{k}" for k in range(argument_count)]))
 
 
-def _expression(operation: str, operands: list[str]) -> str:
-    if operation in OPERATORS:
-        return f"{operands[0]} {OPERATORS[operation]} {operands[1]}"
-    if operation in COMPARISONS:
-        return f"1.0 * ({operands[0]} {COMPARISONS[operation]} {operands[1]})"
-    if operation == "neg":
-        return f"-{operands[0]}"
-    if operation == "not":
-        return f"1.0 - {operands[0]}"
-    if operation in NUMPY_FUNCTIONS:
-        return f"{operation}({', '.join(operands)})"
-    raise UnsupportedOperation(f"there is no {operation} on arrays")
+def write_operation(templates: Mapping[str, str], operation: str, operands: Sequence[str], place: str) -> str:
+    """An operation in a language, by its templates.
+
+    Raises UnsupportedOperation, which says by `place` ("on arrays") where the operation is missing.
+    """
+    if operation not in templates:
+        raise UnsupportedOperation(f"there is no {operation} {place}")
+    return templates[operation].format(*operands)
 
 
 class FormulaFunction:

@@ -178,7 +178,7 @@ def actions_of_load(field: KinematicArrays, load: Load, factor: Array) -> Iterat
 def effort_actions(field: KinematicArrays, kind: str, pair: str, effort: Array) -> list[ExternalAction]:
     """What drives a pair, on the one link and on the other."""
     way = relative_motions(field.mechanism)[pair].effort_action(field.frames, field.shapes)
-    found = []
+    actions = []
     for link, sense in ((way.link, 1.0), (way.reaction_link, -1.0)):
         force, couple, at = (
             np.zeros((field.position_count, 2)),
@@ -187,9 +187,9 @@ def effort_actions(field: KinematicArrays, kind: str, pair: str, effort: Array) 
         )
         if way.point is not None and way.direction is not None:
             at = np.stack(np.broadcast_arrays(*way.point, effort)[:2], axis=-1)
-            force, couple = np.stack([each * sense * effort for each in way.direction], axis=-1), 0.0 * effort
-        found.append(ExternalAction(kind, pair, link, at, force, couple))
-    return found
+            force, couple = np.stack([part * sense * effort for part in way.direction], axis=-1), 0.0 * effort
+        actions.append(ExternalAction(kind, pair, link, at, force, couple))
+    return actions
 
 
 def _input_positions(field: KinematicArrays, pair: str) -> Array:

@@ -19,8 +19,8 @@ def explain_imbalance(reactions: ReactionSolver) -> str:
 def imbalance_refusal(reactions: ReactionSolver) -> NoAnswer:
     """That nothing balances the links at a position."""
     loose = explain_loose_links(reactions.mechanism)
-    told = quote_names([given.pair for given in reactions.mechanism.inputs])
-    why = f": {loose}" if loose else f", which the inputs at {told} cannot hold; move the input"
+    input_names = quote_names([given.pair for given in reactions.mechanism.inputs])
+    why = f": {loose}" if loose else f", which the inputs at {input_names} cannot hold; move the input"
     return NoAnswer(Outcome.DEAD_POINT, f"no forces in the pairs balance the links here{why}")
 
 

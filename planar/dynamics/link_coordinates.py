@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from planar.equations.coordinates import FRAME_PARTS
+from planar.equations.coordinates import FRAME_PARTS, consecutive_ranges
 from planar.foundation.arrays import Array
 from planar.foundation.jets import value_and_rates
 from planar.model.loads import Spring
@@ -22,16 +22,14 @@ class LinkCoordinates:
         self.links = tuple(link.name for link in mechanism.links if link.name != mechanism.frame)
         self.link_columns = {link: len(FRAME_PARTS) * k for k, link in enumerate(self.links)}
         self.link_coordinate_count = len(FRAME_PARTS) * len(self.links)
-        self.own_slices: dict[str, slice] = {}
+        own_counts = {pair.name: len(pair.coordinate_kinds) for pair in mechanism.pairs}
+        own_columns = consecutive_ranges(own_counts, self.link_coordinate_count)
+        self.own_slices = {name: slice(columns.start, columns.stop) for name, columns in own_columns.items()}
         "of every pair: its own coordinates"
-        self.coordinate_count = self.link_coordinate_count
-        for pair in mechanism.pairs:
-            first = self.coordinate_count
-            self.coordinate_count += len(pair.coordinate_kinds)
-            self.own_slices[pair.name] = slice(first, self.coordinate_count)
+        self.coordinate_count = self.link_coordinate_count + sum(own_counts.values())
 
     def initial_spring_turns(self, q: Array, springs: Sequence[Spring]) -> Array:
-        """The whole turns (rad) by which links stand apart whose torsional springs do not count them (springs, ...).
+        """The full turns (rad) between links whose torsional springs do not count turns (springs, ...).
 
         Nothing says in a file how often links have turned: where they stand at coordinates q the spring is wound up the
         least, but for a free angle beyond half a turn, which is off the angle between -pi and pi. Coordinates may be

@@ -16,6 +16,7 @@ from planar.dynamics.external_actions import (
     passive_actions,
 )
 from planar.dynamics.link_coordinates import LinkCoordinates
+from planar.equations.coordinates import consecutive_ranges
 from planar.equations.element_groups import ElementGroup, group_elements
 from planar.equations.element_placement import ElementPlacement
 from planar.equations.elements import Element, PlacedElement
@@ -62,19 +63,15 @@ class BalanceEquations(LinkCoordinates):
         self.pair_rows: dict[str, slice] = {}
         "of every pair: its rows of the constraints"
         self.row_count = 0
-        number_columns: dict[str, range] = {}
-        number_count = 0
         for pair in mechanism.pairs:
             first = self.row_count
             self.row_count += len(pair.residual_kinds) - len(pair.coordinate_kinds)
             self.pair_rows[pair.name] = slice(first, self.row_count)
-            number_columns[pair.name] = range(number_count, number_count + len(pair.number_kinds))
-            number_count += len(pair.number_kinds)
         self._place_pairs(
             ElementPlacement(
                 {link: range(first, first + 3) for link, first in self.link_columns.items()},
                 {name: range(own.start, own.stop) for name, own in self.own_slices.items()},
-                number_columns,
+                consecutive_ranges({pair.name: len(pair.number_kinds) for pair in mechanism.pairs}),
             )
         )
 

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planar.codegen.printed_formula import FormulaFunction
-from planar.equations.coordinates import FRAME_PARTS
+from planar.equations.coordinates import FRAME_PARTS, consecutive_ranges
 from planar.equations.pair_formulas import PARTS_OF_FRAME, pair_formula, recorded_pair_formula
 from planar.equations.residuals import CARRIED_ROUNDING, closing_error
 from planar.foundation.arrays import Array, IntArray
@@ -107,7 +107,7 @@ class _PlacedGroup:
         return self.group.record(1)
 
     def parts(self, samples: int) -> Iterator[slice]:
-        """The pairs, so many at a time that arrays stay small."""
+        """The pairs in parts, so that arrays stay small."""
         size = max(1, MAX_STACKED_NUMBERS // samples)
         for first in range(0, self.rows.shape[1], size):
             yield slice(first, first + size)
@@ -147,11 +147,7 @@ class ConstraintCheck:
         self._frame_columns = self._frame_columns.reshape(len(FRAME_PARTS), -1)
         own_columns = [column[pair.name, part] for pair in mechanism.pairs for part, _ in pair.coordinate_kinds]
         self._own = np.array(own_columns, dtype=int)
-        numbers: dict[str, range] = {}
-        count = 0
-        for pair in mechanism.pairs:
-            numbers[pair.name] = range(count, count + len(pair.number_kinds))
-            count += len(pair.number_kinds)
+        numbers = consecutive_ranges({pair.name: len(pair.number_kinds) for pair in mechanism.pairs})
         kinds = [kind for pair in mechanism.pairs for kind in pair.residual_kinds]
         pair_row_count = len(kinds)
         kinds += [pair.input_kind for pair in inputs]
@@ -236,11 +232,7 @@ def _pair_groups(pairs: tuple[Pair, ...], inputs: tuple[Pair, ...], moving: tupl
 
 def _make_groups(pairs: tuple[Pair, ...], inputs: tuple[Pair, ...], moving: tuple[str, ...]) -> tuple[_PairGroup, ...]:
     links = {link: k for k, link in enumerate(moving)}
-    own: dict[str, range] = {}
-    own_count = 0
-    for pair in pairs:
-        own[pair.name] = range(own_count, own_count + len(pair.coordinate_kinds))
-        own_count += len(pair.coordinate_kinds)
+    own = consecutive_ranges({pair.name: len(pair.coordinate_kinds) for pair in pairs})
     members: dict[Hashable, list[tuple[Pair, bool, tuple[bool, ...], range]]] = {}
     row = 0
     for k, pair in enumerate((*pairs, *inputs)):
@@ -260,9 +252,9 @@ def _make_groups(pairs: tuple[Pair, ...], inputs: tuple[Pair, ...], moving: tupl
                 pair,
                 is_input,
                 is_moving,
-                tuple(each.name for each, *_ in group),
-                _index_columns([[links[link] for link in each.bodies if link in links] for each, *_ in group]),
-                _index_columns([own.get(each.name, ()) for each, *_ in group]),
+                tuple(member.name for member, *_ in group),
+                _index_columns([[links[link] for link in member.bodies if link in links] for member, *_ in group]),
+                _index_columns([own.get(member.name, ()) for member, *_ in group]),
                 _index_columns([rows for *_, rows in group]),
             )
         )

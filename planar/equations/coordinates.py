@@ -28,6 +28,15 @@ def coordinate_columns(coordinates: Iterable[Coordinate]) -> dict[tuple[str, str
     return {(each.owner, each.part): k for k, each in enumerate(coordinates)}
 
 
+def consecutive_ranges(counts: Mapping[str, int], first: int = 0) -> dict[str, range]:
+    """Where the entries of each name stand, one name after the other, from `first` on."""
+    ranges: dict[str, range] = {}
+    for name, count in counts.items():
+        ranges[name] = range(first, first + count)
+        first += count
+    return ranges
+
+
 def frames_from_coordinates(
     w: Sequence[Scalar] | Mapping[int, Scalar] | Array,
     column: Mapping[tuple[str, str], int],

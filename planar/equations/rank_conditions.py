@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     import casadi as ca
 
 CIRCLE_POINTS, CIRCLE_RADIUS = 32, 0.25
-"""Of a circle in complex time: powers that are taken for others on so many points are too small to be seen."""
+"""Of a circle in complex time: aliased powers of the series are below round-off with this many points."""
 SMALLEST_CHANGE = 1e-12
 
 

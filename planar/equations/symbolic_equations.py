@@ -14,7 +14,7 @@ import numpy as np
 
 from planar.equations.assembled_equations import AssembledEquations, Elimination
 from planar.equations.block_decomposition import BlockIndices, decompose_blocks
-from planar.equations.coordinates import FRAME_PARTS, Coordinate
+from planar.equations.coordinates import FRAME_PARTS, Coordinate, consecutive_ranges
 from planar.equations.element_placement import ElementPlacement
 from planar.equations.elements import PlacedElement
 from planar.equations.elimination import (
@@ -230,16 +230,13 @@ def _place_elements(mechanism: Mechanism, given_links: Sequence[str], driven: Se
                 Coordinate(link.name, part, kind, True) for part, kind in zip(FRAME_PARTS, kinds, strict=True)
             ]
     own_columns: dict[str, range] = {}
-    number_columns: dict[str, range] = {}
-    number_count = 0
     for pair in mechanism.pairs:
         own_columns[pair.name] = range(len(coordinates), len(coordinates) + len(pair.coordinate_kinds))
         coordinates += [Coordinate(pair.name, part, kind, False) for part, kind in pair.coordinate_kinds]
-        number_columns[pair.name] = range(number_count, number_count + len(pair.number_kinds))
-        number_count += len(pair.number_kinds)
+    number_counts = {pair.name: len(pair.number_kinds) for pair in mechanism.pairs}
     for k, link_name in enumerate(given_links):
         frame_columns[link_name] = range(len(coordinates) + 3 * k, len(coordinates) + 3 * k + 3)
-    placement = ElementPlacement(frame_columns, own_columns, number_columns)
+    placement = ElementPlacement(frame_columns, own_columns, consecutive_ranges(number_counts))
     elements: list[PlacedElement] = []
     rows: list[ConstraintRow] = []
     for pair in mechanism.pairs:
@@ -248,7 +245,7 @@ def _place_elements(mechanism: Mechanism, given_links: Sequence[str], driven: Se
     for motion in driven:
         elements.append(placement.input_position_of(motion, len(rows)))
         rows.append(ConstraintRow(motion.name, motion.input_kind))
-    return _ElementsOfStructure(tuple(elements), tuple(coordinates), tuple(rows), number_count)
+    return _ElementsOfStructure(tuple(elements), tuple(coordinates), tuple(rows), sum(number_counts.values()))
 
 
 def _eliminate_structure(mechanism: Mechanism, given_links: tuple[str, ...]) -> _EliminatedStructure:

@@ -158,7 +158,7 @@ def number_of(value: Scalar, instructions: InstructionList[Any]) -> int:
 
 
 def recorded_arguments(counts: Sequence[int]) -> tuple[InstructionList[int], list[Array]]:
-    """An empty list of instructions, and arguments of a formula, of so many entries each, that record in it."""
+    """An empty list of instructions, and arguments of a formula, with these numbers of entries, that record in it."""
     instructions: InstructionList[int] = InstructionList()
     arguments = np.empty(sum(counts), dtype=object)
     arguments[:] = [RecordedNumber(instructions, instructions.add_input(place)) for place in range(sum(counts))]

@@ -6,22 +6,30 @@ from math import isnan
 
 import casadi as ca
 
-from planar.codegen.printed_formula import FormulaFunction
+from planar.codegen.printed_formula import FormulaFunction, write_operation
 from planar.equations.generic_evaluation import recorded_function
-from planar.foundation.instruction_list import UnsupportedOperation, required_values
+from planar.foundation.instruction_list import required_values
 
-JS_OPERATORS = {"add": "+", "sub": "-", "mul": "*", "div": "/", "less": "<", "most": "<="}
-JS_FUNCTIONS = {
-    "sqrt": "Math.sqrt",
-    "cos": "Math.cos",
-    "sin": "Math.sin",
-    "abs": "Math.abs",
-    "atan2": "Math.atan2",
-    "minnum": "Math.min",
-    "maxnum": "Math.max",
-    "floor": "Math.floor",
-    "tan": "Math.tan",
-    "pow": "Math.pow",
+JS_OPERATIONS = {
+    "add": "{}+{}",
+    "sub": "{}-{}",
+    "mul": "{}*{}",
+    "div": "{}/{}",
+    "less": "{}<{}",
+    "most": "{}<={}",
+    "neg": "-{}",
+    "not": "!{}",
+    "where": "{}?{}:0",
+    "sqrt": "Math.sqrt({})",
+    "cos": "Math.cos({})",
+    "sin": "Math.sin({})",
+    "abs": "Math.abs({})",
+    "atan2": "Math.atan2({},{})",
+    "minnum": "Math.min({},{})",
+    "maxnum": "Math.max({},{})",
+    "floor": "Math.floor({})",
+    "tan": "Math.tan({})",
+    "pow": "Math.pow({},{})",
 }
 
 
@@ -45,7 +53,10 @@ def write_javascript(name: str, function: ca.Function | FormulaFunction) -> str:
             names[number] = places[key]
         else:
             names[number] = f"v{number}"
-            lines.append(f"const v{number}={_js_expression(operation, [names[operand] for operand in operands])};")
+            expression = write_operation(
+                JS_OPERATIONS, operation, [names[operand] for operand in operands], "on a page"
+            )
+            lines.append(f"const v{number}={expression};")
     lines += [f"o[{place}]={names[value]};" for place, value in enumerate(formula.results)]
     arguments = [f"a{k}" for k in range(len(counts))]
     return f"function {name}({','.join([*arguments, 'o'])}){{{''.join(lines)}return o}}"
@@ -55,17 +66,3 @@ def _js_number(value: float) -> str:
     if isnan(value):
         return "NaN"
     return repr(value) if value >= 0.0 else f"({value!r})"
-
-
-def _js_expression(what: str, of: list[str]) -> str:
-    if what in JS_OPERATORS:
-        return f"{of[0]}{JS_OPERATORS[what]}{of[1]}"
-    if what == "neg":
-        return f"-{of[0]}"
-    if what == "not":
-        return f"!{of[0]}"
-    if what == "where":
-        return f"{of[0]}?{of[1]}:0"
-    if what not in JS_FUNCTIONS:
-        raise UnsupportedOperation(f"there is no {what} on a page")
-    return f"{JS_FUNCTIONS[what]}({','.join(of)})"

@@ -10,7 +10,7 @@ from functools import cached_property
 
 import numpy as np
 
-from planar.equations.coordinates import FRAME_PARTS, frames_from_coordinates
+from planar.equations.coordinates import FRAME_PARTS, consecutive_ranges, frames_from_coordinates
 from planar.equations.element_groups import ElementGroup, group_elements
 from planar.equations.element_placement import ElementPlacement
 from planar.equations.mechanism_numbers import scaled_pair_numbers
@@ -145,10 +145,7 @@ class FullConstraints:
 
     @cached_property
     def _placement(self) -> ElementPlacement:
-        column, numbers, count = self.setup.column, dict[str, range](), 0
-        for name, values in self._numbers.items():
-            numbers[name] = range(count, count + len(values))
-            count += len(values)
+        column = self.setup.column
         moving = [link for link in self.setup.shapes if (link, "x") in column]
         return ElementPlacement(
             {link: [column[link, part] for part in FRAME_PARTS] for link in moving},
@@ -156,7 +153,7 @@ class FullConstraints:
                 name: [column[name, part] for part, _ in pair.coordinate_kinds]
                 for name, pair in self.setup.pairs.items()
             },
-            numbers,
+            consecutive_ranges({name: len(values) for name, values in self._numbers.items()}),
         )
 
 

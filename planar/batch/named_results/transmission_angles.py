@@ -54,13 +54,13 @@ class OutputLink:
 
     def angles(self, frames: DesignFrames, values: Mapping[str, Array], is_solved: Array) -> Array:
         """The angle (rad, 0 to pi/2) of designs at every step (steps + 1, designs); NaN where it is not determined."""
-        found = np.full(frames.design_shape, np.nan)
+        angles = np.full(frames.design_shape, np.nan)
         own = design_variables(self.mechanism)  # numbers of loads, springs and masses are not there
         known = {name: value for name, value in values.items() if name in own}
         for positions in position_chunks(self.mechanism, frames, known, is_solved):
             reactions = design_reaction_solver(self.mechanism, frames, positions, known)
-            found[positions.steps, positions.designs] = self._angles_at(reactions)
-        return found
+            angles[positions.steps, positions.designs] = self._angles_at(reactions)
+        return angles
 
     def _angles_at(self, reactions: ReactionSolver) -> Array:
         field = reactions.field

@@ -123,14 +123,14 @@ def _find_steps(linkages: PinnedLinkages, entry_bar: Array, entry_pin: Array, is
     pivot[of[is_fixed[at]]] = at[is_fixed[at]]
     at, of = at[~is_fixed[at]], of[~is_fixed[at]]
     known[at] = True
-    found = [(pivot[of], pivot[of], at, of, of)]
+    levels = [(pivot[of], pivot[of], at, of, of)]
     pin, other, bar = _pairs_on_bars(linkages, entry_bar, entry_pin)
     counts_of = np.bincount(pin, minlength=len(known))
     starts = counts_of.cumsum() - counts_of
     held_count, earlier_pin, earlier_bar = (np.zeros(len(known), dtype=np.int64) for _ in range(3))
     newly_known = np.flatnonzero(known)
     while len(newly_known):
-        # the pins beside those of the level before, each as often as it is held
+        # the pins beside those of the level before, once for each pin that holds it
         counts = counts_of[newly_known]
         stops = counts.cumsum()
         own = np.arange(stops[-1]) + (starts[newly_known] + counts - stops).repeat(counts)
@@ -154,9 +154,9 @@ def _find_steps(linkages: PinnedLinkages, entry_bar: Array, entry_pin: Array, is
         known[placed] = True
         newly_known = placed
         if len(placed):
-            found.append((one_pin, by[second], placed, one_bar, on[second]))
-    level = np.repeat(np.arange(len(found)), [len(each[2]) for each in found])
-    first, second, placed, a, b = (np.concatenate(parts) for parts in zip(*found, strict=True))
+            levels.append((one_pin, by[second], placed, one_bar, on[second]))
+    level = np.repeat(np.arange(len(levels)), [len(pins) for _, _, pins, _, _ in levels])
+    first, second, placed, a, b = (np.concatenate(parts) for parts in zip(*levels, strict=True))
     # the first of the given pins moves
     swap = is_fixed[first] & (level > 0)
     first, second = np.where(swap, second, first), np.where(swap, first, second)

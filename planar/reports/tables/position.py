@@ -42,7 +42,7 @@ def solution_tables(
     ]
     if state.misfits:
         parts.append(misfit_table(state))
-    parts += [_relative_table(text, each, state, scales) for text, each in (relatives or {}).items()]
+    parts += [_relative_table(text, motion, state, scales) for text, motion in (relatives or {}).items()]
     comparisons = tuple(comparisons)
     if comparisons:
         parts.append(published_table(comparisons, state.mechanism.units))

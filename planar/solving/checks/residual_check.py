@@ -94,7 +94,7 @@ class ResidualCheck:
         return ConstraintCheck(self.mechanism, {entry: k for k, entry in enumerate(entries)})
 
     def _motion(self, frames: Frames, own: PairValues, inputs: Sequence[Scalar] | Array, orders: int) -> Array:
-        """Links, pairs and inputs with so many orders of rates (orders, entries, samples), lengths in sizes."""
+        """Links, pairs and inputs, values and rates up to `orders` (orders, entries, samples), lengths in sizes."""
         values: list[tuple[Scalar, float]] = []
         for link in self.mechanism.links:
             if link.name != self.mechanism.frame:

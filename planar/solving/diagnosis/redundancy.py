@@ -162,8 +162,8 @@ def find_conflicting_inputs(setup: PreparedMechanism) -> tuple[tuple[str, ...], 
 
 
 def _closed_positions(setup: PreparedMechanism, w: Array | None = None) -> tuple[Array, ...]:
-    """A closed position, w or one at the inputs if that can be, and one beside it, which is like most; none if none is
-    found."""
+    """A closed position (w, or one with the inputs where they are if possible) and a generic one beside it; empty if
+    there is none."""
     if len(setup.equations.coordinates) > MAX_COORDINATES:
         return ()
     constraints = FullConstraints(setup)

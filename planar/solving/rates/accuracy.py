@@ -150,18 +150,18 @@ def rate_errors(setup: PreparedMechanism, y: Array, y1: Array, y2: Array) -> Rat
 def _rate_errors(setup: PreparedMechanism, y: Array, y1: Array, y2: Array) -> RateErrors:
     e = setup.equations
     rows, unknowns = len(e.rows), len(e.unknowns)
-    found = setup.functions.rounding_terms(y, y1, y2, setup.inputs.p)
+    terms = setup.functions.rounding_terms(y, y1, y2, setup.inputs.p)
     slope, first, second = (
-        np.abs(each) for each in (found.jacobian, found.first_rate_jacobian, found.second_rate_jacobian)
+        np.abs(jacobian) for jacobian in (terms.jacobian, terms.first_rate_jacobian, terms.second_rate_jacobian)
     )
-    inverse = np.abs(inverse_arrays(found.jacobian[:, :rows, :unknowns]))
+    inverse = np.abs(inverse_arrays(terms.jacobian[:, :rows, :unknowns]))
 
     def solved(of_rows: Array, of_inputs: Array) -> Array:
         return np.hstack([_matrix_times_vector(inverse, of_rows), of_inputs])
 
     inputs = np.abs(y[:, unknowns:])
-    dy = solved(np.abs(found.value[:, :rows]) + EPS * found.term_sum[:, :rows], EPS * inputs)
-    at = _matrix_times_vector(slope[:, rows:], dy) + EPS * found.term_sum[:, rows:]
+    dy = solved(np.abs(terms.value[:, :rows]) + EPS * terms.term_sum[:, :rows], EPS * inputs)
+    at = _matrix_times_vector(slope[:, rows:], dy) + EPS * terms.term_sum[:, rows:]
     lost1 = _matrix_times_vector(first, dy) + EPS * _matrix_times_vector(slope, np.abs(y1))
     dy1 = solved(lost1[:, :rows], EPS * np.abs(y1[:, unknowns:]))
     lost2 = (
