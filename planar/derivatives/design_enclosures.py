@@ -6,26 +6,29 @@ from collections.abc import Collection, Iterable
 
 import casadi as ca
 
-from planar.derivatives.design_equations import DesignEquations
+from planar.derivatives.design_equations import DesignEquations, design_equations
 from planar.derivatives.enclosures import ParametricSystem
 from planar.derivatives.limit_systems import LimitEquations, LimitSystem
-from planar.derivatives.result_slopes import SlopeSystem
+from planar.derivatives.result_expressions import kinematic_expressions
+from planar.dynamics.forces import Forces
 from planar.equations.casadi_call import BufferedFunction
 from planar.foundation.errors import BadInput
+from planar.results.motion import Motion, State
 
 
 class PositionResult:
     """A result of a mechanism that follows from its position alone. Raises BadInput of any other."""
 
-    def __init__(self, system: SlopeSystem, of: str, result: str):
-        self.design = system.design
-        self.value: ca.SX = next(each.value for each in system.expressions(of) if each.name == result)
-        design = self.design
+    def __init__(self, source: State | Motion | Forces, offsets: tuple[str, ...], of: str, result: str):
+        refusal = f"guaranteed bands are told of places, angles and lengths, and not of {result!r}"
+        if isinstance(source, Forces):
+            raise BadInput("guaranteed", refusal)
+        self.design = design = design_equations(source.mechanism, offsets)
+        expressions = kinematic_expressions(design, source, of)
+        self.value: ca.SX = next(expression.value for expression in expressions if expression.name == result)
         rates = ca.vertcat(design.z1, design.z2, design.u1, design.u2)
-        if system.balance is not None or (rates.numel() and ca.depends_on(self.value, rates)):
-            raise BadInput(
-                "guaranteed", f"guaranteed bands are told of places, angles and lengths, and not of {result!r}"
-            )
+        if rates.numel() and ca.depends_on(self.value, rates):
+            raise BadInput("guaranteed", refusal)
         if design.F.numel() != design.z.numel():
             told = "guaranteed bands are told of mechanisms without redundant constraints, which deviations contradict"
             raise BadInput("guaranteed", told)

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import replace
+from collections.abc import Mapping
 from functools import cached_property, lru_cache
 from typing import Any
 
@@ -11,7 +10,7 @@ import casadi as ca
 import numpy as np
 
 from planar.derivatives.implicit_system import ImplicitSystem, Level
-from planar.document.dimensions import Dimension, change_dimension, file_dimensions
+from planar.derivatives.parameters import INPUT_RATES, Parameters
 from planar.dynamics.lagrangian import LagrangianFunctions
 from planar.equations.coordinates import FRAME_PARTS, frames_from_coordinates
 from planar.equations.elimination import stack_expressions
@@ -19,76 +18,41 @@ from planar.equations.mechanism_numbers import scale_lengths
 from planar.equations.rates import time_derivatives
 from planar.equations.residuals import scalars
 from planar.foundation.arrays import Array
-from planar.foundation.errors import BadInput
 from planar.foundation.geometry import Frame, Vector
 from planar.foundation.jets import Scalar, value_and_rates
-from planar.model.mechanism import Input, Mechanism
+from planar.model.mechanism import Mechanism
 from planar.model.pairs import MeasureKind, Pair
 from planar.results.kinematic_result import KinematicResult
 from planar.solving.position import PositionSolver, solved_mechanism
-
-DESIGN_SECTIONS = ("links", "pairs", "loads", "springs", "masses", "gravity")
-"""Of the file: numbers of the design itself. Inputs run, sketches choose, and neither changes what is solved."""
-INPUT_RATES = ("position", "velocity", "acceleration")
-
-
-def design_dimensions(mechanism: Mechanism) -> tuple[Dimension, ...]:
-    """The numbers of a mechanism's file that are no counts, no stops, and no numbers of its inputs' courses."""
-    return tuple(
-        each
-        for each in file_dimensions(mechanism).values()
-        if each.path[0] in DESIGN_SECTIONS
-        and each.kind != "count"
-        and each.address[0] not in ("stops", "pair_stiffness")
-        and "varies" not in each.address
-    )
 
 
 class DesignEquations:
     """The equations of one mechanism over t = (u, u', u'', d): inputs with two rates, and dimensions (SI).
 
-    Levels 0, 1, 2 determine the unknowns z and their two rates. `offsets` name pairs whose pins may stand aside in
-    their holes: by `clearance.B.x` and `clearance.B.y` (m, in the axes of the pair's first link), which follow in d.
+    Levels 0, 1, 2 determine the unknowns z and their two rates. `offsets` and
+    errors are those of `Parameters`.
     """
 
     def __init__(self, mechanism: Mechanism, offsets: tuple[str, ...] = ()):
+        self.parameters = Parameters(mechanism, offsets)
         self.solver: PositionSolver = solved_mechanism(mechanism).solver
-        self.solver.refuse_misfit("derivatives are not told")
-        for pair in mechanism.pairs:
-            if not pair.measures_symbols:
-                raise BadInput(pair.name, "derivatives are not told of a mechanism with a cam of given points")
         self.mechanism, self.equations = mechanism, self.solver.equations
-        own = design_dimensions(mechanism)
-        self.dimensions = (*own, *(each for pair in offsets for each in _offset_dimensions(pair)))
+        self.dimensions, self.names = self.parameters.dimensions, self.parameters.names
+        own = len(self.parameters.file_dimensions)
         self.d = ca.SX.sym("d", len(self.dimensions))
-        self.work = LagrangianFunctions(self._symbolic_mechanism(own), self.solver.unit)
+        symbols = [self.d[k] for k in range(own)]
+        self.work = LagrangianFunctions(self.parameters.mechanism_with(symbols), self.solver.unit)
         for k, pair in enumerate(each for name in offsets for each in mechanism.pairs if each.name == name):
-            at = len(own) + 2 * k
+            at = own + 2 * k
             self.work.numbers[pair.name] = pair.offset_pin(
                 self.work.numbers[pair.name], Vector(self.d[at], self.d[at + 1])
             )
-        names = [given.pair for given in mechanism.inputs]
-        self.u, self.u1, self.u2 = (ca.SX.sym(name, len(names)) for name in ("u", "u1", "u2"))
+        count = len(mechanism.inputs)
+        self.u, self.u1, self.u2 = (ca.SX.sym(name, count) for name in ("u", "u1", "u2"))
         self.t = ca.vertcat(self.u, self.u1, self.u2, self.d)
-        self.names = (
-            *(f"{name}.{rate}" for rate in INPUT_RATES for name in names),
-            *(each.name for each in self.dimensions),
-        )
-        "of t"
         self.z = self.equations.z
         self.z1, self.z2 = (ca.SX.sym(name, self.z.numel()) for name in ("z1", "z2"))
         self.F, self.w = self._equations_of_design()
-
-    def _symbolic_mechanism(self, dimensions: tuple[Dimension, ...]) -> Mechanism:
-        changed = replace(
-            self.mechanism,
-            inputs=tuple(Input(given.pair, 0.0) for given in self.mechanism.inputs),
-            loads=tuple(load._replace(varies=None) for load in self.mechanism.loads),
-            stops=(),
-        )
-        for k, each in enumerate(dimensions):
-            changed = change_dimension(changed, each, self.d[k])
-        return changed
 
     def _equations_of_design(self) -> tuple[ca.SX, ca.SX]:
         """F, and w in m and rad."""
@@ -166,12 +130,6 @@ class DesignEquations:
         w = np.array([[np.broadcast_to(part, (many,)) for part in each] for each in parts]).reshape(-1, 3, many)
         unknown = list(self.equations.unknowns)
         return list((w[unknown] / self.solver.scale[unknown, None, None]).transpose(1, 2, 0))
-
-
-def _offset_dimensions(pair: str) -> Iterator[Dimension]:
-    for axis in "xy":
-        place = ("tolerances", "clearance", pair, axis)
-        yield Dimension(f"clearance.{pair}.{axis}", 0.0, "length", "", place, place)
 
 
 def _parts_of(moving: KinematicResult, owner: str, part: str, pairs: Mapping[str, Pair]) -> tuple[Any, ...]:

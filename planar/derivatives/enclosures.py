@@ -18,7 +18,6 @@ from typing import NamedTuple, TypeAlias
 import casadi as ca
 import numpy as np
 
-from planar.derivatives.implicit_system import invert_matrices
 from planar.derivatives.intervals import (
     INTERVAL_OPERATIONS,
     OVER,
@@ -35,6 +34,7 @@ from planar.derivatives.intervals import (
 from planar.equations.casadi_call import BufferedFunction
 from planar.equations.generic_evaluation import evaluate_function
 from planar.foundation.arrays import Array, BoolArray, IntArray
+from planar.foundation.generalised_inverses import invert_matrices
 
 START_STEPS = 2
 """Newton's steps to where boxes have their middles."""

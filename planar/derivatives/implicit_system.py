@@ -7,7 +7,6 @@ A_k = dG_k/dx_k
 
 and transposed, level after level from the last, it gives the gradient of any weighed sum of results at the cost of one
 such solution, however many parameters there are (A. Griewank, A. Walther, Evaluating Derivatives, SIAM 2008, ch. 15).
-Second derivatives are those of the Lagrangian r - lambda^T G along the first ones.
 """
 
 from __future__ import annotations
@@ -21,10 +20,9 @@ import numpy as np
 
 from planar.equations.casadi_call import BufferedFunction
 from planar.foundation.arrays import Array, BoolArray
+from planar.foundation.generalised_inverses import invert_matrices
 from planar.foundation.time_limit import all_within_time, stop_if_over
 
-SINGULAR = 1e-9
-"""A singular value below this part of the greatest is none."""
 CONTRADICTION = 1e-7
 """Equations that no change of the unknowns keeps, by more than this part, are contradicted."""
 MAX_CHUNK_NUMBERS = 4_000_000
@@ -142,31 +140,6 @@ class ImplicitSystem:
         ]
         return BufferedFunction(ca.Function("levels", self.given, found))
 
-    def second_slopes(
-        self, result: ca.SX, values: Sequence[Array], parameters: Array, constants: Array | None = None
-    ) -> Array:
-        """The second derivatives of one result in the parameters (n, parameters, parameters): with the first ones of
-        the unknowns X, (X, 1)^T H (X, 1) of the Hessian H of the Lagrangian r - lambda^T G."""
-        constants = np.zeros((len(parameters), 0)) if constants is None else constants
-        given = [*values, parameters, constants]
-        linear = self.linearise(given)
-        first, _ = linear.unknown_slopes()
-        one = np.ones((len(parameters), 1))
-        *by_unknowns, _ = (
-            each[:, 0] for each in self.weighed_results(result).evaluate_batch(len(parameters), *given, one)
-        )
-        multipliers = np.concatenate(linear.multipliers(by_unknowns), axis=1)
-        equations = ca.vertcat(*(level.equations for level in self.levels))
-        weights = ca.SX.sym("weights", equations.numel())
-        variables = ca.vertcat(*self.given[:-1])
-        hessian = ca.hessian(result - ca.dot(weights, equations), variables)[0]
-        function = BufferedFunction(ca.Function("hessian", [*self.given, weights], [ca.densify(hessian)]))
-        whole = function.evaluate_batch(len(parameters), *given, multipliers)[0]
-        own = np.broadcast_to(np.eye(parameters.shape[1]), (len(parameters), *[parameters.shape[1]] * 2))
-        along = np.concatenate([*first, own], axis=1)
-        found: Array = along.transpose(0, 2, 1) @ whole @ along
-        return found
-
     def linearise(self, values: Sequence[Array]) -> LinearLevels:
         """The levels at positions: the unknowns, parameters and constants (n, ...) each."""
         found = iter(each.transpose(0, 2, 1) for each in self._jacobians.evaluate_batch(len(values[0]), *values))
@@ -217,44 +190,3 @@ class LinearLevels:
                 left[j] -= np.einsum("nru,nr->nu", row[j], own)
             found.append(own)
         return found[::-1]
-
-
-def invert_matrices(matrices: Array) -> tuple[Array, BoolArray]:
-    """The inverses (n, columns, rows) of matrices (n, rows, columns), as far as there are any, and where they do not
-    determine all that they are multiplied by (n,)."""
-    many, rows, columns = matrices.shape
-    is_known: BoolArray = np.asarray(np.isfinite(matrices).all(axis=(1, 2)))
-    if not columns or not many:
-        return np.zeros((many, columns, rows)), ~is_known
-    known = np.where(is_known[:, None, None], matrices, 0.0)
-    by_row = _nonzero(np.linalg.norm(known, axis=2, keepdims=True))
-    by_column = _nonzero(np.linalg.norm(known / by_row, axis=1, keepdims=True))
-    scaled = known / by_row / by_column
-    inverse, is_sure = _regular_inverses(scaled)
-    is_singular: BoolArray = ~is_known | (rows < columns)
-    if not is_sure.all():
-        u, s, v = np.linalg.svd(scaled[~is_sure], full_matrices=False)
-        weak: BoolArray = np.asarray(s <= SINGULAR * s[:, :1])
-        kept = np.where(weak, 0.0, 1.0 / np.where(weak, 1.0, s))
-        inverse[~is_sure] = (v.transpose(0, 2, 1) * kept[:, None]) @ u.transpose(0, 2, 1)
-        is_singular[~is_sure] |= weak.any(axis=1)
-    return inverse / by_row.transpose(0, 2, 1) / by_column.transpose(0, 2, 1), is_singular
-
-
-def _regular_inverses(matrices: Array) -> tuple[Array, BoolArray]:
-    """The inverses of matrices (n, rows, columns), and which of them (n,) surely have no weak singular value."""
-    many, rows, columns = matrices.shape
-    found = np.zeros((many, columns, rows))
-    none: BoolArray = np.zeros(many, dtype=bool)
-    if rows != columns:
-        return found, none
-    try:
-        found[:] = np.linalg.inv(matrices)
-    except np.linalg.LinAlgError:  # one of them is singular to the last digit
-        return found, none
-    sizes = np.linalg.norm(matrices, axis=(1, 2)) * np.linalg.norm(found, axis=(1, 2))  # no less than the condition
-    return found, np.asarray(sizes < 1.0 / SINGULAR)
-
-
-def _nonzero(scale: Array) -> Array:
-    return np.where(scale > 0.0, scale, 1.0)

@@ -9,10 +9,11 @@ import casadi as ca
 import numpy as np
 
 from planar.derivatives.design_equations import DesignEquations
-from planar.derivatives.implicit_system import ImplicitSystem, Level, invert_matrices
+from planar.derivatives.implicit_system import ImplicitSystem, Level
 from planar.derivatives.result_expressions import kinematic_expressions
 from planar.equations.casadi_call import BufferedFunction
 from planar.foundation.arrays import Array
+from planar.foundation.generalised_inverses import invert_matrices
 from planar.results.motion import Motion, State
 
 MAX_NEWTON_STEPS = 20

@@ -8,10 +8,8 @@ from typing import NamedTuple
 import casadi as ca
 
 from planar.derivatives.design_equations import DesignEquations
-from planar.derivatives.force_equations import ForceEquations
 from planar.equations.elimination import stack_expressions
 from planar.foundation.errors import Unknown, suggest_name
-from planar.model.pairs import MeasureKind
 from planar.results.kinematic_result import KinematicResult
 
 LINK_RESULTS = ("angle", "angular_velocity", "angular_acceleration")
@@ -47,25 +45,6 @@ def kinematic_expressions(design: DesignEquations, moving: KinematicResult, name
         for key, value in found.items():
             if value is not None:
                 yield ResultExpression(key, pair.result_kinds[key], value)
-
-
-def force_expressions(equations: ForceEquations, name: str) -> Iterator[ResultExpression]:
-    """What forces tell of this name: the effort of an input with its power, the force and couple of a pair."""
-    mechanism, design = equations.work.mechanism, equations.design
-    inputs = [given.pair for given in mechanism.inputs]
-    if name in inputs:
-        effort = equations.efforts[inputs.index(name)]
-        slides = equations.work.relative_motions[name].input_kind is MeasureKind.LENGTH
-        yield ResultExpression("effort", "force" if slides else "torque", effort)
-        yield ResultExpression("power", "power", effort * design.u1[inputs.index(name)])
-    if name in equations.pair_actions:
-        reaction = equations.in_unknowns(equations.reaction(name))
-        yield ResultExpression("force", "force", reaction[:2])
-        yield ResultExpression("couple", "torque", reaction[2])
-    if equations.rubbing is not None and name in equations.rubbing.pairs:
-        slides = equations.work.relative_motions[name].input_kind is MeasureKind.LENGTH
-        friction = equations.in_unknowns(equations.rubbing.effort(name))
-        yield ResultExpression("friction", "force" if slides else "torque", friction)
 
 
 def refuse_name(design: DesignEquations, moving: KinematicResult, name: str) -> Unknown:

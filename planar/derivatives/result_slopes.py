@@ -1,161 +1,204 @@
-"""The derivatives of results of a state, a motion or forces, at every position, in every number of the file."""
+"""The derivatives of results of a state, a motion or forces, at every position, in every parameter."""
 
 from __future__ import annotations
 
-from collections.abc import Container, Mapping, Sequence
+from collections.abc import Callable, Container, Iterator, Mapping, Sequence
+from functools import cached_property
 from typing import NamedTuple
 
-import casadi as ca
 import numpy as np
 
-from planar.derivatives.design_equations import DesignEquations, design_equations
-from planar.derivatives.force_equations import ForceEquations
-from planar.derivatives.implicit_system import ImplicitSystem, ResultSlopes
-from planar.derivatives.result_expressions import (
-    ResultExpression,
-    force_expressions,
-    kinematic_expressions,
-    refuse_name,
+from planar.derivatives.directional_jets import parameter_jet
+from planar.derivatives.force_slopes import ForceSlopes, factor_slopes, slopes_by_factors
+from planar.derivatives.kinematic_slopes import (
+    KinematicSlopes,
+    NamedResult,
+    PositionRates,
+    constraint_elements,
+    kinematic_results,
+    result_array,
 )
+from planar.derivatives.parameters import Parameters, design_dimensions
 from planar.document.dimensions import Dimension
 from planar.document.revised.changed_numbers import with_values
 from planar.dynamics.forces import Forces
-from planar.equations.casadi_call import BufferedFunction
-from planar.equations.residuals import pair_residuals
+from planar.dynamics.load_variation import load_factors
 from planar.foundation.arrays import Array, BoolArray
-from planar.foundation.errors import BadInput
+from planar.foundation.errors import BadInput, Unknown, suggest_name
+from planar.foundation.jets import Scalar
+from planar.foundation.time_limit import all_within_time
 from planar.model.mechanism import Mechanism
-from planar.model.pairs import MeasureKind
 from planar.results.motion import Motion, State
+from planar.solving.position import solved_mechanism
 
-OPENING = 1e-6
-"""Constraints that are opened by more than this part of a change (sizes, rad) do not go with it."""
+MAX_CHUNK_NUMBERS = 2_000_000
+"""Derivatives of coordinates that are held at once."""
 NUDGE = 1e-3
 """Of a number, or of the size: a change of its own that a file may be refused for."""
 GOLDEN_FRACTION = (5.0**0.5 - 1.0) / 2.0
 """Its multiples leave fractions that are all different: no two numbers are changed by the same part."""
 
 
-class NamedSlopes(NamedTuple):
-    """Derivatives (n, parts, parameters) of results by name, the kind of quantity of each, and of the parameters their
-    names; where there are none (n,), and which parameters cannot change alone."""
+class DerivedResults(NamedTuple):
+    """Values (n, parts; angles go on over a turn) and derivatives (n, parts, parameters) of results by name, and the
+    kind of quantity of each; where there are none (n,), and of these where friction is not determined (n,); which
+    parameters cannot change alone."""
 
+    values: Mapping[str, Array]
     slopes: Mapping[str, Array]
     kinds: Mapping[str, str]
-    parameters: tuple[str, ...]
     is_singular: BoolArray
+    is_unknown: BoolArray
     tied: tuple[str, ...]
 
 
+class PositionSlopes:
+    """The derivatives at some of the positions."""
+
+    def __init__(self, system: SlopeSystem, rows: slice):
+        self.system, self.rows = system, rows
+        rates = PositionRates(*(rate[rows] for rate in system.rates))
+        self.count = len(rates.q)
+        self.kinematics = KinematicSlopes(system.parameters, system.parameter_count, rates)
+        self.is_singular = self.kinematics.is_singular
+        self.is_unknown: BoolArray = np.zeros(self.count, dtype=bool)
+        self.forces: ForceSlopes | None = None
+        if system.is_balanced:
+            turns = np.repeat(system.spring_turns[None], self.count, axis=0)
+            self.forces = ForceSlopes(self.kinematics, system.forces, rows, system.factors[rows], turns)
+            self.is_unknown = self.forces.is_unknown
+            self.is_singular = self.is_singular | self.is_unknown
+
+    def results(self, name: str, order: int) -> list[NamedResult]:
+        """What is told of a name, as jets of an order. Raises Unknown."""
+        system, kinematics = self.system, self.kinematics
+        motion = kinematics.motion if order == 1 else kinematics.second_motion
+        results = kinematic_results(motion, system.points, name)
+        if self.forces is not None:
+            results += self.forces.balance(order).results(name, self._input_velocities(order))
+        if not results:
+            moving = system.moving
+            known = dict.fromkeys((*moving.point_names, *moving.frames, *moving._relative_motions))
+            raise Unknown(f"there is no point, link or pair {name!r}{suggest_name(name, known, 'names')}")
+        return results
+
+    def _input_velocities(self, order: int) -> list[Scalar]:
+        inputs = self.system.parameters.inputs
+        velocities = [np.broadcast_to(self.system.moving.inputs[name].velocity, self.system.count) for name in inputs]
+        return [
+            parameter_jet(
+                velocity[self.rows].reshape(-1, *((1,) * order)), len(inputs) + k, self.system.parameter_count, order
+            )
+            for k, velocity in enumerate(velocities)
+        ]
+
+
 class SlopeSystem:
-    """The system of equations that a result follows from, with its values at the result's positions."""
+    """The system of equations that a result follows from, with its values at the result's positions; `offsets` as of
+    `Parameters`."""
 
-    def __init__(self, result: State | Motion | Forces, offsets: tuple[str, ...] = ()):
-        self.moving = result.moving if isinstance(result, Forces) else result
+    def __init__(self, result: State | Motion | Forces, offsets: tuple[str, ...] = (), is_balanced: bool = False):
+        """`is_balanced`: forces without friction and inertia are derived, of a state or a motion too."""
+        self.moving: State | Motion = result.moving if isinstance(result, Forces) else result
         self.forces = result if isinstance(result, Forces) else None
-        self.design: DesignEquations = design_equations(self.moving.mechanism, offsets)
-        self.constants: Array | None = None
-        if self.forces is None:
-            self.balance = None
-            self.system: ImplicitSystem = self.design.kinematics
-            self.values, self.parameters = self.design.coordinates_at(self.moving)
-        else:
+        self.is_balanced = is_balanced or self.forces is not None
+        mechanism = self.moving.mechanism
+        self.parameters = Parameters(mechanism, offsets)
+        self.names = self.parameters.names
+        self.parameter_count = len(self.names)
+        if self.forces is not None:
             refuse_stiffness(self.forces)
-            inertia = any(each.kind == "inertia" for each in self.forces.acting)
-            self.balance = ForceEquations(self.design, inertia, self.forces)
-            self.system = self.balance.system
-            self.values, self.parameters, self.constants = self.balance.values_at(self.moving)
+        if self.is_balanced:
+            self.parameter_count += len(mechanism.loads)
+        elements = constraint_elements(mechanism)
+        self.rates = PositionRates(*elements.coordinates(self.moving))
+        self.count = len(self.rates.q)
+        self.spring_turns = elements.initial_spring_turns(self.rates.q[0], mechanism.springs)
+        self.points = {name: point.members[0] for name, point in self.moving._point_names.items()}
 
-    def expressions(self, name: str) -> list[ResultExpression]:
-        """What the result tells of a point, link, pair or input. Raises Unknown."""
-        found = list(kinematic_expressions(self.design, self.moving, name))
-        if self.balance is not None:
-            found += force_expressions(self.balance, name)
-        if not found:
-            raise refuse_name(self.design, self.moving, name)
-        return found
+    @cached_property
+    def factors(self) -> Array:
+        """The factors of the loads (n, loads)."""
+        inputs = {name: np.broadcast_to(each.position, (self.count,)) for name, each in self.moving.inputs.items()}
+        return load_factors(self.moving.mechanism, inputs, getattr(self.moving, "time", None), self.count)
 
-    def result_values(self, name: str) -> dict[str, Array]:
-        """What the result tells of a name (n, parts), by the names of its results; angles go on over a turn."""
-        found = {}
-        given = self.system.given
-        for each in self.expressions(name):
-            value = BufferedFunction(ca.Function("value", given, [ca.densify(each.value)]))
-            held = np.zeros((len(self.parameters), 0)) if self.constants is None else self.constants
-            told = value.evaluate_batch(len(self.parameters), *self.values, self.parameters, held)[0]
-            told = told.reshape(len(self.parameters), -1)
-            found[each.name] = np.unwrap(told, axis=0) if each.kind == "angle" else told
-        return found
+    def _parts(self) -> Iterator[PositionSlopes]:
+        """The derivatives, part after part of the positions."""
+        size = len(self.rates.q[0]) * self.parameter_count
+        step = max(1, MAX_CHUNK_NUMBERS // max(size, 1))
+        for first in all_within_time(range(0, self.count, step), "parts of the positions"):
+            yield self._single if step >= self.count else PositionSlopes(self, slice(first, first + step))
 
-    def slopes(self, results: ca.SX) -> ResultSlopes:
-        """The derivatives of results (n, results, parameters), those in the inputs with what loads change by them."""
-        jacobians = self.system.result_jacobians(results)
-        found = self.system.slopes(jacobians, self.values, self.parameters, self.constants)
-        if self.balance is None:
-            return found
-        own = self.design.t.numel()
-        slopes, of_factors = found.slopes[..., :own], found.slopes[..., own:]
-        slopes = slopes + self.balance.slopes_by_factors(of_factors, self.moving)
-        return ResultSlopes(slopes, found.is_singular | self.balance.is_unknown, found.contradicts[:, :own])
+    @cached_property
+    def _single(self) -> PositionSlopes:
+        """Those of all positions at once."""
+        return PositionSlopes(self, slice(None))
 
-    def named_slopes(self, name: str) -> NamedSlopes:
-        """The derivatives of all that the result tells of a name."""
-        found = self.expressions(name)
-        gaps = pair_gaps(self.design)
-        whole = self.slopes(ca.vertcat(*(each.value for each in found), gaps))
-        parts = np.cumsum([each.value.numel() for each in found])
-        *each_slopes, open_by = np.split(whole.slopes, parts, axis=1)
-        tied = whole.contradicts | (np.abs(open_by * self.design.scale).max(axis=1, initial=0.0) > OPENING)
-        tied[whole.is_singular] = False
-        names = self.design.names
-        bound = set(tied_dimensions(self.moving.mechanism)) | {names[k] for k in np.flatnonzero(tied.any(axis=0))}
-        alone = np.array([name not in bound for name in names])
-        slopes = {}
-        for each, own in zip(found, each_slopes, strict=True):
-            moved = np.where(alone, own, np.nan)
-            moved[whole.is_singular] = np.nan
-            slopes[each.name] = moved
-        kinds = {each.name: each.kind for each in found}
-        return NamedSlopes(slopes, kinds, names, whole.is_singular, tuple(name for name in names if name in bound))
-
-    def gradient(self, weights: Mapping[str, Mapping[str, Array]]) -> tuple[Array, BoolArray]:
-        """The derivatives (n, parameters) of the sum of results by name times their weights (n, parts), and where there
-        are none (n,)."""
-        values, given = [], []
-        for name, of in weights.items():
-            expressions = {each.name: each.value for each in self.expressions(name)}
-            for result, numbers in of.items():
-                values.append(expressions[result])
-                given.append(numbers.reshape(len(self.parameters), -1))
-        weighed = self.system.weighed_results(ca.vertcat(*values))
-        found, is_singular = self.system.gradient(
-            weighed, np.concatenate(given, axis=1), self.values, self.parameters, self.constants
+    def derive(self, results_of: Callable[[PositionSlopes], Sequence[NamedResult]]) -> DerivedResults:
+        """The values and derivatives of results."""
+        values: dict[str, list[Array]] = {}
+        slopes: dict[str, list[Array]] = {}
+        kinds: dict[str, str] = {}
+        parts = []
+        for part in self._parts():
+            parts.append(part)
+            shape = part.count, self.parameter_count
+            for result in results_of(part):
+                kinds[result.name] = result.kind
+                rows = [result_array(value, 0, shape[:1]) for value in result.parts]
+                values.setdefault(result.name, []).append(np.stack(rows, axis=1))
+                rows = [result_array(value, 1, shape) for value in result.parts]
+                slopes.setdefault(result.name, []).append(np.stack(rows, axis=1))
+        # results side by side, so that what a kink of a load's course does not change is told by the others' size
+        ends = np.cumsum([arrays[0].shape[1] for arrays in slopes.values()])[:-1]
+        joined = self._with_factors(np.concatenate([np.concatenate(arrays) for arrays in slopes.values()], axis=1))
+        is_singular, is_unknown = (
+            np.concatenate([getattr(part, name) for part in parts]) for name in ("is_singular", "is_unknown")
         )
-        own = self.design.t.numel()
-        if self.balance is None:
-            return found, is_singular
-        by_factors = self.balance.slopes_by_factors(found[:, None, own:], self.moving)[:, 0]
-        return found[:, :own] + by_factors, is_singular | self.balance.is_unknown
+        tied = set[str]()
+        for part in parts:
+            is_tied: BoolArray = np.asarray(part.kinematics.tied.any(axis=0))
+            tied.update(name for name, binds in zip(self.names, is_tied, strict=False) if binds)
+        joined[is_singular] = np.nan
+        return DerivedResults(
+            {
+                name: np.unwrap(np.concatenate(arrays), axis=0) if kinds[name] == "angle" else np.concatenate(arrays)
+                for name, arrays in values.items()
+            },
+            dict(zip(slopes, np.split(joined, ends, axis=1), strict=True)),
+            kinds,
+            is_singular,
+            is_unknown,
+            tuple(name for name in self.names if name in tied),
+        )
+
+    def named_slopes(self, name: str) -> DerivedResults:
+        """The values and derivatives of all that the result tells of a name; none in numbers that cannot change
+        alone."""
+        derived = self.derive(lambda part: part.results(name, 1))
+        bound = {*tied_dimensions(self.moving.mechanism), *derived.tied}
+        is_free = np.array([parameter not in bound for parameter in self.names])
+        slopes = {result: np.where(is_free, array, np.nan) for result, array in derived.slopes.items()}
+        return derived._replace(slopes=slopes, tied=tuple(each for each in self.names if each in bound))
+
+    def _with_factors(self, slopes: Array) -> Array:
+        """The derivatives by the parameters alone, with what the factors of loads change by them."""
+        if not self.is_balanced:
+            return slopes
+        count = len(self.names)
+        by_inputs = factor_slopes(self.moving, count)
+        return slopes[..., :count] + slopes_by_factors(slopes[..., count:], by_inputs)
 
     def second_slopes(self, name: str, result: str) -> Array:
         """The second derivatives of a result (n, parts, parameters, parameters)."""
-        (value,) = (each.value for each in self.expressions(name) if each.name == result)
-        own = self.design.t.numel()
-        found = [
-            self.system.second_slopes(part, self.values, self.parameters, self.constants)[:, :own, :own]
-            for part in ca.vertsplit(value)
-        ]
-        return np.stack(found, axis=1)
-
-
-def pair_gaps(design: DesignEquations) -> ca.SX:
-    """What all constraints leave open (sizes, rad), those that the equations do without among them."""
-    frames, own = design.placed
-    work, unit = design.work, design.solver.unit
-    rows = pair_residuals(work.mechanism.pairs, frames, work.numbers, own)
-    scaled = [value / unit if row.kind is MeasureKind.LENGTH else value for row, value in rows]
-    scaled += [pair.contact_gap(work.numbers[pair.name], own[pair.name]) / unit for pair in work.mechanism.pairs]
-    return ca.vertcat(ca.SX(0, 1), *scaled)
+        count = len(self.names)
+        found = []
+        for part in self._parts():
+            part.results(name, 1)
+            (values,) = (each.parts for each in part.results(name, 2) if each.name == result)
+            shape = part.count, self.parameter_count, self.parameter_count
+            found.append(np.stack([result_array(value, 2, shape)[:, :count, :count] for value in values], axis=1))
+        return np.concatenate(found)
 
 
 def refuse_stiffness(forces: Forces) -> None:
@@ -174,40 +217,39 @@ def tied_dimensions(mechanism: Mechanism, among: Container[str] | None = None) -
     So the radii of wheels and the distance of their centres, or the rises of a cam's law.
     """
     known: dict[str, bool] = mechanism.__dict__.setdefault("_tied_dimensions", {})  # kept: numbers are tried
-    design = design_equations(mechanism)
     chosen = [
-        each
-        for each in design.dimensions
-        if each.path[0] in ("links", "pairs") and (among is None or each.name in among)
+        dimension
+        for dimension in design_dimensions(mechanism)
+        if dimension.path[0] in ("links", "pairs") and (among is None or dimension.name in among)
     ]
-    untried = [each for each in chosen if each.name not in known]
-    bound = {*_find_tied(design, untried)}
-    known.update({each.name: each.name in bound for each in untried})
-    return tuple(each.name for each in chosen if known[each.name])
+    untried = [dimension for dimension in chosen if dimension.name not in known]
+    bound = {*_find_tied(mechanism, untried)}
+    known.update({dimension.name: dimension.name in bound for dimension in untried})
+    return tuple(dimension.name for dimension in chosen if known[dimension.name])
 
 
-def _find_tied(design: DesignEquations, dimensions: Sequence[Dimension]) -> list[str]:
+def _find_tied(mechanism: Mechanism, dimensions: Sequence[Dimension]) -> list[str]:
     """Those of some numbers that cannot change alone, found by halving.
 
     A file is checked once for all numbers that are free: changed together, each by a part of its own, tied numbers do
     not go with one another but by chance.
     """
-    if not dimensions or any(_is_accepted(design, dimensions, sign) for sign in (1.0, -1.0)):
+    if not dimensions or any(_is_accepted(mechanism, dimensions, sign) for sign in (1.0, -1.0)):
         return []
     if len(dimensions) == 1:
         return [dimensions[0].name]
     middle = len(dimensions) // 2
-    return [*_find_tied(design, dimensions[:middle]), *_find_tied(design, dimensions[middle:])]
+    return [*_find_tied(mechanism, dimensions[:middle]), *_find_tied(mechanism, dimensions[middle:])]
 
 
-def _is_accepted(design: DesignEquations, dimensions: Sequence[Dimension], sign: float) -> bool:
+def _is_accepted(mechanism: Mechanism, dimensions: Sequence[Dimension], sign: float) -> bool:
     """Whether a file is accepted in which these numbers are somewhat greater, or less for a sign of -1."""
-    values = {}
-    for index, each in enumerate(dimensions):
-        size = abs(each.value) or (design.solver.unit if each.kind == "length" else 1.0)
-        values[each.name] = each.value + sign * NUDGE * (1.0 + index * GOLDEN_FRACTION % 1.0) * size
+    values, unit = {}, solved_mechanism(mechanism).solver.unit
+    for index, dimension in enumerate(dimensions):
+        size = abs(dimension.value) or (unit if dimension.kind == "length" else 1.0)
+        values[dimension.name] = dimension.value + sign * NUDGE * (1.0 + index * GOLDEN_FRACTION % 1.0) * size
     try:
-        with_values(design.mechanism, values)
+        with_values(mechanism, values)
     except BadInput:
         return False
     return True

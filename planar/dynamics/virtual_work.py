@@ -9,8 +9,9 @@ from typing import NamedTuple
 import numpy as np
 
 from planar.dynamics.external_actions import (
-    ExternalAction,
     KinematicArrays,
+    LinkAction,
+    action_on_link,
     effort_actions,
     inertia_actions,
     passive_actions,
@@ -125,7 +126,7 @@ class BalanceEquations(LinkCoordinates):
         return VirtualWorkBalance(
             constraints,
             directions,
-            self._on_links(field, passive_actions(field, factors, spring_turns)),
+            self._on_links(field, passive_actions(field, factors.T, spring_turns)),
             -self._on_links(field, inertia_actions(field) if inertia else ()),
             openings,
         )
@@ -157,16 +158,14 @@ class BalanceEquations(LinkCoordinates):
             openings[:, group.rows] = residuals
         return SparseMatrices(self.pattern, entries), openings
 
-    def _on_links(self, field: KinematicArrays, actions: Iterable[ExternalAction]) -> Array:
+    def _on_links(self, field: KinematicArrays, actions: Iterable[LinkAction]) -> Array:
         """What forces and couples put on the coordinates of the links (n, links)."""
         total: Array = np.zeros((field.position_count, self.link_coordinate_count))
         for action in actions:
             if action.link in self.link_columns:
-                first, frame = self.link_columns[action.link], field.frame(action.link)
-                x, y = action.force.T
-                total[:, first] += x
-                total[:, first + 1] += y
-                total[:, first + 2] += (action.at[:, 0] - frame.x) * y - (action.at[:, 1] - frame.y) * x + action.couple
+                first = self.link_columns[action.link]
+                for k, part in enumerate(action_on_link(field, action)):
+                    total[:, first + k] += part
         return total
 
 

@@ -141,6 +141,8 @@ class Jet:
     def arctan2(self, x: Scalar) -> Jet:
         """The angle of (x, self): its derivative is (x y' - y x') / (x^2 + y^2)."""
         other = Jet(*self._derivatives_of(x))
+        if len(self.parts) == 1:
+            return Jet(atan2(self.parts[0], other.parts[0]))
         y0, x0 = Jet(*self.parts[:-1]), Jet(*other.parts[:-1])
         y1, x1 = Jet(*self.parts[1:]), Jet(*other.parts[1:])
         rate = (x0 * y1 - y0 * x1) / (x0 * x0 + y0 * y0)
@@ -241,6 +243,11 @@ class TermSizes(Jet):
 def term_sizes(value: Jet) -> TermSizes:
     """The sizes of a quantity and its derivatives, each for itself."""
     return TermSizes(*(abs(part) for part in value.parts))
+
+
+def constant_jet(value: Scalar, part_count: int) -> Scalar:
+    """A number that may itself be a jet, of other derivatives, as a jet of so many parts that does not change."""
+    return Jet(value, *([0.0] * (part_count - 1))) if isinstance(value, Jet) else value
 
 
 def value_and_rates(value: Scalar) -> tuple[Scalar, ...]:

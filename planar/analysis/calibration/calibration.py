@@ -13,7 +13,8 @@ from planar.analysis.calibration.fitted_residuals import FittedSamples, Residual
 from planar.analysis.calibration.identifiability import Unidentified, describe_unseen, unseen_changes
 from planar.analysis.calibration.measurements import Measurement, read_measurement
 from planar.analysis.calibration.outliers import Outlier, find_outliers
-from planar.derivatives.design_equations import design_dimensions, design_equations
+from planar.derivatives.design_equations import design_equations
+from planar.derivatives.parameters import design_dimensions
 from planar.derivatives.result_slopes import tied_dimensions
 from planar.document.dimensions import Dimension, file_dimensions, find_dimension
 from planar.document.first_argument import takes_mechanism

@@ -163,7 +163,7 @@ class _AdvantagesOverInput:
     def _load_rate(self, unit_load: Load, along: str) -> _OutputRate:
         """The power of a load of one (N, N m), at unit rate of the input."""
         field = KinematicArrays(self.state)
-        actions = list(actions_of_load(field, unit_load, np.ones(1)))
+        actions = field.external_actions(actions_of_load(field, unit_load, 1.0))
         value = float(action_powers(field, actions, action_velocities(field, actions)).sum())
 
         def from_motions(motion: PoleOfLink) -> float:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from planar.derivatives.result_slopes import SlopeSystem, tied_dimensions
+from planar.derivatives.result_slopes import DerivedResults, SlopeSystem
 from planar.document.first_argument import takes_result
 from planar.dynamics.forces import Forces
 from planar.foundation.arrays import Array
@@ -30,9 +30,8 @@ def gradient(
 
     `weights` by the name of a point, link, pair or input: an array for what is told of it first, as (n, 2) for the
     positions of a point over a motion of n positions, (2,) in a state; or arrays by the names of its results, as
-    `{"E": {"velocity": ...}}`. The sum is over all that is given. It costs one transposed solution a position, however
-    many numbers the file has (A. Griewank, A. Walther, Evaluating Derivatives, SIAM 2008). Numbers that cannot change
-    alone are NaN (see `Sensitivity.tied`).
+    `{"E": {"velocity": ...}}`. The sum is over all that is given. Numbers that cannot change alone are NaN (see
+    `Sensitivity.tied`).
 
     Raises Unknown for another name, BadInput for weights that do not fit; NoAnswer where a position with a weight has
     no derivatives, and after `timeout` s, or a Ctrl-C, with the outcome "interrupted".
@@ -47,38 +46,45 @@ def gradient(
     if not isinstance(weights, Mapping) or not weights:
         raise BadInput("weights", "name what is weighed, with an array each, as {'E': weights}")
     system = SlopeSystem(result)
-    moving = result.moving if isinstance(result, Forces) else result
-    count = len(moving) if isinstance(moving, Motion) else 1
-    read = {name: _read_weights(system, name, given, count) for name, given in weights.items()}
-    found, is_singular = system.gradient(read)
-    used = np.any([np.any(each != 0.0, axis=1) for of in read.values() for each in of.values()], axis=0)
-    if (is_singular & used).any():
-        row = int(np.argmax(is_singular & used))
+    total, tied = np.zeros((system.count, len(system.names))), set[str]()
+    is_used = np.zeros(system.count, dtype=bool)
+    is_singular = is_used.copy()
+    for name, value in weights.items():
+        derived = system.named_slopes(name)
+        is_singular |= derived.is_singular
+        tied.update(derived.tied)
+        for result_name, weight in _read_weights(derived, name, value).items():
+            rows = np.any(weight != 0.0, axis=1)
+            is_used |= rows
+            total[rows] += np.einsum("np,npk->nk", weight[rows], derived.slopes[result_name][rows])
+    if (is_singular & is_used).any():
+        row = int(np.argmax(is_singular & is_used))
         raise NoAnswer(
             Outcome.DEAD_POINT,
             f"position {row} is a dead point or change point, where there are no derivatives; give it the weight 0",
         )
-    whole = found[used].sum(axis=0)
-    tied = {*tied_dimensions(moving.mechanism)}
-    names = system.design.names
-    return {name: float("nan") if name in tied else float(value) for name, value in zip(names, whole, strict=True)}
+    gradient = total[is_used].sum(axis=0)
+    return {
+        name: float("nan") if name in tied else float(slope) for name, slope in zip(system.names, gradient, strict=True)
+    }
 
 
-def _read_weights(system: SlopeSystem, name: str, given: Any, count: int) -> dict[str, Array]:
+def _read_weights(derived: DerivedResults, name: str, given: Any) -> dict[str, Array]:
     """Weights (n, parts) by the name of the result."""
-    parts = {each.name: each.value.numel() for each in system.expressions(name)}
-    named = given if isinstance(given, Mapping) else {next(iter(parts)): given}
-    found = {}
+    shapes = {result: values.shape for result, values in derived.values.items()}
+    named = given if isinstance(given, Mapping) else {next(iter(shapes)): given}
+    weights = {}
     for result, values in named.items():
         place = f"weights[{name!r}]"
-        if result not in parts:
-            raise BadInput(place, f"of {name!r} are told {join_names(parts)}, and no {result!r}")
+        if result not in shapes:
+            raise BadInput(place, f"of {name!r} are told {join_names(shapes)}, and no {result!r}")
+        count, parts = shapes[result]
         try:
             array = np.asarray(values, dtype=float)
-            found[result] = array.reshape(count, parts[result])
+            weights[result] = array.reshape(count, parts)
         except (TypeError, ValueError):
-            wanted = (count, parts[result]) if parts[result] > 1 else (count,)
-            raise BadInput(place, f"an array of shape {wanted} is wanted here, not {np.shape(values)}") from None
+            expected = (count, parts) if parts > 1 else (count,)
+            raise BadInput(place, f"an array of shape {expected} is wanted here, not {np.shape(values)}") from None
         if not np.isfinite(array).all():
             raise BadInput(place, "a number here is not finite")
-    return found
+    return weights

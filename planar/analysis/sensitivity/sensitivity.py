@@ -5,16 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from planar.analysis.sensitivity.limit_slopes import (
-    LimitSlopes,
-    TravelSlopes,
-    dead_point_slopes,
-    travel_slopes,
-)
 from planar.analysis.sensitivity.transmission_slopes import TransmissionSlopes, transmission_slopes
 from planar.derivatives.result_slopes import SlopeSystem
 from planar.document.dimensions import file_dimensions
@@ -26,6 +20,9 @@ from planar.foundation.short_repr import short_repr
 from planar.foundation.time_limit import stops_in_time
 from planar.model.link_shapes import shape_extent
 from planar.results.motion import Motion, State
+
+if TYPE_CHECKING:
+    from planar.analysis.sensitivity.limit_slopes import LimitSlopes, TravelSlopes
 
 INFLUENCE_STEP = 1e-3
 """Of the mechanism's size for lengths, of a rad for angles, else of the number itself: the change of an effect."""
@@ -102,12 +99,16 @@ class Sensitivity:
     @cached_property
     def dead_points(self) -> tuple[LimitSlopes, ...]:
         """How the dead points of the input that runs move, if it is the one that is asked for."""
+        from planar.analysis.sensitivity.limit_slopes import dead_point_slopes  # loads casadi, as what follows
+
         moving = self.moving
         return dead_point_slopes(moving) if isinstance(moving, Motion) and moving.running_input == self.of else ()
 
     @cached_property
     def travel(self) -> TravelSlopes | None:
         """The stroke of a slide or the swing of a rocker over the motion, with its time ratio; None without one."""
+        from planar.analysis.sensitivity.limit_slopes import travel_slopes
+
         moving = self.moving
         has_travel = self.of in moving.frames or self.of in moving._relative_motions
         return travel_slopes(moving, self.of) if isinstance(moving, Motion) and has_travel else None
@@ -178,7 +179,7 @@ def sensitivity(
     found = system.named_slopes(of)
     moving = result.moving if isinstance(result, Forces) else result
     is_motion = isinstance(moving, Motion)
-    if system.balance is not None and system.balance.is_unknown.all():
+    if found.is_unknown.all():
         raise BadInput(
             of,
             "there are no derivatives of forces with friction here: they are not determined, or a contact is about to "
@@ -191,7 +192,7 @@ def sensitivity(
             f"from the dimensions; move the input away from it",
         )
     slopes = {
-        name: {parameter: _one_parameter(whole, k, is_motion) for k, parameter in enumerate(found.parameters)}
+        name: {parameter: _one_parameter(whole, k, is_motion) for k, parameter in enumerate(system.names)}
         for name, whole in found.slopes.items()
     }
     return Sensitivity(
@@ -199,7 +200,7 @@ def sensitivity(
         result,
         slopes,
         found.kinds,
-        _dimension_kinds(moving, found.parameters),
+        _dimension_kinds(moving, system.names),
         found.tied,
         tuple(map(int, np.flatnonzero(found.is_singular))),
     )

@@ -3,19 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
 from planar.analysis.interpolated_run import InterpolatedRun
 from planar.analysis.motion.output import Extreme
-from planar.analysis.motion.transmission_angle import transmission
-from planar.derivatives.transmission_system import TransmissionSystem
+from planar.analysis.motion.transmission_angle import Transmission, transmission
+from planar.derivatives.kinematic_slopes import NamedResult
+from planar.derivatives.result_slopes import PositionSlopes, SlopeSystem
+from planar.derivatives.transmission_system import loaded_output, output_angle
 from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput, NoAnswer
+from planar.foundation.geometry import Vector
 from planar.foundation.short_repr import short_repr
 from planar.model.output_pair import find_output_pair
+from planar.model.pairs import Pair
 from planar.results.motion import Motion, State
+
+FOLD = 1e-9
+"""rad: so near to a right angle it is one, beyond which it is told as falling again: there it has no derivative."""
 
 
 class TransmissionSlopes(NamedTuple):
@@ -44,17 +52,37 @@ def transmission_slopes(moving: State | Motion, of: str) -> TransmissionSlopes |
     except BadInput:
         return None
     _, pair = find_output_pair(moving.mechanism, of)
-    system = TransmissionSystem(moving.mechanism, found.link, pair, found.through)
-    slopes = system.slopes(moving, np.atleast_1d(found.angle))
+    slopes = _angle_slopes(moving, found, pair, np.atleast_1d(found.angle))
     if not isinstance(moving, Motion):
         return TransmissionSlopes(found.link, found.pair, found.angle, {k: float(v[0]) for k, v in slopes.items()})
     return TransmissionSlopes(
-        found.link, found.pair, found.angle, slopes, found.least, _least_slopes(moving, system, found.least)
+        found.link, found.pair, found.angle, slopes, found.least, _least_slopes(moving, found, pair)
     )
 
 
-def _least_slopes(motion: Motion, system: TransmissionSystem, least: Extreme | None) -> dict[str, float] | None:
+def _angle_slopes(moving: State | Motion, of: Transmission, pair: Pair, angle: Array) -> dict[str, Array]:
+    """The derivatives of the angles (n,) by the names of inputs and of numbers of links and pairs (n,)."""
+    system = SlopeSystem(replace(moving, mechanism=loaded_output(moving.mechanism, pair)), is_balanced=True)
+
+    def output_result(part: PositionSlopes) -> list[NamedResult]:
+        assert part.forces is not None
+        balance = part.forces.balance(1)
+        forces = [Vector(*balance.pair_forces(name)[of.link][:2]) for name in of.through]
+        found = output_angle(balance.motion, (of.link, pair), of.through, forces)
+        return [NamedResult("angle", "angle", (found,))]
+
+    slopes = system.derive(output_result).slopes["angle"][:, 0]
+    is_known = (np.abs(angle - 0.5 * np.pi) > FOLD) & (angle > FOLD)
+    slopes = np.where(is_known[:, None], slopes, np.nan)
+    sections = {dimension.name: dimension.path[0] for dimension in system.parameters.dimensions}
+    return {
+        name: slopes[:, k] for k, name in enumerate(system.names) if sections.get(name, "links") in ("links", "pairs")
+    }
+
+
+def _least_slopes(motion: Motion, of: Transmission, pair: Pair) -> dict[str, float] | None:
     """Those at the least: as the input follows it, its own change does nothing to the first order."""
+    least = of.least
     try:
         run = InterpolatedRun(motion)
         is_end = not run.closed and least is not None and least.input in (run.lowest, run.highest)
@@ -63,5 +91,5 @@ def _least_slopes(motion: Motion, system: TransmissionSystem, least: Extreme | N
         state = run.state_at(least.input)
     except (BadInput, NoAnswer):
         return None
-    slopes = system.slopes(state, np.array([least.value]))
-    return {name: float(each[0]) for name, each in slopes.items() if not name.startswith(f"{run.pair}.")}
+    slopes = _angle_slopes(state, of, pair, np.array([least.value]))
+    return {name: float(values[0]) for name, values in slopes.items() if not name.startswith(f"{run.pair}.")}

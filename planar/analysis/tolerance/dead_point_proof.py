@@ -10,8 +10,8 @@ import numpy as np
 from planar.analysis.tolerance.cover import Undecided
 from planar.analysis.tolerance.varied import Varied
 from planar.derivatives.design_enclosures import dead_points_over_boxes, fold_function
+from planar.derivatives.design_equations import DesignEquations
 from planar.derivatives.enclosures import ParameterBoxes, ParametricSystem
-from planar.derivatives.result_slopes import SlopeSystem
 from planar.equations.casadi_call import BufferedFunction
 from planar.foundation.arrays import Array
 from planar.foundation.errors import NoAnswer, Outcome
@@ -45,9 +45,9 @@ class DeadPointProof:
     their limits; with 0 <= f <= 1 it is within the tolerances.
     """
 
-    def __init__(self, system: SlopeSystem, varied: Varied, names: tuple[str, ...]):
-        self.design, self.varied, self.names = system.design, varied, names
-        self.nominal = system.parameters[0]
+    def __init__(self, design: DesignEquations, nominal: Array, varied: Varied, names: tuple[str, ...]):
+        """`nominal` are the parameters (t,) about which others vary."""
+        self.design, self.nominal, self.varied, self.names = design, nominal, varied, names
 
     @cached_property
     def _dead_points(self) -> ParametricSystem:

@@ -17,10 +17,11 @@ from planar.analysis.tolerance.variations import Variations
 from planar.analysis.tolerance.varied import Varied
 from planar.derivatives.design_enclosures import PositionResult
 from planar.derivatives.intervals import OVER
-from planar.derivatives.result_slopes import SlopeSystem
+from planar.dynamics.forces import Forces
 from planar.foundation.arrays import Array, IntArray
 from planar.foundation.errors import NoAnswer, Outcome
 from planar.foundation.short_repr import short_repr
+from planar.results.motion import Motion, State
 
 DIRECTIONS = 48
 """In which a point's farthest deviation is enclosed; between them it is 1 / cos(pi / 48) times as far at most."""
@@ -39,15 +40,17 @@ class Guaranteed(NamedTuple):
         return short_repr(self)
 
 
-def guaranteed_band(system: SlopeSystem, of: str, result: str, variations: Variations) -> Guaranteed:
+def guaranteed_band(source: State | Motion | Forces, of: str, result: str, variations: Variations) -> Guaranteed:
     """The guaranteed band of a result of positions. Raises BadInput where it is of no such kind, and NoAnswer where a
     dead point is proved within the tolerances, or nothing can be proved."""
-    position = PositionResult(system, of, result)
+    offsets = tuple(offset.pair for offset in variations.offsets)
+    position = PositionResult(source, offsets, of, result)
     varied, names = _what_varies(position, variations)
     equations = position.over_boxes(sorted(set(varied.columns.tolist())))
-    t = system.parameters
-    cover = Cover(equations, varied, t[0], t[:, : varied.inputs], system.values[0])
-    proof = DeadPointProof(system, varied, names)
+    moving = source.moving if isinstance(source, Forces) else source
+    (z, *_), t = position.design.coordinates_at(moving)
+    cover = Cover(equations, varied, t[0], t[:, : varied.inputs], z)
+    proof = DeadPointProof(position.design, t[0], varied, names)
     try:
         cover.decide(proof.look)
     except Undecided as undecided:

@@ -152,7 +152,7 @@ class ToleranceBand:
             return None
         offsets = tuple(each.pair for each in self.variations.offsets)
         system = SlopeSystem(self.source, offsets)
-        names = system.design.names
+        names = system.names
         columns = [names.index(each.number) for each in self.variations.numbers]
         columns += [names.index(f"clearance.{pair}.{axis}") for pair in offsets for axis in "xy"]
         whole = system.second_slopes(self.of, self.result)[:, :, columns][:, :, :, columns]
@@ -259,7 +259,7 @@ def tolerance(  # many: what is asked, of which tolerances, and how it is sample
         raise NoAnswer(Outcome.DEAD_POINT, told)
     variations = leave_out_tied(variations, found.tied)
     name = result or next(iter(found.slopes))
-    slopes, names = found.slopes[name], found.parameters
+    slopes, names = found.slopes[name], system.names
     linear = _linear_spread(source, slopes, names, variations, SIGMAS[distribution])
     sampled = None
     if samples:
@@ -282,8 +282,8 @@ def tolerance(  # many: what is asked, of which tolerances, and how it is sample
         distribution,
         _contributor_names(variations),
         linear,
-        system.result_values(of)[name],
-        guaranteed_band(system, of, name, variations) if guaranteed else None,
+        found.values[name],
+        guaranteed_band(source, of, name, variations) if guaranteed else None,
     )
 
 

@@ -12,7 +12,8 @@ from planar.batch.prepare.llvm_numbers import write_given
 from planar.batch.reference_design import ReferenceDesign
 from planar.codegen.instructions import check_length
 from planar.codegen.llvm_ir import IRWriter
-from planar.derivatives.design_equations import INPUT_RATES, DesignEquations
+from planar.derivatives.design_equations import DesignEquations
+from planar.derivatives.parameters import INPUT_RATES
 from planar.equations.generic_evaluation import inline_function
 from planar.equations.mechanism_numbers import scale_lengths
 from planar.foundation.instruction_list import InstructionList, required_values

@@ -21,12 +21,15 @@ from planar.batch.named_results.result_rows import (
 from planar.batch.reference_design import ReferenceDesign
 from planar.derivatives.design_equations import DesignEquations, design_equations
 from planar.derivatives.implicit_system import ImplicitSystem
-from planar.derivatives.result_slopes import OPENING, pair_gaps, tied_dimensions
+from planar.derivatives.kinematic_slopes import OPENING
+from planar.derivatives.result_slopes import tied_dimensions
 from planar.document.dimensions import value_at
 from planar.equations.casadi_call import BufferedFunction
 from planar.equations.elimination import stack_expressions
+from planar.equations.residuals import pair_residuals
 from planar.foundation.arrays import Array, BoolArray
 from planar.foundation.errors import BadInput, suggest_name
+from planar.model.pairs import MeasureKind
 
 Expression = tuple[str, ca.SX]
 """What is derived, as `position of E`, and its parts (parts,)."""
@@ -151,6 +154,16 @@ class DesignSlopes:
         slopes = np.where((tied | self.is_bound)[:, None], np.nan, slopes)
         slopes[told.is_singular] = np.nan
         return slopes
+
+
+def pair_gaps(design: DesignEquations) -> ca.SX:
+    """What all constraints leave open (sizes, rad), those that the equations do without among them."""
+    frames, own = design.placed
+    work, unit = design.work, design.solver.unit
+    rows = pair_residuals(work.mechanism.pairs, frames, work.numbers, own)
+    scaled = [value / unit if row.kind is MeasureKind.LENGTH else value for row, value in rows]
+    scaled += [pair.contact_gap(work.numbers[pair.name], own[pair.name]) / unit for pair in work.mechanism.pairs]
+    return ca.vertcat(ca.SX(0, 1), *scaled)
 
 
 @lru_cache(maxsize=16)

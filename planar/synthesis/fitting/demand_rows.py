@@ -12,7 +12,8 @@ import numpy as np
 
 from planar.analysis.motion.transmission_angle import Transmission
 from planar.derivatives.design_equations import DesignEquations, design_equations
-from planar.derivatives.transmission_system import TransmissionSystem
+from planar.derivatives.force_equations import ForceEquations
+from planar.derivatives.transmission_system import loaded_output, output_angle
 from planar.equations.casadi_call import BufferedFunction
 from planar.equations.elimination import stack_expressions
 from planar.foundation.arrays import Array, BoolArray, IntArray
@@ -137,13 +138,13 @@ def _transmission_systems(mechanism: Mechanism, transmissions: Sequence[Transmis
     constraints' multipliers; see `planar.transmission`."""
     for each in transmissions:
         pair = find_output_pair(mechanism, each.pair)[1]
-        system = TransmissionSystem(mechanism, each.link, pair, each.through)
-        balance, design = system.balance, system.design
+        balance = ForceEquations(design_equations(loaded_output(mechanism, pair)))
+        forces = (balance.force_on(name, each.link) for name in each.through)
+        angle = output_angle(balance.work, (each.link, pair), each.through, forces)
+        design = balance.design
         given = [balance.work.factors, balance.constants, design.z1, design.z2]
         known = [ca.SX.ones(given[0].numel()), *(ca.SX.zeros(other.numel()) for other in given[1:])]
-        acting, angle = ca.substitute(
-            [balance.in_unknowns(balance.acting), balance.in_unknowns(system.angle)], given, known
-        )
+        acting, angle = ca.substitute([balance.in_unknowns(balance.acting), balance.in_unknowns(angle)], given, known)
         yield LinearSystem(design, acting, balance.unknowns, angle)
 
 

@@ -9,8 +9,9 @@ from typing import NamedTuple
 import casadi as ca
 import numpy as np
 
-from planar.derivatives.design_equations import design_dimensions, design_equations
+from planar.derivatives.design_equations import design_equations
 from planar.derivatives.implicit_system import ImplicitSystem, Level
+from planar.derivatives.parameters import design_dimensions
 from planar.derivatives.result_slopes import tied_dimensions
 from planar.document.dimensions import Dimension
 from planar.foundation.arrays import Array

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 from planar.foundation.angles import wrap_angle
 from planar.foundation.argument_types import checked_arguments
 from planar.foundation.geometry import Vector, direction
-from planar.foundation.jets import Jet, Scalar, TermSizes, atan2, hypot, sqrt, value_between, within_turn
+from planar.foundation.jets import Jet, Scalar, TermSizes, atan2, constant_jet, hypot, sqrt, value_between, within_turn
 from planar.model.entry_reader import EntryReader, QuantityWriter
 from planar.model.pairs.base import MeasureKind, Schema, described, list_schema, schema_reference
 from planar.model.pairs.cams import (
@@ -126,7 +126,9 @@ class ArcLift:
         self, angle: Scalar, numbers: Sequence[Scalar], kinds: FollowerAxes, is_flat: bool
     ) -> tuple[Scalar, ...]:
         """The lift and its first three derivatives by the cam's angle."""
-        found: Jet = self.lift(Jet(angle, 1.0, 0.0, 0.0), numbers, kinds, is_flat)
+        found: Jet = self.lift(
+            Jet(angle, 1.0, 0.0, 0.0), [constant_jet(number, 4) for number in numbers], kinds, is_flat
+        )
         return found.parts
 
     def lift_pieces(self, numbers: Sequence[Scalar]) -> list[LiftPiece]:

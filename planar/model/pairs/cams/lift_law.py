@@ -10,7 +10,7 @@ from math import pi
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from planar.foundation.argument_types import check_field_types
-from planar.foundation.jets import Jet, Scalar, part_of_piece, value_between, within_turn
+from planar.foundation.jets import Jet, Scalar, constant_jet, part_of_piece, value_between, within_turn
 from planar.model.entry_reader import EntryReader, QuantityWriter
 from planar.model.pairs.base import MeasureKind, Schema, described, list_schema, schema_reference
 
@@ -163,7 +163,7 @@ class LiftLaw:
 
     def lift_rates(self, angle: Scalar, numbers: Sequence[Scalar]) -> tuple[Scalar, ...]:
         """The lift and its first three derivatives by the cam's angle."""
-        found = self.lift(Jet(angle, 1.0, 0.0, 0.0), numbers)
+        found = self.lift(Jet(angle, 1.0, 0.0, 0.0), [constant_jet(number, 4) for number in numbers])
         return found.parts if isinstance(found, Jet) else (found, 0.0, 0.0, 0.0)
 
     def find_problem(self) -> tuple[str, str] | None:

@@ -17,7 +17,7 @@ import numpy as np
 
 from planar.foundation.arrays import Array
 from planar.foundation.geometry import Vector
-from planar.foundation.jets import Jet, Scalar, TermSizes, value_between, within_turn
+from planar.foundation.jets import Jet, Scalar, TermSizes, constant_jet, value_between, within_turn
 from planar.model.entry_reader import EntryReader, QuantityWriter
 from planar.model.pairs.base import MeasureKind
 from planar.model.pairs.cams import FollowerAxes, FollowerFace, FollowerRest
@@ -148,7 +148,7 @@ class ProfileLift:
 
     def lift_rates(self, angle: Scalar, numbers: Sequence[Scalar]) -> tuple[Scalar, ...]:
         """The lift and its first three derivatives by the cam's angle."""
-        found: Jet = self.lift(Jet(angle, 1.0, 0.0, 0.0), numbers)
+        found: Jet = self.lift(Jet(angle, 1.0, 0.0, 0.0), [constant_jet(number, 4) for number in numbers])
         return found.parts
 
     def lift_pieces(self, rest: FollowerRest) -> list[LiftPiece]:
