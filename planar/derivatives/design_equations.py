@@ -9,7 +9,6 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from planar.derivatives.implicit_system import ImplicitSystem, Level
 from planar.derivatives.parameters import INPUT_RATES, Parameters
 from planar.dynamics.lagrangian import LagrangianFunctions
 from planar.equations.coordinates import FRAME_PARTS, frames_from_coordinates
@@ -29,8 +28,8 @@ from planar.solving.position import PositionSolver, solved_mechanism
 class DesignEquations:
     """The equations of one mechanism over t = (u, u', u'', d): inputs with two rates, and dimensions (SI).
 
-    Levels 0, 1, 2 determine the unknowns z and their two rates. `offsets` and
-    errors are those of `Parameters`.
+    They determine the unknowns z, and their rates with them two rates of z. `offsets` and errors are those of
+    `Parameters`.
     """
 
     def __init__(self, mechanism: Mechanism, offsets: tuple[str, ...] = ()):
@@ -73,24 +72,16 @@ class DesignEquations:
         kinds = self.equations.input_kinds
         return np.array([self.solver.unit if kind is MeasureKind.LENGTH else 1.0 for kind in kinds])
 
-    @cached_property
+    @property
     def scale(self) -> Array:
-        """What each of t is in units of (parameters,): m for one of the size, else as it is."""
-        lengths = [self.solver.unit if each.kind == "length" else 1.0 for each in self.dimensions]
-        return np.concatenate([*[self.input_scale] * 3, lengths])
+        """What each of t is in units of (parameters,): see `Parameters.scale`."""
+        return self.parameters.scale
 
     def rates(self, value: ca.SX) -> tuple[ca.SX, ca.SX]:
         """The first and second rates of what is made of z, u and d."""
         y, y1 = ca.vertcat(self.z, self.u), ca.vertcat(self.z1, self.u1)
         first, second = time_derivatives(value, y, y1, ca.vertcat(self.z2, self.u2))
         return first, second
-
-    @cached_property
-    def kinematics(self) -> ImplicitSystem:
-        """The levels of positions, velocities and accelerations."""
-        first, second = self.rates(self.F)
-        levels = [Level(self.z, self.F), Level(self.z1, first), Level(self.z2, second)]
-        return ImplicitSystem(levels, self.t)
 
     @cached_property
     def placed(self) -> tuple[dict[str, Frame], dict[str, tuple[Scalar, ...]]]:

@@ -52,19 +52,21 @@ def plain_value(value: Scalar) -> Scalar:
 
 
 def stack_numbers(numbers: Sequence[Scalar], count: int, order: int) -> Scalar:
-    """Numbers as one jet of arrays (1, numbers, ...), of `count` parameters; of order 0 an array (1, numbers, 1)."""
+    """Numbers as one jet of arrays (1 or n, numbers, ...), of `count` parameters; of order 0 an array (1 or n, numbers,
+    1)."""
+    plain = [plain_value(number) for number in numbers]
+    size, lanes = max((np.size(value) for value in plain), default=1), max(order, 1)
+    values: Array = np.zeros((size, len(numbers), *((1,) * lanes)))
+    for k, value in enumerate(plain):
+        values[:, k] = value
     if order == 0:
-        return np.array(numbers, dtype=float).reshape(1, len(numbers), 1)
-    shape = (1,) * order
-    values: Array = np.zeros((1, len(numbers), *shape))
-    slopes: Array = np.zeros((1, len(numbers), *shape[1:], count))
-    second: Array = np.zeros((1, len(numbers), *((count,) * order)))
+        return values
+    slopes: Array = np.zeros((size, len(numbers), *((1,) * (order - 1)), count))
+    second: Array = np.zeros((size, len(numbers), *((count,) * order)))
     for k, number in enumerate(numbers):
-        values[0, k] = plain_value(number)
         if isinstance(number, Jet):
-            first = number.parts[1] if order == 1 else number.parts[0].parts[1]
-            slopes[0, k] = first
-            second[0, k] = highest_slopes(number, order)
+            slopes[:, k] = number.parts[1] if order == 1 else number.parts[0].parts[1]
+            second[:, k] = highest_slopes(number, order)
     if order == 1:
         return Jet(values, slopes)
     return Jet(Jet(values, slopes), Jet(slopes.swapaxes(-1, -2), second))

@@ -21,7 +21,6 @@ import numpy as np
 from planar.derivatives.directional_jets import take_entries, variable_jet
 from planar.derivatives.kinematic_slopes import (
     CoordinateMotion,
-    FileNumbers,
     KinematicSlopes,
     NamedResult,
     element_arguments,
@@ -337,9 +336,8 @@ class ForceSlopes:
         self.inputs, self.rubs = parameters.inputs, forces is not None and bool(forces.friction)
         self.with_inertia = forces is not None and any(action.kind == "inertia" for action in forces.acting)
         self.factors = factors
-        self.numbers = FileNumbers(parameters, self.elements, kinematics.count, 0)
         constants = [rates[..., None] for rates in kinematics.rates]
-        self.motion = CoordinateMotion(self.elements, self.numbers, parameters.unit, Jet(*constants))
+        self.motion = CoordinateMotion(self.elements, kinematics.numbers(0), parameters.unit, Jet(*constants))
         count = len(factors)
         pairs = parameters.mechanism.pairs
         self.toothed = [

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import cached_property, lru_cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -23,7 +23,7 @@ from planar.derivatives.directional_jets import (
     take_entries,
     variable_jet,
 )
-from planar.derivatives.parameters import INPUT_RATES, Parameters
+from planar.derivatives.parameters import Parameters
 from planar.dynamics.external_actions import LinkMotion
 from planar.dynamics.link_coordinates import LinkCoordinates
 from planar.equations.coordinates import consecutive_ranges
@@ -32,11 +32,13 @@ from planar.equations.element_placement import ElementPlacement
 from planar.equations.elements import PlacedElement
 from planar.equations.mechanism_numbers import equation_structure, shapes_of_links
 from planar.foundation.arrays import Array, BoolArray
+from planar.foundation.errors import Unknown, suggest_name
 from planar.foundation.generalised_inverses import invert_matrices
 from planar.foundation.geometry import Frame, Vector, frame_at
 from planar.foundation.jets import Jet, Scalar, constant_jet
 from planar.model.mechanism import Mechanism, relative_motions
 from planar.model.pairs import Pair
+from planar.results.kinematic_result import KinematicResult
 
 CONTRADICTION = 1e-7
 """Constraints that no change of the coordinates keeps, by more than this part, are contradicted."""
@@ -100,17 +102,42 @@ def _sine(angle: Scalar) -> Scalar:
     return angle.sin() if isinstance(angle, Jet) else np.sin(angle)
 
 
+class Directions:
+    """The parameters along which there are derivatives: all of them, or those of some `columns` among their names, and
+    `extra` ones behind them on which no coordinates depend."""
+
+    def __init__(self, parameters: Parameters, columns: Sequence[int] | None = None, extra: int = 0):
+        chosen = range(len(parameters.names)) if columns is None else columns
+        self.places = {column: place for place, column in enumerate(chosen)}
+        self.chosen_count = len(self.places)
+        self.count = self.chosen_count + extra
+
+    def jet(self, column: int, value: Scalar, order: int) -> Scalar:
+        """The parameter of a column, of an order; one that is not chosen is a number."""
+        place = self.places.get(column)
+        return value if place is None or order == 0 else parameter_jet(value, place, self.count, order)
+
+
 class FileNumbers:
     """The numbers of a mechanism as jets of an order in all parameters: its `mechanism`, `shapes`, `measured` numbers
     of pairs by name, and `p`, those of all constraints one after the other; of order 0 as they are."""
 
-    def __init__(self, parameters: Parameters, elements: ConstraintElements, count: int, order: int):
-        """`count` is how many parameters there are, those of the file among them."""
+    def __init__(
+        self,
+        parameters: Parameters,
+        elements: ConstraintElements,
+        directions: Directions,
+        order: int,
+        values: Sequence[Any] | None = None,
+    ):
+        """`values` are those of the dimensions, by default of the file: numbers, or arrays (n,) for n positions."""
         first = 3 * len(parameters.inputs)
 
         def number(index: int) -> Scalar:
-            value = parameters.dimensions[index].value
-            return value if order == 0 else parameter_jet(value, first + index, count, order)
+            value = parameters.dimensions[index].value if values is None else values[index]
+            if np.ndim(value):
+                value = np.reshape(value, (-1, *((1,) * max(order, 1))))
+            return directions.jet(first + index, value, order)
 
         file_count = len(parameters.file_dimensions)
         self.mechanism = parameters.mechanism_with([number(k) for k in range(file_count)])
@@ -123,8 +150,8 @@ class FileNumbers:
         for k, name in enumerate(parameters.offsets):
             offset = Vector(number(file_count + 2 * k), number(file_count + 2 * k + 1))
             self.measured[name] = list(pairs[name].offset_pin(self.measured[name], offset))
-        values = [value for name in elements.number_ranges for value in self.measured[name]]
-        self.p = stack_numbers(values, count, order)
+        of_pairs = [value for name in elements.number_ranges for value in self.measured[name]]
+        self.p = stack_numbers(of_pairs, directions.count, order)
 
 
 class CoordinateMotion(LinkMotion):
@@ -168,37 +195,41 @@ class CoordinateMotion(LinkMotion):
         return position if isinstance(position, Jet) else Jet(position, *([0.0] * (orders - 1)))
 
 
-class PositionRates(NamedTuple):
-    """Coordinates (n, coordinates) with their first and second rates."""
-
-    q: Array
-    q1: Array
-    q2: Array
-
-
 class KinematicSlopes:
-    """The derivatives of all coordinates and their rates at positions (n), in all parameters.
+    """The derivatives of all coordinates and their rates at positions (n), in the parameters.
 
-    `parameter_count` may be greater than that of `parameters`: the coordinates do not depend on those that follow.
+    `rates` are the coordinates (n, coordinates), alone or with their first and second rates; `values` as of
+    `FileNumbers`.
     """
 
-    def __init__(self, parameters: Parameters, parameter_count: int, rates: PositionRates):
-        self.parameters, self.count, self.rates = parameters, parameter_count, rates
+    def __init__(
+        self,
+        parameters: Parameters,
+        rates: Sequence[Array],
+        directions: Directions | None = None,
+        values: Sequence[Any] | None = None,
+    ):
+        self.parameters, self.rates, self._values = parameters, rates, values
+        self.directions = Directions(parameters) if directions is None else directions
+        self.count = self.directions.count
         self.elements = constraint_elements(parameters.mechanism)
-        self.first_numbers = FileNumbers(parameters, self.elements, parameter_count, 1)
-        values = FileNumbers(parameters, self.elements, parameter_count, 0)
-        self.jacobian = self._jacobian(values.p[..., 0])
+        self.first_numbers = self.numbers(1)
+        self.jacobian = self._jacobian(self.numbers(0).p[..., 0])
         self.inverse, self.is_singular = invert_matrices(self.jacobian)
         "(n,): where constraints and inputs do not determine the coordinates, so that there are no derivatives"
-        self.contradicts: BoolArray = np.zeros((len(rates.q), parameter_count), dtype=bool)
+        self.contradicts: BoolArray = np.zeros((len(rates[0]), self.count), dtype=bool)
         "(n, parameters): whether constraints contradict a change of a parameter alone"
         self.first_slopes = self._solve(1, self.first_numbers)
 
+    def numbers(self, order: int) -> FileNumbers:
+        """The numbers of the file of an order."""
+        return FileNumbers(self.parameters, self.elements, self.directions, order, self._values)
+
     def _jacobian(self, p: Array) -> Array:
         """dF/dq (n, rows, coordinates)."""
-        jacobian: Array = np.zeros((len(self.rates.q), self.elements.row_count, self.elements.coordinate_count))
+        jacobian: Array = np.zeros((len(self.rates[0]), self.elements.row_count, self.elements.coordinate_count))
         for group in self.elements.groups:
-            _, slopes = group.evaluate(self.rates.q, p)
+            _, slopes = group.evaluate(self.rates[0], p)
             for column, coordinates in enumerate(group.coordinates.T):  # a link may be two bodies of a pair
                 jacobian[:, group.rows, coordinates[:, None]] += slopes[..., column]
         return jacobian
@@ -220,19 +251,15 @@ class KinematicSlopes:
         )
 
     @cached_property
-    def second_numbers(self) -> FileNumbers:
-        """The numbers of the file of the second order."""
-        return FileNumbers(self.parameters, self.elements, self.count, 2)
-
-    @cached_property
     def second_motion(self) -> CoordinateMotion:
         """The positions of links with their second derivatives."""
-        q = self.coordinates(self.first_slopes, self._solve(2, self.second_numbers))
-        return CoordinateMotion(self.elements, self.second_numbers, self.parameters.unit, q)
+        numbers = self.numbers(2)
+        q = self.coordinates(self.first_slopes, self._solve(2, numbers))
+        return CoordinateMotion(self.elements, numbers, self.parameters.unit, q)
 
     def _solve(self, order: int, numbers: FileNumbers) -> list[Array]:
         """The derivatives of an order of the coordinates and their rates (n, coordinates, parameters, ...)."""
-        shape = len(self.rates.q), self.elements.coordinate_count, *([self.count] * order)
+        shape = len(self.rates[0]), self.elements.coordinate_count, *([self.count] * order)
         solved: list[Array] = []
         for rate in range(len(self.rates)):
             tried = [*solved, np.zeros(shape)]
@@ -252,7 +279,7 @@ class KinematicSlopes:
     def _opening(self, q: Jet, p: Scalar, rate: int, order: int) -> Array:
         """By how much a rate of all constraints is opened (n, rows, parameters, ...), the derivatives of the
         coordinates in it still zero."""
-        opening: Array = np.zeros((len(self.rates.q), self.elements.row_count, *([self.count] * order)))
+        opening: Array = np.zeros((len(self.rates[0]), self.elements.row_count, *([self.count] * order)))
         with np.errstate(all="ignore"):  # what is not defined is not a number
             for group in self.elements.groups:
                 rests = group.element.rest.evaluate(element_arguments(group, q, p, rate + 1))
@@ -261,8 +288,9 @@ class KinematicSlopes:
                     opening[:, group.rows[:, row]] = highest_slopes(part, order)
         if order == 1:  # what inputs prescribe
             for k in range(len(self.parameters.inputs)):
-                row = self.elements.constraint_count + k
-                opening[:, row, rate * len(self.parameters.inputs) + k] -= 1.0
+                place = self.directions.places.get(rate * len(self.parameters.inputs) + k)
+                if place is not None:
+                    opening[:, self.elements.constraint_count + k, place] -= 1.0
         return opening
 
     @cached_property
@@ -270,25 +298,17 @@ class KinematicSlopes:
         """Which parameters cannot change alone at each position (n, parameters): constraints contradict it, or a
         contact that other pairs have to keep closed opens."""
         opened: BoolArray = np.zeros_like(self.contradicts)
-        unit = self.parameters.unit
+        unit, scale = self.parameters.unit, np.ones(self.count)
+        for column, place in self.directions.places.items():
+            scale[place] = self.parameters.scale[column]
         for pair in self.first_numbers.mechanism.pairs:
             if type(pair).contact_gap is not Pair.contact_gap:
                 own = [coordinate.parts[0] for coordinate in self.motion.own_coordinates(pair.name)]
                 gap = pair.contact_gap(self.first_numbers.measured[pair.name], own)
-                opened |= np.abs(highest_slopes(gap, 1) / unit * self.parameter_scale) > OPENING
+                opened |= np.abs(highest_slopes(gap, 1) / unit * scale) > OPENING
         tied: BoolArray = self.contradicts | opened
         tied[self.is_singular] = False
         return tied
-
-    @cached_property
-    def parameter_scale(self) -> Array:
-        """What each parameter is in units of (parameters,): m for one of the size, else as it is."""
-        motions = relative_motions(self.parameters.mechanism)
-        kinds = [motions[name].input_quantity_kinds()[0] for name in self.parameters.inputs] * len(INPUT_RATES)
-        kinds += [dimension.kind for dimension in self.parameters.dimensions]
-        scale: Array = np.ones(self.count)
-        scale[: len(kinds)] = [self.parameters.unit if kind == "length" else 1.0 for kind in kinds]
-        return scale
 
 
 class NamedResult(NamedTuple):
@@ -304,26 +324,36 @@ LINK_RESULTS = ("angle", "angular_velocity", "angular_acceleration")
 
 
 def kinematic_results(motion: CoordinateMotion, points: Mapping[str, tuple[str, str]], name: str) -> list[NamedResult]:
-    """What a state tells of a name: of a point, else of a link, and of a pair; `points` are (link, point) by name."""
-    results = []
+    """What a state tells of a name: of a point, else of a link, and of a pair; `points` are (link, point) by name.
+
+    Without rates only what follows from positions.
+    """
+    results, orders = [], len(motion.q.parts)
     if name in points:
         link, point = points[name]
         local = motion.shapes[link].position(point)
         results += [
             NamedResult(result, kind, tuple(motion.place(link, local, rate)))
-            for rate, (result, kind) in enumerate(POINT_RESULTS.items())
+            for rate, (result, kind) in zip(range(orders), POINT_RESULTS.items(), strict=False)
         ]
     elif name in motion.shapes:
         results += [
             NamedResult(result, result.replace("_", " "), (motion.angle_rates(name, rate),))
-            for rate, result in enumerate(LINK_RESULTS)
+            for rate, result in zip(range(orders), LINK_RESULTS, strict=False)
         ]
     if name in motion.relative_motions:
         pair = motion.relative_motions[name]
-        for result, value in pair.results(*motion.input_position(pair).parts).items():
-            if value is not None:
+        parts = [*motion.input_position(pair).parts, 0.0, 0.0][:3]
+        for result, value in pair.results(*parts).items():
+            if value is not None and (orders > 1 or pair.result_kinds[result] in ("length", "angle")):
                 results.append(NamedResult(result, pair.result_kinds[result], (value,)))
     return results
+
+
+def unknown_name(moving: KinematicResult, name: str) -> Unknown:
+    """That nothing bears a name."""
+    known = dict.fromkeys((*moving.point_names, *moving.frames, *moving._relative_motions))
+    return Unknown(f"there is no point, link or pair {name!r}{suggest_name(name, known, 'names')}")
 
 
 def result_array(value: Scalar, order: int, shape: Sequence[int]) -> Array:

@@ -9,7 +9,6 @@ import casadi as ca
 import numpy as np
 
 from planar.derivatives.design_equations import DesignEquations
-from planar.derivatives.implicit_system import ImplicitSystem, Level
 from planar.derivatives.result_expressions import kinematic_expressions
 from planar.equations.casadi_call import BufferedFunction
 from planar.foundation.arrays import Array
@@ -125,11 +124,16 @@ class LimitSystem:
                 break
         else:
             return None
-        system = ImplicitSystem([Level(x, equations)], self.parameters, held)
         results = ca.vertcat(self.u, value)
-        found = system.slopes(system.result_jacobians(results), [here[None]], numbers[None], kept[None])
-        told = float(ca.Function("told", given, [value])(here, numbers, kept))
-        return LimitPoint(float(here[-1]), told, found.slopes[0, 0], found.slopes[0, 1])
+        jacobians = [ca.jacobian(of, by) for of in (equations, results) for by in (x, self.parameters)]
+        linear = ca.Function("linear", given, [ca.densify(each) for each in (*jacobians, value)])
+        by_x, by_parameters, result_by_x, result_by_parameters, at = (
+            part.full() for part in linear(here, numbers, kept)
+        )
+        inverse, is_singular = invert_matrices(by_x[None])
+        slopes = result_by_parameters - result_by_x @ inverse[0] @ by_parameters
+        slopes[:, :] = np.nan if is_singular[0] else slopes
+        return LimitPoint(float(here[-1]), float(at[0, 0]), slopes[0], slopes[1])
 
 
 def _first_result(design: DesignEquations, state: State, output: str) -> ca.SX:

@@ -4,11 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import cached_property
+
+import numpy as np
 
 from planar.document.dimensions import Dimension, change_dimension, file_dimensions
+from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput
 from planar.foundation.jets import Scalar
-from planar.model.mechanism import Input, Mechanism
+from planar.model.mechanism import Input, Mechanism, relative_motions
 from planar.solving.position import solved_mechanism
 
 DESIGN_SECTIONS = ("links", "pairs", "loads", "springs", "masses", "gravity")
@@ -52,6 +56,14 @@ class Parameters:
             *(f"{name}.{rate}" for rate in INPUT_RATES for name in self.inputs),
             *(dimension.name for dimension in self.dimensions),
         )
+
+    @cached_property
+    def scale(self) -> Array:
+        """What each parameter is in units of (parameters,): m for a length of the mechanism's size, else as it is."""
+        motions = relative_motions(self.mechanism)
+        kinds = [motions[name].input_quantity_kinds()[0] for name in self.inputs] * len(INPUT_RATES)
+        kinds += [dimension.kind for dimension in self.dimensions]
+        return np.array([self.unit if kind == "length" else 1.0 for kind in kinds])
 
     def mechanism_with(self, numbers: Sequence[Scalar]) -> Mechanism:
         """The mechanism with other numbers, of any arithmetic, in place of those of the file; inputs, courses of loads

@@ -2,21 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from functools import cached_property
 from typing import NamedTuple
 
-import casadi as ca
 import numpy as np
 
-from planar.derivatives.design_equations import design_equations
-from planar.derivatives.implicit_system import ImplicitSystem, Level
-from planar.derivatives.result_expressions import ResultExpression, kinematic_expressions, refuse_name
+from planar.derivatives.kinematic_slopes import (
+    CoordinateMotion,
+    Directions,
+    KinematicSlopes,
+    NamedResult,
+    constraint_elements,
+    kinematic_results,
+    result_array,
+    unknown_name,
+)
+from planar.derivatives.parameters import Parameters
 from planar.document.dimensions import file_dimensions
-from planar.equations.casadi_call import BufferedFunction
 from planar.foundation.arrays import Array, BoolArray
 from planar.foundation.errors import NoAnswer
+from planar.foundation.jets import sqrt
 from planar.model.mechanism import Mechanism
 from planar.results.kinematic_result import KinematicResult
 from planar.results.motion import Motion
@@ -34,63 +40,66 @@ class PredictedValues(NamedTuple):
     is_singular: BoolArray
 
 
-def position_results(moving: KinematicResult, name: str) -> dict[str, ResultExpression]:
+def position_results(moving: KinematicResult, name: str) -> dict[str, NamedResult]:
     """What is told of the position of a point, link or pair, or of "B to E" (two points), by the results' names.
 
     Raises Unknown.
     """
-    design = design_equations(moving.mechanism)
+    parameters = Parameters(moving.mechanism)
+    coordinates = constraint_elements(moving.mechanism).coordinates(moving)[0]
+    return _results_at(KinematicSlopes(parameters, [coordinates], Directions(parameters, ())).motion, moving, name)
+
+
+def _results_at(motion: CoordinateMotion, moving: KinematicResult, name: str) -> dict[str, NamedResult]:
+    points = moving._point_members
+    results = kinematic_results(motion, points, name)
+    if results:
+        return {result.name: result for result in results}
     first, _, second = name.partition(" to ")
-    found = list(kinematic_expressions(design, moving, name))
-    if not found and second:
-        ends = [position_results(moving, end).get("position") for end in (first, second)]
-        if ends[0] is None or ends[1] is None:
-            raise refuse_name(design, moving, first if ends[0] is None else second)
-        return {"distance": ResultExpression("distance", "length", ca.norm_2(ends[1].value - ends[0].value))}
-    if not found:
-        raise refuse_name(design, moving, name)
-    return {each.name: each for each in found if each.kind in ("length", "angle")}
+    for end in (first, second) if second else (first,):
+        if end not in points:
+            raise unknown_name(moving, end)
+    places = (kinematic_results(motion, points, end)[0].parts for end in (first, second))
+    x, y = (one - other for one, other in zip(*places, strict=True))
+    return {"distance": NamedResult("distance", "length", (sqrt(x * x + y * y),))}
 
 
 class PredictedResults:
-    """Results of mechanisms that differ from one in some numbers, by one set of equations."""
+    """Results, (name, result) each, of mechanisms that differ from one in some numbers."""
 
-    def __init__(self, mechanism: Mechanism, wanted: Sequence[tuple[str, str]], numbers: Sequence[str]):
-        self.design = design_equations(mechanism)
-        state = solve(mechanism)
-        self.results = [position_results(state, name)[result] for name, result in wanted]
-        self.system = ImplicitSystem([Level(self.design.z, self.design.F)], self.design.t)
-        self._value = ca.vertcat(*(each.value for each in self.results))
-        self._jacobians = self.system.result_jacobians(self._value)
-        names = self.design.names
-        self._columns = [names.index(name) for name in numbers]
-        self._inputs = len(mechanism.inputs)
-
-    @cached_property
-    def _values(self) -> BufferedFunction:
-        return BufferedFunction(ca.Function("values", [self.design.z, self.design.t], [ca.densify(self._value)]))
+    def __init__(self, mechanism: Mechanism, results: Sequence[tuple[str, str]], numbers: Sequence[str]):
+        self.parameters = Parameters(mechanism)
+        self.results = tuple(results)
+        self.input_count = len(mechanism.inputs)
+        columns = [*range(self.input_count), *map(self.parameters.names.index, numbers)]
+        self.directions = Directions(self.parameters, columns)
 
     def at_inputs(self, mechanism: Mechanism, inputs: Array) -> PredictedValues:
         """The results of a mechanism at positions of its inputs (n, inputs), rad or m. Raises NoAnswer."""
-        if self._inputs == 1:
+        if self.input_count == 1:
             with suppress(NoAnswer):  # of a single position the reason is told
                 return self.along(motion_over_input(mechanism, inputs[:, 0]))
         names = [each.pair for each in mechanism.inputs]
-        each_given = (dict(zip(names, map(float, u), strict=True)) for u in inputs)
-        found = [self.design.coordinates_at(solve(mechanism, each)) for each in each_given]
-        return self._predict(np.concatenate([z[0] for z, _ in found]), np.concatenate([t for _, t in found]), mechanism)
+        states = [solve(mechanism, dict(zip(names, map(float, position), strict=True))) for position in inputs]
+        elements = constraint_elements(mechanism)
+        coordinates = np.concatenate([elements.coordinates(state)[0] for state in states])
+        return self._predict(coordinates, states[0])
 
     def along(self, motion: Motion) -> PredictedValues:
         """The results at every position of a motion."""
-        z, t = self.design.coordinates_at(motion)
-        return self._predict(z[0], t, motion.mechanism)
+        return self._predict(constraint_elements(motion.mechanism).coordinates(motion)[0], motion)
 
-    def _predict(self, z: Array, t: Array, mechanism: Mechanism) -> PredictedValues:
-        known = file_dimensions(mechanism)
-        own = [known[each.name].value for each in self.design.dimensions]
-        t[:, t.shape[1] - len(own) :] = own
-        values = self._values.evaluate_batch(len(z), z, t)[0]
-        found = self.system.slopes(self._jacobians, [z], t)
-        parts = values.reshape(len(z), -1)
-        slopes = found.slopes
-        return PredictedValues(parts, slopes[:, :, : self._inputs], slopes[:, :, self._columns], found.is_singular)
+    def _predict(self, coordinates: Array, moving: KinematicResult) -> PredictedValues:
+        known: Mapping[str, float] = {
+            name: dimension.value for name, dimension in file_dimensions(moving.mechanism).items()
+        }
+        values = [known[dimension.name] for dimension in self.parameters.dimensions]
+        kinematics = KinematicSlopes(self.parameters, [coordinates], self.directions, values)
+        parts = [
+            part for name, result in self.results for part in _results_at(kinematics.motion, moving, name)[result].parts
+        ]
+        shape = len(coordinates), self.directions.count
+        shown = np.stack([result_array(part, 0, shape[:1]) for part in parts], axis=1)
+        slopes = np.stack([result_array(part, 1, shape) for part in parts], axis=1)
+        count = self.input_count
+        return PredictedValues(shown, slopes[..., :count], slopes[..., count:], kinematics.is_singular)

@@ -9,7 +9,6 @@ import casadi as ca
 
 from planar.derivatives.design_equations import DesignEquations
 from planar.equations.elimination import stack_expressions
-from planar.foundation.errors import Unknown, suggest_name
 from planar.results.kinematic_result import KinematicResult
 
 LINK_RESULTS = ("angle", "angular_velocity", "angular_acceleration")
@@ -45,9 +44,3 @@ def kinematic_expressions(design: DesignEquations, moving: KinematicResult, name
         for key, value in found.items():
             if value is not None:
                 yield ResultExpression(key, pair.result_kinds[key], value)
-
-
-def refuse_name(design: DesignEquations, moving: KinematicResult, name: str) -> Unknown:
-    """That nothing bears a name."""
-    known = dict.fromkeys((*moving.point_names, *moving.frames, *design.work.relative_motions))
-    return Unknown(f"there is no point, link or pair {name!r}{suggest_name(name, known, 'names')}")

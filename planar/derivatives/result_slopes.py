@@ -11,12 +11,13 @@ import numpy as np
 from planar.derivatives.directional_jets import parameter_jet
 from planar.derivatives.force_slopes import ForceSlopes, factor_slopes, slopes_by_factors
 from planar.derivatives.kinematic_slopes import (
+    Directions,
     KinematicSlopes,
     NamedResult,
-    PositionRates,
     constraint_elements,
     kinematic_results,
     result_array,
+    unknown_name,
 )
 from planar.derivatives.parameters import Parameters, design_dimensions
 from planar.document.dimensions import Dimension
@@ -24,7 +25,7 @@ from planar.document.revised.changed_numbers import with_values
 from planar.dynamics.forces import Forces
 from planar.dynamics.load_variation import load_factors
 from planar.foundation.arrays import Array, BoolArray
-from planar.foundation.errors import BadInput, Unknown, suggest_name
+from planar.foundation.errors import BadInput
 from planar.foundation.jets import Scalar
 from planar.foundation.time_limit import all_within_time
 from planar.model.mechanism import Mechanism
@@ -57,9 +58,9 @@ class PositionSlopes:
 
     def __init__(self, system: SlopeSystem, rows: slice):
         self.system, self.rows = system, rows
-        rates = PositionRates(*(rate[rows] for rate in system.rates))
-        self.count = len(rates.q)
-        self.kinematics = KinematicSlopes(system.parameters, system.parameter_count, rates)
+        rates = [rate[rows] for rate in system.rates]
+        self.count = len(rates[0])
+        self.kinematics = KinematicSlopes(system.parameters, rates, system.directions)
         self.is_singular = self.kinematics.is_singular
         self.is_unknown: BoolArray = np.zeros(self.count, dtype=bool)
         self.forces: ForceSlopes | None = None
@@ -73,13 +74,11 @@ class PositionSlopes:
         """What is told of a name, as jets of an order. Raises Unknown."""
         system, kinematics = self.system, self.kinematics
         motion = kinematics.motion if order == 1 else kinematics.second_motion
-        results = kinematic_results(motion, system.points, name)
+        results = kinematic_results(motion, system.moving._point_members, name)
         if self.forces is not None:
             results += self.forces.balance(order).results(name, self._input_velocities(order))
         if not results:
-            moving = system.moving
-            known = dict.fromkeys((*moving.point_names, *moving.frames, *moving._relative_motions))
-            raise Unknown(f"there is no point, link or pair {name!r}{suggest_name(name, known, 'names')}")
+            raise unknown_name(system.moving, name)
         return results
 
     def _input_velocities(self, order: int) -> list[Scalar]:
@@ -87,7 +86,7 @@ class PositionSlopes:
         velocities = [np.broadcast_to(self.system.moving.inputs[name].velocity, self.system.count) for name in inputs]
         return [
             parameter_jet(
-                velocity[self.rows].reshape(-1, *((1,) * order)), len(inputs) + k, self.system.parameter_count, order
+                velocity[self.rows].reshape(-1, *((1,) * order)), len(inputs) + k, self.system.directions.count, order
             )
             for k, velocity in enumerate(velocities)
         ]
@@ -97,24 +96,28 @@ class SlopeSystem:
     """The system of equations that a result follows from, with its values at the result's positions; `offsets` as of
     `Parameters`."""
 
-    def __init__(self, result: State | Motion | Forces, offsets: tuple[str, ...] = (), is_balanced: bool = False):
-        """`is_balanced`: forces without friction and inertia are derived, of a state or a motion too."""
+    def __init__(
+        self,
+        result: State | Motion | Forces,
+        offsets: tuple[str, ...] = (),
+        is_balanced: bool = False,
+        has_rates: bool = True,
+    ):
+        """`is_balanced`: forces without friction and inertia are derived, of a state or a motion too; `has_rates` is
+        false where results of positions alone are asked for."""
         self.moving: State | Motion = result.moving if isinstance(result, Forces) else result
         self.forces = result if isinstance(result, Forces) else None
         self.is_balanced = is_balanced or self.forces is not None
         mechanism = self.moving.mechanism
         self.parameters = Parameters(mechanism, offsets)
         self.names = self.parameters.names
-        self.parameter_count = len(self.names)
         if self.forces is not None:
             refuse_stiffness(self.forces)
-        if self.is_balanced:
-            self.parameter_count += len(mechanism.loads)
+        self.directions = Directions(self.parameters, extra=len(mechanism.loads) if self.is_balanced else 0)
         elements = constraint_elements(mechanism)
-        self.rates = PositionRates(*elements.coordinates(self.moving))
-        self.count = len(self.rates.q)
-        self.spring_turns = elements.initial_spring_turns(self.rates.q[0], mechanism.springs)
-        self.points = {name: point.members[0] for name, point in self.moving._point_names.items()}
+        self.rates = elements.coordinates(self.moving)[: None if has_rates else 1]
+        self.count = len(self.rates[0])
+        self.spring_turns = elements.initial_spring_turns(self.rates[0][0], mechanism.springs)
 
     @cached_property
     def factors(self) -> Array:
@@ -124,7 +127,7 @@ class SlopeSystem:
 
     def _parts(self) -> Iterator[PositionSlopes]:
         """The derivatives, part after part of the positions."""
-        size = len(self.rates.q[0]) * self.parameter_count
+        size = len(self.rates[0][0]) * self.directions.count
         step = max(1, MAX_CHUNK_NUMBERS // max(size, 1))
         for first in all_within_time(range(0, self.count, step), "parts of the positions"):
             yield self._single if step >= self.count else PositionSlopes(self, slice(first, first + step))
@@ -142,8 +145,9 @@ class SlopeSystem:
         parts = []
         for part in self._parts():
             parts.append(part)
-            shape = part.count, self.parameter_count
-            for result in results_of(part):
+            shape = part.count, self.directions.count
+            # of a point and a pair of one name the pair's result of a name is told
+            for result in {result.name: result for result in results_of(part)}.values():
                 kinds[result.name] = result.kind
                 rows = [result_array(value, 0, shape[:1]) for value in result.parts]
                 values.setdefault(result.name, []).append(np.stack(rows, axis=1))
@@ -196,7 +200,7 @@ class SlopeSystem:
         for part in self._parts():
             part.results(name, 1)
             (values,) = (each.parts for each in part.results(name, 2) if each.name == result)
-            shape = part.count, self.parameter_count, self.parameter_count
+            shape = part.count, self.directions.count, self.directions.count
             found.append(np.stack([result_array(value, 2, shape)[:, :count, :count] for value in values], axis=1))
         return np.concatenate(found)
 

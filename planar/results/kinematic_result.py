@@ -62,6 +62,11 @@ class KinematicResult(Displayable):
         return under_links | {each.name: each for each in self._points}
 
     @cached_property
+    def _point_members(self) -> dict[str, tuple[str, str]]:
+        """The (link, point) of every name of a point."""
+        return {name: point.members[0] for name, point in self._point_names.items()}
+
+    @cached_property
     def _links_counting_turns(self) -> frozenset[str]:
         return links_counting_turns(self.mechanism)
 

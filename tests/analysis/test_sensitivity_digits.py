@@ -56,8 +56,8 @@ class DigitSolver:
         design = design_equations(state.mechanism)
         unknowns, (t,) = design.coordinates_at(state)
         self.t, self.names, self.scale = exactly(t), design.names, design.scale
-        x, levels = ca.vertcat(design.z, design.z1, design.z2), design.kinematics.levels
-        G = ca.vertcat(*(level.equations for level in levels))
+        x = ca.vertcat(design.z, design.z1, design.z2)
+        G = ca.vertcat(design.F, *design.rates(design.F))
         self.equations = ca.Function("G", [x, design.t], [ca.densify(G)])
         self.x = exactly(np.concatenate([each[0] for each in unknowns]))
         jacobian = ca.Function("J", [x, design.t], [ca.densify(ca.jacobian(G, x))])

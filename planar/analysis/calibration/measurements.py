@@ -81,7 +81,7 @@ def read_measurement(mechanism: Mechanism, measured: Any, inputs: Any, deviation
             place = f"measured[{name!r}]"
             if result not in known:
                 raise BadInput(place, f"of {name!r} are measured {join_names(known)}, and no {result!r}")
-            parts, kind = known[result].value.numel(), known[result].kind
+            parts, kind = len(known[result].parts), known[result].kind
             deviation = _read_deviation(name, given.get(name), size if kind == "length" else 1.0)
             series.append(MeasuredSeries(str(name), result, kind, _read_values(place, numbers, parts), deviation))
     count = {len(each.values) for each in series}

@@ -131,10 +131,10 @@ class RunGradients:
     def _prepare(self, rows: tuple[int, ...]) -> NativeRuns | None:
         try:
             from planar.batch.gradients.native_gradient import padded_width, prepare_native_gradient
+            from planar.derivatives.design_equations import design_equations
         except ImportError:  # there is no compiler
             return None
         self._width = padded_width(len(self._positions))
         general, may_shift = self._general, self._range == (None, None)
-        return prepare_native_gradient(
-            general.reference, general.design, general.points, rows, self._positions, may_shift
-        )
+        design = design_equations(general.reference.mechanism)
+        return prepare_native_gradient(general.reference, design, general.points, rows, self._positions, may_shift)

@@ -234,7 +234,7 @@ class _ResultBlockSolver:
             found["transmission_angle", name] = angles[None]
         if self.slopes is not None and not self.marches_slopes:
             wanted = is_solved & self._slope_positions(part.which, refined)
-            found |= self.slopes.find(frames, part.designs, self._input_rates(frames, part), wanted)
+            found |= self.slopes.find(frames, part.designs, wanted)
         at = 0
         for row in self.rows:
             if row.quantity == "derivatives" and self.marches_slopes:
@@ -248,14 +248,6 @@ class _ResultBlockSolver:
         found = np.zeros((self.block.steps * refined + 1, self.design_count), dtype=bool)
         found[::refined] = True if self.slopes_at is None else self.slopes_at
         return found[:, designs]
-
-    def _input_rates(self, frames: DesignFrames, part: _DesignPart) -> Array:
-        """The rates of the inputs (2, inputs, steps + 1, designs), in SI."""
-        if self.duration is not None:
-            return input_motions(self.mechanism, part.designs, part.input)[1:]
-        designs, many = with_design_values(self.mechanism, part.designs), frames.design_shape[1]
-        scaled = np.array(self.reference.inputs(designs, many)[1:]) * self.reference.input_scale[:, None]
-        return np.broadcast_to(scaled[:, :, None], (*scaled.shape[:2], *frames.design_shape))
 
 
 class _DesignPart:

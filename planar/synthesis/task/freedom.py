@@ -9,12 +9,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
-import casadi as ca
 import numpy as np
 
 from planar.analysis.calibration.identifiability import unseen_changes
 from planar.derivatives.design_equations import design_equations
-from planar.derivatives.implicit_system import ImplicitSystem, Level
 from planar.document.revised.changed_numbers import with_values
 from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput, NoAnswer, PlanarError
@@ -24,7 +22,7 @@ from planar.results.motion import Motion
 from planar.solving.cycle import cycle
 from planar.synthesis.task.starts import FreeNumbers, free_numbers, motion_kind
 from planar.synthesis.task.synthesis_task import SynthesisTask, Wanted, WantedFunction, WantedPath
-from planar.synthesis.task.wanted_results import wanted_expression
+from planar.synthesis.task.wanted_results import wanted_slopes
 
 MOVED = 1e-6
 """Of a move: what free numbers leave of it is none."""
@@ -196,24 +194,21 @@ def _stack(items: Sequence[_ResultRows]) -> Array:
 
 def _result_rows(mechanism: Mechanism, wanted: Sequence[Wanted], free: FreeNumbers) -> list[_ResultRows]:
     """What is wanted over the motion of a mechanism, where it is determined, with its derivatives."""
-    design = design_equations(mechanism)
     motion = _motion(mechanism, max(LEAST_POSITIONS, 2 * len(free.names)))
-    z, t = design.coordinates_at(motion)
-    results = [wanted_expression(design, item) for item in wanted]
-    system = ImplicitSystem([Level(design.z, design.F)], design.t)
-    whole = ca.vertcat(*results)
-    found = system.slopes(system.result_jacobians(whole), [z[0]], t)
-    sizes = np.abs(found.slopes).max(axis=(1, 2), initial=0.0)
-    regular = ~found.is_singular & (sizes <= NEARLY_SINGULAR * np.median(sizes))
-    values = np.array(ca.Function("values", [design.z, design.t], [whole])(z[0][regular].T, t[regular].T)).T
+    system, derived = wanted_slopes(motion, wanted)
+    all_slopes = np.concatenate([*derived.slopes.values()], axis=1)
+    sizes = np.abs(np.nan_to_num(all_slopes)).max(axis=(1, 2), initial=0.0)
+    regular = ~derived.is_singular & (sizes <= NEARLY_SINGULAR * np.median(sizes))
+    results = [values[regular] for values in derived.values.values()]
+    values = np.concatenate(results, axis=1)
     units = [
-        design.solver.unit if _is_length(mechanism, item, part) else 1.0
+        system.parameters.unit if _is_length(mechanism, item, part) else 1.0
         for item, own in zip(wanted, results, strict=True)
-        for part in range(own.numel())
+        for part in range(own.shape[1])
     ]
-    slopes = found.slopes[regular] * design.scale / np.array(units)[:, None]
-    columns = [design.names.index(name) for name in free.names]
-    ends = np.cumsum([0, *(result.numel() for result in results)])
+    slopes = all_slopes[regular] * system.parameters.scale / np.array(units)[:, None]
+    columns = [system.names.index(name) for name in free.names]
+    ends = np.cumsum([0, *(result.shape[1] for result in results)])
     return [
         _ResultRows(
             item,

@@ -6,11 +6,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
-import casadi as ca
 import numpy as np
 
-from planar.derivatives.design_equations import design_equations
-from planar.derivatives.implicit_system import ImplicitSystem, Level
 from planar.derivatives.parameters import design_dimensions
 from planar.derivatives.result_slopes import tied_dimensions
 from planar.document.dimensions import Dimension
@@ -33,7 +30,7 @@ from planar.synthesis.task.wanted_results import (
     depended_numbers,
     influential_numbers,
     set_apart,
-    wanted_expression,
+    wanted_slopes,
 )
 
 NO_INFLUENCE = 1e-9
@@ -81,15 +78,13 @@ def _chain_starts(task: SynthesisTask, start: ChainStart) -> Iterator[Mechanism]
 
 def _all_links_matter(mechanism: Mechanism, task: SynthesisTask) -> bool:
     """Whether what is wanted depends on every link; else a simpler chain does as well."""
-    design = design_equations(mechanism)
-    z, t = design.coordinates_at(cycle(mechanism, 8, pair=mechanism.inputs[0].pair))
-    results = ca.vertcat(*(wanted_expression(design, item) for item in task.wanted))
-    system = ImplicitSystem([Level(design.z, design.F)], design.t)
-    found = system.slopes(system.result_jacobians(results), [z[0]], t)
-    strength = np.abs(found.slopes[~found.is_singular] * design.scale).max(axis=(0, 1), initial=0.0)
-    first = len(design.names) - len(design.dimensions)
+    motion = cycle(mechanism, 8, pair=mechanism.inputs[0].pair)
+    system, derived = wanted_slopes(motion, task.wanted)
+    slopes = np.concatenate([*derived.slopes.values()], axis=1)[~derived.is_singular]
+    strength = np.abs(slopes * system.parameters.scale).max(axis=(0, 1), initial=0.0)
+    dimensions = system.parameters.dimensions
     by_link = {link.name: 0.0 for link in mechanism.links}
-    for dimension, own in zip(design.dimensions, strength[first:], strict=True):
+    for dimension, own in zip(dimensions, strength[len(strength) - len(dimensions) :], strict=True):
         if dimension.link in by_link:
             by_link[dimension.link] = max(by_link[dimension.link], float(own))
     return min(by_link.values()) > NO_INFLUENCE * max(by_link.values())

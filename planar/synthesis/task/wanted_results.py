@@ -2,38 +2,82 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable, Mapping
+
 import casadi as ca
 import numpy as np
 
 from planar.derivatives.design_equations import DesignEquations, design_equations
-from planar.derivatives.result_slopes import tied_dimensions
+from planar.derivatives.kinematic_slopes import NamedResult
+from planar.derivatives.result_slopes import DerivedResults, PositionSlopes, SlopeSystem, tied_dimensions
 from planar.equations.elimination import stack_expressions
 from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput
-from planar.foundation.jets import TURN
-from planar.model.mechanism import Mechanism, named_points
+from planar.foundation.geometry import Frame
+from planar.foundation.jets import TURN, Scalar
+from planar.model.link_shapes import LinkShape
+from planar.model.mechanism import Mechanism, named_points, relative_motions
+from planar.results.motion import Motion
 from planar.synthesis.task.synthesis_task import Wanted, WantedFunction, WantedPath, WantedPoses
 
 
-def wanted_expression(design: DesignEquations, wanted: Wanted) -> ca.SX:
-    """The parts (parts,) of what is wanted, SI: of a point x and y, of a link those of its origin and its angle, of a
-    pair its position."""
-    frames, _ = design.placed
+def wanted_parts(
+    mechanism: Mechanism,
+    frames: Mapping[str, Frame],
+    shapes: Mapping[str, LinkShape],
+    position_of: Callable[[str], Scalar],
+    wanted: Wanted,
+) -> list[Scalar]:
+    """The parts of what is wanted, SI, in any arithmetic: of a point x and y, of a link those of its origin and its
+    angle, of a pair its position, which `position_of` gives by its name."""
     if isinstance(wanted, WantedPath):
-        name = carried_name(design.mechanism, wanted.point)
-        point = next((point for point in named_points(design.mechanism) if point.name == name), None)
+        name = carried_name(mechanism, wanted.point)
+        point = next((point for point in named_points(mechanism) if point.name == name), None)
         if point is None:
-            raise BadInput("$.wanted", f"{design.mechanism.name!r} has no point {wanted.point!r}")
-        link, at = point.members[0]
-        return stack_expressions(frames[link].to_world(design.work.shapes[link].position(at)))
+            raise BadInput("$.wanted", f"{mechanism.name!r} has no point {wanted.point!r}")
+        link, place = point.members[0]
+        return list(frames[link].to_world(shapes[link].position(place)))
     if isinstance(wanted, WantedPoses):
         if wanted.link not in frames:
-            raise BadInput("$.wanted", f"{design.mechanism.name!r} has no link {wanted.link!r}")
+            raise BadInput("$.wanted", f"{mechanism.name!r} has no link {wanted.link!r}")
         frame = frames[wanted.link]
-        return ca.vertcat(ca.SX(frame.x), ca.SX(frame.y), ca.SX(frame.angle))
-    if wanted.to_pair not in design.work.relative_motions:
-        raise BadInput("$.wanted", f"{design.mechanism.name!r} has no pair {wanted.to_pair!r}")
-    return design.in_link_coordinates(ca.vertcat(*design.work.relative_positions([wanted.to_pair])))
+        return [frame.x, frame.y, frame.angle]
+    if wanted.to_pair not in relative_motions(mechanism):
+        raise BadInput("$.wanted", f"{mechanism.name!r} has no pair {wanted.to_pair!r}")
+    return [position_of(wanted.to_pair)]
+
+
+def wanted_expression(design: DesignEquations, wanted: Wanted) -> ca.SX:
+    """The parts (parts,) of what is wanted in the unknowns and numbers of a design."""
+
+    def position_of(name: str) -> ca.SX:
+        return design.in_link_coordinates(design.work.relative_positions([name])[0])
+
+    parts = wanted_parts(design.mechanism, design.placed[0], design.work.shapes, position_of, wanted)
+    return stack_expressions(parts)
+
+
+def wanted_slopes(moving: Motion, wanted: Iterable[Wanted]) -> tuple[SlopeSystem, DerivedResults]:
+    """What is wanted over a motion, by the number of each item, with its derivatives, and the system that they follow
+    from."""
+    system = SlopeSystem(moving, has_rates=False)
+
+    def results(part: PositionSlopes) -> list[NamedResult]:
+        motion = part.kinematics.motion
+
+        def position_of(name: str) -> Scalar:
+            return motion.input_position(motion.relative_motions[name]).parts[0]
+
+        return [
+            NamedResult(
+                str(number),
+                "length",
+                tuple(wanted_parts(moving.mechanism, motion.frames, motion.shapes, position_of, item)),
+            )
+            for number, item in enumerate(wanted)
+        ]
+
+    return system, system.derive(results)
 
 
 def set_apart(point: str) -> str:
