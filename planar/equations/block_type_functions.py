@@ -20,7 +20,12 @@ from planar.equations.linear import solve_vectors
 from planar.equations.structure_formulas import StructureFormulas
 from planar.foundation.angles import wrap_angle
 from planar.foundation.arrays import Array, greatest_size
-from planar.foundation.recorded_formula import RecordedFormula
+from planar.foundation.recorded_formula import (
+    RecordedFormula,
+    formula_of_results,
+    number_of,
+    recorded_arguments,
+)
 from planar.model.pairs import MeasureKind
 
 MAX_RUN_STEPS = 6
@@ -133,7 +138,7 @@ class BlockTypeFunctions:
     def _run_form(self, z: Array, known: Array, numbers: Array) -> Array:
         """The assembly in closed form that is the nearer to z at the first sample."""
         assert self.assemblies is not None
-        form, is_angle = self.assemblies.form, self._is_angle
+        form, is_angle = self._polished_form, self._is_angle
 
         def distance(sign: float) -> float:
             move = form(z, known[0], numbers, np.array([sign]))[0][0] - z
@@ -142,11 +147,29 @@ class BlockTypeFunctions:
 
         sign = np.array([min((1.0, -1.0), key=distance)])
         starts = np.repeat(z[None], len(known), axis=0)
-        samples: Array = form.evaluate_batch(len(known), starts, known, numbers, sign)[0][:, 0]
-        steps = np.diff(samples[:, is_angle], axis=0, prepend=z[None, is_angle])
-        samples[:, is_angle] = z[is_angle] + np.cumsum(wrap_angle(steps), axis=0)
-        self.assemblies.polish(samples, known, numbers)
+        assemblies, steps = form.evaluate_batch(len(known), starts, known, numbers, sign)
+        samples: Array = assemblies[:, 0]
+        turned = np.diff(samples[:, is_angle], axis=0, prepend=z[None, is_angle])
+        samples[:, is_angle] = z[is_angle] + np.cumsum(wrap_angle(turned), axis=0)
+        if (np.abs(steps) > SETTLED_STEP).any():
+            self.assemblies.polish(samples, known, numbers)
         return samples
+
+    @cached_property
+    def _polished_form(self) -> FormulaFunction:
+        """(unknowns, known coordinates, numbers, sign) -> the unknowns of an assembly in closed form after a step of
+        Newton's method, and that step."""
+        assert self._formulas.closed_form is not None
+        counts = *self._counts, 1
+        instructions, (z, known, numbers, sign) = recorded_arguments(counts)
+        assembly = self._formulas.closed_form.evaluate([*z, *known, *numbers, *sign])[: len(z)]
+        closing = self._formulas.closing.evaluate([*assembly, *known, *numbers])
+        first, second, a, c, b, d = closing  # the Jacobian column by column
+        determinant = a * d - b * c
+        steps = (d * first - b * second) / determinant, (a * second - c * first) / determinant
+        results = [*(unknown - step for unknown, step in zip(assembly, steps, strict=True)), *steps]
+        formula = formula_of_results(instructions, [number_of(result, instructions) for result in results])
+        return FormulaFunction(formula, counts, ((1, len(z)), (1, len(z))))
 
     def _run_newton(self, z: Array, known: Array, numbers: Array) -> Array:
         """By Newton's method from where the samples before lead."""
