@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from planar.document.dimensions import (
     Dimension,
-    change_dimension,
+    change_dimensions,
     file_dimensions,
-    replace_value,
 )
 from planar.foundation.errors import BadInput, suggest_name
-from planar.model.link_shapes import Link
 from planar.model.mechanism import LARGEST_COUNTED_ANGLE, Mechanism
 
 Array = np.ndarray
@@ -74,16 +71,7 @@ def _read_values(name: str, given: Any, known: Mapping[str, Dimension]) -> Array
 def with_design_values(mechanism: Mechanism, values: Mapping[str, Any]) -> Mechanism:
     """The mechanism with these numbers, or arrays of them, in place of its own."""
     known = design_variables(mechanism)
-    links: dict[int, Link] = {}  # each is replaced once, however many of its numbers change
-    for name, value in values.items():
-        section, index, *rest = known[name].address
-        if section == "links" and isinstance(index, int):
-            links[index] = replace_value(links.get(index, mechanism.links[index]), tuple(rest), value)
-        else:
-            mechanism = change_dimension(mechanism, known[name], value)
-    if not links:
-        return mechanism
-    return replace(mechanism, links=tuple(links.get(index, link) for index, link in enumerate(mechanism.links)))
+    return change_dimensions(mechanism, ((known[name], value) for name, value in values.items()))
 
 
 def values_of_design(values: Mapping[str, Array], index: int) -> dict[str, float]:

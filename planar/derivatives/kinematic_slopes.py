@@ -24,6 +24,7 @@ from planar.derivatives.directional_jets import (
     variable_jet,
 )
 from planar.derivatives.parameters import Parameters
+from planar.dynamics.equilibrium import Equilibrium
 from planar.dynamics.external_actions import LinkMotion
 from planar.dynamics.link_coordinates import LinkCoordinates
 from planar.equations.coordinates import consecutive_ranges
@@ -31,15 +32,18 @@ from planar.equations.element_groups import ElementGroup, group_elements
 from planar.equations.element_placement import ElementPlacement
 from planar.equations.elements import PlacedElement
 from planar.equations.mechanism_numbers import equation_structure, shapes_of_links
+from planar.equations.sparse_matrices import SparseMatrices, SparsePattern
 from planar.foundation.arrays import Array, BoolArray
 from planar.foundation.errors import Unknown, suggest_name
-from planar.foundation.generalised_inverses import invert_matrices
 from planar.foundation.geometry import Frame, Vector, frame_at
 from planar.foundation.jets import Jet, Scalar, constant_jet
 from planar.model.mechanism import Mechanism, relative_motions
-from planar.model.pairs import Pair
+from planar.model.pairs import MeasureKind, Pair
 from planar.results.kinematic_result import KinematicResult
 
+TINY = 1e-300
+ROUNDING = 1e-15
+"""Of the greatest derivative of a coordinate (sizes, rad) by a parameter: lesser ones are rounding of none."""
 CONTRADICTION = 1e-7
 """Constraints that no change of the coordinates keeps, by more than this part, are contradicted."""
 OPENING = 1e-6
@@ -70,6 +74,25 @@ class ConstraintElements(LinkCoordinates):
         placed_inputs = [placement.input_position_of(pair, self.constraint_count + k) for k, pair in enumerate(inputs)]
         self.row_count = self.constraint_count + len(inputs)
         self.groups = group_elements([*self.placed_pairs.values(), *placed_inputs])
+        kinds = [kind for pair in mechanism.pairs for kind in pair.residual_kinds]
+        self.is_length_row = np.array(
+            [kind is MeasureKind.LENGTH for kind in (*kinds, *(i.input_kind for i in inputs))]
+        )
+        own_kinds = [kind for pair in mechanism.pairs for _, kind in pair.coordinate_kinds]
+        of_links = [MeasureKind.LENGTH, MeasureKind.LENGTH, MeasureKind.ANGLE] * len(self.links)
+        self.is_length = np.array([kind is MeasureKind.LENGTH for kind in (*of_links, *own_kinds)])
+        # dF/dq, column after column; a link may be two bodies of a pair
+        places = [(g.coordinates[:, None, :] * self.row_count + g.rows[:, :, None]).ravel() for g in self.groups]
+        entries, indices = np.unique(np.concatenate([np.zeros(0, dtype=int), *places]), return_inverse=True)
+        columns, rows = np.divmod(entries, max(self.row_count, 1))
+        first = np.searchsorted(columns, np.arange(self.coordinate_count + 1))
+        self.pattern = SparsePattern((self.row_count, self.coordinate_count), rows, first)
+        ends = np.cumsum([len(part) for part in places])
+        self.entries = [
+            part.reshape(group.rows.shape[0], group.rows.shape[1], -1)
+            for part, group in zip(np.split(indices, ends[:-1]), self.groups, strict=True)
+        ]
+        "of every group the entries there (places, rows, local coordinates)"
 
 
 @lru_cache(maxsize=32)
@@ -214,9 +237,16 @@ class KinematicSlopes:
         self.count = self.directions.count
         self.elements = constraint_elements(parameters.mechanism)
         self.first_numbers = self.numbers(1)
-        self.jacobian = self._jacobian(self.numbers(0).p[..., 0])
-        self.inverse, self.is_singular = invert_matrices(self.jacobian)
+        unit = parameters.unit
+        self._row_scale = np.where(self.elements.is_length_row, 1.0 / unit, 1.0)[:, None]
+        self._column_scale = np.where(self.elements.is_length, unit, 1.0)[:, None]
+        scaled = self._scaled_jacobian(self.numbers(0).p[..., 0])
+        sizes = scaled.column_norms(TINY)
+        self._column_scale = self._column_scale / sizes[..., None]
+        self._constraints = Equilibrium(scaled.divide_columns(sizes))
+        self.is_singular: BoolArray = np.asarray(np.any(self._constraints.null_space, axis=(1, 2)))
         "(n,): where constraints and inputs do not determine the coordinates, so that there are no derivatives"
+        self.is_singular |= ~np.isfinite(scaled.values).all(axis=1)
         self.contradicts: BoolArray = np.zeros((len(rates[0]), self.count), dtype=bool)
         "(n, parameters): whether constraints contradict a change of a parameter alone"
         self.first_slopes = self._solve(1, self.first_numbers)
@@ -225,14 +255,16 @@ class KinematicSlopes:
         """The numbers of the file of an order."""
         return FileNumbers(self.parameters, self.elements, self.directions, order, self._values)
 
-    def _jacobian(self, p: Array) -> Array:
-        """dF/dq (n, rows, coordinates)."""
-        jacobian: Array = np.zeros((len(self.rates[0]), self.elements.row_count, self.elements.coordinate_count))
-        for group in self.elements.groups:
+    def _scaled_jacobian(self, p: Array) -> SparseMatrices:
+        """dF/dq (n, rows, coordinates), lengths in sizes of the mechanism."""
+        pattern = self.elements.pattern
+        values: Array = np.zeros((len(self.rates[0]), len(pattern.rows)))
+        for group, entries in zip(self.elements.groups, self.elements.entries, strict=True):
             _, slopes = group.evaluate(self.rates[0], p)
-            for column, coordinates in enumerate(group.coordinates.T):  # a link may be two bodies of a pair
-                jacobian[:, group.rows, coordinates[:, None]] += slopes[..., column]
-        return jacobian
+            for column in range(slopes.shape[-1]):
+                values[:, entries[..., column]] += slopes[..., column]
+        scale = self._row_scale[pattern.rows, 0] * self._column_scale[pattern.columns, 0]
+        return SparseMatrices(pattern, values * scale)
 
     def coordinates(self, slopes: Sequence[Array], second: Sequence[Array] | None = None) -> Jet:
         """The coordinates as jets in time, as far as their derivatives are given."""
@@ -265,15 +297,16 @@ class KinematicSlopes:
             tried = [*solved, np.zeros(shape)]
             q = self.coordinates(tried) if order == 1 else self.coordinates(self.first_slopes[: rate + 1], tried)
             opening = self._opening(q, numbers.p, rate, order)
-            columns = opening.reshape(*opening.shape[:2], -1)
-            slopes = -self.inverse @ columns
-            residual = columns + self.jacobian @ slopes
-            slopes -= self.inverse @ residual  # refined once
+            columns = opening.reshape(*opening.shape[:2], -1) * self._row_scale
+            constraints = self._constraints
+            slopes = -constraints.solve(columns)
+            slopes -= constraints.solve(columns + constraints.matrix @ slopes)  # refined once
+            slopes[np.abs(slopes) < ROUNDING * np.abs(slopes).max(axis=1, keepdims=True, initial=0.0)] = 0.0
             if order == 1:
-                residual = np.abs(columns + self.jacobian @ slopes).max(axis=1, initial=0.0)
-                terms = np.abs(columns) + np.abs(self.jacobian) @ np.abs(slopes)
-                self.contradicts |= residual > CONTRADICTION * terms.max(axis=1, initial=0.0)
-            solved.append(slopes.reshape(shape))
+                residual = np.abs(columns + constraints.matrix @ slopes).max(axis=1, initial=0.0)
+                terms = np.maximum(np.abs(columns).max(axis=1, initial=0.0), np.abs(slopes).max(axis=1, initial=0.0))
+                self.contradicts |= residual > CONTRADICTION * terms
+            solved.append((slopes * self._column_scale).reshape(shape))
         return solved
 
     def _opening(self, q: Jet, p: Scalar, rate: int, order: int) -> Array:

@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from planar.document.dimensions import Dimension, change_dimension, file_dimensions
+from planar.document.dimensions import Dimension, change_dimensions, file_dimensions
 from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput
 from planar.foundation.jets import Scalar
@@ -74,9 +74,7 @@ class Parameters:
             loads=tuple(load._replace(varies=None) for load in self.mechanism.loads),
             stops=(),
         )
-        for dimension, number in zip(self.file_dimensions, numbers, strict=True):
-            changed = change_dimension(changed, dimension, number)
-        return changed
+        return change_dimensions(changed, zip(self.file_dimensions, numbers, strict=True))
 
 
 def _offset_dimension(pair: str, axis: str) -> Dimension:

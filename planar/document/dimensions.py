@@ -102,17 +102,26 @@ def input_numbers(mechanism: Mechanism) -> Iterator[Dimension]:
 
 def change_dimension(mechanism: Mechanism, dimension: Dimension, value: Any) -> Mechanism:
     """The mechanism with this number at another value (SI), or at an array or a symbol, unchecked."""
-    where, index, *rest = dimension.address
-    if where == "stops" and rest == ["restitution"]:
-        return _with_restitution(mechanism, dimension, value)
-    if where != "pairs" or not isinstance(index, int):
-        alone: Mechanism = replace_value(mechanism, dimension.address, value)
-        return alone
-    entry = mechanism.pairs[index].entry_name()  # a pin of several links is several pairs of one entry
-    changed = (
-        replace_value(pair, tuple(rest), value) if pair.entry_name() == entry else pair for pair in mechanism.pairs
-    )
-    return replace(mechanism, pairs=tuple(changed))
+    return change_dimensions(mechanism, [(dimension, value)])
+
+
+def change_dimensions(mechanism: Mechanism, changes: Iterable[tuple[Dimension, Any]]) -> Mechanism:
+    """The same with several numbers at other values."""
+    pairs_of_entry: dict[str, list[int]] = {}
+    for index, pair in enumerate(mechanism.pairs):  # a pin of several links is several pairs of one entry
+        pairs_of_entry.setdefault(pair.entry_name(), []).append(index)
+    values: dict[Address, Any] = {}
+    for dimension, value in changes:
+        section, number, *rest = dimension.address
+        if section == "stops" and rest == ["restitution"]:
+            mechanism = _with_restitution(mechanism, dimension, value)
+        elif section == "pairs":
+            for place in pairs_of_entry[mechanism.pairs[int(number)].entry_name()]:
+                values["pairs", place, *rest] = value
+        else:
+            values[dimension.address] = value
+    changed: Mechanism = replace_values(mechanism, values)
+    return changed
 
 
 def _with_restitution(mechanism: Mechanism, dimension: Dimension, value: Any) -> Mechanism:
@@ -296,10 +305,22 @@ def value_at(data: Any, address: Address) -> Any:
 
 def replace_value(data: Any, address: Address, value: Any) -> Any:
     """Nested data with one part replaced."""
-    if not address:
-        return value
-    step, rest = address[0], address[1:]
-    if isinstance(step, int):
-        return (*data[:step], replace_value(data[step], rest, value), *data[step + 1 :])
-    part = replace_value(getattr(data, step), rest, value)
-    return data._replace(**{step: part}) if hasattr(data, "_replace") else replace(data, **{step: part})
+    return replace_values(data, {address: value})
+
+
+def replace_values(data: Any, values: Mapping[Address, Any]) -> Any:
+    """Nested data with several parts replaced, each object that holds some of them once."""
+    if () in values:
+        return values[()]
+    if not values:
+        return data
+    inside: dict[str | int, dict[Address, Any]] = {}
+    for (step, *rest), value in values.items():
+        inside.setdefault(step, {})[tuple(rest)] = value
+    if isinstance(next(iter(inside)), int):
+        items = list(data)
+        for step, part in inside.items():
+            items[int(step)] = replace_values(items[int(step)], part)
+        return tuple(items)
+    parts = {str(step): replace_values(getattr(data, str(step)), part) for step, part in inside.items()}
+    return data._replace(**parts) if hasattr(data, "_replace") else replace(data, **parts)

@@ -12,7 +12,7 @@ from planar.document.cursor import Cursor, FileContext
 from planar.document.dimensions import (
     Address,
     Dimension,
-    change_dimension,
+    change_dimensions,
     file_dimensions,
     find_dimension,
     replace_value,
@@ -48,9 +48,10 @@ def with_values(mechanism: Mechanism, values: Mapping[str, Any], units: FileUnit
         raise BadInput("values", f"give the numbers by name, as {{'BC.length': 0.4}}, not {values!r:.60}")
     known = file_dimensions(mechanism)
     chosen = {name: find_dimension(known, name) for name in values}
-    changed = mechanism
-    for name, each in chosen.items():
-        changed = change_dimension(changed, each, _read_value(name, values[name], each.kind, units))
+    changed = change_dimensions(
+        mechanism,
+        ((each, _read_value(name, values[name], each.kind, units)) for name, each in chosen.items()),
+    )
     for index, given in enumerate(changed.inputs):
         if given.law and any(
             each.address[:2] == ("inputs", index) and len(each.address) == 3 for each in chosen.values()

@@ -9,7 +9,7 @@ from typing import Any
 
 import casadi as ca
 
-from planar.document.dimensions import change_dimension, link_lengths
+from planar.document.dimensions import change_dimensions, link_lengths
 from planar.equations.elimination import stack_expressions
 from planar.equations.mechanism_numbers import shapes_of_links
 from planar.foundation.geometry import Vector
@@ -92,9 +92,8 @@ class DimensionNumbers:
     def __init__(self, mechanism: Mechanism, live: bool = True):
         self.dimensions = list(link_lengths(mechanism, (link.name for link in mechanism.links))) if live else []
         self.d = ca.SX.sym("d", len(self.dimensions))
-        for k, each in enumerate(self.dimensions):
-            mechanism = change_dimension(mechanism, each, self.d[k])
-        self.mechanism, self.shapes = mechanism, shapes_of_links(mechanism)
+        self.mechanism = change_dimensions(mechanism, ((each, self.d[k]) for k, each in enumerate(self.dimensions)))
+        self.shapes = shapes_of_links(self.mechanism)
         self.values: list[Any] = []
 
     def add(self, value: Any) -> int:

@@ -9,7 +9,7 @@ from typing import Any
 import casadi as ca
 
 from planar.analysis.motion.mechanical_advantage import loaded_outputs
-from planar.document.dimensions import change_dimension
+from planar.document.dimensions import change_dimensions
 from planar.drawing.forces.action_arrows import ActionSymbol, action_symbols, reaction_symbols
 from planar.dynamics.forces import forces
 from planar.dynamics.lagrangian import LagrangianFunctions
@@ -43,8 +43,7 @@ def force_data(
         return None
     parameters = list(action_parameters(filed))
     symbols = ca.SX.sym("f", len(parameters))
-    for k, each in enumerate(parameters):
-        mechanism = change_dimension(mechanism, each, symbols[k])
+    mechanism = change_dimensions(mechanism, ((each, symbols[k]) for k, each in enumerate(parameters)))
     work = LagrangianFunctions(mechanism, unit)
     rows = BalanceRows(work)
     slopes = ca.jacobian(work.residuals, work.q)
