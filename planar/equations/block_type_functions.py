@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 from functools import cached_property, lru_cache
+from math import inf, isfinite, remainder
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -20,6 +21,7 @@ from planar.equations.linear import solve_vectors
 from planar.equations.structure_formulas import StructureFormulas
 from planar.foundation.angles import wrap_angle
 from planar.foundation.arrays import Array, greatest_size
+from planar.foundation.jets import TURN
 from planar.foundation.recorded_formula import (
     RecordedFormula,
     formula_of_results,
@@ -140,10 +142,14 @@ class BlockTypeFunctions:
         assert self.assemblies is not None
         form, is_angle = self._polished_form, self._is_angle
 
+        first = z.tolist(), known[0].tolist(), numbers.tolist()
+
         def distance(sign: float) -> float:
-            move = form(z, known[0], numbers, np.array([sign]))[0][0] - z
-            size = np.abs(np.where(is_angle, wrap_angle(move), move)).max(initial=0.0)
-            return float(size) if np.isfinite(size) else np.inf
+            moves = [there - here for there, here in zip(form.values(*first, [sign]), first[0], strict=False)]
+            if not all(map(isfinite, moves)):
+                return inf
+            sizes = (remainder(move, TURN) if turns else move for move, turns in zip(moves, is_angle, strict=True))
+            return max(map(abs, sizes))
 
         sign = np.array([min((1.0, -1.0), key=distance)])
         starts = np.repeat(z[None], len(known), axis=0)
