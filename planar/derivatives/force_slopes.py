@@ -452,7 +452,7 @@ class ForceSlopes:
         balance = BalanceAtPositions(self, motion, y, self._factor_jets(order), order)
         with np.errstate(all="ignore"):  # what is not defined is not a number
             (opening,) = balance.open_balance([(1,) * order], [shape])
-        columns = opening.reshape(*shape[:2], -1)
+        columns = opening.reshape(*shape[:2], self.kinematics.count**order)
         solved = -inverse @ columns
         solved -= inverse @ (columns + slopes @ solved)
         solved = solved.reshape(rest.shape)
@@ -470,24 +470,25 @@ class ForceSlopes:
         return [Jet(factor[:, None], unit) for factor, unit in zip(self.factors.T, units, strict=True)]
 
 
-def factor_slopes(moving: State | Motion, parameter_count: int) -> Array:
+def factor_slopes(moving: State | Motion, parameters: Sequence[str]) -> Array:
     """How the factors of loads change with the parameters at positions (n, loads, parameters), by the inputs that they
     follow; NaN where two pieces of their course meet at an angle."""
     mechanism = moving.mechanism
-    names = [given.pair for given in mechanism.inputs]
-    count = max(np.size(each.position) for each in moving.inputs.values()) if names else 1
-    slopes: Array = np.zeros((count, len(mechanism.loads), parameter_count))
+    count = max((np.size(driven.position) for driven in moving.inputs.values()), default=1)
+    slopes: Array = np.zeros((count, len(mechanism.loads), len(parameters)))
     for k, load in enumerate(mechanism.loads):
         if load.varies is None or load.varies.input is None:
             continue
         name = load.varies.input
+        if f"{name}.position" not in parameters:
+            continue
         turns = moving._relative_motions[name].input_kind is MeasureKind.ANGLE
         positions = np.broadcast_to(moving.inputs[name].position, (count,))
         ahead, behind = (
             np.array([course_piece(load.varies, float(position), sense, turns).slope for position in positions])
             for sense in (1.0, -1.0)
         )
-        slopes[:, k, names.index(name)] = np.where(ahead == behind, ahead, np.nan)
+        slopes[:, k, parameters.index(f"{name}.position")] = np.where(ahead == behind, ahead, np.nan)
     return slopes
 
 

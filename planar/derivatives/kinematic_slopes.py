@@ -87,10 +87,10 @@ class ConstraintElements(LinkCoordinates):
         columns, rows = np.divmod(entries, max(self.row_count, 1))
         first = np.searchsorted(columns, np.arange(self.coordinate_count + 1))
         self.pattern = SparsePattern((self.row_count, self.coordinate_count), rows, first)
-        ends = np.cumsum([len(part) for part in places])
+        ends = np.cumsum([len(part) for part in places], dtype=int)
         self.entries = [
-            part.reshape(group.rows.shape[0], group.rows.shape[1], -1)
-            for part, group in zip(np.split(indices, ends[:-1]), self.groups, strict=True)
+            indices[end - len(part) : end].reshape(*group.rows.shape, group.coordinates.shape[1])
+            for end, part, group in zip(ends, places, self.groups, strict=True)
         ]
         "of every group the entries there (places, rows, local coordinates)"
 
@@ -132,8 +132,7 @@ class Directions:
     def __init__(self, parameters: Parameters, columns: Sequence[int] | None = None, extra: int = 0):
         chosen = range(len(parameters.names)) if columns is None else columns
         self.places = {column: place for place, column in enumerate(chosen)}
-        self.chosen_count = len(self.places)
-        self.count = self.chosen_count + extra
+        self.count = len(self.places) + extra
 
     def jet(self, column: int, value: Scalar, order: int) -> Scalar:
         """The parameter of a column, of an order; one that is not chosen is a number."""
@@ -297,7 +296,7 @@ class KinematicSlopes:
             tried = [*solved, np.zeros(shape)]
             q = self.coordinates(tried) if order == 1 else self.coordinates(self.first_slopes[: rate + 1], tried)
             opening = self._opening(q, numbers.p, rate, order)
-            columns = opening.reshape(*opening.shape[:2], -1) * self._row_scale
+            columns = opening.reshape(*opening.shape[:2], self.count**order) * self._row_scale
             constraints = self._constraints
             slopes = -constraints.solve(columns)
             slopes -= constraints.solve(columns + constraints.matrix @ slopes)  # refined once
@@ -352,6 +351,8 @@ class NamedResult(NamedTuple):
     parts: tuple[Scalar, ...]
 
 
+POSITION_KINDS = ("length", "angle")
+"""Of results that follow from positions alone."""
 POINT_RESULTS = {"position": "length", "velocity": "velocity", "acceleration": "acceleration"}
 LINK_RESULTS = ("angle", "angular_velocity", "angular_acceleration")
 
@@ -378,7 +379,7 @@ def kinematic_results(motion: CoordinateMotion, points: Mapping[str, tuple[str, 
         pair = motion.relative_motions[name]
         parts = [*motion.input_position(pair).parts, 0.0, 0.0][:3]
         for result, value in pair.results(*parts).items():
-            if value is not None and (orders > 1 or pair.result_kinds[result] in ("length", "angle")):
+            if value is not None and (orders > 1 or pair.result_kinds[result] in POSITION_KINDS):
                 results.append(NamedResult(result, pair.result_kinds[result], (value,)))
     return results
 

@@ -8,7 +8,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.derivatives.directional_jets import parameter_jet
 from planar.derivatives.force_slopes import ForceSlopes, factor_slopes, slopes_by_factors
 from planar.derivatives.kinematic_slopes import (
     Directions,
@@ -84,10 +83,9 @@ class PositionSlopes:
     def _input_velocities(self, order: int) -> list[Scalar]:
         inputs = self.system.parameters.inputs
         velocities = [np.broadcast_to(self.system.moving.inputs[name].velocity, self.system.count) for name in inputs]
+        directions = self.system.directions
         return [
-            parameter_jet(
-                velocity[self.rows].reshape(-1, *((1,) * order)), len(inputs) + k, self.system.directions.count, order
-            )
+            directions.jet(len(inputs) + k, velocity[self.rows].reshape(-1, *((1,) * order)), order)
             for k, velocity in enumerate(velocities)
         ]
 
@@ -102,18 +100,20 @@ class SlopeSystem:
         offsets: tuple[str, ...] = (),
         is_balanced: bool = False,
         has_rates: bool = True,
+        numbers: Sequence[str] | None = None,
     ):
         """`is_balanced`: forces without friction and inertia are derived, of a state or a motion too; `has_rates` is
-        false where results of positions alone are asked for."""
+        false where results of positions alone are asked for, `numbers` are the parameters, by default all."""
         self.moving: State | Motion = result.moving if isinstance(result, Forces) else result
         self.forces = result if isinstance(result, Forces) else None
         self.is_balanced = is_balanced or self.forces is not None
         mechanism = self.moving.mechanism
         self.parameters = Parameters(mechanism, offsets)
-        self.names = self.parameters.names
+        self.names = self.parameters.names if numbers is None else tuple(numbers)
         if self.forces is not None:
             refuse_stiffness(self.forces)
-        self.directions = Directions(self.parameters, extra=len(mechanism.loads) if self.is_balanced else 0)
+        columns = [self.parameters.names.index(name) for name in self.names]
+        self.directions = Directions(self.parameters, columns, len(mechanism.loads) if self.is_balanced else 0)
         elements = constraint_elements(mechanism)
         self.rates = elements.coordinates(self.moving)[: None if has_rates else 1]
         self.count = len(self.rates[0])
@@ -125,9 +125,9 @@ class SlopeSystem:
         inputs = {name: np.broadcast_to(each.position, (self.count,)) for name, each in self.moving.inputs.items()}
         return load_factors(self.moving.mechanism, inputs, getattr(self.moving, "time", None), self.count)
 
-    def _parts(self) -> Iterator[PositionSlopes]:
-        """The derivatives, part after part of the positions."""
-        size = len(self.rates[0][0]) * self.directions.count
+    def _parts(self, order: int = 1) -> Iterator[PositionSlopes]:
+        """The derivatives of an order, part after part of the positions."""
+        size = len(self.rates[0][0]) * self.directions.count**order
         step = max(1, MAX_CHUNK_NUMBERS // max(size, 1))
         for first in all_within_time(range(0, self.count, step), "parts of the positions"):
             yield self._single if step >= self.count else PositionSlopes(self, slice(first, first + step))
@@ -190,14 +190,14 @@ class SlopeSystem:
         if not self.is_balanced:
             return slopes
         count = len(self.names)
-        by_inputs = factor_slopes(self.moving, count)
+        by_inputs = factor_slopes(self.moving, self.names)
         return slopes[..., :count] + slopes_by_factors(slopes[..., count:], by_inputs)
 
     def second_slopes(self, name: str, result: str) -> Array:
         """The second derivatives of a result (n, parts, parameters, parameters)."""
         count = len(self.names)
         found = []
-        for part in self._parts():
+        for part in self._parts(2):
             part.results(name, 1)
             (values,) = (each.parts for each in part.results(name, 2) if each.name == result)
             shape = part.count, self.directions.count, self.directions.count

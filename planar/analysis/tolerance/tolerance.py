@@ -15,6 +15,7 @@ from planar.analysis.tolerance.guaranteed_limits import guaranteed_dead_points, 
 from planar.analysis.tolerance.sampled import Draw, Sampled, sample_deviations, summarise
 from planar.analysis.tolerance.spread import SIGMAS, LinearSpread, NormalSpread
 from planar.analysis.tolerance.variations import PinOffset, Variations, find_variations, leave_out_tied
+from planar.derivatives.kinematic_slopes import POSITION_KINDS
 from planar.derivatives.result_slopes import SlopeSystem
 from planar.document.first_argument import takes_result
 from planar.dynamics.forces import Forces
@@ -151,11 +152,11 @@ class ToleranceBand:
         if self.result in LIMIT_RESULTS:
             return None
         offsets = tuple(each.pair for each in self.variations.offsets)
-        system = SlopeSystem(self.source, offsets)
-        names = system.names
-        columns = [names.index(each.number) for each in self.variations.numbers]
-        columns += [names.index(f"clearance.{pair}.{axis}") for pair in offsets for axis in "xy"]
-        whole = system.second_slopes(self.of, self.result)[:, :, columns][:, :, :, columns]
+        numbers = [variation.number for variation in self.variations.numbers]
+        numbers += [f"clearance.{pair}.{axis}" for pair in offsets for axis in "xy"]
+        has_rates = isinstance(self.source, Forces) or self.kind not in POSITION_KINDS
+        system = SlopeSystem(self.source, offsets, has_rates=has_rates, numbers=numbers)
+        whole = system.second_slopes(self.of, self.result)
         half = 0.5 * (self.linear.upper - self.linear.lower) / self.linear.sigmas
         many = len(whole)
         deviations = np.concatenate(
