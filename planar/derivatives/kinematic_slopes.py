@@ -239,7 +239,7 @@ class KinematicSlopes:
         unit = parameters.unit
         self._row_scale = np.where(self.elements.is_length_row, 1.0 / unit, 1.0)[:, None]
         self._column_scale = np.where(self.elements.is_length, unit, 1.0)[:, None]
-        scaled = self._scaled_jacobian(self.numbers(0).p[..., 0])
+        scaled = self._scaled_jacobian(plain_value(self.first_numbers.p)[..., 0])
         sizes = scaled.column_norms(TINY)
         self._column_scale = self._column_scale / sizes[..., None]
         self._constraints = Equilibrium(scaled.divide_columns(sizes))

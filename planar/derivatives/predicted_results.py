@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from typing import NamedTuple
 
@@ -19,7 +19,7 @@ from planar.derivatives.kinematic_slopes import (
     unknown_name,
 )
 from planar.derivatives.parameters import Parameters
-from planar.document.dimensions import file_dimensions
+from planar.document.dimensions import value_at
 from planar.foundation.arrays import Array, BoolArray
 from planar.foundation.errors import NoAnswer
 from planar.foundation.jets import sqrt
@@ -90,10 +90,7 @@ class PredictedResults:
         return self._predict(constraint_elements(motion.mechanism).coordinates(motion)[0], motion)
 
     def _predict(self, coordinates: Array, moving: KinematicResult) -> PredictedValues:
-        known: Mapping[str, float] = {
-            name: dimension.value for name, dimension in file_dimensions(moving.mechanism).items()
-        }
-        values = [known[dimension.name] for dimension in self.parameters.dimensions]
+        values = [value_at(moving.mechanism, dimension.address) for dimension in self.parameters.dimensions]
         kinematics = KinematicSlopes(self.parameters, [coordinates], self.directions, values)
         parts = [
             part for name, result in self.results for part in _results_at(kinematics.motion, moving, name)[result].parts

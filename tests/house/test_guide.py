@@ -60,13 +60,12 @@ COMMANDS = {
 
 
 def kinds_of(line: str) -> set[tuple[str, ...]]:
-    """What a command shows: itself with each of its options, its drawing, the format of its file, a refusal."""
+    """What a command shows: itself, its drawing, the format of its file, a refusal."""
     words = shlex.split(line.partition(" > ")[0], comments=True)
     drawing = [("plot", words[3])] if words[1] == "plot" else []
     files = [(words[1], Path(words[k + 1]).suffix) for k, word in enumerate(words[:-1]) if word == "-o"]
-    options = [(words[1], word) for word in words if word.startswith("-")]
     refusals = [(words[1], "refused")] if "# refused" in line else []
-    return {(words[1],), *drawing, *files, *options, *refusals}
+    return {(words[1],), *drawing, *files, *refusals}
 
 
 SHORTER = {
