@@ -30,8 +30,6 @@ ROUNDS, SLIDING_ROUNDS, CANDIDATES = 16, 4, 12
 STEPS = 72
 STROKE = 1e-3 * LENGTH
 """m that a driven slide had best go."""
-LEAST_TURN = 0.02
-"""Of a turn: the range that a linkage has at least that is taken where no crank turns fully."""
 
 
 def find_linkage(linkage: Linkage, seed: int, name: str) -> Mechanism:

@@ -85,11 +85,6 @@ class LayoutEnergy:
         part = np.clip(part, 0.0, 1.0)
         return part, to_spot - part * line
 
-    def least_gap(self, at: Array) -> Array:
-        """Of each drawing how near a spot comes to a line that does not end there."""
-        least: Array = np.abs(self._gaps(at, at @ self.along.T)[1]).min(axis=1)
-        return least
-
     def _straighten(self, at: Array, one: Array, other: Array, energy: Array, slope: Array) -> None:
         """Add what a bend at the middle of three spots costs."""
         to_one, to_other = (at @ each.T for each in (one, other))
