@@ -6,7 +6,7 @@ import pytest
 import planar
 from planar.batch.linkage_layer import LayerRange, LinkageLayer
 from planar.foundation.errors import BadInput
-from tests.draws import is_exhaustive
+from tests.draws import first_cases, is_exhaustive
 
 FREE = ["crank.length", "coupler.length"]
 
@@ -56,7 +56,7 @@ def test_what_is_not_solved_is_nothing_and_masked():
     np.testing.assert_array_equal(layer.pull_back(values, [masked]), slopes)
 
 
-@pytest.mark.parametrize("stem", ["crank-rocker", "geared-five-bar", "stephenson-3-five-bar"])
+@pytest.mark.parametrize("stem", first_cases(["stephenson-3-five-bar", "geared-five-bar", "crank-rocker"]))
 def test_derivatives_of_many_designs_are_those_of_each(stem):
     """Some of which go to a dead point, or do not go together."""
     rng = np.random.default_rng(3)

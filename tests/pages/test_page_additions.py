@@ -9,6 +9,7 @@ import pytest
 
 import planar
 from planar.document.texts.mechanism_link import read_link, write_link
+from tests.draws import first_cases
 from tests.known import MODELS
 from tests.page_scripts import downloaded, same, settled
 
@@ -183,7 +184,7 @@ def test_points_and_paths_that_are_added_are_steps_of_one_history(shown):
     assert "points=" in window.url
 
 
-@pytest.mark.parametrize("name", ["000-P1", "toggle-clamp"])
+@pytest.mark.parametrize("name", first_cases(["toggle-clamp", "000-P1"]))
 def test_a_page_without_a_server_says_where_new_loads_are_drawn(name, shown, drawing):
     window = shown(MODELS[name])
     part = window.get_by_text("Loads, springs and masses", exact=True).locator("..")
