@@ -13,6 +13,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 import planar
+from benchmarks.growth import linkage
 from planar.derivatives import result_slopes
 from planar.derivatives.parameters import design_dimensions
 from planar.document.dimensions import change_dimension, file_dimensions
@@ -402,6 +403,29 @@ def test_at_a_dead_point_there_are_none():
     weights = np.ones((25, 2))
     weights[[0, 24]] = 0.0
     assert np.isfinite(list(planar.gradient(motion, {"C": weights}).values())).all()
+
+
+@pytest.mark.parametrize(
+    ("stem", "name", "rows"), [("coupled-wheels", "rod", (4, 10)), ("elliptical-trammel", "Q", (0, 12))]
+)
+def test_change_points_and_dead_points_of_all_structures_have_none(stem, name, rows):
+    """With all cranks in line the wheels could turn against each other; a slide of the trammel turns back at an end."""
+    motion = planar.cycle(stem, 12)
+    found = planar.sensitivity(motion, name)
+    assert found.singular_rows == rows
+    for slopes in found.slopes.values():
+        free = [slope for number, slope in slopes.items() if number not in found.tied]
+        assert np.isnan([slope[list(rows)] for slope in free]).all()
+        assert np.isfinite([np.delete(slope, rows, axis=0) for slope in free]).all()
+
+
+def test_a_long_row_is_derived_by_sparse_factors_as_its_first_links_are_alone():
+    long, short = (planar.from_dict(linkage("rows of four-bars", count)) for count in (60, 4))
+    name = next(point for point in planar.solve(short).points if np.any(planar.solve(short).point(point).velocity))
+    slopes = [planar.sensitivity(planar.solve(each), name).position for each in (long, short)]
+    assert len(long.links) > 40
+    for number, slope in slopes[1].items():
+        np.testing.assert_allclose(slopes[0][number], slope, rtol=1e-9, atol=1e-12)
 
 
 def test_a_time_ratio_of_one_has_none():
