@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.derivatives.directional_jets import take_entries, variable_jet
+from planar.derivatives.directional_jets import highest_slopes, take_entries, variable_jet
 from planar.derivatives.kinematic_slopes import (
     CoordinateMotion,
     KinematicSlopes,
@@ -31,6 +31,7 @@ from planar.dynamics.external_actions import (
     effort_actions,
     inertia_actions,
     passive_actions,
+    two_sided_actions,
 )
 from planar.dynamics.forces import Forces
 from planar.dynamics.load_variation import course_piece
@@ -143,9 +144,7 @@ class BalanceAtPositions:
         total: LinkForces = {}
         for action in actions:
             if action.link in self.of.elements.link_columns:
-                parts = action_on_link(self.motion, action)
-                previous = total.get(action.link, [0.0] * 3)
-                total[action.link] = [one + other for one, other in zip(previous, parts, strict=True)]
+                _add_forces(total, action.link, action_on_link(self.motion, action))
         return total
 
     def _tooth_actions(self, name: str, apart: bool) -> Iterator[LinkAction]:
@@ -167,35 +166,32 @@ class BalanceAtPositions:
         total: LinkForces = {}
         moving = [link for link in self.pairs[name].bodies if link in self.of.elements.link_columns]
         for body, link in enumerate(moving):
-            parts = [_take_place(exerted[3 * body + k], place) for k in range(3)]
-            previous = total.get(link, [0.0] * 3)
-            total[link] = [one + other for one, other in zip(previous, parts, strict=True)]
+            _add_forces(total, link, [_take_place(exerted[3 * body + k], place) for k in range(3)])
         return total
 
     def _friction_size(self, index: int) -> Scalar:
         return take_entries(self.y, self.of.first_friction + index)
 
+    def _friction(self, index: int) -> Scalar:
+        """What friction in a contact does in the positive sense of its action (N, N m)."""
+        contact = self.rubbing_contacts[index]
+        sense = -contact.rubbing.rate_sense * self._constant("senses", contact.pair_index)
+        return self._friction_size(index) * sense
+
     def _friction_actions(self, name: str | None = None) -> Iterator[LinkAction]:
         """What friction in a pair, or in all, does on links."""
         for index, contact in enumerate(self.rubbing_contacts):
-            if name not in (None, contact.pair.name):
-                continue
-            way = contact.rubbing.action
-            size = self._friction_size(index) * (
-                -contact.rubbing.rate_sense * self._constant("senses", contact.pair_index)
-            )
-            for link, sign in ((way.link, 1.0), (way.reaction_link, -1.0)):
-                if way.point is not None and way.direction is not None:
-                    yield LinkAction("friction", contact.pair.name, link, way.point, way.direction * (size * sign), 0.0)
-                else:
-                    origin = self.motion.place(link, Vector(0.0, 0.0))
-                    yield LinkAction("friction", contact.pair.name, link, origin, Vector(0.0, 0.0), size * sign)
+            pair = contact.pair.name
+            if name in (None, pair):
+                yield from two_sided_actions(
+                    self.motion, "friction", pair, contact.rubbing.action, self._friction(index)
+                )
 
     def pair_forces(self, name: str) -> LinkForces:
         """What a pair does on the links that move, with its friction."""
         total = self.constraint_forces(name)
         for link, parts in self.forces_on_links(self._friction_actions(name)).items():
-            total[link] = [one + other for one, other in zip(total.get(link, [0.0] * 3), parts, strict=True)]
+            _add_forces(total, link, parts)
         return total
 
     def effort(self, index: int) -> Scalar:
@@ -291,9 +287,7 @@ class BalanceAtPositions:
             results.append(NamedResult("couple", "torque", (couple,)))
         for index, contact in enumerate(self.rubbing_contacts):
             if contact.pair.name == name:
-                sense = self._constant("senses", contact.pair_index)
-                friction = self._friction_size(index) * (-contact.rubbing.rate_sense * sense)
-                results.append(NamedResult("friction", effort_kind, (friction,)))
+                results.append(NamedResult("friction", effort_kind, (self._friction(index),)))
                 break
         return results
 
@@ -317,6 +311,11 @@ class BalanceAtPositions:
             return self.contacts[pair.name].pitch_point
         end = bearing_point(pair)
         return self.motion.place(end[0], self.motion.shapes[end[0]].position(end[1])) if end else None
+
+
+def _add_forces(total: LinkForces, link: str, parts: Sequence[Scalar]) -> None:
+    """Add forces on the coordinates of a link."""
+    total[link] = [one + other for one, other in zip(total.get(link, [0.0] * 3), parts, strict=True)]
 
 
 def _take_place(value: Scalar, place: int) -> Scalar:
@@ -343,8 +342,8 @@ class ForceSlopes:
         self.toothed = [
             pair.name for pair in pairs if pair.tooth_contact(self.motion.frames, self.motion.shapes, pairs) is not None
         ]
-        placed = {name: each for name, each in self.elements.placed_pairs.items() if name not in self.toothed}
-        by_rows = {each.rows.start: name for name, each in placed.items()}
+        placed = {name: element for name, element in self.elements.placed_pairs.items() if name not in self.toothed}
+        by_rows = {element.rows.start: name for name, element in placed.items()}
         self.groups = [
             (group, [by_rows[int(row)] for row in group.rows[:, 0]]) for group in group_elements(placed.values())
         ]
@@ -353,7 +352,6 @@ class ForceSlopes:
         self.constants = ForceConstants(spring_turns, np.zeros((count, len(self.toothed))), none, none)
         contacts = self._values(np.zeros((count, self.first_friction))).rubbing_contacts
         self.unknown_count = self.first_friction + len(contacts)
-        self.first_slopes: Array = np.zeros(0)
         self.is_unknown: BoolArray = np.zeros(count, bool)
         "(n,): where the solution is on a kink of friction, or no forces are known"
         if forces is not None and contacts:
@@ -382,12 +380,8 @@ class ForceSlopes:
         return opening, slopes
 
     def _solve_linear(self) -> Array:
-        none: Array = np.zeros((len(self.factors), self.unknown_count))
-        opening, slopes = self._linearise(none)
-        inverse, _ = invert_matrices(slopes)
-        y = -inverse @ opening
-        y -= inverse @ (opening + slopes @ y)
-        return y[..., 0]
+        opening, slopes = self._linearise(np.zeros((len(self.factors), self.unknown_count)))
+        return _close_balance(slopes, invert_matrices(slopes)[0], opening)[..., 0]
 
     def _solve_with_friction(self, forces: Forces, rows_of_all: slice, contacts: list[_Contact]) -> Array:
         """The forces with friction, by Newton's method from what the solution tells, on its side of all kinks."""
@@ -399,8 +393,8 @@ class ForceSlopes:
         )
         acts = first_of_pair & (senses[:, [contact.pair_index for contact in contacts]] != 0.0)
         efforts = [np.abs(forces.friction[contact.pair.name].effort) for contact in contacts]
-        told = self._column_per_pair(efforts, rows_of_all)
-        y: Array = np.concatenate([np.zeros((count, own)), np.nan_to_num(told) * acts], axis=1)
+        known = self._column_per_pair(efforts, rows_of_all)
+        y: Array = np.concatenate([np.zeros((count, own)), np.nan_to_num(known) * acts], axis=1)
         self.constants.senses = senses.astype(float)
         self.constants.leading = np.zeros((count, contacts[-1].parts.stop))
         is_tie: BoolArray = np.zeros(count, bool)
@@ -415,7 +409,7 @@ class ForceSlopes:
             self.constants.pressing = np.sign(y[:, self._pressing_rows])
             is_tie = self._choose_greatest(y)
         size, moved = np.abs(y).max(axis=1), np.abs(change).max(axis=1)
-        off = (np.abs(y[:, own:] - told) * acts).max(axis=1, initial=0.0)
+        off = (np.abs(y[:, own:] - known) * acts).max(axis=1, initial=0.0)
         self.is_unknown = is_tie | ~(moved <= SETTLED * size) | ~(off <= SETTLED * size)
         return y
 
@@ -441,25 +435,44 @@ class ForceSlopes:
         self.constants.leading = leading
         return is_tie
 
+    @cached_property
+    def _closing_matrices(self) -> tuple[Array, Array]:
+        """The Jacobian of the balance in the forces that were solved for, and its inverse."""
+        _, slopes = self._linearise(self.y)
+        return slopes, invert_matrices(slopes)[0]
+
+    @cached_property
+    def first_balance(self) -> BalanceAtPositions:
+        """The balance with the first derivatives of all forces."""
+        return self._derive(1)
+
+    @cached_property
+    def second_balance(self) -> BalanceAtPositions:
+        """The balance with their second derivatives."""
+        return self._derive(2)
+
     def balance(self, order: int) -> BalanceAtPositions:
         """The balance with the derivatives of all forces of an order, to be asked for results."""
+        return self.first_balance if order == 1 else self.second_balance
+
+    def _derive(self, order: int) -> BalanceAtPositions:
         motion = self.kinematics.motion if order == 1 else self.kinematics.second_motion
-        _, slopes = self._linearise(self.y)
-        inverse, _ = invert_matrices(slopes)
-        shape = len(self.y), slopes.shape[1], *([self.kinematics.count] * order)
-        rest: Array = np.zeros((len(self.y), self.unknown_count, *shape[2:]))
-        y = variable_jet(self.y, rest) if order == 1 else variable_jet(self.y, self.first_slopes, rest)
-        balance = BalanceAtPositions(self, motion, y, self._factor_jets(order), order)
+        slopes, inverse = self._closing_matrices
+        lanes = [self.kinematics.count] * order
+
+        def balance_with(derivatives: Array) -> BalanceAtPositions:
+            """The balance with these derivatives of the highest order (n, unknowns, parameters, ...)."""
+            if order == 1:
+                y = variable_jet(self.y, derivatives)
+            else:
+                y = variable_jet(self.y, highest_slopes(self.first_balance.y, 1), derivatives)
+            return BalanceAtPositions(self, motion, y, self._factor_jets(order), order)
+
+        none: Array = np.zeros((len(self.y), self.unknown_count, *lanes))
         with np.errstate(all="ignore"):  # what is not defined is not a number
-            (opening,) = balance.open_balance([(1,) * order], [shape])
-        columns = opening.reshape(*shape[:2], self.kinematics.count**order)
-        solved = -inverse @ columns
-        solved -= inverse @ (columns + slopes @ solved)
-        solved = solved.reshape(rest.shape)
-        y = variable_jet(self.y, solved) if order == 1 else variable_jet(self.y, self.first_slopes, solved)
-        if order == 1:
-            self.first_slopes = solved
-        return BalanceAtPositions(self, motion, y, balance.factors, order)
+            (opening,) = balance_with(none).open_balance([(1,) * order], [(len(self.y), slopes.shape[1], *lanes)])
+        columns = opening.reshape(*opening.shape[:2], self.kinematics.count**order)
+        return balance_with(_close_balance(slopes, inverse, columns).reshape(none.shape))
 
     def _factor_jets(self, order: int) -> list[Scalar]:
         """The factors of the loads, the parameters that follow those of the kinematics."""
@@ -468,6 +481,13 @@ class ForceSlopes:
         first = self.kinematics.count - self.factors.shape[1]
         units = np.eye(self.kinematics.count)[first:]
         return [Jet(factor[:, None], unit) for factor, unit in zip(self.factors.T, units, strict=True)]
+
+
+def _close_balance(slopes: Array, inverse: Array, opening: Array) -> Array:
+    """The changes of forces (n, unknowns, k) that close what is open of the balance (n, rows, k), refined once."""
+    changes = -inverse @ opening
+    closed: Array = changes - inverse @ (opening + slopes @ changes)
+    return closed
 
 
 def factor_slopes(moving: State | Motion, parameters: Sequence[str]) -> Array:

@@ -29,14 +29,13 @@ from planar.dynamics.external_actions import LinkMotion
 from planar.dynamics.link_coordinates import LinkCoordinates
 from planar.equations.coordinates import consecutive_ranges
 from planar.equations.element_groups import ElementGroup, group_elements
-from planar.equations.element_placement import ElementPlacement
 from planar.equations.elements import PlacedElement
 from planar.equations.mechanism_numbers import equation_structure, shapes_of_links
 from planar.equations.sparse_matrices import SparseMatrices, SparsePattern
 from planar.foundation.arrays import Array, BoolArray
 from planar.foundation.errors import Unknown, suggest_name
 from planar.foundation.geometry import Frame, Vector, frame_at
-from planar.foundation.jets import Jet, Scalar, constant_jet
+from planar.foundation.jets import Jet, Scalar, constant_jet, cos, sin
 from planar.model.mechanism import Mechanism, relative_motions
 from planar.model.pairs import MeasureKind, Pair
 from planar.results.kinematic_result import KinematicResult
@@ -58,14 +57,10 @@ class ConstraintElements(LinkCoordinates):
         super().__init__(mechanism)
         motions = relative_motions(mechanism)
         inputs = [motions[given.pair] for given in mechanism.inputs]
-        self.number_ranges = consecutive_ranges(
-            {pair.name: len(pair.number_kinds) for pair in (*mechanism.pairs, *inputs)}
-        )
-        placement = ElementPlacement(
-            {link: range(first, first + 3) for link, first in self.link_columns.items()},
-            {name: range(own.start, own.stop) for name, own in self.own_slices.items()},
-            self.number_ranges,
-        )
+        numbered = {pair.name: pair for pair in (*mechanism.pairs, *inputs)}
+        self.numbered_pairs = tuple(numbered)
+        "the names of the pairs whose numbers are p, one after the other"
+        placement = self.element_placement(numbered.values())
         self.pair_rows = consecutive_ranges({pair.name: len(pair.residual_kinds) for pair in mechanism.pairs})
         self.placed_pairs: dict[str, PlacedElement] = {
             pair.name: placement.residual_of(pair, self.pair_rows[pair.name].start) for pair in mechanism.pairs
@@ -111,18 +106,10 @@ def element_arguments(group: ElementGroup, q: Scalar, p: Scalar, orders: int) ->
     taken, arguments = group.element.arguments, []
     arguments += [take_entries(q, group.coordinates[:, k]) for k in taken.coordinates]
     angles = {body: take_entries(q, group.coordinates[:, 3 * body + 2]) for body in {*taken.cosines, *taken.sines}}
-    arguments += [_cosine(angles[body]) for body in taken.cosines]
-    arguments += [_sine(angles[body]) for body in taken.sines]
+    arguments += [cos(angles[body]) for body in taken.cosines]
+    arguments += [sin(angles[body]) for body in taken.sines]
     numbers = [take_entries(p, group.numbers[:, k]) for k in taken.numbers]
     return [*arguments, *(constant_jet(number, orders) if orders else number for number in numbers)]
-
-
-def _cosine(angle: Scalar) -> Scalar:
-    return angle.cos() if isinstance(angle, Jet) else np.cos(angle)
-
-
-def _sine(angle: Scalar) -> Scalar:
-    return angle.sin() if isinstance(angle, Jet) else np.sin(angle)
 
 
 class Directions:
@@ -172,7 +159,7 @@ class FileNumbers:
         for k, name in enumerate(parameters.offsets):
             offset = Vector(number(file_count + 2 * k), number(file_count + 2 * k + 1))
             self.measured[name] = list(pairs[name].offset_pin(self.measured[name], offset))
-        of_pairs = [value for name in elements.number_ranges for value in self.measured[name]]
+        of_pairs = [value for name in elements.numbered_pairs for value in self.measured[name]]
         self.p = stack_numbers(of_pairs, directions.count, order)
 
 
@@ -396,3 +383,8 @@ def result_array(value: Scalar, order: int, shape: Sequence[int]) -> Array:
     array: Array = np.empty(shape)
     array[:] = part if order else np.reshape(part, (-1,)) if np.ndim(part) else part
     return array
+
+
+def stack_results(values: Sequence[Scalar], order: int, shape: Sequence[int]) -> Array:
+    """The same of several numbers (n, values, ...)."""
+    return np.stack([result_array(value, order, shape) for value in values], axis=1)

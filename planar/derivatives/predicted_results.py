@@ -15,7 +15,7 @@ from planar.derivatives.kinematic_slopes import (
     NamedResult,
     constraint_elements,
     kinematic_results,
-    result_array,
+    stack_results,
     unknown_name,
 )
 from planar.derivatives.parameters import Parameters
@@ -79,7 +79,7 @@ class PredictedResults:
         if self.input_count == 1:
             with suppress(NoAnswer):  # of a single position the reason is told
                 return self.along(motion_over_input(mechanism, inputs[:, 0]))
-        names = [each.pair for each in mechanism.inputs]
+        names = [driven.pair for driven in mechanism.inputs]
         states = [solve(mechanism, dict(zip(names, map(float, position), strict=True))) for position in inputs]
         elements = constraint_elements(mechanism)
         coordinates = np.concatenate([elements.coordinates(state)[0] for state in states])
@@ -90,13 +90,12 @@ class PredictedResults:
         return self._predict(constraint_elements(motion.mechanism).coordinates(motion)[0], motion)
 
     def _predict(self, coordinates: Array, moving: KinematicResult) -> PredictedValues:
-        values = [value_at(moving.mechanism, dimension.address) for dimension in self.parameters.dimensions]
-        kinematics = KinematicSlopes(self.parameters, [coordinates], self.directions, values)
+        numbers = [value_at(moving.mechanism, dimension.address) for dimension in self.parameters.dimensions]
+        kinematics = KinematicSlopes(self.parameters, [coordinates], self.directions, numbers)
         parts = [
             part for name, result in self.results for part in _results_at(kinematics.motion, moving, name)[result].parts
         ]
         shape = len(coordinates), self.directions.count
-        shown = np.stack([result_array(part, 0, shape[:1]) for part in parts], axis=1)
-        slopes = np.stack([result_array(part, 1, shape) for part in parts], axis=1)
+        values, slopes = stack_results(parts, 0, shape[:1]), stack_results(parts, 1, shape)
         count = self.input_count
-        return PredictedValues(shown, slopes[..., :count], slopes[..., count:], kinematics.is_singular)
+        return PredictedValues(values, slopes[..., :count], slopes[..., count:], kinematics.is_singular)

@@ -10,12 +10,13 @@ import numpy as np
 
 from planar.derivatives.force_slopes import ForceSlopes, factor_slopes, slopes_by_factors
 from planar.derivatives.kinematic_slopes import (
+    POSITION_KINDS,
     Directions,
     KinematicSlopes,
     NamedResult,
     constraint_elements,
     kinematic_results,
-    result_array,
+    stack_results,
     unknown_name,
 )
 from planar.derivatives.parameters import Parameters, design_dimensions
@@ -122,7 +123,7 @@ class SlopeSystem:
     @cached_property
     def factors(self) -> Array:
         """The factors of the loads (n, loads)."""
-        inputs = {name: np.broadcast_to(each.position, (self.count,)) for name, each in self.moving.inputs.items()}
+        inputs = {name: np.broadcast_to(driven.position, (self.count,)) for name, driven in self.moving.inputs.items()}
         return load_factors(self.moving.mechanism, inputs, getattr(self.moving, "time", None), self.count)
 
     def _parts(self, order: int = 1) -> Iterator[PositionSlopes]:
@@ -142,27 +143,22 @@ class SlopeSystem:
         values: dict[str, list[Array]] = {}
         slopes: dict[str, list[Array]] = {}
         kinds: dict[str, str] = {}
-        parts = []
+        singular_rows, unknown_rows, tied = [], [], set[str]()
         for part in self._parts():
-            parts.append(part)
+            singular_rows.append(part.is_singular)
+            unknown_rows.append(part.is_unknown)
+            is_tied: BoolArray = np.asarray(part.kinematics.tied.any(axis=0))
+            tied.update(name for name, binds in zip(self.names, is_tied, strict=False) if binds)
             shape = part.count, self.directions.count
             # of a point and a pair of one name the pair's result of a name is told
             for result in {result.name: result for result in results_of(part)}.values():
                 kinds[result.name] = result.kind
-                rows = [result_array(value, 0, shape[:1]) for value in result.parts]
-                values.setdefault(result.name, []).append(np.stack(rows, axis=1))
-                rows = [result_array(value, 1, shape) for value in result.parts]
-                slopes.setdefault(result.name, []).append(np.stack(rows, axis=1))
+                values.setdefault(result.name, []).append(stack_results(result.parts, 0, shape[:1]))
+                slopes.setdefault(result.name, []).append(stack_results(result.parts, 1, shape))
         # results side by side, so that what a kink of a load's course does not change is told by the others' size
         ends = np.cumsum([arrays[0].shape[1] for arrays in slopes.values()])[:-1]
         joined = self._with_factors(np.concatenate([np.concatenate(arrays) for arrays in slopes.values()], axis=1))
-        is_singular, is_unknown = (
-            np.concatenate([getattr(part, name) for part in parts]) for name in ("is_singular", "is_unknown")
-        )
-        tied = set[str]()
-        for part in parts:
-            is_tied: BoolArray = np.asarray(part.kinematics.tied.any(axis=0))
-            tied.update(name for name, binds in zip(self.names, is_tied, strict=False) if binds)
+        is_singular = np.concatenate(singular_rows)
         joined[is_singular] = np.nan
         return DerivedResults(
             {
@@ -172,7 +168,7 @@ class SlopeSystem:
             dict(zip(slopes, np.split(joined, ends, axis=1), strict=True)),
             kinds,
             is_singular,
-            is_unknown,
+            np.concatenate(unknown_rows),
             tuple(name for name in self.names if name in tied),
         )
 
@@ -183,7 +179,7 @@ class SlopeSystem:
         bound = {*tied_dimensions(self.moving.mechanism), *derived.tied}
         is_free = np.array([parameter not in bound for parameter in self.names])
         slopes = {result: np.where(is_free, array, np.nan) for result, array in derived.slopes.items()}
-        return derived._replace(slopes=slopes, tied=tuple(each for each in self.names if each in bound))
+        return derived._replace(slopes=slopes, tied=tuple(number for number in self.names if number in bound))
 
     def _with_factors(self, slopes: Array) -> Array:
         """The derivatives by the parameters alone, with what the factors of loads change by them."""
@@ -196,13 +192,25 @@ class SlopeSystem:
     def second_slopes(self, name: str, result: str) -> Array:
         """The second derivatives of a result (n, parts, parameters, parameters)."""
         count = len(self.names)
-        found = []
+        rows = []
         for part in self._parts(2):
-            part.results(name, 1)
-            (values,) = (each.parts for each in part.results(name, 2) if each.name == result)
+            (values,) = (named.parts for named in part.results(name, 2) if named.name == result)
             shape = part.count, self.directions.count, self.directions.count
-            found.append(np.stack([result_array(value, 2, shape)[:, :count, :count] for value in values], axis=1))
-        return np.concatenate(found)
+            rows.append(stack_results(values, 2, shape)[:, :, :count, :count])
+        return np.concatenate(rows)
+
+
+def second_derivatives(
+    source: State | Motion | Forces,
+    of: str,
+    result: str,
+    kind: str,
+    offsets: tuple[str, ...] = (),
+    numbers: Sequence[str] | None = None,
+) -> Array:
+    """Those of a result of this kind of quantity, see `SlopeSystem`; without rates where positions determine it."""
+    has_rates = isinstance(source, Forces) or kind not in POSITION_KINDS
+    return SlopeSystem(source, offsets, has_rates=has_rates, numbers=numbers).second_slopes(of, result)
 
 
 def refuse_stiffness(forces: Forces) -> None:

@@ -24,6 +24,7 @@ from planar.model.link_shapes import LinkShape
 from planar.model.loads import COINCIDENCE_TOLERANCE, Load, Spring
 from planar.model.mechanism import Mechanism, relative_motions
 from planar.model.pairs import Pair
+from planar.model.pairs.base import EffortAction
 from planar.results.kinematic_result import KinematicResult
 
 
@@ -226,12 +227,20 @@ def actions_of_load(field: LinkMotion, load: Load, factor: Scalar) -> Iterator[L
 
 def effort_actions(field: LinkMotion, kind: str, pair: str, effort: Scalar) -> Iterator[LinkAction]:
     """What drives a pair, on the one link and on the other."""
-    way = field.relative_motions[pair].effort_action(field.frames, field.shapes)
-    for link, sense in ((way.link, 1.0), (way.reaction_link, -1.0)):
-        if way.point is not None and way.direction is not None:
-            yield LinkAction(kind, pair, link, way.point, way.direction * (sense * effort), 0.0)
+    unit_action = field.relative_motions[pair].effort_action(field.frames, field.shapes)
+    return two_sided_actions(field, kind, pair, unit_action, effort)
+
+
+def two_sided_actions(
+    field: LinkMotion, kind: str, name: str, unit_action: EffortAction, size: Scalar
+) -> Iterator[LinkAction]:
+    """A force or couple of this size on a link, and its opposite on another."""
+    for link, sense in ((unit_action.link, 1.0), (unit_action.reaction_link, -1.0)):
+        if unit_action.point is not None and unit_action.direction is not None:
+            force = unit_action.direction * (sense * size)
+            yield LinkAction(kind, name, link, unit_action.point, force, 0.0)
         else:
-            yield LinkAction(kind, pair, link, field.place(link, Vector(0.0, 0.0)), NO_FORCE, sense * effort)
+            yield LinkAction(kind, name, link, field.place(link, Vector(0.0, 0.0)), NO_FORCE, sense * size)
 
 
 def action_on_link(field: LinkMotion, action: LinkAction) -> tuple[Scalar, Scalar, Scalar]:

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
 from planar.equations.coordinates import FRAME_PARTS, consecutive_ranges
+from planar.equations.element_placement import ElementPlacement
 from planar.foundation.arrays import Array
 from planar.foundation.jets import value_and_rates
 from planar.model.loads import Spring
 from planar.model.mechanism import Mechanism
+from planar.model.pairs import Pair
 from planar.results.kinematic_result import KinematicResult
 
 
@@ -27,6 +29,14 @@ class LinkCoordinates:
         self.own_slices = {name: slice(columns.start, columns.stop) for name, columns in own_columns.items()}
         "of every pair: its own coordinates"
         self.coordinate_count = self.link_coordinate_count + sum(own_counts.values())
+
+    def element_placement(self, pairs: Iterable[Pair]) -> ElementPlacement:
+        """Finds the elements of pairs in q, whose numbers follow one another in this order."""
+        return ElementPlacement(
+            {link: range(first, first + len(FRAME_PARTS)) for link, first in self.link_columns.items()},
+            {name: range(own.start, own.stop) for name, own in self.own_slices.items()},
+            consecutive_ranges({pair.name: len(pair.number_kinds) for pair in pairs}),
+        )
 
     def initial_spring_turns(self, q: Array, springs: Sequence[Spring]) -> Array:
         """The full turns (rad) between links whose torsional springs do not count turns (springs, ...).

@@ -17,7 +17,6 @@ from planar.dynamics.external_actions import (
     passive_actions,
 )
 from planar.dynamics.link_coordinates import LinkCoordinates
-from planar.equations.coordinates import consecutive_ranges
 from planar.equations.element_groups import ElementGroup, group_elements
 from planar.equations.element_placement import ElementPlacement
 from planar.equations.elements import Element, PlacedElement
@@ -68,13 +67,7 @@ class BalanceEquations(LinkCoordinates):
             first = self.row_count
             self.row_count += len(pair.residual_kinds) - len(pair.coordinate_kinds)
             self.pair_rows[pair.name] = slice(first, self.row_count)
-        self._place_pairs(
-            ElementPlacement(
-                {link: range(first, first + 3) for link, first in self.link_columns.items()},
-                {name: range(own.start, own.stop) for name, own in self.own_slices.items()},
-                consecutive_ranges({pair.name: len(pair.number_kinds) for pair in mechanism.pairs}),
-            )
-        )
+        self._place_pairs(self.element_placement(mechanism.pairs))
 
     def _place_pairs(self, placement: ElementPlacement) -> None:
         """Group the pairs by their elements, and lay out the entries of the constraints, row after row."""

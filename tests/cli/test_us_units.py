@@ -74,6 +74,7 @@ AS_BUILT = {
     "forces press --at O=230deg": "motor-press",
     "forces press --solve-for loads.0 --effort 90lbf*ft --at O=230deg": "motor-press",
     "forces clamp": "toggle-clamp",
+    "forces clamp --cycle --steps 12": "toggle-clamp",
     "forces clamp --effort -40lbf*ft": "toggle-clamp",
     "forces jack": "screw-jack",
     "forces truck --at stroke=700mm": "tipper",

@@ -210,7 +210,6 @@ WAYS: dict[str, tuple[dict[str, Any], Outcome, str, dict[str, str]]] = {
 
 
 FEW_COMMANDS = {
-    "a coupler too long": ("inspect", "solve", "scheme", "modes", "cycle", "circuits", "simulate", "view"),
     "bars in a line that only just close": ("scheme", "cycle", "circuits", "simulate", "view", "animate"),
     "a four-bar whose bars in a line only just close": ("cycle",),
     "a dead point at the start": ("solve", "scheme", "modes", "cycle", "simulate", "parts"),

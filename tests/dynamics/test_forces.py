@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 
 import planar
 from planar.analysis.motion.mechanical_advantage import advantage, advantages
+from planar.dynamics import virtual_work
 from planar.dynamics.virtual_velocities import has_length_motion, unit_rate_state
 from planar.dynamics.virtual_work import BalanceEquations
 from planar.foundation.errors import BadInput, NoAnswer, Outcome, Unknown
@@ -701,6 +702,7 @@ def test_the_program_ends_with_no_answer_on_a_dead_point(tmp_path):
 
 def test_the_equations_are_set_up_once_wherever_inputs_stand_and_however_fast_they_run(monkeypatch):
     """Setting them up takes ten times as long as a position; also loads that vary are none of their business."""
+    virtual_work._cached_balance_equations.cache_clear()  # other tests may have set them up before
     made = []
     kept = BalanceEquations.__init__
     monkeypatch.setattr(BalanceEquations, "__init__", lambda self, work: (made.append(work), kept(self, work))[1])

@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from planar.analysis.sensitivity.transmission_slopes import TransmissionSlopes, transmission_slopes
-from planar.derivatives.kinematic_slopes import POSITION_KINDS
-from planar.derivatives.result_slopes import SlopeSystem
+from planar.derivatives.result_slopes import SlopeSystem, second_derivatives
 from planar.document.dimensions import file_dimensions
 from planar.document.first_argument import takes_result
 from planar.dynamics.forces import Forces
@@ -126,8 +125,7 @@ class Sensitivity:
         Loads that follow an input count as straight there. NaN as the first ones.
         """
         getattr(self, result)  # refuses what there is not
-        has_rates = isinstance(self.result, Forces) or self.kinds[result] not in POSITION_KINDS
-        whole = SlopeSystem(self.result, has_rates=has_rates).second_slopes(self.of, result)
+        whole = second_derivatives(self.result, self.of, result, self.kinds[result])
         is_motion = isinstance(self.moving, Motion)
         whole[list(self.singular_rows)] = np.nan
         names = list(self.slopes[result])

@@ -15,8 +15,7 @@ from planar.analysis.tolerance.guaranteed_limits import guaranteed_dead_points, 
 from planar.analysis.tolerance.sampled import Draw, Sampled, sample_deviations, summarise
 from planar.analysis.tolerance.spread import SIGMAS, LinearSpread, NormalSpread
 from planar.analysis.tolerance.variations import PinOffset, Variations, find_variations, leave_out_tied
-from planar.derivatives.kinematic_slopes import POSITION_KINDS
-from planar.derivatives.result_slopes import SlopeSystem
+from planar.derivatives.result_slopes import SlopeSystem, second_derivatives
 from planar.document.first_argument import takes_result
 from planar.dynamics.forces import Forces
 from planar.foundation.arrays import Array
@@ -154,9 +153,7 @@ class ToleranceBand:
         offsets = tuple(each.pair for each in self.variations.offsets)
         numbers = [variation.number for variation in self.variations.numbers]
         numbers += [f"clearance.{pair}.{axis}" for pair in offsets for axis in "xy"]
-        has_rates = isinstance(self.source, Forces) or self.kind not in POSITION_KINDS
-        system = SlopeSystem(self.source, offsets, has_rates=has_rates, numbers=numbers)
-        whole = system.second_slopes(self.of, self.result)
+        whole = second_derivatives(self.source, self.of, self.result, self.kind, offsets, numbers)
         half = 0.5 * (self.linear.upper - self.linear.lower) / self.linear.sigmas
         many = len(whole)
         deviations = np.concatenate(
