@@ -47,7 +47,7 @@ from planar.model.pairs.rubbing import ContactLoad, LoadLaw
 from planar.results.motion import Motion, State
 
 FIXED_FRICTION_STEPS, MAX_FRICTION_STEPS = 2, 7
-"""With contacts as the solution tells them, and in all."""
+"""With contacts as the solution has them, and in all."""
 SETTLED = 1e-7
 """Of the greatest force: what is further from the solution is another."""
 TIE = 1e-9
@@ -148,7 +148,7 @@ class BalanceAtPositions:
         return total
 
     def _tooth_actions(self, name: str, apart: bool) -> Iterator[LinkAction]:
-        """Teeth drive, and push each other apart, whichever way they press."""
+        """Teeth drive, and push each other apart, in whichever sense they press."""
         contact, (first, second) = self.contacts[name], self.pairs[name].links
         press = take_entries(self.y, self.of.elements.pair_rows[name].start)
         force = contact.drive_direction * press
@@ -270,8 +270,8 @@ class BalanceAtPositions:
     # results
 
     def results(self, name: str, input_rates: Sequence[Scalar]) -> list[NamedResult]:
-        """What forces tell of a name: the effort of an input with its power, the force and couple of a pair, friction;
-        `input_rates` are the velocities of the inputs."""
+        """The results of forces of a name: the effort of an input with its power, the force and couple of a pair,
+        friction; `input_rates` are the velocities of the inputs."""
         results = []
         motions = self.motion.relative_motions
         slides = name in motions and motions[name].input_kind is MeasureKind.LENGTH
@@ -292,7 +292,7 @@ class BalanceAtPositions:
         return results
 
     def _reaction(self, name: str) -> tuple[Scalar, Scalar, Scalar]:
-        """The force (x, y) of a pair on its second link, and its couple about where the force is told."""
+        """The force (x, y) of a pair on its second link, and its couple about the point of that force."""
         pair, forces = self.pairs[name], self.pair_forces(name)
         wrenches: dict[str, tuple[Scalar, Scalar, Scalar]] = {}
         for link, (x, y, moment) in forces.items():
@@ -384,7 +384,7 @@ class ForceSlopes:
         return _close_balance(slopes, invert_matrices(slopes)[0], opening)[..., 0]
 
     def _solve_with_friction(self, forces: Forces, rows_of_all: slice, contacts: list[_Contact]) -> Array:
-        """The forces with friction, by Newton's method from what the solution tells, on its side of all kinks."""
+        """The forces with friction, by Newton's method from the friction of the solution, on its side of all kinks."""
         count, own = len(self.factors), self.first_friction
         names = list(dict.fromkeys(contact.pair.name for contact in contacts))
         senses = self._column_per_pair([forces.friction[name].sense for name in names], rows_of_all)

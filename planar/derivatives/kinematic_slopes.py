@@ -345,7 +345,7 @@ LINK_RESULTS = ("angle", "angular_velocity", "angular_acceleration")
 
 
 def kinematic_results(motion: CoordinateMotion, points: Mapping[str, tuple[str, str]], name: str) -> list[NamedResult]:
-    """What a state tells of a name: of a point, else of a link, and of a pair; `points` are (link, point) by name.
+    """The results of a state of a name: of a point, else of a link, and of a pair; `points` are (link, point) by name.
 
     Without rates only what follows from positions.
     """

@@ -126,7 +126,7 @@ class LimitSystem:
             return None
         results = ca.vertcat(self.u, value)
         jacobians = [ca.jacobian(of, by) for of in (equations, results) for by in (x, self.parameters)]
-        linear = ca.Function("linear", given, [ca.densify(each) for each in (*jacobians, value)])
+        linear = ca.Function("linear", given, [ca.densify(output) for output in (*jacobians, value)])
         by_x, by_parameters, result_by_x, result_by_parameters, at = (
             part.full() for part in linear(here, numbers, kept)
         )

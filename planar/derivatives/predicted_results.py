@@ -41,7 +41,7 @@ class PredictedValues(NamedTuple):
 
 
 def position_results(moving: KinematicResult, name: str) -> dict[str, NamedResult]:
-    """What is told of the position of a point, link or pair, or of "B to E" (two points), by the results' names.
+    """The results of the position of a point, link or pair, or of "B to E" (two points), by the results' names.
 
     Raises Unknown.
     """

@@ -71,7 +71,7 @@ class PositionSlopes:
             self.is_singular = self.is_singular | self.is_unknown
 
     def results(self, name: str, order: int) -> list[NamedResult]:
-        """What is told of a name, as jets of an order. Raises Unknown."""
+        """The results of a name, as jets of an order. Raises Unknown."""
         system, kinematics = self.system, self.kinematics
         motion = kinematics.motion if order == 1 else kinematics.second_motion
         results = kinematic_results(motion, system.moving._point_members, name)
@@ -150,12 +150,12 @@ class SlopeSystem:
             is_tied: BoolArray = np.asarray(part.kinematics.tied.any(axis=0))
             tied.update(name for name, binds in zip(self.names, is_tied, strict=False) if binds)
             shape = part.count, self.directions.count
-            # of a point and a pair of one name the pair's result of a name is told
+            # where a point and a pair have one name, and a result too, it is the pair's
             for result in {result.name: result for result in results_of(part)}.values():
                 kinds[result.name] = result.kind
                 values.setdefault(result.name, []).append(stack_results(result.parts, 0, shape[:1]))
                 slopes.setdefault(result.name, []).append(stack_results(result.parts, 1, shape))
-        # results side by side, so that what a kink of a load's course does not change is told by the others' size
+        # results side by side, so that rounding at a kink of a load's course is judged beside all of them
         ends = np.cumsum([arrays[0].shape[1] for arrays in slopes.values()])[:-1]
         joined = self._with_factors(np.concatenate([np.concatenate(arrays) for arrays in slopes.values()], axis=1))
         is_singular = np.concatenate(singular_rows)
@@ -173,8 +173,7 @@ class SlopeSystem:
         )
 
     def named_slopes(self, name: str) -> DerivedResults:
-        """The values and derivatives of all that the result tells of a name; none in numbers that cannot change
-        alone."""
+        """The values and derivatives of all results of a name; none in numbers that cannot change alone."""
         derived = self.derive(lambda part: part.results(name, 1))
         bound = {*tied_dimensions(self.moving.mechanism), *derived.tied}
         is_free = np.array([parameter not in bound for parameter in self.names])

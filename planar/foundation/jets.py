@@ -246,7 +246,7 @@ def term_sizes(value: Jet) -> TermSizes:
 
 
 def constant_jet(value: Scalar, part_count: int) -> Scalar:
-    """A number that may itself be a jet, of other derivatives, as a jet of so many parts that does not change."""
+    """A number that may itself be a jet, of other derivatives, as a jet of `part_count` parts that does not change."""
     return Jet(value, *([0.0] * (part_count - 1))) if isinstance(value, Jet) else value
 
 

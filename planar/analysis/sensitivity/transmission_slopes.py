@@ -23,7 +23,7 @@ from planar.model.pairs import Pair
 from planar.results.motion import Motion, State
 
 FOLD = 1e-9
-"""rad: so near to a right angle it is one, beyond which it is told as falling again: there it has no derivative."""
+"""rad: nearer to a right angle, from which the reported angle falls to both sides, it has no derivative."""
 
 
 class TransmissionSlopes(NamedTuple):
@@ -68,8 +68,8 @@ def _angle_slopes(moving: State | Motion, of: Transmission, pair: Pair, angle: A
         assert part.forces is not None
         balance = part.forces.balance(1)
         forces = [Vector(*balance.pair_forces(name)[of.link][:2]) for name in of.through]
-        found = output_angle(balance.motion, (of.link, pair), of.through, forces)
-        return [NamedResult("angle", "angle", (found,))]
+        derived_angle = output_angle(balance.motion, (of.link, pair), of.through, forces)
+        return [NamedResult("angle", "angle", (derived_angle,))]
 
     slopes = system.derive(output_result).slopes["angle"][:, 0]
     is_known = (np.abs(angle - 0.5 * np.pi) > FOLD) & (angle > FOLD)

@@ -76,7 +76,7 @@ class GeneralGradients:
         motion, solved = found.motion, slice(found.many)
         coordinates = constraint_elements(mechanism).coordinates(motion)[: 3 if self.rates else 1]
         numbers = [value_at(mechanism, dimension.address) for dimension in self.parameters.dimensions]
-        kinematics = KinematicSlopes(self.parameters, [each[solved] for each in coordinates], values=numbers)
+        kinematics = KinematicSlopes(self.parameters, [rates[solved] for rates in coordinates], values=numbers)
         w = np.hstack(weights.arrays)[solved]
         rows = self._rows(kinematics.motion)
         shape = len(w), len(self.names)

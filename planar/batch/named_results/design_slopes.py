@@ -47,7 +47,7 @@ class DesignSlopes:
             if each not in names:
                 hint = suggest_name(each, names, "numbers")
                 raise BadInput("derivatives", f"nothing is derived in {each!r:.60}{hint}")
-        self.directions = Directions(self.parameters, [names.index(each) for each in results.derivatives])
+        self.directions = Directions(self.parameters, [names.index(number) for number in results.derivatives])
 
     @cached_property
     def is_bound(self) -> BoolArray:
@@ -89,14 +89,14 @@ class DesignSlopes:
 
         NaN where positions are not there or are singular, and in numbers that cannot change alone.
         """
-        found = {
+        derivatives = {
             ("derivatives", derivative_name(what, number)): np.full((size, *frames.design_shape), np.nan)
             for what, size in self._quantities()
             for number in self.results.derivatives
         }
         elements = constraint_elements(self.reference.mechanism)
         for positions in position_chunks(self.reference.mechanism, frames, values, is_solved):
-            numbers = [value_at(positions.mechanism, each.address) for each in self.parameters.dimensions]
+            numbers = [value_at(positions.mechanism, number.address) for number in self.parameters.dimensions]
             coordinates = elements.coordinates(positions)[: self.orders]
             kinematics = KinematicSlopes(self.parameters, coordinates, self.directions, numbers)
             is_unknown = kinematics.tied | self.is_bound | kinematics.is_singular[:, None]
@@ -105,8 +105,8 @@ class DesignSlopes:
                 for axis, part in enumerate(parts):
                     slopes = np.where(is_unknown, np.nan, result_array(part, 1, is_unknown.shape))
                     for number, column in zip(self.results.derivatives, slopes.T, strict=True):
-                        found["derivatives", derivative_name(what, number)][axis][places] = column
-        return found
+                        derivatives["derivatives", derivative_name(what, number)][axis][places] = column
+        return derivatives
 
     def _quantities(self) -> Iterator[tuple[str, int]]:
         """What is derived, as `position of E`, and how many parts it has."""

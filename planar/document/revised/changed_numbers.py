@@ -50,7 +50,7 @@ def with_values(mechanism: Mechanism, values: Mapping[str, Any], units: FileUnit
     chosen = {name: find_dimension(known, name) for name in values}
     changed = change_dimensions(
         mechanism,
-        ((each, _read_value(name, values[name], each.kind, units)) for name, each in chosen.items()),
+        ((number, _read_value(name, values[name], number.kind, units)) for name, number in chosen.items()),
     )
     for index, given in enumerate(changed.inputs):
         if given.law and any(

@@ -92,7 +92,9 @@ class DimensionNumbers:
     def __init__(self, mechanism: Mechanism, live: bool = True):
         self.dimensions = list(link_lengths(mechanism, (link.name for link in mechanism.links))) if live else []
         self.d = ca.SX.sym("d", len(self.dimensions))
-        self.mechanism = change_dimensions(mechanism, ((each, self.d[k]) for k, each in enumerate(self.dimensions)))
+        self.mechanism = change_dimensions(
+            mechanism, ((dimension, self.d[k]) for k, dimension in enumerate(self.dimensions))
+        )
         self.shapes = shapes_of_links(self.mechanism)
         self.values: list[Any] = []
 

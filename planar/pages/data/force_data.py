@@ -43,7 +43,7 @@ def force_data(
         return None
     parameters = list(action_parameters(filed))
     symbols = ca.SX.sym("f", len(parameters))
-    mechanism = change_dimensions(mechanism, ((each, symbols[k]) for k, each in enumerate(parameters)))
+    mechanism = change_dimensions(mechanism, ((parameter, symbols[k]) for k, parameter in enumerate(parameters)))
     work = LagrangianFunctions(mechanism, unit)
     rows = BalanceRows(work)
     slopes = ca.jacobian(work.residuals, work.q)

@@ -28,7 +28,7 @@ def wanted_parts(
     position_of: Callable[[str], Scalar],
     wanted: Wanted,
 ) -> list[Scalar]:
-    """The parts of what is wanted, SI, in any arithmetic: of a point x and y, of a link those of its origin and its
+    """The parts of a wanted item, SI, in any arithmetic: of a point x and y, of a link those of its origin and its
     angle, of a pair its position, which `position_of` gives by its name."""
     if isinstance(wanted, WantedPath):
         name = carried_name(mechanism, wanted.point)
@@ -48,7 +48,7 @@ def wanted_parts(
 
 
 def wanted_expression(design: DesignEquations, wanted: Wanted) -> ca.SX:
-    """The parts (parts,) of what is wanted in the unknowns and numbers of a design."""
+    """The parts (parts,) of a wanted item in the unknowns and numbers of a design."""
 
     def position_of(name: str) -> ca.SX:
         return design.in_link_coordinates(design.work.relative_positions([name])[0])
@@ -58,8 +58,8 @@ def wanted_expression(design: DesignEquations, wanted: Wanted) -> ca.SX:
 
 
 def wanted_slopes(moving: Motion, wanted: Iterable[Wanted]) -> tuple[SlopeSystem, DerivedResults]:
-    """What is wanted over a motion, by the number of each item, with its derivatives, and the system that they follow
-    from."""
+    """The results of wanted items over a motion, by the numbers of the items, with their derivatives, and their
+    system."""
     system = SlopeSystem(moving, has_rates=False)
 
     def results(part: PositionSlopes) -> list[NamedResult]:

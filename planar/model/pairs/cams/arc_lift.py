@@ -126,10 +126,10 @@ class ArcLift:
         self, angle: Scalar, numbers: Sequence[Scalar], kinds: FollowerAxes, is_flat: bool
     ) -> tuple[Scalar, ...]:
         """The lift and its first three derivatives by the cam's angle."""
-        found: Jet = self.lift(
+        lift: Jet = self.lift(
             Jet(angle, 1.0, 0.0, 0.0), [constant_jet(number, 4) for number in numbers], kinds, is_flat
         )
-        return found.parts
+        return lift.parts
 
     def lift_pieces(self, numbers: Sequence[Scalar]) -> list[LiftPiece]:
         """The pieces over a turn, from where the follower comes onto the base circle, in plain numbers."""

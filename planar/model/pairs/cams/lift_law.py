@@ -163,8 +163,8 @@ class LiftLaw:
 
     def lift_rates(self, angle: Scalar, numbers: Sequence[Scalar]) -> tuple[Scalar, ...]:
         """The lift and its first three derivatives by the cam's angle."""
-        found = self.lift(Jet(angle, 1.0, 0.0, 0.0), [constant_jet(number, 4) for number in numbers])
-        return found.parts if isinstance(found, Jet) else (found, 0.0, 0.0, 0.0)
+        lift = self.lift(Jet(angle, 1.0, 0.0, 0.0), [constant_jet(number, 4) for number in numbers])
+        return lift.parts if isinstance(lift, Jet) else (lift, 0.0, 0.0, 0.0)
 
     def find_problem(self) -> tuple[str, str] | None:
         """The place within the law that cannot be meant, such as "[1].in", and why."""

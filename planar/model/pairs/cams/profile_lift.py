@@ -148,8 +148,8 @@ class ProfileLift:
 
     def lift_rates(self, angle: Scalar, numbers: Sequence[Scalar]) -> tuple[Scalar, ...]:
         """The lift and its first three derivatives by the cam's angle."""
-        found: Jet = self.lift(Jet(angle, 1.0, 0.0, 0.0), [constant_jet(number, 4) for number in numbers])
-        return found.parts
+        lift: Jet = self.lift(Jet(angle, 1.0, 0.0, 0.0), [constant_jet(number, 4) for number in numbers])
+        return lift.parts
 
     def lift_pieces(self, rest: FollowerRest) -> list[LiftPiece]:
         """Parts of a turn, in plain numbers: they end where the contact jumps."""
