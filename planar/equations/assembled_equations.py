@@ -11,13 +11,14 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from heapq import heapify, heappop, heappush
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from planar.codegen.printed_formula import PrintedFunction
 from planar.equations.elements import Element, PlacedElement
-from planar.equations.elimination import EliminationRow
+from planar.equations.elimination import EliminationRow, substitute_solution
 from planar.equations.sparse_matrices import SparsePattern
 from planar.foundation.angles import wrap_angle
 from planar.foundation.arrays import Array, IntArray
@@ -26,6 +27,7 @@ from planar.foundation.recorded_formula import RecordedFormula, elementwise
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_matrix
+    from scipy.sparse.linalg import SuperLU
 
 MAX_DENSE_SIZE = 60
 """Unknowns and inputs up to which all entries of their derivatives are written."""
@@ -207,12 +209,16 @@ class AssembledEquations:
         self._row_count = len(rows)
         self._state_count = elimination.coordinate_count + elimination.input_count
         self._rest_count = max((placed.rows.stop for placed in elimination.elements), default=0)
-        self._coordinate_sums = self._eliminated_coordinates()[: self._coordinate_count]
+        self._line_of = dict(elimination.solved)
+        self._place_of = {column: place for place, (column, _) in enumerate(elimination.solved)}
+        self._y_place_of = {int(column): k for k, column in enumerate(self._unknowns)}
+        first_input = len(unknowns)
+        for column in range(self._coordinate_count, self._state_count):
+            self._y_place_of[column] = first_input + column - self._coordinate_count
         self._residual_sums = [self._line_sums(elimination.lines[row]) for row in rows]
         self._make_slope_entries()
         self._make_stages()
         self._last: _Evaluation | None = None
-        self._all_coordinates = _combinations(enumerate(self._coordinate_sums))
         self._all_residuals = _combinations(enumerate(self._residual_sums))
 
     @property
@@ -222,30 +228,32 @@ class AssembledEquations:
 
     # sums over x = (y, rests)
 
-    def _eliminated_coordinates(self) -> list[dict[int, float]]:
-        """Every entry of s as a sum over x."""
-        first_input = len(self._unknowns) - self._coordinate_count
-        sums: list[dict[int, float]] = [{} for _ in range(self._coordinate_count)]
-        sums += [{first_input + column: 1.0} for column in range(self._coordinate_count, self._state_count)]
-        for k, column in enumerate(self._unknowns):
-            sums[column] = {k: 1.0}
-        self._state_sums = sums
-        for column, line in self._elimination.solved:
-            factor = line.factors[column]
-            sums[column] = {source: -value / factor for source, value in self._line_sums(line, column).items()}
-        return sums
+    def _state_sums(self, column: int) -> dict[int, float]:
+        """An entry of s as a sum over x."""
+        if column in self._y_place_of:
+            return {self._y_place_of[column]: 1.0}
+        line = self._line_of[column]
+        return {source: -value / line.factors[column] for source, value in self._line_sums(line, column).items()}
 
     def _line_sums(self, line: EliminationRow, pivot: int | None = None) -> dict[int, float]:
-        """A constraint as a sum over x, a pivot left out."""
-        total: dict[int, float] = {}
-        for column, factor in line.factors.items():
-            if column != pivot:
-                for source, value in self._state_sums[column].items():
-                    total[source] = total.get(source, 0.0) + factor * value
-        for row, multiplier in line.multipliers.items():
-            source = self._y_count + row
-            total[source] = total.get(source, 0.0) + multiplier
-        return {source: value for source, value in total.items() if value != 0.0}
+        """A constraint as a sum over x, a pivot left out. What was solved for last is replaced first, so that what
+        cancels is not followed to the frame."""
+        factors = {column: factor for column, factor in line.factors.items() if column != pivot}
+        multipliers = dict(line.multipliers)
+        open_places = [-self._place_of[column] for column in factors if column in self._place_of]
+        heapify(open_places)
+        while open_places:
+            column, by = self._elimination.solved[-heappop(open_places)]
+            factor = factors.get(column)
+            if factor is None:  # it cancelled, or stood there twice
+                continue
+            for other in by.factors:
+                if other != column and other not in factors and other in self._place_of:
+                    heappush(open_places, -self._place_of[other])
+            substitute_solution(factors, multipliers, column, by)
+        sums = {self._y_place_of[column]: factor for column, factor in factors.items()}
+        sums |= {self._y_count + row: multiplier for row, multiplier in multipliers.items()}
+        return dict(sorted(sums.items()))
 
     # stages
 
@@ -276,12 +284,14 @@ class AssembledEquations:
             return row_level[row]
 
         early: dict[int, int] = {}
+        sums_of = self._early_sums = {int(column): self._state_sums(column) for column in self._y_place_of}
         for column, _ in self._elimination.solved:
             if column in needed:
-                sources = [source - y_count for source in self._coordinate_sums[column] if source >= y_count]
+                sums_of[column] = self._state_sums(column)
+                sources = [source - y_count for source in sums_of[column] if source >= y_count]
                 level[column] = early[column] = 1 + max(map(level_of_row, sources), default=-1)
         self._start_columns = [*self._unknowns.tolist(), *(column for column, value in early.items() if value == 0)]
-        self._start_coordinates = _combinations((column, self._state_sums[column]) for column in self._start_columns)
+        self._start_coordinates = _combinations((column, sums_of[column]) for column in self._start_columns)
         count = 1 + max([*map(level_of_row, range(self._rest_count)), *early.values()], default=0)
         by_stage: list[dict[Element, list[tuple[PlacedElement, int]]]] = [{} for _ in range(count)]
         for placed, first_slope in zip(self._elimination.elements, self._first_slope, strict=True):
@@ -300,7 +310,7 @@ class AssembledEquations:
             _Stage(
                 [self._group(element, places) for element, places in elements.items()],
                 _products(stage_terms),
-                _combinations((column, self._coordinate_sums[column]) for column in columns),
+                _combinations((column, sums_of[column]) for column in columns),
             )
             for elements, stage_terms, columns in zip(by_stage, terms, self._columns_after_stage, strict=True)
         ]
@@ -376,7 +386,46 @@ class AssembledEquations:
 
     def coordinates(self, z: Array, u: Array, p: Array) -> Array:
         """w (samples, coordinates) at z (samples, unknowns), u and p (numbers,) or alike."""
-        return self._sums(self._all_coordinates, self._evaluate(z, u, p, False).x, self._coordinate_count)
+        return self._coordinates(self._evaluate(z, u, p, False).x)
+
+    def _coordinates(self, x: Array) -> Array:
+        """w (samples, coordinates) from x, or the rates of one from those of the other."""
+        if x.dtype == object or self._y_count <= MAX_DENSE_SIZE:
+            return self._sums(self._all_coordinates, x, self._coordinate_count)
+        w: Array = np.zeros((len(x), self._coordinate_count), x.dtype)
+        w[:, self._unknowns] = x[:, : len(self._unknowns)]
+        solved, right_side, factored = self._factored_coordinates
+        if len(solved):
+            w[:, solved] = factored.solve(right_side @ x.T).T
+        return w
+
+    @cached_property
+    def _all_coordinates(self) -> _Combinations:
+        """x -> w."""
+        return _combinations((column, self._state_sums(column)) for column in range(self._coordinate_count))
+
+    @cached_property
+    def _factored_coordinates(self) -> tuple[IntArray, csr_matrix, SuperLU]:
+        """The coordinates that were solved for, in order; what their equations have of x on the right (coordinates, x),
+        and the factored matrix of their factors. Of many links sums over x would be long."""
+        from scipy.sparse.linalg import splu
+
+        solved = [column for column, _ in self._elimination.solved]
+        left: list[tuple[int, int, float]] = []
+        right: list[tuple[int, int, float]] = []
+        for place, (_, line) in enumerate(self._elimination.solved):
+            for column, factor in line.factors.items():
+                if column in self._place_of:
+                    left.append((place, self._place_of[column], factor))
+                else:
+                    right.append((place, self._y_place_of[column], -factor))
+            right += [(place, self._y_count + row, -multiplier) for row, multiplier in line.multipliers.items()]
+        matrices = []
+        for terms, width in ((left, len(solved)), (right, self._y_count + self._rest_count)):
+            rows, columns, values = (np.array(part) for part in zip(*terms, strict=True))
+            matrices.append(_sparse_matrix((len(solved), width), values, rows, columns))
+        factored = splu(matrices[0].tocsc(), permc_spec="NATURAL", diag_pivot_thresh=0.0)  # it is triangular
+        return np.array(solved, dtype=int), matrices[1], factored
 
     @staticmethod
     def _sums(combinations: _Combinations, x: Array, count: int) -> Array:
@@ -401,8 +450,7 @@ class AssembledEquations:
         return evaluation.jacobian_entries
 
     def derivatives(self, z: Array, u: Array, p: Array) -> list[Array | csr_matrix]:
-        """dF/dy, and below it dw/dy (rows and coordinates, y), at each sample: what is asked once of a structure, so
-        that no plan of entries is made for it."""
+        """dF/dy (rows, y) at each sample: what is asked once of a structure, so that no plan of entries is made."""
         slopes = self._evaluate(z, u, p, True).slopes
         assert slopes is not None
         return [self._derivatives_at(each) for each in slopes]
@@ -411,11 +459,10 @@ class AssembledEquations:
         y_count, states, rests = self._y_count, self._state_count, self._rest_count
         if y_count <= MAX_DENSE_SIZE:
             rates = self._rates(slopes[None], np.eye(y_count), None)[0]
-            sums = (self._all_residuals, self._row_count), (self._all_coordinates, self._coordinate_count)
-            return np.hstack([self._sums(combinations, rates, count) for combinations, count in sums]).T
+            return self._sums(self._all_residuals, rates, self._row_count).T
         of_x = states, y_count + rests
         inputs = range(self._coordinate_count, states)
-        start = _combinations((column, self._state_sums[column]) for column in (*self._start_columns, *inputs))
+        start = _combinations((column, self._early_sums[column]) for column in (*self._start_columns, *inputs))
         of_states = start.matrix(of_x)[:, :y_count]
         nowhere = np.zeros(0, dtype=int)
         of_rests = _sparse_matrix((rests, y_count), np.zeros(0), nowhere, nowhere)
@@ -423,8 +470,7 @@ class AssembledEquations:
             of_rests = of_rests + stage.rest_rates.matrix((rests, states), slopes) @ of_states
             sums = stage.coordinates.matrix(of_x)
             of_states = of_states + sums[:, :y_count] + sums[:, y_count:] @ of_rests
-        wanted = _combinations(enumerate((*self._residual_sums, *self._coordinate_sums)))
-        sums = wanted.matrix((self._row_count + self._coordinate_count, y_count + rests))
+        sums = self._all_residuals.matrix((self._row_count, y_count + rests))
         return sums[:, :y_count] + sums[:, y_count:] @ of_rests
 
     def _rates(self, slopes: Array, y_rates: Array, bending: Array | None) -> tuple[Array, Array]:
@@ -452,12 +498,12 @@ class AssembledEquations:
         evaluation = self._evaluate(y[:, :split], y[:, split:], p, True)
         values, x, slopes = evaluation.values, evaluation.x, evaluation.slopes
         assert slopes is not None
-        residuals, coordinates = [self._residuals(x)], [self._sums(self._all_coordinates, x, self._coordinate_count)]
+        residuals, coordinates = [self._residuals(x)], [self._coordinates(x)]
         bending: Array = np.zeros((samples, self._rest_count))
         for order, rates in enumerate((y1, y2), 1):
             x_rates, state_rates = self._rates(slopes, rates, bending if order == 2 else None)
             residuals.append(self._sums(self._all_residuals, x_rates, self._row_count))
-            coordinates.append(self._sums(self._all_coordinates, x_rates, self._coordinate_count))
+            coordinates.append(self._coordinates(x_rates))
             if order == 1:
                 for stage in self._stages:
                     for group in stage.groups:
@@ -487,7 +533,7 @@ class AssembledEquations:
             return entries
 
         for column in (*self._start_columns, *range(self._coordinate_count, self._state_count)):
-            add_state(column, self._state_sums[column])
+            add_state(column, self._early_sums[column])
         rest_entries: dict[int, dict[int, int]] = {}
         rest_count = 0
         steps: list[tuple[_Products, _Combinations]] = []
@@ -506,7 +552,7 @@ class AssembledEquations:
                 rest_entries[int(row)] = entries
             sums: list[tuple[int, dict[int, float]]] = []
             for column in self._columns_after_stage[number]:
-                constant, varying = self._expand(self._coordinate_sums[column], rest_entries)
+                constant, varying = self._expand(self._early_sums[column], rest_entries)
                 sources = {**constant, **varying}
                 places = add_state(column, {source: constant.get(source, 0.0) for source in sources})
                 sums += [(places[source], parts) for source, parts in varying.items()]

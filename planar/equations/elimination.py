@@ -20,6 +20,8 @@ else:
 
 CANCELLATION_TOLERANCE = 1e-12
 """A factor below this part of those that it was made of is what rounding left of zero."""
+MAX_SHORT_LOOP = 12
+"""Solutions that are put into a constraint, or rows on a way between two coordinates, up to which it is short."""
 
 
 class CoordinateSymbols(NamedTuple):
@@ -103,17 +105,22 @@ def _substitute_pivot(line: EliminationRow, pivot: int, pivot_line: EliminationR
     if pivot in line.nonlinear:
         line.nonlinear.discard(pivot)
         line.nonlinear |= (set(pivot_line.factors) | pivot_line.nonlinear) - {pivot}
-    factor = line.factors.pop(pivot, 0.0)
-    if factor == 0.0:
-        return
-    ratio = factor / pivot_line.factors[pivot]
+    if pivot in line.factors:
+        substitute_solution(line.factors, line.multipliers, pivot, pivot_line)
+        line.rest_coordinates |= pivot_line.rest_coordinates
+        line.nonlinear |= pivot_line.nonlinear
+
+
+def substitute_solution(
+    factors: dict[int, float], multipliers: dict[int, float], pivot: int, pivot_line: EliminationRow
+) -> None:
+    """Put a constraint's solution for a coordinate into a sum of coordinates and of rests of rows."""
+    ratio = factors.pop(pivot) / pivot_line.factors[pivot]
     for column, slope in pivot_line.factors.items():
         if column != pivot:
-            _add_term(line.factors, column, -ratio * slope)
+            _add_term(factors, column, -ratio * slope)
     for row, multiplier in pivot_line.multipliers.items():
-        _add_term(line.multipliers, row, -ratio * multiplier)
-    line.rest_coordinates |= pivot_line.rest_coordinates
-    line.nonlinear |= pivot_line.nonlinear
+        _add_term(multipliers, row, -ratio * multiplier)
 
 
 def _add_term(terms: dict[int, float], key: int, term: float) -> None:
@@ -124,6 +131,76 @@ def _add_term(terms: dict[int, float], key: int, term: float) -> None:
         terms.pop(key, None)
     else:
         terms[key] = total
+
+
+class EarlierRows:
+    """The rows of earlier blocks that tie two coordinates by equal factors: a way from one coordinate to another by few
+    of them shortens a constraint whose own way goes far back, up and down a tower to its foot."""
+
+    def __init__(self, solved: EliminationSteps):
+        self._solved = solved
+        self._order: dict[int, int] = {}
+        self._ties: dict[int, list[tuple[int, EliminationRow]]] = {}
+        "for every coordinate the others that a row ties to it, with the row as the pair has it"
+
+    def add(self, line: EliminationRow) -> None:
+        """A row of a block that is done, as it was before elimination."""
+        if len(line.factors) == 2:
+            (one, first), (other, second) = line.factors.items()
+            if abs(first) == abs(second):
+                self._ties.setdefault(one, []).append((other, line))
+                self._ties.setdefault(other, []).append((one, line))
+
+    def shorten(self, line: EliminationRow) -> None:
+        """Take rows of earlier blocks into a constraint between two of their coordinates if that makes it short."""
+        for place in range(len(self._order), len(self._solved)):
+            self._order[self._solved[place][0]] = place
+        ends = [column for column in line.factors if column in self._order]
+        if len(ends) != 2 or self._is_short(line):
+            return
+        way = self._way_between(*ends)
+        if way is None:
+            return
+        factors, multipliers = dict(line.factors), dict(line.multipliers)
+        column = ends[0]
+        for other, by in way:
+            substitute_solution(factors, multipliers, column, by)
+            column = other
+        if column in factors:  # it does not cancel
+            return
+        line.factors, line.multipliers = factors, multipliers
+        for _, by in way:
+            line.rest_coordinates |= by.rest_coordinates
+
+    def _is_short(self, line: EliminationRow) -> bool:
+        """Whether a constraint ends after few solutions have been put into it, the last ones first."""
+        factors, multipliers = dict(line.factors), dict(line.multipliers)
+        for _ in range(MAX_SHORT_LOOP):
+            column = max(filter(self._order.__contains__, factors), key=self._order.__getitem__, default=None)
+            if column is None:
+                return True
+            substitute_solution(factors, multipliers, *self._solved[self._order[column]])
+        return False
+
+    def _way_between(self, start: int, end: int) -> list[tuple[int, EliminationRow]] | None:
+        """The shortest way from one coordinate to another: coordinates, each with the row that leads to it."""
+        reached_by: dict[int, tuple[int, EliminationRow] | None] = {start: None}
+        front = [start]
+        for _ in range(MAX_SHORT_LOOP):
+            next_front: list[int] = []
+            for column in front:
+                for other, line in self._ties.get(column, ()):
+                    if other not in reached_by:
+                        reached_by[other] = column, line
+                        next_front.append(other)
+            front = next_front
+            if end in reached_by:
+                way = []
+                while (step := reached_by[end]) is not None:
+                    way.append((end, step[1]))
+                    end = step[0]
+                return way[::-1]
+        return None
 
 
 def back_substitute(

@@ -19,6 +19,7 @@ from planar.equations.element_placement import ElementPlacement
 from planar.equations.elements import PlacedElement
 from planar.equations.elimination import (
     CoordinateSymbols,
+    EarlierRows,
     EliminationRow,
     EliminationSteps,
     back_substitute,
@@ -267,6 +268,7 @@ def _eliminate_structure(mechanism: Mechanism, given_links: tuple[str, ...]) -> 
     remaining_rows: list[int] = []
     surplus: list[int] = []
     is_coordinate = range(len(coordinates)).__contains__
+    earlier, pair_lines = EarlierRows(solved), _elimination_rows(elements)
     groups = decompose_blocks([{*filter(is_coordinate, line.dependencies)} for line in lines], len(coordinates))
     for group in groups:
         group_rows, group_unknowns = eliminate(group.rows, group.columns, lines, solved)
@@ -274,6 +276,10 @@ def _eliminate_structure(mechanism: Mechanism, given_links: tuple[str, ...]) -> 
             surplus += [row for row in group.rows if row < len(rows) - len(driven)]
         unknowns += group_unknowns
         remaining_rows += group_rows
+        for row in group_rows:
+            earlier.shorten(lines[row])
+        for row in group.rows:
+            earlier.add(pair_lines[row])
     elimination = Elimination(
         elements,
         tuple(dependency_order(solved)),
@@ -321,7 +327,7 @@ def _assembled_equations_of(structure: _EliminatedStructure) -> ConstraintEquati
     ends = np.cumsum([unknown_count, elimination.input_count, elimination.number_count])
     z, u, p = np.split(generic_numbers(2, int(ends[-1])), ends[:2], axis=1)
     with np.errstate(all="ignore"):
-        one, other = (abs(each[:, :unknown_count]) for each in assembled.derivatives(z, u, p))
+        one, other = (abs(slopes[:, :unknown_count]) for slopes in assembled.derivatives(z, u, p))
         # what grew beyond all numbers, along a long train of wheels, is more than rounding
         sizes = one + other
         rows, columns = sizes.nonzero()
@@ -334,7 +340,15 @@ def _assembled_equations_of(structure: _EliminatedStructure) -> ConstraintEquati
     equations = ConstraintEquations(
         structure.coordinates, structure.unknowns, remaining, (), (), structure.input_kinds, make_expressions
     )
-    return _split_into_blocks(structure, equations, moved)
+
+    def coordinate_levels(level_of: Mapping[int, int]) -> tuple[int, ...]:
+        levels = {column: level_of[k] for k, column in enumerate(structure.unknowns)}
+        for column, line in elimination.solved:
+            needed = (set(line.factors) | line.rest_coordinates) - {column}
+            levels[column] = max((levels.get(other, -1) for other in needed), default=-1)
+        return tuple(levels[column] for column in range(elimination.coordinate_count))
+
+    return _split_into_blocks(structure, equations, moved, coordinate_levels)
 
 
 def _expressions_of(structure: _EliminatedStructure, misfits: Mapping[int, ca.SX]) -> ConstraintExpressions:
@@ -396,11 +410,12 @@ def expressions_of_elimination(
 
 
 def _without_idle_unknowns(expressions: ConstraintExpressions, moved: Sequence[set[int]]) -> ConstraintExpressions:
-    """F and w with no unknown in an entry that does not move it; `moved` are those that move each entry."""
+    """F and w with no unknown in an entry that does not move it; `moved` are those that move the entries of F, and
+    those of w if they were looked for."""
     z, u, p, w, F = expressions
     both, row_count = ca.vertcat(F, w), F.numel()
-    for row, unknowns in enumerate(expression_unknowns(both, z)):
-        idle = sorted(unknowns - moved[row])
+    for row, (unknowns, moving) in enumerate(zip(expression_unknowns(both, z), moved, strict=False)):
+        idle = sorted(unknowns - moving)
         if idle:
             both[row] = ca.substitute(both[row], z[idle], ca.SX.zeros(len(idle)))
     return ConstraintExpressions(z, u, p, both[row_count:], both[:row_count])
@@ -413,7 +428,12 @@ def _least_misfit_equations_of(structure: _EliminatedStructure, open_rows: Seque
     expressions = equations.expressions
     moved = _moving_unknowns(expressions)
     equations = replace(equations, make_expressions=lambda: _without_idle_unknowns(expressions, moved))
-    return _split_into_blocks(structure, equations, moved)
+
+    def coordinate_levels(level_of: Mapping[int, int]) -> tuple[int, ...]:
+        of_coordinates = moved[len(equations.rows) :]
+        return tuple(max((level_of[column] for column in unknowns), default=-1) for unknowns in of_coordinates)
+
+    return _split_into_blocks(structure, equations, moved, coordinate_levels)
 
 
 def _with_least_misfit(
@@ -455,12 +475,16 @@ def _with_least_misfit(
 
 
 def _split_into_blocks(
-    structure: _EliminatedStructure, equations: ConstraintEquations, moved: Sequence[set[int]]
+    structure: _EliminatedStructure,
+    equations: ConstraintEquations,
+    moved: Sequence[set[int]],
+    coordinate_levels: Callable[[Mapping[int, int]], tuple[int, ...]],
 ) -> ConstraintEquations:
     """The shortened equations split once more, in the order in which they are solved.
 
     Only now does it show where constraints hold each other twice: angles that a ring of slides closes by itself
-    have dropped out, and what was matched with them is free. `moved` are the unknowns that move every entry of F and w.
+    have dropped out, and what was matched with them is free. `moved` are the unknowns that move every entry of F;
+    `coordinate_levels` gives from the block of every unknown that after which every coordinate is known, -1 for none.
     """
     mechanism = structure.mechanism
     groups = [
@@ -469,7 +493,7 @@ def _split_into_blocks(
         if group.rows or group.columns
     ]
     level_of = {column: level for level, group in enumerate(groups) for column in group.columns}
-    known_from = tuple(max((level_of[column] for column in held), default=-1) for held in moved[len(equations.rows) :])
+    known_from = coordinate_levels(level_of)
     stages, first_unknown, first_row = [], 0, 0
     level_of_link: dict[str, int] = {}
     for coordinate, level in zip(equations.coordinates, known_from, strict=True):
