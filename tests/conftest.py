@@ -11,7 +11,8 @@ from tempfile import TemporaryDirectory
 
 import pytest
 
-from tests.draws import EXHAUSTIVE_OPTION, EXHAUSTIVE_VARIABLE, load_profile
+from tests.draws import EXHAUSTIVE_OPTION, EXHAUSTIVE_VARIABLE, is_exhaustive, load_profile
+from tests.repeated_cases import without_repeated
 
 for _limit in ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS"):
     os.environ.setdefault(_limit, "1")  # matrices are small, and on a busy machine threads wait for one another
@@ -30,6 +31,17 @@ load_profile()
 def pytest_addoption(parser):
     """The option for all cases of tests of which a plain run takes some."""
     parser.addoption(EXHAUSTIVE_OPTION, action="store_true", help="run every case, not only one of each kind")
+    parser.addoption("--repeated", action="store_true", help="run the cases of tests/repeated_cases.json as well")
+
+
+def pytest_collection_modifyitems(config, items):
+    """Leave out the cases that repeat what others show, but those that are asked for by name."""
+    asked = [argument for argument in config.args if "::" in argument]
+    if is_exhaustive() or config.getoption("--repeated") or asked:
+        return
+    kept = without_repeated([item.nodeid for item in items])
+    config.hook.pytest_deselected(items=[item for item in items if item.nodeid not in kept])
+    items[:] = [item for item in items if item.nodeid in kept]
 
 
 def pytest_configure(config):

@@ -496,13 +496,11 @@ def _split_into_blocks(
     known_from = coordinate_levels(level_of)
     stages, first_unknown, first_row = [], 0, 0
     level_of_link: dict[str, int] = {}
+    placed_at: dict[int, dict[str, None]] = {}
     for coordinate, level in zip(equations.coordinates, known_from, strict=True):
         if coordinate.of_link:
             level_of_link[coordinate.owner] = max(level, level_of_link.get(coordinate.owner, -1))
-    placed_at: dict[int, dict[str, None]] = {}
-    for c, known in zip(equations.coordinates, known_from, strict=True):
-        if c.of_link:
-            placed_at.setdefault(known, {})[c.owner] = None
+            placed_at.setdefault(level, {})[coordinate.owner] = None
     joined_at: dict[int, list[str]] = {}
     for pair in mechanism.pairs:
         joined_at.setdefault(max(level_of_link.get(link, -1) for link in pair.bodies), []).append(pair.name)
