@@ -505,18 +505,11 @@ def _split_into_blocks(
     for pair in mechanism.pairs:
         joined_at.setdefault(max(level_of_link.get(link, -1) for link in pair.bodies), []).append(pair.name)
     for level, group in enumerate(groups):
-        placed, joined = placed_at.get(level, {}), joined_at.get(level, [])
-        stages.append(
-            Block(
-                slice(first_unknown, first_unknown + len(group.columns)),
-                slice(first_row, first_row + len(group.rows)),
-                tuple(placed),
-                tuple(joined),
-                group.is_free,
-                level,
-            )
-        )
-        first_unknown, first_row = stages[-1].unknowns.stop, stages[-1].rows.stop
+        unknowns = slice(first_unknown, first_unknown + len(group.columns))
+        rows = slice(first_row, first_row + len(group.rows))
+        links, pairs = tuple(placed_at.get(level, ())), tuple(joined_at.get(level, ()))
+        stages.append(Block(unknowns, rows, links, pairs, group.is_free, level))
+        first_unknown, first_row = unknowns.stop, rows.stop
     columns = [column for group in groups for column in group.columns]
     order = [row for group in groups for row in group.rows]
 

@@ -227,7 +227,7 @@ class BlockAssemblies:
         links = {*stage.links, *(link for pair in pairs.values() for link in pair.bodies)}
         links |= {link for _, link, _ in sketched.values()}
         w = self.functions.coordinates_ahead(stage.block_index + 1, whole, self.u, self.p)
-        frames, own = frames_from_coordinates(memoryview(w), self.column, links, pairs)  # floats, few of many
+        frames, own = frames_from_coordinates(w.data, self.column, links, pairs)  # floats, few of many
         gaps = [
             frames[link].to_world(self.local[link][point]) - self.sketch[name]
             for name, (_, link, point) in sketched.items()
