@@ -136,7 +136,8 @@ def fast_run(setup: FastSolver, z: Array, u: Array, u1: Array, u2: Array) -> Fas
         samples, judged = _run_along(functions, z, u, way.axis, scales)
         w, w1, w2 = judged.coordinate_rates.transpose(1, 0, 2)
         first, second = along
-        coordinate_rates = np.stack([w, w1 * first, w2 * first * first + w1 * second], axis=1)
+        with np.errstate(all="ignore"):  # at a dead point rates are no numbers
+            coordinate_rates = np.stack([w, w1 * first, w2 * first * first + w1 * second], axis=1)
         ends = _ends_along(functions, judged, way.gone)
     else:
         samples, judged = functions.run(z, InputSamples(u, u1, u2), scales)
