@@ -8,7 +8,7 @@ from io import BytesIO
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from planar.drawing.labels.fonts import have_truetype_outlines, outlines_only, printable_text, quiet_font_logs
-from planar.drawing.labels.placement import MAX_FAR_LABELS, PlacedLabel, count_labels, place_labels
+from planar.drawing.labels.placement import PlacedLabel, count_labels, place_labels
 from planar.drawing.labels.text_metrics import text_size, wrap_text
 from planar.drawing.output.matplotlib_marks import draw_labels, draw_mark, frame_window
 from planar.drawing.paper.pens import MM_PER_POINT, require_matplotlib
@@ -233,7 +233,7 @@ def lay_out_picture(picture: Picture, caption_width: float = MIN_CAPTION_WIDTH) 
     labels = [mark for mark in picture.marks if isinstance(mark, Label)]
     letters = place_labels(labels, picture.marks)
     notes = list(picture.notes)
-    left_out = count_labels(labels) - len(letters) if len(labels) > MAX_FAR_LABELS else 0
+    left_out = count_labels(labels) - len(letters)
     if left_out:
         letters_text = f"{count_phrase(left_out, 'letter')} of {len(letters) + left_out}"
         notes.append(f"{letters_text} left out: there is no room for them at this scale")
