@@ -21,7 +21,7 @@ else:
 CANCELLATION_TOLERANCE = 1e-12
 """A factor below this part of those that it was made of is what rounding left of zero."""
 MAX_SHORT_LOOP = 12
-"""Solutions that are put into a constraint, or rows on a way between two coordinates, up to which it is short."""
+"""Solutions that are put into a constraint, or rows on a path between two coordinates, up to which it is short."""
 
 
 class CoordinateSymbols(NamedTuple):
@@ -134,8 +134,11 @@ def _add_term(terms: dict[int, float], key: int, term: float) -> None:
 
 
 class EarlierRows:
-    """The rows of earlier blocks that tie two coordinates by equal factors: a way from one coordinate to another by few
-    of them shortens a constraint whose own way goes far back, up and down a tower to its foot."""
+    """The rows of earlier blocks that tie two coordinates by equal factors.
+
+    In a tower of loops a constraint between two links of a stage leads, solution by solution, down to the frame and up
+    again. A path from one coordinate to the other by few rows of the stages below shortens it.
+    """
 
     def __init__(self, solved: EliminationSteps):
         self._solved = solved
@@ -158,18 +161,18 @@ class EarlierRows:
         ends = [column for column in line.factors if column in self._order]
         if len(ends) != 2 or self._is_short(line):
             return
-        way = self._way_between(*ends)
-        if way is None:
+        path = self._path_between(*ends)
+        if path is None:
             return
         factors, multipliers = dict(line.factors), dict(line.multipliers)
         column = ends[0]
-        for other, by in way:
+        for other, by in path:
             substitute_solution(factors, multipliers, column, by)
             column = other
         if column in factors:  # it does not cancel
             return
         line.factors, line.multipliers = factors, multipliers
-        for _, by in way:
+        for _, by in path:
             line.rest_coordinates |= by.rest_coordinates
 
     def _is_short(self, line: EliminationRow) -> bool:
@@ -182,8 +185,8 @@ class EarlierRows:
             substitute_solution(factors, multipliers, *self._solved[self._order[column]])
         return False
 
-    def _way_between(self, start: int, end: int) -> list[tuple[int, EliminationRow]] | None:
-        """The shortest way from one coordinate to another: coordinates, each with the row that leads to it."""
+    def _path_between(self, start: int, end: int) -> list[tuple[int, EliminationRow]] | None:
+        """The shortest path from one coordinate to another: coordinates with the rows that lead to them."""
         reached_by: dict[int, tuple[int, EliminationRow] | None] = {start: None}
         front = [start]
         for _ in range(MAX_SHORT_LOOP):
@@ -195,11 +198,11 @@ class EarlierRows:
                         next_front.append(other)
             front = next_front
             if end in reached_by:
-                way = []
+                path = []
                 while (step := reached_by[end]) is not None:
-                    way.append((end, step[1]))
+                    path.append((end, step[1]))
                     end = step[0]
-                return way[::-1]
+                return path[::-1]
         return None
 
 

@@ -279,7 +279,8 @@ def _eliminate_structure(mechanism: Mechanism, given_links: tuple[str, ...]) -> 
         for row in group_rows:
             earlier.shorten(lines[row])
         for row in group.rows:
-            earlier.add(pair_lines[row])
+            if rows[row].kind is not MeasureKind.ANGLE:  # these close modulo a turn
+                earlier.add(pair_lines[row])
     elimination = Elimination(
         elements,
         tuple(dependency_order(solved)),
