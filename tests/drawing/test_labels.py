@@ -10,10 +10,17 @@ from hypothesis import strategies as st
 
 from planar.drawing.labels import placement
 from planar.drawing.labels.fonts import UNKNOWN_CHARACTER, font_properties, printable_text
-from planar.drawing.labels.placement import LEADER_DISTANCE, MAX_FAR_LABELS, PlacedLabel, count_labels, place_labels
+from planar.drawing.labels.placement import (
+    LEADER_DISTANCE,
+    MAX_FAR_LABELS,
+    SAME_POINT_TOLERANCE,
+    PlacedLabel,
+    count_labels,
+    place_labels,
+)
 from planar.drawing.labels.text_metrics import text_size, wrap_text
 from planar.drawing.output.matplotlib_figure import lay_out_picture
-from planar.drawing.paper.boxes import Box
+from planar.drawing.paper.boxes import Box, nearby_points
 from planar.drawing.paper.pens import MM_PER_POINT
 from planar.drawing.paper.picture import Arrow, Circle, Label, Pen, Picture, Polyline
 from planar.foundation.errors import MissingGlyphs
@@ -274,3 +281,25 @@ def test_of_very_many_letters_those_without_room_near_their_spots_are_left_out(m
     picture = Picture((*marks, *crowded), "row", ())
     note, _ = lay_out_picture(picture).text_lines[1]
     assert note.startswith(f"{len(crowded) - len(letters)} letters of {len(crowded)} left out")
+
+
+def test_points_near_each_other_are_those_of_all_pairs():
+    rng = np.random.default_rng(3)
+    points, reach = rng.uniform(0.0, 10.0, (60, 2)), rng.uniform(0.1, 0.8, 60)
+    expected = [
+        [one, other]
+        for one in range(60)
+        for other in range(one + 1, 60)
+        if hypot(*(points[one] - points[other])) < reach[one] + reach[other]
+    ]
+    assert len(expected) > 10
+    assert nearby_points(points, reach).tolist() == expected
+    assert nearby_points(points[:0], 1.0).tolist() == []
+
+
+def test_letters_of_one_spot_are_joined_wherever_their_cells_end():
+    """Spots a little apart may lie in two cells of those that are compared."""
+    at = (3.0 * SAME_POINT_TOLERANCE, 1.0)
+    close, far = (at[0] - 0.4 * SAME_POINT_TOLERANCE, 1.0), (at[0] + 2.0 * SAME_POINT_TOLERANCE, 1.0)
+    letters = place_labels([Label("A", at), Label("B", close), Label("C", far)], [])
+    assert sorted(each.label.text for each in letters) == ["A, B", "C"]

@@ -8,7 +8,8 @@ beside where the others are now, until no one would move; one that finds no room
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from math import hypot
+from itertools import product
+from math import ceil, floor, hypot
 from typing import NamedTuple
 
 import numpy as np
@@ -41,6 +42,10 @@ READ_ON_DISTANCE, READ_ON_COST = 10.0, 4.0
 """mm within which a figure that follows words in their line is read as theirs, and what that costs."""
 ACCEPTABLE_COST = 12.0
 """What the place of a letter costs at the most where nothing is wrong with it."""
+FREEDOM_COST = 6.0
+"""What places may cost beyond the cheapest one to count as room that a letter has."""
+STROKES_AT_ONCE = 64
+"""Strokes that are looked at together among many letters."""
 MAX_FAR_LABELS = 200
 """Of more labels only places near by are looked at, without leaders, and labels that have no room there are left out:
 leaders of so many cross everything."""
@@ -109,12 +114,17 @@ def _name_same_point(one: Label, other: Label) -> bool:
 def _group_labels(letters: list[Label]) -> list[list[Label]]:
     """Letters by spot and manner, in the order given."""
     groups: list[list[Label]] = []
+    groups_in_cell: dict[tuple[int, int], list[int]] = {}
     for letter in letters:
-        found = next((each for each in groups if _name_same_point(each[0], letter)), None)
+        x, y = (floor(at / SAME_POINT_TOLERANCE) for at in letter.at)
+        beside = product((x - 1, x, x + 1), (y - 1, y, y + 1))
+        near = sorted(group for cell in beside for group in groups_in_cell.get(cell, ()))
+        found = next((group for group in near if _name_same_point(groups[group][0], letter)), None)
         if found is None:
+            groups_in_cell.setdefault((x, y), []).append(len(groups))
             groups.append([letter])
         else:
-            found.append(letter)
+            groups[found].append(letter)
     return groups
 
 
@@ -196,10 +206,14 @@ class _LabelPlacer:
         led = far > _leaderless_distance(letter)
         leaders = np.concatenate([spot + far[:, None] * ways, np.broadcast_to(spot, ways.shape)], axis=1)
         leaders[~led] = np.nan
-        near = self._nearby_strokes(boxes)
+        region = np.concatenate([boxes[:, :2].min(axis=0), boxes[:, 2:].max(axis=0)])
+        near = self.strokes.select(nearby_pairs(region[None], self.bounds, 1.5)[1])
         costs = 1.2 * np.minimum(far - letter.clearance, LEADER_DISTANCE) + np.where(led, 6.0 + 0.5 * far, 0.0)
         costs += self._direction_costs(letter, ways) + 0.5 * self._offset_from_middle(middles, half, ways)
-        costs += self._stroke_costs(boxes, near) + self._other_point_costs(index, boxes, far, led)
+        if self.is_crowded:  # what costs too much stands nowhere
+            clear = self._clear_of_strokes(boxes, near, costs)
+            boxes, leaders, far, led, costs = boxes[clear], leaders[clear], far[clear], led[clear], costs[clear]
+        costs += self._stroke_costs(boxes, near) + self._other_point_costs(index, region, boxes, far, led)
         if len(self.obstacles):
             deep = overlap_depths(boxes, self.obstacles, MIN_STROKE_GAP)
             costs += np.where(deep > 0.0, OVERLAP_COST + 10.0 * deep, 0.0).sum(axis=1)
@@ -213,17 +227,40 @@ class _LabelPlacer:
             costs[good] += np.minimum(1.5 * np.bincount(line, crossed, minlength=len(lines)), 9.0) - 5.0
         return _LabelCandidates(boxes, leaders, costs).ordered()
 
-    def _nearby_strokes(self, boxes: np.ndarray) -> StrokeSegments:
-        """The strokes that any of the boxes can have to do with."""
-        whole = np.concatenate([boxes[:, :2].min(axis=0), boxes[:, 2:].max(axis=0)])[None]
-        return self.strokes.select(nearby_pairs(whole, self.bounds, 1.5)[1])
+    @staticmethod
+    def _clear_of_strokes(boxes: np.ndarray, near: StrokeSegments, costs: np.ndarray) -> np.ndarray:
+        """Indices of the boxes that strokes leave within reach of an acceptable cost; of one where there are none.
+
+        Among many strokes the first ones decide over most boxes.
+        """
+        most = ACCEPTABLE_COST + FREEDOM_COST
+        left = np.flatnonzero(costs <= most)
+        crossing = costs[left]
+        parts = ceil(len(near.ends) / STROKES_AT_ONCE)
+        spread = np.concatenate([np.arange(k, len(near.ends), parts) for k in range(parts)] or [np.zeros(0, dtype=int)])
+        first, count = 0, STROKES_AT_ONCE
+        while first < len(spread):
+            part = near.select(spread[first : first + count])  # those next to each other in the list lie side by side
+            first, count = first + count, 2 * count
+            box, piece = nearby_pairs(boxes[left], bounding_boxes(part.ends), GOOD_STROKE_GAP + 0.5)
+            padding = part.half_widths[piece] + MIN_STROKE_GAP
+            length = lengths_inside_boxes(boxes[left][box], part.ends[piece], padding)
+            across = np.where(length >= 0.0, part.weights[piece] * (STROKE_COST + 8.0 * length), 0.0)
+            crossing = crossing + np.bincount(box, across, minlength=len(left))
+            kept = crossing <= most
+            left, crossing = left[kept], crossing[kept]
+            if not len(left):
+                return np.array([int(costs.argmin())])
+        return left
 
     def _direction_costs(self, letter: Label, ways: np.ndarray) -> np.ndarray:
         """The free side is opposite to the strokes about the spot; with none, up and to the right."""
         costs = 0.25 * (1.0 - ways.sum(axis=1) / np.sqrt(2.0))
         radius = letter.clearance + 4.0
-        start = self.strokes.ends[:, :2] - letter.at
-        way = self.strokes.ends[:, 2:] - self.strokes.ends[:, :2]
+        low, high = self.bounds[:, :2] - radius, self.bounds[:, 2:] + radius
+        ends = self.strokes.ends[((low <= letter.at) & (letter.at <= high)).all(axis=1)]
+        start = ends[:, :2] - letter.at
+        way = ends[:, 2:] - ends[:, :2]
         square = np.maximum((way**2).sum(axis=1), 1e-18)
         middle = -(start * way).sum(axis=1) / square
         root = middle**2 - ((start**2).sum(axis=1) - radius**2) / square
@@ -254,10 +291,12 @@ class _LabelPlacer:
         beside = np.bincount(box, weight, minlength=len(boxes))
         return np.bincount(box, across, minlength=len(boxes)) + np.minimum(1.5 * beside, 5.0)
 
-    def _other_point_costs(self, index: int, boxes: np.ndarray, far: np.ndarray, led: np.ndarray) -> np.ndarray:
+    def _other_point_costs(
+        self, index: int, region: np.ndarray, boxes: np.ndarray, far: np.ndarray, led: np.ndarray
+    ) -> np.ndarray:
         """What it costs to cover the spot of another letter, or to stand nearer to it than to one's own."""
         spots = self.points[np.abs(self.points - self.points[index]).max(axis=1) > SAME_POINT_TOLERANCE]
-        low, high = boxes[:, :2].min(axis=0) - LEADER_DISTANCE, boxes[:, 2:].max(axis=0) + LEADER_DISTANCE
+        low, high = region[:2] - LEADER_DISTANCE, region[2:] + LEADER_DISTANCE
         spots = spots[((spots >= low) & (spots <= high)).all(axis=1)]
         if not len(spots):
             return np.zeros(len(boxes))
@@ -350,7 +389,9 @@ class _LabelPlacer:
 
     def settle(self) -> None:
         """Let the letters choose, those with the least room first, until none moves; then part any that still meet."""
-        freedom = [np.searchsorted(each.costs, each.costs[0] + 6.0) - each.costs[0] for each in self.candidates]
+        freedom = [
+            np.searchsorted(each.costs, each.costs[0] + FREEDOM_COST) - each.costs[0] for each in self.candidates
+        ]
         order = [int(each) for each in np.argsort(freedom, kind="stable")]
         for index in order:
             self._choose(index)

@@ -82,6 +82,17 @@ def nearby_pairs(boxes: np.ndarray, others: np.ndarray, gap: float) -> tuple[np.
     return box, other
 
 
+def nearby_points(points: np.ndarray, reach: np.ndarray | float) -> np.ndarray:
+    """The pairs (pairs, 2) of points (n, 2) that are nearer to each other than the sum of their reaches (n,)."""
+    far = np.broadcast_to(reach, len(points))
+    boxes = np.concatenate([points, points], axis=1)
+    one, other = nearby_pairs(boxes, boxes, 2.0 * float(np.max(far, initial=0.0)))
+    later = one < other
+    one, other = one[later], other[later]
+    near = np.hypot(*(points[one] - points[other]).T) < far[one] + far[other]
+    return np.stack([one[near], other[near]], axis=1)
+
+
 def overlap_depths(boxes: np.ndarray, others: np.ndarray, gap: float) -> np.ndarray:
     """How deep boxes (n, 4) reach into others (m, 4) grown by a gap (mm), as (n, m); 0 where they stay apart."""
     deep = np.inf

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from itertools import combinations
 from math import hypot
 
+import numpy as np
+
 from planar.drawing.labels.placement import SAME_POINT_TOLERANCE
+from planar.drawing.paper.boxes import nearby_points
 from planar.drawing.paper.picture import Label, Mark, PaperPoint, Pen, Picture, Polyline, extent, paper_point
 from planar.drawing.paper.scales import Scale, round_scale
 from planar.drawing.scheme import symbol_table
@@ -81,11 +83,13 @@ def _clusters(
     points: Mapping[str, tuple[Vector, float]], scale: Scale
 ) -> Iterator[tuple[list[str], list[Vector], float]]:
     """Points whose symbols lie upon each other: their names, their places (m), and how far the nearest two are (m)."""
+    names_of, places_of = list(points), [place for place, _ in points.values()]
+    at = np.array([(place.x, place.y) for place in places_of]).reshape(-1, 2) / scale.per_mm
     near: dict[tuple[str, str], float] = {}
-    for (one, (a, reach)), (other, (b, far)) in combinations(points.items(), 2):
-        apart = hypot(*(a - b))
-        if SAME_POINT_TOLERANCE < scale.on_paper(apart) < reach + far:
-            near[one, other] = apart
+    for one, other in nearby_points(at, np.array([reach for _, reach in points.values()])).tolist():
+        apart = hypot(*(places_of[one] - places_of[other]))
+        if scale.on_paper(apart) > SAME_POINT_TOLERANCE:
+            near[names_of[one], names_of[other]] = apart
     left = set(near)
     for first in sorted(near, key=lambda pair: near[pair]):
         if first not in left:

@@ -131,6 +131,8 @@ def _outline_support(scene: Scene, body: LinkBody) -> tuple[Vector, Vector] | No
 
 def _guide_strokes(scene: Scene, link: str, body: LinkBody, pen: Pen) -> Iterator[PlacedLine]:
     """The lines of a link along which blocks run, from its body to beyond the block."""
+    if not body.guides:
+        return
     through = {mark.name: mark.through for mark in scene.marks if isinstance(mark, GuideMark | SlotMark)}
     over = GUIDE_OVERHANG * scene.per_mm
     slides = {mark.position for mark in scene.marks if isinstance(mark, SliderMark) and mark.link == link}

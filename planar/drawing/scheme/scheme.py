@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from itertools import combinations
 from math import hypot
 from typing import NamedTuple
 
 import numpy as np
 
 from planar.drawing.labels.placement import SAME_POINT_TOLERANCE
+from planar.drawing.paper.boxes import nearby_points
 from planar.drawing.paper.picture import Label, Mark, Pen, Picture, Polyline, paper_point
 from planar.drawing.paper.scales import DRAWING_HEIGHT, DRAWING_WIDTH, Scale, round_scale
 from planar.drawing.scheme import symbol_table
@@ -162,8 +162,9 @@ def scheme_scale(state: State) -> Scale:
     pins = {mark.name for mark in all_marks(mechanism, shapes) if isinstance(mark, PinMark)}
     named = [each.members[0] for each in named_points(mechanism) if each.name in pins]
     places = [frames[link].to_world(shapes[link].position(point)) for link, point in named]
-    apart = [fits.on_paper(hypot(*(one - other))) for one, other in combinations(places, 2)]
-    if not any(SAME_POINT_TOLERANCE < each < CROWDED_PIN_DISTANCE for each in apart):
+    on_paper = np.array([(place.x, place.y) for place in places]).reshape(-1, 2) / fits.per_mm
+    one, other = nearby_points(on_paper, CROWDED_PIN_DISTANCE / 2.0).T
+    if not (np.hypot(*(on_paper[one] - on_paper[other]).T) > SAME_POINT_TOLERANCE).any():
         return fits
     return space_scale(mechanism, frames, shapes, CROWDED_SHEET_SIZE)
 
