@@ -1,7 +1,7 @@
 """The cases of parametrised tests that run no line that cheaper ones do not: they run in exhaustive runs alone.
 
-They stand in `repeated_cases.json` by their tests. What is not there runs, and of every test one case does. Made anew
-from a run of all cases (`pip install pytest-cov`; its own time limit is an hour on two cores):
+They stand in `repeated_cases.json` by their tests. What is not there runs, and of every test one case does. The file is
+made from a run with coverage by test (`pip install pytest-cov`; half an hour on two slow cores):
 
     python -m pytest --repeated --cov=planar --cov-context=test --junitxml=times.xml
     python -m tests.repeated_cases times.xml

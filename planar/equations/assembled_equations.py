@@ -11,14 +11,13 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from heapq import heapify, heappop, heappush
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from planar.codegen.printed_formula import PrintedFunction
 from planar.equations.elements import Element, PlacedElement
-from planar.equations.elimination import EliminationRow, substitute_solution
+from planar.equations.elimination import EliminationRow, substitute_solutions
 from planar.equations.sparse_matrices import SparsePattern
 from planar.foundation.angles import wrap_angle
 from planar.foundation.arrays import Array, IntArray
@@ -236,21 +235,10 @@ class AssembledEquations:
         return {source: -value / line.factors[column] for source, value in self._line_sums(line, column).items()}
 
     def _line_sums(self, line: EliminationRow, pivot: int | None = None) -> dict[int, float]:
-        """A constraint as a sum over x, a pivot left out. What was solved for last is replaced first, so that what
-        cancels is not followed to the frame."""
+        """A constraint as a sum over x, a pivot left out."""
         factors = {column: factor for column, factor in line.factors.items() if column != pivot}
         multipliers = dict(line.multipliers)
-        open_places = [-self._place_of[column] for column in factors if column in self._place_of]
-        heapify(open_places)
-        while open_places:
-            column, by = self._elimination.solved[-heappop(open_places)]
-            factor = factors.get(column)
-            if factor is None:  # it cancelled, or stood there twice
-                continue
-            for other in by.factors:
-                if other != column and other not in factors and other in self._place_of:
-                    heappush(open_places, -self._place_of[other])
-            substitute_solution(factors, multipliers, column, by)
+        substitute_solutions(factors, multipliers, self._elimination.solved, self._place_of)
         sums = {self._y_place_of[column]: factor for column, factor in factors.items()}
         sums |= {self._y_count + row: multiplier for row, multiplier in multipliers.items()}
         return dict(sorted(sums.items()))

@@ -6,8 +6,9 @@ these constraints for them leaves the loop equations by itself.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from heapq import heapify, heappop, heappush
 from typing import TYPE_CHECKING, NamedTuple
 
 from planar.foundation.lazy_module import LazyModule
@@ -133,6 +134,35 @@ def _add_term(terms: dict[int, float], key: int, term: float) -> None:
         terms[key] = total
 
 
+def substitute_solutions(
+    factors: dict[int, float],
+    multipliers: dict[int, float],
+    solved: Sequence[tuple[int, EliminationRow]],
+    place_of: Mapping[int, int],
+    limit: int | None = None,
+) -> bool:
+    """Put the solutions for all coordinates that were solved for into a sum of coordinates and of rests of rows.
+
+    The last one goes first (`place_of` has the places in `solved`): what cancels is not followed to the frame.
+    Returns whether that took fewer solutions than `limit`; if not, the sum stays as it is then.
+    """
+    places = [-place_of[column] for column in factors if column in place_of]
+    heapify(places)
+    count = 0
+    while places:
+        column, line = solved[-heappop(places)]
+        if column not in factors:  # it cancelled, or stood there twice
+            continue
+        for other in line.factors:
+            if other != column and other not in factors and other in place_of:
+                heappush(places, -place_of[other])
+        substitute_solution(factors, multipliers, column, line)
+        count += 1
+        if count == limit:
+            return False
+    return True
+
+
 class EarlierRows:
     """The rows of earlier blocks that tie two coordinates by equal factors.
 
@@ -159,7 +189,8 @@ class EarlierRows:
         for place in range(len(self._order), len(self._solved)):
             self._order[self._solved[place][0]] = place
         ends = [column for column in line.factors if column in self._order]
-        if len(ends) != 2 or self._is_short(line):
+        sums = dict(line.factors), dict(line.multipliers)
+        if len(ends) != 2 or substitute_solutions(*sums, self._solved, self._order, MAX_SHORT_LOOP):
             return
         path = self._path_between(*ends)
         if path is None:
@@ -174,16 +205,6 @@ class EarlierRows:
         line.factors, line.multipliers = factors, multipliers
         for _, by in path:
             line.rest_coordinates |= by.rest_coordinates
-
-    def _is_short(self, line: EliminationRow) -> bool:
-        """Whether a constraint ends after few solutions have been put into it, the last ones first."""
-        factors, multipliers = dict(line.factors), dict(line.multipliers)
-        for _ in range(MAX_SHORT_LOOP):
-            column = max(filter(self._order.__contains__, factors), key=self._order.__getitem__, default=None)
-            if column is None:
-                return True
-            substitute_solution(factors, multipliers, *self._solved[self._order[column]])
-        return False
 
     def _path_between(self, start: int, end: int) -> list[tuple[int, EliminationRow]] | None:
         """The shortest path from one coordinate to another: coordinates with the rows that lead to them."""

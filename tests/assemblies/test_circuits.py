@@ -14,7 +14,7 @@ from planar.assemblies.circuits.chebyshev_zeros import SignedLog, find_zeros
 from planar.assemblies.polynomial.completeness import Completeness
 from tests.builders import bare_four_bar, slider_crank_document
 from tests.closed_forms import between
-from tests.draws import draws, first_cases, is_exhaustive, part, repeats
+from tests.draws import draws, first_cases, is_exhaustive, part
 from tests.known import MODELS
 from tests.linkages import random_linkage
 
@@ -119,7 +119,6 @@ def test_branches_of_half_a_thousandth_of_a_radian_are_not_missed():
 
 
 @pytest.mark.parametrize(("seed", "dyads", "driven"), part([(23, 2, "Q1"), (35, 3, "Q2"), (31, 2, "Q1")], 2))
-@repeats("numbers of circuits of four-bars and of random linkages")
 def test_a_linkage_driven_through_a_larger_group_has_as_many_circuits_as_by_its_crank(seed, dyads, driven):
     chain = Chain(seed, dyads)
     found = planar.circuits(chain.mechanism(driven))
@@ -264,7 +263,6 @@ def test_rows_of_a_circuits_motion_lie_on_their_branches(name):
             assert own.max() - own.min() > 0.95 * (high - low)
 
 
-@repeats("circuits of single linkages have their order by the rule")
 def test_the_order_does_not_depend_on_the_sketch():
     mechanism = planar.load("klann-leg")
     found = planar.circuits(mechanism)
@@ -308,7 +306,6 @@ def test_every_assembly_of_random_linkages_lies_on_a_circuit_where_their_number_
             assert None not in [found.of(mode) for mode in modes]
 
 
-@repeats("numbers of circuits of linkages with slides")
 def test_circuits_that_come_back_from_infinity_are_not_counted():
     found = planar.circuits(planar.from_dict(random_linkage(39, 3).value))
     assert not any(each.closed for each in found)
@@ -324,7 +321,6 @@ def test_a_slide_without_end_is_followed_both_ways():
         assert branch.low < -100.0 < 100.0 < branch.high
 
 
-@repeats("circuits of linkages with one input")
 def test_several_inputs_run_one_at_a_time():
     mechanism = planar.load("excavator-arm")
     with pytest.raises(planar.BadInput, match="name the one that runs"):

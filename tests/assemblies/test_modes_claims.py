@@ -7,7 +7,6 @@ import pytest
 import planar
 from planar.assemblies.polynomial.completeness import Completeness
 from tests.builders import bar_linkage, bare_four_bar, tower
-from tests.draws import repeats
 
 
 def test_without_certifying_nothing_is_called_proved():
@@ -105,7 +104,6 @@ def test_what_does_not_hang_on_a_curve_cannot_be_assembled_all_the_same():
     assert refused.outcome is planar.Outcome.CANNOT_BE_ASSEMBLED
 
 
-@repeats("what is said of lists that are read to their ends")
 def test_what_is_said_of_the_list_does_not_depend_on_how_far_it_was_read():
     for certify, many, said in ((True, 5, "complete"), (True, 10, "numerically complete")):
         modes = planar.modes(tower(many), certify=certify)

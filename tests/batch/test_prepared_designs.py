@@ -13,7 +13,7 @@ from planar.batch.prepare.design_numbers import compiled_variables
 from planar.batch.prepare.run_endings import UNSURE
 from planar.foundation.errors import BadInput
 from tests.builders import open_four_bar
-from tests.draws import draws, repeats
+from tests.draws import draws
 from tests.known import MODELS
 
 pytest.importorskip("llvmlite")
@@ -79,7 +79,6 @@ def test_a_run_begins_where_it_is_asked_to():
     assert agree_with_general_path(ready, {"AB.length": 0.25, "A.position": 2.5, "A.velocity": -1.0})
 
 
-@repeats("designs of a linkage with one input")
 def test_another_input_stands_where_a_design_has_it():
     mechanism = MODELS["stephenson-valve-gear"]
     running, standing = (given.pair for given in mechanism.inputs)
@@ -88,7 +87,6 @@ def test_another_input_stands_where_a_design_has_it():
     assert [agree_with_general_path(ready, {f"{standing}.position": at + by}) for by in (0.0, 0.02)] == [True, True]
 
 
-@repeats("designs that fail in a sweep say why")
 def test_what_a_failing_design_says_is_what_a_sweep_says():
     mechanism = open_four_bar(0.3, 0.8, 0.7, 1.0)
     ready = planar.prepared(mechanism, 60)

@@ -19,7 +19,7 @@ from planar.model.pairs import pair_types
 from planar.solving.position import PositionSolver
 from tests.builders import block_slider_crank, four_bar
 from tests.closed_forms import ROCKER, TURN, rocker
-from tests.draws import first_cases, repeats
+from tests.draws import first_cases
 from tests.known import MODELS
 from tests.linkages import random_linkage
 
@@ -119,7 +119,6 @@ def test_random_linkages_of_every_pair_type(seed, links, higher):
     as_cycle(mechanism, result[0], 20, result.outcomes, 1e-7)
 
 
-@repeats("random linkages of every pair type are the cycles of each")
 def test_many_random_dyads_end_where_their_cycles_end():
     mechanisms = [dyads(seed, 4 + seed % 4) for seed in range(14)]
     result = planar.sweep_each(mechanisms, 40)

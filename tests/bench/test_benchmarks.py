@@ -18,7 +18,6 @@ from benchmarks.mixed import Mixed
 from benchmarks.processes import Process
 from benchmarks.swept import RATES, SWEPT, SweptFourBar, angles
 from benchmarks.swept.row import Row
-from tests.draws import repeats
 
 NAMES = [swept.name for swept in SWEPT]
 WITHIN = {"python_solvespace": 1e-7}
@@ -234,7 +233,6 @@ def test_long_chains_of_triads_go_round():
     assert 0.15 < np.ptp(last[:, 0]) < 0.3
 
 
-@repeats("code that is kept is read in tests of its cache")
 def test_code_is_printed_and_compiled_by_one_process_and_read_by_another():
     pytest.importorskip("llvmlite")
     first = compiling._measure_structure("four-bar")

@@ -12,7 +12,6 @@ import pytest
 import planar
 from planar.document.files import MAX_FILE_BYTES, find_model_file, load_models, model_files
 from planar.foundation.errors import BadInput
-from tests.draws import repeats
 from tests.watchdog import watched
 
 CRANK: dict[str, Any] = {
@@ -80,7 +79,6 @@ def test_the_models_that_come_along_are_in_the_order_of_their_names() -> None:
     assert [file for file, _ in load_models()] == list(model_files())
 
 
-@repeats("names of models are read in most tests")
 def test_a_model_is_found_by_its_name_and_by_its_ids(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     for file, mechanism in load_models():

@@ -24,7 +24,7 @@ from tests import documents as document
 from tests import random_documents
 from tests import wheel_documents as wheels
 from tests.cams import cam_document
-from tests.draws import draws, repeats
+from tests.draws import draws
 
 EXAMPLE_FILES = Path(planar.__file__).parent / "guide" / "examples"
 VALIDATOR = Draft202012Validator(schema())
@@ -146,7 +146,6 @@ def test_a_mistake_that_a_schema_can_say_is_refused_by_it(value):
         assert known or ("too large" in sentence and TOO_LARGE in json.dumps(value)), sentence
 
 
-@repeats("every mistake that a schema can say is refused by it")
 def test_of_all_that_a_schema_cannot_say_there_are_examples():
     passed = [refusal(*row.values) for row in BAD if wrong(*row.values) is None]
     for words in (words for each in UNSAID.values() for words in each):

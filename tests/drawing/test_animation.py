@@ -16,7 +16,6 @@ from planar.drawing.paper.pens import PEN_STYLES
 from planar.drawing.paper.picture import Pen
 from planar.drawing.scheme.symbol_table import PIN_RADIUS
 from planar.foundation.errors import BadInput
-from tests.draws import repeats
 
 pytest.importorskip("matplotlib")
 from PIL import Image
@@ -129,7 +128,6 @@ def test_the_corners_hold_every_position():
             assert (spots <= script.high).all()
 
 
-@repeats("the README's moving picture is the same file whenever it is made")
 def test_a_hundred_frames_of_a_four_bar_are_small_and_always_the_same():
     content = animate(planar.load("four-bar"))
     assert len(content) < 1.5e6

@@ -12,7 +12,7 @@ from planar.drawing.paper.picture import Circle, Fill, Polyline, extent
 from planar.drawing.structures.chain_pictures import chain_picture, draw_chain, inversion_picture
 from planar.reports.tables.design.structures import record
 from tests.command import run
-from tests.draws import part, repeats
+from tests.draws import part
 
 
 @pytest.fixture(scope="module")
@@ -101,7 +101,6 @@ def test_an_inversion_has_its_fixed_link_hatched_and_its_driven_joints_black():
         assert len(re.findall(r"\d-\d:\sII", " ".join(picture.notes))) == len(own)
 
 
-@repeats("the atlas of few chains")
 def test_figures_are_a_sheet_for_twenty_chains():
     assert [len(figure.axes) for figure in plot.chains([planar.chains(6)[0]] * 21)] == [20, 1]
     assert [len(figure.axes) for figure in plot.chains(planar.chains(6)[0], mechanisms=True)] == [2]

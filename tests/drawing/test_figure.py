@@ -21,7 +21,7 @@ from planar.drawing.output.solution_pages import encode_sheets
 from planar.drawing.paper.pens import ARROW_HEAD_LENGTH, ARROW_HEAD_WIDTH, FILL_COLOURS, PEN_STYLES, require_matplotlib
 from planar.drawing.paper.picture import Arrow, Circle, Fill, Label, Pen, Picture, Polyline
 from planar.foundation.errors import BadInput
-from tests.draws import draws, repeats
+from tests.draws import draws
 from tests.fonts import own_fonts  # noqa: F401
 from tests.hostile import TEXTS
 
@@ -376,7 +376,6 @@ def test_the_same_picture_is_the_same_file(kind):
     assert not any(word in one for word in (b"CreationDate", b"<dc:date>", b"tIME"))
 
 
-@repeats("the same picture is the same file in one process")
 def test_the_same_picture_is_the_same_file_in_another_process():
     code = (
         "import hashlib, sys; from tests.drawing.test_figure import draw_pictures, encode_figure, polygon, scheme"

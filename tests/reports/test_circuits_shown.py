@@ -20,7 +20,7 @@ from planar.drawing.labels.text_metrics import format_tick
 from planar.model.wording import number_ranges
 from tests import command
 from tests.closed_forms import between
-from tests.draws import first_cases, part, repeats
+from tests.draws import first_cases, part
 from tests.figures import text_boxes
 from tests.fonts import own_fonts  # noqa: F401
 from tests.known import MODELS
@@ -190,7 +190,6 @@ def test_what_would_not_be_heeded_is_refused(words, sentence, tmp_path):
     assert sentence in command.run(tmp_path, *words).refused(2)
 
 
-@repeats("no line leaps, and limits are those of the table")
 def test_every_curve_that_is_drawn_closes_the_loop():
     for axes in panels(sheets("rocker.json", "crank")[0]):
         drawn = branches(axes)

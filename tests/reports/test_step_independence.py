@@ -5,7 +5,6 @@ import pytest
 import planar
 from planar.reports.tables.forces.friction import mean_efficiency
 from tests.command import run
-from tests.draws import repeats
 from tests.step_independence import AMONG, compare_steps, differences, solved_lines
 
 FORCES = ("forces", "--cycle")
@@ -25,7 +24,6 @@ def test_printed_numbers_do_not_depend_on_the_steps(tmp_path, model, words):
     assert compare_steps(tmp_path, words, model, (45, 46)) == []
 
 
-@repeats("other printed numbers do not depend on the steps")
 def test_the_efficiency_over_a_motion_does_not_depend_on_the_steps():
     """Of a clamp whose guide bears now on this side, now on that, so that its friction steps between positions."""
     first, second = (mean_efficiency(planar.forces(planar.cycle("toggle-clamp", steps))) for steps in (12, 17))

@@ -12,7 +12,6 @@ from planar.foundation.errors import BadInput
 from planar.structures import linkage_store
 from planar.structures.random_linkages import random_linkages, structures
 from tests.command import run
-from tests.draws import repeats
 
 zarr = pytest.importorskip("zarr")
 
@@ -47,7 +46,6 @@ def test_links_keep_their_shapes_and_the_structure_is_that_of_the_chain(linkages
         assert linkages.frame[k] in chain.edges[linkages.drive[k]]
 
 
-@repeats("structures of few links come alike")
 def test_all_structures_come_alike():
     found = random_linkages(6, 900, 12, (1,)).structure
     counts = np.bincount(found, minlength=len(structures(6)))

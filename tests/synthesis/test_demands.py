@@ -12,7 +12,7 @@ from planar.synthesis.judgement.defects import output_transmissions, polygon_dep
 from planar.synthesis.judgement.judgement import DesignJudge
 from planar.synthesis.task.starts import start_mechanisms
 from planar.synthesis.task.wanted_results import entry_misses, resting_misses
-from tests.draws import covering, first_cases, repeats
+from tests.draws import covering, first_cases
 from tests.known import MODELS
 from tests.small_searches import set_small_searches
 
@@ -185,7 +185,6 @@ def test_a_transmission_angle_is_kept_all_round_the_turn(few_designs, model, out
     assert found[0].greatest_miss < 0.1 * found.size
 
 
-@repeats("the angle is kept all round a turn")
 def test_between_entries_a_transmission_angle_is_kept_where_the_input_swings(few_designs):
     wanted = {"point": "E", "through": [[0, 0], [20, 12], [42, 15], [63, 8], [80, -6]], "in_order": True}
     found = planar.synthesise(task("four-bar", wanted, demands=[{"transmission": 60}]), many=3)
@@ -239,7 +238,6 @@ def test_designs_grow_as_far_as_their_bounds_let_them():
     assert held.moves.factors(x, held.free.lower / scale, held.free.upper / scale) is None
 
 
-@repeats("other demands are kept, or named where they are in the way")
 def test_bounded_lengths_are_matched_wherever_what_is_wanted_lies(few_designs):
     wanted = {"point": "E", "through": [[5000, 0], [5020, 12], [5042, 15], [5063, 8], [5080, -6]], "in_order": True}
     within = {"AB.length": [5, 8], "BC.length": [70, 90]}

@@ -15,7 +15,6 @@ import pytest
 import planar
 from planar.synthesis.judgement.judgement import DesignJudge
 from tests.command import ROOT, run
-from tests.draws import repeats
 
 SETTINGS = {"DRAWS": 100, "MATCHES": 4, "ROUNDS": 2, "GOOD": 0.0, "SETTLED": 99}
 TASK = {
@@ -114,7 +113,6 @@ def test_what_was_stopped_goes_on_to_the_same_designs(whole, tmp_path, monkeypat
     assert texts(tmp_path / "designs") == texts(folder)
 
 
-@repeats("a search that was stopped goes on to the same designs")
 def test_what_is_in_the_way_is_told_alike_after_an_interrupt(tmp_path, monkeypatch):
     task = TASK | {"start": "slider-crank", "demands": [{"inside": [[-1, -1], [1, 1]]}]}
     with monkeypatch.context() as patch:

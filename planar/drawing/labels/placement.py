@@ -119,12 +119,12 @@ def _group_labels(letters: list[Label]) -> list[list[Label]]:
         x, y = (floor(at / SAME_POINT_TOLERANCE) for at in letter.at)
         beside = product((x - 1, x, x + 1), (y - 1, y, y + 1))
         near = sorted(group for cell in beside for group in groups_in_cell.get(cell, ()))
-        found = next((group for group in near if _name_same_point(groups[group][0], letter)), None)
-        if found is None:
+        same = next((group for group in near if _name_same_point(groups[group][0], letter)), None)
+        if same is None:
             groups_in_cell.setdefault((x, y), []).append(len(groups))
             groups.append([letter])
         else:
-            groups[found].append(letter)
+            groups[same].append(letter)
     return groups
 
 
@@ -227,8 +227,7 @@ class _LabelPlacer:
             costs[good] += np.minimum(1.5 * np.bincount(line, crossed, minlength=len(lines)), 9.0) - 5.0
         return _LabelCandidates(boxes, leaders, costs).ordered()
 
-    @staticmethod
-    def _clear_of_strokes(boxes: np.ndarray, near: StrokeSegments, costs: np.ndarray) -> np.ndarray:
+    def _clear_of_strokes(self, boxes: np.ndarray, near: StrokeSegments, costs: np.ndarray) -> np.ndarray:
         """Indices of the boxes that strokes leave within reach of an acceptable cost; of one where there are none.
 
         Among many strokes the first ones decide over most boxes.
@@ -243,10 +242,7 @@ class _LabelPlacer:
             part = near.select(spread[first : first + count])  # those next to each other in the list lie side by side
             first, count = first + count, 2 * count
             box, piece = nearby_pairs(boxes[left], bounding_boxes(part.ends), GOOD_STROKE_GAP + 0.5)
-            padding = part.half_widths[piece] + MIN_STROKE_GAP
-            length = lengths_inside_boxes(boxes[left][box], part.ends[piece], padding)
-            across = np.where(length >= 0.0, part.weights[piece] * (STROKE_COST + 8.0 * length), 0.0)
-            crossing = crossing + np.bincount(box, across, minlength=len(left))
+            crossing = crossing + self._crossing_costs(boxes[left], part, box, piece)
             kept = crossing <= most
             left, crossing = left[kept], crossing[kept]
             if not len(left):
@@ -279,17 +275,20 @@ class _LabelPlacer:
         off = np.abs(middles) / half
         return np.where(ways[:, 0] == 0.0, off[:, 0], np.where(ways[:, 1] == 0.0, off[:, 1], 1.0))
 
-    @staticmethod
-    def _stroke_costs(boxes: np.ndarray, near: StrokeSegments) -> np.ndarray:
+    def _stroke_costs(self, boxes: np.ndarray, near: StrokeSegments) -> np.ndarray:
         """What strokes across boxes cost, and less those close by."""
         box, piece = nearby_pairs(boxes, bounding_boxes(near.ends), GOOD_STROKE_GAP + 0.5)
         wide = lengths_inside_boxes(boxes[box], near.ends[piece], near.half_widths[piece] + GOOD_STROKE_GAP) >= 0.0
         box, piece = box[wide], piece[wide]
-        weight = near.weights[piece]
-        tight = lengths_inside_boxes(boxes[box], near.ends[piece], near.half_widths[piece] + MIN_STROKE_GAP)
-        across = np.where(tight >= 0.0, weight * (STROKE_COST + 8.0 * tight), 0.0)
-        beside = np.bincount(box, weight, minlength=len(boxes))
-        return np.bincount(box, across, minlength=len(boxes)) + np.minimum(1.5 * beside, 5.0)
+        beside = np.bincount(box, near.weights[piece], minlength=len(boxes))
+        return self._crossing_costs(boxes, near, box, piece) + np.minimum(1.5 * beside, 5.0)
+
+    @staticmethod
+    def _crossing_costs(boxes: np.ndarray, near: StrokeSegments, box: np.ndarray, piece: np.ndarray) -> np.ndarray:
+        """What strokes across boxes cost, by pairs of a box and a piece of a stroke."""
+        length = lengths_inside_boxes(boxes[box], near.ends[piece], near.half_widths[piece] + MIN_STROKE_GAP)
+        across = np.where(length >= 0.0, near.weights[piece] * (STROKE_COST + 8.0 * length), 0.0)
+        return np.bincount(box, across, minlength=len(boxes))
 
     def _other_point_costs(
         self, index: int, region: np.ndarray, boxes: np.ndarray, far: np.ndarray, led: np.ndarray
@@ -389,9 +388,8 @@ class _LabelPlacer:
 
     def settle(self) -> None:
         """Let the letters choose, those with the least room first, until none moves; then part any that still meet."""
-        freedom = [
-            np.searchsorted(each.costs, each.costs[0] + FREEDOM_COST) - each.costs[0] for each in self.candidates
-        ]
+        costs = [choice.costs for choice in self.candidates]
+        freedom = [np.searchsorted(ordered, ordered[0] + FREEDOM_COST) - ordered[0] for ordered in costs]
         order = [int(each) for each in np.argsort(freedom, kind="stable")]
         for index in order:
             self._choose(index)
