@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cached_property
 from importlib.util import find_spec
+from math import inf
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -38,6 +40,14 @@ PYTHON_OPERATIONS = {
     "pow": "pow({}, {})",
     "where": "where({}, {})",
 }
+FLOAT_OPERATIONS = PYTHON_OPERATIONS | {
+    "minnum": "{0} if {0} <= {1} or {1} != {1} else {1}",
+    "maxnum": "{0} if {0} >= {1} or {1} != {1} else {1}",
+    "where": "{1} if {0} else 0.0",
+}
+"""The same of floats alone: what is no number is not equal to itself."""
+REPEATING_OPERATIONS = ("minnum", "maxnum")
+"""Those that may name an operand more than once."""
 NUMPY_FUNCTIONS: Mapping[str, Callable[..., Any]] = {
     "sqrt": np.sqrt,
     "abs": np.abs,
@@ -58,12 +68,11 @@ FLOAT_FUNCTIONS: Mapping[str, Callable[..., float]] = {
     "sin": math.sin,
     "tan": math.tan,
     "atan2": math.atan2,
-    "minnum": lambda a, b: a if a <= b or math.isnan(b) else b,
-    "maxnum": lambda a, b: a if a >= b or math.isnan(b) else b,
     "floor": lambda a: float(math.floor(a)),
     "pow": math.pow,
-    "where": lambda condition, value: value if condition else 0.0,
 }
+MAX_NESTED_EXPRESSIONS = 12
+"""So deep expressions stand within one another: Python's parser bears some hundred."""
 MAX_INTERPRETED_CALLS = 12
 """Calls that take less time, the formula's instructions carried out one by one, than printing it."""
 MAX_FLOAT_POSITIONS = 5
@@ -79,36 +88,59 @@ PrintedFunction = Callable[..., tuple[Any, ...]]
 
 
 def write_python(
-    formula: Instructions, results: Sequence[int], names: Mapping[int, str], parameters: Sequence[str]
+    formula: Instructions,
+    results: Sequence[int],
+    names: Mapping[int, str],
+    parameters: Sequence[str],
+    operations: Mapping[str, str] = PYTHON_OPERATIONS,
 ) -> str:
     """The source of `values`, a function of the parameters. `names` are expressions of values that are known.
 
-    A value's name is taken again once nothing needs the value, so that few arrays are in use, and in the cache.
-    Raises UnsupportedOperation.
+    A value that is used once stands within the expression that uses it. The name of any other is taken again once
+    nothing needs the value, so that few arrays are in use, and in the cache. Raises UnsupportedOperation.
     """
-    names = dict(names)
+    expressions = dict(names)
+    order = [number for number in required_values(formula, results, expressions) if number not in expressions]
+    use_counts = Counter(operand for number in order for operand in formula.instructions[number].operands)
+    use_counts.update(results)
+    statement_of: dict[int, int] = {}
+    "by values that stand within another's expression, the value whose statement that is"
+    last_use: dict[int, float] = dict.fromkeys(results, inf)
+    depths: dict[int, int] = {}
+    for number in reversed(order):
+        statement = statement_of.setdefault(number, number)
+        can_nest = formula.instructions[number].operation not in REPEATING_OPERATIONS
+        for operand in formula.instructions[number].operands:
+            depth = depths.get(number, 0) + 1
+            if can_nest and use_counts[operand] == 1 and operand not in last_use and depth <= MAX_NESTED_EXPRESSIONS:
+                statement_of[operand], depths[operand] = statement, depth
+            last_use[operand] = max(last_use.get(operand, 0), statement)
     lines = [f"def values({', '.join(parameters)}):"]
-    order = [number for number in required_values(formula, results, names) if number not in names]
-    last_use = {operand: number for number in order for operand in formula.instructions[number].operands}
-    last_use |= dict.fromkeys(results, -1)
+    repeated = [number for number in names if use_counts[number] > 1 and names[number].endswith("]")]
+    for number in repeated:
+        expressions[number] = f"e{number}"
+        lines.append(f"    e{number} = {names[number]}")
+    needed_by: dict[float, list[int]] = defaultdict(list)
+    for number in order:
+        needed_by[last_use[number]].append(number)
     free: list[str] = []
     count = 0
     for number in order:
         operation, operands, constant, _ = formula.instructions[number]
         if operation == "const":
-            names[number] = f"({constant!r})"
+            expressions[number] = f"({constant!r})"
             continue
-        expression = write_operation(
-            PYTHON_OPERATIONS, operation, [names[operand] for operand in operands], "on arrays"
-        )
-        unused = dict.fromkeys(operand for operand in operands if last_use[operand] == number)
-        free += [names[operand] for operand in unused if names[operand][0] == "r"]
+        expression = write_operation(operations, operation, [expressions[operand] for operand in operands], "on arrays")
+        if statement_of[number] != number:
+            expressions[number] = f"({expression})"
+            continue
+        free += [expressions[value] for value in needed_by[number] if expressions[value][0] == "r"]
         if not free:
             free.append(f"r{count}")
             count += 1
-        names[number] = free.pop()
-        lines.append(f"    {names[number]} = {expression}")
-    lines.append(f"    return ({''.join(names[number] + ', ' for number in results)})")
+        expressions[number] = free.pop()
+        lines.append(f"    {expressions[number]} = {expression}")
+    lines.append(f"    return ({''.join(expressions[number] + ', ' for number in results)})")
     return "\n".join(lines)
 
 
@@ -164,9 +196,8 @@ class FormulaFunction:
         self._kernels: dict[tuple[bool, ...], FormulaKernel] = {}
         self._slices = [slice(sum(self._sizes[:k]), sum(self._sizes[: k + 1])) for k in range(len(shapes))]
 
-    @cached_property
-    def source(self) -> str:
-        """What is compiled for floats as for arrays: an argument is indexed by its entries."""
+    def _source(self, operations: Mapping[str, str]) -> str:
+        """What is compiled: an argument is indexed by its entries."""
         places = [(k, place) for k, count in enumerate(self.argument_counts) for place in range(count)]
         names = {
             number: "a{}[{}]".format(*places[value.key])
@@ -174,15 +205,15 @@ class FormulaFunction:
             if value.key is not None
         }
         parameters = [f"a{k}" for k in range(len(self.argument_counts))]
-        return write_python(self.formula, self.formula.results, names, parameters)
+        return write_python(self.formula, self.formula.results, names, parameters, operations)
 
     @cached_property
     def _of_floats(self) -> PrintedFunction:
-        return compile_source(self.source, FLOAT_FUNCTIONS)
+        return compile_source(self._source(FLOAT_OPERATIONS), FLOAT_FUNCTIONS)
 
     @cached_property
     def _of_arrays(self) -> PrintedFunction:
-        return compile_source(self.source)
+        return compile_source(self._source(PYTHON_OPERATIONS))
 
     def _interpret(self, arguments: Iterable[Iterable[Any]]) -> Sequence[Any]:
         return self.formula.evaluate([entry for argument in arguments for entry in argument])

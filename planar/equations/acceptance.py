@@ -18,6 +18,7 @@ from planar.equations.coordinates import coordinate_columns
 from planar.equations.functions import MAX_CACHED_STRUCTURES, EquationFunctions, equation_functions
 from planar.equations.mechanism_numbers import equation_structure
 from planar.equations.symbolic_equations import Block, slice_length
+from planar.foundation.angles import wrap_angle
 from planar.foundation.arrays import Array
 from planar.foundation.recorded_formula import (
     formula_of_results,
@@ -87,6 +88,14 @@ class JudgedPositions(NamedTuple):
     distances: Array
 
 
+class RecordedStep(NamedTuple):
+    """Recorded: unknowns, by how much a step of Newton's method has moved each, and what is judged there."""
+
+    z: Array
+    moves: Array
+    judged: JudgedPositions
+
+
 class _BlockMotion(NamedTuple):
     """The coordinates and inputs with their rates (3, entries, samples), what blocks leave open (rows, samples), and
     of every block the regularity, least singular value, loss by round-off and distance (4, blocks, samples)."""
@@ -127,7 +136,7 @@ class AcceptanceFunctions:
     def position(self, z: Array, given: InputSamples, scales: Scales) -> tuple[Array, AcceptanceResult[float]]:
         """Coordinates with their rates (3, coordinates) at unknowns z (unknowns,), and what is judged of them."""
         self._call_count += 1
-        if self._call_count > self._calls_before_fusing:
+        if self.has_one_formula:
             values = self._fused_position.values(*(argument.tolist() for argument in (z, *given, *scales)))
             split = ORDERS * len(self.equations.coordinates)
             return np.array(values[:split]).reshape(ORDERS, -1), AcceptanceResult(*values[split : split + RESULT_COUNT])
@@ -139,19 +148,19 @@ class AcceptanceFunctions:
         with np.errstate(all="ignore"):  # what is not defined is not a number, and is not accepted
             return self._judge(self._move(np.array([rates.T for rates in given]), scales, z=z.T), scales)
 
-    def run(self, z: Array, given: InputSamples, scales: Scales) -> tuple[Array, JudgedPositions]:
-        """The unknowns at samples of inputs (samples, unknowns), on the branch of z (unknowns,) at the first, and what
-        is judged of them."""
+    def run(self, z: Array, given: InputSamples, scales: Scales, at: int = 0) -> tuple[Array, JudgedPositions]:
+        """The unknowns at samples of inputs (samples, unknowns), on the branch of z (unknowns,) at the sample `at`, and
+        what is judged of them."""
         self._call_count += 1
         with np.errstate(all="ignore"):
-            if self._call_count > self._calls_before_fusing:
-                samples = self._solve_run(z, given.u, scales.p)
+            if self.has_one_formula:
+                samples = self._solve_run(z, given.u, scales.p, at)
                 return samples, self._judge_by_one_formula(samples, given, scales)
-            motion = self._move(np.array([rates.T for rates in given]), scales, start=z)
+            motion = self._move(np.array([rates.T for rates in given]), scales, start=z, at=at)
             return motion.entries[0, self.unknown_columns].T, self._judge(motion, scales)
 
-    def _solve_run(self, start: Array, u: Array, p: Array) -> Array:
-        """The unknowns at samples of inputs u (samples, inputs), block after block, on the branch of `start`."""
+    def _solve_run(self, start: Array, u: Array, p: Array, at: int) -> Array:
+        """The unknowns at samples of inputs u (samples, inputs), block after block, on the branch of `start` at one."""
         count = len(self.equations.coordinates)
         entries: Array = np.empty((len(u), count + u.shape[1]))
         entries[:, count:] = u
@@ -160,12 +169,65 @@ class AcceptanceFunctions:
             known, numbers = entries[:, placed.known], p[placed.numbers]
             own = known[:, :0]
             if slice_length(block.unknowns):
-                own = of_type.run(start[block.unknowns], known, numbers)
+                own = of_type.run(start[block.unknowns], known, numbers, at)
                 entries[:, self.unknown_columns[block.unknowns]] = own
             if block is not last:  # nothing follows from its coordinates
                 (coordinates,) = of_type.coordinates.evaluate_batch(len(u), own, known, numbers)
                 entries[:, placed.coordinates] = coordinates[:, 0]
         return entries[:, self.unknown_columns]
+
+    @property
+    def has_one_formula(self) -> bool:
+        """Whether a formula of all blocks pays by now."""
+        return self._call_count > self._calls_before_fusing
+
+    @cached_property
+    def has_closed_forms(self) -> bool:
+        """Whether every block that has unknowns has a closed form."""
+        return all(of_type.assemblies is not None for block, _, of_type in self._blocks if slice_length(block.unknowns))
+
+    @property
+    def block_count(self) -> int:
+        """How many blocks there are, those of inputs among them."""
+        return len(self._placed)
+
+    @property
+    def scale_counts(self) -> tuple[int, int, int]:
+        """How many numbers `Scales` has of each kind."""
+        e = self.equations
+        assert e.elimination is not None
+        return e.elimination.number_count, len(e.rows), len(e.unknowns)
+
+    def record_step(self, signs: Array, near: Array, given: InputSamples, scales: Scales) -> RecordedStep:
+        """The formula of the position at inputs, blocks in closed form by their signs (blocks,), angles within half a
+        turn of those `near` (unknowns,): all of it recorded numbers."""
+        e = self.equations
+        entries: Array = np.zeros(len(e.coordinates) + len(given.u), dtype=object)
+        entries[len(e.coordinates) :] = given.u
+        z, moves = near.copy(), near.copy()
+        for k, (block, placed, of_type) in enumerate(self._blocks):
+            known, numbers = entries[placed.known], scales.p[placed.numbers]
+            unknowns = z[block.unknowns]
+            if len(unknowns):
+                results = of_type.polished_form.evaluate_entries(1, unknowns, known, numbers, signs[k : k + 1])
+                assembly, moves[block.unknowns] = np.split(results[:, 0], 2)
+                move = assembly - unknowns
+                z[block.unknowns] = np.where(of_type.is_angle, unknowns + wrap_angle(move), assembly)
+            entries[placed.coordinates] = of_type.coordinates.evaluate_entries(1, z[block.unknowns], known, numbers)[
+                :, 0
+            ]
+        return RecordedStep(z, moves, self.judge(z[None], InputSamples(*(rates[None] for rates in given)), scales))
+
+    def signs_at(self, z: Array, u: Array, p: Array) -> list[float]:
+        """Of every block the sign of its assembly in closed form at unknowns z (unknowns,)."""
+        e = self.equations
+        entries = np.append(np.zeros(len(e.coordinates)), u)
+        signs = []
+        for block, placed, of_type in self._blocks:
+            own, known, numbers = z[block.unknowns], entries[placed.known], p[placed.numbers]
+            signs.append(of_type.nearest_sign(own, known, numbers) if len(own) else 0.0)
+            entries[placed.coordinates] = of_type.coordinates.evaluate_entries(1, own, known, numbers)[:, 0]
+        return signs
 
     def _judge_by_one_formula(self, z: Array, given: InputSamples, scales: Scales) -> JudgedPositions:
         """Judge samples z (samples, unknowns) by the formula of all blocks and pairs."""
@@ -175,9 +237,11 @@ class AcceptanceFunctions:
         result = AcceptanceResult(*values[split : split + RESULT_COUNT])
         return JudgedPositions(rates, result, values[split + RESULT_COUNT :].T)
 
-    def _move(self, u: Array, scales: Scales, z: Array | None = None, start: Array | None = None) -> _BlockMotion:
+    def _move(
+        self, u: Array, scales: Scales, z: Array | None = None, start: Array | None = None, at: int = 0
+    ) -> _BlockMotion:
         """All blocks one after the other, each at all samples: from inputs with their rates (3, inputs, samples), at
-        unknowns z (unknowns, samples), or on the branch of `start` (unknowns,) at the first of them."""
+        unknowns z (unknowns, samples), or on the branch of `start` (unknowns,) at one of them."""
         e, samples = self.equations, u.shape[-1]
         count = len(e.coordinates)
         entries: Array = np.zeros((ORDERS, count + u.shape[1], samples), u.dtype)
@@ -191,7 +255,7 @@ class AcceptanceFunctions:
             else:
                 assert start is not None
                 own = (
-                    of_type.run(start[block.unknowns], known[0].T, numbers).T
+                    of_type.run(start[block.unknowns], known[0].T, numbers, at).T
                     if slice_length(block.unknowns)
                     else known[0, :0]
                 )
@@ -240,9 +304,8 @@ class AcceptanceFunctions:
         """(z, u, u1, u2, p, row scale, column floor) -> coordinates with their rates, what is judged, and distances:
         the formulas of all blocks and pairs one after the other."""
         e = self.equations
-        rows, inputs = len(e.rows), len(e.input_kinds)
-        assert e.elimination is not None
-        counts = len(e.unknowns), inputs, inputs, inputs, e.elimination.number_count, rows, len(e.unknowns)
+        inputs = len(e.input_kinds)
+        counts = len(e.unknowns), inputs, inputs, inputs, *self.scale_counts
         instructions, (z, u, u1, u2, *scales) = recorded_arguments(counts)
         judged = self.judge(z[None], InputSamples(u[None], u1[None], u2[None]), Scales(*scales))
         results = [*judged.coordinate_rates.reshape(-1), *(values[0] for values in judged.result)]

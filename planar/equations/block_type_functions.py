@@ -15,7 +15,7 @@ import numpy as np
 
 from planar.codegen.printed_formula import FormulaFunction
 from planar.equations.block_types import MAX_BLOCK_TYPES, BlockTypeKey, block_equations
-from planar.equations.closed_form_assemblies import SETTLED_STEP, ArrayFunction, ClosedFormAssemblies
+from planar.equations.closed_form_assemblies import SETTLED_STEP, ClosedFormAssemblies
 from planar.equations.known_types import known_text
 from planar.equations.linear import solve_vectors
 from planar.equations.structure_formulas import StructureFormulas
@@ -91,7 +91,7 @@ class BlockTypeFunctions:
     def __init__(self, key: BlockTypeKey):
         self._key = key
         self._counts = key.unknown_count, len(key.known_kinds), key.number_count
-        self._is_angle = np.array(
+        self.is_angle = np.array(
             [kind is not MeasureKind.LENGTH for kind, _ in key.own_kinds[: key.unknown_count]], bool
         )
 
@@ -101,13 +101,13 @@ class BlockTypeFunctions:
         return derive_block_type(self._key) if text is None else BlockTypeFormulas.from_text(text)
 
     @cached_property
-    def closing(self) -> ArrayFunction:
+    def closing(self) -> FormulaFunction:
         """F (1, rows) and the columns of its Jacobian (unknowns, rows)."""
         rows = len(self._key.row_kinds)
         return FormulaFunction(self._formulas.closing, self._counts, ((1, rows), (self._counts[0], rows)))
 
     @cached_property
-    def coordinates(self) -> ArrayFunction:
+    def coordinates(self) -> FormulaFunction:
         """Its own coordinates (1, coordinates)."""
         return FormulaFunction(self._formulas.coordinates, self._counts, ((1, len(self._key.own_kinds)),))
 
@@ -133,36 +133,44 @@ class BlockTypeFunctions:
         form = FormulaFunction(formula, (*self._counts, 1), ((1, count), (1, 1)))
         return ClosedFormAssemblies(slice(0, count), form, self.closing, self._formulas.has_changing_arm)
 
-    def run(self, z: Array, known: Array, numbers: Array) -> Array:
-        """The unknowns (samples, unknowns) where known coordinates are `known` (samples, known), the first from z."""
-        return self._run_newton(z, known, numbers) if self.assemblies is None else self._run_form(z, known, numbers)
+    def run(self, z: Array, known: Array, numbers: Array, at: int = 0) -> Array:
+        """The unknowns (samples, unknowns) where known coordinates are `known` (samples, known); z is next to those of
+        the sample `at`."""
+        run = self._run_newton if self.assemblies is None else self._run_form
+        return run(z, known, numbers, at)
 
-    def _run_form(self, z: Array, known: Array, numbers: Array) -> Array:
-        """The assembly in closed form that is the nearer to z at the first sample."""
+    def _run_form(self, z: Array, known: Array, numbers: Array, at: int) -> Array:
+        """The assembly in closed form that is the nearer to z at that sample."""
         assert self.assemblies is not None
-        form, is_angle = self._polished_form, self._is_angle
-
-        first = z.tolist(), known[0].tolist(), numbers.tolist()
-
-        def distance(sign: float) -> float:
-            moves = [there - here for there, here in zip(form.values(*first, [sign]), first[0], strict=False)]
-            if not all(map(isfinite, moves)):
-                return inf
-            sizes = (remainder(move, TURN) if turns else move for move, turns in zip(moves, is_angle, strict=True))
-            return max(map(abs, sizes))
-
-        sign = np.array([min((1.0, -1.0), key=distance)])
+        is_angle = self.is_angle
+        sign = np.array([self.nearest_sign(z, known[at], numbers)])
         starts = np.repeat(z[None], len(known), axis=0)
-        assemblies, steps = form.evaluate_batch(len(known), starts, known, numbers, sign)
+        assemblies, steps = self.polished_form.evaluate_batch(len(known), starts, known, numbers, sign)
         samples: Array = assemblies[:, 0]
-        turned = np.diff(samples[:, is_angle], axis=0, prepend=z[None, is_angle])
-        samples[:, is_angle] = z[is_angle] + np.cumsum(wrap_angle(turned), axis=0)
+        angles = samples[:, is_angle]
+        turned = np.cumsum(wrap_angle(np.diff(angles, axis=0, prepend=angles[:1])), axis=0)
+        samples[:, is_angle] = z[is_angle] + wrap_angle(angles[at] - z[is_angle]) + (turned - turned[at])
         if (np.abs(steps) > SETTLED_STEP).any():
             self.assemblies.polish(samples, known, numbers)
         return samples
 
+    def nearest_sign(self, z: Array, known: Array, numbers: Array) -> float:
+        """The sign of the assembly in closed form that is the nearer to z (unknowns,)."""
+        place = z.tolist(), known.tolist(), numbers.tolist()
+
+        def distance(sign: float) -> float:
+            moves = [
+                there - here for there, here in zip(self.polished_form.values(*place, [sign]), place[0], strict=False)
+            ]
+            if not all(map(isfinite, moves)):
+                return inf
+            sizes = (remainder(move, TURN) if turns else move for move, turns in zip(moves, self.is_angle, strict=True))
+            return max(map(abs, sizes))
+
+        return min((1.0, -1.0), key=distance)
+
     @cached_property
-    def _polished_form(self) -> FormulaFunction:
+    def polished_form(self) -> FormulaFunction:
         """(unknowns, known coordinates, numbers, sign) -> the unknowns of an assembly in closed form after a step of
         Newton's method, and that step."""
         assert self._formulas.closed_form is not None
@@ -177,20 +185,25 @@ class BlockTypeFunctions:
         formula = formula_of_results(instructions, [number_of(result, instructions) for result in results])
         return FormulaFunction(formula, counts, ((1, len(z)), (1, len(z))))
 
-    def _run_newton(self, z: Array, known: Array, numbers: Array) -> Array:
+    def _run_newton(self, z: Array, known: Array, numbers: Array, at: int) -> Array:
         """By Newton's method from where the samples before lead."""
         samples: Array = np.empty((len(known), len(z)))
-        step: Array = np.zeros(len(z))
-        for k, coordinates in enumerate(known):
-            start, z = z, z + step
+
+        def corrected(z: Array, coordinates: Array) -> Array:
             for _ in range(MAX_RUN_STEPS):
                 residuals, columns = self.closing(z, coordinates, numbers)
                 move = solve_vectors(columns.T[None], residuals)[0]
                 z = z - move
                 if not greatest_size(move) > SETTLED_STEP:
                     break
-            samples[k] = z
-            step = z - start if k else step
+            return z
+
+        samples[at] = corrected(z, known[at])
+        for rows in (range(at + 1, len(known)), range(at - 1, -1, -1)):
+            here, step = samples[at], np.zeros(len(z))
+            for k in rows:
+                samples[k] = corrected(here + step, known[k])
+                here, step = samples[k], samples[k] - here
         return samples
 
 

@@ -22,7 +22,7 @@ class KnownCoordinates:
         e: ConstraintEquations,
         assembled: AssembledEquations,
         placed: tuple[PlacedBlock | None, ...],
-        coordinate_calls: list[ArrayFunction | None],
+        coordinate_calls: Sequence[ArrayFunction | None],
     ):
         self._equations, self._assembled, self._placed = e, assembled, placed
         self._coordinate_calls = coordinate_calls

@@ -194,9 +194,15 @@ class Mechanism(Displayable, Revisable):
             object.__setattr__(self, "_hash", found)
         return found
 
+    def with_inputs(self, inputs: tuple[Input, ...]) -> Mechanism:
+        """The same mechanism with other inputs: `replace` takes several times as long."""
+        there = object.__new__(type(self))
+        there.__dict__.update(self.__getstate__(), inputs=inputs)
+        return there
+
     def __getstate__(self) -> dict[str, Any]:
         """Without what was worked out from it, as the hash, which another process would not share."""
-        return {name: value for name, value in self.__dict__.items() if not name.startswith("_")}
+        return {name: value for name, value in self.__dict__.items() if name[0] != "_"}
 
 
 class NamedPoint(NamedTuple):
@@ -250,10 +256,14 @@ def replace_inputs(mechanism: Mechanism, drives: tuple[Drive, ...]) -> Mechanism
         drive = changes.get(given.pair)
         if drive is None:
             return given
-        found = given._replace(**{key: new for key, new in drive._asdict().items() if new is not None})
-        return found._replace(law=given.law and given.law.start_at(found.position, found.velocity))
+        old = given.position, given.velocity, given.acceleration
+        position, velocity, acceleration = (
+            now if new is None else new for now, new in zip(old, drive[1:], strict=True)
+        )
+        law = given.law and given.law.start_at(position, velocity)
+        return given._replace(position=position, velocity=velocity, acceleration=acceleration, law=law)
 
-    return replace(mechanism, inputs=tuple(changed(given) for given in mechanism.inputs))
+    return mechanism.with_inputs(tuple(map(changed, mechanism.inputs)))
 
 
 def has_input_rates(mechanism: Mechanism) -> bool:

@@ -29,6 +29,7 @@ from planar.solving.assembly.nearest_assembly import (
 from planar.solving.checks.singular_values import MIN_REGULARITY
 from planar.solving.continuation.fast_path import (
     MIN_FAST_REGULARITY,
+    FastPosition,
     StraightPathCache,
     fast_position,
     is_surely_regular,
@@ -63,7 +64,7 @@ def solve(mechanism: Mechanism, drives: Mapping[str, float] | Sequence[Drive] = 
     <State of 'Four-bar chain' at A = 60 deg>
     """
     if isinstance(drives, Mapping):
-        drives = [Drive(pair)._replace(position=position) for pair, position in drives.items()]
+        drives = [Drive._make((pair, position, None, None)) for pair, position in drives.items()]
     known = solved_mechanism(mechanism)
     if not mechanism.inputs:
         known = solved_mechanism(known.completed_mechanism)
@@ -73,8 +74,12 @@ def solve(mechanism: Mechanism, drives: Mapping[str, float] | Sequence[Drive] = 
             return here.state(found.z, known.remarks)
         except NoAnswer as problem:
             raise known.structure_refusal(problem) or problem from None
-    there = here.with_inputs_of(replace_inputs(mechanism, tuple(drives)))
-    z = known.nearby_positions.unknowns_at(there.inputs.u) if there.unit == here.unit else None
+    moved = replace_inputs(mechanism, tuple(drives))
+    quick = known.nearby_positions.position_at(moved)
+    if quick is not None:
+        return here.state_of(quick, known.remarks, moved)
+    there = here.with_inputs_of(moved)
+    z = known.nearby_positions.unknowns_at(there.inputs.u.tolist()) if there.unit == here.unit else None
     if z is not None:
         return there.state(z, known.remarks)
     from planar.solving.continuation.path import follow_straight  # most ways are surely regular
@@ -285,11 +290,12 @@ class PositionSolver(PreparedMechanism):
     def _fast_state(self, z: Array, remarks: tuple[str, ...]) -> State | None:
         """The state by the acceptance test alone, where that finds nothing to look at."""
         found = fast_position(self, z)
-        if found is None:
-            return None
+        return None if found is None else self.state_of(found, remarks, self.mechanism)
+
+    def state_of(self, found: FastPosition, remarks: tuple[str, ...], mechanism: Mechanism) -> State:
+        """The state of a position that is surely sound, of a mechanism that may have other inputs."""
         frames, own = lazy_frames(self, found.coordinate_rates.T)
-        mobility = len(self.inputs.u)
-        return State(self.mechanism, mobility, found.residual, remarks, frames, own, self.shapes)
+        return State(mechanism, len(self.inputs.u), found.residual, remarks, frames, own, self.shapes)
 
     def end_refusal(self, u: Array, point: CurvePoint, ending: TrackingEnd) -> NoAnswer:
         """What to say of a motion that ends at inputs u, and went as far as a point."""

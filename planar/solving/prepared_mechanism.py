@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple, Self
 
@@ -78,8 +78,7 @@ class PreparedMechanism:
 
     def with_inputs_of(self, mechanism: Mechanism) -> Self:
         """The same for a mechanism that differs from this one in its inputs' numbers alone."""
-        lawful = any(given.law is not None for given in mechanism.inputs)
-        if lawful or not self.has_extent:
+        if not self.keeps_its_numbers(mechanism):
             there = type(self)(mechanism)
             there.__dict__["stops"] = self.stops
             return there.with_functions(self.functions) if self.is_deflated else there
@@ -88,6 +87,10 @@ class PreparedMechanism:
         there.mechanism, there.residual_check = mechanism, self.residual_check.with_inputs_of(mechanism)
         there.inputs = PositionInputs(*self._inputs(mechanism), self.inputs.p)
         return there
+
+    def keeps_its_numbers(self, mechanism: Mechanism) -> bool:
+        """Whether its size and all numbers but the inputs' are those of a mechanism with other inputs, too."""
+        return self.has_extent and all(given.law is None for given in mechanism.inputs)
 
     def with_functions(self, program: EquationFunctions) -> Self:
         """The same with more constraints, which hold wherever its own do on the motion; see `solving.deflation`."""
@@ -172,10 +175,15 @@ class PreparedMechanism:
 
     def _inputs(self, mechanism: Mechanism) -> tuple[Array, Array, Array]:
         """Positions, velocities and accelerations of a mechanism's inputs (scaled)."""
-        by = [self.unit if slides else 1.0 for slides in self.structure.input_slides]
-        parts = [[value / size for value in given[1:4]] for given, size in zip(mechanism.inputs, by, strict=True)]
-        u, u1, u2 = np.array(parts, dtype=float).reshape(-1, 3).T.copy()
+        u, u1, u2 = np.array([*self.scaled_inputs(mechanism)], dtype=float).reshape(3, -1)
         return u, u1, u2
+
+    def scaled_inputs(self, mechanism: Mechanism) -> Iterator[list[float]]:
+        """Positions, velocities and accelerations of a mechanism's inputs, lengths in sizes."""
+        sizes = [self.unit if slides else 1.0 for slides in self.structure.input_slides]
+        yield [given.position / size for given, size in zip(mechanism.inputs, sizes, strict=True)]
+        yield [given.velocity / size for given, size in zip(mechanism.inputs, sizes, strict=True)]
+        yield [given.acceleration / size for given, size in zip(mechanism.inputs, sizes, strict=True)]
 
     @property
     def acceptance(self) -> AcceptanceFunctions | None:

@@ -107,7 +107,9 @@ def test_a_process_prints_writes_and_ends_as_the_command_does_within_this_one(wo
         written(folder, short, "short.json")
         ended = way(folder, *words)
         files = {file.name: file.read_bytes() for file in folder.iterdir()}
-        ways.append((ended.status, ended.out, ended.err, files))
+        # a process that has computed much evaluates by machine code, which rounds otherwise
+        out = re.sub(r"round-off \(\d\.\de-1[5-7]", "round-off (#", ended.out)
+        ways.append((ended.status, out, ended.err, files))
     assert ways[0] == ways[1]
 
 

@@ -21,6 +21,7 @@ from planar.codegen.instructions import MAX_INSTRUCTIONS, CosSin, expand_angle_s
 from planar.equations.mechanism_numbers import equation_structure
 from planar.foundation.errors import BadInput, Outcome
 from planar.foundation.instruction_list import InstructionList, UnsupportedOperation
+from planar.foundation.recorded_formula import formula_of_results
 from planar.model.mechanism import named_points
 from tests.builders import designs_around
 from tests.draws import first_cases, part
@@ -205,24 +206,54 @@ def test_blocks_too_large_for_expressions_are_solved_in_numbers_to_the_same(monk
             )
 
 
-def test_numpy_source_says_each_value_once_and_takes_names_again():
+def test_source_says_each_value_once_and_takes_names_again():
     made = InstructionList()
     a, b = (made.add_input(("p", k)) for k in range(2))
-    whole = made.add("mul", made.add("add", a, b), made.add("sqrt", b))
-    wanted = [made.add("neg", whole), made.add("minnum", whole, made.add_constant(2.0)), a]
+    root = made.add("sqrt", b)
+    whole = made.add("mul", made.add("add", a, b), root)
+    rest = made.add("mul", made.add("sub", root, a), root)
+    wanted = [made.add("neg", whole), made.add("minnum", whole, made.add("mul", rest, rest)), a]
     assert printed_formula.write_numpy(made, wanted, (a, b)).splitlines() == [
         "def values(x0, x1):",
-        "    r0 = x0 + x1",
-        "    r1 = sqrt(x1)",
-        "    r1 = r0 * r1",
-        "    r0 = -r1",
-        "    r1 = minnum(r1, (2.0))",
-        "    return (r0, r1, x0, )",
+        "    r0 = sqrt(x1)",
+        "    r1 = r0 * (x0 + x1)",
+        "    r0 = r0 * (r0 - x0)",
+        "    r2 = -r1",
+        "    r0 = r0 * r0",
+        "    r0 = minnum(r1, r0)",
+        "    return (r2, r0, x0, )",
     ]
     found = printed_formula.compile_numpy(made, wanted, (a, b))(np.array([1.0, 2.0]), 4.0)
-    np.testing.assert_allclose(np.stack(found), [[-10.0, -12.0], [2.0, 2.0], [1.0, 2.0]])
+    np.testing.assert_allclose(np.stack(found), [[-10.0, -12.0], [4.0, 0.0], [1.0, 2.0]])
     with pytest.raises(UnsupportedOperation, match="no atan"):
         printed_formula.write_numpy(made, [made.add("atan", a)], (a, b))
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_a_printed_formula_is_what_its_instructions_say_one_by_one(seed):
+    """Sums of products, roots, least and greatest values of random operands, some used once and some often."""
+    rng = np.random.default_rng(seed)
+    made: InstructionList[int] = InstructionList()
+    numbers = [made.add_input(k) for k in range(3)] + [made.add_constant(float(rng.normal()))]
+    arities = {"add": 2, "sub": 2, "mul": 2, "minnum": 2, "maxnum": 2, "less": 2, "where": 2, "abs": 1, "cos": 1}
+    for _ in range(60):
+        operation = str(rng.choice([*arities]))
+        numbers.append(
+            made.add(
+                operation,
+                *(numbers[-int(rng.integers(1, min(9, len(numbers) + 1)))] for _ in range(arities[operation])),
+            )
+        )
+    wanted = [int(number) for number in rng.choice(numbers, 5)]
+    formula = formula_of_results(made, wanted)
+    function = printed_formula.FormulaFunction(formula, (2, 1), ((1, len(wanted)),))
+    places = rng.normal(size=(3, 9))
+    one_by_one = np.array([formula.evaluate(place.tolist()) for place in places.T], dtype=float).T
+    for _ in range(printed_formula.MAX_INTERPRETED_CALLS + 2):  # printed in the end
+        floats = [function.values(place[:2].tolist(), place[2:].tolist()) for place in places.T]
+        np.testing.assert_array_equal(np.transpose(floats), one_by_one)
+        arrays = function.evaluate_entries(9, places[:2], places[2:])
+        np.testing.assert_allclose(arrays, one_by_one, rtol=1e-13, atol=1e-13)
 
 
 # how much is printed

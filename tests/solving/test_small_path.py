@@ -138,11 +138,11 @@ def test_a_position_beside_a_dead_point_is_left_to_the_general_path():
 def test_where_a_drive_leads_does_not_depend_on_what_was_asked_for_before():
     first, second = SolvedMechanism(mechanism()), SolvedMechanism(mechanism())
     for theta in (5.1, 1.3, -2.0, 2.0):
-        first.nearby_positions.unknowns_at(np.array([theta]))
+        first.nearby_positions.unknowns_at([theta])
     for theta in (1.05, 2.0, 4.7, -0.9):
         np.testing.assert_array_equal(
-            first.nearby_positions.unknowns_at(np.array([theta])),
-            second.nearby_positions.unknowns_at(np.array([theta])),
+            first.nearby_positions.unknowns_at([theta]),
+            second.nearby_positions.unknowns_at([theta]),
         )
 
 
@@ -152,7 +152,80 @@ def test_a_drive_leads_where_following_does():
     for theta in (1.0, 1.01, 1.125, 3.0, -4.0, 30.0):
         u = np.array([theta])
         wanted = path.follow_to(here, here.inputs.p, known.assembly.z, here.inputs.u, u)
-        np.testing.assert_allclose(known.nearby_positions.unknowns_at(u), wanted, atol=1e-12)
+        np.testing.assert_allclose(known.nearby_positions.unknowns_at([theta]), wanted, atol=1e-12)
+
+
+@pytest.mark.parametrize("name", [*MODELS, "klann-leg", "watt-six-bar"])
+def test_a_drive_by_the_formula_of_one_step_is_the_state_to_which_following_leads(name):
+    """With positions, velocities and accelerations of its inputs, near and far, both ways."""
+    model = planar.load(name)
+    known = position.solved_mechanism(model)
+    here = known.solver
+    for _ in range(2 + int(here.acceptance._calls_before_fusing)):
+        planar.solve(model)
+    pair, rng = model.inputs[0].pair, np.random.default_rng(0)
+    by_formula = 0
+    for move in (0.01, -0.03, 0.11, 0.2, -0.3, 0.01, 0.125):
+        drive = Drive(pair, model.inputs[0].position + move * (here.unit if here.is_sliding(pair) else 1.0))
+        if rng.random() < 0.5:
+            drive = drive._replace(velocity=float(rng.normal()), acceleration=float(rng.normal()))
+        moved = replace_inputs(model, (drive,))
+        there = PositionSolver(moved)
+        quick = known.nearby_positions.position_at(moved)
+        try:
+            z = path.follow_to(here, here.inputs.p, known.assembly.z, here.inputs.u, there.inputs.u)
+        except planar.NoAnswer:
+            assert quick is None
+            continue
+        wanted, found = there.state(z), planar.solve(model, [drive])
+        assert found.mechanism == wanted.mechanism and found.residual <= there.tolerance
+        for point, state in wanted.points.items():
+            for order in ("position", "velocity", "acceleration"):
+                np.testing.assert_allclose(
+                    getattr(found.point(point), order), getattr(state, order), rtol=1e-9, atol=1e-9
+                )
+        if quick is not None:
+            by_formula += 1
+            np.testing.assert_allclose(
+                quick.coordinate_rates[0, list(here.equations.unknowns)], z, rtol=1e-11, atol=1e-11
+            )
+    assert by_formula >= 4
+
+
+def test_a_drive_beyond_a_dead_point_is_none_by_the_formula_of_one_step():
+    """Nor is one next to it, where its two branches come together."""
+    model = planar.load("four-bar")
+    known = position.solved_mechanism(model)
+    for _ in range(2 + int(known.solver.acceptance._calls_before_fusing)):
+        planar.solve(model)
+    limit = planar.cycle(model, steps=4).limits[-1].input
+    for beyond in (1e-3, 0.05, 0.4, -1e-7):
+        moved = replace_inputs(model, (Drive("A", limit + beyond),))
+        assert known.nearby_positions.position_at(moved) is None
+    assert known.nearby_positions.position_at(replace_inputs(model, (Drive("A", 1.2),))) is not None
+
+
+MIDDLE = 15
+
+
+@pytest.mark.parametrize("name", [*MODELS, "klann-leg", "double-butterfly", "watt-six-bar"])
+def test_a_run_from_within_is_the_two_runs_from_there(name):
+    here = PositionSolver(planar.load(name))
+    z = here.find_assembly().z
+    rows = here.inputs.u + np.linspace(-0.3, 0.2, 26)[:, None] * (np.arange(len(here.inputs.u)) == 0)
+    rows += here.inputs.u - rows[MIDDLE]
+    u1, u2 = np.ones_like(rows), np.zeros_like(rows)
+    for _ in range(3):
+        whole = fast_run(here, z, rows, u1, u2, MIDDLE)
+        down, up = (
+            fast_run(here, z, rows[way], u1[way], u2[way]) for way in (slice(MIDDLE, None, -1), slice(MIDDLE, None))
+        )
+        if len(down.z) + len(up.z) <= len(rows):
+            assert whole is None
+            continue
+        np.testing.assert_allclose(whole.z, np.vstack([down.z[::-1], up.z[1:]]), rtol=1e-11, atol=1e-11)
+        wanted = np.vstack([down.coordinate_rates[::-1], up.coordinate_rates[1:]])
+        np.testing.assert_allclose(whole.coordinate_rates, wanted, rtol=1e-8, atol=1e-8)
 
 
 def test_a_drive_through_a_dead_point_is_refused_as_before_and_again():

@@ -15,6 +15,7 @@ import numpy as np
 
 from planar.equations.acceptance import AcceptanceFunctions, InputSamples, Scales
 from planar.foundation.arrays import Array, BoolArray, IntArray
+from planar.foundation.recorded_formula import greatest_entries
 from planar.solving.checks.singular_values import SINGULAR_DISTANCE_RATIO
 
 
@@ -40,44 +41,51 @@ def keep_branch(
     squares: Array,
     block_starts: IntArray,
     ratio: float = SINGULAR_DISTANCE_RATIO,
-) -> BoolArray:
+) -> Array:
     """For each step, by the moves of its unknowns (steps, unknowns), whether it keeps to its branch; of its inputs the
     sums of squares (steps,). `ratio` says how many steps its ends together have to be from where a block is singular.
+
+    True or False, or recorded: then 1 or 0.
     """
     if not moves.shape[1]:
         return np.ones(len(moves), dtype=bool)
     with np.errstate(all="ignore"):  # what is not a number is no more than anything
-        is_far = (np.abs(before.distances) + np.abs(after.distances)).min(axis=1) > ratio
-        smooth = is_move_allowed(moves, before.rates, after.rates).all(axis=1)
-        return smooth & is_far & keep_signs(before, after) & keep_direction(before, after, squares, block_starts)
+        is_far = _all_of_step(np.abs(before.distances) + np.abs(after.distances) > ratio)
+        smooth = _all_of_step(is_move_allowed(moves, before.rates, after.rates))
+        return smooth * is_far * keep_signs(before, after) * keep_direction(before, after, squares, block_starts)
 
 
-def keep_signs(before: StepEnds, after: StepEnds) -> BoolArray:
+def _all_of_step(conditions: Array | BoolArray) -> Array:
+    """For each step whether all its conditions (steps, conditions) hold."""
+    hold: Array = np.multiply.reduce(conditions, axis=1, dtype=conditions.dtype)
+    return hold
+
+
+def keep_signs(before: StepEnds, after: StepEnds) -> Array:
     """For each step whether the determinant of every block keeps its sign.
 
     Of two assemblies that come near to each other before a dead point each has another one, so that no step leads from
     one to the other, however alike they are.
     """
-    kept: BoolArray = (np.signbit(before.distances) == np.signbit(after.distances)).all(axis=1)
-    return kept
+    return _all_of_step(before.distances * after.distances >= 0.0)
 
 
-def keep_direction(before: StepEnds, after: StepEnds, squares: Array, block_starts: IntArray) -> BoolArray:
+def keep_direction(before: StepEnds, after: StepEnds, squares: Array, block_starts: IntArray) -> Array:
     """For each step whether every block goes on as it came: less than a right angle between the tangents.
 
     Beside a limit both ends of a step may be closed, and any move allowed by rates that grow beyond all bounds there;
     but on the branch that comes back from the limit they have the other sign.
     """
-    turns = np.add.reduceat(before.rates * after.rates, block_starts, axis=1).min(axis=1)
-    onwards: BoolArray = turns + squares >= 0.0
-    return onwards
+    turns = np.add.reduceat(before.rates * after.rates, block_starts, axis=1)
+    return _all_of_step(turns + squares[:, None] >= 0.0)
 
 
-def is_move_allowed(move: Array, before: Array, after: Array) -> BoolArray:
+def is_move_allowed(move: Array, before: Array, after: Array) -> Array:
     """Whether a move is one that the rates at its two ends allow, each as a move over the whole step.
 
     A smooth move differs from the mean of the two by no more than they differ from one another, with room for the
     curvature between (a quarter of the greater) and a floor of round-off for what hardly moves.
     """
-    room = np.abs(after - before) + 0.25 * np.maximum(np.abs(before), np.abs(after)) + 1e-9
-    return np.abs(move - 0.5 * (before + after)) <= room
+    greater = greatest_entries(np.array([np.abs(before), np.abs(after)]))
+    allowed: Array = np.abs(move - 0.5 * (before + after)) <= np.abs(after - before) + 0.25 * greater + 1e-9
+    return allowed

@@ -2,17 +2,32 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
 
-from planar.equations.acceptance import AcceptanceFunctions, AcceptanceResult, InputSamples, JudgedPositions, Scales
+from planar.codegen.printed_formula import FormulaFunction
+from planar.equations.acceptance import (
+    RESULT_COUNT,
+    AcceptanceFunctions,
+    AcceptanceResult,
+    InputSamples,
+    JudgedPositions,
+    Scales,
+)
+from planar.equations.closed_form_assemblies import SETTLED_STEP
+from planar.equations.constraint_check import ORDERS
+from planar.equations.functions import MAX_CACHED_STRUCTURES
 from planar.foundation.arrays import Array, BoolArray
+from planar.foundation.recorded_formula import formula_of_results, greatest_entries, number_of, recorded_arguments
 from planar.solving.checks.branch_check import StepEnds, keep_branch, step_ends
 from planar.solving.checks.residual_check import CONTACT_TOLERANCE, EPS, NEGLIGIBLE_ERROR
 from planar.solving.prepared_mechanism import PreparedMechanism
 
 if TYPE_CHECKING:
+    from planar.model.mechanism import Mechanism
     from planar.solving.stops import PairStops
 
 MIN_FAST_REGULARITY = 1e-3
@@ -73,8 +88,11 @@ class FastSamples(NamedTuple):
 
     def padded(self, before: int, after: int) -> FastSamples:
         """With so many more rows at the ends of which nothing is told."""
-        many = ((before, after), (0, 0), (0, 0))
-        return FastSamples(np.pad(self.coordinate_rates, many), np.pad(self.is_sure, many[0]), self.residual)
+        rows = slice(before, before + len(self.is_sure))
+        coordinate_rates: Array = np.zeros((rows.stop + after, *self.coordinate_rates.shape[1:]))
+        is_sure: BoolArray = np.zeros(rows.stop + after, dtype=bool)
+        coordinate_rates[rows], is_sure[rows] = self.coordinate_rates, self.is_sure
+        return FastSamples(coordinate_rates, is_sure, self.residual)
 
     def reversed(self) -> FastSamples:
         """The rows in the opposite order, velocities turned round."""
@@ -124,23 +142,24 @@ class FastRun(NamedTuple):
     residual: float
 
 
-def fast_run(setup: FastSolver, z: Array, u: Array, u1: Array, u2: Array) -> FastRun | None:
+def fast_run(setup: FastSolver, z: Array, u: Array, u1: Array, u2: Array, at: int = 0) -> FastRun | None:
     """A run of inputs (rows, inputs) with rates u1, u2 from the unknowns of its first row, as far as its rows are
-    closed and keep to the branch. None for a structure that is not computed block after block."""
+    closed and keep to the branch; or from those of a row `at` within it, if all rows are and do. None for a structure
+    that is not computed block after block."""
     functions, scales = setup.acceptance, setup.acceptance_scales
     if functions is None or not u.size:
         return None
     way, steps = _straight_way(u), np.diff(u, axis=0)
     along = None if way is None else _along(way.axis, u1, u2)
     if way is not None and along is not None:
-        samples, judged = _run_along(functions, z, u, way.axis, scales)
+        samples, judged = _run_along(functions, z, u, way.axis, scales, at)
         w, w1, w2 = judged.coordinate_rates.transpose(1, 0, 2)
         first, second = along
         with np.errstate(all="ignore"):  # at a dead point rates are no numbers
             coordinate_rates = np.stack([w, w1 * first, w2 * first * first + w1 * second], axis=1)
         ends = _ends_along(functions, judged, way.gone)
     else:
-        samples, judged = functions.run(z, InputSamples(u, u1, u2), scales)
+        samples, judged = functions.run(z, InputSamples(u, u1, u2), scales, at)
         coordinate_rates = judged.coordinate_rates
         ends = (
             step_ends(functions, samples[:-1], u[:-1], steps, scales),
@@ -157,15 +176,17 @@ def fast_run(setup: FastSolver, z: Array, u: Array, u1: Array, u2: Array) -> Fas
         accepted &= setup.stops.sure_rows(setup.stop_positions(samples, u), samples)
         accepted[1:] &= np.abs(steps).max(axis=1, initial=0.0) <= MAX_SURE_MOVE
     count = _count_first(accepted)
+    if at and count < len(u):
+        return None
     residual = float(result.residual[:count].max(initial=0.0))
     return FastRun(samples[:count], coordinate_rates[:count], is_sure[:count], residual)
 
 
 def _run_along(
-    functions: AcceptanceFunctions, z: Array, u: Array, axis: Array, scales: Scales
+    functions: AcceptanceFunctions, z: Array, u: Array, axis: Array, scales: Scales, at: int = 0
 ) -> tuple[Array, JudgedPositions]:
     """A run of inputs along an axis, judged while they move along it evenly."""
-    return functions.run(z, InputSamples(u, np.broadcast_to(axis, u.shape), np.zeros_like(u)), scales)
+    return functions.run(z, InputSamples(u, np.broadcast_to(axis, u.shape), np.zeros_like(u)), scales, at)
 
 
 def _count_first(accepted: BoolArray) -> int:
@@ -202,8 +223,11 @@ def _along(axis: Array, u1: Array, u2: Array) -> tuple[Array, Array] | None:
 
 def _ends_along(functions: AcceptanceFunctions, judged: JudgedPositions, gone: Array) -> tuple[StepEnds, StepEnds]:
     """What is known at both ends of steps so far along the axis by which positions were judged."""
-    rates, distances = judged.coordinate_rates[:, 1, functions.unknown_columns], judged.distances
-    step = gone[:, None]
+    return _ends(judged.coordinate_rates[:, 1, functions.unknown_columns], judged.distances, gone[:, None])
+
+
+def _ends(rates: Array, distances: Array, step: Array) -> tuple[StepEnds, StepEnds]:
+    """The same by the rates of unknowns and the distances along the axis; `step` (steps, 1)."""
     with np.errstate(all="ignore"):  # a step to the same place
         return (
             StepEnds(rates[:-1] * step, distances[:-1] / np.abs(step)),
@@ -229,6 +253,31 @@ def _is_closed(result: AcceptanceResult[Any], tolerance: float) -> Any:
     return (result.residual <= tolerance) & (result.finite_sum - result.finite_sum == 0.0)
 
 
+class _KeptPosition(NamedTuple):
+    """A position that is kept: unknowns, rates of these along the way, and how far along it each block is regular."""
+
+    z: Array
+    rates: Array
+    distances: Array
+
+
+class _KeptWay(NamedTuple):
+    """A straight way of the inputs: its axis, how far it goes, and how many strides lead to its last kept position."""
+
+    axis: tuple[float, ...]
+    reach: float
+    last_stride: int
+
+
+def _rates_along(axis: Sequence[float], u1: list[float], u2: list[float]) -> tuple[float, float] | None:
+    """First and second rates of inputs as multiples of an axis; None where they are none."""
+    square = sum(part * part for part in axis) or 1.0
+    first, second = (sum(a * b for a, b in zip(rates, axis, strict=False)) / square for rates in (u1, u2))
+    if [first * part for part in axis] != u1 or [second * part for part in axis] != u2:
+        return None
+    return first, second
+
+
 class StraightPathCache:
     """Positions at even distances along straight ways that lead away from one position, each made when it is needed.
 
@@ -237,42 +286,87 @@ class StraightPathCache:
     """
 
     def __init__(self, setup: PreparedMechanism, z: Array):
-        self.setup, self.z, self.start = setup, z, setup.inputs.u
+        self.setup, self.z, self.start = setup, z, setup.inputs.u.tolist()
         self.max_positions = max(MAX_STORED_NUMBERS // max(len(z), 1), MIN_STORED_POSITIONS)
-        self._kept: dict[tuple[float, ...], dict[int, Array | None]] = {}
+        self._kept: dict[tuple[float, ...], dict[int, _KeptPosition | None]] = {}
+        self._step_arguments: dict[tuple[tuple[float, ...], int], list[list[float]]] = {}
 
-    def unknowns_at(self, stop: Array) -> Array | None:
+    def unknowns_at(self, stop: Sequence[float]) -> Array | None:
         """The unknowns to which the straight way to other inputs leads; None where not all of it is surely sound."""
-        if self.setup.acceptance is None or self.setup.stops is not None:
+        way = self._straight_way(stop)
+        if way.reach == 0.0:
+            return None if self.setup.acceptance is None or self.setup.stops is not None else self.z
+        kept = self._last_kept(way)
+        last = kept and self._walk(kept.z, np.array([way.last_stride * STEP_LENGTH, way.reach]), way.axis)[1]
+        return last and last.z
+
+    def position_at(self, mechanism: Mechanism) -> FastPosition | None:
+        """The position with its rates to which the straight way to the inputs of a mechanism leads, if it is surely
+        sound and they move along that way, by the formula of one step; None where that does not pay yet."""
+        functions = self.setup.acceptance
+        if functions is None or not (functions.has_one_formula and functions.has_closed_forms):
             return None
-        way = stop - self.start
-        reach = max(map(abs, way.tolist()), default=0.0)
-        if reach == 0.0:
-            return self.z
-        many = int(reach / STEP_LENGTH)
-        if not many <= self.max_positions:
+        if not self.setup.keeps_its_numbers(mechanism):
             return None
-        axis = way / reach
-        key = tuple(axis.tolist())
-        kept = self._kept.get(key)
+        stop, u1, u2 = self.setup.scaled_inputs(mechanism)
+        way = self._straight_way(stop)
+        place = way.last_stride * STEP_LENGTH
+        along = _rates_along(way.axis, u1, u2)
+        kept = self._last_kept(way) if along is not None and way.reach > place else None
+        if along is None or kept is None:
+            return None
+        key = way.axis, way.last_stride
+        known = self._step_arguments.get(key)
+        if known is None:
+            u = np.array(self.start) + place * np.array(way.axis)
+            known = self._step_arguments[key] = [
+                functions.signs_at(kept.z, u, self.setup.inputs.p),
+                *(part.tolist() for part in kept),
+                [*way.axis],
+                *(part.tolist() for part in self.setup.acceptance_scales),
+            ]
+        values = _step_formula(functions).values(*known, [way.reach - place, *along], stop)
+        keeps_branch, greatest_move, *of_result = values[: RESULT_COUNT + 2]
+        result: AcceptanceResult[float] = AcceptanceResult(*of_result)
+        is_regular = greatest_move <= SETTLED_STEP and result.least_singular_value > MIN_SINGULAR_VALUE
+        if not (keeps_branch and is_regular and _is_sure(result, self.setup.tolerance)):
+            return None
+        return FastPosition(np.array(values[RESULT_COUNT + 2 :]).reshape(ORDERS, -1), result.residual)
+
+    def _straight_way(self, stop: Sequence[float]) -> _KeptWay:
+        way = [there - here for there, here in zip(stop, self.start, strict=True)]
+        reach = max(map(abs, way), default=0.0)
+        return _KeptWay(tuple([gone / reach for gone in way]) if reach else (), reach, int(reach / STEP_LENGTH))
+
+    def _last_kept(self, way: _KeptWay) -> _KeptPosition | None:
+        """The last kept position on a way; None where what leads there is not surely sound."""
+        many = way.last_stride
+        if self.setup.acceptance is None or self.setup.stops is not None or many > self.max_positions:
+            return None
+        kept = self._kept.get(way.axis)
         if kept is None:
             if len(self._kept) >= MAX_DIRECTIONS:
                 self._kept.clear()
-            kept = self._kept[key] = {0: self.z}
-        known = max(kept)
-        while known < many and (z := kept[known]) is not None:
-            strides = np.arange(known, min(known + STRIDES_AT_ONCE, self.max_positions) + 1)
-            samples = self._walk(z, strides * STEP_LENGTH, axis)
-            kept.update(zip(strides.tolist(), samples, strict=True))
+                self._step_arguments.clear()
+            kept = self._kept[way.axis] = {}
+        known, start = max(kept, default=-1), self.z
+        while known < many:
+            if known >= 0:
+                before = kept[known]
+                if before is None:
+                    return None
+                start = before.z
+            strides = np.arange(max(known, 0), min(max(known, 0) + STRIDES_AT_ONCE, self.max_positions) + 1)
+            kept.update(zip(strides.tolist(), self._walk(start, strides * STEP_LENGTH, way.axis), strict=True))
             known = int(strides[-1])
-        z = kept.get(many)
-        return None if z is None else self._walk(z, np.array([many * STEP_LENGTH, reach]), axis)[1]
+        return kept.get(many)
 
-    def _walk(self, z: Array, places: Array, axis: Array) -> list[Array | None]:
-        """The unknowns at places along an axis, from those at the first as far as each step is surely sound."""
+    def _walk(self, z: Array, places: Array, along: Sequence[float]) -> list[_KeptPosition | None]:
+        """The positions at places along an axis, from the unknowns at the first as far as each step is surely sound."""
         functions = self.setup.acceptance
         assert functions is not None
-        u, scales = self.start + places[:, None] * axis, self.setup.acceptance_scales
+        axis, scales = np.array(along), self.setup.acceptance_scales
+        u = np.array(self.start) + places[:, None] * axis
         samples, judged = _run_along(functions, z, u, axis, scales)
         result, gone = judged.result, np.diff(places)
         with np.errstate(all="ignore"):  # of what is not finite
@@ -281,4 +375,32 @@ class StraightPathCache:
         ratio = MIN_SINGULAR_DISTANCE_RATIO
         accepted[1:] &= keep_branch(np.diff(samples, axis=0), *ends, squares, functions.block_starts, ratio)
         count = _count_first(accepted)
-        return [*samples[:count], *[None] * (len(samples) - count)]
+        rates = judged.coordinate_rates[:, 1, functions.unknown_columns]
+        kept = [_KeptPosition(*parts) for parts in zip(samples[:count], rates, judged.distances, strict=False)]
+        return [*kept, *[None] * (len(samples) - count)]
+
+
+@lru_cache(maxsize=MAX_CACHED_STRUCTURES)
+def _step_formula(functions: AcceptanceFunctions) -> FormulaFunction:
+    """(signs of blocks, the kept position, axis, scales, how far along it from that position with first and second
+    rate, inputs) -> whether the step keeps to its branch, the greatest move by Newton's method, what is judged,
+    and coordinates with their rates in time."""
+    unknowns, inputs = len(functions.unknown_columns), len(functions.equations.input_kinds)
+    blocks, distances = functions.block_count, len(functions.block_starts)
+    counts = blocks, unknowns, unknowns, distances, inputs, *functions.scale_counts, 3, inputs
+    instructions, (signs, *kept, axis, p, row_scale, floor, along, u) = recorded_arguments(counts)
+    gone, first, second = np.split(along, 3)
+    before = _KeptPosition(*kept)
+    step = functions.record_step(
+        signs, before.z, InputSamples(u, axis, np.zeros_like(axis)), Scales(p, row_scale, floor)
+    )
+    judged = step.judged
+    w, w1, w2 = judged.coordinate_rates[0]
+    both = np.stack([before.rates, w1[functions.unknown_columns]]), np.stack([before.distances, judged.distances[0]])
+    ends = _ends(*both, np.array([gone]))
+    squares = gone * gone * np.sum(axis * axis, keepdims=True)
+    keeps = keep_branch((step.z - before.z)[None], *ends, squares, functions.block_starts, MIN_SINGULAR_DISTANCE_RATIO)
+    results = [*keeps, *greatest_entries(np.abs(step.moves)[:, None]), *(values[0] for values in judged.result)]
+    results += [*w, *(w1 * first), *(w2 * first * first + w1 * second)]
+    formula = formula_of_results(instructions, [number_of(result, instructions) for result in results])
+    return FormulaFunction(formula, counts, ((1, len(results)),))

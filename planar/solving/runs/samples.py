@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from planar.equations.acceptance import InputSamples
 from planar.foundation.arrays import Array, IntArray
 from planar.foundation.errors import NoAnswer, Outcome
 from planar.foundation.jets import Jet
@@ -15,7 +16,7 @@ from planar.model.mechanism import Drive, replace_inputs
 from planar.model.wording import count_phrase
 from planar.results.motion import FollowedPath, Motion
 from planar.results.records import InputMotion, ThirdRates
-from planar.solving.checks.residual_check import MAX_RATE_ERROR
+from planar.solving.checks.residual_check import CONTACT_TOLERANCE, MAX_RATE_ERROR
 from planar.solving.continuation.change_point_remarks import change_point_remarks
 from planar.solving.continuation.fast_path import FastSamples, concatenate_samples
 from planar.solving.continuation.path import FollowedSamples
@@ -144,7 +145,10 @@ def build_motion(
         parts, residual = list(told.coordinate_rates.transpose(1, 0, 2)), told.residual
     elif told is not None:
         rest = np.flatnonzero(~told.is_sure)
-        looked_at, residual, remarks = _checked_rates(solver, run.select(rest), with_jerk, bool(told.is_sure.any()))
+        some = run.select(rest)
+        looked_at, residual, remarks = _rates_at_dead_points(solver, some) or _checked_rates(
+            solver, some, with_jerk, bool(told.is_sure.any())
+        )
         whole = told.coordinate_rates.copy()
         whole[rest] = np.stack(looked_at, axis=1)
         parts, residual = list(whole.transpose(1, 0, 2)), max(residual, told.residual)
@@ -197,6 +201,20 @@ class _CheckedRates(NamedTuple):
     coordinate_rates: list[Array]
     residual: float
     remarks: tuple[str, ...] = ()
+
+
+def _rates_at_dead_points(solver: PositionSolver, run: RunSamples) -> _CheckedRates | None:
+    """Rows that are all dead points, which have no rates, by the acceptance test; None where it does not tell."""
+    if solver.acceptance is None or len(run.dead_points) < len(run.z):
+        return None
+    w: Array = np.full((3, len(run.z), len(solver.scale)), np.nan)
+    residual = 0.0
+    for row, (z, *given) in enumerate(zip(run.z, *run.inputs[:3], strict=True)):
+        coordinate_rates, judged = solver.acceptance.position(z, InputSamples(*given), solver.acceptance_scales)
+        w[0, row], residual = coordinate_rates[0], max(residual, judged.residual)
+        if not (judged.residual <= solver.tolerance and judged.contact_gap <= CONTACT_TOLERANCE):
+            return None
+    return _CheckedRates([*w], residual)
 
 
 def _checked_rates(solver: PositionSolver, run: RunSamples, with_jerk: bool, is_part: bool = False) -> _CheckedRates:
