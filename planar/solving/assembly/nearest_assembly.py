@@ -24,7 +24,7 @@ EQUAL_DISTANCE_TOLERANCE = 1e-9
 """Assemblies whose sums of squared distances to the sketch (sizes squared) agree to this fit alike."""
 MAX_TIED = 64
 """Assemblies that fit alike among which one is looked for whose rates are determined."""
-MAX_BEST_FIRST_EFFORT = 1500.0
+MAX_BEST_FIRST_EFFORT = 3000.0
 """The effort (steps of Newton's method) on blocks that were solved before, with earlier blocks elsewhere, up to which
 the search looks for a nearer assembly; beyond it takes the best partial one to an end."""
 MAX_REPEATED_EFFORT = 1.2 * MAX_BEST_FIRST_EFFORT
