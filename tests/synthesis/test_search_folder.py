@@ -27,10 +27,16 @@ TASK = {
 }
 
 
+def set_small_search(patch):
+    """Few designs; and no machine code, which rounds otherwise than numpy, so that numbers are the same to the bit."""
+    patch.setattr("planar.codegen.printed_formula.MAX_COMPILED_INSTRUCTIONS", 0)
+    for name, value in SETTINGS.items():
+        patch.setattr(f"planar.synthesis.synthesise.{name}", value)
+
+
 @pytest.fixture(autouse=True)
 def few_designs(monkeypatch):
-    for name, value in SETTINGS.items():
-        monkeypatch.setattr(f"planar.synthesis.synthesise.{name}", value)
+    set_small_search(monkeypatch)
 
 
 @pytest.fixture(scope="module")
@@ -38,8 +44,7 @@ def whole(tmp_path_factory):
     """A search that nothing stopped, with its folder, and how many designs were judged."""
     folder, judged = tmp_path_factory.mktemp("whole") / "designs", []
     with pytest.MonkeyPatch.context() as patch:
-        for name, value in SETTINGS.items():
-            patch.setattr(f"planar.synthesis.synthesise.{name}", value)
+        set_small_search(patch)
         stop_at(patch, None, judged)
         found = planar.synthesise(TASK, many=2, seed=5, folder=folder)
     return found, folder, len(judged)
