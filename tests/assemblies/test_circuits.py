@@ -337,6 +337,11 @@ def test_several_inputs_run_one_at_a_time():
     )
 
 
+def zeros_of(function, low, high):
+    """The zeros of a function of one place."""
+    return find_zeros(lambda places: [function(at) for at in places], low, high)
+
+
 def test_zeros_are_found_however_near_to_each_other_and_to_the_ends():
     rng = np.random.default_rng(3)
     for _ in range(40):
@@ -347,7 +352,7 @@ def test_zeros_are_found_however_near_to_each_other_and_to_the_ends():
             factor = np.prod([x - each for each in at]) * (2.0 + sqrt(x) + sqrt(2.0 - x) * x)
             return SignedLog(float(np.sign(factor)), float(np.log(abs(factor))) if factor else -np.inf)
 
-        found = find_zeros(function, 0.0, 2.0)
+        found = zeros_of(function, 0.0, 2.0)
         assert found.is_complete
         assert found.touched == ()
         assert found.crossed == pytest.approx(at, abs=1e-11)
@@ -359,7 +364,7 @@ def test_a_function_that_touches_zero_is_told_from_one_that_does_not(lift):
         value = (x - 0.3) ** 2 * (x + 2.0) + lift
         return SignedLog(float(np.sign(value)), float(np.log(abs(value))) if value else -np.inf)
 
-    found = find_zeros(function, -1.0, 1.0)
+    found = zeros_of(function, -1.0, 1.0)
     assert found.crossed == ()
     assert found.touched == (() if lift else pytest.approx((0.3,) * len(found.touched), abs=1e-6))
     assert bool(found.touched) is not bool(lift)
@@ -367,7 +372,7 @@ def test_a_function_that_touches_zero_is_told_from_one_that_does_not(lift):
 
 @pytest.mark.parametrize("place", np.random.default_rng(6).uniform(-1.0, 1.0, 20))
 def test_a_jump_is_not_taken_for_a_function_that_is_known(place):
-    assert not find_zeros(lambda x: SignedLog(1.0 if x < place else -1.0, 0.0), -1.0, 1.0).is_complete
+    assert not zeros_of(lambda x: SignedLog(1.0 if x < place else -1.0, 0.0), -1.0, 1.0).is_complete
 
 
 def test_of_many_blocks_that_hang_on_one_another_the_own_circuit_alone_is_listed():

@@ -40,6 +40,7 @@ POSES = np.array([100j, -40 + 190j, -130 + 120j]) * 1e-3, np.exp(1j * np.radians
 @pytest.fixture(autouse=True)
 def few_designs(monkeypatch):
     monkeypatch.setattr("planar.synthesis.exact.exact_synthesis.FAMILY_DESIGNS", 2)
+    monkeypatch.setattr("planar.synthesis.synthesise.DRAWS", 600)
 
 
 def searched(value):

@@ -7,7 +7,7 @@ Trefethen, Approximation Theory and Approximation Practice, 2013; J. Boyd, SIAM 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import lru_cache
 from math import isfinite, pi, sin
 from typing import NamedTuple
@@ -57,8 +57,9 @@ class Zeros(NamedTuple):
     is_complete: bool
 
 
-def find_zeros(function: Callable[[float], SignedLog], low: float, high: float) -> Zeros:
-    """Every zero of a function between two places, at which it may have square roots."""
+def find_zeros(function: Callable[[Sequence[float]], Sequence[SignedLog]], low: float, high: float) -> Zeros:
+    """Every zero between two places of a function, which may have square roots there; it is computed at many places at
+    once."""
     middle, half = 0.5 * (low + high), 0.5 * (high - low)
 
     def place(phi: float) -> float:
@@ -72,7 +73,7 @@ def find_zeros(function: Callable[[float], SignedLog], low: float, high: float) 
         if not waiting:
             break
         first, last = waiting.pop()
-        values = [function(place(phi)) for phi in _nodes_between(first, last)]
+        values = function([place(phi) for phi in _nodes_between(first, last)])
         greatest = float(np.max([each.log for each in values]))
         if not isfinite(greatest):
             return Zeros(tuple(crossed), tuple(touched), False)
@@ -94,7 +95,7 @@ def find_zeros(function: Callable[[float], SignedLog], low: float, high: float) 
         before = float(chebyshev.chebval(1.0, series)), greatest
 
         def scaled(phi: float, greatest: float = greatest) -> float:
-            value = function(place(phi))
+            (value,) = function([place(phi)])
             return value.sign * float(np.exp(min(value.log - greatest, 300.0)))
 
         phis = 0.5 * (first + last) + 0.5 * (last - first) * places

@@ -67,6 +67,10 @@ def critical_positions(setup: PreparedMechanism, index: int) -> CriticalPosition
     return _DeadPointSearch(setup, index).search()
 
 
+class _PlacesDiffer(Exception):
+    """Blocks have other assemblies at some places of the input than at others, or are solved at one place at a time."""
+
+
 class _DeadPointSearch:
     """The dead points of one mechanism; positions of the input are in rad and sizes here."""
 
@@ -81,7 +85,7 @@ class _DeadPointSearch:
         self.budget = MAX_SOLVED_BLOCKS
         reach = SLIDE_REACH_RATIO * sum(setup.reach.values()) or 1.0
         self.span = (-reach, reach) if self.slides else (TURN_START, TURN_START + 2.0 * pi)
-        self._reached: dict[tuple[float, tuple[int, ...]], list[tuple[DyadChoices, Array]]] = {}
+        self._reached: dict[tuple[tuple[float, ...], tuple[int, ...]], list[tuple[DyadChoices, Array]]] = {}
 
     def search(self) -> CriticalPositions:
         found: list[list[float]] = []
@@ -137,54 +141,60 @@ class _DeadPointSearch:
         """The zeros of N of a block between two places where the blocks before it have dead points, for each choice."""
         kept: dict[float, dict[DyadChoices, SignedLog]] = {}
 
-        def values(at: float) -> dict[DyadChoices, SignedLog]:
-            if at not in kept:
-                kept[at] = self._discriminants(level, at)
-            return kept[at]
+        def keep(places: Sequence[float]) -> None:
+            missing = tuple(at for at in places if at not in kept)
+            if missing:
+                kept.update(zip(missing, self._discriminants(level, missing), strict=True))
 
-        choices = set(values(0.5 * (low + high)))
+        middle = 0.5 * (low + high)
+        keep([middle])
+        choices = set(kept[middle])
         for each in sorted(choices):
 
-            def value(at: float, each: DyadChoices = each) -> SignedLog:
-                found = values(at)
-                if set(found) != choices:
+            def values(places: Sequence[float], each: DyadChoices = each) -> list[SignedLog]:
+                keep(places)
+                if any(set(kept[at]) != choices for at in places):
                     raise DeadPointsUnclaimed("the groups before it have others than were found")
-                return found[each]
+                return [kept[at][each] for at in places]
 
-            yield find_zeros(value, low, high)
+            yield find_zeros(values, low, high)
 
-    def _discriminants(self, level: int, at: float) -> dict[DyadChoices, SignedLog]:
-        """N of a block with the input at a place, for each choice before it."""
+    def _discriminants(self, level: int, places: tuple[float, ...]) -> list[dict[DyadChoices, SignedLog]]:
+        """N of a block with the input at some places, for each choice before it."""
         over = time_is_over()
         if over:
             raise DeadPointsUnclaimed(over)
-        found: dict[DyadChoices, SignedLog] = {}
-        u = self._inputs_at(at)
-        for choices, z in self._earlier_assemblies(level, at):
-            sign, size = self._discriminant(level, z, u)
-            before = found.get(choices, SignedLog(1.0, 0.0))
-            found[choices] = SignedLog(before.sign * sign, before.log + size)
+        found: list[dict[DyadChoices, SignedLog]] = [{} for _ in places]
+        u = self._inputs_at(places)
+        try:
+            earlier = self._earlier_assemblies(level, places)
+        except _PlacesDiffer:
+            return [self._discriminants(level, (at,))[0] for at in places]
+        for choices, z in earlier:
+            for of_place, (sign, size) in zip(found, self._discriminant(level, z, u), strict=True):
+                before = of_place.get(choices, SignedLog(1.0, 0.0))
+                of_place[choices] = SignedLog(before.sign * sign, before.log + size)
         return found
 
-    def _inputs_at(self, at: float) -> Array:
-        u = self.setup.inputs.u.copy()
-        u[self.index] = at
+    def _inputs_at(self, places: Sequence[float]) -> Array:
+        u = np.repeat(self.setup.inputs.u[None], len(places), axis=0)
+        u[:, self.index] = places
         return u
 
-    def _earlier_assemblies(self, level: int, at: float) -> list[tuple[DyadChoices, Array]]:
-        """Every assembly of the blocks on which one hangs."""
-        found: list[tuple[DyadChoices, Array]] = [((), np.zeros(len(self.setup.equations.unknowns)))]
-        u = self._inputs_at(at)
+    def _earlier_assemblies(self, level: int, places: tuple[float, ...]) -> list[tuple[DyadChoices, Array]]:
+        """Every assembly (places, unknowns) of the blocks on which one hangs."""
+        found: list[tuple[DyadChoices, Array]] = [((), np.zeros((len(places), len(self.setup.equations.unknowns))))]
+        u = self._inputs_at(places)
         earlier = tuple(sorted(self.dependencies[level]))
         for k, group in enumerate(earlier):
-            key = at, earlier[: k + 1]
+            key = places, earlier[: k + 1]
             if key not in self._reached:
                 own = self.stages[group].unknowns
                 following: list[tuple[DyadChoices, Array]] = []
                 for choices, z in found:
                     for choice, values in self._assemblies(group, z, u):
                         there = z.copy()
-                        there[own] = values
+                        there[:, own] = values
                         following.append(((*choices, choice), there))
                 self._reached[key] = following
             found = self._reached[key]
@@ -196,46 +206,52 @@ class _DeadPointSearch:
             raise DeadPointsUnclaimed("there are too many choices before it")
 
     def _assemblies(self, level: int, z: Array, u: Array) -> list[tuple[int, Array]]:
-        """The assemblies of one block, those before it given: which of two closed forms, and the unknowns."""
+        """The assemblies of one block, those before it given (places, unknowns): which of two closed forms, and the
+        unknowns (places, own unknowns)."""
         stage, setup = self.stages[level], self.setup
-        self._spend(1)
+        self._spend(len(z))
         closed = setup.functions.block_assemblies(stage)
         if closed is not None:
-            both, left, bend = closed(z, u, setup.inputs.p)
-            if not bend < 1.0:
+            both, left, bend = closed.of_designs(z, u, setup.inputs.p)
+            exists = bend < 1.0
+            if not exists.any():
                 return []
-            if not left <= CLOSED_TOLERANCE:
+            if not exists.all():
+                raise _PlacesDiffer
+            if not (left <= CLOSED_TOLERANCE).all():
                 raise DeadPointsUnclaimed("an earlier group does not close")
             return list(enumerate(both))
+        if len(z) > 1:
+            raise _PlacesDiffer
         self._spend(20)
-        there = _with_inputs(setup, u)
-        found = block_roots(there, stage, z, certify=False)
+        there = _with_inputs(setup, u[0])
+        found = block_roots(there, stage, z[0], certify=False)
         if found.complete is Completeness.NOT or found.has_curve:
             raise DeadPointsUnclaimed("not all assemblies of the groups before it are known")
-        return [(0, each) for each in found.real]
+        return [(0, each[None]) for each in found.real]
 
-    def _discriminant(self, level: int, z: Array, u: Array) -> SignedLog:
-        """N of one block, those before it given."""
+    def _discriminant(self, level: int, z: Array, u: Array) -> list[SignedLog]:
+        """N of one block at some places, those before it given (places, unknowns)."""
         stage, setup = self.stages[level], self.setup
         if slice_length(stage.rows) != slice_length(stage.unknowns):
             raise DeadPointsUnclaimed("it holds more than it needs")
-        self._spend(1)
+        self._spend(len(z))
         closed = setup.functions.block_assemblies(stage)
         if closed is not None:
-            _, _, bend = closed(z, u, setup.inputs.p)
-            if np.isnan(bend):
+            bends = closed.evaluate_batch(z, u, setup.inputs.p)[1]
+            if np.isnan(bends).any():
                 raise DeadPointsUnclaimed("its links have no length")
-            return _dyad_discriminant(bend)
+            return [_dyad_discriminant(bend) for bend in bends.tolist()]
         if level not in self.solutions:
             self.solutions[level] = (
                 None if is_linear(setup, stage, self.random_unknowns) else self._complex_solutions(stage)
             )
         of = self.solutions[level]
         if of is None:
-            slope = setup.functions.block_call(stage)(z, u, setup.inputs.p)[1]
-            return SignedLog(*map(float, np.linalg.slogdet(slope)))
-        self._spend(of.form.bezout_number)
-        return of.discriminant(z, u, setup.inputs.p)
+            slopes = setup.functions.block_call(stage).evaluate_batch(len(z), z, u, setup.inputs.p)[1]
+            return [SignedLog(*map(float, parts)) for parts in zip(*np.linalg.slogdet(slopes), strict=True)]
+        self._spend(len(z) * of.form.bezout_number)
+        return [of.discriminant(*place, setup.inputs.p) for place in zip(z, u, strict=True)]
 
     def _complex_solutions(self, stage: Block) -> MovingSolutions:
         found = isotropic_form(self.setup.equations, stage)

@@ -317,8 +317,11 @@ def _encode_gif(script: AnimationScript, fps: float, progress: Progress) -> byte
 
 def _palette(shot: Pixels) -> Pixels:
     """The most frequent colours of a frame (n, 3), as bytes."""
-    colours, counts = np.unique(shot.reshape(-1, 3), axis=0, return_counts=True)
-    return colours[np.argsort(-counts, kind="stable")[:PALETTE_SIZE]]
+    # sorted as numbers of three bytes, in a tenth of the time that rows take
+    packed = shot.astype(np.uint32) @ np.array([1 << 16, 1 << 8, 1], np.uint32)
+    colours, counts = np.unique(packed, return_counts=True)
+    frequent = colours[np.argsort(-counts, kind="stable")[:PALETTE_SIZE]]
+    return (frequent[:, None] >> np.array([16, 8, 0]) & 0xFF).astype(np.uint8)
 
 
 def _nearest_colours(colours: Pixels) -> Pixels:
