@@ -22,6 +22,7 @@ from benchmarks.long import long
 from benchmarks.memory import hold
 from benchmarks.mixed import STOPPING, Mixed
 from benchmarks.processes import ROOT, cold_starts
+from benchmarks.repeated import repeated_calls
 from benchmarks.versions import versions
 
 DESIGNS, ROW = "time a position against the number of designs", "time a position against the number of links"
@@ -43,6 +44,7 @@ def main() -> None:
         DESIGNS: against_designs,
         ROW: against_links,
         **{linkage.name: _compare(linkage) for linkage in LINKAGES},
+        "repeated calls": lambda: tables.repeated(repeated_calls()),
         "growth": lambda: tables.growth(growths()),
         LONG: long,
         CODE: compilings,

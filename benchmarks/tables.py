@@ -18,6 +18,7 @@ from benchmarks.growth import Growth
 from benchmarks.imports import Cost
 from benchmarks.long import Long
 from benchmarks.processes import Process
+from benchmarks.repeated import RepeatedCall
 
 
 def comparison(linkage: str, rows: Iterable[Row]) -> RenderableType:
@@ -126,6 +127,14 @@ def processes(measured: Iterable[Process]) -> RenderableType:
     for each in measured:
         command = f"{each.command} ({each.remark})" if each.remark else each.command
         table.add_row(command, time(each.seconds), ratio(each.ratio))
+    return table
+
+
+def repeated(measured: Iterable[RepeatedCall]) -> RenderableType:
+    """Calls that are repeated in one process."""
+    table = _table("calls repeated in one process, positions with rates", "call", "time", "positions", "fsolve")
+    for each in measured:
+        table.add_row(each.call, time(each.seconds), f"{each.positions:,}", ratio(each.ratio))
     return table
 
 

@@ -7,9 +7,10 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from rich.console import Console
 
 import planar
-from benchmarks import by_planar, compiling, dyadic, growth, long, peers, speed_page
+from benchmarks import by_planar, compiling, dyadic, growth, long, peers, repeated, speed_page, tables
 from benchmarks.contests import Contest, Result
 from benchmarks.curves import Curve
 from benchmarks.limit import LANES, compiled
@@ -262,3 +263,13 @@ def test_linkages_of_any_length_are_solved_and_run(kind):
     assert measured.links == 10
     assert 0.0 <= measured.residual < 1e-13
     assert all(seconds is not None and seconds > 0.0 for seconds in measured.per_link())
+
+
+def test_repeated_calls_stand_in_a_table_beside_fsolve():
+    measured = repeated.repeated_calls(warm_calls=1, rounds=1)
+    assert {each.positions for each in measured} == {1, 73, 361}
+    assert all(0.0 < each.ratio < 1000.0 for each in measured)
+    console = Console(width=120)
+    with console.capture() as captured:
+        console.print(tables.repeated(measured))
+    assert "cycle of 72 steps, between dead points" in captured.get()

@@ -281,8 +281,8 @@ def _rates_along(axis: Sequence[float], u1: list[float], u2: list[float]) -> tup
 class StraightPathCache:
     """Positions at even distances along straight ways that lead away from one position, each made when it is needed.
 
-    They depend on that position and the way alone, so that what is found by them does not depend on what was asked for
-    before.
+    They depend on that position and the way alone, so that what is found by them does not depend, but for rounding, on
+    what was asked for before.
     """
 
     def __init__(self, setup: PreparedMechanism, z: Array):
