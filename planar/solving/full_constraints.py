@@ -15,8 +15,9 @@ from planar.equations.element_groups import ElementGroup, group_elements
 from planar.equations.element_placement import ElementPlacement
 from planar.equations.mechanism_numbers import scaled_pair_numbers
 from planar.equations.residuals import ConstraintRow, input_positions, pair_residuals
+from planar.equations.sparse_matrices import MAX_DENSE_UNKNOWNS, SparseMatrices, SparsePattern
 from planar.foundation.angles import wrap_angle
-from planar.foundation.arrays import Array
+from planar.foundation.arrays import Array, IntArray
 from planar.foundation.geometry import Frame
 from planar.foundation.jets import Scalar
 from planar.model.pairs import MeasureKind, Pair
@@ -125,6 +126,28 @@ class FullConstraints:
         residuals[:, pair_rows:] -= positions
         residuals[:, self._angle_rows] = wrap_angle(residuals[:, self._angle_rows])
         return residuals.reshape(*w.shape[:-1], row_count), jacobian.reshape(*w.shape[:-1], row_count, w.shape[-1])
+
+    def transposed_jacobians(self, w: Array, held: tuple[str, ...] = ()) -> Array | SparseMatrices:
+        """The same Jacobian at positions w (n, coordinates), transposed (n, coordinates, rows): an array, or sparse
+        where coordinates are many."""
+        if len(self.coordinates) <= MAX_DENSE_UNKNOWNS:
+            return self.residuals_and_jacobian(w, held)[1].transpose(0, 2, 1)
+        row_count = len(self.pair_of_row) + len(held)
+        rows: list[IntArray] = []
+        columns: list[IntArray] = []
+        slopes: list[Array] = []
+        for group in self._groups_with(held):  # by coordinates of an element, elements, rows of an element
+            shape = group.coordinates.shape[1], *group.rows.shape
+            rows.append(np.broadcast_to(group.rows, shape).ravel())
+            columns.append(np.broadcast_to(group.coordinates.T[:, :, None], shape).ravel())
+            slopes.append(np.moveaxis(group.evaluate(w, self._p)[1], -1, 1).reshape(len(w), -1).T)
+        # a link may be two bodies of a pair: what stands at one place is added up
+        count = len(self.coordinates)
+        places, entry_of = np.unique(np.concatenate(rows) * count + np.concatenate(columns), return_inverse=True)
+        values: Array = np.zeros((len(places), len(w)))
+        np.add.at(values, entry_of, np.concatenate(slopes))
+        first = np.searchsorted(places, count * np.arange(row_count + 1))
+        return SparseMatrices(SparsePattern((count, row_count), places % count, first), values.T)
 
     @cached_property
     def _p(self) -> Array:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
+from collections.abc import Sequence
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -10,6 +13,8 @@ from planar.analysis.interpolated_run import InterpolatedRun
 from planar.analysis.motion.output import Extreme
 from planar.analysis.motion.zeros import SERIES_TOLERANCE, bracket_maxima, find_maximum
 from planar.document.first_argument import takes_result
+from planar.equations.coordinates import FRAME_PARTS
+from planar.equations.sparse_matrices import SparseMatrices
 from planar.foundation.arrays import Array, BoolArray
 from planar.foundation.errors import BadInput, NoAnswer
 from planar.foundation.jets import Jet
@@ -124,11 +129,14 @@ class _DrivenOutput:
         self.prepared.refuse_misfit("a transmission angle is not told")
         self.constraints = FullConstraints(self.prepared)
         self.inputs = tuple(given.pair for given in mechanism.inputs)
-        self.columns = [self.prepared.column[self.link, part] for part in ("x", "y", "angle")]
+        first = self.prepared.column[self.link, "x"]
+        self.columns = slice(first, first + len(FRAME_PARTS))
         self.slides = self.pair.input_kind is MeasureKind.LENGTH
         rows = [self.prepared.pairs[name] for name in self.constraints.pair_of_row]
         rows += [self.prepared.relative_motions[name] for name in self.inputs]
-        self.rows_of_pair = {pair.name: [k for k, row in enumerate(rows) if row.name == pair.name] for pair in rows}
+        self.rows_of_pair: dict[str, list[int]] = defaultdict(list)
+        for number, row in enumerate(rows):
+            self.rows_of_pair[row.name].append(number)
         self.driving_pairs = {pair.name: pair for pair in rows if self._can_drive(pair)}
         self.direction = self._slide_direction(moving) if self.slides else np.zeros(2)
 
@@ -161,17 +169,14 @@ class _DrivenOutput:
         stuck = np.zeros(w.shape[1], dtype=bool)
         for start in range(0, w.shape[1], CHUNK_SIZE):
             chunk = slice(start, start + CHUNK_SIZE)
-            slopes = self._jacobians(w[:, chunk])
-            multipliers, stuck[chunk] = self._multipliers(slopes, load)
+            sides = self.constraints.transposed_jacobians(w.T[chunk], self.inputs)
+            multipliers, stuck[chunk] = self._multipliers(sides, load)
+            rows_of_pairs = [self.rows_of_pair[name] for name in self.driving_pairs]
             parts = [
-                np.einsum(
-                    "nrc,nr->cn",
-                    slopes[:, self.rows_of_pair[name]][:, :, self.columns],
-                    multipliers[:, self.rows_of_pair[name]],
-                )
-                for name in self.driving_pairs
+                np.einsum("ncr,nr->cn", _block(sides, self.columns, rows), multipliers[:, rows])
+                for rows in rows_of_pairs
             ]
-            found.append(np.array(parts).reshape(len(self.driving_pairs), 3, len(slopes)))
+            found.append(np.array(parts).reshape(len(self.driving_pairs), 3, len(sides)))
         every = np.concatenate(found, axis=2)
         greatest = np.abs(every).max(axis=(0, 1), initial=0.0)
         if not (greatest > NEGLIGIBLE_FORCE).any() and not stuck.all():
@@ -180,38 +185,40 @@ class _DrivenOutput:
         with np.errstate(invalid="ignore", divide="ignore"):
             return dict(zip(self.driving_pairs, every / greatest, strict=True)), stuck
 
-    def _multipliers(self, jacobians: Array, load: Array) -> tuple[Array, BoolArray]:
-        """Multipliers (n, rows) that balance a load (coordinates,) on slopes (n, rows, coordinates); which do not.
+    def _multipliers(self, sides: Array | SparseMatrices, load: Array) -> tuple[Array, BoolArray]:
+        """Multipliers (n, rows) that balance a load (coordinates,) on slopes, transposed (n, coordinates, rows); which
+        do not.
 
         NaN where nothing does, and where the position is a limit and they are not the only ones.
         """
-        many, rows, columns = jacobians.shape
+        many, columns, rows = sides.shape
         found: Array = np.zeros((many, rows))
         stuck, sound = np.zeros(many, dtype=bool), np.zeros(many, dtype=bool)
         if rows == columns:
             try:
                 loads = np.broadcast_to(-load[:, None], (many, columns, 1))
-                found = np.linalg.solve(jacobians.transpose(0, 2, 1), loads)[..., 0]
+                solve = sides.solve if isinstance(sides, SparseMatrices) else partial(np.linalg.solve, sides)
+                found = solve(loads)[..., 0]
                 sound = np.abs(found).max(axis=1) < MAX_REGULAR_MULTIPLIER
             except np.linalg.LinAlgError:
                 pass  # one of them is exactly at a limit
         if not sound.all():
-            found[~sound], stuck[~sound] = self._minimum_norm_multipliers(jacobians[~sound], load)
+            found[~sound], stuck[~sound] = self._minimum_norm_multipliers(np.asarray(sides[~sound]), load)
         return found, stuck
 
-    def _minimum_norm_multipliers(self, slopes: Array, load: Array) -> tuple[Array, BoolArray]:
+    def _minimum_norm_multipliers(self, sides: Array, load: Array) -> tuple[Array, BoolArray]:
         """See `_multipliers`; where constraints may hold twice, or a position is a limit."""
-        sides, columns = slopes.transpose(0, 2, 1), slopes.shape[2]
+        columns = sides.shape[1]
         u, s, vt = np.linalg.svd(sides, full_matrices=False)
         held = s > SINGULAR_TOLERANCE * s[:, :1]
         gain = np.where(held, 1.0 / np.where(held, s, 1.0), 0.0)
         inverse = (vt.transpose(0, 2, 1) * gain[:, None]) @ u.transpose(0, 2, 1)
         found = -inverse @ load
-        stuck = np.abs(np.einsum("nrc,nr->nc", slopes, found) + load).max(axis=1) > BALANCE_TOLERANCE
+        stuck = np.abs(np.einsum("ncr,nr->nc", sides, found) + load).max(axis=1) > BALANCE_TOLERANCE
         found[stuck] = np.nan
         mine = [row for name in self.driving_pairs for row in self.rows_of_pair[name]]
-        free = np.eye(slopes.shape[1]) - inverse @ sides
-        acting = slopes[:, mine][:, :, self.columns].transpose(0, 2, 1) @ free[:, mine]
+        free = np.eye(sides.shape[2]) - inverse @ sides
+        acting = sides[:, self.columns][:, :, mine] @ free[:, mine]
         loose = np.abs(acting).max(axis=(1, 2), initial=0.0) > BALANCE_TOLERANCE
         if (loose & (held.sum(axis=1) == columns)).any():
             told = f"constraints hold twice, so that the forces on {self.link} are not determined without elasticity"
@@ -259,9 +266,9 @@ class _DrivenOutput:
 
     def _slide_direction(self, moving: KinematicResult) -> Array:
         """The unit direction (2,) in which the output slides on the frame: how its place goes with the displacement."""
-        slope = self._jacobians(self._coordinates(moving)[:, :1])[0]
+        sides = self.constraints.transposed_jacobians(self._coordinates(moving).T[:1], self.inputs)
         own = self.prepared.column[self.pair.name, self.pair.coordinate_kinds[0][0]]
-        way = slope[self.rows_of_pair[self.pair.name][:2], own]
+        way = _block(sides, slice(own, own + 1), self.rows_of_pair[self.pair.name][:2])[0, 0]
         found: Array = way / np.hypot(*way)
         return found
 
@@ -275,9 +282,10 @@ class _DrivenOutput:
         values = [_value(parts[each.owner, each.part]) for each in self.constraints.coordinates]
         return np.stack(np.broadcast_arrays(*map(np.atleast_1d, values))) / self.prepared.scale[:, None]
 
-    def _jacobians(self, w: Array) -> Array:
-        """The slopes of all constraints and drives (n, rows, coordinates)."""
-        return self.constraints.residuals_and_jacobian(w.T, self.inputs)[1]
+
+def _block(matrices: Array | SparseMatrices, rows: slice, columns: Sequence[int]) -> Array:
+    """The entries of some rows and columns of matrices (n, rows, columns)."""
+    return np.concatenate([matrices[:, rows, column : column + 1] for column in columns], axis=2)
 
 
 def _value(value: object) -> Array:
