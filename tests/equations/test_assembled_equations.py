@@ -44,6 +44,12 @@ def random_place(equations, samples, seed=0):
     return z, u, p[0]
 
 
+def random_place_of(stem, samples):
+    """The same of a model; the numbers of a cam of arcs are its own, since such arcs have to meet."""
+    z, u, p = random_place(equations_of(stem), samples)
+    return z, u, PositionSolver(MODELS[stem]).inputs.p if stem == "tangent-cam" else p
+
+
 def test_every_pair_type_is_in_a_model_that_is_compared():
     for stems in (COMPARED, SQUARE):
         assert {type(pair) for stem in stems for pair in MODELS[stem].pairs} == set(pair_types().values())
@@ -53,7 +59,7 @@ def test_every_pair_type_is_in_a_model_that_is_compared():
 def test_elements_say_what_expressions_of_the_whole_say(stem, monkeypatch):
     equations = equations_of(stem)
     assembled, compiled = equations.assembled, of_expressions(equations)
-    z, u, p = random_place(equations, 3)
+    z, u, p = random_place_of(stem, 3)
     y = np.hstack([z, u])
     y1, y2 = np.random.default_rng(1).normal(size=(2, *y.shape))
     expected = compiled.kinematics(y, y1, y2, p)
@@ -145,7 +151,7 @@ def test_what_is_not_defined_at_a_place_is_not_a_number():
 def test_what_is_carried_out_on_jets_is_what_casadi_derives(stem):
     e = equations_of(stem)
     functions = EquationFunctions(e)
-    z, u, p = random_place(e, 3)
+    z, u, p = random_place_of(stem, 3)
     y = np.hstack([z, u])
     y1, y2, y3 = np.random.default_rng(2).normal(size=(3, *y.shape))
     both, symbols = ca.vertcat(e.F, e.w), rate_symbols(e.y, 3)
