@@ -395,8 +395,8 @@ def __getattr__(name: str) -> Any:
     if name not in MODULES:
         raise AttributeError(f"module 'planar' has no attribute {name!r}")
     module = import_module(f"planar.{MODULES[name]}")
-    globals()[name] = found = module if MODULES[name] == name else getattr(module, name)
-    return found
+    globals()[name] = value = module if MODULES[name] == name else getattr(module, name)
+    return value
 
 
 def __dir__() -> list[str]:

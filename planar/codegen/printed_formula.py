@@ -7,7 +7,6 @@ from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cached_property
 from importlib.util import find_spec
-from math import inf
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -105,7 +104,7 @@ def write_python(
     use_counts.update(results)
     statement_of: dict[int, int] = {}
     "by values that stand within another's expression, the value whose statement that is"
-    last_use: dict[int, float] = dict.fromkeys(results, inf)
+    last_use: dict[int, float] = dict.fromkeys(results, math.inf)
     depths: dict[int, int] = {}
     for number in reversed(order):
         statement = statement_of.setdefault(number, number)

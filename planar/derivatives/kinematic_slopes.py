@@ -28,10 +28,10 @@ from planar.dynamics.equilibrium import Equilibrium
 from planar.dynamics.external_actions import LinkMotion
 from planar.dynamics.link_coordinates import LinkCoordinates
 from planar.equations.coordinates import consecutive_ranges
-from planar.equations.element_groups import ElementGroup, group_elements
+from planar.equations.element_groups import ElementGroup, group_elements, pattern_of_groups
 from planar.equations.elements import PlacedElement
 from planar.equations.mechanism_numbers import equation_structure, shapes_of_links
-from planar.equations.sparse_matrices import SparseMatrices, SparsePattern
+from planar.equations.sparse_matrices import SparseMatrices
 from planar.foundation.arrays import Array, BoolArray
 from planar.foundation.errors import Unknown, suggest_name
 from planar.foundation.geometry import Frame, Vector, frame_at
@@ -76,17 +76,7 @@ class ConstraintElements(LinkCoordinates):
         own_kinds = [kind for pair in mechanism.pairs for _, kind in pair.coordinate_kinds]
         of_links = [MeasureKind.LENGTH, MeasureKind.LENGTH, MeasureKind.ANGLE] * len(self.links)
         self.is_length = np.array([kind is MeasureKind.LENGTH for kind in (*of_links, *own_kinds)])
-        # dF/dq, column after column; a link may be two bodies of a pair
-        places = [(g.coordinates[:, None, :] * self.row_count + g.rows[:, :, None]).ravel() for g in self.groups]
-        entries, indices = np.unique(np.concatenate([np.zeros(0, dtype=int), *places]), return_inverse=True)
-        columns, rows = np.divmod(entries, max(self.row_count, 1))
-        first = np.searchsorted(columns, np.arange(self.coordinate_count + 1))
-        self.pattern = SparsePattern((self.row_count, self.coordinate_count), rows, first)
-        ends = np.cumsum([len(part) for part in places], dtype=int)
-        self.entries = [
-            indices[end - len(part) : end].reshape(*group.rows.shape, group.coordinates.shape[1])
-            for end, part, group in zip(ends, places, self.groups, strict=True)
-        ]
+        self.pattern, self.entries = pattern_of_groups(self.groups, self.row_count, self.coordinate_count)
         "of every group the entries there (places, rows, local coordinates)"
 
 

@@ -213,21 +213,19 @@ class AcceptanceFunctions:
                 assembly, moves[block.unknowns] = np.split(results[:, 0], 2)
                 move = assembly - unknowns
                 z[block.unknowns] = np.where(of_type.is_angle, unknowns + wrap_angle(move), assembly)
-            entries[placed.coordinates] = of_type.coordinates.evaluate_entries(1, z[block.unknowns], known, numbers)[
-                :, 0
-            ]
+            coordinates = of_type.coordinates.evaluate_entries(1, z[block.unknowns], known, numbers)
+            entries[placed.coordinates] = coordinates[:, 0]
         return RecordedStep(z, moves, self.judge(z[None], InputSamples(*(rates[None] for rates in given)), scales))
 
-    def signs_at(self, z: Array, u: Array, p: Array) -> list[float]:
-        """Of every block the sign of its assembly in closed form at unknowns z (unknowns,)."""
-        e = self.equations
-        entries = np.append(np.zeros(len(e.coordinates)), u)
-        signs = []
-        for block, placed, of_type in self._blocks:
-            own, known, numbers = z[block.unknowns], entries[placed.known], p[placed.numbers]
-            signs.append(of_type.nearest_sign(own, known, numbers) if len(own) else 0.0)
-            entries[placed.coordinates] = of_type.coordinates.evaluate_entries(1, own, known, numbers)[:, 0]
-        return signs
+    def signs_at(self, coordinates: Array, u: Array, p: Array) -> list[float]:
+        """Of every block the sign of its assembly in closed form at a position; 0 of one without unknowns."""
+        entries, z = np.append(coordinates, u), coordinates[self.unknown_columns]
+        return [
+            of_type.nearest_sign(z[block.unknowns], entries[placed.known], p[placed.numbers])
+            if slice_length(block.unknowns)
+            else 0.0
+            for block, placed, of_type in self._blocks
+        ]
 
     def _judge_by_one_formula(self, z: Array, given: InputSamples, scales: Scales) -> JudgedPositions:
         """Judge samples z (samples, unknowns) by the formula of all blocks and pairs."""

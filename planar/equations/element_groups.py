@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from planar.equations.elements import Element, PlacedElement
+from planar.equations.sparse_matrices import SparsePattern
 from planar.foundation.arrays import Array, IntArray
 
 
@@ -62,3 +63,24 @@ def group_elements(placed_elements: Iterable[PlacedElement]) -> list[ElementGrou
         )
         for element, group in members.items()
     ]
+
+
+def pattern_of_groups(
+    groups: Sequence[ElementGroup], row_count: int, coordinate_count: int, transposed: bool = False
+) -> tuple[SparsePattern, list[IntArray]]:
+    """Where the entries of dF/dq stand, or of its transpose, and of every group which of them its slopes are (elements,
+    rows, local coordinates); a link may be two bodies of a pair, whose slopes are then added up."""
+    shape = (coordinate_count, row_count) if transposed else (row_count, coordinate_count)
+    places = []
+    for group in groups:
+        rows, columns = group.rows[:, :, None], group.coordinates[:, None, :]
+        places.append((rows * shape[0] + columns if transposed else columns * shape[0] + rows).ravel())
+    entries, indices = np.unique(np.concatenate([np.zeros(0, dtype=int), *places]), return_inverse=True)
+    columns, rows = np.divmod(entries, max(shape[0], 1))
+    first = np.searchsorted(columns, np.arange(shape[1] + 1))
+    ends = np.cumsum([len(part) for part in places], dtype=int)
+    entries_of_groups: list[IntArray] = [
+        indices[end - len(part) : end].reshape(*group.rows.shape, group.coordinates.shape[1])
+        for end, part, group in zip(ends, places, groups, strict=True)
+    ]
+    return SparsePattern(shape, rows, first), entries_of_groups

@@ -11,7 +11,7 @@ from functools import cached_property
 import numpy as np
 
 from planar.equations.coordinates import FRAME_PARTS, consecutive_ranges, frames_from_coordinates
-from planar.equations.element_groups import ElementGroup, group_elements
+from planar.equations.element_groups import ElementGroup, group_elements, pattern_of_groups
 from planar.equations.element_placement import ElementPlacement
 from planar.equations.mechanism_numbers import scaled_pair_numbers
 from planar.equations.residuals import ConstraintRow, input_positions, pair_residuals
@@ -55,6 +55,8 @@ class FullConstraints:
         }
         self._groups: dict[tuple[str, ...], list[ElementGroup]] = {}
         "of all pairs, by the relative motions whose positions follow in the rows"
+        self._patterns: dict[tuple[str, ...], tuple[SparsePattern, list[IntArray]]] = {}
+        "of their transposed Jacobians, by the same"
 
     def row_residuals(self, w: Array | Sequence[Scalar]) -> Iterator[tuple[ConstraintRow, Scalar]]:
         """The residual of every constraint, with its row, at coordinates of any arithmetic; angles with their turns."""
@@ -132,22 +134,15 @@ class FullConstraints:
         where coordinates are many."""
         if len(self.coordinates) <= MAX_DENSE_UNKNOWNS:
             return self.residuals_and_jacobian(w, held)[1].transpose(0, 2, 1)
-        row_count = len(self.pair_of_row) + len(held)
-        rows: list[IntArray] = []
-        columns: list[IntArray] = []
-        slopes: list[Array] = []
-        for group in self._groups_with(held):  # by coordinates of an element, elements, rows of an element
-            shape = group.coordinates.shape[1], *group.rows.shape
-            rows.append(np.broadcast_to(group.rows, shape).ravel())
-            columns.append(np.broadcast_to(group.coordinates.T[:, :, None], shape).ravel())
-            slopes.append(np.moveaxis(group.evaluate(w, self._p)[1], -1, 1).reshape(len(w), -1).T)
-        # a link may be two bodies of a pair: what stands at one place is added up
-        count = len(self.coordinates)
-        places, entry_of = np.unique(np.concatenate(rows) * count + np.concatenate(columns), return_inverse=True)
-        values: Array = np.zeros((len(places), len(w)))
-        np.add.at(values, entry_of, np.concatenate(slopes))
-        first = np.searchsorted(places, count * np.arange(row_count + 1))
-        return SparseMatrices(SparsePattern((count, row_count), places % count, first), values.T)
+        groups = self._groups_with(held)
+        if held not in self._patterns:
+            row_count = len(self.pair_of_row) + len(held)
+            self._patterns[held] = pattern_of_groups(groups, row_count, len(self.coordinates), transposed=True)
+        pattern, entries_of_groups = self._patterns[held]
+        values: Array = np.zeros((len(pattern.rows), len(w)))
+        for group, entries in zip(groups, entries_of_groups, strict=True):
+            np.add.at(values, entries, np.moveaxis(group.evaluate(w, self._p)[1], 0, -1))
+        return SparseMatrices(pattern, values.T)
 
     @cached_property
     def _p(self) -> Array:

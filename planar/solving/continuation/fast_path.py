@@ -254,11 +254,13 @@ def _is_closed(result: AcceptanceResult[Any], tolerance: float) -> Any:
 
 
 class _KeptPosition(NamedTuple):
-    """A position that is kept: unknowns, rates of these along the way, and how far along it each block is regular."""
+    """A position that is kept: unknowns, rates of these along the way, how far along it every block is regular, and
+    coordinates."""
 
     z: Array
     rates: Array
     distances: Array
+    coordinates: Array
 
 
 class _KeptWay(NamedTuple):
@@ -293,7 +295,7 @@ class StraightPathCache:
 
     def unknowns_at(self, stop: Sequence[float]) -> Array | None:
         """The unknowns to which the straight way to other inputs leads; None where not all of it is surely sound."""
-        way = self._straight_way(stop)
+        way = self._way_to(stop)
         if way.reach == 0.0:
             return None if self.setup.acceptance is None or self.setup.stops is not None else self.z
         kept = self._last_kept(way)
@@ -309,7 +311,7 @@ class StraightPathCache:
         if not self.setup.keeps_its_numbers(mechanism):
             return None
         stop, u1, u2 = self.setup.scaled_inputs(mechanism)
-        way = self._straight_way(stop)
+        way = self._way_to(stop)
         place = way.last_stride * STEP_LENGTH
         along = _rates_along(way.axis, u1, u2)
         kept = self._last_kept(way) if along is not None and way.reach > place else None
@@ -320,8 +322,8 @@ class StraightPathCache:
         if known is None:
             u = np.array(self.start) + place * np.array(way.axis)
             known = self._step_arguments[key] = [
-                functions.signs_at(kept.z, u, self.setup.inputs.p),
-                *(part.tolist() for part in kept),
+                functions.signs_at(kept.coordinates, u, self.setup.inputs.p),
+                *(part.tolist() for part in kept[:3]),
                 [*way.axis],
                 *(part.tolist() for part in self.setup.acceptance_scales),
             ]
@@ -333,7 +335,7 @@ class StraightPathCache:
             return None
         return FastPosition(np.array(values[RESULT_COUNT + 2 :]).reshape(ORDERS, -1), result.residual)
 
-    def _straight_way(self, stop: Sequence[float]) -> _KeptWay:
+    def _way_to(self, stop: Sequence[float]) -> _KeptWay:
         way = [there - here for there, here in zip(stop, self.start, strict=True)]
         reach = max(map(abs, way), default=0.0)
         return _KeptWay(tuple([gone / reach for gone in way]) if reach else (), reach, int(reach / STEP_LENGTH))
@@ -349,16 +351,14 @@ class StraightPathCache:
                 self._kept.clear()
                 self._step_arguments.clear()
             kept = self._kept[way.axis] = {}
-        known, start = max(kept, default=-1), self.z
-        while known < many:
-            if known >= 0:
-                before = kept[known]
-                if before is None:
-                    return None
-                start = before.z
-            strides = np.arange(max(known, 0), min(max(known, 0) + STRIDES_AT_ONCE, self.max_positions) + 1)
-            kept.update(zip(strides.tolist(), self._walk(start, strides * STEP_LENGTH, way.axis), strict=True))
-            known = int(strides[-1])
+        while many not in kept:
+            first = max(kept, default=0)
+            before = kept.get(first)
+            if kept and before is None:
+                return None
+            strides = np.arange(first, min(first + STRIDES_AT_ONCE, self.max_positions) + 1)
+            positions = self._walk(self.z if before is None else before.z, strides * STEP_LENGTH, way.axis)
+            kept.update(zip(strides.tolist(), positions, strict=True))
         return kept.get(many)
 
     def _walk(self, z: Array, places: Array, along: Sequence[float]) -> list[_KeptPosition | None]:
@@ -376,7 +376,8 @@ class StraightPathCache:
         accepted[1:] &= keep_branch(np.diff(samples, axis=0), *ends, squares, functions.block_starts, ratio)
         count = _count_first(accepted)
         rates = judged.coordinate_rates[:, 1, functions.unknown_columns]
-        kept = [_KeptPosition(*parts) for parts in zip(samples[:count], rates, judged.distances, strict=False)]
+        parts = samples[:count], rates, judged.distances, judged.coordinate_rates[:, 0]
+        kept = [_KeptPosition(*of_position) for of_position in zip(*parts, strict=False)]
         return [*kept, *[None] * (len(samples) - count)]
 
 
@@ -388,18 +389,15 @@ def _step_formula(functions: AcceptanceFunctions) -> FormulaFunction:
     unknowns, inputs = len(functions.unknown_columns), len(functions.equations.input_kinds)
     blocks, distances = functions.block_count, len(functions.block_starts)
     counts = blocks, unknowns, unknowns, distances, inputs, *functions.scale_counts, 3, inputs
-    instructions, (signs, *kept, axis, p, row_scale, floor, along, u) = recorded_arguments(counts)
+    instructions, (signs, z, rates, regular, axis, p, row_scale, floor, along, u) = recorded_arguments(counts)
     gone, first, second = np.split(along, 3)
-    before = _KeptPosition(*kept)
-    step = functions.record_step(
-        signs, before.z, InputSamples(u, axis, np.zeros_like(axis)), Scales(p, row_scale, floor)
-    )
+    step = functions.record_step(signs, z, InputSamples(u, axis, np.zeros_like(axis)), Scales(p, row_scale, floor))
     judged = step.judged
     w, w1, w2 = judged.coordinate_rates[0]
-    both = np.stack([before.rates, w1[functions.unknown_columns]]), np.stack([before.distances, judged.distances[0]])
+    both = np.stack([rates, w1[functions.unknown_columns]]), np.stack([regular, judged.distances[0]])
     ends = _ends(*both, np.array([gone]))
     squares = gone * gone * np.sum(axis * axis, keepdims=True)
-    keeps = keep_branch((step.z - before.z)[None], *ends, squares, functions.block_starts, MIN_SINGULAR_DISTANCE_RATIO)
+    keeps = keep_branch((step.z - z)[None], *ends, squares, functions.block_starts, MIN_SINGULAR_DISTANCE_RATIO)
     results = [*keeps, *greatest_entries(np.abs(step.moves)[:, None]), *(values[0] for values in judged.result)]
     results += [*w, *(w1 * first), *(w2 * first * first + w1 * second)]
     formula = formula_of_results(instructions, [number_of(result, instructions) for result in results])

@@ -203,8 +203,8 @@ class RangeRun(RunningInput):
         if sure is None or len(sure.z) <= len(places):
             return None
         rows = np.arange(len(sure.z)) != at
-        told = FastSamples(sure.coordinate_rates[rows], sure.is_sure[rows], sure.residual)
-        return FollowedSamples(sure.z[rows], 0, fast_samples=None if self.with_jerk else told)
+        samples = FastSamples(sure.coordinate_rates[rows], sure.is_sure[rows], sure.residual)
+        return FollowedSamples(sure.z[rows], 0, fast_samples=None if self.with_jerk else samples)
 
     def _one_turn(self, steps: int, here: float) -> RunSamples | _RangeEnd | None:
         """One turn on, if the input makes it; else the end of its range, if that is known."""
