@@ -1,4 +1,4 @@
-"""planar on a swept linkage: `planar.sweep` by each of its backends, and `planar.cycle` design by design."""
+"""planar on a swept linkage: `planar.sweep`, and `planar.cycle` design by design."""
 
 from __future__ import annotations
 
@@ -15,40 +15,16 @@ from planar.results.motion import Motion
 from planar.solving.continuation.path import follow_samples
 from planar.solving.position import PositionSolver
 
-BACKENDS = {"native": 10**9, "numpy": 2000}
-"""The backends of `planar.sweep`, and to how many designs each is put."""
+SYSTEM = "planar.sweep"
 CYCLED = 3
 """So many designs are enough to time `planar.cycle` design by design."""
-
-
-def system(backend: str) -> str:
-    """The name of a row."""
-    return f"planar.sweep, {backend}"
 
 
 def sweeps(swept: Swept, d: Array, steps: int) -> list[Entry]:
     """Designs d (dimensions, designs) over a turn, positions alone and with rates; refused ones are NaN."""
     mechanism = planar.from_dict(swept.document())
-    found = [
-        _sweep(mechanism, swept, d[:, : BACKENDS[backend]], steps, backend, rates)
-        for backend in backends(mechanism, swept)
-        for rates in (False, True)
-    ]
+    found = [_sweep(mechanism, swept, d, steps, rates) for rates in (False, True)]
     return [*found, _cycle_each(mechanism, swept, d[:, :CYCLED], steps)]
-
-
-def backends(mechanism: Mechanism, swept: Swept) -> list[str]:
-    """The backends that are there: none before `planar.sweep` is, `native` only beside its compiler."""
-    there = []
-    for backend in BACKENDS if hasattr(planar, "sweep") else ():
-        try:
-            planar.sweep(
-                mechanism, _name_values(swept, swept.base()[:, None]), steps=4, points=[swept.point], backend=backend
-            )
-        except (ImportError, planar.BadInput):
-            continue
-        there.append(backend)
-    return there
 
 
 def turns(swept: Swept, steps: int) -> list[Entry]:
@@ -115,7 +91,7 @@ def _prepare(mechanism: Mechanism, swept: Swept, steps: int, rates: bool) -> Ent
     return Entry("planar.prepared", rates, np.arange(1), np.arange(steps + 1), ready, read)
 
 
-def _sweep(mechanism: Mechanism, swept: Swept, d: Array, steps: int, backend: str, rates: bool) -> Entry:
+def _sweep(mechanism: Mechanism, swept: Swept, d: Array, steps: int, rates: bool) -> Entry:
     named, points = _name_values(swept, d), [swept.point]
 
     def read(found: Any) -> Array:
@@ -125,11 +101,11 @@ def _sweep(mechanism: Mechanism, swept: Swept, d: Array, steps: int, backend: st
         return told
 
     return Entry(
-        system(backend),
+        SYSTEM,
         rates,
         np.arange(d.shape[1]),
         np.arange(steps + 1),
-        lambda: planar.sweep(mechanism, named, steps=steps, points=points, rates=rates, backend=backend, workers=1),
+        lambda: planar.sweep(mechanism, named, steps=steps, points=points, rates=rates, workers=1),
         read,
     )
 

@@ -8,7 +8,6 @@ import subprocess
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
-from importlib.util import find_spec
 from tempfile import TemporaryDirectory
 from time import perf_counter
 from typing import Any
@@ -41,9 +40,7 @@ STRUCTURES: dict[str, Callable[[], tuple[dict[str, Any], str]]] = {
 
 
 def compilings() -> tuple[Compiling, ...]:
-    """Every structure, in processes of its own; none without what compiles."""
-    if find_spec("llvmlite") is None:
-        return ()
+    """Every structure, in processes of its own."""
     return tuple(_measure_structure(structure) for structure in STRUCTURES)
 
 
@@ -69,9 +66,9 @@ def _process(structure: str, folder: str) -> dict[str, float]:
 def spent(structure: str) -> dict[str, float]:
     """Seconds of each step in this process, which has the structure's equations."""
     import planar
+    from planar.batch.march.designs_writer import ARGUMENT_TYPES, FUNCTION_NAME
     from planar.batch.march.kernel import kernel_equations
-    from planar.batch.march.llvm.designs_writer import ARGUMENT_TYPES, FUNCTION_NAME
-    from planar.batch.march.llvm.kernel_runs import designs_kernel
+    from planar.batch.march.runs import designs_kernel
     from planar.codegen import llvm_compile
     from planar.equations.functions import equation_functions
     from planar.equations.mechanism_numbers import equation_structure as of

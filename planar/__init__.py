@@ -136,7 +136,7 @@ if TYPE_CHECKING:
     from planar.synthesis.task.task_file import task_schema, write_task
     from planar.synthesis.task.task_reader import read_task
 
-__version__ = "0.18.0"
+__version__ = "0.19.0"
 
 __all__ = [
     "Advantage",

@@ -7,7 +7,6 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import cached_property
-from importlib.util import find_spec
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -105,12 +104,7 @@ class Truth:
     @cached_property
     def ways(self) -> dict[str, Callable[[], list[DesignResult]]]:
         """Every other way to solve the case."""
-        backends = ["native", "numpy"] if find_spec("llvmlite") else ["numpy"]
-        return {
-            **{f"sweep, {backend}": lambda backend=backend: self._sweep(backend) for backend in backends},
-            "prepared": self._prepared,
-            **{f"sweep_each, {backend}": lambda backend=backend: self._sweep_each(backend) for backend in backends},
-        }
+        return {"sweep": self._sweep, "prepared": self._prepared, "sweep_each": self._sweep_each}
 
     def order(self, column: int) -> str:
         """What a column of the numbers is."""
@@ -120,11 +114,9 @@ class Truth:
         """Of which point a column of the numbers is."""
         return self.points[column % (2 * len(self.points)) // 2]
 
-    def _sweep(self, backend: str) -> list[DesignResult]:
+    def _sweep(self) -> list[DesignResult]:
         case = self.case
-        found = planar.sweep(
-            self.mechanism, case.designs, case.steps, rates=case.rates, pair=case.pair, backend=backend
-        )
+        found = planar.sweep(self.mechanism, case.designs, case.steps, rates=case.rates, pair=case.pair)
         return [self._result_of(found, np.asarray(found.status)[k], k) for k in range(len(case))]
 
     def _prepared(self) -> list[DesignResult]:
@@ -133,10 +125,10 @@ class Truth:
         found = [ready(values_of_design(case.designs, k)) for k in range(len(case))]
         return [self._result_of(each, each.status, None) for each in found]
 
-    def _sweep_each(self, backend: str) -> list[DesignResult]:
+    def _sweep_each(self) -> list[DesignResult]:
         case = self.case
         mechanisms = [with_design_values(self.mechanism, values_of_design(case.designs, k)) for k in range(len(case))]
-        found = planar.sweep_each(mechanisms, case.steps, rates=case.rates, pair=case.pair, backend=backend)
+        found = planar.sweep_each(mechanisms, case.steps, rates=case.rates, pair=case.pair)
         return [self._result_of(each, each.status, None) for each in found]
 
     def _result_of(self, found: Any, status: Array, design: int | None) -> DesignResult:

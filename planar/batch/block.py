@@ -11,22 +11,16 @@ from planar.batch.closed_form.ends import closed_form_designs, find_ends
 from planar.batch.closed_form.own_ranges import run_between_limits
 from planar.batch.dead_point_tracking import DEAD_POINT_MARGIN, FollowedDesigns, follow_to_dead_points
 from planar.batch.design_arrays import values_of_design, with_design_values
-from planar.batch.design_stops import DesignStops, StepRunner
+from planar.batch.design_stops import DesignStops
 from planar.batch.general_path import OUTCOMES, DesignQuestion
 from planar.batch.initial_assembly import find_assemblies, given_assemblies
-from planar.batch.march.backend import (
-    DesignBatch,
-    DesignRunner,
-    UnsupportedStructure,
-    erase_between,
-    erase_from_steps,
-)
-from planar.batch.march.choice import find_runner
-from planar.batch.march.numpy.runner import NumpyRunner
+from planar.batch.march.design_batch import DesignBatch, erase_between, erase_from_steps
+from planar.batch.march.runs import lead_designs, run_designs
 from planar.batch.march.stops import SAME_END
 from planar.batch.reference_design import ReferenceDesign, reference_design
 from planar.codegen.aligned_arrays import allocate_aligned
 from planar.foundation.errors import NoAnswer, Outcome
+from planar.foundation.instruction_list import UnsupportedOperation
 from planar.foundation.turns import take_turn
 from planar.model.link_shapes import LinkShape, PointMember, PointName, place_in_link
 from planar.model.mechanism import LARGEST_INPUT_POSITION, Mechanism
@@ -55,7 +49,6 @@ class DesignBlock(NamedTuple):
     start: float | None
     stop: float | None
     pair: str | None
-    backend: str
     assemblies: Array | None = None
     dtype: str = "float64"
 
@@ -92,7 +85,7 @@ def status_code(outcome: Outcome) -> int:
 
 
 class DesignBlockSolver:
-    """Solves one block, see `solve_design_block`; then `march` is what a backend ran, from where it started."""
+    """Solves one block, see `solve_design_block`; then `march` is what ran compiled, from where it started."""
 
     def __init__(self, block: DesignBlock, out: Array | None):
         self.block, self.out = block, out
@@ -127,9 +120,9 @@ class DesignBlockSolver:
         block = self.block
         same = bool(np.ptp(self.range_length) == 0.0)
         # farther the general path counts turns
-        runs = self.reference.can_run_backend and np.abs(self.range_length).max() <= LARGEST_INPUT_POSITION
+        runs = self.reference.can_be_compiled and np.abs(self.range_length).max() <= LARGEST_INPUT_POSITION
         runs = runs and (block.start is None or (same and not self.has_own_range))
-        found = self._run_with_backend(same and not self.has_own_range) if runs else None
+        found = self._run_compiled(same and not self.has_own_range) if runs else None
         out, good = found or (self._output_array(), np.zeros(self.design_count, dtype=int))
         if found is None:
             out[:] = np.nan
@@ -197,16 +190,16 @@ class DesignBlockSolver:
             many, first = self.endings.get(code, (0, sentence))
             self.endings[code] = many + 1, first
 
-    def _run_with_backend(self, is_common: bool) -> tuple[Array, Array] | None:
+    def _run_compiled(self, is_common: bool) -> tuple[Array, Array] | None:
         """out (m, s), and how many of the first steps passed, whether all go equally far (`is_common`) or not; None
-        where no backend can run the structure."""
-        block, base_, runner = self.block, self.reference, find_runner(self.block.backend)
+        where the structure cannot be compiled."""
+        block, base_ = self.block, self.reference
         shapes = base_.shapes(self.all_designs)
         p = base_.pair_numbers(shapes, self.design_count, self.all_designs)
         told = {name: base_.point_member(name) for name in block.points}
         moving = {name: each for name, each in told.items() if each[0] != base_.mechanism.frame}
         if block.assemblies is None:
-            start = find_assemblies(base_, shapes, p, self.u, runner, block.backend)
+            start = find_assemblies(base_, shapes, p, self.u)
         else:
             start = given_assemblies(block.assemblies)
         self.failed_block = start.failed_block
@@ -222,16 +215,15 @@ class DesignBlockSolver:
             march = self._watch_stops(march, fit)
         try:
             if not is_common:
-                out = self._run_own_ranges(march, fit, start.signs, runner)
+                out = self._run_own_ranges(march, fit, start.signs)
                 return None if out is None else (self._with_frame_points(out, told, shapes), np.zeros(len(fit), int))
-            march, fit = self._lead_to_start(march, fit, start.signs, runner)
+            march, fit = self._lead_to_start(march, fit, start.signs)
             fit = fit if self.stops is None else fit & self.stops.have_room(march, self.range_length)
-            own = runner if self.stops is None else self.stops.shorten_runs(runner, march, self.range_length, fit)
-            out, good, candidates = self._run_fit_designs(own, march, fit)
+            out, good, candidates = self._run_fit_designs(march, fit)
             self._end_at_input_stops(march, good, candidates)
-        except UnsupportedStructure:
+        except UnsupportedOperation:
             return None
-        self._follow_to_dead_points(march, out, (good, candidates), start.signs, runner)
+        self._follow_to_dead_points(march, out, (good, candidates), start.signs)
         erase_between(out, np.where(self.solved_steps >= 0, self.solved_steps, good), candidates)
         return self._with_frame_points(out, told, shapes), good
 
@@ -255,14 +247,12 @@ class DesignBlockSolver:
         self.solved_steps[some] = met.solved_steps[some]
         self._keep_ends(some, met.distance[some], np.ones(some.size, dtype=bool))
 
-    def _run_own_ranges(
-        self, march: DesignBatch, fit: Array, signs: Array | None, runner: DesignRunner
-    ) -> Array | None:
+    def _run_own_ranges(self, march: DesignBatch, fit: Array, signs: Array | None) -> Array | None:
         """out of designs each of which has a range of its own; None where not all blocks are in closed form."""
         fit = fit if self.stops is None or self.has_own_range else fit & self.stops.have_room(march, self.range_length)
         some = np.flatnonzero(fit & (self.range_length != 0.0))
         own = None if signs is None else signs[:, some]
-        designs = closed_form_designs(march.select(some), self.reference.running_index, own, runner, self.block.backend)
+        designs = closed_form_designs(march.select(some), self.reference.running_index, own)
         if designs is None:
             return None
         out = self._own_output(march)
@@ -293,19 +283,22 @@ class DesignBlockSolver:
             self.out = allocate_aligned(block.steps + 1, rows, self.design_count, block.dtype)
         return self.out
 
-    def _run_fit_designs(self, runner: StepRunner, march: DesignBatch, fit: Array) -> tuple[Array, Array, Array]:
+    def _run_fit_designs(self, march: DesignBatch, fit: Array) -> tuple[Array, Array, Array]:
         """out, good and candidates of all designs, of which only the fit ones are run."""
         out, candidates = self._own_output(march), np.zeros(self.design_count, dtype=int)
         self.march, march.u0[:, ~fit] = march, np.nan
+        steps = len(out) if self.stops is None else self.stops.needed_steps(march, self.range_length, fit)
+        shown = march._replace(input_offsets=march.input_offsets[:steps])
+        out[steps:] = np.nan
         if fit.mean() > RUN_ALL_RATIO:
             # where all go together, few stop
-            return out, runner.run(march, out, None if fit.all() else candidates), candidates
+            return out, run_designs(shown, out[:steps], None if fit.all() else candidates), candidates
         out[:] = np.nan
         some, good = np.flatnonzero(fit), np.zeros(self.design_count, dtype=int)
         if some.size:
-            own, found = allocate_aligned(len(out), march.output_row_count, some.size, out.dtype), good[some]
-            good[some] = runner.run(march.select(some), own, found)
-            out[:, :, some], candidates[some] = own, found
+            own, found = allocate_aligned(steps, march.output_row_count, some.size, out.dtype), good[some]
+            good[some] = run_designs(shown.select(some), own, found)
+            out[:steps, :, some], candidates[some] = own, found
         return out, good, candidates
 
     def _follow_to_dead_points(
@@ -314,9 +307,8 @@ class DesignBlockSolver:
         out: Array,
         counts: tuple[Array, Array],
         signs: Array | None,
-        runner: DesignRunner,
     ) -> None:
-        """Follow those that a backend did not bring to the end, all at once, as far as they come.
+        """Follow those that compiled code did not bring to the end, all at once, as far as they come.
 
         counts: how many steps of each design are good, and how many candidates (designs,).
         """
@@ -326,14 +318,14 @@ class DesignBlockSolver:
             return
         index = self.reference.running_index
         own = None if signs is None else signs[:, some]
-        designs = closed_form_designs(march.select(some), index, own, runner, self.block.backend)
+        designs = closed_form_designs(march.select(some), index, own)
         if designs is not None:
             lengths = self.range_length[some] / self.scale
             ends = find_ends(designs, lengths, good[some], np.maximum(good, candidates)[some], self.block.steps)
             self._settle(some, ends, out)
             some = some[~ends.is_settled]
         if some.size:
-            found = follow_to_dead_points(march.select(some), index, good[some], runner)
+            found = follow_to_dead_points(march.select(some), index, good[some])
             self._settle(some, found, out)
             self.general_positions += int(found.design.size)
             self.followed_designs += int(found.is_settled.sum())
@@ -353,9 +345,7 @@ class DesignBlockSolver:
         self.stop_position[settled] = np.where(ended & is_stopped, position, np.nan)
         self.is_stopped[settled] = is_stopped
 
-    def _lead_to_start(
-        self, march: DesignBatch, fit: Array, signs: Array | None, runner: DesignRunner
-    ) -> tuple[DesignBatch, Array]:
+    def _lead_to_start(self, march: DesignBatch, fit: Array, signs: Array | None) -> tuple[DesignBatch, Array]:
         """The same march from the assemblies at its start, to which those at the designs' own positions are led."""
         gone = march.u0 - self.u
         far = float(np.max(np.abs(gone), initial=0.0))
@@ -366,7 +356,7 @@ class DesignBlockSolver:
         index, own = self.reference.running_index, np.flatnonzero(fit)
         there = march._replace(u0=self.u).select(own)
         signs = None if signs is None else signs[:, own]
-        designs = closed_form_designs(there, index, signs, runner, self.block.backend)
+        designs = closed_form_designs(there, index, signs)
         if designs is not None:
             span = gone[index, own]
             z, found = designs.lead(span, LEAD_IN_STEP)
@@ -378,10 +368,13 @@ class DesignBlockSolver:
             passed[own] = ends - np.abs(span) > DEAD_POINT_MARGIN * np.abs(span)
             march.z0[:, own] = z
             return march, passed
-        z, passed = NumpyRunner().lead(march._replace(u0=self.u), gone, LEAD_IN_STEP)
+        z, led = lead_designs(there, index, gone[index, own], LEAD_IN_STEP)
+        passed = np.zeros_like(fit)
+        passed[own] = led
         if march.stops is not None:
             passed &= march.stops.input_rooms(self.u[index], gone[index]) >= np.abs(gone[index]) - SAME_END
-        return march._replace(z0=z), fit & passed
+        march.z0[:, own] = z
+        return march, passed
 
     def _with_frame_points(
         self, out: Array, told: Mapping[PointName, PointMember], shapes: Mapping[str, LinkShape]

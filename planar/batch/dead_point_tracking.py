@@ -1,4 +1,4 @@
-"""On along the curves of many designs at once, from where a backend left them to their dead points."""
+"""On along the curves of many designs at once, from where compiled code left them to their dead points."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.batch.march.backend import DesignBatch, DesignRunner
-from planar.batch.march.checks import PointWriter, design_positions, pair_positions
-from planar.batch.march.design_functions import DesignFunctions
+from planar.batch.march.checks import DesignFunctions, PointWriter, design_positions, pair_positions
+from planar.batch.march.design_batch import DesignBatch
+from planar.batch.march.runs import last_good_unknowns
 from planar.batch.march.stops import nearest_end
 from planar.equations.linear import solve_vectors
 from planar.solving.checks.singular_values import SINGULAR_DISTANCE_RATIO
@@ -142,14 +142,14 @@ def _solve_bordered(jacobians: Array, normal: Array, right: Array, last: float) 
     return solve_vectors(whole, right, least_determinant=1e-12)
 
 
-def follow_to_dead_points(batch: DesignBatch, index: int, good_steps: Array, runner: DesignRunner) -> FollowedDesigns:
-    """Go on from the last of the good steps of each design, one at least, to which `runner` has brought them.
+def follow_to_dead_points(batch: DesignBatch, index: int, good_steps: Array) -> FollowedDesigns:
+    """Go on from the last of the good steps of each design, one at least.
 
     Each step is under the conditions of `solving.continuation.predictor_corrector`; a design that does not keep them is
     not settled. `index` is the input that runs.
     """
     with np.errstate(all="ignore"):  # what leads astray ends as what is no number
-        return _DeadPointTracker(batch, index, good_steps).follow(runner.last_good_unknowns(batch, good_steps).T)
+        return _DeadPointTracker(batch, index, good_steps).follow(last_good_unknowns(batch, good_steps).T)
 
 
 class _DeadPointTracker:

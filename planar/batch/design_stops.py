@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 
-from planar.batch.march.backend import DesignBatch, DesignRunner
 from planar.batch.march.checks import pair_positions
+from planar.batch.march.design_batch import DesignBatch
 from planar.batch.march.stops import (
     LEAST_RANGES,
     SAME_END,
@@ -122,29 +122,9 @@ class DesignStops:
         unclear = ends & ((off > SAME_END) & (off < SURE_DISTANCE * max(last, 1.0))).any(axis=0)
         return InputStops(rooms, solved, ~unclear)
 
-    def shorten_runs(self, runner: DesignRunner, march: DesignBatch, lengths: Array, fit: Array) -> StepRunner:
-        """What runs a march as far as the input can go in any design that is fit (designs,)."""
+    def needed_steps(self, march: DesignBatch, lengths: Array, fit: Array) -> int:
+        """How many steps of a march show how far the input can go in any design that is fit (designs,)."""
+        every = len(march.input_offsets)
         if not fit.any():
-            return runner
-        needed = int(self.find_input_stops(march, lengths).solved_steps[fit].max()) + STEPS_BEYOND_STOP
-        return ShortenedRunner(runner, needed) if needed < len(march.input_offsets) else runner
-
-
-class StepRunner(Protocol):
-    """What runs the designs of a batch through all steps: of a `DesignRunner` that alone."""
-
-    def run(self, batch: DesignBatch, out: Array, candidates: Array | None = None) -> Array:
-        """See `DesignRunner`."""
-
-
-class ShortenedRunner:
-    """A runner that stops after so many steps; see `DesignRunner`."""
-
-    def __init__(self, runner: DesignRunner, step_count: int):
-        self.runner, self.step_count = runner, step_count
-
-    def run(self, batch: DesignBatch, out: Array, candidates: Array | None = None) -> Array:
-        """See `DesignRunner`."""
-        out[self.step_count :] = np.nan
-        own = batch._replace(input_offsets=batch.input_offsets[: self.step_count])
-        return self.runner.run(own, out[: self.step_count], candidates)
+            return every
+        return min(every, int(self.find_input_stops(march, lengths).solved_steps[fit].max()) + STEPS_BEYOND_STOP)

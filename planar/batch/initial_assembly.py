@@ -10,7 +10,6 @@ from planar.batch.assembly.assembly_scores import DesignAssemblies
 from planar.batch.assembly.assembly_search import AssemblySearch
 from planar.batch.assembly.nearest_assemblies import find_nearest_assemblies
 from planar.batch.closed_form.start_assemblies import find_start_assemblies
-from planar.batch.march.backend import DesignRunner
 from planar.batch.reference_design import ReferenceDesign, shape_of_designs
 from planar.model.link_shapes import LinkShape
 
@@ -30,12 +29,10 @@ def find_assemblies(
     shapes: Mapping[str, LinkShape],
     p: Array,
     u: Array,
-    runner: DesignRunner,
-    backend: str = "auto",
 ) -> DesignAssemblies:
     """The assemblies at inputs u (inputs, designs), of designs with numbers p (numbers, designs) and these shapes."""
     with np.errstate(all="ignore"):  # starts that lead nowhere end as what is no number
-        every = _find_without_search(reference, shapes, p, u, runner, backend)
+        every = _find_without_search(reference, shapes, p, u)
         if every is None:
             return AssemblySearch(reference, shapes, p, u).search()
         rest = np.flatnonzero(~every.is_sure & (every.failed_block < 0))
@@ -53,12 +50,10 @@ def _find_without_search(
     shapes: Mapping[str, LinkShape],
     p: Array,
     u: Array,
-    runner: DesignRunner,
-    backend: str,
 ) -> DesignAssemblies | None:
     """Those by closed forms, else those near the base's own; None where neither can be."""
-    start = find_start_assemblies(reference, shapes, p, u, backend)
+    start = find_start_assemblies(reference, shapes, p, u)
     if start is not None:
         return start
-    near = find_nearest_assemblies(reference, shapes, p, u, runner)
+    near = find_nearest_assemblies(reference, shapes, p, u)
     return None if near is None else DesignAssemblies(near.z, near.is_clear, np.full(len(near.is_clear), -1))

@@ -11,7 +11,7 @@ from math import isfinite
 import numpy as np
 
 from planar.batch.design_arrays import design_variables, values_of_design, with_design_values
-from planar.batch.march.backend import DesignBatch
+from planar.batch.march.design_batch import DesignBatch
 from planar.equations.coordinates import frames_from_coordinates
 from planar.equations.mechanism_numbers import scaled_pair_numbers, shapes_of_links
 from planar.foundation.errors import BadInput, suggest_name
@@ -68,8 +68,8 @@ class ReferenceDesign:
         return BlockAssemblies(self.solver)
 
     @property
-    def can_run_backend(self) -> bool:
-        """Whether a backend can run the structure: every block closes once, and no contact is kept closed by others."""
+    def can_be_compiled(self) -> bool:
+        """Whether designs can run compiled: every block closes once, and no contact is kept closed by others."""
         watched = any(type(pair).contact_gap is not Pair.contact_gap for pair in self.mechanism.pairs)
         return self.functions.is_square and not watched
 
@@ -211,7 +211,7 @@ class ReferenceDesign:
         return np.flatnonzero(self.pair_numbers(self.solver.shapes, 1, self.mechanism)[:, 0] == 0.0)
 
     def is_fit(self, values: Mapping[str, Array], shapes: Mapping[str, LinkShape], p: Array) -> Array:
-        """The designs that a backend may run (designs,): see `is_unfit` and `has_short_arm`."""
+        """The designs that may run compiled (designs,): see `is_unfit` and `has_short_arm`."""
         fit = ~self.has_short_arm(shapes, p.shape[1])
         if not np.isfinite(self._row_bounds(p)).all():
             fit &= np.isfinite(p).all(axis=0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import replace
@@ -18,7 +19,6 @@ from planar.batch.assembly.assembly_lists import list_assemblies
 from planar.batch.block import DesignBlock
 from planar.batch.design_arrays import read_designs, split_into_blocks
 from planar.batch.executor import TASKS_PER_WORKER, run_tasks, thread_count, worker_count
-from planar.batch.march.choice import available_backends
 from planar.batch.named_results.design_slopes import design_slopes
 from planar.batch.named_results.result_block import ResultBlock, solve_result_block
 from planar.batch.named_results.result_rows import RequestedResults, select_names
@@ -78,7 +78,6 @@ def sweep(  # many: the public signature
     stop: float | None = None,
     pair: str | None = None,
     duration: float | None = None,
-    backend: str = "auto",
     workers: int | None = None,
     executor: Executor | None = None,
     block: int | None = None,
@@ -87,6 +86,7 @@ def sweep(  # many: the public signature
     reduce: None = None,
     progress: Callable[[int, int], object] | None = None,
     timeout: float | None = None,
+    backend: str | None = None,
 ) -> Sweep: ...
 @overload
 @takes_mechanism
@@ -108,7 +108,6 @@ def sweep(  # many: the public signature
     stop: float | None = None,
     pair: str | None = None,
     duration: float | None = None,
-    backend: str = "auto",
     workers: int | None = None,
     executor: Executor | None = None,
     block: int | None = None,
@@ -117,6 +116,7 @@ def sweep(  # many: the public signature
     reduce: Mapping[str, str | Reduction[Sweep]],
     progress: Callable[[int, int], object] | None = None,
     timeout: float | None = None,
+    backend: str | None = None,
 ) -> ReducedSweep: ...
 @takes_mechanism
 @returns_part_in_time
@@ -138,7 +138,6 @@ def sweep(  # many: the public signature; # long: its docstring
     stop: float | None = None,
     pair: str | None = None,
     duration: float | None = None,
-    backend: str = "auto",
     workers: int | None = None,
     executor: Executor | None = None,
     block: int | None = None,
@@ -147,6 +146,7 @@ def sweep(  # many: the public signature; # long: its docstring
     reduce: Mapping[str, str | Reduction[Sweep]] | None = None,
     progress: Callable[[int, int], object] | None = None,
     timeout: float | None = None,  # noqa: ARG001 - of the decorator
+    backend: str | None = None,
 ) -> Sweep | ReducedSweep:
     """The motions of many designs of one mechanism, which differ in any numbers of its file.
 
@@ -172,8 +172,8 @@ def sweep(  # many: the public signature; # long: its docstring
     `assemblies` "nearest" takes of each design that nearest to the sketch; "all" takes every assembly that it has at
     its own inputs, each as a design of its own: see `Sweep.assembly`.
 
-    `backend` "native" runs compiled machine code, "numpy" is always there, "auto" takes the faster that is there. What
-    a backend cannot do, or its gate does not let pass, the general path does, which is counted and said.
+    Designs run as compiled machine code; what that cannot do, or its checks do not let pass, the general path does,
+    which is counted and said. `backend` is no longer needed.
 
     Blocks of designs are solved in as many threads as there are cores for this process, or in so many `workers`; that
     changes no digit of the results. `executor`, any of `concurrent.futures`' kind, solves them elsewhere instead; a
@@ -222,14 +222,14 @@ def sweep(  # many: the public signature; # long: its docstring
     if reductions is not None:
         own, rates = reductions.with_points(names, rates)
         names = own or ()
-    available_backends(backend)
+    warn_of_backend(backend, "sweep", 5)
     if assemblies not in ("nearest", "all"):
         raise BadInput("assemblies", f"choose from nearest, all; there is no {assemblies!r:.40}")
     listed = list_assemblies(common, values) if assemblies == "all" else None
     if listed is not None:
         values = {name: array[listed.design] for name, array in values.items()}
     z = listed and listed.z
-    whole = DesignBlock(mechanism, values, int(steps), names, rates, start, stop, pair, backend, z, number_type)
+    whole = DesignBlock(mechanism, values, int(steps), names, rates, start, stop, pair, z, number_type)
     many = len(next(iter(values.values())))
     kept = "reduced" if reduce is not None else "store" if store is not None or any(results) else "memory"
     width = len(names) + 2 * len(mechanism.links) * any(results)
@@ -278,6 +278,13 @@ def _solve_blocks(
         yield ready
     if missing:
         into.leave_out(missing, time_is_over())
+
+
+def warn_of_backend(backend: str | None, function: str, stacklevel: int) -> None:
+    """Say that an argument of earlier versions is no longer needed, where it is given."""
+    if backend is not None:
+        told = f"{function}: every run is compiled now; leave out the argument 'backend'"
+        warnings.warn(told, DeprecationWarning, stacklevel)
 
 
 def check_range(mechanism: Mechanism, steps: object, start: object, stop: object, pair: str | None) -> Mechanism:

@@ -13,8 +13,6 @@ from numpy.typing import DTypeLike
 
 from planar.batch.executor import in_order, run_tasks, thread_count
 from planar.batch.general_path import OUTCOMES, solve_design
-from planar.batch.march.choice import available_backends
-from planar.batch.mechanisms.block_runner import BlockRunner, find_block_runner
 from planar.batch.mechanisms.endings import find_ending
 from planar.batch.mechanisms.initial_assembly import StartAssemblies, find_start_assemblies
 from planar.batch.mechanisms.linkage_groups import LinkageGroup, SweepRequest, linkage_group, wanted_points
@@ -35,6 +33,7 @@ from planar.batch.pinned.solve import solve_pinned
 from planar.batch.pinned.told_pins import ToldPins, find_told_pins, pin_number
 from planar.batch.reductions.reduced_mechanisms import sweep_reduced
 from planar.batch.reductions.reduced_sweep import ReducedSweep, Reduction, result_type
+from planar.batch.sweep import warn_of_backend
 from planar.document.first_argument import MechanismSource
 from planar.foundation.errors import BadInput, Outcome
 from planar.foundation.time_limit import returns_part_in_time, time_is_over
@@ -67,8 +66,7 @@ _ATTEMPTS = (
     _Attempt(1, True, False),
     _Attempt(REFINEMENT, True, False),
 )
-"""One after the other, each for those that the ones before left open; those that give a verdict only are for runners
-that can give extremes."""
+"""One after the other, each for those that the ones before left open."""
 
 
 @overload
@@ -79,13 +77,13 @@ def sweep_each(  # many: the public signature
     *,
     rates: bool = True,
     pair: str | None = None,
-    backend: str = "auto",
     workers: int | None = None,
     executor: Executor | None = None,
     dtype: DTypeLike = "float64",
     reduce: None = None,
     progress: Callable[[int, int], object] | None = None,
     timeout: float | None = None,
+    backend: str | None = None,
 ) -> Each: ...
 @overload
 def sweep_each(  # many: the public signature
@@ -95,13 +93,13 @@ def sweep_each(  # many: the public signature
     *,
     rates: bool = True,
     pair: str | None = None,
-    backend: str = "auto",
     workers: int | None = None,
     executor: Executor | None = None,
     dtype: DTypeLike = "float64",
     reduce: Mapping[str, str | Reduction[Each]],
     progress: Callable[[int, int], object] | None = None,
     timeout: float | None = None,
+    backend: str | None = None,
 ) -> ReducedSweep: ...
 @returns_part_in_time
 def sweep_each(  # many: the public signature; # long: its docstring
@@ -111,13 +109,13 @@ def sweep_each(  # many: the public signature; # long: its docstring
     *,
     rates: bool = True,
     pair: str | None = None,
-    backend: str = "auto",
     workers: int | None = None,
     executor: Executor | None = None,
     dtype: DTypeLike = "float64",
     reduce: Mapping[str, str | Reduction[Each]] | None = None,
     progress: Callable[[int, int], object] | None = None,
     timeout: float | None = None,  # noqa: ARG001 - of the decorator
+    backend: str | None = None,
 ) -> Each | ReducedSweep:
     """The motions of mechanisms of any structure, each as `planar.sweep` would have it as a single design.
 
@@ -136,10 +134,10 @@ def sweep_each(  # many: the public signature; # long: its docstring
     input that runs, and those that come so near to where two assemblies meet that steps eight times finer do not show
     on which side they pass. A linkage that comes to a dead point has NaN from there on, and says so.
 
-    `backend` "native" runs compiled machine code, "numpy" numpy, "auto" the faster that is there. Parts of the whole
-    are solved in as many threads as there are cores for this process, or in so many `workers`; that changes no digit of
-    the results. `executor`, any of `concurrent.futures`' kind, solves them elsewhere instead. `progress` is called with
-    how many mechanisms are done, and how many there are, as far as that is known.
+    Parts of the whole are solved in as many threads as there are cores for this process, or in so many `workers`; that
+    changes no digit of the results. `executor`, any of `concurrent.futures`' kind, solves them elsewhere instead.
+    `progress` is called with how many mechanisms are done, and how many there are, as far as that is known. `backend`
+    is no longer needed.
 
     `dtype` "float32" halves the memory: each number is computed in double precision and rounded once. With `reduce` no
     positions are kept, only what is made of them part by part, by the names given: measures of points as
@@ -158,8 +156,8 @@ def sweep_each(  # many: the public signature; # long: its docstring
     """
     step_count, threads, number_type = check_steps(steps), thread_count(workers, executor), result_type(dtype)
     names = (points,) if isinstance(points, str) else None if points is None else tuple(dict.fromkeys(points))
-    available_backends(backend)
-    wanted = SweepRequest(step_count, names, rates, pair, backend)
+    warn_of_backend(backend, "sweep_each", 4)
+    wanted = SweepRequest(step_count, names, rates, pair)
     runs = PartRuns(threads, executor, number_type, progress)
     if reduce is not None:
         return sweep_reduced(mechanisms, wanted, runs, reduce, _solve_rounded)
@@ -289,16 +287,14 @@ def solve_by_blocks(
     path if that is left out."""
     solve_general = solve_general or _solve_with_general_path
     found: dict[int, Swept] = {}
-    runner = find_block_runner(request.backend)
-    attempts = [each for each in _ATTEMPTS if runner.can_give_extremes or not each.verdict_only]
     ready = linkage_group(mechanisms, request)
     if ready is not None:
-        start = find_start_assemblies(ready.arrays, runner)
+        start = find_start_assemblies(ready.arrays)
         left = np.flatnonzero(start.is_sure)
-        for each in attempts:
+        for each in _ATTEMPTS:
             refinement = step_division(request.steps) * each.refinement
             for some in _cache_sized_chunks(ready.arrays.link_counts, left, request, refinement):
-                found |= _run_attempt(ready, some, start, request, each, runner)
+                found |= _run_attempt(ready, some, start, request, each)
             left = np.array([k for k in left if ready.numbers[k] not in found], dtype=int)
             if not left.size:
                 break
@@ -325,7 +321,6 @@ def _run_attempt(
     start: StartAssemblies,
     request: SweepRequest,
     attempt: _Attempt,
-    runner: BlockRunner,
 ) -> dict[int, Swept]:
     """Those that came to their end, or to a dead point, by their numbers."""
     steps, finer = request.steps, step_division(request.steps) * attempt.refinement
@@ -337,7 +332,6 @@ def _run_attempt(
         gone,
         FULL_TURN / (steps * finer),
         request.rates,
-        runner,
         attempt.polished,
         attempt.verdict_only,
     )

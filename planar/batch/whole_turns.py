@@ -23,7 +23,7 @@ def run_whole_turns(linkages: PinnedLinkages, steps: int) -> tuple[BoolArray, Pi
 
     What compiled code leaves open, most of it linkages that come to a dead point, is not looked at by the general path.
     """
-    request = SweepRequest(steps, None, False, None, "auto")
+    request = SweepRequest(steps, None, False, None)
     leave_open = partial(_leave_open, request=request)
     solve_blocks = partial(solve_by_blocks, request=request, solve_general=_leave_open)
     part = solve_pinned(linkages, request, solve_blocks, leave_open)

@@ -33,8 +33,6 @@ SWEEP_STEPS, CYCLE_STEPS = 200, 360
 """Steps of a sweep, and of a cycle."""
 LENGTH_VARIATIONS = (0.01, 1e-4)
 """Of itself that every length of a design may differ from the file's; the second where the first lets none move."""
-BACKEND_LIBRARIES = {"native": "llvmlite", "numpy": "numpy"}
-"""The backends of sweeps, and the library that each needs."""
 MAX_DESIGNS, FIRST_DESIGNS, SWEEP_SECONDS = 2000, 50, 3.0
 """Designs in a sweep at most, and where it is not known yet how long one takes; s that all sweeps should take about."""
 MAX_REPEAT_SECONDS, MAX_PROFILED_SECONDS = 0.4, 2.0
@@ -47,20 +45,18 @@ SWEPT_RANGE_RATIO, UNLIMITED_SLIDE_RATIO = 0.9, 0.1
 
 @dataclass(frozen=True)
 class SweepTiming:
-    """One backend: seconds a position of a sweep over designs with every length `within` 1 % of the file's, or less.
+    """Seconds a position of a sweep over designs with every length `within` 1 % of the file's, or less.
 
-    `first`: s by which the first call takes longer than those after it, `compiling`: s of that for machine code (None:
-    the backend makes none). `refused` designs have a position that is not given; the general path solved `general` of
-    all positions.
+    `first`: s by which the first call takes longer than those after it, `compiling`: s of that for machine code.
+    `refused` designs have a position that is not given; the general path solved `general` of all positions.
     """
 
-    backend: str
     rates: bool
     within: float
     designs: int
     seconds: float
     first: float
-    compiling: float | None
+    compiling: float
     refused: int
     general: int
     parts: dict[str, float]
@@ -114,8 +110,6 @@ def measure_speed(mechanism: Mechanism, rounds: int = 5, seconds: float = SWEEP_
             parts = profile_cycle(lambda: cycle(mechanism, CYCLE_STEPS, *between))
             told.append(_describe_shares("A cycle, which is the general path too", parts))
         cycled /= rows
-        if find_spec(BACKEND_LIBRARIES["native"]) is None:
-            told.append('Machine code is not installed; pip install "planar-linkages[native]"')
     unknowns, links = len(solver.equations.unknowns), len(mechanism.links)
     return Speed(mechanism.name, links, unknowns, equations, assembly, solved, cycled, swept, tuple(told))
 
@@ -189,13 +183,12 @@ def _time_sweeps_within(
 
 
 def _time_sweeps(mechanism: Mechanism, input_range: InputRange, seconds: float) -> Iterator[SweepTiming]:
-    """Every backend that is there, with rates and without."""
+    """With rates and without."""
     start, stop, pair = input_range
     points = list(reference_design(mechanism, pair).moving_points)[-1:]
-    todo = [(name, rates) for name, needs in BACKEND_LIBRARIES.items() if find_spec(needs) for rates in (True, False)]
     end, within = perf_counter() + seconds, LENGTH_VARIATIONS[0]
 
-    def run(backend: str, rates: bool, designs: int) -> Sweep:
+    def run(rates: bool, designs: int) -> Sweep:
         drawn = _draw_designs(mechanism, designs, within)
         return sweep(
             mechanism,
@@ -206,18 +199,17 @@ def _time_sweeps(mechanism: Mechanism, input_range: InputRange, seconds: float) 
             start=start,
             stop=stop,
             pair=pair,
-            backend=backend,
             workers=1,
         )
 
-    for k, (backend, rates) in enumerate(todo):
-        task = partial(run, backend, rates)
+    for k, rates in enumerate((True, False)):
+        task = partial(run, rates)
         first, compiling = profile_first_call(partial(task, 1))
         if not k and not task(2).whole.any():
             within = LENGTH_VARIATIONS[1]
             first, compiling = profile_first_call(partial(task, 1))
         least, found = _time_call(partial(task, 1))
-        alone, designs, until = least, 1, perf_counter() + (end - perf_counter()) / (len(todo) - k)
+        alone, designs, until = least, 1, perf_counter() + (end - perf_counter()) / (2 - k)
         if found.whole.all() and not found.general and least < until - perf_counter():
             # beside what every sweep takes, a design that is marched takes nearly nothing
             designs = FIRST_DESIGNS
@@ -228,13 +220,12 @@ def _time_sweeps(mechanism: Mechanism, input_range: InputRange, seconds: float) 
             least, found = _time_call(partial(task, designs))
         whole, parts = profile_sweep(partial(task, designs))
         yield SweepTiming(
-            backend,
             rates,
             within,
             designs,
             min(least, whole) / (designs * (SWEEP_STEPS + 1)),
             max(0.0, first - alone),
-            compiling if backend == "native" else None,
+            compiling,
             designs - int(np.sum(found.whole)),
             int(found.general),
             parts,
@@ -255,7 +246,7 @@ def _draw_designs(mechanism: Mechanism, count: int, within: float) -> dict[str, 
 def _describe_sweep(swept: SweepTiming) -> str:
     """What takes the time of a sweep, and what became of the designs."""
     rates = "with rates" if swept.rates else "positions alone"
-    told = [_describe_shares(f"A sweep by {swept.backend}, {rates}", swept.parts)]
+    told = [_describe_shares(f"A sweep, {rates}", swept.parts)]
     part = swept.general / (swept.designs * (SWEEP_STEPS + 1))
     told.append(f"{'none' if not part else f'{100.0 * part:.3g} %'} of its positions by the general path")
     if swept.refused:

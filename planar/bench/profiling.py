@@ -14,8 +14,7 @@ FunctionKey = tuple[str, ...]
 
 SWEEP_PARTS: dict[FunctionKey, str] = {
     ("batch", "initial_assembly.py", "find_assemblies"): "assembling the starts",
-    ("llvm", "runner.py", "run"): "machine code",
-    ("numpy", "runner.py", "run"): "numpy",
+    ("march", "runs.py", "run_compiled"): "machine code",
     ("batch", "block.py", "_lead_to_start"): "leading designs to where the run starts",
     ("closed_form", "ends.py", "find_ends"): "finding dead points in closed form",
     ("batch", "dead_point_tracking.py", "follow_to_dead_points"): "following designs to where they stop",
@@ -47,10 +46,8 @@ class CallProfile(NamedTuple):
 
 def profile_first_call(task: Callable[[], Any]) -> tuple[float, float]:
     """Seconds of a task, with none of its machine code known before, and of these to compile it."""
-    try:
-        from planar.codegen import llvm_compile
-    except ImportError:
-        return profile_call(task).seconds, 0.0
+    from planar.codegen import llvm_compile  # takes long to load
+
     llvm_compile.compile_function.cache_clear()
     with disable_cache():
         found = profile_call(task)

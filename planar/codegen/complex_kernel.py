@@ -1,9 +1,8 @@
-"""An instruction list on complex numbers as machine code over many columns, and by numpy where there is no LLVM."""
+"""An instruction list on complex numbers as machine code over many columns, and by numpy in more digits."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
@@ -23,14 +22,14 @@ ComplexPair = tuple[int, int]
 class ComplexKernel:
     """Computes rows of complex values from rows of complex operands, column by column.
 
-    The machine code is made at the first call; without llvmlite, and for operands in more digits, numpy computes.
+    The machine code is made at the first call; of operands in more digits numpy computes.
     """
 
     def __init__(self, instructions: InstructionList[Any], outputs: Sequence[int], operands: Sequence[int]):
         self.instructions, self.outputs, self.operands = instructions, list(outputs), list(operands)
         self._numpy = compile_numpy(instructions, outputs, operands)
         self._native: Any = None
-        self._can_be_native = find_spec("llvmlite") is not None
+        self._can_be_native = True
 
     def __call__(self, operands: ComplexArray) -> ComplexArray:
         """Outputs (outputs, columns) of operands (operands, columns); columns are a multiple of LANES."""

@@ -6,7 +6,6 @@ import math
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cached_property
-from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -269,7 +268,7 @@ class FormulaFunction:
         self._array_time += instructions * (NUMPY_INSTRUCTION_TIME + count * NUMPY_NUMBER_TIME)
         if self._array_time < MIN_COMPILED_TIME + instructions * COMPILED_TIME_PER_INSTRUCTION:
             return None
-        if instructions > MAX_COMPILED_INSTRUCTIONS or find_spec("llvmlite") is None:
+        if instructions > MAX_COMPILED_INSTRUCTIONS:
             self._array_time = -np.inf
             return None
         varies = tuple(argument.ndim > 1 for argument in arguments)

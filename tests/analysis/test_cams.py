@@ -173,18 +173,13 @@ def test_points_of_a_file_keep_its_tolerance():
     assert away.max() <= tolerance * 1.05
 
 
-@pytest.mark.parametrize(
-    ("follower", "backend"),
-    first_cases(
-        [("swinging flat", "native"), ("roller", "numpy"), ("roller", "native"), ("swinging flat", "numpy")], 2
-    ),
-)
-def test_many_designs_of_a_cam_are_what_the_general_path_says(follower, backend):
+@pytest.mark.parametrize("follower", ["swinging flat", "roller"])
+def test_many_designs_of_a_cam_are_what_the_general_path_says(follower):
     mechanism = planar.from_dict(cam_document(follower))
     rng, many = np.random.default_rng(0), 12
     designs = {"K.base_radius": rng.uniform(0.005, 0.08, many), "K.start": rng.uniform(-3.0, 3.0, many)}
     designs |= {"ground.O.x": rng.uniform(-0.03, 0.03, many)}
-    swept, base = planar.sweep(mechanism, designs, 40, backend=backend), reference_design(mechanism, None)
+    swept, base = planar.sweep(mechanism, designs, 40), reference_design(mechanism, None)
     for index in range(many):
         own = with_design_values(base.mechanism, values_of_design(designs, index))
         row = np.broadcast_to(swept.input, swept.status.shape)[index]

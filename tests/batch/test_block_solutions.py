@@ -8,7 +8,6 @@ from planar.assemblies.block_roots import block_roots
 from planar.batch.block_solutions.complete_lists import BlockListing
 from planar.batch.design_arrays import values_of_design, with_design_values
 from planar.batch.initial_assembly import find_assemblies
-from planar.batch.march.choice import find_runner
 from planar.batch.reference_design import reference_design
 from planar.document.dimensions import link_lengths
 from planar.foundation.angles import distances
@@ -59,7 +58,7 @@ def test_wide_designs_have_the_assemblies_of_the_complete_list(case):
 def test_of_all_assemblies_the_nearest_is_taken_and_none_where_none_is():
     mechanism = planar.load("stephenson-3-five-bar")
     values, common, shapes, p, u = drawn(mechanism, 0.4, 24)
-    found = find_assemblies(common, shapes, p, u, find_runner("numpy"))
+    found = find_assemblies(common, shapes, p, u)
     refused = found.failed_block == 0
     assert np.all(found.is_sure | refused | ~np.isfinite(p).all(axis=0))
     assert np.any(refused)
@@ -71,12 +70,11 @@ def test_of_all_assemblies_the_nearest_is_taken_and_none_where_none_is():
             assert distances(angle, nearest.z, found.z[:, index]).max() < 1e-6
 
 
-@pytest.mark.parametrize("backend", ["native", "numpy"])
-def test_wide_designs_run_as_the_cycle(backend):
+def test_wide_designs_run_as_the_cycle():
     mechanism = planar.load("stephenson-3-five-bar")
     values, *_ = drawn(mechanism, 0.15, 4)
     start = mechanism.inputs[0].position
-    swept = planar.sweep(mechanism, values, 6, start=start, stop=start + 0.4, backend=backend)
+    swept = planar.sweep(mechanism, values, 6, start=start, stop=start + 0.4)
     assert swept.general == 0
     for index in range(4):
         design = with_design_values(mechanism, values_of_design(values, index))

@@ -49,11 +49,10 @@ def equal(one, other):
 # workers
 
 
-@pytest.mark.parametrize("backend", ["native", "numpy"])
-def test_whatever_the_number_of_workers_every_digit_is_the_same(backend):
-    alone = swept(block=16, workers=1, backend=backend)
+def test_whatever_the_number_of_workers_every_digit_is_the_same():
+    alone = swept(block=16, workers=1)
     for workers in (3, None):
-        found = swept(block=16, workers=workers, backend=backend)
+        found = swept(block=16, workers=workers)
         equal(found, alone)
         assert (found.remarks, found.general) == (alone.remarks, alone.general)
 
@@ -132,10 +131,9 @@ def test_as_many_cores_as_the_process_may_use(monkeypatch):
 # float32
 
 
-@pytest.mark.parametrize("backend", ["native", "numpy"])
 @pytest.mark.parametrize("block", [None, 17])
-def test_single_precision_is_what_double_is_rounded_once(backend, block):
-    wanted, found = (swept(block=block, backend=backend, dtype=dtype) for dtype in (float, np.float32))
+def test_single_precision_is_what_double_is_rounded_once(block):
+    wanted, found = (swept(block=block, dtype=dtype) for dtype in (float, np.float32))
     for order in ORDERS:
         for name, values in getattr(found, order).items():
             assert values.dtype == np.float32

@@ -28,9 +28,7 @@ def test_a_run_of_a_model_is_that_of_a_sweep(stem):
     mechanism = MODELS[stem]
     at = mechanism.inputs[0]
     ready = planar.prepared(mechanism, 40, start=at.position, stop=at.position + 0.2)
-    swept = planar.sweep(
-        mechanism, {f"{at.pair}.position": at.position}, 40, start=at.position, stop=at.position + 0.2, backend="numpy"
-    )
+    swept = planar.sweep(mechanism, {f"{at.pair}.position": at.position}, 40, start=at.position, stop=at.position + 0.2)
     agree(ready(), swept, ready.points)
     agree(ready(), swept, ready.points)
 
@@ -61,7 +59,7 @@ def test_positions_between_which_a_dead_point_lies_are_not_told():
     mechanism = open_four_bar(0.4999, 0.8, 0.7, 1.0)
     ready, swept = (
         planar.prepared(mechanism, 13),
-        planar.sweep(mechanism, {"AB.length": [0.4999]}, 13, backend="numpy"),
+        planar.sweep(mechanism, {"AB.length": [0.4999]}, 13),
     )
     agree(ready(), swept, ready.points)
 

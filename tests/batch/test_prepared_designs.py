@@ -16,8 +16,6 @@ from tests.builders import open_four_bar
 from tests.draws import draws
 from tests.known import MODELS
 
-pytest.importorskip("llvmlite")
-
 FULL_TURN = 2.0 * np.pi
 
 

@@ -7,14 +7,13 @@ from hypothesis import strategies as st
 
 import planar
 from planar.batch.design_arrays import values_of_design, with_design_values
-from planar.batch.march import choice
-from planar.batch.march.backend import RunnerAttempt, UnsupportedStructure
+from planar.batch.march import runs
 from planar.batch.march.checks import DesignResidualCheck
-from planar.batch.march.numpy.runner import NumpyRunner
 from planar.batch.reference_design import reference_design
 from planar.document import files
 from planar.document.dimensions import link_lengths
 from planar.foundation.errors import BadInput, NoAnswer, Outcome
+from planar.foundation.instruction_list import UnsupportedOperation
 from planar.solving.position import PositionSolver
 from tests.builders import block_slider_crank, designs_around, four_bar
 from tests.checks import ORDERS, accept_steps
@@ -202,27 +201,23 @@ def test_what_is_open_by_the_pairs_own_formulas_does_not_pass():
     assert (left <= solver.tolerance).tolist() == [True, False, False]
 
 
-def backend(monkeypatch, name, runner):
-    """Puts a runner in the place of a backend."""
-    monkeypatch.setitem(choice.BACKENDS, name, lambda: (RunnerAttempt(runner, True),))
-
-
 @pytest.mark.parametrize("rates", [True, False])
-def test_what_a_backend_does_not_let_pass_is_solved_all_the_same_and_counted(monkeypatch, rates):
+def test_what_compiled_code_does_not_let_pass_is_solved_all_the_same_and_counted(monkeypatch, rates):
     mechanism, designs = four_bar(*ROCKER, 0.8), {"BC.length": np.linspace(0.85, 0.95, 6)}
     wanted = planar.sweep(mechanism, designs, 30, "E", rates=rates)
 
-    class Failing(NumpyRunner):
-        def run(self, batch, out, candidates=None):
-            good = super().run(batch, out)
-            out[7:, :, 1] = np.nan
-            out[:, :, 2] = np.nan
-            good[1], good[2] = 7, 0
-            return good
+    really = runs.run_compiled
 
-    backend(monkeypatch, "numpy", Failing())
+    def run_in_part(batch, out, candidates=None):
+        good = really(batch, out)
+        out[7:, :, 1] = np.nan
+        out[:, :, 2] = np.nan
+        good[1], good[2] = 7, 0
+        return good
+
+    monkeypatch.setattr(runs, "run_compiled", run_in_part)
     monkeypatch.setattr("planar.batch.block.closed_form_designs", lambda *_: None)
-    found = planar.sweep(mechanism, designs, 30, "E", rates=rates, backend="numpy")
+    found = planar.sweep(mechanism, designs, 30, "E", rates=rates)
     assert found.general == 24 + 30
     assert found.remarks == ("2 of 6 designs went to the general path, which solved 54 positions",)
     np.testing.assert_allclose(found.position["E"], wanted.position["E"], atol=1e-13)
@@ -231,30 +226,40 @@ def test_what_a_backend_does_not_let_pass_is_solved_all_the_same_and_counted(mon
     assert found.whole.all()
 
 
-def test_a_structure_that_a_backend_cannot_do_is_done_by_the_next(monkeypatch):
-    class Refusing(NumpyRunner):
-        def run(self, batch, out, candidates=None):
-            raise UnsupportedStructure("not this one")
+def test_a_structure_that_is_not_compiled_is_followed_from_its_start(monkeypatch):
+    def refuse(*_given, **_more):
+        raise UnsupportedOperation("not this one")
 
-    backend(monkeypatch, "native", Refusing())
-    for name in ("native", "auto"):
-        assert planar.sweep(four_bar(*ROCKER, 0.8), {"BC.length": [0.9]}, 30, backend=name).general == 0
+    mechanism, designs = four_bar(*ROCKER, 0.8), {"BC.length": [0.9, 0.92]}
+    wanted = planar.sweep(mechanism, designs, 30, "E")
+    monkeypatch.setattr(runs, "run_compiled", refuse)
+    found = planar.sweep(mechanism, designs, 30, "E")
+    assert (found.whole.all(), wanted.general) == (True, 0)
+    np.testing.assert_allclose(found.acceleration["E"], wanted.acceleration["E"], atol=1e-11)
 
 
-def test_designs_that_one_runner_does_not_begin_are_begun_by_the_next(monkeypatch):
-    asked = []
+def test_designs_that_compiled_code_does_not_begin_are_looked_at_where_they_start(monkeypatch):
+    asked, really = [], runs.run_compiled
+    mechanism, designs = four_bar(*ROCKER, 0.8), {"BC.length": np.linspace(0.85, 0.95, 6)}
+    wanted = planar.sweep(mechanism, designs, 30, "E")
 
-    class Lame(NumpyRunner):
-        def run(self, batch, out, candidates=None):
-            asked.append(batch.p.shape[1])
-            return np.where(np.arange(out.shape[2]) % 2, super().run(batch, out), 0)
+    def begin_every_second(batch, out, candidates=None, **more):
+        asked.append(batch.p.shape[1])
+        return np.where(np.arange(out.shape[2]) % 2, really(batch, out, None, **more), 0)
 
-    backend(monkeypatch, "native", Lame())
-    found = planar.sweep(four_bar(*ROCKER, 0.8), {"BC.length": np.linspace(0.85, 0.95, 6)}, 30, "E", backend="native")
-    assert asked == [6]
-    assert found.general == 0
-    wanted = planar.sweep(four_bar(*ROCKER, 0.8), {"BC.length": np.linspace(0.85, 0.95, 6)}, 30, "E", backend="numpy")
+    monkeypatch.setattr(runs, "run_compiled", begin_every_second)
+    found = planar.sweep(mechanism, designs, 30, "E")
+    assert asked[0] == 6
+    assert found.whole.all()
     np.testing.assert_allclose(found.position["E"], wanted.position["E"], atol=1e-13)
+
+
+def test_the_argument_backend_is_no_longer_needed():
+    calls = (planar.sweep, ("four-bar", {"BC.length": [0.07]})), (planar.sweep_each, (["four-bar"],))
+    for function, arguments in calls:
+        with pytest.warns(DeprecationWarning, match="leave out the argument 'backend'") as told:
+            function(*arguments, 6, backend="numpy")
+        assert told[0].filename == __file__
 
 
 # what may be asked for, and how it is said
@@ -300,7 +305,6 @@ WRONG = [
     ({"BC.length": 0.9}, {"block": 0}, "whole number of designs"),
     ({"BC.length": 0.9}, {"start": "now"}, "a number up to"),
     ({"BC.length": 0.9}, {"pair": "Z"}, "no input at 'Z'"),
-    ({"BC.length": 0.9}, {"backend": "fortran"}, "choose from auto, native, numpy"),
     ({"BC.length": 0.9}, {"store": "results.csv"}, "ends in .zarr or .parquet"),
     ({"BC.length": np.ones(10**6)}, {"steps": 10**5}, "too much for memory"),
 ]

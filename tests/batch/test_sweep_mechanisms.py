@@ -12,7 +12,7 @@ from planar.batch.mechanisms import partition
 from planar.batch.mechanisms.block_type import FRAME_BODY, BlockPair, BlockSignature
 from planar.batch.mechanisms.partition import NotPartitionable, partition_mechanism
 from planar.batch.mechanisms.solved_block_type import find_block_type
-from planar.codegen import block_formula, block_kernel, instructions
+from planar.codegen import block_formula, instructions
 from planar.document import files
 from planar.foundation.errors import BadInput, NoAnswer, Outcome
 from planar.model.pairs import pair_types
@@ -24,7 +24,6 @@ from tests.known import MODELS
 from tests.linkages import random_linkage
 
 ORDERS = ("position", "velocity", "acceleration")
-BACKENDS = ("native", "numpy")
 
 
 def as_cycle(mechanism, found, steps, outcomes, allowed=1e-9):
@@ -88,8 +87,7 @@ def dyads(seed, pins):
 # as the cycle of every mechanism
 
 
-@pytest.mark.parametrize("backend", BACKENDS)
-def test_mixed_mechanisms_are_the_cycles_of_each(backend):
+def test_mixed_mechanisms_are_the_cycles_of_each():
     mechanisms = [
         four_bar(*ROCKER, 0.8),
         four_bar(*ROCKER, 0.8, -1),
@@ -101,7 +99,7 @@ def test_mixed_mechanisms_are_the_cycles_of_each(backend):
         triads(2),
         MODELS["002-E3.4"],
     ]
-    result = planar.sweep_each(mechanisms, 60, backend=backend)
+    result = planar.sweep_each(mechanisms, 60)
     assert result.general == 0
     assert result.remarks == ()
     assert result.whole.all()
@@ -150,8 +148,7 @@ def as_arrays(mechanisms):
     )
 
 
-@pytest.mark.parametrize("backend", BACKENDS)
-def test_linkages_as_arrays_are_the_mechanisms_one_by_one(backend):
+def test_linkages_as_arrays_are_the_mechanisms_one_by_one():
     """Ones that go round and ones that stop, with bars of three pins, and one that is no crank and dyads."""
     places = [(0.0, 0.0), (0.3, 0.2), (1.0, 0.0), (0.9, 0.7), (0.6, 1.1), (2.0, 0.0), (2.1, 0.8)]
     bell = planar.pinned(places, [(0, 1), (1, 3), (2, 3, 4), (4, 6), (5, 6)], [0, 2, 5], velocity=-3.0)
@@ -159,8 +156,8 @@ def test_linkages_as_arrays_are_the_mechanisms_one_by_one(backend):
     given, rates = as_arrays(mechanisms)
     linkages = planar.pinned_linkages(*given, **rates)
     assert list(linkages) == mechanisms
-    arrays = planar.sweep_each(linkages, 60, backend=backend)
-    each = planar.sweep_each([replace(one) for one in mechanisms], 60, backend=backend)
+    arrays = planar.sweep_each(linkages, 60)
+    each = planar.sweep_each([replace(one) for one in mechanisms], 60)
     np.testing.assert_array_equal(arrays.whole, each.whole)
     assert not arrays.whole.all()
     rows = arrays.rows()
@@ -192,12 +189,11 @@ def test_linkages_as_arrays_in_parts_and_with_points_of_some(monkeypatch):
         planar.sweep_each(linkages, 6, ["C"])
 
 
-@pytest.mark.parametrize("backend", BACKENDS)
-def test_pins_read_as_arrays_and_links_read_one_by_one_are_the_same(backend):
+def test_pins_read_as_arrays_and_links_read_one_by_one_are_the_same():
     laid = [dyads(seed, 9) for seed in range(6)]
     plain = [replace(each) for each in laid]
     assert plain[0].layout is None
-    one, two = (planar.sweep_each(each, 50, backend=backend) for each in (laid, plain))
+    one, two = (planar.sweep_each(each, 50) for each in (laid, plain))
     for own, other in zip(one, two, strict=True):
         np.testing.assert_array_equal(own.status, other.status)
         for order in ORDERS:
@@ -236,9 +232,9 @@ def test_pins_that_only_later_groups_hang_on_may_lie_next_to_each_other(apart):
 # closed forms
 
 
-@pytest.mark.parametrize(("links", "backend"), [(4, "native"), (42, "native"), (22, "numpy")])
-def test_rows_of_four_bars_against_the_closed_form(links, backend):
-    result = planar.sweep_each([planar.from_dict(chain.document(links))], 100, backend=backend)
+@pytest.mark.parametrize("links", [4, 22, 42])
+def test_rows_of_four_bars_against_the_closed_form(links):
+    result = planar.sweep_each([planar.from_dict(chain.document(links))], 100)
     assert result.general == 0
     last, cells = (links - 2) // 2, chain.cells(links)
     theta = result[0].input
@@ -357,7 +353,6 @@ BAD = {
     "another": (lambda: planar.sweep_each([four_bar(*ROCKER, 0.8)], pair="Q"), "no input at 'Q'"),
     "point": (lambda: planar.sweep_each([four_bar(*ROCKER, 0.8)], 6, "Z"), "no mechanism has a point 'Z'"),
     "steps": (lambda: planar.sweep_each([four_bar(*ROCKER, 0.8)], 0), "whole number"),
-    "backend": (lambda: planar.sweep_each([four_bar(*ROCKER, 0.8)], 6, backend="fast"), "no backend"),
 }
 
 
@@ -425,8 +420,8 @@ def test_every_dyad_is_in_closed_form(joints):
     assert find_block_type(signature) is find_block_type(signature)
 
 
-def test_machine_code_tells_the_extremes_of_what_numpy_tells(monkeypatch):
-    """What the quick look of machine code lets pass, and what not, as by all that it leaves out."""
+def test_extremes_are_those_of_all_that_is_told():
+    """What the quick look lets pass, and what not, as by all that it leaves out."""
     crank = find_block_type(BlockSignature(1, 0, (BlockPair(pair_types()["turning"], (FRAME_BODY, 0), True),)))
     dyad = find_block_type(
         BlockSignature(2, 2, tuple(BlockPair(pair_types()["turning"], of, False) for of in ((0, -1), (1, -2), (0, 1))))
@@ -445,10 +440,10 @@ def test_machine_code_tells_the_extremes_of_what_numpy_tells(monkeypatch):
     formula = dyad.run_formula(False)
     for one in (0, 1):
         both = state.copy(), state.copy()
-        plain = block_formula.run_formula(
+        plain = block_formula.run_kernel(
             formula, block_formula.KernelLayout(gives, 13, 4, 2), both[0], index[:1], p[one : one + 1]
         )
-        quick = block_kernel.run_kernel(
+        quick = block_formula.run_kernel(
             formula, block_formula.KernelLayout(gives, 13, 4, 2, True), both[1], index[:1], p[one : one + 1]
         )
         np.testing.assert_allclose(both[0], both[1], atol=1e-12)

@@ -71,7 +71,7 @@ def test_links_and_pairs_are_those_of_every_designs_motion(name):
 def test_results_are_told_with_points_and_without_rates():
     mechanism, lengths = four_bar(*ROCKER, 0.8), np.linspace(0.85, 0.95, 3)
     result = planar.sweep(mechanism, {"BC.length": lengths}, 40, "C", links="BC", pairs=["C"], rates=False)
-    whole = planar.sweep(mechanism, {"BC.length": lengths}, 40, "C", links="BC", pairs=["C"], backend="numpy")
+    whole = planar.sweep(mechanism, {"BC.length": lengths}, 40, "C", links="BC", pairs=["C"])
     np.testing.assert_allclose(result.angle["BC"], whole.angle["BC"], atol=1e-12)
     np.testing.assert_allclose(result.value["C"], whole.value["C"], atol=1e-12)
     np.testing.assert_allclose(result.position["C"], whole.position["C"], atol=1e-12)
@@ -248,7 +248,7 @@ def test_several_inputs_run_in_time_as_in_a_cycle(name):
 def test_dead_points_are_those_of_triangles():
     a, b, c = np.array([0.9, 0.7, 0.3]), 0.8, np.array([0.5, 0.85, 0.9])
     designs = {"AB.length": a, "BC.length": b, "DC.length": c, "AD.D.x": 1.0}
-    result = planar.sweep(four_bar(0.9, b, 0.5, 1.0, 0.8), designs, 60, backend="numpy")
+    result = planar.sweep(four_bar(0.9, b, 0.5, 1.0, 0.8), designs, 60)
     # coupler and follower in one line, so long as that goes together with the crank and the base
     wanted = np.arccos((a**2 + 1.0 - (b + c) ** 2) / (2.0 * a), where=a + 1.0 > b + c, out=np.full(3, np.nan))
     np.testing.assert_allclose(result.dead_point, wanted, atol=1e-9)

@@ -52,17 +52,14 @@ def designs_around(mechanism, spread, many, seed=1):
     return {each.name: each.value * np.exp(spread * rng.uniform(-1.0, 1.0, many)) for each in lengths if each.value}
 
 
-@pytest.mark.parametrize("backend", ["native", "numpy"])
 @pytest.mark.parametrize("ends", [(60.0, 110.0), (None, 110.0)])
-def test_a_rocker_meets_its_stop_where_two_circles_say(backend, ends):
-    if backend == "native":
-        pytest.importorskip("llvmlite")
+def test_a_rocker_meets_its_stop_where_two_circles_say(ends):
     rng, many = np.random.default_rng(3), 40
     a, b, c = (length * np.exp(0.05 * rng.uniform(-1.0, 1.0, many)) for length in (CRANK, COUPLER, ROCKER))
     low, high = (None if end is None else end * DEG for end in ends)
     mechanism = replace(four_bar(CRANK, COUPLER, ROCKER, GROUND, 0.8), stops=(Stops("D", low, high),))
     designs = {"AB.length": a, "BC.length": b, "DC.length": c}
-    swept = planar.sweep(mechanism, designs, 90, "C", backend=backend)
+    swept = planar.sweep(mechanism, designs, 90, "C")
     assert swept.general == 0
     ended = swept.status[:, -1] == STOP
     assert ended.sum() > 20
@@ -140,7 +137,6 @@ def test_the_input_ends_at_its_own_stop_and_a_range_up_to_it_is_whole():
 
 
 def test_prepared_runs_end_at_stops_in_their_compiled_code(monkeypatch):
-    pytest.importorskip("llvmlite")
     base = four_bar(CRANK, COUPLER, ROCKER, GROUND, 0.8)
     for stops, ends in (((Stops("D", 0.2, 1.9),), True), ((Stops("D", 0.2, 3.0),), False)):
         mechanism = replace(base, stops=stops)
@@ -148,7 +144,7 @@ def test_prepared_runs_end_at_stops_in_their_compiled_code(monkeypatch):
         with monkeypatch.context() as alone:
             alone.setattr(type(ready), "_run_as_sweep", lambda *_: pytest.fail("it went through a sweep"))
             found = [ready({"AB.length": length}) for length in (0.28, 0.3, 0.33)]
-        swept = planar.sweep(mechanism, {"AB.length": [0.28, 0.3, 0.33]}, 90, "C", backend="numpy")
+        swept = planar.sweep(mechanism, {"AB.length": [0.28, 0.3, 0.33]}, 90, "C")
         for k, each in enumerate(found):
             np.testing.assert_array_equal(each.status, swept.status[k])
             np.testing.assert_allclose(each.position["C"], swept.position["C"][k], atol=1e-12)

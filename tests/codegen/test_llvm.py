@@ -1,4 +1,4 @@
-"""What kernels compute, as machine code and by numpy, equals what casadi computes: runs of designs against one."""
+"""What kernels compute equals what casadi computes: runs of designs against one."""
 
 from pathlib import Path
 
@@ -6,14 +6,10 @@ import numpy as np
 import pytest
 
 import planar
-from planar.batch.march import kernel
-from planar.batch.march.backend import DesignBatch, UnsupportedStructure
+from planar.batch.march import designs_writer, kernel, runs
+from planar.batch.march.design_batch import DesignBatch
 from planar.batch.march.kernel import BareAngle, kernel_equations
-from planar.batch.march.llvm import designs_writer, kernel_runs
-from planar.batch.march.llvm.kernel_runs import designs_kernel
-from planar.batch.march.llvm.runner import LLVMRunner
-from planar.batch.march.numpy import runner as numpy_runner
-from planar.batch.march.numpy.runner import NumpyRunner
+from planar.batch.march.runs import designs_kernel
 from planar.batch.reference_design import reference_design
 from planar.codegen import instructions, llvm_compile, printed_formula
 from planar.codegen.aligned_arrays import allocate_aligned
@@ -63,15 +59,14 @@ def repeated(given, designs):
     return given.select(np.zeros(designs, dtype=int))
 
 
-def run(runner, batch):
+def run(batch):
     """The points and the good steps of a batch."""
     out = allocate_aligned(len(batch.input_offsets), batch.output_row_count, batch.p.shape[1])
-    return out, runner.run(batch, out)
+    return out, runs.run_compiled(batch, out)
 
 
-@pytest.mark.parametrize("runner", [LLVMRunner(), NumpyRunner()])
 @pytest.mark.parametrize("stem", part([stem for stem, mechanism in MODELS.items() if mechanism.inputs], 9))
-def test_a_run_of_a_model_is_the_one_that_casadi_gives(stem, runner):
+def test_a_run_of_a_model_is_the_one_that_casadi_gives(stem):
     mechanism = MODELS[stem]
     try:
         motion = planar.cycle(mechanism, pair=mechanism.inputs[0].pair)
@@ -82,10 +77,10 @@ def test_a_run_of_a_model_is_the_one_that_casadi_gives(stem, runner):
     points = motion.point_names[-3:]
     given = repeated(arguments(motion, points), 3)
     if not given.functions.is_square:
-        with pytest.raises(UnsupportedStructure, match="more than once"):
-            run(runner, given)
+        with pytest.raises(UnsupportedOperation, match="more than once"):
+            run(given)
         return
-    out, good = run(runner, given)
+    out, good = run(given)
     np.testing.assert_array_equal(out, np.repeat(out[:, :, :1], 3, axis=2))
     # what is near a change point, or moves too far in a step, is left to the general path; a step condemns that before
     first = int(good[0])
@@ -123,7 +118,7 @@ def test_a_run_from_signs_is_that_from_the_unknowns(stem, at_two):
     assert not equations.has_newton_blocks
     signs = np.repeat(equations.assembly_signs(one, given.u0[:, 0], given.p[:, 0])[:, None], 20, axis=1)
     signs[:, 5] = 0.0
-    wanted, found = (run(LLVMRunner(), given._replace(signs=each)) for each in (None, signs))
+    wanted, found = (run(given._replace(signs=each)) for each in (None, signs))
     np.testing.assert_array_equal(found[1], wanted[1])
     assert found[1][3] == 0
     assert np.delete(found[1], 3).min() == len(given.input_offsets)
@@ -164,38 +159,38 @@ def test_cos_and_sin_of_sums_are_put_together_from_the_angles_own():
     np.testing.assert_allclose([found[k] for k in numbers], [np.cos(angle), np.sin(angle)], atol=1e-15)
 
 
-@pytest.mark.parametrize("runner", [LLVMRunner(), NumpyRunner()])
-def test_what_is_not_a_number_is_not_good(runner):
+def test_what_is_not_a_number_is_not_good():
     motion = planar.cycle(MODELS["crank-rocker"])
     given = repeated(arguments(motion, motion.point_names[-1:]), 2)
     given.p[0, 1] = np.nan
-    _, good = run(runner, given)
+    _, good = run(given)
     assert good.tolist() == [len(given.input_offsets), 0]
 
 
 @pytest.mark.parametrize("stem", part(["crank-rocker", "004-QR", "double-butterfly", "geared-five-bar"], 2))
-def test_both_runners_correct_assemblies_alike_and_come_to_the_same_unknowns(stem):
+def test_assemblies_are_corrected_and_steps_come_to_the_unknowns_as_by_the_equations(stem):
     motion = planar.cycle(MODELS[stem], pair=MODELS[stem].inputs[0].pair)
     given = repeated(arguments(motion, motion.point_names[-3:]), 3)
     given.z0[:] += 1e-3 * np.arange(3)
     blocks = [block.block_index for block in given.functions.equations.blocks][-1:] * 3
-    one, other = (runner.correct_assemblies(given, blocks, 6) for runner in (LLVMRunner(), NumpyRunner()))
-    for first, second in zip(one, other, strict=True):
-        np.testing.assert_allclose(first, second, rtol=1e-9, atol=1e-12)
+    corrected = runs.correct_designs(given, blocks, 6)
+    wanted = given.functions.correct_samples(given.z0.T, given.u0.T, given.p.T)
+    assert corrected.converged.all()
+    np.testing.assert_allclose(np.exp(1j * corrected.z), np.exp(1j * wanted.T), atol=1e-10)
     steps = np.array([1, 20, 100])
-    one, other = (runner.last_good_unknowns(given, steps) for runner in (LLVMRunner(), NumpyRunner()))
-    np.testing.assert_allclose(np.exp(1j * one), np.exp(1j * other), atol=1e-10)
+    wanted = motion.course.found.z[PART][steps - 1]
+    np.testing.assert_allclose(np.exp(1j * runs.last_good_unknowns(given, steps)), np.exp(1j * wanted.T), atol=1e-9)
 
 
-@pytest.mark.parametrize(("stem", "backend"), [("stephenson-2-six-bar", "native"), ("double-butterfly", "numpy")])
-def test_blocks_too_large_for_expressions_are_solved_in_numbers_to_the_same(monkeypatch, stem, backend):
-    mechanism, caches = MODELS[stem], (numpy_runner._cached_kernel, kernel_runs._designs_kernel_or_reason)
+@pytest.mark.parametrize("stem", ["stephenson-2-six-bar", "double-butterfly"])
+def test_blocks_too_large_for_expressions_are_solved_in_numbers_to_the_same(monkeypatch, stem):
+    mechanism, caches = MODELS[stem], (runs._designs_kernel_or_reason,)
     designs = designs_around(mechanism, 0.005, 3)
-    wanted = planar.sweep(mechanism, designs, 30, backend=backend)
+    wanted = planar.sweep(mechanism, designs, 30)
     monkeypatch.setattr(kernel, "MAX_EXPRESSION_UNKNOWNS", 3)
     for cache in (kernel.kernel_equations, *caches):
         cache.cache_clear()
-    found = planar.sweep(mechanism, designs, 30, backend=backend)
+    found = planar.sweep(mechanism, designs, 30)
     for cache in (kernel.kernel_equations, *caches):
         cache.cache_clear()
     assert (found.general, found.whole.all()) == (0, True)
@@ -282,7 +277,7 @@ def test_what_is_printed_ends(seed, rates):
 def test_a_slide_that_turns_nothing_leaves_a_sweep_as_the_cycle():
     with watched(10):
         motion = planar.cycle(IDLE, 10, -0.07, 0.03)
-        found = planar.sweep(IDLE, {"S7.velocity": [1.9]}, 10, start=-0.07, stop=0.03, backend="native")
+        found = planar.sweep(IDLE, {"S7.velocity": [1.9]}, 10, start=-0.07, stop=0.03)
     assert found.whole.all()
     assert found.general == 0
     for point in found.points:
@@ -312,7 +307,7 @@ def test_what_cancels_is_nothing():
     assert [made.constant_value(made.add("add", *both)) for both in ((value, less), (less, value))] == [0.0, 0.0]
 
 
-def test_a_longer_function_is_left_to_casadi_and_printed_once_in_vain(monkeypatch):
+def test_designs_of_a_longer_function_are_followed_and_it_is_printed_once_in_vain(monkeypatch):
     mechanism, tried, really = MODELS["stephenson-1-six-bar"], [], designs_writer.write_designs_kernel
 
     def printing(*given, **more):
@@ -321,16 +316,16 @@ def test_a_longer_function_is_left_to_casadi_and_printed_once_in_vain(monkeypatc
 
     at, pair = mechanism.inputs[0].position, mechanism.inputs[0].pair
     designs, run_ = {f"{pair}.velocity": np.linspace(1, 2, 6)}, {"start": at, "stop": at + 0.1, "pair": pair}
-    wanted = planar.sweep(mechanism, designs, 5, backend="numpy", **run_)
+    wanted = planar.sweep(mechanism, designs, 5, **run_)
     monkeypatch.setattr(instructions, "MAX_INSTRUCTIONS", 100)
-    monkeypatch.setattr(kernel_runs, "write_designs_kernel", printing)
-    kernel_runs._designs_kernel_or_reason.cache_clear()
-    found = planar.sweep(mechanism, designs, 5, backend="native", block=2, **run_)
-    kernel_runs._designs_kernel_or_reason.cache_clear()
+    monkeypatch.setattr(runs, "write_designs_kernel", printing)
+    runs._designs_kernel_or_reason.cache_clear()
+    found = planar.sweep(mechanism, designs, 5, block=2, **run_)
+    runs._designs_kernel_or_reason.cache_clear()
     assert len({given[1:] for given in tried}) == len(tried) > 0
-    assert (found.general, found.whole.all()) == (0, True)
+    assert (wanted.general, found.whole.all()) == (0, True)
     for point in found.points:
-        np.testing.assert_array_equal(found.acceleration[point], wanted.acceleration[point])
+        np.testing.assert_allclose(found.acceleration[point], wanted.acceleration[point], rtol=1e-9, atol=1e-9)
 
 
 def test_a_long_text_is_compiled_briefly(monkeypatch):

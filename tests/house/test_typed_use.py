@@ -16,9 +16,7 @@ def test_results_have_the_types_that_a_type_checker_sees() -> None:
     mechanism = assert_type(planar.load("four-bar"), planar.Mechanism)
     state = assert_type(planar.solve(mechanism, {"A": 1.0}), planar.State)
     motion = assert_type(planar.cycle(Path("models/four-bar.json"), steps=12), planar.Motion)
-    swept = assert_type(
-        planar.sweep("four-bar", {"BC.length": [0.066, 0.0661]}, steps=4, backend="numpy"), planar.Sweep
-    )
+    swept = assert_type(planar.sweep("four-bar", {"BC.length": [0.066, 0.0661]}, steps=4), planar.Sweep)
     each = assert_type(planar.sweep_each([mechanism], steps=4), planar.Each)
     found: list[tuple[object, type]] = [
         (mechanism, planar.Mechanism),

@@ -82,7 +82,7 @@ def _list_dyads(reference: ReferenceDesign, p: Array, u: Array, fit: Array) -> t
     empty = np.zeros(0, dtype=int)
     nothing = ListedAssemblies(empty, empty, np.zeros((len(equations.unknowns), 0)))
     ways = [functions.block_assemblies(block) or _linear_block(reference, block) for block in equations.blocks]
-    if not reference.can_run_backend or any(way is None for way in ways):
+    if not reference.can_be_compiled or any(way is None for way in ways):
         return nothing, np.zeros_like(fit)
     design, z = np.flatnonzero(fit), np.zeros((len(equations.unknowns), int(fit.sum())))
     for block, way in zip(equations.blocks, ways, strict=True):

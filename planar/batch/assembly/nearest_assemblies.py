@@ -14,9 +14,11 @@ from planar.batch.assembly.assembly_scores import (
     is_clearly_regular,
     is_surely_farther,
 )
-from planar.batch.march.backend import CorrectedAssemblies, DesignRunner, UnsupportedStructure
+from planar.batch.march.design_batch import CorrectedAssemblies
+from planar.batch.march.runs import correct_designs
 from planar.batch.reference_design import ReferenceDesign
 from planar.equations.symbolic_equations import Block, slice_length
+from planar.foundation.instruction_list import UnsupportedOperation
 from planar.model.link_shapes import LinkShape
 from planar.solving.assembly.block_assemblies import SAME_ASSEMBLY_TOLERANCE, BlockAssemblies
 
@@ -38,10 +40,9 @@ def find_nearest_assemblies(
     shapes: Mapping[str, LinkShape],
     p: Array,
     u: Array,
-    runner: DesignRunner,
 ) -> NearestAssemblies | None:
-    """The assemblies at inputs u (inputs, designs); None where the sketch does not show every block, or no
-    runner can correct them.
+    """The assemblies at inputs u (inputs, designs); None where the sketch does not show every block, or the
+    structure cannot be compiled.
 
     Costs never fall: where the nearest assembly is taken of every block, and each block's next one alone would cost
     more than all these, there is no nearer one of the whole. A block in closed form has two assemblies; any other as
@@ -56,8 +57,8 @@ def find_nearest_assemblies(
     ):
         return None
     try:
-        return _NearestAssemblySearch(reference, shapes, p, u, runner, candidates, blocks).search()
-    except UnsupportedStructure:
+        return _NearestAssemblySearch(reference, shapes, p, u, candidates, blocks).search()
+    except UnsupportedOperation:
         return None
 
 
@@ -68,11 +69,10 @@ class _NearestAssemblySearch:
         shapes: Mapping[str, LinkShape],
         p: Array,
         u: Array,
-        runner: DesignRunner,
         candidates: BlockAssemblies,
         blocks: list[Block],
     ):
-        self.design_count, self.runner, self.blocks = p.shape[1], runner, blocks
+        self.design_count, self.blocks = p.shape[1], blocks
         at = candidates.sketched_by_level
         self.roots = {
             block.block_index: each
@@ -88,7 +88,7 @@ class _NearestAssemblySearch:
 
     def search(self) -> NearestAssemblies:
         """See `find_nearest_assemblies`."""
-        found = self.runner.correct_assemblies(self.batch, self.point_blocks, CORRECTIONS)
+        found = correct_designs(self.batch, self.point_blocks, CORRECTIONS)
         costs, others = (np.square(places - self.sketch).sum(axis=1) for places in (found.points, found.other_points))
         clear, total, before = found.converged.copy(), costs.sum(axis=0), np.zeros(self.design_count)
         for block in self.blocks:
@@ -112,7 +112,7 @@ class _NearestAssemblySearch:
         count = np.ones(self.design_count, dtype=int)
         for root in roots[1:]:
             self.batch.z0[block.unknowns] = root[:, None]
-            other = self.runner.correct_assemblies(self.batch, self.point_blocks, CORRECTIONS)
+            other = correct_designs(self.batch, self.point_blocks, CORRECTIONS)
             z = other.z[block.unknowns]
             apart = [
                 ~(np.max(np.abs(np.exp(1j * z) - np.exp(1j * each)), axis=0) <= SAME_ASSEMBLY_TOLERANCE)

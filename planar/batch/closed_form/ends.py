@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from planar.batch.closed_form.choice import find_joiner
-from planar.batch.closed_form.joined_blocks import BlockJoiner, DeadPoints, InputRanges, unknowns_from_state
+from planar.batch.closed_form.joined_blocks import BlockJoiner, DeadPoints, InputRanges, find_joiner
 from planar.batch.dead_point_tracking import DEAD_POINT_MARGIN, FollowedDesigns
 from planar.batch.design_arrays import split_into_blocks
-from planar.batch.march.backend import DesignBatch, DesignRunner
 from planar.batch.march.checks import pair_positions
+from planar.batch.march.design_batch import DesignBatch
+from planar.batch.march.kernel import unknowns_from_state
+from planar.batch.march.runs import run_designs
 from planar.batch.march.stops import nearest_end
 from planar.codegen.aligned_arrays import allocate_aligned
 from planar.model.mechanism import links_counting_turns
@@ -25,8 +26,8 @@ POSITIONS_AT_ONCE = 2**16
 class ClosedFormDesigns:
     """Designs whose blocks are all in closed form, in assemblies that are known, one of whose inputs runs."""
 
-    def __init__(self, joiner: BlockJoiner, batch: DesignBatch, index: int, signs: Array, runner: DesignRunner):
-        self.joiner, self.batch, self.index, self.signs, self.runner = joiner, batch, index, signs, runner
+    def __init__(self, joiner: BlockJoiner, batch: DesignBatch, index: int, signs: Array):
+        self.joiner, self.batch, self.index, self.signs = joiner, batch, index, signs
         self.direction = np.where(np.arange(len(batch.u0)) == index, 1.0, 0.0)
 
     def find_dead_points(self, reached: Array, lengths: Array, step: Array) -> DeadPoints:
@@ -91,28 +92,26 @@ class ClosedFormDesigns:
             z = unknowns_from_state(self.joiner.state, self.follow(own, signs, u), len(own.z0))
             row = allocate_aligned(1, len(out), len(moved[part]))
             here = own._replace(u0=u, z0=z, input_offsets=np.zeros((1, len(u))))
-            passed[part] = self.runner.run(here, row) > 0
+            passed[part] = run_designs(here, row) > 0
             out[:, part] = row[0]
         return out, passed
 
 
-def closed_form_designs(
-    batch: DesignBatch, index: int, signs: Array | None, runner: DesignRunner, backend: str
-) -> ClosedFormDesigns | None:
+def closed_form_designs(batch: DesignBatch, index: int, signs: Array | None) -> ClosedFormDesigns | None:
     """Designs of a batch at their start, where `index` is the input that runs; None where a block has no closed form.
 
     signs (blocks, designs) of the blocks' assemblies, 0 where that is not known.
     """
     if signs is None or links_counting_turns(batch.mechanism):
         return None
-    joiner = find_joiner(batch._replace(links=()), (), backend)
+    joiner = find_joiner(batch._replace(links=()), ())
     if joiner is None:
         return None
     unknown = np.flatnonzero(~signs.all(axis=0))
     if unknown.size:
         rows = (each[:, unknown] for each in (batch.z0, batch.u0, batch.p))
         signs[:, unknown] = joiner.equations.assembly_signs(*rows)
-    return ClosedFormDesigns(joiner, batch, index, signs, runner)
+    return ClosedFormDesigns(joiner, batch, index, signs)
 
 
 def find_ends(
@@ -121,7 +120,7 @@ def find_ends(
     """As `follow_to_dead_points`, of designs of which so many steps are good (designs,), none at first.
 
     lengths (designs,): how far the input is to go, rad or sizes, in so many steps. Of these so many `candidates`
-    (designs,) need not be solved here, see `DesignRunner.run`.
+    (designs,) need not be solved here, see `run_designs`.
     """
     step, count = np.abs(lengths) / steps, len(good)
     found = designs.find_dead_points(np.maximum(good - 1, 0) * step, lengths, step)

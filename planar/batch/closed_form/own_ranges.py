@@ -7,9 +7,14 @@ from typing import NamedTuple
 import numpy as np
 
 from planar.batch.closed_form.ends import ClosedFormDesigns
-from planar.batch.closed_form.joined_blocks import unknowns_from_state
-from planar.batch.march.checks import DesignsAtStep, PointWriter, find_sensitivities, make_residual_check
-from planar.batch.march.design_functions import DesignFunctions
+from planar.batch.march.checks import (
+    DesignFunctions,
+    DesignsAtStep,
+    PointWriter,
+    find_sensitivities,
+    make_residual_check,
+)
+from planar.batch.march.kernel import unknowns_from_state
 from planar.codegen.aligned_arrays import allocate_aligned
 from planar.solving.continuation.predictor_corrector import SHOWN_SLIDE_EXTENT
 

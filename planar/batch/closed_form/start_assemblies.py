@@ -8,9 +8,9 @@ from typing import NamedTuple
 import numpy as np
 
 from planar.batch.assembly.assembly_scores import CLEARLY_OPEN, DesignAssemblies, is_surely_farther
-from planar.batch.closed_form.choice import find_joiner
-from planar.batch.closed_form.joined_blocks import BlockJoiner, JoinedBlocks, unknowns_from_state
-from planar.batch.march.backend import DesignBatch
+from planar.batch.closed_form.joined_blocks import BlockJoiner, JoinedBlocks, find_joiner
+from planar.batch.march.design_batch import DesignBatch
+from planar.batch.march.kernel import unknowns_from_state
 from planar.batch.reference_design import ReferenceDesign
 from planar.equations.symbolic_equations import slice_length
 from planar.model.link_shapes import LinkShape
@@ -23,7 +23,7 @@ MAX_WAYS = 64
 
 
 def find_start_assemblies(
-    reference: ReferenceDesign, shapes: Mapping[str, LinkShape], p: Array, u: Array, backend: str
+    reference: ReferenceDesign, shapes: Mapping[str, LinkShape], p: Array, u: Array
 ) -> DesignAssemblies | None:
     """The assemblies at inputs u (inputs, designs); None where a block has no closed form, or no sketched points.
 
@@ -39,7 +39,7 @@ def find_start_assemblies(
     names = [name for block in blocks for name in at[block.block_index]]
     point_blocks = tuple(block.block_index for block in blocks for _ in at[block.block_index])
     batch = reference.design_batch(shapes, p, (u, u, u), [candidates.first_link[name][1:] for name in names])
-    joiner = find_joiner(batch, point_blocks, backend)
+    joiner = find_joiner(batch, point_blocks)
     if joiner is None:
         return None
     sketch = np.array([candidates.sketch[name] for name in names]).reshape(-1, 2)

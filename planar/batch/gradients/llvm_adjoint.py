@@ -9,7 +9,7 @@ import casadi as ca
 
 from planar.batch.gradients.adjoint_equations import WeighedRow, adjoint_expressions
 from planar.batch.march.kernel import BareAngle, KernelEquations, Operand
-from planar.batch.march.llvm.kernel_writer import KernelWriter, OperandNames
+from planar.batch.march.kernel_writer import KernelWriter, OperandNames
 from planar.codegen.llvm_ir import IRWriter
 from planar.foundation.instruction_list import UnsupportedOperation
 

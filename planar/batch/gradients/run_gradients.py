@@ -10,10 +10,12 @@ import numpy as np
 
 from planar.batch.design_arrays import read_designs
 from planar.batch.gradients.general_gradient import GeneralGradients
+from planar.batch.gradients.native_gradient import padded_width, prepare_native_gradient
 from planar.batch.gradients.run_gradient import WeightRows, check_finite
 from planar.batch.prepare.native_run import NativeRuns
 from planar.batch.prepare.run_endings import ALL_SOLVED, STATUS_OF_ENDING, UNSURE
 from planar.batch.reference_design import ReferenceDesign
+from planar.derivatives.design_equations import design_equations
 from planar.foundation.arrays import Array, IntArray
 from planar.foundation.errors import BadInput
 
@@ -129,11 +131,6 @@ class RunGradients:
         return self._native[rows]
 
     def _prepare(self, rows: tuple[int, ...]) -> NativeRuns | None:
-        try:
-            from planar.batch.gradients.native_gradient import padded_width, prepare_native_gradient
-            from planar.derivatives.design_equations import design_equations
-        except ImportError:  # there is no compiler
-            return None
         self._width = padded_width(len(self._positions))
         general, may_shift = self._general, self._range == (None, None)
         design = design_equations(general.reference.mechanism)

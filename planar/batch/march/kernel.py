@@ -14,7 +14,7 @@ from typing import NamedTuple
 import casadi as ca
 import numpy as np
 
-from planar.batch.march.backend import DesignBatch
+from planar.batch.march.design_batch import DesignBatch
 from planar.batch.march.regularity import LEAST_START_REGULARITY
 from planar.batch.march.stops import NUMBERS_PER_STOP, are_periodic, stop_rooms
 from planar.codegen.instructions import CosSin, check_length, expand_angle_sums
@@ -113,6 +113,12 @@ class KernelEquations:
         self.has_large_blocks = any(part.is_large for part in self.blocks)
         self.sides = ca.vertcat(ca.SX(0, 1), *(form.sign_expression for form in self.closed_forms))
         self.column_of = coordinate_columns(e.coordinates)
+        self.input_operands: tuple[Operand, ...] = tuple(
+            operand
+            for k, is_angle in enumerate(self.input_is_angle)
+            for operand in (("uc", k), ("us", k), ("u", k))[0 if is_angle else 2 :]
+        )
+        "what stands for the inputs"
 
     def assembly_signs(self, z: np.ndarray, u: np.ndarray, p: np.ndarray) -> np.ndarray:
         """Which assembly every block in closed form is in (blocks,), +1 or -1; of designs (..., designs) each."""
@@ -238,11 +244,7 @@ class KernelInstructions:
         self.sign_index = {
             part.block.block_index: k for k, part in enumerate(p for p in equations.blocks if p.closed_form is not None)
         }
-        self.input_operands = tuple(
-            operand
-            for k, is_angle in enumerate(equations.input_is_angle)
-            for operand in (("uc", k), ("us", k), ("u", k))[0 if is_angle else 2 :]
-        )
+        self.input_operands = equations.input_operands
 
     def is_carried(self, operand: Operand) -> bool:
         """Whether an angle's own value is carried beside its cos and sin."""
@@ -348,3 +350,22 @@ class KernelInstructions:
         z1, z2 = symbols if self.solves_rates_apart else self.equations.rates(s["u1"], s["u2"])
         y, y1, y2 = e.y, ca.vertcat(z1, s["u1"]), ca.vertcat(z2, s["u2"])
         return [positions, *first_and_second_rates(positions, y, y1, y2)]
+
+
+def operand_rows(operands: Sequence[Operand], values: np.ndarray) -> np.ndarray:
+    """Cosines, sines and values of rows (rows, designs), as operands say."""
+    found = np.empty((len(operands), values.shape[1]))
+    for row, (part, k) in zip(found, operands, strict=True):
+        of = values[k]
+        # designs mostly start at one input
+        alike = of.size and of[0] == of[-1] and np.all(of == of[0])
+        row[:] = {"c": np.cos, "s": np.sin}.get(part[1:], np.positive)(of[:1] if alike else of)
+    return found
+
+
+def unknowns_from_state(operands: Sequence[Operand], state: np.ndarray, count: int) -> np.ndarray:
+    """The unknowns z (unknowns, designs) of a state (operands, designs)."""
+    rows, z = dict(zip(operands, state, strict=True)), np.empty((count, state.shape[1]))
+    for k in range(count):
+        z[k] = rows["z", k] if ("z", k) in rows else np.arctan2(rows["zs", k], rows["zc", k])
+    return z

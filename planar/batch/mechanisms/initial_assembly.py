@@ -9,11 +9,11 @@ from typing import NamedTuple
 import numpy as np
 
 from planar.batch.assembly.assembly_scores import is_at_sketch, is_clearly_regular, is_surely_farther
-from planar.batch.mechanisms.block_runner import BlockRunner
 from planar.batch.mechanisms.block_type import COS, POSE_ROWS, SIN, SKETCH_SUMS, X, Y
 from planar.batch.mechanisms.linkage_arrays import BlockBatch, LinkageArrays, PointArrays
+from planar.batch.mechanisms.newton_march import run_newton
 from planar.batch.mechanisms.solved_block_type import MAX_SIGNS, BlockType
-from planar.codegen.block_formula import KernelLayout
+from planar.codegen.block_formula import LANES, KernelLayout, run_kernel
 from planar.foundation.geometry import GROUND, Frame
 
 Array = np.ndarray
@@ -37,7 +37,7 @@ class StartAssemblies(NamedTuple):
     z: Array
 
 
-def find_start_assemblies(linkages: LinkageArrays, runner: BlockRunner) -> StartAssemblies:
+def find_start_assemblies(linkages: LinkageArrays) -> StartAssemblies:
     """See `Started`.
 
     A way to assemble a group is taken where it is nearer to the sketch than any other by more than all groups of the
@@ -45,7 +45,7 @@ def find_start_assemblies(linkages: LinkageArrays, runner: BlockRunner) -> Start
     """
     many = len(linkages)
     first = np.concatenate([[0], np.cumsum(linkages.link_counts)])
-    state = np.zeros((1 + first[-1], POSE_ROWS, runner.lanes))
+    state = np.zeros((1 + first[-1], POSE_ROWS, LANES))
     _fill_inputs(state, linkages, first)
     stats = _sketch_sums(linkages.sketch, first)
     seen: Array | None = None
@@ -58,7 +58,7 @@ def find_start_assemblies(linkages: LinkageArrays, runner: BlockRunner) -> Start
         if not kind.has_closed_form:
             seen = _sketch_sums(linkages.shown_points, first) if seen is None else seen
             found, distance, good = _correct_from_sketch(
-                batch, state, index, (stats[inner], seen[inner]), linkages.tolerance, runner
+                batch, state, index, (stats[inner], seen[inner]), linkages.tolerance
             )
             sure[batch.owner[~good]] = False
             z[batch.block_numbers, : found.shape[1]] = found
@@ -67,7 +67,7 @@ def find_start_assemblies(linkages: LinkageArrays, runner: BlockRunner) -> Start
         p = np.hstack([batch.p, stats[inner].reshape(groups, -1)])
         ways, width = 2**kind.sign_count, POSE_ROWS * len(kind.inner_links) + 3
         walk = KernelLayout((), p.shape[1], kind.slot_count, ways * width)
-        found = runner.run_formula(kind.start_formula, walk, state, index, p)[:, :, 0].reshape(groups, ways, width)
+        found = run_kernel(kind.start_formula, walk, state, index, p)[:, :, 0].reshape(groups, ways, width)
         left, clear, distance = (found[:, :, k] for k in (-3, -2, -1))
         distance = np.where(np.isfinite(left), distance, np.inf)
         best = np.argmin(distance, axis=1)
@@ -97,7 +97,6 @@ def _correct_from_sketch(
     index: Array,
     sketch_sums: tuple[Array, Array],
     tolerance: Array,
-    runner: BlockRunner,
 ) -> tuple[Array, Array, Array]:
     """Groups that are not in closed form, solved from where they are shown, the points of the sketch and what is shown
     in `sketch_sums`: unknowns there, squared distances to the sketch, and for which of them no other assembly can be
@@ -121,7 +120,7 @@ def _correct_from_sketch(
         return state[index[:, slot], row, 0]
 
     z = _unknowns_from_frames(kind, frames, rows, batch.p)
-    told = runner.run_newton(kind, state, index, batch.p, z, False)
+    told = run_newton(kind, state, index, batch.p, z, False)
     left, regularity = told.residuals[:, 0], np.sqrt(np.maximum(told.squared_regularity[:, 0], 0.0))
     x, y, c, s = (state[index[:, batch.inner_slots], row, 0] for row in (X, Y, COS, SIN))
     many, px, py, tx, ty, along, across, squares = np.moveaxis(sketch, 2, 0)

@@ -25,7 +25,6 @@ class SweepRequest(NamedTuple):
     points: tuple[str, ...] | None
     rates: bool
     pair: str | None
-    backend: str
 
 
 class LinkageGroup(NamedTuple):

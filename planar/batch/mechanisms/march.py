@@ -7,13 +7,12 @@ from typing import NamedTuple
 import numpy as np
 
 from planar.batch.march.prediction import MAX_TURN_PER_STEP, correction_limit
-from planar.batch.mechanisms.block_runner import BlockRunner
 from planar.batch.mechanisms.block_type import COS, POSE_ROWS, SIN, X1, X2, X
 from planar.batch.mechanisms.initial_assembly import LEAST_CLEARANCE, StartAssemblies
 from planar.batch.mechanisms.linkage_arrays import BlockBatch, LinkageArrays
-from planar.batch.mechanisms.newton_march import PREDICTOR_ORDER
+from planar.batch.mechanisms.newton_march import PREDICTOR_ORDER, run_newton
 from planar.batch.mechanisms.points import point_formula
-from planar.codegen.block_formula import KernelLayout
+from planar.codegen.block_formula import LANES, KernelLayout, run_kernel
 
 Array = np.ndarray
 
@@ -34,23 +33,22 @@ def run_linkages(
     offsets: Array,
     step: float,
     rates: bool,
-    runner: BlockRunner,
     polished: bool = False,
     verdict_only: bool = False,
 ) -> LinkageRuns:
     """Run linkages whose running inputs go so far (steps,) from where they are, by `step` in each. See `LinkageRuns`.
 
     `polished`: every closed form is followed by a step of Newton's method. `verdict_only`: of blocks in closed form
-    only whether all steps are good is looked at, by a runner that can give extremes alone.
+    only whether all steps are good is looked at.
     """
     many, steps = len(linkages), len(offsets)
     first = np.concatenate([[0], np.cumsum(linkages.link_counts)])
-    state = _initial_state(linkages, first, offsets, step, rates, runner.lanes)
+    state = _initial_state(linkages, first, offsets, step, rates, LANES)
     good, dead, at = np.full(many, steps), np.zeros(many, dtype=bool), np.full(many, -1)
-    for batch in linkages.merged_batches if runner.runs_in_order else linkages.batches:
+    for batch in linkages.merged_batches:
         index, tolerance = batch.state_indices(first), linkages.tolerance[batch.owner]
         if batch.block_type.has_closed_form:
-            found = _run_closed_form(runner, batch, start, state, index, rates, polished, verdict_only)
+            found = _run_closed_form(batch, start, state, index, rates, polished, verdict_only)
             if verdict_only:
                 left, clear, bend, fastest = found
                 fine = (left <= tolerance) & (clear > np.maximum(bend, LEAST_CLEARANCE))
@@ -59,7 +57,7 @@ def run_linkages(
             residuals, clearance = found[:, 0, :steps], found[:, 1, :steps]
         else:
             z = start.z[batch.block_numbers, : len(batch.block_type.unknown_is_angle)]
-            run = runner.run_newton(batch.block_type, state, index, batch.p, z, rates)
+            run = run_newton(batch.block_type, state, index, batch.p, z, rates)
             residuals, clearance = run.residuals[:, :steps].copy(), run.squared_regularity[:, :steps]
             # what was not where it was predicted may be elsewhere
             far = run.corrections[:, PREDICTOR_ORDER + 1 : steps] > correction_limit(step)
@@ -73,11 +71,10 @@ def run_linkages(
     if not verdict_only:
         slow = _has_slow_links(state, first, steps, good)
         good[~slow], dead[~slow] = 0, False
-    return LinkageRuns(_run_points(runner, linkages, first, state, rates), good, dead, at)
+    return LinkageRuns(_run_points(linkages, first, state, rates), good, dead, at)
 
 
 def _run_closed_form(
-    runner: BlockRunner,
     batch: BlockBatch,
     start: StartAssemblies,
     state: Array,
@@ -91,15 +88,15 @@ def _run_closed_form(
     p = np.hstack([batch.p, start.signs[batch.block_numbers, : kind.sign_count]])
     rows = tuple((slot, row) for slot in range(*batch.inner_slots.indices(kind.slot_count)) for row in range(wide))
     layout = KernelLayout(rows, p.shape[1], kind.slot_count, 2, verdict_only)
-    return runner.run_formula(kind.run_formula(rates, polished), layout, state, index, p)
+    return run_kernel(kind.run_formula(rates, polished), layout, state, index, p)
 
 
-def _run_points(runner: BlockRunner, linkages: LinkageArrays, first: Array, state: Array, rates: bool) -> Array:
+def _run_points(linkages: LinkageArrays, first: Array, state: Array, rates: bool) -> Array:
     formula, layout = point_formula(rates)
     points = linkages.points
     index = np.where(points.link_index > 0, points.link_index + first[points.owner], 0)[:, None]
     numbers = np.hstack([points.numbers, linkages.unit[points.owner][:, None]])
-    return runner.run_formula(formula, layout, state, index, numbers)
+    return run_kernel(formula, layout, state, index, numbers)
 
 
 def _count_good_steps(residuals: Array, clearance: Array, tolerance: Array) -> tuple[Array, Array]:

@@ -10,7 +10,7 @@ import numpy as np
 from planar.batch.block import FULL_TURN, DesignBlock, DesignBlockSolver, SolvedDesigns, solve_design_block
 from planar.batch.design_arrays import split_into_blocks, values_of_design, with_design_values
 from planar.batch.general_path import link_angles
-from planar.batch.march.backend import DesignBatch
+from planar.batch.march.design_batch import DesignBatch
 from planar.batch.march.prediction import LONGEST_STEP
 from planar.batch.named_results.design_frames import DesignFrames
 from planar.batch.named_results.design_slopes import design_slopes
@@ -131,7 +131,7 @@ class _ResultBlockSolver:
         )
 
     def _solve_places(self, asked: DesignBlock) -> tuple[SolvedDesigns, DesignBatch | None]:
-        """The points and places that are asked for, and how a backend marched to them."""
+        """The points and places that are asked for, and how compiled code marched to them."""
         if self.duration is not None:
             return solve_timed_block(asked, self.duration), None
         solver = DesignBlockSolver(asked, None)

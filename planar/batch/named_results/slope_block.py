@@ -8,7 +8,7 @@ import numpy as np
 
 from planar.batch.block import DesignBlock, SolvedDesigns
 from planar.batch.gradients.marched_slopes import march_slopes
-from planar.batch.march.backend import DesignBatch
+from planar.batch.march.design_batch import DesignBatch
 from planar.batch.named_results.design_slopes import DesignSlopes
 from planar.foundation.arrays import Array, BoolArray
 
@@ -27,7 +27,7 @@ def march_block_slopes(
     """The slopes of a block that has been solved and marched so; None where machine code does not do that."""
     if march is None:
         return None
-    found = march_slopes(slopes.reference, march, slopes.free, block.designs, block.backend)
+    found = march_slopes(slopes.reference, march, slopes.free, block.designs)
     if found is None:
         return None
     missing = np.zeros((len(found), found.shape[2]), dtype=bool)

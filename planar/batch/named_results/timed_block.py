@@ -8,11 +8,11 @@ from planar.batch.block import DesignBlock, SolvedDesigns
 from planar.batch.design_arrays import design_variables, values_of_design, with_design_values
 from planar.batch.general_path import OUTCOMES, solve_timed_design
 from planar.batch.initial_assembly import find_assemblies, given_assemblies
-from planar.batch.march.backend import UnsupportedStructure
-from planar.batch.march.choice import find_runner
+from planar.batch.march.runs import run_designs
 from planar.batch.reference_design import ReferenceDesign, reference_design
 from planar.codegen.aligned_arrays import allocate_aligned
 from planar.foundation.errors import NoAnswer, Outcome
+from planar.foundation.instruction_list import UnsupportedOperation
 from planar.foundation.turns import take_turn
 from planar.model.link_shapes import place_in_link
 from planar.model.mechanism import LARGEST_INPUT_POSITION, Mechanism
@@ -60,7 +60,7 @@ class _TimedBlockSolver:
         steps, many = self.block.steps, self.design_count
         out = allocate_aligned(steps + 1, self.row_count, many, self.block.dtype)
         status = np.zeros((many, steps + 1), dtype=np.int8)
-        good = self._run_with_backend(out)
+        good = self._run_compiled(out)
         general, said = 0, dict[int, tuple[int, str | NoAnswer]]()
         rest = np.flatnonzero(good <= steps)
         for index in rest:
@@ -86,21 +86,18 @@ class _TimedBlockSolver:
         u = self.reference.inputs(design, 1)[0][:, 0]
         return self.reference.with_sketch_of(design, self.block.assemblies[:, index], u)
 
-    def _run_with_backend(self, out: Array) -> Array:
-        """Fill out (steps + 1, rows, designs) as far as a backend does it; how many first steps passed (designs,)."""
+    def _run_compiled(self, out: Array) -> Array:
+        """Fill out (steps + 1, rows, designs) as far as it runs compiled; how many steps passed (designs,)."""
         base_, block = self.reference, self.block
         good = np.zeros(self.design_count, dtype=int)
-        if not base_.can_run_backend or base_.mechanism.stops:
+        if not base_.can_be_compiled or base_.mechanism.stops:
             return good
-        runner = find_runner(block.backend)
         designs = with_design_values(base_.mechanism, block.designs)
         shapes = base_.shapes(designs)
         p = base_.pair_numbers(shapes, self.design_count, designs)
         u, u1, u2 = input_motions(base_.mechanism, dict(block.designs), self.time) / base_.input_scale[:, None, None]
         if block.assemblies is None:
-            start = find_assemblies(
-                base_, shapes, p, base_.inputs(designs, self.design_count)[0], runner, block.backend
-            )
+            start = find_assemblies(base_, shapes, p, base_.inputs(designs, self.design_count)[0])
         else:
             start = given_assemblies(block.assemblies)
         fit = start.is_sure & base_.is_fit(block.designs, shapes, p)
@@ -122,9 +119,9 @@ class _TimedBlockSolver:
                 own = which[alike == group]
                 part = march.select(own)._replace(input_offsets=np.ascontiguousarray(offsets[:, :, own[0]]))
                 rows = allocate_aligned(len(out), march.output_row_count, own.size)
-                good[own] = runner.run(part, rows)
+                good[own] = run_designs(part, rows)
                 found[:, :, own] = rows
-        except UnsupportedStructure:
+        except UnsupportedOperation:
             return np.zeros_like(good)
         orders = 3 if block.rates else 1
         out[:] = 0.0

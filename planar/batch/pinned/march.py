@@ -9,7 +9,6 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from planar.batch.march.choice import available_backends
 from planar.batch.march.prediction import MAX_TURN_PER_STEP
 from planar.batch.pinned.formulas import ROWS, TABLE_ROWS, PinStep, pin_formulas
 from planar.batch.pinned.tape import PinTape, make_tape
@@ -21,8 +20,9 @@ from planar.codegen.tape import (
     Tape,
     TapeFormula,
     TapeResult,
+    clear_rows,
     padded_steps,
-    run_tape_numpy,
+    run_tape,
 )
 from planar.model.pin_linkages import PinnedLinkages
 
@@ -63,9 +63,7 @@ class PinRun(NamedTuple):
     bars: Array
 
 
-def run_pinned_linkages(
-    linkages: PinnedLinkages, told: ToldPins, values: Array, steps: int, rates: bool, backend: str
-) -> PinRun:
+def run_pinned_linkages(linkages: PinnedLinkages, told: ToldPins, values: Array, steps: int, rates: bool) -> PinRun:
     """Run all linkages through a turn of their cranks: values (points, rows, numbers) are filled, see `make_values`.
 
     What is not decided by any attempt is left to others.
@@ -75,20 +73,19 @@ def run_pinned_linkages(
     run = PinRun(decided[0], decided[1], solved, np.zeros((many, 2)), np.zeros((many, 2), np.int64))
     whole = _tape(linkages)
     run.is_dyadic[whole.which] = True
-    is_native = available_backends(backend)[0] == "native"
     frame = _FramePins(linkages, told)
     left = np.arange(len(whole.which))
     for attempt in _ATTEMPTS:
         finer = step_division(steps) * attempt.refinement
-        for some in _chunks(linkages, whole.which[left], steps * finer + 1, rates, finer > 1 or not is_native):
+        for some in _chunks(linkages, whole.which[left], steps * finer + 1, rates, finer > 1):
             tape = whole.select(left[some])
-            _run_attempt(linkages, tape, told, values, steps, rates, attempt, is_native, run)
+            _run_attempt(linkages, tape, told, values, steps, rates, attempt, run)
         left = left[~run.is_decided[whole.which[left]]]
         if not left.size:
             break
     frame.fill(values)
     stopped = np.flatnonzero(run.is_decided & (run.solved <= steps))
-    clear_points(values, told, stopped, run.solved[stopped], is_native)
+    clear_points(values, told, stopped, run.solved[stopped])
     return run
 
 
@@ -117,20 +114,14 @@ def make_values(points: int, steps: int, rates: bool, dtype: str = "float64") ->
     return made[first : first + size].reshape(shape)
 
 
-def clear_points(values: Array, told: ToldPins, which: Array, first: Array, is_native: bool) -> None:
+def clear_points(values: Array, told: ToldPins, which: Array, first: Array) -> None:
     """The points of some linkages are NaN from a step of each on."""
     counts = np.diff(told.first)[which]
     begin = np.cumsum(counts) - counts
     points = np.repeat(told.first[which] - begin, counts) + np.arange(counts.sum())
     steps = np.repeat(first, counts)
-    if is_native:
-        from planar.codegen.tape_kernel import clear_rows
-
-        rows = values.ctypes.data + points[:, None] * values.strides[0] + np.arange(values.shape[1]) * values.strides[1]
-        clear_rows(rows.ravel(), np.repeat(steps, values.shape[1]), values.shape[2])
-        return
-    beyond = np.arange(values.shape[2]) >= steps[:, None]
-    values[points] = np.where(beyond[:, None], np.nan, values[points])
+    rows = values.ctypes.data + points[:, None] * values.strides[0] + np.arange(values.shape[1]) * values.strides[1]
+    clear_rows(rows.ravel(), np.repeat(steps, values.shape[1]), values.shape[2])
 
 
 class _FramePins:
@@ -174,7 +165,6 @@ def _run_attempt(  # many: one attempt with all that it takes and fills
     steps: int,
     rates: bool,
     attempt: _Attempt,
-    is_native: bool,
     run: PinRun,
 ) -> None:
     """Run some linkages, and note those that are decided."""
@@ -185,26 +175,21 @@ def _run_attempt(  # many: one attempt with all that it takes and fills
     table = np.stack([np.cos(far), np.sin(far)])
     point = np.full(len(linkages.positions), -1)
     point[told.pins] = np.arange(len(told.pins))
-    if finer == 1 and is_native:
-        result = _run_native(linkages, tape, point, values, formulas, count, table)
+    if finer == 1:
+        result = _run_in_place(linkages, tape, point, values, formulas, count, table)
     else:
         state, slot = _make_state(linkages, tape, far, rates, table)
         slots = _tape_rows(tape, slot, len(state) - 1)
-        arrays = Tape(tape.first, tape.kinds, slots, tape.p, tape.level, tape.tolerance, tape.clearance)
-        if is_native:
-            from planar.codegen.tape_kernel import run_tape
-
-            result = run_tape(
-                formulas, LEAST_COSINE, count, arrays._replace(slots=state.ctypes.data + slots * state.strides[0])
-            )
-        else:
-            result = run_tape_numpy(formulas, LEAST_COSINE, count, arrays, state)
+        arrays = Tape(tape.first, tape.kinds, slots, tape.p, tape.tolerance, tape.clearance)
+        result = run_tape(
+            formulas, LEAST_COSINE, count, arrays._replace(slots=state.ctypes.data + slots * state.strides[0])
+        )
         placed = tape.placed[point[tape.placed] >= 0]
         values[point[placed], :, : steps + 1] = state[slot[placed], :, :count:finer]
     _note(tape, result, finer, far, run)
 
 
-def _run_native(  # many: what is run, and where it is told
+def _run_in_place(  # many: what is run, and where it is told
     linkages: PinnedLinkages,
     tape: PinTape,
     point: Array,
@@ -214,8 +199,6 @@ def _run_native(  # many: what is run, and where it is told
     table: Array,
 ) -> TapeResult:
     """Write what is told where it is told, and what else is needed into room that linkages share."""
-    from planar.codegen.tape_kernel import run_tape
-
     own = np.arange(len(point)) - np.repeat(linkages.first_pin[:-1], np.diff(linkages.first_pin))
     addresses = values.ctypes.data + point * values.strides[0]
     apart = point < 0
@@ -226,7 +209,7 @@ def _run_native(  # many: what is run, and where it is told
         formulas,
         LEAST_COSINE,
         count,
-        Tape(tape.first, tape.kinds, slots, tape.p, tape.level, tape.tolerance, tape.clearance),
+        Tape(tape.first, tape.kinds, slots, tape.p, tape.tolerance, tape.clearance),
     )
 
 

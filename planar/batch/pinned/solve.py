@@ -31,7 +31,7 @@ def solve_pinned(
     """
     told = find_told_pins(linkages, request.points) if told is None else told
     values = make_values(len(told.pins), request.steps, request.rates) if values is None else values
-    run = run_pinned_linkages(linkages, told, values, request.steps, request.rates, request.backend)
+    run = run_pinned_linkages(linkages, told, values, request.steps, request.rates)
     left = np.flatnonzero(~run.is_decided)
     others = [k for k in left.tolist() if not run.is_dyadic[k]]
     found = dict(zip(others, solve_blocks([linkages[k] for k in others]), strict=True)) if others else {}

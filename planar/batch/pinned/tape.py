@@ -21,12 +21,11 @@ SMALLEST_SIZE, LARGEST_SIZE = 1e-50, 1e50
 
 class PinTape(NamedTuple):
     """Steps of linkages, linkage after linkage, each after those that it needs: their `kinds` (see `PinStep`), the two
-    pins that each takes, `given` (steps, 2), and the one that it places (steps,), numbers p (steps, numbers), the two
-    `bars` (steps, 2), and of what `level` each is.
+    pins that each takes, `given` (steps, 2), and the one that it places (steps,), numbers p (steps, numbers), and the
+    two `bars` (steps, 2).
 
     Linkage k of `which` has the steps from first[k] to first[k + 1]; `tolerance` (linkages,) in sizes and least
-    `clearance` (linkages,). Pins and bars
-    are numbered through all linkages.
+    `clearance` (linkages,). Pins and bars are numbered through all linkages.
     """
 
     which: Array
@@ -36,7 +35,6 @@ class PinTape(NamedTuple):
     placed: Array
     p: Array
     bars: Array
-    level: Array
     tolerance: Array
     clearance: Array
 
@@ -55,14 +53,13 @@ class PinTape(NamedTuple):
             self.placed[own],
             self.p[own],
             self.bars[own],
-            self.level[own],
             self.tolerance[some],
             self.clearance[some],
         )
 
 
 class _Steps(NamedTuple):
-    """Steps: their kinds, the two given pins, the one that is placed, the two bars, their level."""
+    """Steps, level after level: their kinds, the two given pins, the one that is placed, the two bars."""
 
     kinds: Array
     first: Array
@@ -70,7 +67,6 @@ class _Steps(NamedTuple):
     placed: Array
     one: Array
     two: Array
-    level: Array
 
 
 def make_tape(linkages: PinnedLinkages) -> PinTape:
@@ -103,8 +99,8 @@ def make_tape(linkages: PinnedLinkages) -> PinTape:
     tolerance = residual_tolerance(bar_counts + 1, reach / unit)[which]
     shortest = np.minimum.reduceat(arm[order], first[:-1]) if len(which) else np.ones(0)
     clearance = EPS / (NEGLIGIBLE_ERROR * np.minimum(shortest, 1.0))
-    kinds, placed, level = steps.kinds[order], steps.placed[order], steps.level[order]
-    return PinTape(which, first, kinds, given, placed, p[order], bars, level, tolerance, clearance)
+    kinds, placed = steps.kinds[order], steps.placed[order]
+    return PinTape(which, first, kinds, given, placed, p[order], bars, tolerance, clearance)
 
 
 def _find_steps(linkages: PinnedLinkages, entry_bar: Array, entry_pin: Array, is_fixed: Array) -> tuple[_Steps, Array]:
@@ -123,7 +119,7 @@ def _find_steps(linkages: PinnedLinkages, entry_bar: Array, entry_pin: Array, is
     pivot[of[is_fixed[at]]] = at[is_fixed[at]]
     at, of = at[~is_fixed[at]], of[~is_fixed[at]]
     known[at] = True
-    levels = [(pivot[of], pivot[of], at, of, of)]
+    levels, on_cranks = [(pivot[of], pivot[of], at, of, of)], slice(0, len(of))
     pin, other, bar = _pairs_on_bars(linkages, entry_bar, entry_pin)
     counts_of = np.bincount(pin, minlength=len(known))
     starts = counts_of.cumsum() - counts_of
@@ -155,14 +151,14 @@ def _find_steps(linkages: PinnedLinkages, entry_bar: Array, entry_pin: Array, is
         newly_known = placed
         if len(placed):
             levels.append((one_pin, by[second], placed, one_bar, on[second]))
-    level = np.repeat(np.arange(len(levels)), [len(pins) for _, _, pins, _, _ in levels])
     first, second, placed, a, b = (np.concatenate(parts) for parts in zip(*levels, strict=True))
-    # the first of the given pins moves
-    swap = is_fixed[first] & (level > 0)
+    # the first of the given pins moves, but for cranks
+    swap = is_fixed[first]
+    swap[on_cranks] = False
     first, second = np.where(swap, second, first), np.where(swap, first, second)
     kinds = np.where(a == b, int(PinStep.CARRIED), int(PinStep.DYAD)) + is_fixed[second]
-    kinds[level == 0] = PinStep.CRANK
-    return _Steps(kinds, first, second, placed, np.where(swap, b, a), np.where(swap, a, b), level), known
+    kinds[on_cranks] = PinStep.CRANK
+    return _Steps(kinds, first, second, placed, np.where(swap, b, a), np.where(swap, a, b)), known
 
 
 def _pairs_on_bars(linkages: PinnedLinkages, entry_bar: Array, entry_pin: Array) -> tuple[Array, Array, Array]:

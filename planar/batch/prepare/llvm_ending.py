@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from planar.batch.march.kernel import KernelEquations
-from planar.batch.march.llvm.checks import write_keeps_apart
+from planar.batch.march.kernel_writer import write_keeps_apart
 from planar.batch.march.prediction import MAX_TURN_PER_STEP
 from planar.batch.prepare.run_endings import CLEARLY_OPEN, DEAD_POINT, STOP, UNSURE
 from planar.codegen.llvm_ir import IRWriter

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 from planar.batch.assembly.assembly_scores import MAX_BLOCK_UNKNOWNS, NEAR_SKETCH
 from planar.batch.march.kernel import KernelEquations, Operand
-from planar.batch.march.llvm.kernel_writer import DesignsKernelLayout, write_angle_sum
+from planar.batch.march.kernel_writer import DesignsKernelLayout, write_angle_sum
 from planar.batch.march.regularity import CLEAR_REGULARITY, LEAST_KERNEL_REGULARITY, least_regularity
 from planar.batch.prepare.design_numbers import DesignNumbers
 from planar.batch.prepare.llvm_numbers import FUNCTION_NAME as NUMBERS_FUNCTION

@@ -9,8 +9,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from planar.batch.march.kernel import BareAngle, KernelEquations, Operand
-from planar.batch.march.llvm.checks import write_keeps_apart
-from planar.batch.march.llvm.kernel_writer import KernelWriter, OperandNames
+from planar.batch.march.kernel_writer import KernelWriter, OperandNames, write_keeps_apart
 from planar.batch.march.prediction import MAX_TURN_PER_STEP
 from planar.batch.prepare.llvm_ending import FUNCTION_NAME as ENDING_FUNCTION
 from planar.batch.prepare.llvm_ending import PositionRows, write_ending

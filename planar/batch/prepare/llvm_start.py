@@ -10,9 +10,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from math import inf
 
-from planar.batch.closed_form.llvm_joiner import BlockJoinWriter
+from planar.batch.closed_form.joined_blocks import BlockJoinWriter
 from planar.batch.march.kernel import BareAngle, KernelBlock, KernelEquations, Operand
-from planar.batch.march.llvm.kernel_writer import OperandNames
+from planar.batch.march.kernel_writer import OperandNames
 from planar.batch.prepare.llvm_numbers import SAID
 from planar.batch.prepare.run_endings import ALL_SOLVED, CANNOT_BE_ASSEMBLED, CLEARLY_OPEN, UNSURE
 from planar.codegen.llvm_ir import IRWriter

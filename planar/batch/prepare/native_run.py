@@ -71,14 +71,14 @@ def prepare_native(
 ) -> NativeRuns | None:
     """What is compiled of a run over these positions, for each choice of lengths that are nothing in all designs; None
     where that cannot be."""
-    if not reference.can_run_backend or not all(pair.measures_symbols for pair in reference.mechanism.pairs):
+    if not reference.can_be_compiled or not all(pair.measures_symbols for pair in reference.mechanism.pairs):
         return None
     grid = find_positions(reference, positions)
     if len(grid.u) > MAX_POSITIONS or np.max(np.abs(grid.u)) > LARGEST_INPUT_POSITION:
         return None
     try:
         runs = RunsByZeros(partial(compile_run, grid), reference)
-    except (ImportError, UnsupportedOperation):
+    except UnsupportedOperation:
         return None
     if any(type(pair).find_misfit is not Pair.find_misfit for pair in reference.mechanism.pairs):
         return NativeRuns(FittingPairs(reference, runs.run), FittingPairs(reference, runs.run_other))
@@ -105,7 +105,7 @@ def compile_run_function(  # many: what a run is made of
 ) -> CompiledRun | NewtonRun:
     """The function of a run over all these positions, for points on links, or for the states.
 
-    Raises UnsupportedOperation; ImportError where there is no compiler.
+    Raises UnsupportedOperation.
     """
     from planar.batch.prepare.compiled_run import CompiledRun
     from planar.batch.prepare.newton_run import NewtonRun

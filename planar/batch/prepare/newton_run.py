@@ -11,17 +11,16 @@ import numpy as np
 
 from planar.batch.assembly.nearest_assemblies import CORRECTIONS
 from planar.batch.initial_assembly import find_assemblies
-from planar.batch.march.choice import find_runner
-from planar.batch.march.kernel import KernelEquations
-from planar.batch.march.llvm.designs_writer import ARGUMENT_TYPES as KERNEL_ARGUMENTS
-from planar.batch.march.llvm.designs_writer import FUNCTION_NAME as KERNEL_FUNCTION
-from planar.batch.march.llvm.designs_writer import write_designs_kernel
-from planar.batch.march.llvm.kernel_runs import operand_rows, run_designs_kernel, step_table, unknowns_at_steps
+from planar.batch.march.designs_writer import ARGUMENT_TYPES as KERNEL_ARGUMENTS
+from planar.batch.march.designs_writer import FUNCTION_NAME as KERNEL_FUNCTION
+from planar.batch.march.designs_writer import write_designs_kernel
+from planar.batch.march.kernel import KernelEquations, operand_rows
 from planar.batch.march.prediction import (
     PREDICTOR_ORDER,
     correction_limit,
     longest_step,
 )
+from planar.batch.march.runs import run_designs, step_table, unknowns_at_steps
 from planar.batch.prepare.design_numbers import DesignNumbers
 from planar.batch.prepare.llvm_newton import (
     ARGUMENT_TYPES,
@@ -33,7 +32,7 @@ from planar.batch.prepare.llvm_newton import (
 )
 from planar.batch.prepare.value_binder import RunCall, ValueBinder, address_of
 from planar.batch.reference_design import ReferenceDesign
-from planar.codegen.aligned_arrays import WIDEST_VECTOR_BYTES
+from planar.codegen.aligned_arrays import WIDEST_VECTOR_BYTES, allocate_aligned
 from planar.codegen.llvm_compile import compile_function
 from planar.foundation.instruction_list import UnsupportedOperation
 from planar.model.link_shapes import PointMember
@@ -46,8 +45,6 @@ LEAST_PIECE = PREDICTOR_ORDER + 2
 """Steps of a piece, at least: before, too little is predicted."""
 START_CORRECTIONS = 8
 """Newton's steps from where the file's own design is at the same inputs."""
-EXTRA_CORRECTIONS = 2
-"""Newton's steps more than usual by which the file's own design is run."""
 DIGITS = 16.0
 """Decimals of what is solved."""
 
@@ -151,12 +148,12 @@ def _own_unknowns(reference: ReferenceDesign, u: Array, members: Sequence[PointM
     """
     shapes = reference.shapes(reference.mechanism)
     p, inputs = reference.pair_numbers(shapes, 1, reference.mechanism), reference.inputs(reference.mechanism, 1)
-    start = find_assemblies(reference, shapes, p, inputs[0], find_runner("native"))
+    start = find_assemblies(reference, shapes, p, inputs[0])
     batch = reference.design_batch(shapes, p, inputs, members)._replace(z0=start.z, input_offsets=u - u[0])
-    _, good = run_designs_kernel(batch, EXTRA_CORRECTIONS)
+    good = run_designs(batch, allocate_aligned(len(u), batch.output_row_count, 1))
     if not start.is_sure[0] or good[0] < len(u):
         raise UnsupportedOperation("the file's own design does not run to the end")
-    return unknowns_at_steps(batch.select(np.zeros(len(at), dtype=int)), EXTRA_CORRECTIONS, at)
+    return unknowns_at_steps(batch.select(np.zeros(len(at), dtype=int)), at)
 
 
 def _assembly_lanes(reference: ReferenceDesign, equations: KernelEquations) -> tuple[Array, AssemblyLanes]:

@@ -42,24 +42,22 @@ def _sweep_tables(speed: Speed) -> list[RenderableType]:
     said = paragraphs(("-", f"{sentence}.") for sentence in speed.bounds)
     if not speed.sweeps:
         return [Text(speed.name, style="bold"), said]
-    headings = ("backend", "a position", "with rates", "designs", "refused", "general path", "first call", "compiling")
+    headings = ("a position", "with rates", "designs", "refused", "general path", "first call", "compiling")
     within = f"{100.0 * speed.sweeps[0].within:g} %"
     found = plain_table(
         f"{speed.name}: sweeps of designs whose lengths are within {within}, {SWEEP_STEPS} steps", *headings
     )
-    for backend in dict.fromkeys(each.backend for each in speed.sweeps):
-        both = {each.rates: each for each in speed.sweeps if each.backend == backend}
-        most = both[True]
-        found.add_row(
-            backend,
-            format_time(both[False].seconds if False in both else None),
-            format_time(most.seconds),
-            str(most.designs),
-            str(most.refused),
-            f"{100.0 * most.general / (most.designs * (SWEEP_STEPS + 1)):.3g} %",
-            f"+ {format_time(most.first)}",
-            format_time(most.compiling),
-        )
+    both = {each.rates: each for each in speed.sweeps}
+    most = both[True]
+    found.add_row(
+        format_time(both[False].seconds if False in both else None),
+        format_time(most.seconds),
+        str(most.designs),
+        str(most.refused),
+        f"{100.0 * most.general / (most.designs * (SWEEP_STEPS + 1)):.3g} %",
+        f"+ {format_time(most.first)}",
+        format_time(most.compiling),
+    )
     return [found, said]
 
 

@@ -1,21 +1,30 @@
-"""Runs of many designs through the compiled function."""
+"""All designs of a block through the same steps by compiled code, each position judged."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from functools import lru_cache
-from typing import Any
+from collections.abc import Callable, Sequence
+from functools import lru_cache, partial
+from math import ceil
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from planar.batch.march.backend import CorrectedAssemblies, DesignBatch, ResultRows, erase_between
-from planar.batch.march.kernel import KernelEquations, batch_equations
-from planar.batch.march.llvm.designs_writer import (
+from planar.batch.design_arrays import split_into_blocks
+from planar.batch.march.checks import DesignFunctions, PointWriter, design_positions
+from planar.batch.march.design_batch import (
+    CorrectedAssemblies,
+    DesignBatch,
+    ResultRows,
+    erase_between,
+    erase_from_steps,
+)
+from planar.batch.march.designs_writer import (
     ARGUMENT_TYPES,
     FUNCTION_NAME,
     write_designs_kernel,
 )
-from planar.batch.march.llvm.kernel_writer import STATE_GIVEN, DesignsKernelLayout, KernelStart
+from planar.batch.march.kernel import KernelEquations, batch_equations, operand_rows, unknowns_from_state
+from planar.batch.march.kernel_writer import STATE_GIVEN, DesignsKernelLayout, KernelStart
 from planar.batch.march.prediction import (
     LONGEST_STEP,
     PREDICTOR_ORDER,
@@ -33,6 +42,12 @@ Array = np.ndarray
 
 LONG_CALL_POSITIONS = 2**13
 """Positions from which on other threads go on while they are solved."""
+REFINED_STEP = 0.12
+"""rad or sizes to which steps are divided that are too long."""
+MAX_DIVIDED_NUMBERS = 2**23
+"""Numbers of divided steps that are kept at once."""
+EXTRA_CORRECTIONS = 2
+"""Further corrections at every step for designs that the usual ones leave open."""
 LANES = 16
 """Designs at once: two vectors of the widest machines, so that one waits while the other works."""
 
@@ -75,25 +90,111 @@ def _designs_kernel_or_reason(
         return str(why)
 
 
-def run_designs_kernel(
-    batch: DesignBatch, extra_corrections: int = 0, out: Array | None = None, candidates: Array | None = None
-) -> tuple[Array, Array]:
-    """The points of a batch over its steps, and how many of its first steps every design did well (designs,).
+def run_designs(batch: DesignBatch, out: Array, candidates: Array | None = None) -> Array:
+    """Fill out (steps + 1, rows, designs): x and y of each point, then their first, then second rates (m, s); what is
+    no number from the first step on that did not pass.
 
-    `extra_corrections` are made at every step for designs that are less well predicted. The points are out (steps + 1,
-    rows, designs), as for `DesignRunner`, with `candidates`, in single precision where `out` is. Raises
-    UnsupportedOperation where the structure is not for machine code.
+    Where `out` is in single precision, each number is rounded when it is written. `candidates` (designs,) takes how
+    many of the first steps stand in `out`, where that is more than passed: those that follow pass the checks of one
+    position, but there may be a dead point before them.
+
+    Designs that do not come to the end run once more with more corrections, where Newton's method solves a block; of
+    those that do not begin it is looked whether they can start nearer to where two assemblies meet.
+
+    Returns how many of the first steps passed residual and branch check (designs,). Raises UnsupportedOperation.
     """
-    longest = _longest_step(batch)
-    is_single = out is not None and out.dtype == np.float32
+    good, step_count, runs = np.zeros(out.shape[2], dtype=int), len(batch.input_offsets), 0
+    attempts: list[tuple[Callable[[DesignBatch, Array, Array | None], Array], int]] = [(run_compiled, step_count)]
+    if batch_equations(batch).has_newton_blocks:
+        attempts.append((partial(run_compiled, extra_corrections=EXTRA_CORRECTIONS), step_count))
+    if batch.results is None:
+        attempts.append((_run_start, 1))
+    for run, wanted in attempts:
+        left = np.flatnonzero(good < wanted)
+        if runs:  # what has nowhere to start is given once
+            left = left[np.isfinite(batch.z0[:, left]).all(axis=0) & np.isfinite(batch.u0[:, left]).all(axis=0)]
+        if not left.size:
+            continue
+        try:
+            if left.size == len(good):
+                good = run(batch, out, candidates)
+            else:
+                own = allocate_aligned(out.shape[0], out.shape[1], left.size, out.dtype)
+                good[left] = run(batch.select(left), own, None)
+                out[:, :, left] = own
+                if candidates is not None:
+                    candidates[left] = good[left]
+        except UnsupportedOperation:
+            continue
+        runs += 1
+    if not runs:
+        raise UnsupportedOperation("the structure is too long to be compiled")
+    return good
+
+
+def _run_start(batch: DesignBatch, out: Array, candidates: Array | None) -> Array:
+    """The first position alone, of designs of any structure."""
+    functions = DesignFunctions(batch.functions, batch.p)
+    with np.errstate(all="ignore"):
+        row = design_positions(functions, batch, functions.correct(_columns(batch.z0), batch.u0.T), batch.u0)
+        good: Array = (PointWriter(batch, functions).write(out[0], row) & row.passed).astype(int)
+    erase_from_steps(out, good)
+    if candidates is not None:
+        candidates[:] = good
+    return good
+
+
+def _columns(rows: Array) -> Array:
+    return np.ascontiguousarray(rows.T)
+
+
+class _Division(NamedTuple):
+    """Steps that are divided into so many parts each, and where the inputs are (parts + 1, inputs)."""
+
+    part_count: int
+    input_offsets: Array
+
+
+def _divide_steps(offsets: Array) -> _Division:
+    """Steps as they are, or divided where they do not show what lies between, by offsets (steps + 1, inputs)."""
+    steps, longest = len(offsets), longest_step(offsets)
+    count = ceil(longest / REFINED_STEP) if longest > LONGEST_STEP or steps == 2 else 1
+    count = max(count, 2) if steps == 2 else count
+    if count == 1:
+        return _Division(1, offsets)
+    knots = np.arange(count * (steps - 1) + 1) / count
+    return _Division(count, np.array([np.interp(knots, np.arange(steps), each) for each in offsets.T]).T)
+
+
+def run_compiled(batch: DesignBatch, out: Array, candidates: Array | None = None, extra_corrections: int = 0) -> Array:
+    """As `run_designs`, once, by compiled code alone, with so many corrections more at every step than usual."""
+    parts, offsets = _divide_steps(batch.input_offsets)
+    if parts == 1:
+        return _run_steps(batch, out, candidates, extra_corrections)
+    good = np.empty(out.shape[2], dtype=int)
+    batch = batch._replace(input_offsets=offsets)
+    for some in split_into_blocks(len(good), max(LANES, MAX_DIVIDED_NUMBERS // (len(offsets) * out.shape[1] + 1))):
+        own = allocate_aligned(len(offsets), out.shape[1], some.stop - some.start)
+        good[some] = _run_steps(batch.select(some), own, None, extra_corrections)
+        out[:, :, some] = own[::parts]
+    good = np.where(good > 0, (good - 1) // parts + 1, 0)
+    erase_from_steps(out, good)
+    if candidates is not None:
+        candidates[:] = good
+    return good
+
+
+def _run_steps(batch: DesignBatch, out: Array, candidates: Array | None, extra_corrections: int) -> Array:
+    """As `run_compiled`, of steps that are short enough."""
+    is_single = out.dtype == np.float32
     equations = batch_equations(batch)
     signs, common = _known_signs(batch, equations), _common_inputs(batch.u0)
     start = KernelStart(signs is not None, signs is not None and common is not None)
     counts = candidates is not None and not equations.has_newton_blocks
     kernel = designs_kernel(equations, tuple(batch.links), batch.rates, None, is_single, start, counts, batch.results)
     table, corrections = step_table(batch.input_offsets, common if kernel.start.has_common_inputs else None)
-    tolerances = batch.tolerance, correction_limit(longest), batch.unit
-    out, good, found = _run_kernel(
+    tolerances = batch.tolerance, correction_limit(longest_step(batch.input_offsets)), batch.unit
+    _, good, found = _run_kernel(
         kernel, batch._replace(signs=signs), batch.rates, (table, corrections + extra_corrections), tolerances, out
     )
     written = found if counts else good.copy()
@@ -103,17 +204,46 @@ def run_designs_kernel(
         erase_between(out, good, written)
     else:
         candidates[:] = written
-    return out, good
+    return good
 
 
-def unknowns_at_steps(batch: DesignBatch, extra_corrections: int, steps: Array) -> Array:
+def last_good_unknowns(batch: DesignBatch, good: Array) -> Array:
+    """The unknowns (unknowns, designs) at the last of so many good steps (designs,), one at least."""
+    try:
+        return unknowns_at_steps(batch, np.maximum(good - 1, 0))
+    except UnsupportedOperation:  # none has gone beyond its start
+        functions = DesignFunctions(batch.functions, batch.p)
+        with np.errstate(all="ignore"):
+            return functions.correct(_columns(batch.z0), batch.u0.T).T
+
+
+def unknowns_at_steps(batch: DesignBatch, steps: Array) -> Array:
     """The unknowns (unknowns, designs) of a run that came to these steps, at (designs,), of each design to one."""
-    batch = batch._replace(stops=None)
+    parts, offsets = _divide_steps(batch.input_offsets)
+    batch = batch._replace(stops=None, input_offsets=offsets)
     kernel = designs_kernel(batch_equations(batch), (), False, ())
-    table, counts = step_table(batch.input_offsets)
-    tolerances = batch.tolerance, correction_limit(_longest_step(batch)), 1.0
-    found = _run_kernel(kernel, batch, False, (table, counts + extra_corrections), tolerances, None)[0]
-    return _unknowns_from_state(kernel, found[steps, :, np.arange(len(steps))].T, len(batch.z0))
+    table, counts = step_table(offsets)
+    tolerances = batch.tolerance, correction_limit(longest_step(offsets)), 1.0
+    found = _run_kernel(kernel, batch, False, (table, counts + EXTRA_CORRECTIONS), tolerances, None)[0]
+    rows = found[parts * steps, : len(kernel.state), np.arange(len(steps))].T
+    return unknowns_from_state(kernel.state, rows, len(batch.z0))
+
+
+def lead_designs(batch: DesignBatch, index: int, span: Array, step: float) -> tuple[Array, Array]:
+    """Designs led on from where they start, their input `index` by its span (designs,), in steps of so much.
+
+    The unknowns there (unknowns, designs), and which designs passed all checks on the way (designs,).
+    """
+    z, passed = batch.z0.copy(), np.zeros(len(span), dtype=bool)
+    for length in np.unique(span[np.isfinite(span)]):
+        some = np.flatnonzero(span == length)
+        offsets = np.zeros((ceil(abs(length) / step) + 2, len(batch.u0)))
+        offsets[:, index] = np.linspace(0.0, length, len(offsets))
+        own = batch.select(some)._replace(input_offsets=offsets, links=(), q=batch.q[:0, some], rates=False)
+        good = run_designs(own, allocate_aligned(len(offsets), 0, len(some)))
+        passed[some] = good == len(offsets)
+        z[:, some] = last_good_unknowns(own, good)
+    return z, passed
 
 
 def correct_designs(batch: DesignBatch, point_blocks: Sequence[int], corrections: int) -> CorrectedAssemblies:
@@ -123,7 +253,7 @@ def correct_designs(batch: DesignBatch, point_blocks: Sequence[int], corrections
     counts[:] = corrections
     out, good, _ = _run_kernel(kernel, batch, False, (table, counts), (batch.tolerance, np.inf, 1.0), None)
     rows, places = out[0], 2 * len(batch.links)
-    z = _unknowns_from_state(kernel, rows[2 * places :], len(batch.z0))
+    z = unknowns_from_state(kernel.state, rows[2 * places : -1], len(batch.z0))
     both = rows[: 2 * places].reshape(2, len(batch.links), 2, rows.shape[1])
     return CorrectedAssemblies(good > 0, np.sqrt(np.maximum(rows[-1], 0.0)), z, *both)
 
@@ -150,23 +280,6 @@ def _common_inputs(u0: Array) -> Array | None:
         return first
     least, most = (np.array([of(row) for row in u0]) for of in (np.fmin.reduce, np.fmax.reduce))
     return least if np.array_equal(least, most) else None
-
-
-def _longest_step(batch: DesignBatch) -> float:
-    """How far an input goes in a step at most. Raises UnsupportedOperation where that is too far."""
-    longest = longest_step(batch.input_offsets)
-    if longest > LONGEST_STEP or len(batch.input_offsets) == 2:
-        raise UnsupportedOperation("steps so long do not show what lies between them")
-    return longest
-
-
-def _unknowns_from_state(kernel: DesignsKernelLayout, rows: Array, count: int) -> Array:
-    """The unknowns (unknowns, designs) of a state (rows, designs)."""
-    state = dict(zip(kernel.state, rows, strict=False))
-    z = np.empty((count, rows.shape[1]))
-    for k in range(count):
-        z[k] = state["z", k] if ("z", k) in state else np.arctan2(state["zs", k], state["zc", k])
-    return z
 
 
 def _run_kernel(
@@ -232,17 +345,6 @@ def _call_function(
             out.ctypes.data,
             *(each.ctypes.data for each in counted),
         )
-
-
-def operand_rows(operands: Sequence[tuple[str, int]], values: Array) -> Array:
-    """Cosines, sines and values of rows, as leaves say."""
-    found = np.empty((len(operands), values.shape[1]))
-    for row, (part, k) in zip(found, operands, strict=True):
-        of = values[k]
-        # designs mostly start at one input
-        alike = of.size and of[0] == of[-1] and np.all(of == of[0])
-        row[:] = {"c": np.cos, "s": np.sin}.get(part[1:], np.positive)(of[:1] if alike else of)
-    return found
 
 
 def step_table(offsets: Array, start: Array | None = None) -> tuple[Array, Array]:

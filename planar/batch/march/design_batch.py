@@ -1,31 +1,24 @@
-"""What runs the designs of a sweep: all of a batch through the same steps, each position judged."""
+"""A block of designs that runs through the same steps, and arrays of its results."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple, Protocol, TypeVar
+from typing import Any, NamedTuple, Protocol
 
 import casadi as ca
 import numpy as np
 
 from planar.batch.march.stops import StopLimits
-from planar.codegen.aligned_arrays import allocate_aligned
 from planar.equations.functions import EquationFunctions
 from planar.model.mechanism import Mechanism
 from planar.model.pairs import Pair
 
 Array = np.ndarray
-Answer = TypeVar("Answer")
-
-
-class UnsupportedStructure(Exception):
-    """A backend cannot do this structure; the text says why."""
 
 
 class ResultRows(Protocol):
     """Results that a march tells in place of points: so many rows of them, of further numbers of a design (symbols).
 
-    `write_rows` writes them into the text of a march (a `NewtonBlockWriter`) where numbers stand under these names.
+    `write_rows` writes them into the text of a march (a `KernelWriter`) where numbers stand under these names.
     """
 
     row_count: int
@@ -47,7 +40,7 @@ class DesignBatch(NamedTuple):
     `zeros`: rows of p and q, as ("p", row), that are nothing in all designs and are left out of what is computed.
     `signs` (blocks, designs): of the assemblies of blocks in closed form, 0 where one is not known; None of none.
     `stops`: those of pairs, which no position of a design passes; None where there are none. `results`: what is told in
-    place of the points, by machine code alone; the numbers that it takes stand in q behind those of the points.
+    place of the points; the numbers that it takes stand in q behind those of the points.
     """
 
     functions: EquationFunctions
@@ -100,7 +93,7 @@ class DesignBatch(NamedTuple):
 
 
 class CorrectedAssemblies(NamedTuple):
-    """Where designs are that a runner corrected from near by.
+    """Where designs are that were corrected from near by.
 
     `converged` (designs,), and how regular the least regular is of the blocks that Newton's method solved (the volume
     that the columns of its Jacobian span) (designs,); the unknowns z (unknowns, designs); the points of the batch, and
@@ -112,35 +105,6 @@ class CorrectedAssemblies(NamedTuple):
     z: Array
     points: Array
     other_points: Array
-
-
-class DesignRunner(Protocol):
-    """Runs the designs of a batch through all steps. Each method raises UnsupportedStructure where it cannot."""
-
-    def can_help(self, batch: DesignBatch) -> bool:
-        """Whether it can do anything for such designs that others have not done before."""
-
-    def run(self, batch: DesignBatch, out: Array, candidates: Array | None = None) -> Array:
-        """Fill out (steps + 1, rows, designs): x and y of each point, then their first, then second rates (m, s); what
-        is no number from the first step on that did not pass.
-
-        Where `out` is in single precision, each number is rounded when it is written. `candidates` (designs,) takes
-        how many of the first steps stand in `out`, where a runner leaves more than passed: those that follow pass the
-        checks of one position, but there may be a dead point before them.
-
-        Returns how many of the first steps passed residual and branch check (designs,).
-        """
-
-    def last_good_unknowns(self, batch: DesignBatch, good: Array) -> Array:
-        """The unknowns (unknowns, designs) at the last of so many good steps (designs,), one at least."""
-
-    def correct_assemblies(
-        self, batch: DesignBatch, point_blocks: Sequence[int], corrections: int
-    ) -> CorrectedAssemblies:
-        """Designs corrected from near by, where they start, by so many of Newton's steps.
-
-        `point_blocks` are the blocks that place the points of the batch.
-        """
 
 
 def erase_from_steps(out: Array, first: Array) -> None:
@@ -155,67 +119,3 @@ def erase_between(out: Array, first: Array, end: Array) -> None:
     design = np.repeat(np.arange(len(first)), many)
     begins = np.repeat(first - (np.cumsum(many) - many), many)
     out[begins + np.arange(len(design)), :, design] = np.nan
-
-
-class RunnerAttempt(NamedTuple):
-    """A runner, and whether it is given all designs that have not come to the end, or those that have not begun."""
-
-    runner: DesignRunner
-    runs_to_end: bool
-
-
-class RunnerLadder:
-    """A runner made of others: one after the other, each for the designs that the ones before left open."""
-
-    def __init__(self, attempts: Sequence[RunnerAttempt]):
-        self.attempts = attempts
-
-    def can_help(self, batch: DesignBatch) -> bool:
-        """See `DesignRunner`."""
-        return True
-
-    def run(self, batch: DesignBatch, out: Array, candidates: Array | None = None) -> Array:
-        """See `DesignRunner`."""
-        good, runs = np.zeros(out.shape[2], dtype=int), 0
-        for runner, runs_to_end in self.attempts:
-            left = np.flatnonzero(good < (len(batch.input_offsets) if runs_to_end else 1))
-            if not left.size or not runner.can_help(batch):
-                continue
-            if runs:  # what has nowhere to start is given once
-                left = left[np.isfinite(batch.z0[:, left]).all(axis=0) & np.isfinite(batch.u0[:, left]).all(axis=0)]
-                if not left.size:
-                    continue
-            try:
-                if left.size == len(good):
-                    good = runner.run(batch, out, candidates)
-                else:
-                    steps, rows, _ = out.shape
-                    own = allocate_aligned(steps, rows, left.size, out.dtype)
-                    good[left] = runner.run(batch.select(left), own)
-                    out[:, :, left] = own
-                    if candidates is not None:
-                        candidates[left] = good[left]
-            except UnsupportedStructure:
-                continue
-            runs += 1
-        if not runs:
-            raise UnsupportedStructure("no runner can run this structure")
-        return good
-
-    def last_good_unknowns(self, batch: DesignBatch, good: Array) -> Array:
-        """See `DesignRunner`."""
-        return self._first_answer(lambda runner: runner.last_good_unknowns(batch, good))
-
-    def correct_assemblies(
-        self, batch: DesignBatch, point_blocks: Sequence[int], corrections: int
-    ) -> CorrectedAssemblies:
-        """See `DesignRunner`."""
-        return self._first_answer(lambda runner: runner.correct_assemblies(batch, point_blocks, corrections))
-
-    def _first_answer(self, ask: Callable[[DesignRunner], Answer]) -> Answer:
-        for runner, _ in self.attempts:
-            try:
-                return ask(runner)
-            except UnsupportedStructure:
-                continue
-        raise UnsupportedStructure("no runner can do this")

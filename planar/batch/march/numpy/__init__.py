@@ -1,1 +1,0 @@
-"""The march by numpy: designs and steps in arrays."""
