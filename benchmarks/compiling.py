@@ -66,7 +66,7 @@ def _process(structure: str, folder: str) -> dict[str, float]:
 def spent(structure: str) -> dict[str, float]:
     """Seconds of each step in this process, which has the structure's equations."""
     import planar
-    from planar.batch.march.designs_writer import ARGUMENT_TYPES, FUNCTION_NAME
+    from planar.batch.march.designs_writer import MARCH_ARGUMENTS, MARCH_FUNCTION
     from planar.batch.march.kernel import kernel_equations
     from planar.batch.march.runs import designs_kernel
     from planar.codegen import llvm_compile
@@ -93,7 +93,7 @@ def spent(structure: str) -> dict[str, float]:
     text = designs_kernel(kernel_equations(known, of(mechanism)), links, True).ir
     told["printing"] = perf_counter() - start
     start = perf_counter()
-    llvm_compile.compile_function(text, FUNCTION_NAME, *ARGUMENT_TYPES)
+    llvm_compile.compile_function(text, MARCH_FUNCTION, *MARCH_ARGUMENTS)
     told["reading"] = perf_counter() - start - told.get("compiling", 0.0)
     return told
 

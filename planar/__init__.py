@@ -48,7 +48,7 @@ if TYPE_CHECKING:
     from planar.assemblies.circuits.traced_circuit import Branch
     from planar.assemblies.conflict import Conflict, conflict
     from planar.assemblies.modes import Mode, Modes, modes
-    from planar.batch.gradients.run_gradient import RunGradient
+    from planar.batch.gradients.run_gradients import RunGradient
     from planar.batch.mechanisms.results import Each, Swept
     from planar.batch.prepared import PreparedRun, PreparedSweep, prepared
     from planar.batch.reductions.reduced_sweep import ReducedSweep

@@ -7,8 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.batch.closed_form.ends import closed_form_designs, find_ends
-from planar.batch.closed_form.own_ranges import run_between_limits
+from planar.batch.closed_form.ends import closed_form_designs, find_ends, run_between_limits
 from planar.batch.dead_point_tracking import DEAD_POINT_MARGIN, FollowedDesigns, follow_to_dead_points
 from planar.batch.design_arrays import values_of_design, with_design_values
 from planar.batch.design_stops import DesignStops
@@ -18,7 +17,7 @@ from planar.batch.march.design_batch import DesignBatch, erase_between, erase_fr
 from planar.batch.march.runs import lead_designs, run_designs
 from planar.batch.march.stops import SAME_END
 from planar.batch.reference_design import ReferenceDesign, reference_design
-from planar.codegen.aligned_arrays import allocate_aligned
+from planar.codegen.llvm_compile import allocate_aligned
 from planar.foundation.errors import NoAnswer, Outcome
 from planar.foundation.instruction_list import UnsupportedOperation
 from planar.foundation.turns import take_turn

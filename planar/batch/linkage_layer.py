@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from planar.batch.gradients.run_gradient import ORDERS, read_names
+from planar.batch.gradients.run_gradients import ORDERS, read_names
 from planar.batch.prepared import prepared
 from planar.foundation.arrays import Array, BoolArray
 from planar.foundation.errors import BadInput

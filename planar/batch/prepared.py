@@ -1,19 +1,18 @@
-"""`planar.prepared`: one linkage made ready to be run again and again with other dimensions, as an optimiser does."""
+"""Results of a run that are made when they are read."""
 
 from __future__ import annotations
 
 import struct
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple, TypedDict
+from typing import TYPE_CHECKING, Any, NamedTuple, TypedDict, overload
 
 import numpy as np
 
 from planar.batch.design_arrays import design_variables
-from planar.batch.gradients.run_gradient import RunGradient, RunWeights, read_names, read_weights
-from planar.batch.prepare.kept_results import KeptPoints, LateSentences
+from planar.batch.gradients.run_gradients import RunGradient, RunWeights, read_names, read_weights
 from planar.batch.prepare.native_run import NativeRuns, prepare_native_run
-from planar.batch.prepare.run_endings import ALL_SOLVED, STATUS_OF_ENDING, UNSURE
+from planar.batch.prepare.run_calls import ALL_SOLVED, STATUS_OF_ENDING, UNSURE
 from planar.batch.reference_design import reference_design
 from planar.batch.results import Sweep
 from planar.batch.sweep import check_range, sweep
@@ -26,6 +25,69 @@ if TYPE_CHECKING:
     from planar.batch.gradients.run_gradients import RunGradients
 
 Array = np.ndarray
+
+
+class KeptPoints(Mapping[str, Array]):
+    """Points by name, each (positions, 2), of one order of a run's rows (rows, positions)."""
+
+    __slots__ = ("_first", "_index", "_rows")
+
+    def __init__(self, rows: Array, index: Mapping[str, int], first: int):
+        """`index`: the row of each point's x beside the order's `first` row."""
+        self._rows, self._index, self._first = rows, index, first
+
+    def __getitem__(self, name: str) -> Array:
+        row = self._first + self._index[name]
+        return self._rows[row : row + 2].T
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._index)
+
+    def __len__(self) -> int:
+        return len(self._index)
+
+    def __repr__(self) -> str:
+        return repr(dict(self))
+
+
+class LateSentences(Sequence[str]):
+    """Sentences as a tuple, made once they are read."""
+
+    __slots__ = ("_make", "_sentences")
+
+    def __init__(self, make: Callable[[], Sequence[str]]):
+        self._make = make
+        self._sentences: tuple[str, ...] | None = None
+
+    def _all(self) -> tuple[str, ...]:
+        if self._sentences is None:
+            self._sentences = tuple(self._make())
+        return self._sentences
+
+    @overload
+    def __getitem__(self, at: int) -> str: ...
+
+    @overload
+    def __getitem__(self, at: slice) -> Sequence[str]: ...
+
+    def __getitem__(self, at: int | slice) -> str | Sequence[str]:
+        return self._all()[at]
+
+    def __len__(self) -> int:
+        return len(self._all())
+
+    def __eq__(self, other: object) -> bool:
+        return self._all() == (other._all() if isinstance(other, LateSentences) else other)
+
+    def __hash__(self) -> int:
+        return hash(self._all())
+
+    def __repr__(self) -> str:
+        return repr(self._all())
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return tuple, (self._all(),)
+
 
 PLAIN_NUMBERS = frozenset({float, int, np.float64})
 """Types of values that are surely one number."""

@@ -13,10 +13,9 @@ from numpy.typing import DTypeLike
 
 from planar.batch.executor import in_order, run_tasks, thread_count
 from planar.batch.general_path import OUTCOMES, solve_design
-from planar.batch.mechanisms.endings import find_ending
 from planar.batch.mechanisms.initial_assembly import StartAssemblies, find_start_assemblies
-from planar.batch.mechanisms.linkage_groups import LinkageGroup, SweepRequest, linkage_group, wanted_points
-from planar.batch.mechanisms.march import run_linkages
+from planar.batch.mechanisms.linkages import LinkageGroup, SweepRequest, linkage_group, wanted_points
+from planar.batch.mechanisms.march import find_ending, run_linkages
 from planar.batch.mechanisms.parts import (
     PART_SIZE,
     PartRuns,
@@ -27,12 +26,10 @@ from planar.batch.mechanisms.parts import (
     read_mechanisms,
 )
 from planar.batch.mechanisms.results import Each, PointMapping, Swept, SweptList, SweptPart
-from planar.batch.pinned.march import FULL_TURN, REFINEMENT, make_values, step_division
+from planar.batch.pinned.march import FULL_TURN, REFINEMENT, make_values, solve_pinned, step_division
 from planar.batch.pinned.results import PinnedPart, join_parts
-from planar.batch.pinned.solve import solve_pinned
-from planar.batch.pinned.told_pins import ToldPins, find_told_pins, pin_number
-from planar.batch.reductions.reduced_mechanisms import sweep_reduced
-from planar.batch.reductions.reduced_sweep import ReducedSweep, Reduction, result_type
+from planar.batch.pinned.tape import ToldPins, find_told_pins, pin_number
+from planar.batch.reductions.reduced_sweep import ReducedSweep, Reduction, result_type, sweep_reduced
 from planar.batch.sweep import warn_of_backend
 from planar.document.first_argument import MechanismSource
 from planar.foundation.errors import BadInput, Outcome

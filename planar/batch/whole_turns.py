@@ -7,10 +7,10 @@ from functools import partial
 import numpy as np
 
 from planar.batch.general_path import OUTCOMES
-from planar.batch.mechanisms.linkage_groups import SweepRequest
+from planar.batch.mechanisms.linkages import SweepRequest
 from planar.batch.mechanisms.results import Swept
+from planar.batch.pinned.march import solve_pinned
 from planar.batch.pinned.results import PinnedPart
-from planar.batch.pinned.solve import solve_pinned
 from planar.batch.sweep_mechanisms import solve_by_blocks
 from planar.foundation.arrays import BoolArray
 from planar.foundation.errors import Outcome

@@ -1,4 +1,4 @@
-"""LLVM IR compiled for this machine, once for each text; what is compiled is kept on disk for other processes."""
+"""Machine code kept on disk by its fingerprint, so that other processes need not compile it again."""
 
 from __future__ import annotations
 
@@ -10,8 +10,32 @@ from typing import Any
 
 import llvmlite
 import llvmlite.binding as llvm
+import numpy as np
+from numpy.typing import DTypeLike
 
-from planar.codegen.code_cache import MACHINE_CODE
+from planar.foundation.arrays import Array
+from planar.foundation.private_cache import PrivateCache
+
+MACHINE_CODE = PrivateCache("code", ".code", b"planar machine code\n", 256 * 2**20)
+
+
+WIDEST_VECTOR_BYTES = 64
+"""Bytes of the widest vectors of a machine."""
+
+
+def allocate_aligned(steps: int, rows: int, designs: int, dtype: DTypeLike = np.float64) -> Array:
+    """An array (steps, rows, designs), not filled, every row of which begins at a whole vector."""
+    many = WIDEST_VECTOR_BYTES // np.dtype(dtype).itemsize
+    width = -(-designs // many) * many
+    made = np.empty(steps * rows * width + many, dtype)
+    first = -(made.ctypes.data // made.itemsize) % many
+    return made[first : first + steps * rows * width].reshape(steps, rows, width)[:, :, :designs]
+
+
+def is_aligned(array: Array) -> bool:
+    """Whether every row of an array begins so."""
+    return not any(place % WIDEST_VECTOR_BYTES for place in (array.ctypes.data, *array.strides[:2]))
+
 
 PASS_LEVEL, CODEGEN_LEVEL, FAST_CODEGEN_LEVEL = 1, 2, 0
 """How much the passes over the text, and the making of code, may take: more costs time and gives none back."""

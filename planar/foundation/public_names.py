@@ -125,7 +125,7 @@ MODULES = {
     "ReducedSweep": "batch.reductions.reduced_sweep",
     "RelativeState": "results.records",
     "RubbingPair": "dynamics.in_time.friction_record",
-    "RunGradient": "batch.gradients.run_gradient",
+    "RunGradient": "batch.gradients.run_gradients",
     "SearchProgress": "synthesis.synthesise",
     "Sensitivity": "analysis.sensitivity.sensitivity",
     "Shaking": "dynamics.balancing.balance",

@@ -10,7 +10,7 @@ import planar
 from planar.batch.design_arrays import with_design_values
 from planar.batch.general_path import solve_design
 from planar.batch.prepare.design_numbers import compiled_variables
-from planar.batch.prepare.run_endings import UNSURE
+from planar.batch.prepare.run_calls import UNSURE
 from planar.foundation.errors import BadInput
 from tests.builders import open_four_bar
 from tests.draws import draws

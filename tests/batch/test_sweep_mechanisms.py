@@ -9,9 +9,8 @@ import pytest
 import planar
 from benchmarks import chain
 from planar.batch.mechanisms import partition
-from planar.batch.mechanisms.block_type import FRAME_BODY, BlockPair, BlockSignature
+from planar.batch.mechanisms.block_type import FRAME_BODY, BlockPair, BlockSignature, find_block_type
 from planar.batch.mechanisms.partition import NotPartitionable, partition_mechanism
-from planar.batch.mechanisms.solved_block_type import find_block_type
 from planar.codegen import block_formula, instructions
 from planar.document import files
 from planar.foundation.errors import BadInput, NoAnswer, Outcome

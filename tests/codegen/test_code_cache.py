@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from planar.codegen import llvm_compile
-from planar.codegen.code_cache import MACHINE_CODE
+from planar.codegen.llvm_compile import MACHINE_CODE
 from planar.foundation import safe_files
 from planar.foundation.private_cache import CACHE_TAG_NAME, CACHE_TAG_TEXT, CHECKSUM_LENGTH
 

@@ -12,8 +12,8 @@ from planar.batch.march.kernel import BareAngle, kernel_equations
 from planar.batch.march.runs import designs_kernel
 from planar.batch.reference_design import reference_design
 from planar.codegen import instructions, llvm_compile, printed_formula
-from planar.codegen.aligned_arrays import allocate_aligned
 from planar.codegen.instructions import MAX_INSTRUCTIONS, CosSin, expand_angle_sums
+from planar.codegen.llvm_compile import allocate_aligned
 from planar.equations.mechanism_numbers import equation_structure
 from planar.foundation.errors import BadInput, Outcome
 from planar.foundation.instruction_list import InstructionList, UnsupportedOperation
@@ -345,8 +345,7 @@ def test_a_long_text_is_compiled_briefly(monkeypatch):
 
 
 def test_cosines_and_sines_of_lanes_have_all_their_digits():
-    from planar.codegen.llvm_ir import IRWriter
-    from planar.codegen.llvm_trigonometry import write_cos_sin
+    from planar.codegen.llvm_ir import IRWriter, write_cos_sin
 
     t = IRWriter(8)
     t.write_line("define void @turn(ptr %angle, ptr %cos, ptr %sin) {")

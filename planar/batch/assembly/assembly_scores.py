@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.batch.march.regularity import CLEAR_REGULARITY
+from planar.batch.march.prediction import CLEAR_REGULARITY
 from planar.solving.assembly.block_assemblies import CLEAR_SKETCH_DISTANCE
 from planar.solving.assembly.nearest_assembly import EQUAL_DISTANCE_TOLERANCE
 

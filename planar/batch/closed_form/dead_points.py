@@ -10,7 +10,7 @@ from math import inf, nan
 
 from planar.batch.march.kernel import KernelEquations
 from planar.batch.march.kernel_writer import KernelWriter, OperandNames
-from planar.codegen.llvm_trigonometry import write_cos_sin
+from planar.codegen.llvm_ir import write_cos_sin
 
 LEAST_INTERVALS = 3
 """Intervals that are safe one after the other before longer ones are looked at."""

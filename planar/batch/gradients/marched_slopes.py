@@ -1,21 +1,214 @@
-"""Derivatives over a sweep by machine code: the march of its designs once more, with slopes in place of points."""
+"""Derivatives of what a sweep tells, in numbers of the file, as rows that a march writes beside its positions.
+
+Where a number of the file changes the equations F(z, u, p) = 0 and their rates stay zero, so that
+
+    A dz = -(F_p dp + F_u du)    A dz' = -(F'_z dz + F'_p dp + ...)    A dz'' = -(F''_z dz + F''_z' dz' + ...)
+
+with A = dF/dz, block after block. What the numbers p of pairs and q of points change by stands for a whole run.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from functools import lru_cache
+from collections.abc import Iterator, Mapping
+from functools import cached_property, lru_cache
+from typing import Any, NamedTuple
 
+import casadi as ca
 import numpy as np
 
 from planar.batch.design_arrays import split_into_blocks
-from planar.batch.gradients.slope_rows import SlopeResults, SlopeRows
 from planar.batch.march.design_batch import DesignBatch
+from planar.batch.march.kernel import KernelInstructions, Operand
 from planar.batch.march.runs import run_designs
 from planar.batch.reference_design import ReferenceDesign
-from planar.codegen.aligned_arrays import allocate_aligned
-from planar.derivatives.design_equations import design_equations
+from planar.codegen.llvm_compile import allocate_aligned
+from planar.derivatives.design_equations import DesignEquations, design_equations
+from planar.equations.casadi_call import BufferedFunction
+from planar.equations.coordinates import frames_from_coordinates
+from planar.equations.elimination import stack_expressions
+from planar.equations.linear import solve_by_determinants
+from planar.equations.mechanism_numbers import scale_lengths
+from planar.equations.rates import block_jacobian, time_derivatives
+from planar.equations.residuals import input_positions, split_pair_numbers
 from planar.foundation.arrays import Array
 from planar.foundation.instruction_list import UnsupportedOperation
+from planar.model.mechanism import relative_motions
+from planar.model.pairs import MeasureKind
+
+CHANGING = ("p", "q", "u", "u1", "u2")
+"""What a number of the file changes."""
+
+
+class SlopeResults(NamedTuple):
+    """What is derived: points, links and pairs by name, with two rates or without; and in which numbers of the file."""
+
+    points: tuple[str, ...]
+    links: tuple[str, ...]
+    pairs: tuple[str, ...]
+    numbers: tuple[str, ...]
+    rates: bool
+
+    @property
+    def row_count(self) -> int:
+        """How many numbers these are at a position."""
+        parts = 2 * len(self.points) + len(self.links) + len(self.pairs)
+        return parts * len(self.numbers) * (3 if self.rates else 1)
+
+    def split_rows(self, rows: Array) -> Iterator[Array]:
+        """Of rows (steps + 1, rows, designs) those of points, links and pairs: views (steps + 1, orders times results,
+        numbers, parts, designs)."""
+        first, many = 0, len(self.numbers)
+        for results, parts in ((self.points, 2), (self.links, 1), (self.pairs, 1)):
+            lines = len(results) * (3 if self.rates else 1)
+            stop = first + lines * many * parts
+            yield rows[:, first:stop].reshape(len(rows), lines, many, parts, rows.shape[2])
+            first = stop
+
+
+class SlopeRows:
+    """See `ResultRows`: for each kind of result, order, result and number of the file so many rows as it has parts."""
+
+    def __init__(self, reference: ReferenceDesign, design: DesignEquations, results: SlopeResults):
+        self.reference, self.design, self.results = reference, design, results
+        self.members = [reference.point_member(name) for name in results.points]
+        self.orders, self.row_count = 3 if results.rates else 1, results.row_count
+        numbers = [
+            number
+            for pair in reference.mechanism.pairs
+            for number in scale_lengths(design.work.numbers[pair.name], pair.number_kinds, reference.unit)
+        ]
+        shapes, unit = design.work.shapes, reference.unit
+        places = [part / unit for link, point in self.members for part in shapes[link].position(point)]
+        self.changes = self._changes(ca.vertcat(ca.SX(0, 1), *numbers, *places))
+        varying = [k for k in range(self.changes.nnz()) if not self.changes.nz[k].is_constant()]
+        told = [ca.vertcat(ca.SX(0, 1), *of) for of in (places, [self.changes.nz[k] for k in varying])]
+        self._numbers = BufferedFunction(ca.Function("numbers", [design.d], [ca.densify(each) for each in told]))
+        self.numbers = ca.SX.sym("number", len(varying))
+        "the further numbers of a design: what is changed by no constant"
+        for number, k in enumerate(varying):
+            self.changes.nz[k] = self.numbers[number]
+
+    def _changes(self, taken: ca.SX) -> ca.SX:
+        """How what is `CHANGING` changes (entries, numbers), of which p and q are `taken` from the file."""
+        design, inputs = self.design, len(self.reference.mechanism.inputs)
+        columns = []
+        for name in self.results.numbers:
+            of_inputs, k = ca.SX(3 * inputs, 1), design.names.index(name)
+            if k < 3 * inputs:
+                of_inputs[k] = 1.0 / float(self.reference.input_scale[k % inputs])
+                columns.append(ca.vertcat(ca.SX(taken.numel(), 1), of_inputs))
+            else:
+                columns.append(ca.vertcat(ca.jacobian(taken, design.t[k]), of_inputs))
+        return ca.sparsify(ca.horzcat(*columns))
+
+    def design_numbers(self, values: Mapping[str, Array], count: int) -> tuple[Array, Array]:
+        """q (2 a point, designs), in sizes, and the further numbers (numbers, designs), of designs with these values
+        (designs,) by name."""
+        d = np.empty((count, len(self.design.dimensions)))
+        for k, each in enumerate(self.design.dimensions):
+            d[:, k] = values.get(each.name, each.value)
+        places, numbers = (each.reshape(count, -1).T for each in self._numbers.evaluate_batch(count, d))
+        return np.ascontiguousarray(places), np.ascontiguousarray(numbers)
+
+    @cached_property
+    def zero_places(self) -> list[int]:
+        """The rows of q that are nothing in the reference."""
+        return np.flatnonzero(self.design_numbers({}, 1)[0][:, 0] == 0.0).tolist()
+
+    def write_rows(self, writer: Any, have: dict[Operand, str]) -> list[str]:
+        """See `ResultRows`."""
+        return _SlopeWriter(self, writer).write(have)
+
+
+class _SlopeWriter:
+    """Writes the rows into one march."""
+
+    def __init__(self, rows: SlopeRows, writer: Any):
+        self.rows, self.writer = rows, writer
+        kernel: KernelInstructions = writer
+        e, s = kernel.equations.equations, kernel.symbols
+        self.kernel, self.count = kernel, e.z.numel()
+        self.unknowns = [e.z, s["z1"], s["z2"]][: rows.orders]
+        self.y = [e.y, ca.vertcat(s["z1"], s["u1"]), ca.vertcat(s["z2"], s["u2"])][: rows.orders]
+        many = len(rows.results.numbers)
+        s["slope"] = ca.SX.sym("slope", rows.orders * many * self.count)
+        # of every order the unknowns' slopes (unknowns, numbers)
+        size = many * self.count
+        self.slopes = [
+            ca.reshape(s["slope"][order * size : (order + 1) * size], self.count, many) for order in range(rows.orders)
+        ]
+        self.given = ca.vertcat(*(s[kind] for kind in CHANGING))
+        self.changes = rows.changes
+
+    def write(self, have: dict[Operand, str]) -> list[str]:
+        """The rows, after the unknowns' slopes have been put into `have`."""
+        e, t = self.kernel.equations.equations, self.writer.ir
+        levels = self._with_rates(e.F)
+        many = self.changes.shape[1]
+        for part in self.kernel.equations.blocks:
+            jacobian = block_jacobian(e, part.block.rows, part.block.unknowns)
+            if part.is_large:
+                columns = self.writer.write_values([ca.vec(jacobian)], have)
+                self.writer.linear_systems.factorise(columns, len(part.unknowns))
+            for order, level in enumerate(levels):
+                changed = ca.horzsplit(self._slopes_of(level[part.block.rows], order, part.unknowns.start))
+                if part.is_large:
+                    known = self.writer.write_separately(changed, have)
+                    found = [self.writer.linear_systems.solve(each) for each in known]
+                else:
+                    solved = [solve_by_determinants(jacobian, each) for each in changed]
+                    found = self.writer.write_separately(solved, have)
+                for number, values in enumerate(found):
+                    first = (order * many + number) * self.count
+                    for k, value in zip(part.unknowns, values, strict=True):
+                        have["slope", first + k] = t.add_instruction(f"fneg {t.vector} {value}")
+        return self.writer.write_values(self._told(), have)
+
+    def _slopes_of(self, value: ca.SX, order: int, known: int) -> ca.SX:
+        """The slopes (rows, numbers) of what stands at an order, where of that order so many unknowns' slopes are
+        known."""
+        found = ca.mtimes(ca.jacobian(value, self.given), self.changes)
+        for k in range(order + 1):
+            many = known if k == order else self.count
+            found += ca.mtimes(ca.jacobian(value, self.unknowns[k][:many]), self.slopes[k][:many, :])
+        return ca.densify(found)
+
+    def _told(self) -> list[ca.SX]:
+        """The slopes of all results, row by row."""
+        rows = []
+        for values, width, scale in self._results():
+            for order, value in enumerate(self._with_rates(values)):
+                slopes = self._slopes_of(value, order, self.count)
+                for first in range(0, value.numel(), width):
+                    for number in range(slopes.shape[1]):
+                        rows.append(slopes[first : first + width, number] * scale[first : first + width])
+        return rows
+
+    def _results(self) -> list[tuple[ca.SX, int, ca.SX]]:
+        """Of points, links and pairs the values, how many numbers each has, and what each number is in units of."""
+        rows, equations = self.rows, self.kernel.equations
+        e, scale = equations.equations, self.kernel.symbols["scale"]
+        results, found = rows.results, []
+        if results.points:
+            points = self.kernel.point_coordinates(range(len(results.points)))
+            found.append((points, 2, ca.repmat(scale, points.numel(), 1)))
+        if results.links:
+            angles = [ca.SX(equations.frame(link).angle) for link in results.links]
+            found.append((ca.vertcat(*angles), 1, ca.SX.ones(len(angles))))
+        if results.pairs:
+            mechanism = rows.reference.mechanism
+            motions = [relative_motions(mechanism)[name] for name in results.pairs]
+            pairs = {pair.name: pair for pair in equations.mechanism.pairs}
+            _, own = frames_from_coordinates(ca.vertsplit(e.w), equations.column_of, (), pairs)
+            frames = {link.name: equations.frame(link.name) for link in equations.mechanism.links}
+            values = input_positions(motions, frames, split_pair_numbers(equations.mechanism.pairs, e.p), own)
+            units = [scale if each.input_kind is MeasureKind.LENGTH else ca.SX(1.0) for each in motions]
+            found.append((stack_expressions(values), 1, ca.vertcat(*units)))
+        return found
+
+    def _with_rates(self, value: ca.SX) -> list[ca.SX]:
+        return [value, *time_derivatives(value, *self.y)] if self.rows.orders > 1 else [value]
+
 
 MAX_NUMBERS = 8
 """Numbers of the file by which one function derives: of more its text grows so long that its code is made briefly."""

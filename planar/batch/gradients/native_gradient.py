@@ -1,17 +1,17 @@
-"""Gradients of runs as compiled functions: the states of a run, then the adjoint of all its positions in one call."""
+"""From the derivatives in what a run takes of a design to those in the numbers of its file, as an LLVM function."""
 
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+import casadi as ca
 import numpy as np
 
-from planar.batch.gradients.adjoint_equations import WeighedRow
-from planar.batch.gradients.llvm_adjoint import LANES
-from planar.batch.gradients.llvm_gradient import ARGUMENT_TYPES, FUNCTION_NAME, TOLD, GradientWriter
-from planar.batch.prepare.design_numbers import DesignNumbers
+from planar.batch.gradients.llvm_adjoint import ADJOINT_FUNCTION, LANES, WeighedRow, write_adjoint
+from planar.batch.march.kernel import Operand
+from planar.batch.prepare.design_numbers import NUMBERS_FUNCTION, DesignNumbers, write_given, write_numbers
 from planar.batch.prepare.native_run import (
     NativeRun,
     NativeRuns,
@@ -20,16 +20,214 @@ from planar.batch.prepare.native_run import (
     prepare_native,
     run_design_numbers,
 )
-from planar.batch.prepare.value_binder import address_of
+from planar.batch.prepare.run_calls import ALL_SOLVED, CANNOT_BE_ASSEMBLED, UNSURE, RunCall, address_of
 from planar.batch.reference_design import ReferenceDesign
-from planar.codegen.aligned_arrays import WIDEST_VECTOR_BYTES
-from planar.codegen.llvm_compile import compile_function
+from planar.codegen.instructions import check_length
+from planar.codegen.llvm_compile import WIDEST_VECTOR_BYTES, compile_function
+from planar.codegen.llvm_ir import IRWriter
 from planar.derivatives.design_equations import DesignEquations
+from planar.derivatives.parameters import INPUT_RATES
+from planar.equations.generic_evaluation import inline_function
+from planar.equations.mechanism_numbers import scale_lengths
 from planar.foundation.arrays import Array
+from planar.foundation.instruction_list import InstructionList, required_values
+from planar.model.link_shapes import PointMember
 
 if TYPE_CHECKING:
-    from planar.batch.prepare.compiled_run import CompiledRun
+    from planar.batch.prepare.native_run import CompiledRun
     from planar.batch.prepare.newton_run import NewtonRun
+
+SLOPES_FUNCTION = "file_slopes"
+RATE_KINDS = dict(zip(INPUT_RATES, ("u", "u1", "u2"), strict=True))
+"""By what a number of an input is, the kind of operand that it becomes."""
+
+
+def file_slope_expressions(
+    reference: ReferenceDesign,
+    equations: DesignEquations,
+    design: DesignNumbers,
+    members: Sequence[PointMember],
+    sums: dict[Operand, ca.SX],
+) -> ca.SX:
+    """The derivatives in `equations.names`, by the symbols of a design's values, from those of a sum in operands."""
+    unit, work = reference.unit, equations.work
+    numbers = [
+        number
+        for pair in reference.mechanism.pairs
+        for number in scale_lengths(work.numbers[pair.name], pair.number_kinds, unit)
+    ]
+    places = [part / unit for link, point in members for part in work.shapes[link].position(point)]
+    taken = {("p", k): ca.SX(each) for k, each in enumerate(numbers)}
+    taken |= {("q", k): ca.SX(each) for k, each in enumerate(places)}
+    weighed = [(value, sums[operand]) for operand, value in taken.items() if operand in sums]
+    values, weights = (ca.vertcat(ca.SX(0, 1), *each) for each in zip(*weighed, strict=True))
+    slopes = ca.jtimes(values, equations.d, weights, True)
+    own = ca.vertcat(
+        ca.SX(0, 1),
+        *(
+            design.symbols[design.index[each.name]] if each.name in design.index else ca.SX(each.value)
+            for each in equations.dimensions
+        ),
+    )
+    of_inputs = []
+    for rate in INPUT_RATES:
+        for k, given in enumerate(reference.mechanism.inputs):
+            moves = rate == "position" or k == reference.running_index
+            slope = sums.get((RATE_KINDS[rate], k), ca.SX(0.0)) if moves else ca.SX(0.0)
+            of_inputs.append(slope / (unit if reference.solver.is_sliding(given.pair) else 1.0))
+    return ca.densify(ca.vertcat(*of_inputs, ca.substitute(slopes, equations.d, own)))
+
+
+def write_file_slopes(design: DesignNumbers, sums: ca.SX, slopes: ca.SX) -> IRWriter:
+    """The function: the values by which a design differs, as `write_numbers` takes them, and sums, to slopes.
+
+    Raises UnsupportedOperation.
+    """
+    t = IRWriter(1)
+    t.write_line(
+        f"define internal void @{SLOPES_FUNCTION}(ptr %own, ptr %places, ptr %given, ptr %sums, ptr %slopes) {{"
+    )
+    t.write_label("entry")
+    size = design.symbols.numel()
+    t.write_line(f"%values = alloca [{size} x double], align 64")
+    t.write_line(f"call void @llvm.memcpy.p0.p0.i64(ptr %values, ptr %own, i64 {8 * size}, i1 false)")
+    write_given(t)
+    function = ca.Function("file_slopes", [design.symbols, sums], [slopes], {"cse": True})
+    check_length(function.n_instructions())
+    listing: InstructionList[tuple[str, int]] = InstructionList()
+    given = {
+        base: [listing.add_input((base, k)) for k in range(many)]
+        for base, many in (("%values", size), ("%sums", sums.numel()))
+    }
+    [wanted] = inline_function(listing, function, list(given.values()))
+    order = required_values(listing, wanted)
+    known = {
+        number: t.load(t.double_pointer(base, str(k)))
+        for base, numbers in given.items()
+        for k, number in enumerate(numbers)
+        if number in set(order)
+    }
+    names: dict[int, str] = {}
+    t.write_values(listing, order, names, known)
+    for k, number in enumerate(wanted):
+        t.store(names[number], t.double_pointer("%slopes", str(k)))
+    t.write_line("ret void")
+    t.write_line("}")
+    return t
+
+
+FUNCTION_NAME, OF_ONE = "gradients", "gradient"
+ARGUMENT_TYPES = (*("array",) * 6, "int")
+"""Of the function's arguments: what does not change from call to call, which are addresses; places of values that are
+given, these, design after design; weights; room; out; and how many designs there are."""
+TOLD = 2
+"""Numbers of each design ahead of the sum and its derivatives: how the run ended, and how many positions are good."""
+NUMBER_KINDS = frozenset({"p", "q", "u1", "u2", "d", "dc", "ds"})
+ONE_ARGUMENTS = "ptr %context, ptr %places, ptr %given, ptr %weights, ptr %room, ptr %out"
+
+
+class GradientWriter:
+    """Writes the function for weighed rows of points (by their `members`, link and point)."""
+
+    def __init__(
+        self,
+        reference: ReferenceDesign,
+        equations: DesignEquations,
+        members: Sequence[PointMember],
+        weighed: Sequence[WeighedRow],
+    ):
+        self.reference, self.equations, self.members, self.weighed = reference, equations, members, weighed
+
+    def write(self, design: DesignNumbers, run: RunCall, wanted: range, width: int) -> tuple[str, tuple[Operand, ...]]:
+        """The text, and what the rows of given inputs are, of the `wanted` positions of a run; rows of weights have
+        this width. Raises UnsupportedOperation."""
+        order = [operand for operand in design.numbers if operand[0] in NUMBER_KINDS]
+        links = tuple(link for link, _ in self.members)
+        adjoint = write_adjoint(design.equations("q"), links, self.weighed, order, wanted)
+        sums = ca.SX.sym("sum", 1 + len(adjoint.derived))
+        unit = self.reference.unit
+        named: dict[Operand, ca.SX] = {operand: unit * sums[1 + k] for k, operand in enumerate(adjoint.derived)}
+        slopes = file_slope_expressions(self.reference, self.equations, design, self.members, named)
+        by_file = write_file_slopes(design, sums, ca.vertcat(unit * sums[0], slopes))
+        t = IRWriter(1)
+        self._write_one(t, run, wanted, width, (len(order), sums.numel()))
+        self._write_designs(t, 2 * len(self.weighed) * width, TOLD + 1 + slopes.numel())
+        return t.module_text(write_numbers(design, order), adjoint.writer, by_file), adjoint.inputs
+
+    def _write_one(self, t: IRWriter, run: RunCall, wanted: range, width: int, counts: tuple[int, int]) -> None:
+        """One design: where the run is not sure nothing but that is told."""
+        t.write_line(f"define internal void @{OF_ONE}({ONE_ARGUMENTS}) {{")
+        t.write_label("entry")
+        own, drive, function, context = (
+            t.add_instruction(f"load ptr, ptr {t.double_pointer('%context', str(k))}") for k in range(4)
+        )
+        t.write_line(f"%numbers = alloca [{counts[0]} x double], align 64")
+        t.write_line(f"%sums = alloca [{counts[1]} x double], align 64")
+        second = "" if run.second is None else f", ptr {t.double_pointer('%room', str(run.second))}"
+        t.write_line(f"call void {function}(ptr {context}, ptr %places, ptr %given, ptr %room{second})")
+        ending = t.add_instruction(f"load double, ptr {t.double_pointer('%room', str(run.ending))}")
+        t.write_line(f"store double {ending}, ptr %out")
+        self._write_good(t, ending, run, wanted)
+        t.write_line("%shown = sitofp i64 %good to double")
+        t.write_line(f"store double %shown, ptr {t.double_pointer('%out', '1')}")
+        t.write_line(f"call void @{NUMBERS_FUNCTION}(ptr {own}, ptr %places, ptr %given, ptr %numbers)")
+        states, told = t.double_pointer("%room", str(run.rows)), t.double_pointer("%out", str(TOLD))
+        t.write_line(
+            f"call void @{ADJOINT_FUNCTION}(i64 %good, ptr %numbers, ptr {drive}, i64 {width}, ptr {states}, "
+            f"i64 {run.stride}, ptr %weights, ptr %sums)"
+        )
+        t.write_line(f"call void @{SLOPES_FUNCTION}(ptr {own}, ptr %places, ptr %given, ptr %sums, ptr {told})")
+        t.write_line("ret void")
+        t.write_line("}")
+
+    @staticmethod
+    def _write_good(t: IRWriter, ending: str, run: RunCall, wanted: range) -> None:
+        """How many of the wanted positions are good; a run that ends on its way to the first one is not sure."""
+
+        def branch(ends: float, label: str, otherwise: str) -> None:
+            t.write_line(
+                f"br i1 {t.add_instruction(f'fcmp oeq double {ending}, {ends}')}, label %{label}, label %{otherwise}"
+            )
+
+        branch(ALL_SOLVED, "whole", "ended")
+        t.write_label("ended")
+        branch(CANNOT_BE_ASSEMBLED, "whole", "stopped")
+        t.write_label("stopped")
+        branch(UNSURE, "leave", "found")
+        t.write_label("leave")
+        t.write_line(f"store double {UNSURE}, ptr %out")
+        t.write_line("ret void")
+        t.write_label("found")
+        place = t.add_instruction(f"load double, ptr {t.double_pointer('%room', str(run.ending + 1))}")
+        t.write_line(f"%at = fptosi double {place} to i64")
+        is_ahead = t.add_instruction(f"icmp sle i64 %at, {wanted.start}")
+        t.write_line(f"%before = sub i64 %at, {wanted.start - wanted.step + 1}")
+        t.write_line(f"%stop = sdiv i64 %before, {wanted.step}")
+        t.write_line(f"br i1 {is_ahead}, label %leave, label %whole")
+        t.write_label("whole")
+        t.write_line(f"%good = phi i64 [{len(wanted)}, %entry], [0, %ended], [%stop, %found]")
+
+    @staticmethod
+    def _write_designs(t: IRWriter, weights: int, told: int) -> None:
+        """One design after the other."""
+        t.write_line(f"define void @{FUNCTION_NAME}({ONE_ARGUMENTS}, i64 %designs) {{")
+        t.write_label("entry")
+        t.write_line("%names = load i64, ptr %places")
+        t.write_line("br label %design")
+        t.write_label("design")
+        t.write_line("%k = phi i64 [0, %entry], [%knext, %design]")
+        of_one = [
+            t.double_pointer(base, t.add_instruction(f"mul i64 %k, {size}"))
+            for base, size in (("%given", "%names"), ("%weights", weights), ("%out", told))
+        ]
+        given, weighed, out = of_one
+        t.write_line(
+            f"call void @{OF_ONE}(ptr %context, ptr %places, ptr {given}, ptr {weighed}, ptr %room, ptr {out})"
+        )
+        t.close_loop("k", "designs", "design", "done")
+        t.write_label("done")
+        t.write_line("ret void")
+        t.write_line("}")
 
 
 def prepare_native_gradient(  # many: what a gradient is made of

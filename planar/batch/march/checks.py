@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planar.batch.march.design_batch import DesignBatch
-from planar.batch.march.regularity import LEAST_START_REGULARITY, least_regularity
+from planar.batch.march.prediction import LEAST_START_REGULARITY, least_regularity
 from planar.equations.coordinates import coordinate_columns, frames_from_coordinates
 from planar.equations.functions import EquationFunctions, EquationRates
 from planar.equations.linear import solve_arrays, solve_vectors

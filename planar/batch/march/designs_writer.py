@@ -24,14 +24,18 @@ from planar.batch.march.kernel_writer import (
     write_keeps_apart,
     write_turns_little,
 )
-from planar.batch.march.prediction import PREDICTOR_ORDER
-from planar.batch.march.regularity import LEAST_KERNEL_REGULARITY, LEAST_START_REGULARITY, least_regularity
+from planar.batch.march.prediction import (
+    LEAST_KERNEL_REGULARITY,
+    LEAST_START_REGULARITY,
+    PREDICTOR_ORDER,
+    least_regularity,
+)
 from planar.codegen.llvm_linear import LinearSystems
 from planar.equations.linear import solve_by_determinants
 from planar.foundation.instruction_list import UnsupportedOperation
 
-FUNCTION_NAME, _READ_ARRAYS = "march", ("p", "q", "state", "drive", "rate", "table", "counts")
-ARGUMENT_TYPES = (*("int",) * 5, *("array",) * 7, *("float",) * 3, *("array",) * 3)
+MARCH_FUNCTION, _READ_ARRAYS = "march", ("p", "q", "state", "drive", "rate", "table", "counts")
+MARCH_ARGUMENTS = (*("int",) * 5, *("array",) * 7, *("float",) * 3, *("array",) * 3)
 """Of the function's arguments: blocks, steps, width of the arrays that are read, how far a row and a step of `out` are
 from the next; p, q, state, drives, rates, table, counts; tolerance, astray, scale; out, good, candidates."""
 HISTORY_LENGTH = 8
@@ -119,7 +123,7 @@ class _DesignsKernelWriter(KernelWriter):
         numbers = ", ".join(f"double %{name}" for name in ("tolerance", "astray", "scale"))
         written = ", ".join(f"ptr noalias %{name}" for name in ("out", "good", "candidates"))
         sizes = ", ".join(f"i64 %{name}" for name in ("blocks", "steps", "width", "row", "time"))
-        t.write_line(f"define void @{FUNCTION_NAME}({sizes}, {arrays}, {numbers}, {written}) {{")
+        t.write_line(f"define void @{MARCH_FUNCTION}({sizes}, {arrays}, {numbers}, {written}) {{")
         t.write_label("entry")
         self.state_slots = {leaf: t.allocate() for leaf in self.state}
         self.history_slots = {

@@ -15,7 +15,7 @@ import casadi as ca
 import numpy as np
 
 from planar.batch.march.design_batch import DesignBatch
-from planar.batch.march.regularity import LEAST_START_REGULARITY
+from planar.batch.march.prediction import LEAST_START_REGULARITY
 from planar.batch.march.stops import NUMBERS_PER_STOP, are_periodic, stop_rooms
 from planar.codegen.instructions import CosSin, check_length, expand_angle_sums
 from planar.codegen.invariant_hoisting import InvariantHoister

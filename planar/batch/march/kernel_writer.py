@@ -9,8 +9,7 @@ from typing import NamedTuple
 import casadi as ca
 
 from planar.batch.march.kernel import BareAngle, KernelBlock, KernelEquations, KernelInstructions, Operand
-from planar.batch.march.prediction import MAX_TURN_PER_STEP
-from planar.batch.march.regularity import LEAST_KERNEL_REGULARITY
+from planar.batch.march.prediction import LEAST_KERNEL_REGULARITY, MAX_TURN_PER_STEP
 from planar.codegen.instructions import check_length
 from planar.codegen.llvm_ir import IRWriter
 from planar.foundation.instruction_list import required_values

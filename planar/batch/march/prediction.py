@@ -1,9 +1,10 @@
-"""How far a march of many steps goes by what it was before: the prediction, its error, and how long a step may be."""
+"""How far a march of many steps may go: the prediction by the steps before, and how regular blocks have to be."""
 
 from __future__ import annotations
 
 from functools import lru_cache
 from math import comb
+from typing import TypeVar
 
 import numpy as np
 
@@ -50,3 +51,18 @@ def correction_counts(steps: int, longest: float) -> Array:
     counts = np.full(steps, CORRECTIONS + sum(longest > each for each in COARSE_STEPS), dtype=np.int64)
     counts[: PREDICTOR_ORDER + 1] = FIRST_CORRECTIONS
     return counts
+
+
+Number = TypeVar("Number", float, Array)
+
+LEAST_START_REGULARITY = 1e-4
+"""Below it a design does not start."""
+LEAST_KERNEL_REGULARITY = 1e-2
+"""Below it a march does not go on, so that between steps too no two assemblies meet."""
+CLEAR_REGULARITY = 0.2
+"""From it on no other assembly is near."""
+
+
+def least_regularity(base: Number, unknowns: int) -> Number:
+    """The least volume of a block of so many unknowns; `base` is that of one or two, or of each design's."""
+    return base if unknowns <= 2 else base**1.5

@@ -19,8 +19,8 @@ from planar.batch.march.design_batch import (
     erase_from_steps,
 )
 from planar.batch.march.designs_writer import (
-    ARGUMENT_TYPES,
-    FUNCTION_NAME,
+    MARCH_ARGUMENTS,
+    MARCH_FUNCTION,
     write_designs_kernel,
 )
 from planar.batch.march.kernel import KernelEquations, batch_equations, operand_rows, unknowns_from_state
@@ -33,8 +33,7 @@ from planar.batch.march.prediction import (
     extrapolation_weights,
     longest_step,
 )
-from planar.codegen.aligned_arrays import allocate_aligned, is_aligned
-from planar.codegen.llvm_compile import compile_function
+from planar.codegen.llvm_compile import allocate_aligned, compile_function, is_aligned
 from planar.foundation.instruction_list import UnsupportedOperation
 from planar.foundation.turns import leave_turn
 
@@ -291,7 +290,7 @@ def _run_kernel(
     out: Array | None,
 ) -> tuple[Array, Array, Array]:
     """What the kernel gives: out, good, candidates."""
-    function = compile_function(kernel.ir, FUNCTION_NAME, *ARGUMENT_TYPES)
+    function = compile_function(kernel.ir, MARCH_FUNCTION, *MARCH_ARGUMENTS)
     many, steps, lanes = batch.p.shape[1], len(tables[0]), kernel.lanes
     rows = (
         batch.numbers,

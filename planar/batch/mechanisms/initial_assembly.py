@@ -9,10 +9,9 @@ from typing import NamedTuple
 import numpy as np
 
 from planar.batch.assembly.assembly_scores import is_at_sketch, is_clearly_regular, is_surely_farther
-from planar.batch.mechanisms.block_type import COS, POSE_ROWS, SIN, SKETCH_SUMS, X, Y
-from planar.batch.mechanisms.linkage_arrays import BlockBatch, LinkageArrays, PointArrays
+from planar.batch.mechanisms.block_type import COS, MAX_SIGNS, POSE_ROWS, SIN, SKETCH_SUMS, BlockType, X, Y
+from planar.batch.mechanisms.linkages import BlockBatch, LinkageArrays, PointArrays
 from planar.batch.mechanisms.newton_march import run_newton
-from planar.batch.mechanisms.solved_block_type import MAX_SIGNS, BlockType
 from planar.codegen.block_formula import LANES, KernelLayout, run_kernel
 from planar.foundation.geometry import GROUND, Frame
 

@@ -1,18 +1,58 @@
-"""All positions of many assembled linkages, block type after block type, and how far each is sure."""
+"""All positions of many assembled linkages, block type after block type: how far each is sure, and why it ends."""
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 
 from planar.batch.march.prediction import MAX_TURN_PER_STEP, correction_limit
-from planar.batch.mechanisms.block_type import COS, POSE_ROWS, SIN, X1, X2, X
+from planar.batch.mechanisms.block_type import COS, POSE_ROWS, SIN, TURN1, TURN2, X1, X2, Y1, Y2, X, Y
 from planar.batch.mechanisms.initial_assembly import LEAST_CLEARANCE, StartAssemblies
-from planar.batch.mechanisms.linkage_arrays import BlockBatch, LinkageArrays
+from planar.batch.mechanisms.linkages import BlockBatch, LinkageArrays, LinkageGroup, SweepRequest
 from planar.batch.mechanisms.newton_march import PREDICTOR_ORDER, run_newton
-from planar.batch.mechanisms.points import point_formula
-from planar.codegen.block_formula import LANES, KernelLayout, run_kernel
+from planar.batch.stop_checks import find_first_stop
+from planar.codegen.block_formula import LANES, BlockFormula, FormulaInput, KernelLayout, run_kernel
+from planar.foundation.errors import Outcome
+from planar.foundation.instruction_list import InstructionList
+from planar.model.mechanism import running_input_index
+
+
+@lru_cache
+def point_formula(rates: bool) -> tuple[BlockFormula, KernelLayout]:
+    """x and y of a point, then of its first and second rates, from its link's pose and rates.
+
+    Numbers: the point in its link (m), then what the link's own lengths are multiplied by.
+    """
+    listing: InstructionList[FormulaInput] = InstructionList()
+    leaves: dict[int, FormulaInput] = {}
+
+    def leaf(what: str, first: int, second: int = 0) -> int:
+        key = FormulaInput(what, first, second)
+        number = listing.add_input(key)
+        leaves[number] = key
+        return number
+
+    def times(a: int, b: int) -> int:
+        return listing.add("mul", a, b)
+
+    px, py, unit = (leaf("p", k) for k in range(3))
+    c, s = leaf("row", 0, COS), leaf("row", 0, SIN)
+    rx = listing.add("sub", times(c, px), times(s, py))
+    ry = listing.add("add", times(s, px), times(c, py))
+    wanted = [listing.add("add", times(leaf("row", 0, row), unit), r) for row, r in ((X, rx), (Y, ry))]
+    if rates:
+        turn1, turn2 = leaf("row", 0, TURN1), leaf("row", 0, TURN2)
+        square = times(turn1, turn1)
+        wanted.append(listing.add("sub", times(leaf("row", 0, X1), unit), times(turn1, ry)))
+        wanted.append(listing.add("add", times(leaf("row", 0, Y1), unit), times(turn1, rx)))
+        along = listing.add("add", times(turn2, ry), times(square, rx))
+        across = listing.add("sub", times(turn2, rx), times(square, ry))
+        wanted.append(listing.add("sub", times(leaf("row", 0, X2), unit), along))
+        wanted.append(listing.add("add", times(leaf("row", 0, Y2), unit), across))
+    return BlockFormula(listing, tuple(wanted), leaves), KernelLayout((), 3, 1, len(wanted))
+
 
 Array = np.ndarray
 
@@ -156,3 +196,42 @@ def _initial_state(
         state[where, X1] = (inputs.velocity * runs)[:, None]
         state[where, X2] = (inputs.acceleration * runs)[:, None]
     return state
+
+
+class LinkageEnding(NamedTuple):
+    """So many of the first fine steps are solved; why no more, and what there is to say of it."""
+
+    solved_steps: int
+    outcome: Outcome = Outcome.SOLVED
+    reason: str = ""
+
+
+def find_ending(  # many: what a mechanism is run by
+    group: LinkageGroup, one: int, runs: LinkageRuns, run: int, places: Array, gone: Array, request: SweepRequest
+) -> LinkageEnding | None:
+    """How the mechanism `one` of a group ends by its `run` of the runs, whose input has gone so far (steps,); None
+    where that is not sure. places (two a watched link, 2, steps)."""
+    good = int(runs.good_steps[run])
+    if group.watched[one] and good:
+        mechanism, at = group.mechanisms[one], np.moveaxis(places[..., :good], 1, 2)
+        pair = mechanism.inputs[running_input_index(mechanism, request.pair, "inputs")].pair
+        found = {link: (at[2 * k], at[2 * k + 1]) for k, link in enumerate(group.watched[one])}
+        unit, positions = float(group.arrays.unit[one]), group.start[one] + gone[:good]
+        met = find_first_stop(mechanism, unit, pair, positions, found)
+        if met is None or (met.step is None and good < len(gone)):
+            return None  # beside a dead point it is not clear which comes first
+        if met.step is not None:
+            return LinkageEnding(met.step, Outcome.STOP, f"{met.reason}, {_where(group, one, gone, met.step)}")
+    if good == len(gone):
+        return LinkageEnding(good)
+    if not runs.ends_in_dead_point[run]:
+        return None
+    links = group.links_of_block(int(runs.dead_point_block[run]))
+    told = f"links {links} come to a dead point {_where(group, one, gone, good)}"
+    return LinkageEnding(good, Outcome.DEAD_POINT, told)
+
+
+def _where(group: LinkageGroup, one: int, gone: Array, step: int) -> str:
+    """Between which inputs a step ends."""
+    before, after = group.start[one] + gone[[max(step - 1, 0), step]]
+    return f"at an input of {before:.6g} to {after:.6g} rad"

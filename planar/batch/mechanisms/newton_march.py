@@ -8,8 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from planar.batch.march.prediction import extrapolation_weights
-from planar.batch.mechanisms.block_type import POSE_ROWS
-from planar.batch.mechanisms.solved_block_type import BlockType
+from planar.batch.mechanisms.block_type import POSE_ROWS, BlockType
 from planar.codegen.block_formula import BlockFormula, FormulaInput
 from planar.codegen.llvm_compile import compile_function
 from planar.codegen.llvm_ir import IRWriter

@@ -10,8 +10,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.batch.mechanisms.block_type import FRAME_BODY, BlockPair, BlockSignature
-from planar.batch.mechanisms.solved_block_type import MAX_BLOCK_TYPES, BlockType, find_block_type
+from planar.batch.mechanisms.block_type import (
+    FRAME_BODY,
+    MAX_BLOCK_TYPES,
+    BlockPair,
+    BlockSignature,
+    BlockType,
+    find_block_type,
+)
 from planar.equations.block_decomposition import decompose_blocks
 from planar.foundation.geometry import Vector, frame_at
 from planar.model.link_shapes import At, Link, LinkShape, link_shape

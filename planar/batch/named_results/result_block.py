@@ -1,4 +1,4 @@
-"""One block of a sweep with results beside the points': of links and pairs, by the places of the links' axes."""
+"""Which results a sweep tells beside the points', and the rows in which they stand."""
 
 from __future__ import annotations
 
@@ -12,15 +12,14 @@ from planar.batch.design_arrays import split_into_blocks, values_of_design, with
 from planar.batch.general_path import link_angles
 from planar.batch.march.design_batch import DesignBatch
 from planar.batch.march.prediction import LONGEST_STEP
+from planar.batch.named_results.design_forces import find_forces
 from planar.batch.named_results.design_frames import DesignFrames
-from planar.batch.named_results.design_slopes import design_slopes
-from planar.batch.named_results.force_results import find_forces
+from planar.batch.named_results.design_slopes import MarchedBlock, design_slopes, march_block_slopes
 from planar.batch.named_results.result_rows import LINK_QUANTITIES, PAIR_QUANTITIES, RequestedResults
-from planar.batch.named_results.slope_block import MarchedBlock, march_block_slopes
 from planar.batch.named_results.timed_block import input_motions, solve_timed_block
 from planar.batch.named_results.transmission_angles import output_link
 from planar.batch.reference_design import ReferenceDesign, reference_design
-from planar.codegen.aligned_arrays import allocate_aligned
+from planar.codegen.llvm_compile import allocate_aligned
 from planar.foundation.arrays import BoolArray
 from planar.foundation.geometry import Vector
 from planar.foundation.turns import take_turn

@@ -10,7 +10,7 @@ from planar.batch.general_path import OUTCOMES, solve_timed_design
 from planar.batch.initial_assembly import find_assemblies, given_assemblies
 from planar.batch.march.runs import run_designs
 from planar.batch.reference_design import ReferenceDesign, reference_design
-from planar.codegen.aligned_arrays import allocate_aligned
+from planar.codegen.llvm_compile import allocate_aligned
 from planar.foundation.errors import NoAnswer, Outcome
 from planar.foundation.instruction_list import UnsupportedOperation
 from planar.foundation.turns import take_turn

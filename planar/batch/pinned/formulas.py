@@ -8,9 +8,15 @@ from functools import lru_cache
 
 import casadi as ca
 
-from planar.batch.mechanisms.block_formulas import FormulaBuilder, SymbolicAssembly
-from planar.batch.mechanisms.block_type import FRAME_BODY, BlockPair, BlockSignature
-from planar.batch.mechanisms.solved_block_type import BlockType, find_block_type
+from planar.batch.mechanisms.block_type import (
+    FRAME_BODY,
+    BlockPair,
+    BlockSignature,
+    BlockType,
+    FormulaBuilder,
+    SymbolicAssembly,
+    find_block_type,
+)
 from planar.codegen.block_formula import BlockFormula, FormulaInput, simplify_formula
 from planar.codegen.instructions import CosSin
 from planar.codegen.tape import TapeFormula

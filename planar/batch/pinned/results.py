@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from planar.batch.mechanisms.results import PointMapping, PointRows, Swept
-from planar.batch.pinned.told_pins import pin_number
+from planar.batch.pinned.tape import pin_number
 from planar.foundation.errors import Outcome
 
 Array = np.ndarray

@@ -13,14 +13,14 @@ from math import inf
 from planar.batch.closed_form.joined_blocks import BlockJoinWriter
 from planar.batch.march.kernel import BareAngle, KernelBlock, KernelEquations, Operand
 from planar.batch.march.kernel_writer import OperandNames
-from planar.batch.prepare.llvm_numbers import SAID
-from planar.batch.prepare.run_endings import ALL_SOLVED, CANNOT_BE_ASSEMBLED, CLEARLY_OPEN, UNSURE
+from planar.batch.prepare.design_numbers import SAID
+from planar.batch.prepare.run_calls import ALL_SOLVED, CANNOT_BE_ASSEMBLED, CLEARLY_OPEN, UNSURE
 from planar.codegen.llvm_ir import IRWriter
 from planar.foundation.instruction_list import UnsupportedOperation
 from planar.solving.assembly.block_assemblies import MEETING_COSINE_SQUARED
 from planar.solving.assembly.nearest_assembly import EQUAL_DISTANCE_TOLERANCE
 
-FUNCTION_NAME = "start"
+START_FUNCTION = "start"
 ENUMERATED_BLOCKS = 4
 """Blocks of whose assemblies all combinations are tried."""
 
@@ -57,7 +57,7 @@ class _StartWriter(BlockJoinWriter):
     def write_function(self) -> IRWriter:
         """The whole function."""
         t = self.ir
-        t.write_line(f"define internal void @{FUNCTION_NAME}(ptr noalias %numbers) {{")
+        t.write_line(f"define internal void @{START_FUNCTION}(ptr noalias %numbers) {{")
         t.write_label("entry")
         have: OperandNames = {}
         for k, operand in enumerate(self.order):

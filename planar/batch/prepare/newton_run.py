@@ -1,41 +1,393 @@
-"""Runs of one linkage with blocks that Newton's method solves: a piece of the run in each lane, in one call."""
+"""One call for a linkage with blocks that Newton's method solves, as LLVM IR around two kernels of many designs.
+
+The lanes are one design: first from each assembly of the file's own, then at inputs over the whole run, so that each
+lane goes over a piece of it.
+"""
 
 from __future__ import annotations
 
 import ctypes
 from collections.abc import Mapping, Sequence
-from math import ceil, log2, log10
-from typing import Any
+from math import ceil, inf, log2, log10
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from planar.batch.assembly.assembly_scores import MAX_BLOCK_UNKNOWNS, NEAR_SKETCH
 from planar.batch.assembly.nearest_assemblies import CORRECTIONS
 from planar.batch.initial_assembly import find_assemblies
-from planar.batch.march.designs_writer import ARGUMENT_TYPES as KERNEL_ARGUMENTS
-from planar.batch.march.designs_writer import FUNCTION_NAME as KERNEL_FUNCTION
-from planar.batch.march.designs_writer import write_designs_kernel
-from planar.batch.march.kernel import KernelEquations, operand_rows
+from planar.batch.march.designs_writer import MARCH_ARGUMENTS, MARCH_FUNCTION, write_designs_kernel
+from planar.batch.march.kernel import KernelEquations, Operand, operand_rows
+from planar.batch.march.kernel_writer import DesignsKernelLayout, write_angle_sum
 from planar.batch.march.prediction import (
+    CLEAR_REGULARITY,
+    LEAST_KERNEL_REGULARITY,
     PREDICTOR_ORDER,
     correction_limit,
+    least_regularity,
     longest_step,
 )
 from planar.batch.march.runs import run_designs, step_table, unknowns_at_steps
-from planar.batch.prepare.design_numbers import DesignNumbers
-from planar.batch.prepare.llvm_newton import (
-    ARGUMENT_TYPES,
-    CONTEXT,
-    FUNCTION_NAME,
-    LANES,
-    AssemblyLanes,
-    write_newton_run,
-)
-from planar.batch.prepare.value_binder import RunCall, ValueBinder, address_of
+from planar.batch.prepare.design_numbers import NUMBERS_FUNCTION, SAID, DesignNumbers, write_numbers
+from planar.batch.prepare.run_calls import ALL_SOLVED, UNSURE, RunCall, ValueBinder, address_of
 from planar.batch.reference_design import ReferenceDesign
-from planar.codegen.aligned_arrays import WIDEST_VECTOR_BYTES, allocate_aligned
-from planar.codegen.llvm_compile import compile_function
+from planar.codegen.llvm_compile import WIDEST_VECTOR_BYTES, allocate_aligned, compile_function
+from planar.codegen.llvm_ir import IRWriter
 from planar.foundation.instruction_list import UnsupportedOperation
 from planar.model.link_shapes import PointMember
+from planar.solving.assembly.block_assemblies import CLEAR_SKETCH_DISTANCE, SAME_ASSEMBLY_TOLERANCE
+from planar.solving.assembly.nearest_assembly import EQUAL_DISTANCE_TOLERANCE
+
+FUNCTION_NAME = "run"
+ARGUMENT_TYPES = ("array",) * 5
+"""Of the function's arguments: what does not change from call to call; places of values that are given, these; scratch;
+out."""
+LANES = 16
+CONTEXT = (
+    "own values",
+    "corrector",
+    "starts",
+    "start inputs",
+    "start table",
+    "start counts",
+    "march",
+    "states",
+    "inputs",
+    "table",
+    "counts",
+    "steps",
+    "places",
+    "blocks",
+    "positions",
+    "correction limit",
+)
+"""What does not change, each of eight bytes: addresses, whole numbers, and the limit of what may be corrected."""
+
+
+class AssemblyLanes(NamedTuple):
+    """Of every block: how many assemblies the file's own design has, and the lanes that begin in another one of it."""
+
+    counts: tuple[int, ...]
+    lanes: tuple[tuple[int, ...], ...]
+
+
+class NewtonLayout(NamedTuple):
+    """The text of `run`, the rows that are told, and how many numbers of scratch it takes beside what it gathers."""
+
+    ir: str
+    told: int
+    scratch: int
+
+
+def write_newton_run(
+    equations: KernelEquations,
+    design: DesignNumbers,
+    kernels: tuple[DesignsKernelLayout, DesignsKernelLayout],
+    points: int,
+    rates: bool,
+    lanes: AssemblyLanes,
+) -> NewtonLayout:
+    """The function: `kernels` are those that correct the sketched points and that march. Raises
+    UnsupportedOperation."""
+    return _NewtonRunWriter(equations, design, kernels, (points, rates), lanes).write()
+
+
+class _NewtonRunWriter:
+    def __init__(
+        self,
+        equations: KernelEquations,
+        design: DesignNumbers,
+        kernels: tuple[DesignsKernelLayout, DesignsKernelLayout],
+        results: tuple[int, bool],
+        lanes: AssemblyLanes,
+    ):
+        self.equations, self.design, self.lanes = equations, design, lanes
+        self.corrector, self.march = kernels
+        points, self.rates = results
+        self.told = 2 * points * (3 if self.rates else 1)
+        self.state_first = self.told + 2 * points
+        self.order: list[Operand] = [*design.numbers, SAID]
+        self.ir = IRWriter(LANES)
+        self.scratch_size = 0
+
+    def write(self) -> NewtonLayout:
+        """The whole function."""
+        t = self.ir
+        numbers = write_numbers(self.design, self.order)
+        t.write_line(f"define void @{FUNCTION_NAME}(ptr %context, ptr %places, ptr %given, ptr %scratch, ptr %out) {{")
+        t.write_label("entry")
+        t.write_line(f"%numbers = alloca [{len(self.order)} x double], align 64")
+        own = self._context("own values")
+        t.write_line(f"call void @{NUMBERS_FUNCTION}(ptr {own}, ptr %places, ptr %given, ptr %numbers)")
+        t.write_line(f"store double {self._number(SAID)}, ptr %out")
+        self._write_leave(self.ir.add_instruction(f"fcmp oeq double {self._number(SAID)}, {ALL_SOLVED}"), "fits")
+        t.write_line(f"store double {UNSURE}, ptr %out")
+        rows = {name: self._write_spread(name) for name in ("p", "q", "at", "u1", "u2")}
+        found = self._write_correction(rows)
+        self._write_leave(self._write_is_nearest(found), "begins")
+        good, out = self._write_march(rows)
+        state = self._write_gather(good, out)
+        self._write_leave(self._write_is_one_run(state, found), "follows")
+        t.write_line(f"store double {ALL_SOLVED}, ptr %out")
+        t.write_line("ret void")
+        t.write_label("leave")
+        t.write_line("ret void")
+        t.write_line("}")
+        v, pointers = t.vector, f"<{LANES} x ptr>"
+        t.write_line(f"declare i1 @llvm.vector.reduce.and.v{LANES}i1(<{LANES} x i1>)")
+        t.write_line(f"declare {v} @llvm.masked.gather.v{LANES}f64.v{LANES}p0({pointers}, i32, <{LANES} x i1>, {v})")
+        return NewtonLayout(t.module_text(numbers), self.told, self.scratch_size)
+
+    def _context(self, name: str, kind: str = "ptr") -> str:
+        """One of `CONTEXT`."""
+        t = self.ir
+        place = t.add_instruction(f"getelementptr i64, ptr %context, i64 {CONTEXT.index(name)}")
+        return t.add_instruction(f"load {kind}, ptr {place}")
+
+    def _take_scratch(self, many: int) -> str:
+        """Room for so many vectors."""
+        first, self.scratch_size = self.scratch_size, self.scratch_size + many * LANES
+        return self.ir.double_pointer("%scratch", str(first))
+
+    def _row(self, base: str, k: int) -> str:
+        return self.ir.load(self.ir.double_pointer(base, str(k * LANES)))
+
+    def _write_leave(self, flag: str, on: str) -> None:
+        """Go on where a flag is up."""
+        self.ir.write_line(f"br i1 {flag}, label %{on}, label %leave")
+        self.ir.write_label(on)
+
+    def _all(self, flag: str) -> str:
+        return self.ir.add_instruction(f"call i1 @llvm.vector.reduce.and.v{LANES}i1(<{LANES} x i1> {flag})")
+
+    def _number(self, operand: Operand) -> str:
+        t = self.ir
+        return t.add_instruction(f"load double, ptr {t.double_pointer('%numbers', str(self.order.index(operand)))}")
+
+    def _write_spread(self, kind: str) -> str:
+        """The numbers of a kind in all lanes, row by row."""
+        t = self.ir
+        operands = [operand for operand in self.order if operand[0] == kind]
+        # rates stand together, the first and the second
+        base = self._take_scratch(len(operands))
+        for k, operand in enumerate(operands):
+            t.store(t.broadcast(self._number(operand)), t.double_pointer(base, str(k * LANES)))
+        return base
+
+    def _write_inputs(self, name: str) -> str:
+        """Where the inputs are in each lane: where the file's design has them, and as much farther as this one."""
+        t, given, rows = self.ir, self._context(name), {operand: k for k, operand in enumerate(self.march.inputs)}
+        base = self._take_scratch(len(rows))
+        for k, is_angle in enumerate(self.equations.input_is_angle):
+            moved = {("u", k): t.binary("add", self._row(given, rows["u", k]), t.broadcast(self._number(("d", k))))}
+            if is_angle:
+                cos, sin = (self._row(given, rows[part, k]) for part in ("uc", "us"))
+                by = [t.broadcast(self._number((part, k))) for part in ("dc", "ds")]
+                moved["uc", k], moved["us", k] = write_angle_sum(t, cos, sin, by[0], by[1])
+            for operand, value in moved.items():
+                t.store(value, t.double_pointer(base, str(rows[operand] * LANES)))
+        return base
+
+    def _write_kernel_call(self, function: str, arrays: Sequence[str], steps: str, row_count: int, ends: str) -> None:
+        t = self.ir
+        given = ", ".join(f"ptr {each}" for each in arrays)
+        t.write_line(
+            f"call void {function}(i64 1, i64 {steps}, i64 {LANES}, i64 {LANES}, i64 {row_count * LANES}, "
+            f"{given}, {ends}, ptr null)"  # kernels with the blocks of points count no candidates
+        )
+
+    def _write_correction(self, rows: dict[str, str]) -> tuple[str, str]:
+        """The design from each of the file's assemblies: which lanes converged, and what the kernel gives of them."""
+        good, out = self._take_scratch(1), self._take_scratch(self.corrector.output_row_count)
+        arrays = [rows["p"], rows["at"], self._context("starts"), self._write_inputs("start inputs")]
+        arrays += [rows["u1"], self._context("start table"), self._context("start counts")]
+        ends = f"double {self._number(('tolerance', 0))}, double 0x7FF0000000000000, double 1.0, ptr {out}, ptr {good}"
+        self._write_kernel_call(self._context("corrector"), arrays, "1", self.corrector.output_row_count, ends)
+        return good, out
+
+    def _first(self, value: str) -> str:
+        """What stands in the first lane, in every lane."""
+        return self._lane(value, 0)
+
+    def _lane(self, value: str, lane: int) -> str:
+        """What stands in one of the lanes, in every lane."""
+        t, mask = self.ir, ", ".join([f"i32 {lane}"] * LANES)
+        return t.add_instruction(f"shufflevector {t.vector} {value}, {t.vector} poison, <{LANES} x i32> <{mask}>")
+
+    def _write_is_nearest(self, found: tuple[str, str]) -> str:
+        """Whether the first lane is surely the assembly nearest to the sketch, as `NearestAssemblies` has it."""
+        t = self.ir
+        good, out = found
+        blocks = [block for block, *_ in self.design.sketched]
+        count = len(blocks)
+        shown = [t.broadcast(self._number(("sketch", k))) for k in range(2 * count)]
+        costs, others = (
+            [self._write_squared_distance(out, first + 2 * k, shown[2 * k : 2 * k + 2]) for k in range(count)]
+            for first in (0, 2 * count)
+        )
+        converged = t.compare("ogt", t.load(good), t.constant(0.0))
+        regularity = self._row(out, 4 * count + len(self.corrector.state))
+        regular = t.compare("ogt", regularity, t.constant(CLEAR_REGULARITY**2))
+        flag, before = converged, t.constant(0.0)
+        of_blocks = [
+            [k for k, block in enumerate(blocks) if block == part.block.block_index] for part in self.equations.blocks
+        ]
+        total = self._first(t.add_all([costs[k] for own in of_blocks for k in own]))
+        for part, own, most, lanes in zip(self.equations.blocks, of_blocks, *self.lanes, strict=True):
+            cost = t.add_all([costs[k] for k in own])
+            here = self._first(cost)
+            if part.closed_form is not None:
+                least = self._first(t.add_all([others[k] for k in own]))
+                flag = t.and_flags(flag, self._write_is_farther(before, least, total))
+            else:
+                is_small = len(part.unknowns) <= MAX_BLOCK_UNKNOWNS
+                reach = NEAR_SKETCH if is_small else CLEAR_SKETCH_DISTANCE
+                near, at_sketch = (
+                    t.compare("ole", here, t.constant(len(own) * each**2)) for each in (reach, CLEAR_SKETCH_DISTANCE)
+                )
+                least = self._write_least_other(part.unknowns, out, converged, (most, lanes), cost)
+                nearest = t.or_flags(at_sketch, self._write_is_farther(before, least, total))
+                flag = t.and_flags(t.and_flags(flag, regular), t.and_flags(near, nearest))
+            before = t.add_instruction(f"fadd {t.vector} {before}, {here}")
+        return self.ir.add_instruction(f"extractelement <{LANES} x i1> {flag}, i64 0")
+
+    def _write_is_farther(self, before: str, other: str, total: str) -> str:
+        t = self.ir
+        return t.compare(
+            "ogt", t.binary("add", before, other), t.binary("add", total, t.constant(EQUAL_DISTANCE_TOLERANCE))
+        )
+
+    def _write_squared_distance(self, out: str, row: int, shown: Sequence[str]) -> str:
+        t = self.ir
+        gaps = [t.binary("sub", self._row(out, row + axis), shown[axis]) for axis in range(2)]
+        return t.add_all([t.binary("mul", gap, gap) for gap in gaps])
+
+    def _write_least_other(
+        self, unknowns: range, out: str, converged: str, other: tuple[int, tuple[int, ...]], cost: str
+    ) -> str:
+        """The least cost of a block's other assemblies; less than nothing where not as many are found as it has."""
+        t = self.ir
+        most, lanes = other
+        places = 4 * len(self.design.sketched)
+        state = [self._row(out, places + k) for k, leaf in enumerate(self.corrector.state) if leaf[1] in unknowns]
+        mine = f"<{', '.join(f'i1 {str(k in lanes).lower()}' for k in range(LANES))}>"
+        new = t.and_flags(converged, mine)
+        for back, at in enumerate((0, *lanes)):
+            # apart from the assembly of an earlier lane
+            gap = t.constant(0.0)
+            for each in state:
+                off = t.binary("sub", each, self._lane(each, at))
+                gap = t.call_intrinsic("maxnum", gap, t.call_intrinsic("fabs", off))
+            apart = t.compare("ogt", gap, t.constant(SAME_ASSEMBLY_TOLERANCE))
+            earlier = f"<{', '.join(f'i1 {str(k not in lanes[back:]).lower()}' for k in range(LANES))}>"
+            new = t.and_flags(new, t.or_flags(apart, earlier))
+        count = t.broadcast(t.reduce("fadd", t.select_or_zero(new, t.constant(1.0))))
+        least = t.broadcast(t.reduce("fmin", t.select(new, cost, t.constant(inf))))
+        return t.select(t.compare("oeq", count, t.constant(most - 1.0)), least, t.constant(-inf))
+
+    def _write_march(self, rows: dict[str, str]) -> tuple[str, str]:
+        """The run, a piece in each lane: how many steps went well, and what the kernel gives of all steps."""
+        t = self.ir
+        good = self._take_scratch(1)
+        arrays = [rows["p"], rows["q"], self._context("states"), self._write_inputs("inputs")]
+        arrays += [rows["u1"], self._context("table"), self._context("counts")]
+        limit, steps = self._context("correction limit", "double"), self._context("steps", "i64")
+        # what the march gives stands at the end of the scratch, where there is room for as many steps as there are
+        self.gathered_rows = len(self.march.state)
+        out = "%pieces"
+        state_room = t.add_instruction(f"mul i64 {self._context('blocks', 'i64')}, {LANES * self.gathered_rows}")
+        first = t.add_instruction(f"add i64 {state_room}, {self.scratch_size + LANES}")
+        t.write_line(f"{out} = getelementptr double, ptr %scratch, i64 {first}")
+        ends = (
+            f"double {self._number(('tolerance', 0))}, double {limit}, double {self._number(('unit', 0))}, "
+            f"ptr {out}, ptr {good}"
+        )
+        self._write_kernel_call(self._context("march"), arrays, steps, self.march.output_row_count, ends)
+        return good, out
+
+    def _write_gather(self, good: str, out: str) -> str:
+        """What is told of all positions in their order, and the state beside it: where the state's rows begin."""
+        t = self.ir
+        steps = t.broadcast(t.add_instruction(f"sitofp i64 {self._context('steps', 'i64')} to double"))
+        self._write_leave(self._all(t.compare("oeq", t.load(good), steps)), "marched")
+        regularity = self.state_first + len(self.march.state)
+        worst = t.allocate()
+        t.store(t.constant(inf), worst)
+        state = t.double_pointer("%scratch", str(self.scratch_size))
+        blocks, places = self._context("blocks", "i64"), self._context("places")
+        width = t.add_instruction(f"mul i64 {blocks}, {LANES}")
+        told = t.double_pointer("%out", "8")
+        t.write_line("br label %gather")
+        t.write_label("gather")
+        t.write_line("%g = phi i64 [0, %marched], [%gnext, %gather]")
+        first = t.add_instruction(f"mul i64 %g, {LANES}")
+        index = t.add_instruction(
+            f"load <{LANES} x i64>, ptr {t.add_instruction(f'getelementptr i64, ptr {places}, i64 {first}')}, align 8"
+        )
+
+        def gather(row: int) -> str:
+            base = t.double_pointer(out, str(row * LANES))
+            at = t.add_instruction(f"getelementptr double, ptr {base}, <{LANES} x i64> {index}")
+            return t.add_instruction(
+                f"call {t.vector} @llvm.masked.gather.v{LANES}f64.v{LANES}p0(<{LANES} x ptr> {at}, i32 8, "
+                f"<{LANES} x i1> splat (i1 true), {t.vector} poison)"
+            )
+
+        targets = [(told, k, k) for k in range(self.told)]
+        targets += [(state, k, self.state_first + k) for k in range(len(self.march.state))]
+        for base, k, row in targets:
+            place = t.add_instruction(f"add i64 {t.add_instruction(f'mul i64 {width}, {k}')}, {first}")
+            t.store(gather(row), t.double_pointer(base, place))
+        t.store(t.call_intrinsic("minnum", t.load(worst), gather(regularity)), worst)
+        t.close_loop("g", blocks.lstrip("%"), "gather", "gathered")
+        t.write_label("gathered")
+        # one limit for all blocks: that of the smallest
+        least = max(
+            least_regularity(LEAST_KERNEL_REGULARITY**2, len(part.unknowns))
+            for part in self.equations.blocks
+            if part.closed_form is None
+        )
+        enough = t.compare("oge", t.load(worst), t.constant(least))
+        self._write_leave(self._all(enough), "regular")
+        return state
+
+    def _write_is_one_run(self, state: str, found: tuple[str, str]) -> str:
+        """Whether the pieces are one run from where the design begins: from position to position everything goes on as
+        the three before say, by as little as may be corrected."""
+        t = self.ir
+        places = 4 * len(self.design.sketched)
+        off_start = t.constant(0.0)
+        blocks = self._context("blocks", "i64")
+        width = t.add_instruction(f"mul i64 {blocks}, {LANES}")
+        for k in range(len(self.march.state)):
+            here = t.load(t.double_pointer(state, t.add_instruction(f"mul i64 {width}, {k}")))
+            off = t.binary("sub", self._first(here), self._first(self._row(found[1], places + k)))
+            off_start = t.binary("add", off_start, t.call_intrinsic("fabs", off))
+        begins = t.compare("ole", off_start, t.constant(SAME_ASSEMBLY_TOLERANCE))
+        self._write_leave(self._all(begins), "compare")
+        most = t.allocate()
+        t.store(t.constant(0.0), most)
+        last = t.add_instruction(f"sub i64 {self._context('positions', 'i64')}, 3")
+        lanes_last = t.add_instruction(f"insertelement <{LANES} x i64> poison, i64 {last}, i64 0")
+        t.write_line("br label %difference")
+        t.write_label("difference")
+        t.write_line("%d = phi i64 [0, %compare], [%dnext, %difference]")
+        first = t.add_instruction(f"mul i64 %d, {LANES}")
+        sums = t.constant(0.0)
+        for k in range(len(self.march.state)):
+            at = t.add_instruction(f"add i64 {t.add_instruction(f'mul i64 {width}, {k}')}, {first}")
+            four = [t.load(t.double_pointer(state, t.add_instruction(f"add i64 {at}, {ahead}"))) for ahead in range(4)]
+            inner = t.binary("mul", t.constant(3.0), t.binary("sub", four[1], four[2]))
+            third = t.binary("add", t.binary("sub", four[3], four[0]), inner)
+            sums = t.binary("add", sums, t.call_intrinsic("fabs", third))
+        beyond = t.lanes_from(first, lanes_last)
+        limit = t.broadcast(self._context("correction limit", "double"))
+        fine = t.or_flags(t.compare("ole", sums, limit), beyond)
+        t.store(t.binary("add", t.load(most), t.select(fine, t.constant(0.0), t.constant(1.0))), most)
+        t.close_loop("d", blocks.lstrip("%"), "difference", "compared")
+        t.write_label("compared")
+        return self._all(t.compare("oeq", t.load(most), t.constant(0.0)))
+
 
 Array = np.ndarray
 
@@ -81,7 +433,7 @@ class NewtonRun:
             "places": pieces.places(kernels[1].output_row_count * LANES),
             **_step_tables(u, pieces.steps),
         }
-        self._kernels = [compile_function(each.ir, KERNEL_FUNCTION, *KERNEL_ARGUMENTS) for each in kernels]
+        self._kernels = [compile_function(each.ir, MARCH_FUNCTION, *MARCH_ARGUMENTS) for each in kernels]
         numbers: dict[str, int] = {name: array.ctypes.data for name, array in self._held.items()}
         for name, function in zip(("corrector", "march"), self._kernels, strict=True):
             numbers[name] = ctypes.cast(function, ctypes.c_void_p).value or 0

@@ -17,7 +17,7 @@ from planar.batch.assembly.assembly_lists import ListedAssemblies
 from planar.batch.block import DesignBlock, SolvedDesigns
 from planar.batch.named_results.result_rows import POINT_QUANTITIES, RequestedResults, ResultRow
 from planar.batch.results import Sweep, SweepNotes
-from planar.codegen.aligned_arrays import allocate_aligned
+from planar.codegen.llvm_compile import allocate_aligned
 from planar.document.files import to_dict
 from planar.foundation.errors import BadInput, Outcome
 from planar.foundation.safe_files import PARTIAL_FILE_NAME, write_error

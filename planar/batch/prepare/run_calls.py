@@ -1,4 +1,4 @@
-"""What a compiled function is called with: values by name as numbers, addresses of arrays."""
+"""How a compiled run is called, and how it says that it ended."""
 
 from __future__ import annotations
 
@@ -8,6 +8,9 @@ from struct import Struct
 from typing import Any, NamedTuple
 
 import numpy as np
+
+from planar.batch.general_path import OUTCOMES
+from planar.foundation.errors import Outcome
 
 Array = np.ndarray
 
@@ -57,3 +60,15 @@ class ValueBinder:
             # packing keeps the order; bytes are read where they are
             found = self.bound[names] = Struct(f"{len(names)}d").pack, places, places.ctypes.data
         return found
+
+
+ALL_SOLVED, UNSURE, CANNOT_BE_ASSEMBLED, DEAD_POINT, STOP = 0.0, 1.0, 2.0, 3.0, 4.0
+"""At its end, nobody knows, at its start, at a dead point, or where a pair meets its stop."""
+CLEARLY_OPEN = 1.0 + 1e-4
+"""Of a block's coalescence: from there on it cannot be joined, whatever rounding does; a pair is beyond its stop."""
+STATUS_OF_ENDING = {
+    CANNOT_BE_ASSEMBLED: OUTCOMES.index(Outcome.CANNOT_BE_ASSEMBLED),
+    DEAD_POINT: OUTCOMES.index(Outcome.DEAD_POINT),
+    STOP: OUTCOMES.index(Outcome.STOP),
+}
+"""What stands in a status after a run has ended so."""
