@@ -6,16 +6,15 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import replace
 from functools import partial
-from typing import NamedTuple, overload
+from typing import overload
 
 import numpy as np
 from numpy.typing import DTypeLike
 
 from planar.batch.executor import in_order, run_tasks, thread_count
-from planar.batch.general_path import OUTCOMES, solve_design
-from planar.batch.mechanisms.initial_assembly import StartAssemblies, find_start_assemblies
-from planar.batch.mechanisms.linkages import LinkageGroup, SweepRequest, linkage_group, wanted_points
-from planar.batch.mechanisms.march import find_ending, run_linkages
+from planar.batch.general_path import solve_design
+from planar.batch.mechanisms.linkage_runs import solve_by_blocks
+from planar.batch.mechanisms.linkages import SweepRequest, wanted_points
 from planar.batch.mechanisms.parts import (
     PART_SIZE,
     PartRuns,
@@ -25,14 +24,15 @@ from planar.batch.mechanisms.parts import (
     part_messages,
     read_mechanisms,
 )
-from planar.batch.mechanisms.results import Each, PointMapping, Swept, SweptList, SweptPart
-from planar.batch.pinned.march import FULL_TURN, REFINEMENT, make_values, solve_pinned, step_division
+from planar.batch.mechanisms.results import Each, Swept, SweptList, SweptPart
+from planar.batch.mechanisms.tape_runs import FULL_TURN, make_values
+from planar.batch.pinned.march import solve_pinned
 from planar.batch.pinned.results import PinnedPart, join_parts
 from planar.batch.pinned.tape import ToldPins, find_told_pins, pin_number
 from planar.batch.reductions.reduced_sweep import ReducedSweep, Reduction, result_type, sweep_reduced
 from planar.batch.sweep import warn_of_backend
 from planar.document.first_argument import MechanismSource
-from planar.foundation.errors import BadInput, Outcome
+from planar.foundation.errors import BadInput
 from planar.foundation.time_limit import returns_part_in_time, time_is_over
 from planar.foundation.turns import take_turn
 from planar.model.mechanism import Mechanism, named_points, relative_motions, running_input_index
@@ -45,25 +45,6 @@ Array = np.ndarray
 
 LINKAGES_PART_SIZE = PART_SIZE
 """Linkages that are arrays already, and are handed on together."""
-MAX_STATE_BYTES = 16 * 2**20
-"""Bytes of the links' places that are worked on at once."""
-
-
-class _Attempt(NamedTuple):
-    """How linkages are run: with steps so many times finer, `polished` and `verdict_only` as in `run_linkages`."""
-
-    refinement: int
-    polished: bool
-    verdict_only: bool
-
-
-_ATTEMPTS = (
-    _Attempt(1, False, True),
-    _Attempt(1, True, True),
-    _Attempt(1, True, False),
-    _Attempt(REFINEMENT, True, False),
-)
-"""One after the other, each for those that the ones before left open."""
 
 
 @overload
@@ -241,7 +222,7 @@ def _solve_pinned_rounded(
 def _solve_linkages(
     linkages: PinnedLinkages, request: SweepRequest, told: ToldPins | None = None, values: Array | None = None
 ) -> PinnedPart:
-    solve_blocks = partial(solve_by_blocks, request=request)
+    solve_blocks = partial(solve_partitioned, request=request)
     solve_general = partial(_solve_with_general_path, request=request)
     with take_turn():
         return solve_pinned(linkages, request, solve_blocks, solve_general, told, values)
@@ -260,7 +241,7 @@ def _solve_some(mechanisms: Sequence[Mechanism], request: SweepRequest) -> Swept
         if request.pair is None and isinstance(each, PinnedMechanism) and each.layout is not None and not each.stops
     }
     if not layouts:
-        return SweptList(tuple(solve_by_blocks(mechanisms, request)))
+        return SweptList(tuple(solve_partitioned(mechanisms, request)))
     if len(layouts) == len(mechanisms) == 1:
         kept = mechanisms[0].__dict__  # what is found of one linkage serves its next run
         if "_linkages" not in kept:
@@ -271,96 +252,20 @@ def _solve_some(mechanisms: Sequence[Mechanism], request: SweepRequest) -> Swept
         return pinned
     found = {number: pinned.swept(k) for k, number in enumerate(layouts)}
     others = [k for k in range(len(mechanisms)) if k not in found]
-    found |= zip(others, solve_by_blocks([mechanisms[k] for k in others], request), strict=True)
+    found |= zip(others, solve_partitioned([mechanisms[k] for k in others], request), strict=True)
     return SweptList(tuple(found[k] for k in range(len(mechanisms))))
 
 
-def solve_by_blocks(
+def solve_partitioned(
     mechanisms: Sequence[Mechanism],
     request: SweepRequest,
     solve_general: Callable[[Mechanism, SweepRequest], Swept] | None = None,
 ) -> list[Swept]:
-    """Some mechanisms, in their order, parted into blocks of links; what is left open by `solve_general`, the general
-    path if that is left out."""
+    """Some mechanisms, in their order, partitioned into blocks of links; what is left open by `solve_general`, the
+    general path if that is left out."""
     solve_general = solve_general or _solve_with_general_path
-    found: dict[int, Swept] = {}
-    ready = linkage_group(mechanisms, request)
-    if ready is not None:
-        start = find_start_assemblies(ready.arrays)
-        left = np.flatnonzero(start.is_sure)
-        for each in _ATTEMPTS:
-            refinement = step_division(request.steps) * each.refinement
-            for some in _cache_sized_chunks(ready.arrays.link_counts, left, request, refinement):
-                found |= _run_attempt(ready, some, start, request, each)
-            left = np.array([k for k in left if ready.numbers[k] not in found], dtype=int)
-            if not left.size:
-                break
+    found = solve_by_blocks(mechanisms, request)
     return [found[k] if k in found else solve_general(mechanism, request) for k, mechanism in enumerate(mechanisms)]
-
-
-def _cache_sized_chunks(
-    link_counts: Array, remaining: Array, request: SweepRequest, refinement: int
-) -> Iterator[Array]:
-    """So many of what is left at a time that their places fit into memory near the processor."""
-    each = (request.steps + 1) * refinement * 8 * (10 if request.rates else 4)
-    ends = np.cumsum(link_counts[remaining] * each)
-    first = 0
-    while first < len(remaining):
-        before = ends[first - 1] if first else 0
-        last = max(int(np.searchsorted(ends, before + MAX_STATE_BYTES, side="right")), first + 1)
-        yield remaining[first:last]
-        first = last
-
-
-def _run_attempt(
-    group: LinkageGroup,
-    some: Array,
-    start: StartAssemblies,
-    request: SweepRequest,
-    attempt: _Attempt,
-) -> dict[int, Swept]:
-    """Those that came to their end, or to a dead point, by their numbers."""
-    steps, finer = request.steps, step_division(request.steps) * attempt.refinement
-    gone = np.linspace(0.0, FULL_TURN, steps * finer + 1)
-    lot = group.arrays.select(some)
-    told = run_linkages(
-        lot,
-        start,
-        gone,
-        FULL_TURN / (steps * finer),
-        request.rates,
-        attempt.polished,
-        attempt.verdict_only,
-    )
-    orders = 3 if request.rates else 1
-    fine = told.out.reshape(len(told.out), orders, 2, told.out.shape[2])
-    out = fine[..., : len(gone) : finer]
-    if finer > 1:
-        out = np.ascontiguousarray(out)
-    out = out.transpose(0, 1, 3, 2)
-    found, first = {}, 0
-    grid = np.linspace(0.0, 1.0, steps + 1) * FULL_TURN
-    solved = np.zeros(steps + 1, dtype=np.int8)
-    solved.flags.writeable = False
-    inputs = group.start[some][:, None] + grid
-    for k, one in enumerate(some.tolist()):
-        names, watched = group.names[one], 2 * len(group.watched[one])
-        own, places = out[first : first + len(names)], fine[first + len(names) :, 0][:watched]
-        first += len(names) + watched
-        ending = find_ending(group, one, told, k, places, gone, request)
-        if ending is None:
-            continue
-        status = solved
-        if ending.outcome is not Outcome.SOLVED:
-            row = (ending.solved_steps - 1) // finer + 1
-            own[:, :, row:] = np.nan
-            status = np.zeros(steps + 1, dtype=np.int8)
-            status[row:] = OUTCOMES.index(ending.outcome)
-        parts = [PointMapping(names, own[:, order]) for order in range(orders)]
-        position, velocity, acceleration = parts if request.rates else (parts[0], None, None)
-        number = int(group.numbers[one])
-        found[number] = Swept(position, velocity, acceleration, inputs[k], status, ending.reason, False)
-    return found
 
 
 def _solve_with_general_path(mechanism: Mechanism, request: SweepRequest) -> Swept:

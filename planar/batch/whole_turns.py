@@ -11,7 +11,7 @@ from planar.batch.mechanisms.linkages import SweepRequest
 from planar.batch.mechanisms.results import Swept
 from planar.batch.pinned.march import solve_pinned
 from planar.batch.pinned.results import PinnedPart
-from planar.batch.sweep_mechanisms import solve_by_blocks
+from planar.batch.sweep_mechanisms import solve_partitioned
 from planar.foundation.arrays import BoolArray
 from planar.foundation.errors import Outcome
 from planar.model.mechanism import Mechanism, named_points
@@ -25,7 +25,7 @@ def run_whole_turns(linkages: PinnedLinkages, steps: int) -> tuple[BoolArray, Pi
     """
     request = SweepRequest(steps, None, False, None)
     leave_open = partial(_leave_open, request=request)
-    solve_blocks = partial(solve_by_blocks, request=request, solve_general=_leave_open)
+    solve_blocks = partial(solve_partitioned, request=request, solve_general=_leave_open)
     part = solve_pinned(linkages, request, solve_blocks, leave_open)
     return np.asarray(part.last_status == 0), part
 

@@ -9,9 +9,10 @@ import pytest
 import planar
 from benchmarks import chain
 from planar.batch.mechanisms import partition
-from planar.batch.mechanisms.block_type import FRAME_BODY, BlockPair, BlockSignature, find_block_type
+from planar.batch.mechanisms.block_type import BlockPair, BlockSignature, find_block_type
 from planar.batch.mechanisms.partition import NotPartitionable, partition_mechanism
-from planar.codegen import block_formula, instructions
+from planar.batch.mechanisms.tape_runs import LEAST_COSINE
+from planar.codegen import instructions, tape
 from planar.document import files
 from planar.foundation.errors import BadInput, NoAnswer, Outcome
 from planar.model.pairs import pair_types
@@ -419,44 +420,55 @@ def test_every_dyad_is_in_closed_form(joints):
     assert find_block_type(signature) is find_block_type(signature)
 
 
-def test_extremes_are_those_of_all_that_is_told():
-    """What the quick look lets pass, and what not, as by all that it leaves out."""
-    crank = find_block_type(BlockSignature(1, 0, (BlockPair(pair_types()["turning"], (FRAME_BODY, 0), True),)))
-    dyad = find_block_type(
-        BlockSignature(2, 2, tuple(BlockPair(pair_types()["turning"], of, False) for of in ((0, -1), (1, -2), (0, 1))))
-    )
-    assert crank.has_closed_form
+def plain_ending(left, clear, directions, tolerance, clearance):
+    """How many of the first steps are good, and why no more, looked at one after the other."""
+    steps = len(left)
+    cosines = np.ones(steps)
+    for c, s in directions:
+        cosines[1:] = np.minimum(cosines[1:], c[1:] * c[:-1] + s[1:] * s[:-1])
+    good = (left <= tolerance) & (cosines >= LEAST_COSINE)
+    told = np.where(good | (clear < 0.0), clear, np.nan)
+    for k in range(steps):
+        before = told[max(k - 2, 0) : k]
+        bend = abs(told[k] - 2.0 * told[k - 1] + told[k - 2]) if k > 1 else 0.0
+        needed = max(clearance, bend) if np.isfinite(bend) else clearance
+        if not told[k] > needed or np.any(before <= needed):
+            is_dead = told[k] < 0.0 and k > 0 and bool(np.all(before > needed))
+            return k, tape.DEAD_POINT if is_dead else tape.UNDECIDED
+    return steps, tape.GOOD
+
+
+def test_a_tape_ends_where_its_steps_one_after_the_other_end():
+    """Dyads beside a link that turns: some reach round, some come to a dead point, some to where they turn fast."""
+    pins = ((0, -1), (1, -2), (0, 1))
+    joints = tuple(BlockPair(pair_types()["turning"], of, False) for of in pins)
+    formula = find_block_type(BlockSignature(2, 2, joints)).run_formula(False)
+    steps, many = 601, 60
+    tolerance, clearance = np.full(many, 1e-12), np.full(many, 1e-4)
     rng = np.random.default_rng(3)
-    turn = np.linspace(0.0, 2.0, 24)
-    state = np.zeros((4, 4, 24))
-    state[0, 2] = 1.0
-    state[1, 2], state[1, 3] = np.cos(turn), np.sin(turn)
-    index = np.array([[1, 0, 2, 3]] * 2)
-    p = np.array([[0.0, 0.0, 0.4, 0.0, 0.0, 0.0, 1.0, 0.1, 0.9, 0.0, length, 0.0, 1.0] for length in (0.8, 0.02)])
-    p += 1e-3 * rng.uniform(size=p.shape) * (np.arange(13) < 12)
-    # pairs of a kind read (inner link, given link)
-    gives = tuple((slot, row) for slot in (2, 3) for row in range(4))
-    formula = dyad.run_formula(False)
-    for one in (0, 1):
-        both = state.copy(), state.copy()
-        plain = block_formula.run_kernel(
-            formula, block_formula.KernelLayout(gives, 13, 4, 2), both[0], index[:1], p[one : one + 1]
-        )
-        quick = block_formula.run_kernel(
-            formula, block_formula.KernelLayout(gives, 13, 4, 2, True), both[1], index[:1], p[one : one + 1]
-        )
-        np.testing.assert_allclose(both[0], both[1], atol=1e-12)
-        left, clear = plain[0]
-        bend = np.abs(clear[2:] - 2 * clear[1:-1] + clear[:-2])
-        fast = np.abs(np.diff(both[0][2:, 2:], axis=2))
-        wanted = [left.max(), clear.min(), bend.max(), fast.max()]
-        if one:  # too short to reach: what is no number stays so
-            assert np.isnan(left).any()
-            assert np.isnan(quick[0, 0]) or quick[1, 0] < 0.0
-        else:
-            assert wanted[1] > 0.0
-            np.testing.assert_allclose(quick[1:, 0], wanted[1:], rtol=1e-9, atol=1e-12)
-            assert quick[0, 0] < 1e-14
+    stride = tape.padded_steps(steps)
+    turn = np.linspace(0.0, 2.0, stride)
+    room = np.zeros((2 + many, 10, stride))
+    room[0, 2], room[1, 2:4] = 1.0, (np.cos(turn), np.sin(turn))
+    # of each pair the point of the inner link first
+    p = np.array([[0.0, 0.0, 0.4, 0.0, 0.0, 0.0, 1.0, 0.1, 0.9, 0.0, 0.8, 0.0, 1.0]] * many)
+    p[:, :-1] += 1e-3 * rng.uniform(size=(many, 12))
+    p[:, 10] = np.append(rng.uniform(0.2, 1.6, many - 1), 0.02)
+    at = room.ctypes.data + np.arange(2 + many) * room.strides[0]
+    slots = np.column_stack([np.full((many, 2), at[[1, 0]]), at[2:]])
+    directions = (2, 3), (6, 7)
+    rows = tuple((2, row) for row in range(len(formula.outputs)))
+    whole = tape.Tape(np.arange(many + 1), np.zeros(many, dtype=int), slots, p, tolerance, clearance)
+    tape.run_tape([tape.compile_block(tape.TapeFormula(formula, rows))], steps, whole)
+    values = room[2:, :, :steps].copy()
+    checked = tape.TapeFormula(formula, rows[:8], directions, is_checked=True)
+    found = tape.run_tape([tape.compile_block(checked, LEAST_COSINE)], steps, whole)
+    np.testing.assert_array_equal(room[2:, :8, :steps], values[:, :8])
+    for k, own in enumerate(values):
+        turns = [own[list(each)] for each in directions]
+        wanted = plain_ending(own[8], own[9], turns, tolerance[k], clearance[k])
+        assert (found.good[k], found.outcome[k]) == wanted, k
+    assert set(found.outcome.tolist()) == {tape.GOOD, tape.DEAD_POINT, tape.UNDECIDED}
 
 
 def test_the_sketch_of_what_rides_on_others_says_how_these_go_together():

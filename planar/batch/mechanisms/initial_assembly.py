@@ -8,14 +8,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.batch.assembly.assembly_scores import is_at_sketch, is_clearly_regular, is_surely_farther
+from planar.batch.assembly.assembly_scores import is_at_sketch, is_surely_farther
+from planar.batch.march.prediction import CLEAR_REGULARITY
 from planar.batch.mechanisms.block_type import COS, MAX_SIGNS, POSE_ROWS, SIN, SKETCH_SUMS, BlockType, X, Y
 from planar.batch.mechanisms.linkages import BlockBatch, LinkageArrays, PointArrays
-from planar.batch.mechanisms.newton_march import run_newton
-from planar.codegen.block_formula import LANES, KernelLayout, run_kernel
+from planar.batch.mechanisms.newton_march import compile_newton_block, newton_numbers, step_table
+from planar.codegen.tape import LANES, Tape, TapeFormula, compile_block, run_tape
+from planar.foundation.arrays import Array, BoolArray, IntArray
 from planar.foundation.geometry import GROUND, Frame
-
-Array = np.ndarray
 
 LEAST_CLEARANCE = 1e-4
 """Nearer than this to where two assemblies meet neither is taken."""
@@ -31,7 +31,7 @@ class StartAssemblies(NamedTuple):
     """For every linkage whether its assembly is surely the one that the search of the whole would take (linkages,), and
     the signs of all groups (groups, SIGNS), or the unknowns of those that Newton's method follows (groups, MOST)."""
 
-    is_sure: Array
+    is_sure: BoolArray
     signs: Array
     z: Array
 
@@ -65,8 +65,7 @@ def find_start_assemblies(linkages: LinkageArrays) -> StartAssemblies:
             continue
         p = np.hstack([batch.p, stats[inner].reshape(groups, -1)])
         ways, width = 2**kind.sign_count, POSE_ROWS * len(kind.inner_links) + 3
-        walk = KernelLayout((), p.shape[1], kind.slot_count, ways * width)
-        found = run_kernel(kind.start_formula, walk, state, index, p)[:, :, 0].reshape(groups, ways, width)
+        found = _evaluate_starts(kind, state, index, p, ways * width).reshape(groups, ways, width)
         left, clear, distance = (found[:, :, k] for k in (-3, -2, -1))
         distance = np.where(np.isfinite(left), distance, np.inf)
         best = np.argmin(distance, axis=1)
@@ -93,10 +92,10 @@ def find_start_assemblies(linkages: LinkageArrays) -> StartAssemblies:
 def _correct_from_sketch(
     batch: BlockBatch,
     state: Array,
-    index: Array,
+    index: IntArray,
     sketch_sums: tuple[Array, Array],
     tolerance: Array,
-) -> tuple[Array, Array, Array]:
+) -> tuple[Array, Array, BoolArray]:
     """Groups that are not in closed form, solved from where they are shown, the points of the sketch and what is shown
     in `sketch_sums`: unknowns there, squared distances to the sketch, and for which of them no other assembly can be
     meant.
@@ -119,17 +118,38 @@ def _correct_from_sketch(
         return state[index[:, slot], row, 0]
 
     z = _unknowns_from_frames(kind, frames, rows, batch.p)
-    told = run_newton(kind, state, index, batch.p, z, False)
-    left, regularity = told.residuals[:, 0], np.sqrt(np.maximum(told.squared_regularity[:, 0], 0.0))
+    table = step_table(1, 0.0)
+    slots = np.column_stack([_addresses(state, index), np.full(groups, table.ctypes.data)])
+    tolerances = START_TOLERANCE_FACTOR * tolerance[batch.owner], np.full(groups, CLEAR_REGULARITY**2)
+    every, one = np.arange(groups + 1), np.zeros(groups, dtype=np.int64)
+    tape = Tape(every, one, slots, newton_numbers(kind, batch.p, z), *tolerances)
+    closed = run_tape([compile_newton_block(kind, False)], 1, tape).good > 0
     x, y, c, s = (state[index[:, batch.inner_slots], row, 0] for row in (X, Y, COS, SIN))
     many, px, py, tx, ty, along, across, squares = np.moveaxis(sketch, 2, 0)
     with np.errstate(invalid="ignore", over="ignore"):
         mixed = x * (c * px - s * py - tx) + y * (s * px + c * py - ty) - c * along - s * across
         distance = np.maximum(np.sum(many * (x * x + y * y) + 2.0 * mixed + squares, axis=1), 0.0)
         points = many.sum(axis=1)
-        good = known & (left <= START_TOLERANCE_FACTOR * tolerance[batch.owner]) & is_clearly_regular(regularity)
-        good &= (points > 0.0) & is_at_sketch(distance, points)
+        good = known & closed & (points > 0.0) & is_at_sketch(distance, points)
     return z, distance, good
+
+
+def _evaluate_starts(kind: BlockType, state: Array, index: IntArray, p: Array, width: int) -> Array:
+    """What the formula of starts gives of blocks (blocks, width), whose slots are those of an index in a state."""
+    groups = len(index)
+    found = np.empty((groups, width, LANES))
+    slots = np.column_stack([_addresses(state, index), found.ctypes.data + np.arange(groups) * found.strides[0]])
+    formula = TapeFormula(kind.start_formula, tuple((kind.slot_count, row) for row in range(width)))
+    nothing = np.zeros(groups)
+    run_tape(
+        [compile_block(formula)], 1, Tape(np.arange(groups + 1), nothing.astype(np.int64), slots, p, nothing, nothing)
+    )
+    return found[:, :, 0]
+
+
+def _addresses(state: Array, index: IntArray) -> IntArray:
+    """Where the rows of slots begin."""
+    return state.ctypes.data + index * state.strides[0]
 
 
 def _unknowns_from_frames(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -24,24 +24,15 @@ Array = np.ndarray
 
 @dataclass(frozen=True, eq=False)
 class BlockBatch:
-    """Groups of one kind: `owner` (groups,) whose they are, rising; `places` (groups, slots) where their links are;
-    p (groups, numbers) with the cosine and sine of angles, lengths in sizes; `ids` (groups,): their numbers."""
+    """Blocks of one kind: `owner` (blocks,) whose they are, rising; `link_indices` (blocks, slots) where their links
+    are; p (blocks, numbers) with the cosine and sine of angles, lengths in sizes; `block_numbers` (blocks,), through
+    all linkages."""
 
     block_type: BlockType
     owner: Array
     link_indices: Array
     p: Array
     block_numbers: Array
-
-    def select(self, number: Array) -> BlockBatch | None:
-        """Those of some owners: their new numbers, -1 for the others; None where there are none."""
-        owner = number[self.owner]
-        keep = owner >= 0
-        if keep.all():
-            return replace(self, owner=owner)
-        if not keep.any():
-            return None
-        return BlockBatch(self.block_type, owner[keep], self.link_indices[keep], self.p[keep], self.block_numbers[keep])
 
     def state_indices(self, first: Array) -> Array:
         """The places among those of all linkages, of which each has its own from `first` on; 0 is the frame of all."""
@@ -73,27 +64,21 @@ class PointArrays(NamedTuple):
     link_index: Array
     numbers: Array
 
-    def select(self, number: Array) -> PointArrays:
-        """Those of some owners: their new numbers, -1 for the others."""
-        owner = number[self.owner]
-        keep = owner >= 0
-        return PointArrays(owner[keep], self.link_index[keep], self.numbers[keep])
-
 
 @dataclass(frozen=True, eq=False)
 class LinkageArrays:
-    """Linkages as arrays. `places` (linkages,): how many each has beside the frame; lengths in units of `unit` (m).
+    """Linkages as arrays. `link_counts` (linkages,): how many links and inputs each has beside the frame; lengths in
+    units of `unit` (m).
 
-    `levels` are batches that are solved one after the other; `turns` the same, where groups of a batch may take what
-    others in it have given. `sketch`: x and y in the link, and where it is shown (sizes). `points`: x and y in the link
-    (m), of those that are wanted. `shown`: as `sketch`, for every link that has a point, and pins on the frame too.
+    `batches` are solved one after the other. `sketch`: x and y in the link, and where it is shown (sizes). `points`: x
+    and y in the link (m), of those that are wanted. `shown_points`: as `sketch`, for every link that has a point, and
+    pins on the frame too.
     """
 
     link_counts: Array
     unit: Array
     tolerance: Array
     batches: Sequence[BlockBatch]
-    merged_batches: Sequence[BlockBatch]
     inputs: InputArrays
     sketch: PointArrays
     points: PointArrays
@@ -103,33 +88,6 @@ class LinkageArrays:
     def __len__(self) -> int:
         """How many linkages there are."""
         return len(self.link_counts)
-
-    def select(self, which: Array) -> LinkageArrays:
-        """Some of the linkages (numbers, rising)."""
-        if len(which) == len(self):
-            return self
-        number = np.full(len(self), -1)
-        number[which] = np.arange(len(which))
-        keep = number[self.inputs.owner] >= 0
-        inputs = InputArrays(*(part[keep] for part in self.inputs))
-        inputs = inputs._replace(owner=number[inputs.owner])
-        levels = [part for each in self.batches if (part := each.select(number)) is not None]
-        if self.merged_batches is self.batches:
-            turns = levels
-        else:
-            turns = [part for each in self.merged_batches if (part := each.select(number)) is not None]
-        return LinkageArrays(
-            self.link_counts[which],
-            self.unit[which],
-            self.tolerance[which],
-            levels,
-            turns,
-            inputs,
-            self.sketch.select(number),
-            self.points.select(number),
-            self.shown_points.select(number),
-            self.block_count,
-        )
 
 
 class PartitionedLinkage(NamedTuple):
@@ -152,7 +110,6 @@ def make_linkage_arrays(linkages: Sequence[PartitionedLinkage]) -> LinkageArrays
     """Parted linkages as arrays."""
     unit = np.array([one.partition.unit for one in linkages])
     levels: dict[tuple[int, int], list[_BlockRow]] = {}
-    turns: dict[tuple[int, int], list[_BlockRow]] = {}
     kinds: dict[int, BlockType] = {}
     number = 0
     for owner, one in enumerate(linkages):
@@ -160,7 +117,6 @@ def make_linkage_arrays(linkages: Sequence[PartitionedLinkage]) -> LinkageArrays
             kinds[id(group.block_type)] = group.block_type
             row = (owner, group.link_indices, group.p, number)
             levels.setdefault((group.level, id(group.block_type)), []).append(row)
-            turns.setdefault((group.merged_level, id(group.block_type)), []).append(row)
             number += 1
 
     def batches(of: dict[tuple[int, int], list[_BlockRow]]) -> list[BlockBatch]:
@@ -177,7 +133,6 @@ def make_linkage_arrays(linkages: Sequence[PartitionedLinkage]) -> LinkageArrays
         unit,
         np.array([one.partition.tolerance for one in linkages]),
         batches(levels),
-        batches(turns),
         InputArrays(*(np.array(part) for part in parts)),
         _point_arrays([one.sketch for one in linkages], 4),
         _point_arrays([one.points for one in linkages], 2),

@@ -1,73 +1,66 @@
-"""Blocks without closed form marched by Newton's method as machine code, step after step."""
+"""Blocks without closed form followed by Newton's method as machine code, step after step, as blocks of a tape."""
 
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import Any, NamedTuple
+from math import inf
+from typing import Any
 
 import numpy as np
 
-from planar.batch.march.prediction import extrapolation_weights
-from planar.batch.mechanisms.block_type import POSE_ROWS, BlockType
+from planar.batch.march.prediction import correction_limit, extrapolation_weights
+from planar.batch.mechanisms.block_type import COS, POSE_ROWS, SIN, BlockType
+from planar.batch.mechanisms.tape_runs import LEAST_COSINE
 from planar.codegen.block_formula import BlockFormula, FormulaInput
 from planar.codegen.llvm_compile import compile_function
 from planar.codegen.llvm_ir import IRWriter
-from planar.foundation.turns import leave_turn
-
-Array = np.ndarray
+from planar.codegen.tape import (
+    BLOCK_ARGUMENT_TYPES,
+    BLOCK_ARGUMENTS,
+    BLOCK_NAME,
+    UNDECIDED,
+    write_ended,
+    write_fine_flags,
+    write_turn_flags,
+    write_where_good,
+)
+from planar.foundation.arrays import Array
 
 PREDICTOR_ORDER = 5
 """Moves before from which the next is predicted."""
 CORRECTIONS, FIRST_CORRECTIONS = 2, 10
 """Steps of Newton's method where the run has come far enough to be predicted, and before."""
-CHECK_ROWS = 3
-"""Rows that are told outside the links' places: what is left open, the square of how regular, how far corrected."""
+TABLE_COLUMNS = PREDICTOR_ORDER + 2
 
 
-class NewtonRun(NamedTuple):
-    """What is told of groups (groups, steps): left open, the square of how regular, how far from where predicted."""
-
-    residuals: Array
-    squared_regularity: Array
-    corrections: Array
-
-
-def step_table(steps: int) -> tuple[Array, Array]:
-    """Of every step the weights of those before, and how often it is corrected."""
-    table, counts = np.zeros((steps, PREDICTOR_ORDER)), np.full(steps, CORRECTIONS, dtype=np.int64)
-    for step in range(steps):
-        known = min(max(step - 1, 0), PREDICTOR_ORDER)
-        table[step, :known] = extrapolation_weights(known)
-    counts[: PREDICTOR_ORDER + 2] = FIRST_CORRECTIONS
-    return table, counts
+def step_table(steps: int, step: float) -> Array:
+    """Of every step of such a length the weights of the moves before, how often it is corrected, and by how much at
+    most (steps, TABLE_COLUMNS): what is not where it was predicted may be elsewhere."""
+    table = np.zeros((steps, TABLE_COLUMNS))
+    for k in range(steps):
+        known = min(max(k - 1, 0), PREDICTOR_ORDER)
+        table[k, :known] = extrapolation_weights(known)
+    table[:, -2:] = CORRECTIONS, correction_limit(step)
+    table[: PREDICTOR_ORDER + 2, -2], table[: PREDICTOR_ORDER + 1, -1] = FIRST_CORRECTIONS, inf
+    return table
 
 
-def run_newton(block_type: BlockType, state: Array, index: Array, p: Array, start: Array, rates: bool) -> NewtonRun:
-    """Follow groups (many,) of a kind through all steps from unknowns start (many, unknowns).
-
-    Their places index (many, slots) in state (slots, rows, steps) are filled; p (many, numbers).
-    """
-    many, steps = len(index), state.shape[2]
-    outside = np.empty((many, CHECK_ROWS, steps))
-    places = np.ascontiguousarray(index, dtype=np.int64) * (state.shape[1] * steps)
-    table, counts = step_table(steps)
+def newton_numbers(block_type: BlockType, p: Array, start: Array) -> Array:
+    """The numbers of blocks as `compile_newton_block` takes them: p (blocks, numbers) and unknowns to start from
+    (blocks, unknowns)."""
     is_angle = block_type.unknown_is_angle
     both = np.stack([np.where(is_angle, np.cos(start), start), np.where(is_angle, np.sin(start), 0.0)], axis=2)
-    arrays = places, np.ascontiguousarray(p), np.ascontiguousarray(both), table, counts, state, outside
-    follow = _compile_newton_kernel(block_type, rates)
-    with leave_turn():
-        follow(many, steps, steps, *(each.ctypes.data for each in arrays))
-    return NewtonRun(outside[:, 0], outside[:, 1], outside[:, 2])
+    return np.hstack([p, both.reshape(len(p), -1)])
 
 
 @lru_cache(maxsize=256)
-def _compile_newton_kernel(kind: BlockType, rates: bool) -> Any:
-    kinds = ("int", "int", "int", *("array",) * 7)
-    return compile_function(_NewtonKernelWriter(kind, rates).write(), "follow", *kinds)
+def compile_newton_block(kind: BlockType, rates: bool) -> Any:
+    """The function of a kind of block, see `planar.codegen.tape`: after its slots there is one of the `step_table`."""
+    return compile_function(_NewtonBlockWriter(kind, rates).write(), BLOCK_NAME, *BLOCK_ARGUMENT_TYPES)
 
 
-class _NewtonKernelWriter:
-    """follow(many, steps, stride, index, p, start, table, counts, state, outside), step after step of each group."""
+class _NewtonBlockWriter:
+    """Writes the function of `compile_newton_block`."""
 
     def __init__(self, kind: BlockType, rates: bool):
         self.ir, self.block_type = IRWriter(1), kind
@@ -82,23 +75,25 @@ class _NewtonKernelWriter:
     def write(self) -> str:
         """The text of the function."""
         t = self.ir
-        arrays = "ptr readonly %index, ptr readonly %p, ptr readonly %start, ptr readonly %table, ptr readonly %counts"
-        t.write_line(f"define void @follow(i64 %many, i64 %steps, i64 %stride, {arrays}, ptr %state, ptr %outside) {{")
+        t.write_line(f"define void @{BLOCK_NAME}({BLOCK_ARGUMENTS}) {{")
         t.write_label("entry")
         self.unknown_slots = [[t.allocate() for _ in range(2)] for _ in range(self.unknown_count)]
         self.history_slots = [[t.allocate() for _ in range(PREDICTOR_ORDER)] for _ in range(self.unknown_count)]
         self.correction_slots = [t.allocate() for _ in range(self.unknown_count)]
+        self.direction_slots = [t.allocate() for _ in range(2 * len(self.block_type.inner_links))]
+        self.clear_slots = [t.allocate() for _ in range(2)]
         self.regularity_slot = t.allocate()
-        t.write_line("br label %instance")
         have, bases = self._write_block_start()
         t.write_line("br label %step")
         t.write_label("step")
-        t.write_line("%k = phi i64 [0, %instance], [%knext, %solved]")
+        t.write_line("%k = phi i64 [0, %entry], [%knext, %good]")
         for leaf in self.operands:
             if leaf.source == "row":
-                have[leaf] = t.load(self._state_pointer(bases[leaf.place], leaf.part))
-        aheads = self._write_prediction()
-        t.write_line(f"%count = load i64, ptr {t.add_instruction('getelementptr i64, ptr %counts, i64 %k')}")
+                have[leaf] = t.load(self._row_pointer(bases[leaf.place], leaf.part))
+        row = t.double_pointer(bases[-1], t.add_instruction(f"mul i64 %k, {TABLE_COLUMNS}"))
+        aheads = self._write_prediction(row)
+        count = t.add_instruction(f"load double, ptr {t.double_pointer(row, str(PREDICTOR_ORDER))}")
+        t.write_line(f"%count = fptosi double {count} to i64")
         t.write_line("br label %newton")
         t.write_label("newton")
         t.write_line("%n = phi i64 [0, %step], [%nnext, %newton]")
@@ -110,80 +105,72 @@ class _NewtonKernelWriter:
         t.store(strength, self.regularity_slot)
         t.close_loop("n", "count", "newton", "solved")
         t.write_label("solved")
-        self._write_step_end(have, bases, aheads)
-        t.close_loop("k", "steps", "step", "instanceend")
-        t.write_label("instanceend")
-        t.close_loop("i", "many", "instance", "done")
+        self._write_step_end(have, bases, aheads, self._write_load(row, PREDICTOR_ORDER + 1))
+        t.write_label("bad")
+        write_ended(t, "%k", str(UNDECIDED))
+        t.write_line("br label %done")
+        t.write_label("good")
+        t.close_loop("k", "limit", "step", "done")
         t.write_label("done")
         t.write_line("ret void")
         t.write_line("}")
         return t.module_text()
 
     def _write_block_start(self) -> tuple[dict[FormulaInput, str], list[str]]:
-        """A group begins: its numbers, and where its places are."""
+        """A block begins: its numbers, and where its slots are."""
         t, kind = self.ir, self.block_type
-        have: dict[FormulaInput, str] = {}
-        t.write_label("instance")
-        t.write_line("%i = phi i64 [0, %entry], [%inext, %instanceend]")
-        begin = t.add_instruction(f"mul i64 %i, {len(kind.measures) + 2 * len(kind.angle_measures)}")
-        for leaf in self.operands:
-            if leaf.source == "p":
-                have[leaf] = self._write_load("%p", t.add_instruction(f"add i64 {begin}, {leaf.place}"))
-        begin = t.add_instruction(f"mul i64 %i, {kind.slot_count}")
+        have = {leaf: self._write_load("%p", leaf.place) for leaf in self.operands if leaf.source == "p"}
         bases = []
-        for slot in range(kind.slot_count):
-            place = t.add_instruction(
-                f"getelementptr i64, ptr %index, i64 {t.add_instruction(f'add i64 {begin}, {slot}')}"
-            )
-            bases.append(t.add_instruction(f"load i64, ptr {place}"))
-        begin = t.add_instruction(f"mul i64 %i, {2 * self.unknown_count}")
-        for k, both in enumerate(self.unknown_slots):
-            for part, pointer in enumerate(both):
-                t.store(self._write_load("%start", t.add_instruction(f"add i64 {begin}, {2 * k + part}")), pointer)
+        for slot in range(kind.slot_count + 1):
+            place = t.add_instruction(f"getelementptr ptr, ptr %rows, i64 {slot}")
+            bases.append(t.add_instruction(f"load ptr, ptr {place}"))
+        begin = len(kind.measures) + 2 * len(kind.angle_measures)
+        for k, pointer in enumerate(each for both in self.unknown_slots for each in both):
+            t.store(self._write_load("%p", begin + k), pointer)
         for pointer in (each for own in self.history_slots for each in own):
             t.store("zeroinitializer", pointer)
-        self.check_offset = t.add_instruction(f"mul i64 {t.add_instruction('mul i64 %i, %stride')}, {CHECK_ROWS}")
+        for pointer in (*self.direction_slots, *self.clear_slots):
+            t.store(t.constant(np.nan), pointer)
+        self.tolerance, self.clearance = t.broadcast("%tolerance"), t.broadcast("%clearance")
         return have, bases
 
-    def _state_pointer(self, base: str, row: int) -> str:
+    def _row_pointer(self, base: str, row: int) -> str:
         t = self.ir
-        return t.double_pointer(
-            "%state",
-            t.add_instruction(
-                f"add i64 {t.add_instruction(f'add i64 {base}, %k')}, {t.add_instruction(f'mul i64 %stride, {row}')}"
-            ),
-        )
+        return t.double_pointer(base, t.add_instruction(f"add i64 {t.add_instruction(f'mul i64 %stride, {row}')}, %k"))
 
-    def _write_step_end(self, have: dict[FormulaInput, str], bases: list[str], aheads: list[str]) -> None:
-        """The step ends: its results are written, and what it moved is remembered."""
+    def _write_step_end(self, have: dict[FormulaInput, str], bases: list[str], aheads: list[str], most: str) -> None:
+        """The step ends: its results are written and judged, and what it moved, `most` at a time, is remembered."""
         t, kind = self.ir, self.block_type
         *told, left = self._write_formula(self.output_formula, have)
         first = kind.slot_count - len(kind.inner_links)
         for number, value in enumerate(told):
-            t.store(value, self._state_pointer(bases[first + number // self.row_count], number % self.row_count))
+            t.store(value, self._row_pointer(bases[first + number // self.row_count], number % self.row_count))
         far = t.add_all([t.constant(0.0), *(t.call_intrinsic("fabs", t.load(slot)) for slot in self.correction_slots)])
-        for row, value in enumerate((left, t.load(self.regularity_slot), far)):
-            place = t.add_instruction(
-                f"add i64 {t.add_instruction(f'add i64 {self.check_offset}, %k')}, "
-                f"{t.add_instruction(f'mul i64 %stride, {row}')}"
-            )
-            t.store(value, t.double_pointer("%outside", place))
         for own, ahead, moved in zip(self.history_slots, aheads, self.correction_slots, strict=True):
             whole = t.binary("add", ahead, t.load(moved))
             for later, earlier in zip(reversed(own[1:]), reversed(own[:-1]), strict=True):
                 t.store(t.load(earlier), later)
             t.store(whole, own[0])
+        good = t.and_flags(t.compare("ole", left, self.tolerance), t.compare("ole", far, most))
+        now = [told[number + part] for number in range(0, len(told), self.row_count) for part in (COS, SIN)]
+        good = write_turn_flags(t, good, now, [t.load(slot) for slot in self.direction_slots], LEAST_COSINE)
+        for value, slot in zip(now, self.direction_slots, strict=True):
+            t.store(value, slot)
+        clear = write_where_good(t, t.load(self.regularity_slot), good)
+        one, two = (t.load(slot) for slot in self.clear_slots)
+        fine, *_ = write_fine_flags(t, clear, one, two, self.clearance)
+        t.store(clear, self.clear_slots[0])
+        t.store(one, self.clear_slots[1])
+        t.write_line(f"br i1 {t.add_instruction(f'extractelement <1 x i1> {fine}, i64 0')}, label %good, label %bad")
 
-    def _write_load(self, base: str, place: str) -> str:
-        return self.ir.broadcast(self.ir.add_instruction(f"load double, ptr {self.ir.double_pointer(base, place)}"))
-
-    def _write_prediction(self) -> list[str]:
-        """Move the unknowns to where they would be if they went on as before."""
+    def _write_load(self, base: str, place: int) -> str:
         t = self.ir
-        begin = t.add_instruction(f"mul i64 %k, {PREDICTOR_ORDER}")
-        weights = [
-            self._write_load("%table", t.add_instruction(f"add i64 {begin}, {k}")) for k in range(PREDICTOR_ORDER)
-        ]
+        return t.broadcast(t.add_instruction(f"load double, ptr {t.double_pointer(base, str(place))}"))
+
+    def _write_prediction(self, row: str) -> list[str]:
+        """Move the unknowns to where they would be if they went on as before, by a row of the table."""
+        t = self.ir
+        weights = [self._write_load(row, k) for k in range(PREDICTOR_ORDER)]
         aheads = []
         for k, own in enumerate(self.history_slots):
             ahead = t.add_all([t.binary("mul", w, t.load(slot)) for w, slot in zip(weights, own, strict=True)])

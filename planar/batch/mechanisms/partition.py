@@ -38,8 +38,7 @@ class NotPartitionable(Exception):
 class PartitionBlock(NamedTuple):
     """One group of a mechanism: its kind, the places of its given links, inputs and inner links, and its numbers p (m).
 
-    `level`: after which it can be solved; `turn`: the same, where a kind may take what the same kind has given.
-    `inner` are numbers of links.
+    `level`: after which it can be solved. `inner_links` are numbers of links.
     """
 
     block_type: BlockType
@@ -47,7 +46,6 @@ class PartitionBlock(NamedTuple):
     p: list[float]
     inner_links: tuple[int, ...]
     level: int
-    merged_level: int
 
 
 class Partition(NamedTuple):
@@ -171,8 +169,7 @@ class _Partitioner:
         self.shared_pins = self._find_shared_pins()
         self.link_index = [-1] * many
         self.link_index[self.frame] = 0
-        self.level, self.merged_level = [0] * many, [0] * many
-        self.block_type_of_link: list[BlockType | None] = [None] * many
+        self.level = [0] * many
         self.blocks: list[PartitionBlock] = []
         self.index_count = 1 + len(mechanism.inputs)
 
@@ -323,7 +320,7 @@ class _Partitioner:
         found.sort()
         given: list[int] = []
         p: list[float] = []
-        key, inputs, level, turn = [], [], 0, []
+        key, inputs, level = [], [], 0
         shapes, names = self.shapes, self.names
         for number, here, inside, turned, is_driven, k, other in found:
             there = inside
@@ -332,7 +329,6 @@ class _Partitioner:
                 if there != FRAME_BODY:
                     given.append(place[other])
                 level = max(level, self.level[other])
-                turn.append(other)
             if is_driven:
                 inputs.append(1 + driven[k])
             key.append((number, (here, there) if turned else (there, here), is_driven))
@@ -348,16 +344,13 @@ class _Partitioner:
         own = _BLOCK_TYPES.get(known) or _make_block_type(known, [type(pairs[each[5]]) for each in found])
         if not own.is_square:
             raise NotPartitionable("constraints hold each other more than once")
-        after = max(
-            (self.merged_level[other] + (self.block_type_of_link[other] is not own) for other in turn), default=0
-        )
         own_places = []
         for link in inner:
             place[link] = self.index_count
             own_places.append(self.index_count)
             self.index_count += 1
-            self.level[link], self.merged_level[link], self.block_type_of_link[link] = level + 1, after, own
-        self.blocks.append(PartitionBlock(own, (*given, *inputs, *own_places), p, inner, level, after))
+            self.level[link] = level + 1
+        self.blocks.append(PartitionBlock(own, (*given, *inputs, *own_places), p, inner, level))
 
     def _sort_key(self, link: int) -> tuple[int, list[tuple[int, bool, bool, bool]]]:
         """What a link of a group is held by, so that equal groups come out alike."""

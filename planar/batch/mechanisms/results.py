@@ -75,6 +75,16 @@ class Swept(NamedTuple):
         return self._replace(position=rounded(self.position), velocity=rates[0], acceleration=rates[1])
 
 
+def swept_from_rows(names: Sequence[str], rows: Array, inputs: Array, solved: int, outcome: int, reason: str) -> Swept:
+    """One mechanism by rows of its points (points, 2 or 6, steps + 1): x and y, then their first and second rates.
+    After so many steps that are solved it has the number of an outcome."""
+    orders = [PointMapping(names, rows[:, row : row + 2].swapaxes(1, 2)) for row in range(0, rows.shape[1], 2)]
+    status = np.zeros(len(inputs), dtype=np.int8)
+    status[solved:] = outcome
+    position, velocity, acceleration = orders if len(orders) > 1 else (orders[0], None, None)
+    return Swept(position, velocity, acceleration, inputs, status, reason, False)
+
+
 class PointRows(NamedTuple):
     """Points of many mechanisms one after the other: those of mechanism k from first[k] to first[k + 1], in the order
     of its `Swept`; position, velocity and acceleration (points, steps + 1, 2), SI, the latter two None without rates.

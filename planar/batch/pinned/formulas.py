@@ -17,6 +17,7 @@ from planar.batch.mechanisms.block_type import (
     SymbolicAssembly,
     find_block_type,
 )
+from planar.batch.mechanisms.tape_runs import POINT_ROWS, TABLE_COS, TABLE_SIN
 from planar.codegen.block_formula import BlockFormula, FormulaInput, simplify_formula
 from planar.codegen.instructions import CosSin
 from planar.codegen.tape import TapeFormula
@@ -43,21 +44,21 @@ NUMBERS = 6
 """Numbers of a step at most. Of a crank: where it is on the frame, the pin from there as it stands (m), velocity and
 acceleration. Of a dyad: the lengths of its bars (m), its sign, one by the linkage's size. Of a pin on a bar: where it
 is, in parts of the way from the first pin to the second. Then the second pin (m) where that is on the frame."""
-TABLE_ROWS = 2
-"""The cosine and sine of how far cranks have turned."""
-ROWS = {False: 2, True: 6}
-"""Rows of a pin, without and with rates: x and y, then their first rates, then the second ones."""
 _FRAME_PIN = {PinStep.DYAD_ON_FRAME: 4, PinStep.CARRIED_ON_FRAME: 2}
 
 
 @lru_cache
 def pin_formulas(rates: bool, polished: bool) -> tuple[TapeFormula, ...]:
-    """The formulas of all steps. `polished`: closed forms are followed by a step of Newton's method."""
-    made = [TapeFormula(_crank_formula(rates), ROWS[rates])]
+    """The formulas of all steps, which take two pins and write the third. `polished`: closed forms are followed by a
+    step of Newton's method."""
+    many = POINT_ROWS[rates]
+    rows = tuple((2, row) for row in range(many))
+    made = [TapeFormula(_crank_formula(rates), rows)]
     for step in (PinStep.DYAD, PinStep.DYAD_ON_FRAME):
-        made.append(TapeFormula(_dyad_formula(step, rates, polished), ROWS[rates], 2))
+        directions = (many, many + 1), (many + 2, many + 3)
+        made.append(TapeFormula(_dyad_formula(step, rates, polished), rows, directions, is_checked=True))
     for step in (PinStep.CARRIED, PinStep.CARRIED_ON_FRAME):
-        made.append(TapeFormula(_carried_formula(step, rates), ROWS[rates]))
+        made.append(TapeFormula(_carried_formula(step, rates), rows))
     return tuple(each._replace(formula=simplify_formula(each.formula)) for each in made)
 
 
@@ -112,7 +113,7 @@ def _crank_formula(rates: bool) -> BlockFormula:
     work.clear_inputs()
     none, (at, own, (velocity, acceleration)) = work.instructions.add_constant(0.0), _pairs(work, 3)
     angle = work.add_input("angle", 0)
-    work.cos_sin[angle] = CosSin(*(work.add_input("row", 0, row) for row in range(TABLE_ROWS)))
+    work.cos_sin[angle] = CosSin(work.add_input("row", 0, TABLE_COS), work.add_input("row", 0, TABLE_SIN))
     work.u, work.u1, work.u2, work.p = [angle], [velocity], [acceleration], [*at, none, none]
     local = ca.SX.sym("local", 2)
     way = work.closed_form_assembly([])

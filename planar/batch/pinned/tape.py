@@ -9,18 +9,17 @@ import numpy as np
 
 from planar.batch.assembly.assembly_scores import is_surely_farther
 from planar.batch.pinned.formulas import NUMBERS, PinStep
+from planar.foundation.arrays import Array, BoolArray, IntArray
 from planar.model.pin_linkages import PinnedLinkages
 from planar.solving.checks.residual_check import EPS, NEGLIGIBLE_ERROR, SHORT_ARM, residual_tolerance
-
-Array = np.ndarray
 
 
 class ToldPins(NamedTuple):
     """The pins that are told, numbered through all linkages (points,), and where those of each linkage begin
     (linkages + 1,)."""
 
-    pins: Array
-    first: Array
+    pins: IntArray
+    first: IntArray
 
     def select(self, linkages: PinnedLinkages, begin: int, end: int) -> ToldPins:
         """Those of linkages that follow one another."""
@@ -42,10 +41,10 @@ def find_told_pins(linkages: PinnedLinkages, names: Sequence[str] | None) -> Tol
     return ToldPins(named, np.concatenate([[0], np.cumsum(there.sum(axis=1))]))
 
 
-def frame_pins(linkages: PinnedLinkages) -> Array:
+def frame_pins(linkages: PinnedLinkages) -> IntArray:
     """The pins on the frame, numbered through all linkages."""
     owner = np.repeat(np.arange(len(linkages)), np.diff(linkages.first_frame_pin))
-    found: Array = linkages.frame_pins + linkages.first_pin[owner]
+    found: IntArray = linkages.frame_pins + linkages.first_pin[owner]
     return found
 
 
@@ -68,45 +67,26 @@ class PinTape(NamedTuple):
     `clearance` (linkages,). Pins and bars are numbered through all linkages.
     """
 
-    which: Array
-    first: Array
-    kinds: Array
-    given: Array
-    placed: Array
+    which: IntArray
+    first: IntArray
+    kinds: IntArray
+    given: IntArray
+    placed: IntArray
     p: Array
-    bars: Array
+    bars: IntArray
     tolerance: Array
     clearance: Array
-
-    def select(self, some: Array) -> PinTape:
-        """Some of the linkages (numbers, rising)."""
-        if len(some) == len(self.which):
-            return self
-        counts = np.diff(self.first)[some]
-        first = np.concatenate([[0], np.cumsum(counts)])
-        own = np.repeat(self.first[some] - first[:-1], counts) + np.arange(first[-1])
-        return PinTape(
-            self.which[some],
-            first,
-            self.kinds[own],
-            self.given[own],
-            self.placed[own],
-            self.p[own],
-            self.bars[own],
-            self.tolerance[some],
-            self.clearance[some],
-        )
 
 
 class _Steps(NamedTuple):
     """Steps, level after level: their kinds, the two given pins, the one that is placed, the two bars."""
 
-    kinds: Array
-    first: Array
-    second: Array
-    placed: Array
-    one: Array
-    two: Array
+    kinds: IntArray
+    first: IntArray
+    second: IntArray
+    placed: IntArray
+    one: IntArray
+    two: IntArray
 
 
 def make_tape(linkages: PinnedLinkages) -> PinTape:
@@ -143,7 +123,9 @@ def make_tape(linkages: PinnedLinkages) -> PinTape:
     return PinTape(which, first, kinds, given, placed, p[order], bars, tolerance, clearance)
 
 
-def _find_steps(linkages: PinnedLinkages, entry_bar: Array, entry_pin: Array, is_fixed: Array) -> tuple[_Steps, Array]:
+def _find_steps(
+    linkages: PinnedLinkages, entry_bar: IntArray, entry_pin: IntArray, is_fixed: BoolArray
+) -> tuple[_Steps, BoolArray]:
     """The steps that follow at once from known pins, level after level, and which pins (pins,) are known in the end.
 
     A pin that two known ones hold is carried, where these are of one bar, else the pin of a dyad. Where as many
@@ -201,7 +183,9 @@ def _find_steps(linkages: PinnedLinkages, entry_bar: Array, entry_pin: Array, is
     return _Steps(kinds, first, second, placed, np.where(swap, b, a), np.where(swap, a, b)), known
 
 
-def _pairs_on_bars(linkages: PinnedLinkages, entry_bar: Array, entry_pin: Array) -> tuple[Array, Array, Array]:
+def _pairs_on_bars(
+    linkages: PinnedLinkages, entry_bar: IntArray, entry_pin: IntArray
+) -> tuple[IntArray, IntArray, IntArray]:
     """Every pin with every other on the same bar, sorted by the first: both, and the bar."""
     sizes, starts = np.diff(linkages.first_entry), linkages.first_entry[:-1]
     own, of, bar = [], [], []
@@ -216,14 +200,14 @@ def _pairs_on_bars(linkages: PinnedLinkages, entry_bar: Array, entry_pin: Array)
     return pin[order], other[order], bars[order]
 
 
-def _stable_order(numbers: Array) -> Array:
+def _stable_order(numbers: IntArray) -> IntArray:
     """The order of whole numbers from zero on, alike ones as they stand: short ones are counted, not compared."""
     is_short = len(numbers) and numbers.max() <= np.iinfo(np.uint16).max
     return np.argsort(numbers.astype(np.uint16) if is_short else numbers, kind="stable")
 
 
 def _numbers(
-    linkages: PinnedLinkages, steps: _Steps, pin_owner: Array, unit: Array, is_fixed: Array
+    linkages: PinnedLinkages, steps: _Steps, pin_owner: IntArray, unit: Array, is_fixed: BoolArray
 ) -> tuple[Array, Array]:
     """The numbers of steps (steps, numbers), and the shortest bar of dyads (steps,) in sizes; zero for what is not
     sure."""
@@ -250,7 +234,7 @@ def _numbers(
     return p.T.copy(), np.nan_to_num(arm, nan=0.0, posinf=np.inf)
 
 
-def _sizes(linkages: PinnedLinkages, entry_bar: Array, entry_pin: Array) -> tuple[Array, Array]:
+def _sizes(linkages: PinnedLinkages, entry_bar: IntArray, entry_pin: IntArray) -> tuple[Array, Array]:
     """The greatest extent of a link of each linkage, and how far its numbers reach (m)."""
     starts, frames = linkages.first_entry[:-1], linkages.first_frame_pin[:-1]
     at, first, fixed = linkages.positions.T.copy(), entry_pin[starts], frame_pins(linkages)
@@ -267,7 +251,7 @@ def _sizes(linkages: PinnedLinkages, entry_bar: Array, entry_pin: Array) -> tupl
     return unit, np.maximum(np.maximum.reduceat(reaches, heads), reach)
 
 
-def _extents(points: Sequence[Array], starts: Array) -> tuple[Array, Array]:
+def _extents(points: Sequence[Array], starts: IntArray) -> tuple[Array, Array]:
     """Of the boxes around points x, y (points,), part by part: the diagonals, and the greatest number (parts,)."""
     bounds = [(np.minimum.reduceat(each, starts), np.maximum.reduceat(each, starts)) for each in points]
     (left, right), (low, high) = bounds

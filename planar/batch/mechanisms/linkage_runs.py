@@ -1,0 +1,241 @@
+"""All positions of linkages that are partitioned into blocks: inputs, blocks and points of each on one tape."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from planar.batch.mechanisms.block_type import COS, POSE_ROWS, SIN, TURN1, TURN2, X1, X2, Y1, Y2, BlockType, X, Y
+from planar.batch.mechanisms.initial_assembly import LEAST_CLEARANCE, StartAssemblies, find_start_assemblies
+from planar.batch.mechanisms.linkages import BlockBatch, LinkageArrays, LinkageGroup, SweepRequest, linkage_group
+from planar.batch.mechanisms.newton_march import compile_newton_block, newton_numbers, step_table
+from planar.batch.mechanisms.results import Swept, swept_from_rows
+from planar.batch.mechanisms.tape_runs import (
+    DEAD_POINT_NUMBER,
+    FIRST_ROOM_SLOT,
+    FRAME,
+    FULL_TURN,
+    LEAST_COSINE,
+    POINT_ROWS,
+    STEP_TABLE,
+    TABLE,
+    TABLE_ANGLE,
+    TABLE_COS,
+    TABLE_SIN,
+    BlockKinds,
+    FineRun,
+    LinkageEnding,
+    TapedLinkages,
+    clear_points,
+    make_values,
+    run_taped_linkages,
+)
+from planar.batch.stop_checks import find_first_stop
+from planar.codegen.block_formula import BlockFormula, FormulaInput
+from planar.codegen.tape import TapeFormula, compile_block
+from planar.foundation.arrays import Array, IntArray
+from planar.foundation.errors import Outcome
+from planar.foundation.instruction_list import InstructionList
+from planar.model.mechanism import Mechanism, running_input_index
+
+RUNNING_INPUT, STANDING_INPUT, POINT, FIRST_BLOCK_TYPE = range(4)
+"""Kinds of the blocks of a tape: types of blocks of links come last."""
+INPUT_NUMBERS = 5
+"""Numbers of an input: its position (rad or sizes), cosine and sine of it, its velocity and acceleration."""
+
+
+def solve_by_blocks(mechanisms: Sequence[Mechanism], request: SweepRequest) -> dict[int, Swept]:
+    """Of mechanisms, by their numbers, all those that can be partitioned into blocks of links, and are sure."""
+    group = linkage_group(mechanisms, request)
+    if group is None:
+        return {}
+    arrays, start = group.arrays, find_start_assemblies(group.arrays)
+    first_point = _begins(np.bincount(arrays.points.owner, minlength=len(arrays)))
+    values = make_values(int(first_point[-1]), request.steps, request.rates)
+    types = tuple({id(batch.block_type): batch.block_type for batch in arrays.batches}.values())
+    taped = _make_tape(arrays, start, types).select(np.flatnonzero(start.is_sure))
+    kinds = _block_kinds(types, request.rates)
+
+    def find_ending(number: int, run: FineRun) -> LinkageEnding | None:
+        watched = np.arange(first_point[number] + len(group.names[number]), first_point[number + 1])
+        return _find_ending(group, number, run, run.places(watched), request)
+
+    watched = np.array([bool(group.watched[number]) for number in taped.which.tolist()], dtype=bool)
+    run = run_taped_linkages(taped, kinds, values, request.steps, request.rates, find_ending, watched)
+    stopped = np.flatnonzero(run.is_decided & (run.solved <= request.steps))
+    clear_points(values, first_point, taped.which[stopped], run.solved[stopped])
+    turned = np.linspace(0.0, 1.0, request.steps + 1) * FULL_TURN
+    found = {}
+    for k in np.flatnonzero(run.is_decided).tolist():
+        number = int(taped.which[k])
+        names, begin, reason = group.names[number], int(first_point[number]), run.reasons.get(k, "")
+        if run.outcome[k] == DEAD_POINT_NUMBER:
+            links, near = group.links_of_block(int(run.block[k])), group.start[number] + run.near[k]
+            reason = f"links {links} come to a dead point {_between(near)}"
+        ending = int(run.solved[k]), int(run.outcome[k]), reason
+        rows = values[begin : begin + len(names), :, : request.steps + 1]
+        found[int(group.numbers[number])] = swept_from_rows(names, rows, group.start[number] + turned, *ending)
+    return found
+
+
+def _find_ending(
+    group: LinkageGroup, number: int, run: FineRun, places: Array, request: SweepRequest
+) -> LinkageEnding | None:
+    """How a linkage of a group ends whose pairs have stops; None where that is not sure. places (two of each watched
+    link, 2, steps)."""
+    mechanism, good = group.mechanisms[number], run.good
+    at = np.moveaxis(places[..., :good], 1, 2)
+    pair = mechanism.inputs[running_input_index(mechanism, request.pair, "inputs")].pair
+    found = {link: (at[2 * k], at[2 * k + 1]) for k, link in enumerate(group.watched[number])}
+    positions = group.start[number] + run.turned
+    met = find_first_stop(mechanism, float(group.arrays.unit[number]), pair, positions[:good], found)
+    if met is None or (met.step is None and good < len(positions)):
+        return None  # beside a dead point it is not clear which comes first
+    if met.step is None:
+        return LinkageEnding(good)
+    near = _between(positions[[max(met.step - 1, 0), met.step]])
+    return LinkageEnding(met.step, Outcome.STOP, f"{met.reason}, {near}")
+
+
+def _between(inputs: Array) -> str:
+    return f"at an input of {inputs[0]:.6g} to {inputs[1]:.6g} rad"
+
+
+def _begins(counts: IntArray) -> IntArray:
+    """Where parts of so many begin, and where the last ends."""
+    return np.concatenate([[0], np.cumsum(counts)])
+
+
+def _make_tape(arrays: LinkageArrays, start: StartAssemblies, types: Sequence[BlockType]) -> TapedLinkages:
+    """All linkages, of each first its inputs, then its blocks, then its points, the rows of which are told."""
+    many, inputs, points = len(arrays), arrays.inputs, arrays.points
+    block_owner = np.empty(arrays.block_count, dtype=np.int64)
+    for batch in arrays.batches:
+        block_owner[batch.block_numbers] = batch.owner
+    owners = inputs.owner, block_owner, points.owner
+    counts = np.array([np.bincount(owner, minlength=many) for owner in owners])
+    first = _begins(counts.sum(axis=0))
+    before = np.concatenate([np.zeros((1, many), dtype=np.int64), np.cumsum(counts, axis=0)])
+    at_input, at_block, at_point = (
+        (first[:-1] + earlier - _begins(own)[:-1])[owner] + np.arange(len(owner))
+        for owner, own, earlier in zip(owners, counts, before, strict=False)
+    )
+    numbers = [_block_numbers(batch, start) for batch in arrays.batches]
+    slots = np.full((first[-1], 1 + max(kind.slot_count for kind in types)), FRAME)
+    p = np.zeros((first[-1], max(INPUT_NUMBERS, *(own.shape[1] for own in numbers))))
+    kinds, blocks = np.empty(first[-1], dtype=np.int64), np.full(first[-1], -1)
+    kinds[at_input], kinds[at_point] = np.where(inputs.runs, RUNNING_INPUT, STANDING_INPUT), POINT
+    c, s = (np.where(inputs.is_angle, of(inputs.value), still) for of, still in ((np.cos, 1.0), (np.sin, 0.0)))
+    p[at_input, :INPUT_NUMBERS] = np.stack([inputs.value, c, s, inputs.velocity, inputs.acceleration], axis=1)
+    slots[at_input, 0], slots[at_input, 1] = TABLE, _slot_numbers(inputs.link_index)
+    p[at_point, :2], p[at_point, 2] = points.numbers, arrays.unit[points.owner]
+    slots[at_point, 0], slots[at_point, 1] = _slot_numbers(points.link_index), np.arange(len(at_point))
+    blocks[at_block] = np.arange(arrays.block_count)
+    for batch, own in zip(arrays.batches, numbers, strict=True):
+        at, kind = at_block[batch.block_numbers], batch.block_type
+        kinds[at] = FIRST_BLOCK_TYPE + types.index(kind)
+        slots[at, : kind.slot_count], slots[at, kind.slot_count] = _slot_numbers(batch.link_indices), STEP_TABLE
+        p[at, : own.shape[1]] = own
+    clearance = np.full(many, LEAST_CLEARANCE)
+    return TapedLinkages(np.arange(many), first, kinds, slots, p, blocks, arrays.tolerance, clearance)
+
+
+def _slot_numbers(link_indices: IntArray) -> IntArray:
+    return np.where(link_indices > 0, FIRST_ROOM_SLOT + 1 - link_indices, FRAME)
+
+
+def _block_numbers(batch: BlockBatch, start: StartAssemblies) -> Array:
+    """The numbers of blocks as the functions of their kind take them."""
+    kind = batch.block_type
+    if kind.has_closed_form:
+        return np.hstack([batch.p, start.signs[batch.block_numbers, : kind.sign_count]])
+    return newton_numbers(kind, batch.p, start.z[batch.block_numbers, : len(kind.unknown_is_angle)])
+
+
+def _block_kinds(types: Sequence[BlockType], rates: bool) -> BlockKinds:
+    def compile_kind(number: int, polished: bool) -> Any:
+        if number == POINT:
+            return compile_block(point_formula(rates))
+        if number < FIRST_BLOCK_TYPE:
+            return compile_block(input_formula(number == RUNNING_INPUT, rates))
+        kind = types[number - FIRST_BLOCK_TYPE]
+        if not kind.has_closed_form:
+            return compile_newton_block(kind, rates)
+        wide, inner = _pose_rows(rates), range(kind.slot_count - len(kind.inner_links), kind.slot_count)
+        rows = tuple((slot, row) for slot in inner for row in range(wide))
+        directions = tuple((wide * k + COS, wide * k + SIN) for k in range(len(inner)))
+        formula = TapeFormula(kind.run_formula(rates, polished), rows, directions, is_checked=True)
+        return compile_block(formula, LEAST_COSINE)
+
+    return BlockKinds(compile_kind, _pose_rows(rates), {COS: 1.0}, step_table)
+
+
+def _pose_rows(rates: bool) -> int:
+    return POSE_ROWS + 6 if rates else POSE_ROWS
+
+
+class _Listing:
+    """A formula as it is written, value after value."""
+
+    def __init__(self) -> None:
+        self.instructions: InstructionList[FormulaInput] = InstructionList()
+        self.leaves: dict[int, FormulaInput] = {}
+
+    def take(self, source: str, place: int, part: int = 0) -> int:
+        """A value from outside."""
+        key = FormulaInput(source, place, part)
+        number = self.instructions.add_input(key)
+        self.leaves[number] = key
+        return number
+
+    def turn(self, c: int, s: int, x: int, y: int) -> tuple[int, int]:
+        """x and y turned by an angle of which the cosine and sine are known."""
+        add = self.instructions.add
+        return add("sub", add("mul", c, x), add("mul", s, y)), add("add", add("mul", s, x), add("mul", c, y))
+
+    def as_tape_formula(self, wanted: Sequence[int], rows: Sequence[int]) -> TapeFormula:
+        """The formula of values that go to rows of the second slot."""
+        formula = BlockFormula(self.instructions, tuple(wanted), self.leaves)
+        return TapeFormula(formula, tuple((1, row) for row in rows))
+
+
+@lru_cache
+def input_formula(is_running: bool, rates: bool) -> TapeFormula:
+    """The position of an input, cosine and sine of it, and its rates, from its numbers and how far inputs have
+    turned."""
+    made = _Listing()
+    value, c, s, *own_rates = (made.take("p", k) for k in range(INPUT_NUMBERS))
+    if is_running:
+        cos, sin, angle = (made.take("row", 0, row) for row in (TABLE_COS, TABLE_SIN, TABLE_ANGLE))
+        value = made.instructions.add("add", value, angle)
+        c, s = made.turn(cos, sin, c, s)
+    else:
+        own_rates = [made.instructions.add_constant(0.0)] * 2
+    rows = (X, COS, SIN, X1, X2) if rates else (X, COS, SIN)
+    return made.as_tape_formula((value, c, s, *own_rates)[: len(rows)], rows)
+
+
+@lru_cache
+def point_formula(rates: bool) -> TapeFormula:
+    """x and y of a point, then of its first and second rates, from its link's pose and rates.
+
+    Numbers: the point in its link (m), then what the link's own lengths are multiplied by.
+    """
+    made = _Listing()
+    add = made.instructions.add
+    px, py, unit = (made.take("p", k) for k in range(3))
+    link = {row: made.take("row", 0, row) for row in range(_pose_rows(rates))}
+    rx, ry = made.turn(link[COS], link[SIN], px, py)
+    scaled = {row: add("mul", link[row], unit) for row in ((X, Y, X1, Y1, X2, Y2) if rates else (X, Y))}
+    wanted = [add("add", scaled[X], rx), add("add", scaled[Y], ry)]
+    if rates:
+        turn1, turn2 = link[TURN1], link[TURN2]
+        square = add("mul", turn1, turn1)
+        wanted.append(add("sub", scaled[X1], add("mul", turn1, ry)))
+        wanted.append(add("add", scaled[Y1], add("mul", turn1, rx)))
+        wanted.append(add("sub", scaled[X2], add("add", add("mul", turn2, ry), add("mul", square, rx))))
+        wanted.append(add("add", scaled[Y2], add("sub", add("mul", turn2, rx), add("mul", square, ry))))
+    return made.as_tape_formula(wanted, range(POINT_ROWS[rates]))
