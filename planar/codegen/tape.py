@@ -13,10 +13,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from planar.codegen.block_formula import BlockFormula
 from planar.codegen.llvm_compile import compile_function
 from planar.codegen.llvm_ir import IRWriter
 from planar.foundation.arrays import Array, IntArray
+from planar.foundation.instruction_list import InstructionList, required_values
 from planar.foundation.turns import leave_turn
 
 LANES = 8
@@ -30,17 +30,16 @@ LONG_CALL_NUMBERS = 2**14
 MAX_BLOCK_FUNCTIONS = 4096
 BLOCK_NAME = "block"
 BLOCK_ARGUMENTS = (
-    "i64 %limit, i64 %stride, ptr readonly %rows, ptr readonly %p, double %tolerance, double %clearance, "
-    "ptr %flags, ptr %ended"
+    "i64 %limit, i64 %stride, ptr readonly %rows, ptr readonly %p, double %tolerance, double %clearance, ptr %ended"
 )
 """Of the function of a kind: how many steps are wanted; how far rows are apart; the addresses of its slots; its own
-numbers; what may be left open; how clear of a dead point steps are at least; room for two bytes a vector of steps; and
-where it puts the first step that is not good, with the outcome, if one is not."""
-BLOCK_ARGUMENT_TYPES = ("int", "int", "array", "array", "float", "float", "array", "array")
+numbers; what may be left open; how clear of a dead point steps are at least; and where it puts the first step that is
+not good, with the outcome, if one is not."""
+BLOCK_ARGUMENT_TYPES = ("int", "int", "array", "array", "float", "float", "array")
 _WALK = f"""
 define void @walk(i64 %begin, i64 %end, i64 %steps, i64 %stride, i64 %slots, i64 %numbers, ptr readonly %functions,
   ptr readonly %first, ptr readonly %kinds, ptr readonly %rows, ptr readonly %p, ptr readonly %tolerance,
-  ptr readonly %clearance, ptr %flags, ptr %good, ptr %outcome, ptr %at) {{
+  ptr readonly %clearance, ptr %good, ptr %outcome, ptr %at) {{
 entry:
   %ended = alloca [2 x i64]
   %verdict = getelementptr i64, ptr %ended, i64 1
@@ -73,7 +72,7 @@ block:
   %own = getelementptr ptr, ptr %rows, i64 %rowfirst
   %pfirst = mul i64 %j, %numbers
   %ownp = getelementptr double, ptr %p, i64 %pfirst
-  call void %function(i64 %limit, i64 %stride, ptr %own, ptr %ownp, double %open, double %clear, ptr %flags, ptr %ended)
+  call void %function(i64 %limit, i64 %stride, ptr %own, ptr %ownp, double %open, double %clear, ptr %ended)
   %come = load i64, ptr %ended
   %ends = icmp slt i64 %come, %limit
   %said = load i64, ptr %verdict
@@ -104,14 +103,32 @@ done:
 step goes no further."""
 
 
+class FormulaInput(NamedTuple):
+    """What a formula takes: ("row", slot, which of its rows), ("p", number), or ("z", unknown, 0 or 1)."""
+
+    source: str
+    place: int
+    part: int = 0
+
+
+class BlockFormula:
+    """Values of a list by their numbers, of which some are wanted; those of `inputs` are taken from outside."""
+
+    def __init__(
+        self, listing: InstructionList[FormulaInput], wanted: tuple[int, ...], inputs: dict[int, FormulaInput]
+    ):
+        self.instructions, self.outputs, self.inputs = listing, wanted, inputs
+        self.order = required_values(listing, wanted)
+
+
 class TapeFormula(NamedTuple):
     """The formula of a kind of block: the slot and row to which each of its first values goes; by the numbers of the
-    values the cosines and sines of links that may not turn fast; and whether the last two values are what is left open,
-    and how clear of a dead point it is."""
+    values the vectors along links that may not turn fast, x, y and their squared length, None where that is one; and
+    whether the last two values are what is left open, and how clear of a dead point it is."""
 
     formula: BlockFormula
     output_rows: tuple[tuple[int, int], ...]
-    directions: tuple[tuple[int, int], ...] = ()
+    directions: tuple[tuple[int, int, int | None], ...] = ()
     is_checked: bool = False
 
 
@@ -147,10 +164,9 @@ def run_tape(functions: Sequence[Any], steps: int, tape: Tape) -> TapeResult:
     """Work off a whole tape by the functions of its kinds, see `compile_block`, over rows of `padded_steps`."""
     stride, many = padded_steps(steps), len(tape.tolerance)
     result = TapeResult(*np.empty((3, many), dtype=np.int64))
-    flags = np.empty(2 * stride // LANES, dtype=np.int8)
     addresses = np.array([ctypes.cast(each, ctypes.c_void_p).value for each in functions], dtype=np.int64)
-    arrays = [addresses, *(np.ascontiguousarray(each) for each in tape), flags, *result]
-    walk = compile_function(_WALK, "walk", *("int",) * 6, *("array",) * 11)
+    arrays = [addresses, *(np.ascontiguousarray(each) for each in tape), *result]
+    walk = compile_function(_WALK, "walk", *("int",) * 6, *("array",) * 10)
     with leave_turn(len(tape.kinds) * steps >= LONG_CALL_NUMBERS):
         walk(0, many, steps, stride, tape.slots.shape[1], tape.p.shape[1], *(each.ctypes.data for each in arrays))
     return result
@@ -175,8 +191,6 @@ class _BlockWriter:
         t.write_label("entry")
         t.write_line(f"%rounded = add i64 %limit, {LANES - 1}")
         t.write_line(f"%vectors = lshr i64 %rounded, {SHIFT}")
-        t.write_line(f"%bytes = lshr i64 %stride, {SHIFT}")
-        t.write_line("%deadflags = getelementptr i8, ptr %flags, i64 %bytes")
         self.tolerance, self.clearance = t.broadcast("%tolerance"), t.broadcast("%clearance")
         slots: dict[int, str] = {}
 
@@ -197,12 +211,10 @@ class _BlockWriter:
         given = [row_pointer(*place) for place in own.output_rows]
         t.write_line("br label %step")
         t.write_label("step")
-        t.write_line("%vector = phi i64 [0, %entry], [%vectornext, %step]")
+        t.write_line("%vector = phi i64 [0, %entry], [%vectornext, %next]")
         watched = [f"%watched{k}" for k in range(2 * len(own.directions) + 1 if own.is_checked else 0)]
         for each in watched:
-            t.write_line(f"{each} = phi {t.vector} [{t.constant(nan)}, %entry], [{each}next, %step]")
-        if own.is_checked:
-            t.write_line(f"%all = phi i{LANES} [-1, %entry], [%allnext, %step]")
+            t.write_line(f"{each} = phi {t.vector} [{t.constant(nan)}, %entry], [{each}next, %next]")
         t.write_line(f"%off = mul i64 %vector, {LANES}")
         for number, pointer in taken.items():
             names[number] = t.load(t.double_pointer(pointer, "%off"))
@@ -213,9 +225,10 @@ class _BlockWriter:
             t.store(value, t.double_pointer(pointer, "%off"))
         if own.is_checked:
             self._write_check(watched, found)
-        t.close_loop("vector", "vectors", "step", "told" if own.is_checked else "done")
-        if own.is_checked:
-            self._write_search()
+        else:
+            t.write_line("br label %next")
+        t.write_label("next")
+        t.close_loop("vector", "vectors", "step", "done")
         t.write_label("done")
         t.write_line("ret void")
         t.write_line("}")
@@ -224,83 +237,75 @@ class _BlockWriter:
         return t.module_text()
 
     def _write_check(self, watched: list[str], found: list[str]) -> None:
-        """Look at a vector of steps: directions, what is left open and how clear it is, as before in `watched`."""
-        t, flags, byte = self.ir, f"<{LANES} x i1>", f"i{LANES}"
+        """Look at a vector of steps: directions, what is left open and how clear it is, as before in `watched`. At the
+        first that is not good the block ends."""
+        t, byte = self.ir, f"i{LANES}"
         left, clear = found[-2:]
-        parts = [found[k] for both in self.own.directions for k in both]
-        earlier = [self._earlier(value, before, 1) for value, before in zip(parts, watched, strict=False)]
-        good = t.compare("ole", left, self.tolerance)
-        clear = write_where_good(t, clear, write_turn_flags(t, good, parts, earlier, self.least_cosine))
-        for value, before in zip((*parts, clear), watched, strict=True):
+        now = [Direction(found[x], found[y], k if k is None else found[k]) for x, y, k in self.own.directions]
+        parts = [*(part for each in now for part in each[:2]), clear]
+        earlier = [self._earlier(value, before, 1) for value, before in zip(parts, watched, strict=True)]
+        good = write_turn_flags(t, t.compare("ole", left, self.tolerance), now, earlier[:-1], self.least_cosine)
+        judged = write_clear_flags(t, clear, earlier[-1], self._earlier(clear, watched[-1], 2), self.clearance)
+        for value, before in zip(parts, watched, strict=True):
             # a value of its own name, for the next vector
             t.write_line(f"{before}next = select i1 true, {t.vector} {value}, {t.vector} {value}")
-        fine, dead = self._write_flags(clear, watched[-1])
-        bits = [t.add_instruction(f"bitcast {flags} {each} to {byte}") for each in (fine, dead)]
-        for pointer, value in zip(("%flags", "%deadflags"), bits, strict=True):
-            place = t.add_instruction(f"getelementptr i8, ptr {pointer}, i64 %vector")
-            t.write_line(f"store {byte} {value}, ptr {place}")
-        t.write_line(f"%allnext = and {byte} %all, {bits[0]}")
+        t.write_line(f"%fine = bitcast <{LANES} x i1> {t.and_flags(good, judged.is_clear)} to {byte}")
+        t.write_line(f"%allfine = icmp eq {byte} %fine, -1")
+        t.write_line("br i1 %allfine, label %next, label %found")
+        t.write_label("found")
+        bad = t.add_instruction(f"xor {byte} %fine, -1")
+        lane = t.add_instruction(f"call {byte} @llvm.cttz.{byte}({byte} {bad}, i1 true)")
+        t.write_line(f"%come = add i64 %off, {t.add_instruction(f'zext {byte} {lane} to i64')}")
+        t.write_line("%ends = icmp slt i64 %come, %limit")
+        t.write_line("br i1 %ends, label %stopped, label %done")
+        t.write_label("stopped")
+        below = t.compare("olt", clear, t.constant(0.0))
+        dead = t.and_flags(below, t.compare("ogt", judged.least_before, judged.needed))
+        bits = t.add_instruction(f"bitcast <{LANES} x i1> {dead} to {byte}")
+        is_dead = t.add_instruction(f"trunc {byte} {t.add_instruction(f'lshr {byte} {bits}, {lane}')} to i1")
+        write_ended(t, "%come", t.add_instruction(f"select i1 {is_dead}, i64 {DEAD_POINT}, i64 {UNDECIDED}"))
+        t.write_line("br label %done")
 
     def _earlier(self, value: str, before: str, by: int) -> str:
         """The values so many steps before those of a vector; `before` is the vector before it."""
         v, lanes = self.ir.vector, ", ".join(f"i32 {LANES + k - by}" for k in range(LANES))
         return self.ir.add_instruction(f"shufflevector {v} {before}, {v} {value}, <{LANES} x i32> <{lanes}>")
 
-    def _write_flags(self, clear: str, before: str) -> tuple[str, str]:
-        """Whether all is good up to each step of a vector, and whether there is a dead point just before it."""
-        t = self.ir
-        one, two = (self._earlier(clear, before, by) for by in (1, 2))
-        fine, least, needed = write_fine_flags(t, clear, one, two, self.clearance)
-        dead = t.and_flags(t.compare("olt", clear, t.constant(0.0)), t.compare("ogt", least, needed))
-        return fine, dead
 
-    def _write_search(self) -> None:
-        """The first interval that is not good, and why."""
-        t, byte = self.ir, f"i{LANES}"
-        t.write_label("told")
-        t.write_line(f"%isgood = icmp eq {byte} %allnext, -1")
-        t.write_line("br i1 %isgood, label %done, label %find")
-        t.write_label("find")
-        t.write_line("%w = phi i64 [0, %told], [%wnext, %find]")
-        place = t.add_instruction("getelementptr i8, ptr %flags, i64 %w")
-        t.write_line(f"%bits = load {byte}, ptr {place}")
-        t.write_line("%wnext = add i64 %w, 1")
-        t.write_line(f"%wmore = icmp eq {byte} %bits, -1")
-        t.write_line("br i1 %wmore, label %find, label %found")
-        t.write_label("found")
-        bad = t.add_instruction(f"xor {byte} %bits, -1")
-        lane = t.add_instruction(f"call {byte} @llvm.cttz.{byte}({byte} {bad}, i1 true)")
-        wide = t.add_instruction(f"zext {byte} {lane} to i64")
-        t.write_line(f"%come = add i64 {t.add_instruction(f'mul i64 %w, {LANES}')}, {wide}")
-        place = t.add_instruction("getelementptr i8, ptr %deadflags, i64 %w")
-        dead = t.add_instruction(f"lshr {byte} {t.add_instruction(f'load {byte}, ptr {place}')}, {lane}")
-        dead = t.add_instruction(f"trunc {byte} {dead} to i1")
-        verdict = t.add_instruction(f"select i1 {dead}, i64 {DEAD_POINT}, i64 {UNDECIDED}")
-        t.write_line("%ends = icmp slt i64 %come, %limit")
-        t.write_line("br i1 %ends, label %stopped, label %done")
-        t.write_label("stopped")
-        write_ended(t, "%come", verdict)
-        t.write_line("br label %done")
+class Direction(NamedTuple):
+    """Values of a vector along a link, with its squared length, None where that is one."""
+
+    x: str
+    y: str
+    square: str | None
 
 
-def write_turn_flags(t: IRWriter, good: str, now: Sequence[str], earlier: Sequence[str], least_cosine: float) -> str:
-    """Where it is good, and none of the directions, each a cosine and a sine, turns fast from one step to the next."""
-    for k in range(0, len(now), 2):
-        cosine = t.add_all([t.binary("mul", a, b) for a, b in zip(now[k : k + 2], earlier[k : k + 2], strict=True)])
-        # where a step is no position nothing turns
-        good = t.and_flags(good, t.compare("uge", cosine, t.constant(least_cosine)))
+def write_turn_flags(
+    t: IRWriter, good: str, now: Sequence[Direction], earlier: Sequence[str], least_cosine: float
+) -> str:
+    """Where it is good, and none of the directions, which were so in the step before (x and y of each), turns fast."""
+    for k, (x, y, square) in enumerate(now):
+        along = t.add_all([t.binary("mul", a, b) for a, b in zip((x, y), earlier[2 * k : 2 * k + 2], strict=True)])
+        least = t.constant(least_cosine)
+        if square is not None:
+            least = t.binary("mul", square, least)
+        # at the first step there is none before
+        good = t.and_flags(good, t.compare("uge", along, least))
     return good
 
 
-def write_where_good(t: IRWriter, clear: str, good: str) -> str:
-    """How clear a step is where it is good; else no number, but for what is below zero."""
-    told = t.or_flags(good, t.compare("olt", clear, t.constant(0.0)))
-    return t.select(told, clear, t.constant(nan))
+class ClearFlags(NamedTuple):
+    """Whether no dead point is near a step; how clear the two steps before it are at least, and how clear they need to
+    be."""
+
+    is_clear: str
+    least_before: str
+    needed: str
 
 
-def write_fine_flags(t: IRWriter, clear: str, one: str, two: str, clearance: str) -> tuple[str, str, str]:
-    """Whether no dead point is near, by how clear a step and the two before it are; how clear these two are at least,
-    and how clear they need to be. Between steps what is clear bends by less than its second differences say."""
+def write_clear_flags(t: IRWriter, clear: str, one: str, two: str, clearance: str) -> ClearFlags:
+    """Judge by how clear of a dead point a step and the two before it are: between steps that bends by less than its
+    second differences say."""
 
     def pick(how: str, a: str, b: str) -> str:
         return t.select(t.compare(how, a, b), a, b)
@@ -308,7 +313,7 @@ def write_fine_flags(t: IRWriter, clear: str, one: str, two: str, clearance: str
     bend = t.call_intrinsic("fabs", t.binary("sub", t.binary("sub", clear, one), t.binary("sub", one, two)))
     # at the first steps some of these are no numbers, which is passed over
     needed, least = pick("ogt", bend, clearance), pick("olt", two, one)
-    return t.compare("ogt", pick("olt", least, clear), needed), least, needed
+    return ClearFlags(t.compare("ogt", pick("olt", least, clear), needed), least, needed)
 
 
 def write_ended(t: IRWriter, step: str, outcome: str) -> None:

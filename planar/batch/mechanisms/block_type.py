@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from functools import lru_cache, partial
 from itertools import product
@@ -10,8 +10,8 @@ from typing import NamedTuple
 
 import casadi as ca
 
-from planar.codegen.block_formula import BlockFormula, FormulaInput
 from planar.codegen.instructions import CosSin, check_length, expand_angle_sums
+from planar.codegen.tape import BlockFormula, FormulaInput
 from planar.equations.closed_form import ClosedForm, find_closed_form
 from planar.equations.coordinates import coordinate_columns, frames_from_coordinates
 from planar.equations.generic_evaluation import inline_function
@@ -461,6 +461,16 @@ def find_block_type(signature: BlockSignature) -> BlockType:
 @lru_cache
 def _sample_pair(type_: type[Pair]) -> Pair:
     return type_.samples()[0].pair
+
+
+def write_formula(inputs: Sequence[Sequence[FormulaInput]], write: Callable[..., Sequence[ca.SX]]) -> BlockFormula:
+    """The formula of what is written of groups of inputs, each a column."""
+    listing: InstructionList[FormulaInput] = InstructionList()
+    symbols = [ca.SX.sym(f"of{k}", len(own)) for k, own in enumerate(inputs)]
+    function = ca.Function("written", symbols, [ca.densify(ca.vertcat(*write(*symbols)))], {"cse": True})
+    (wanted,) = inline_function(listing, function, [[listing.add_input(each) for each in own] for own in inputs])
+    leaves = {k: key for k in required_values(listing, wanted) if (key := listing.instructions[k].key) is not None}
+    return BlockFormula(listing, tuple(wanted), leaves)
 
 
 class NewtonFormulas(NamedTuple):

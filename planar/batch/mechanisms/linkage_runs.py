@@ -6,9 +6,24 @@ from collections.abc import Sequence
 from functools import lru_cache
 from typing import Any
 
+import casadi as ca
 import numpy as np
 
-from planar.batch.mechanisms.block_type import COS, POSE_ROWS, SIN, TURN1, TURN2, X1, X2, Y1, Y2, BlockType, X, Y
+from planar.batch.mechanisms.block_type import (
+    COS,
+    POSE_ROWS,
+    SIN,
+    TURN1,
+    TURN2,
+    X1,
+    X2,
+    Y1,
+    Y2,
+    BlockType,
+    X,
+    Y,
+    write_formula,
+)
 from planar.batch.mechanisms.initial_assembly import LEAST_CLEARANCE, StartAssemblies, find_start_assemblies
 from planar.batch.mechanisms.linkages import BlockBatch, LinkageArrays, LinkageGroup, SweepRequest, linkage_group
 from planar.batch.mechanisms.newton_march import compile_newton_block, newton_numbers, step_table
@@ -34,11 +49,10 @@ from planar.batch.mechanisms.tape_runs import (
     run_taped_linkages,
 )
 from planar.batch.stop_checks import find_first_stop
-from planar.codegen.block_formula import BlockFormula, FormulaInput
-from planar.codegen.tape import TapeFormula, compile_block
+from planar.codegen.tape import FormulaInput, TapeFormula, compile_block
 from planar.foundation.arrays import Array, IntArray
 from planar.foundation.errors import Outcome
-from planar.foundation.instruction_list import InstructionList
+from planar.foundation.geometry import Vector
 from planar.model.mechanism import Mechanism, running_input_index
 
 RUNNING_INPUT, STANDING_INPUT, POINT, FIRST_BLOCK_TYPE = range(4)
@@ -166,7 +180,7 @@ def _block_kinds(types: Sequence[BlockType], rates: bool) -> BlockKinds:
             return compile_newton_block(kind, rates)
         wide, inner = _pose_rows(rates), range(kind.slot_count - len(kind.inner_links), kind.slot_count)
         rows = tuple((slot, row) for slot in inner for row in range(wide))
-        directions = tuple((wide * k + COS, wide * k + SIN) for k in range(len(inner)))
+        directions = tuple((wide * k + COS, wide * k + SIN, None) for k in range(len(inner)))
         formula = TapeFormula(kind.run_formula(rates, polished), rows, directions, is_checked=True)
         return compile_block(formula, LEAST_COSINE)
 
@@ -177,45 +191,21 @@ def _pose_rows(rates: bool) -> int:
     return POSE_ROWS + 6 if rates else POSE_ROWS
 
 
-class _Listing:
-    """A formula as it is written, value after value."""
-
-    def __init__(self) -> None:
-        self.instructions: InstructionList[FormulaInput] = InstructionList()
-        self.leaves: dict[int, FormulaInput] = {}
-
-    def take(self, source: str, place: int, part: int = 0) -> int:
-        """A value from outside."""
-        key = FormulaInput(source, place, part)
-        number = self.instructions.add_input(key)
-        self.leaves[number] = key
-        return number
-
-    def turn(self, c: int, s: int, x: int, y: int) -> tuple[int, int]:
-        """x and y turned by an angle of which the cosine and sine are known."""
-        add = self.instructions.add
-        return add("sub", add("mul", c, x), add("mul", s, y)), add("add", add("mul", s, x), add("mul", c, y))
-
-    def as_tape_formula(self, wanted: Sequence[int], rows: Sequence[int]) -> TapeFormula:
-        """The formula of values that go to rows of the second slot."""
-        formula = BlockFormula(self.instructions, tuple(wanted), self.leaves)
-        return TapeFormula(formula, tuple((1, row) for row in rows))
-
-
 @lru_cache
 def input_formula(is_running: bool, rates: bool) -> TapeFormula:
     """The position of an input, cosine and sine of it, and its rates, from its numbers and how far inputs have
     turned."""
-    made = _Listing()
-    value, c, s, *own_rates = (made.take("p", k) for k in range(INPUT_NUMBERS))
-    if is_running:
-        cos, sin, angle = (made.take("row", 0, row) for row in (TABLE_COS, TABLE_SIN, TABLE_ANGLE))
-        value = made.instructions.add("add", value, angle)
-        c, s = made.turn(cos, sin, c, s)
-    else:
-        own_rates = [made.instructions.add_constant(0.0)] * 2
+
+    def write(table: ca.SX, numbers: ca.SX) -> list[ca.SX]:
+        if is_running:
+            c, s = Vector(numbers[1], numbers[2]).rotate(Vector(table[TABLE_COS], table[TABLE_SIN]))
+            return [numbers[0] + table[TABLE_ANGLE], c, s, numbers[3:]]
+        return [numbers[:3], ca.SX.zeros(2)]
+
     rows = (X, COS, SIN, X1, X2) if rates else (X, COS, SIN)
-    return made.as_tape_formula((value, c, s, *own_rates)[: len(rows)], rows)
+    table = [FormulaInput("row", 0, row) for row in (TABLE_COS, TABLE_SIN, TABLE_ANGLE)]
+    formula = write_formula([table, [FormulaInput("p", k) for k in range(INPUT_NUMBERS)]], write)
+    return TapeFormula(formula, tuple((1, row) for row in rows))
 
 
 @lru_cache
@@ -224,18 +214,16 @@ def point_formula(rates: bool) -> TapeFormula:
 
     Numbers: the point in its link (m), then what the link's own lengths are multiplied by.
     """
-    made = _Listing()
-    add = made.instructions.add
-    px, py, unit = (made.take("p", k) for k in range(3))
-    link = {row: made.take("row", 0, row) for row in range(_pose_rows(rates))}
-    rx, ry = made.turn(link[COS], link[SIN], px, py)
-    scaled = {row: add("mul", link[row], unit) for row in ((X, Y, X1, Y1, X2, Y2) if rates else (X, Y))}
-    wanted = [add("add", scaled[X], rx), add("add", scaled[Y], ry)]
-    if rates:
-        turn1, turn2 = link[TURN1], link[TURN2]
-        square = add("mul", turn1, turn1)
-        wanted.append(add("sub", scaled[X1], add("mul", turn1, ry)))
-        wanted.append(add("add", scaled[Y1], add("mul", turn1, rx)))
-        wanted.append(add("sub", scaled[X2], add("add", add("mul", turn2, ry), add("mul", square, rx))))
-        wanted.append(add("add", scaled[Y2], add("sub", add("mul", turn2, rx), add("mul", square, ry))))
-    return made.as_tape_formula(wanted, range(POINT_ROWS[rates]))
+
+    def write(link: ca.SX, numbers: ca.SX) -> list[ca.SX]:
+        arm = ca.vertcat(*map(ca.SX, Vector(numbers[0], numbers[1]).rotate(Vector(link[COS], link[SIN]))))
+        found = [numbers[2] * link[[X, Y]] + arm]
+        if rates:
+            across = ca.vertcat(-arm[1], arm[0])
+            found.append(numbers[2] * link[[X1, Y1]] + link[TURN1] * across)
+            found.append(numbers[2] * link[[X2, Y2]] + link[TURN2] * across - link[TURN1] ** 2 * arm)
+        return found
+
+    link = [FormulaInput("row", 0, row) for row in range(_pose_rows(rates))]
+    formula = write_formula([link, [FormulaInput("p", k) for k in range(3)]], write)
+    return TapeFormula(formula, tuple((1, row) for row in range(POINT_ROWS[rates])))

@@ -11,7 +11,6 @@ import numpy as np
 from planar.batch.march.prediction import correction_limit, extrapolation_weights
 from planar.batch.mechanisms.block_type import COS, POSE_ROWS, SIN, BlockType
 from planar.batch.mechanisms.tape_runs import LEAST_COSINE
-from planar.codegen.block_formula import BlockFormula, FormulaInput
 from planar.codegen.llvm_compile import compile_function
 from planar.codegen.llvm_ir import IRWriter
 from planar.codegen.tape import (
@@ -19,10 +18,12 @@ from planar.codegen.tape import (
     BLOCK_ARGUMENTS,
     BLOCK_NAME,
     UNDECIDED,
+    BlockFormula,
+    Direction,
+    FormulaInput,
+    write_clear_flags,
     write_ended,
-    write_fine_flags,
     write_turn_flags,
-    write_where_good,
 )
 from planar.foundation.arrays import Array
 
@@ -152,13 +153,13 @@ class _NewtonBlockWriter:
                 t.store(t.load(earlier), later)
             t.store(whole, own[0])
         good = t.and_flags(t.compare("ole", left, self.tolerance), t.compare("ole", far, most))
-        now = [told[number + part] for number in range(0, len(told), self.row_count) for part in (COS, SIN)]
+        places = range(0, len(told), self.row_count)
+        now = [Direction(told[number + COS], told[number + SIN], None) for number in places]
         good = write_turn_flags(t, good, now, [t.load(slot) for slot in self.direction_slots], LEAST_COSINE)
-        for value, slot in zip(now, self.direction_slots, strict=True):
+        for value, slot in zip((part for each in now for part in each[:2]), self.direction_slots, strict=True):
             t.store(value, slot)
-        clear = write_where_good(t, t.load(self.regularity_slot), good)
-        one, two = (t.load(slot) for slot in self.clear_slots)
-        fine, *_ = write_fine_flags(t, clear, one, two, self.clearance)
+        clear, one, two = (t.load(slot) for slot in (self.regularity_slot, *self.clear_slots))
+        fine = t.and_flags(good, write_clear_flags(t, clear, one, two, self.clearance).is_clear)
         t.store(clear, self.clear_slots[0])
         t.store(one, self.clear_slots[1])
         t.write_line(f"br i1 {t.add_instruction(f'extractelement <1 x i1> {fine}, i64 0')}, label %good, label %bad")
