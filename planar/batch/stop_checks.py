@@ -24,7 +24,7 @@ class FirstStop(NamedTuple):
 
 def watched_links(mechanism: Mechanism) -> tuple[str, ...]:
     """The moving links whose places tell where the pairs with stops are."""
-    motions = relative_motions(mechanism)
+    motions = relative_motions(mechanism) if mechanism.stops else {}
     links = [link for each in mechanism.stops for link in motions[each.pair].bodies]
     return tuple(link for link in dict.fromkeys(links) if link != mechanism.frame)
 

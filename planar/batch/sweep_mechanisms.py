@@ -220,12 +220,16 @@ def _solve_pinned_rounded(
 
 
 def _solve_linkages(
-    linkages: PinnedLinkages, request: SweepRequest, told: ToldPins | None = None, values: Array | None = None
+    linkages: PinnedLinkages,
+    request: SweepRequest,
+    told: ToldPins | None = None,
+    values: Array | None = None,
+    mechanisms: Sequence[Mechanism] | None = None,
 ) -> PinnedPart:
     solve_blocks = partial(solve_partitioned, request=request)
     solve_general = partial(_solve_with_general_path, request=request)
     with take_turn():
-        return solve_pinned(linkages, request, solve_blocks, solve_general, told, values)
+        return solve_pinned(linkages, request, solve_blocks, solve_general, told, values, mechanisms)
 
 
 def solve_mechanisms(mechanisms: Sequence[Mechanism], request: SweepRequest) -> SweptPart:
@@ -246,8 +250,9 @@ def _solve_some(mechanisms: Sequence[Mechanism], request: SweepRequest) -> Swept
         kept = mechanisms[0].__dict__  # what is found of one linkage serves its next run
         if "_linkages" not in kept:
             kept["_linkages"] = PinnedLinkages.from_layouts(list(layouts.values()))
-        return _solve_linkages(kept["_linkages"], request)
-    pinned = _solve_linkages(PinnedLinkages.from_layouts(list(layouts.values())), request)
+        return _solve_linkages(kept["_linkages"], request, mechanisms=mechanisms)
+    own = [mechanisms[k] for k in layouts]
+    pinned = _solve_linkages(PinnedLinkages.from_layouts(list(layouts.values())), request, mechanisms=own)
     if len(layouts) == len(mechanisms):
         return pinned
     found = {number: pinned.swept(k) for k, number in enumerate(layouts)}

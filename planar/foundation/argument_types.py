@@ -44,7 +44,7 @@ def check_field_types(made: Any) -> None:
     kind = type(made)
     for field in _annotated_fields(cast("Hashable", kind)):
         value = getattr(made, field.name)
-        if field.options and not any(_is_of_type(value, option) for option in field.options):
+        if field.options and not _is_of_any(value, field.options):
             wanted = " or ".join(dict.fromkeys(_describe(option) for option in field.options))
             raise BadInput(f"{kind.__name__}.{field.name}", f"{wanted} is wanted here, not {value!r:.60}")
 
@@ -105,23 +105,32 @@ def _options(node: ast.expr, known: Mapping[str, Any]) -> tuple[_Option, ...]:
     return ()
 
 
+def _is_of_any(value: Any, options: Sequence[_Option]) -> bool:
+    """Whether a value is of one of some types, most often of the first."""
+    return _is_of_type(value, options[0]) or any(_is_of_type(value, option) for option in options[1:])
+
+
 def _is_of_type(value: Any, option: _Option) -> bool:
-    if option.name == "None":
-        return value is None
-    if option.name in NUMBER_NAMES:
+    kind, name = type(value), option.name
+    if name == "tuple":
+        return _is_tuple_of(value, option)
+    if kind.__name__ == name:
+        return True
+    if name in NUMBER_NAMES:
         is_other = value is None or callable(value) or is_dataclass(value)
         return not is_other and not isinstance(value, str | bytes | list | tuple | set | Mapping)
-    if option.name in PLAIN_TYPES:
-        return isinstance(value, PLAIN_TYPES[option.name])
-    if option.name == "tuple":
-        if isinstance(value, str | bytes) or not isinstance(value, Sequence | np.ndarray):
-            return False
-        items = option.items * len(value) if option.repeats else option.items
-        return len(items) == len(value) and all(
-            not types or any(_is_of_type(item, type_) for type_ in types)
-            for item, types in zip(value, items, strict=True)
-        )
-    return any(base.__name__ == option.name for base in type(value).__mro__)
+    if name in PLAIN_TYPES:
+        return isinstance(value, PLAIN_TYPES[name])
+    return value is None if name == "None" else any(base.__name__ == name for base in kind.__mro__)
+
+
+def _is_tuple_of(value: Any, option: _Option) -> bool:
+    if type(value) is not tuple and (isinstance(value, str | bytes) or not isinstance(value, Sequence | np.ndarray)):
+        return False
+    items = option.items * len(value) if option.repeats else option.items
+    return len(items) == len(value) and all(
+        not options or _is_of_any(item, options) for item, options in zip(value, items, strict=True)
+    )
 
 
 def _describe(option: _Option) -> str:

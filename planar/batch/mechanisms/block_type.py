@@ -145,12 +145,26 @@ NAN_PROBE = 1e-300
 """Times what is a number it is nothing beside round-off; times what is none it is none."""
 
 
+FAR_AWAY = 1e300
+"""A squared distance, and more than what is left open where there is a way."""
+
+
 class SymbolicAssembly(NamedTuple):
     """A way to assemble a kind: the numbers of the values that stand for its unknowns, and of its bends."""
 
     z: list[int]
     cos_sin: dict[int, CosSin]
     bends: list[int]
+
+
+class _StartWay(NamedTuple):
+    """Numbers of values of a way to assemble a kind: what is told of it, its squared distance to the sketch, what it
+    leaves open, and how far it is from where two ways meet."""
+
+    told: list[int]
+    distance: int
+    left: int
+    clear: int
 
 
 class FormulaBuilder:
@@ -352,6 +366,30 @@ class FormulaBuilder:
             whole = add("add", whole, own)
         return whole
 
+    def nearest_way(self, ways: Sequence[_StartWay]) -> list[int]:
+        """What is told of the way that is nearest to the sketch, its squared distance, that of the next, and how far
+        any way is from where two meet. What cannot be joined is `FAR_AWAY`."""
+        add = self.instructions.add
+        far = self.instructions.add_constant(FAR_AWAY)
+        distances = []
+        for way in ways:
+            is_joined = add("less", way.left, far)
+            distances.append(
+                add("add", add("where", is_joined, way.distance), add("where", add("not", is_joined), far))
+            )
+        told, nearest, second, clear = ways[0].told, distances[0], far, add("abs", ways[0].clear)
+        for way, distance in zip(ways[1:], distances[1:], strict=True):
+            is_nearer = add("less", distance, nearest)
+            stays = add("not", is_nearer)
+            told = [
+                add("add", add("where", is_nearer, new), add("where", stays, old))
+                for new, old in zip(way.told, told, strict=True)
+            ]
+            second = add("minnum", second, add("maxnum", nearest, distance))
+            nearest = add("minnum", nearest, distance)
+            clear = add("minnum", clear, add("abs", way.clear))
+        return [*told, nearest, second, clear]
+
     def make_formula(self, wanted: list[int]) -> BlockFormula:
         """The formula of wanted values. Raises UnsupportedOperation where an angle stands outside cos and sin, or it is
         long."""
@@ -395,23 +433,26 @@ class BlockType(BlockEquations):
 
     @property
     def start_formula(self) -> BlockFormula:
-        """(given links and inputs, numbers with statistics) -> for each way to assemble the group its inner
-        links' x, y, cos and sin, then what is left open, how far from where two ways meet, and the distance."""
+        """(given links and inputs, numbers with sums of the sketch) -> of the way to assemble the block that is nearest
+        to the sketch its inner links' x, y, cos and sin, then its signs, its squared distance and that of the next,
+        what is left open, and how far from where two ways meet any is."""
         if self._start_formula is None:
             work = FormulaBuilder(self)
             first = len(self.measures) + 2 * len(self.angle_measures)
-            stats = [
+            sums = [
                 [work.add_input("p", first + SKETCH_SUMS * k + i) for i in range(SKETCH_SUMS)]
                 for k in range(len(self.inner_links))
             ]
-            wanted: list[int] = []
+            ways = []
             for signs in product((1.0, -1.0), repeat=self.sign_count):
-                way = work.closed_form_assembly([work.instructions.add_constant(sign) for sign in signs])
+                own = [work.instructions.add_constant(sign) for sign in signs]
+                way = work.closed_form_assembly(own)
                 poses = work.poses(way)
-                wanted += [each for pose in poses for each in pose]
-                wanted += work.acceptance_values(way, work.residuals(way, poses))
-                wanted.append(work.sketch_distance(poses, stats))
-            self._start_formula = work.make_formula(wanted)
+                left, clear = work.acceptance_values(way, work.residuals(way, poses))
+                told = [*(each for pose in poses for each in pose), *own, left]
+                ways.append(_StartWay(told, work.sketch_distance(poses, sums), left, clear))
+            *told, left, nearest, second, least_clear = work.nearest_way(ways)
+            self._start_formula = work.make_formula([*told, nearest, second, left, least_clear])
         return self._start_formula
 
     _start_formula: BlockFormula | None = None

@@ -70,9 +70,9 @@ class LinkageArrays:
     """Linkages as arrays. `link_counts` (linkages,): how many links and inputs each has beside the frame; lengths in
     units of `unit` (m).
 
-    `batches` are solved one after the other. `sketch`: x and y in the link, and where it is shown (sizes). `points`: x
-    and y in the link (m), of those that are wanted. `shown_points`: as `sketch`, for every link that has a point, and
-    pins on the frame too.
+    `batches`: one of each kind; the blocks of a linkage are solved in the order of their numbers. `sketch`: x and y in
+    the link, and where it is shown (sizes). `points`: x and y in the link (m), of those that are wanted.
+    `shown_points`: as `sketch`, for every link that has a point, and pins on the frame too.
     """
 
     link_counts: Array
@@ -109,30 +109,26 @@ _BlockRow = tuple[int, Sequence[int], Sequence[float], int]
 def make_linkage_arrays(linkages: Sequence[PartitionedLinkage]) -> LinkageArrays:
     """Parted linkages as arrays."""
     unit = np.array([one.partition.unit for one in linkages])
-    levels: dict[tuple[int, int], list[_BlockRow]] = {}
+    rows: dict[int, list[_BlockRow]] = {}
     kinds: dict[int, BlockType] = {}
     number = 0
     for owner, one in enumerate(linkages):
         for group in one.partition.blocks:
             kinds[id(group.block_type)] = group.block_type
-            row = (owner, group.link_indices, group.p, number)
-            levels.setdefault((group.level, id(group.block_type)), []).append(row)
+            rows.setdefault(id(group.block_type), []).append((owner, group.link_indices, group.p, number))
             number += 1
 
-    def batches(of: dict[tuple[int, int], list[_BlockRow]]) -> list[BlockBatch]:
-        made = []
-        for key in sorted(of):
-            owners, places, p, block_numbers = zip(*of[key], strict=True)
-            made.append(make_batch(kinds[key[1]], owners, places, p, block_numbers, unit))
-        return made
-
+    batches = []
+    for key, own in rows.items():
+        owners, places, p, block_numbers = zip(*own, strict=True)
+        batches.append(make_batch(kinds[key], owners, places, p, block_numbers, unit))
     inputs = [(owner, 1 + k, *each) for owner, one in enumerate(linkages) for k, each in enumerate(one.inputs)]
     parts = zip(*inputs, strict=True)
     return LinkageArrays(
         np.array([one.partition.index_count - 1 for one in linkages]),
         unit,
         np.array([one.partition.tolerance for one in linkages]),
-        batches(levels),
+        batches,
         InputArrays(*(np.array(part) for part in parts)),
         _point_arrays([one.sketch for one in linkages], 4),
         _point_arrays([one.points for one in linkages], 2),

@@ -38,9 +38,8 @@ def step_table(steps: int, step: float) -> Array:
     """Of every step of such a length the weights of the moves before, how often it is corrected, and by how much at
     most (steps, TABLE_COLUMNS): what is not where it was predicted may be elsewhere."""
     table = np.zeros((steps, TABLE_COLUMNS))
-    for k in range(steps):
-        known = min(max(k - 1, 0), PREDICTOR_ORDER)
-        table[k, :known] = extrapolation_weights(known)
+    for known in range(1, PREDICTOR_ORDER + 1):
+        table[known + 1 :, :known] = extrapolation_weights(known)
     table[:, -2:] = CORRECTIONS, correction_limit(step)
     table[: PREDICTOR_ORDER + 2, -2], table[: PREDICTOR_ORDER + 1, -1] = FIRST_CORRECTIONS, inf
     return table

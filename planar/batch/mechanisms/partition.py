@@ -38,14 +38,13 @@ class NotPartitionable(Exception):
 class PartitionBlock(NamedTuple):
     """One group of a mechanism: its kind, the places of its given links, inputs and inner links, and its numbers p (m).
 
-    `level`: after which it can be solved. `inner_links` are numbers of links.
+    `inner_links` are numbers of links; blocks follow those that give them links.
     """
 
     block_type: BlockType
     link_indices: tuple[int, ...]
     p: list[float]
     inner_links: tuple[int, ...]
-    level: int
 
 
 class Partition(NamedTuple):
@@ -169,7 +168,6 @@ class _Partitioner:
         self.shared_pins = self._find_shared_pins()
         self.link_index = [-1] * many
         self.link_index[self.frame] = 0
-        self.level = [0] * many
         self.blocks: list[PartitionBlock] = []
         self.index_count = 1 + len(mechanism.inputs)
 
@@ -320,7 +318,7 @@ class _Partitioner:
         found.sort()
         given: list[int] = []
         p: list[float] = []
-        key, inputs, level = [], [], 0
+        key, inputs = [], []
         shapes, names = self.shapes, self.names
         for number, here, inside, turned, is_driven, k, other in found:
             there = inside
@@ -328,7 +326,6 @@ class _Partitioner:
                 there = FRAME_BODY if is_driven and other == self.frame else -1 - len(given)
                 if there != FRAME_BODY:
                     given.append(place[other])
-                level = max(level, self.level[other])
             if is_driven:
                 inputs.append(1 + driven[k])
             key.append((number, (here, there) if turned else (there, here), is_driven))
@@ -349,8 +346,7 @@ class _Partitioner:
             place[link] = self.index_count
             own_places.append(self.index_count)
             self.index_count += 1
-            self.level[link] = level + 1
-        self.blocks.append(PartitionBlock(own, (*given, *inputs, *own_places), p, inner, level))
+        self.blocks.append(PartitionBlock(own, (*given, *inputs, *own_places), p, inner))
 
     def _sort_key(self, link: int) -> tuple[int, list[tuple[int, bool, bool, bool]]]:
         """What a link of a group is held by, so that equal groups come out alike."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -39,10 +39,12 @@ def solve_pinned(
     solve_general: Callable[[Mechanism], Swept],
     told: ToldPins | None = None,
     values: Array | None = None,
+    mechanisms: Sequence[Mechanism] | None = None,
 ) -> PinnedPart:
     """All linkages. Those that are no crank and dyads go to `solve_blocks`, what is not sure to `solve_general`.
 
-    `values` take the points that are told, where there is room for them.
+    `values` take the points that are told, where there is room for them. `mechanisms` are the linkages as such, where
+    they are there.
     """
     steps, rates = request.steps, request.rates
     told = find_told_pins(linkages, request.points) if told is None else told
@@ -60,9 +62,14 @@ def solve_pinned(
 
     is_dyadic = np.zeros(len(linkages), dtype=bool)
     is_dyadic[tape.which] = True
+
+    def mechanism(number: int) -> Mechanism:
+        return linkages[number] if mechanisms is None else mechanisms[number]
+
     others = np.flatnonzero(~is_dyadic).tolist()
-    found = dict(zip(others, solve_blocks([linkages[k] for k in others]), strict=True)) if others else {}
-    found |= {k: solve_general(linkages[k]) for k in tape.which[~run.is_decided].tolist()}
+    found = dict(zip(others, solve_blocks([mechanism(k) for k in others]), strict=True)) if others else {}
+    found |= {k: solve_general(mechanism(k)) for k in tape.which[~run.is_decided].tolist()}
+
     owner = np.repeat(np.arange(len(linkages)), np.diff(told.first))
     pins = told.pins - linkages.first_pin[owner]
     solved, bars = np.zeros(len(linkages), dtype=np.int64), np.zeros((len(linkages), 2), dtype=np.int64)
