@@ -138,6 +138,8 @@ def _underdetermined_columns(
     unmatched_columns: Sequence[int], rows: Sequence[AbstractSet[int]], row_of: dict[int, int]
 ) -> set[int]:
     """The columns that stay free: the loose ones, and those whose constraints touch a free one."""
+    if not unmatched_columns:
+        return set()
     touching: dict[int, list[int]] = {}
     column_of = {row: column for column, row in row_of.items()}
     for row, held in enumerate(rows):

@@ -167,8 +167,7 @@ class _DesignsKernelWriter(KernelWriter):
         t.write_line("}")
         if self.linear_systems is not None:
             t.write_line(self.linear_systems.function_text)
-        width = PREDICTOR_ORDER + 3 * self.input_count
-        return DesignsKernelLayout(self.state, self.input_operands, rows, width, t.module_text(), t.lanes, self.start)
+        return DesignsKernelLayout(self.state, self.input_operands, rows, t.module_text(), t.lanes, self.start)
 
     def _row_pointer(self, base: str, k: int) -> str:
         """Where the entries of a row that is read stand for this block of designs."""

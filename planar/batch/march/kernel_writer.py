@@ -42,7 +42,6 @@ class DesignsKernelLayout(NamedTuple):
     state: tuple[Operand, ...]
     inputs: tuple[Operand, ...]
     output_row_count: int
-    table_width: int
     ir: str
     lanes: int
     start: KernelStart

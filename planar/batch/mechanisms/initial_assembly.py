@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,6 +17,9 @@ from planar.foundation.geometry import GROUND, Frame
 
 LEAST_CLEARANCE = 1e-4
 """Nearer than this to where two assemblies meet neither is taken."""
+SKETCH_DISTANCE_RATIO = 0.075
+"""How far points may lie from the sketch on average (sizes) for a slope that is as regular as one: another assembly
+lies farther off."""
 START_TOLERANCE_FACTOR = 100.0
 """How much more may be left open at a start, which is looked at again in the run."""
 MAX_UNKNOWNS = 24
@@ -42,54 +44,41 @@ def find_start_assemblies(linkages: LinkageArrays) -> StartAssemblies:
     A way to assemble a block is taken where it is nearer to the sketch than any other by more than all blocks of the
     linkage together are away from it: whatever else were taken, the whole would lie farther off. Blocks that are not in
     closed form are solved from where they are shown: their points lie at the sketch, and the slope is so regular that
-    no other assembly is near, see `BlockAssemblies`.
+    no other assembly is as near, see `BlockAssemblies`.
     """
-    many = len(linkages)
-    first = np.concatenate([[0], np.cumsum(linkages.link_counts)])
-    state = np.zeros((1 + first[-1], POSE_ROWS, LANES))
-    _fill_inputs(state, linkages, first)
-    sums = _sketch_sums(linkages.sketch, first)
-    shown: _ShownFrames | None = None
-    starts: list[_BatchStart] = []
-    for batch in linkages.batches:
-        kind, index = batch.block_type, batch.state_indices(first)
-        if kind.has_closed_form:
-            p = np.hstack([batch.p, sums[index[:, batch.inner_slots]].reshape(len(index), -1)])
-            rows = [(slot, row) for slot in range(kind.slot_count)[batch.inner_slots] for row in range(POSE_ROWS)]
-            rows += [(kind.slot_count, row) for row in range(kind.sign_count + JUDGED_ROWS)]
-            function = compile_block(TapeFormula(kind.start_formula, tuple(rows)))
-            starts.append(_BatchStart(batch, index, p, function))
-        else:
-            shown = _shown_frames(linkages, first) if shown is None else shown
-            z, is_shown = _unknowns_from_frames(kind, shown, index, batch.p)
-            p = newton_numbers(kind, batch.p, z)
-            starts.append(_BatchStart(batch, index, p, compile_newton_block(kind, False), z, is_shown))
-    is_sure, judged = _run_starts(linkages, state, starts)
-
-    cost = np.zeros(many)
+    many, blocks = len(linkages), linkages.block_count
+    starts = _Starts(linkages)
+    is_sure = starts.run(np.full(many, LEAST_CLEARANCE))
+    if starts.take_solved_frames():
+        is_sure = starts.run(np.full(many, LEAST_CLEARANCE))
+    cost, clearance = np.zeros(many), np.full(many, LEAST_CLEARANCE)
     margins: list[tuple[Array, Array]] = []
-    signs, z = np.ones((linkages.block_count, MAX_SIGNS)), np.zeros((linkages.block_count, MAX_UNKNOWNS))
-    for start in starts:
-        batch, kind, unknowns = start.batch, start.batch.block_type, start.unknowns
-        inner = start.places[:, batch.inner_slots]
-        if unknowns is None or start.is_shown is None:
-            own = judged[batch.block_numbers, :, 0]
-            signs[batch.block_numbers, : kind.sign_count] = own[:, : kind.sign_count]
+    signs, z = np.ones((blocks, MAX_SIGNS)), np.zeros((blocks, MAX_UNKNOWNS))
+    for batch in linkages.batches:
+        kind, owner, numbers = batch.block_type, batch.owner, batch.block_numbers
+        if kind.has_closed_form:
+            own = starts.told[numbers, :, 0]
+            signs[numbers, : kind.sign_count] = own[:, : kind.sign_count]
             nearest, second, left, clear = own[:, kind.sign_count : kind.sign_count + JUDGED_ROWS].T
             with np.errstate(invalid="ignore"):
-                good = left <= START_TOLERANCE_FACTOR * linkages.tolerance[batch.owner]
+                good = left <= START_TOLERANCE_FACTOR * linkages.tolerance[owner]
                 good &= ~(clear < LEAST_CLEARANCE)
             # what can be assembled in one way alone may lie far off where others are
             distance = np.where(good, np.maximum(nearest, 0.0), 0.0)
-            margins.append((batch.owner, second - nearest))
+            margins.append((owner, second - nearest))
         else:
-            z[batch.block_numbers, : unknowns.shape[1]] = unknowns
-            distance, points = _distance_to_sketch(state[inner, :, 0], sums[inner]), sums[inner, 0].sum(axis=1)
-            good = start.is_shown & (points > 0.0) & is_at_sketch(distance, points)
-        is_sure[batch.owner[~good]] = False
-        cost += np.bincount(batch.owner, distance, many)
+            shown = starts.shown[kind]
+            z[numbers, : shown.unknowns.shape[1]] = shown.unknowns
+            distance, points = starts.distance_to_sketch(batch)
+            good = shown.is_shown & (points > 0.0) & is_at_sketch(distance, points)
+            needed = distance / np.maximum(points, 1.0) / SKETCH_DISTANCE_RATIO**2
+            np.maximum.at(clearance, owner[good], np.minimum(needed, CLEAR_REGULARITY**2)[good])
+        is_sure[owner[~good]] = False
+        cost += np.bincount(owner, distance, many)
     for owner, margin in margins:
         is_sure[owner[~is_surely_farther(margin, cost[owner], roundings=2)]] = False
+    if np.any(clearance > LEAST_CLEARANCE):
+        is_sure &= starts.run(clearance)
     return StartAssemblies(is_sure, signs, z)
 
 
@@ -97,49 +86,96 @@ JUDGED_ROWS = 4
 """Rows that are told of a start in closed form after its signs: see `BlockType.start_formula`."""
 
 
-class _BatchStart(NamedTuple):
-    """How a batch of blocks starts: its places in the state, numbers and function; and for those that are not in closed
-    form the unknowns (blocks, unknowns) from which they are solved, and which of them are shown (blocks,)."""
+class _ShownBlocks(NamedTuple):
+    """Unknowns of blocks where they are shown (blocks, unknowns), and which of them are (blocks,)."""
 
-    batch: BlockBatch
-    places: IntArray
-    p: Array
-    function: Any
-    unknowns: Array | None = None
-    is_shown: BoolArray | None = None
+    unknowns: Array
+    is_shown: BoolArray
 
 
-def _run_starts(linkages: LinkageArrays, state: Array, starts: Sequence[_BatchStart]) -> tuple[BoolArray, Array]:
-    """Fill the state, linkage after linkage: which of them are closed, and what is told of blocks (blocks, rows)."""
-    many, blocks = len(linkages), linkages.block_count
-    judged = np.zeros((blocks, MAX_SIGNS + JUDGED_ROWS, LANES))
-    table, owner, kinds = step_table(1, 0.0), *np.zeros((2, blocks), dtype=np.int64)
-    slots = np.zeros((blocks, 1 + max(start.batch.block_type.slot_count for start in starts)), dtype=np.int64)
-    p = np.zeros((blocks, max(start.p.shape[1] for start in starts)))
-    for number, (batch, index, own, _, unknowns, _) in enumerate(starts):
-        at, last = batch.block_numbers, batch.block_type.slot_count
-        owner[at], kinds[at], p[at, : own.shape[1]] = batch.owner, number, own
-        slots[at, :last] = state.ctypes.data + index * state.strides[0]
-        slots[at, last] = judged.ctypes.data + at * judged.strides[0] if unknowns is None else table.ctypes.data
-    first = np.concatenate([[0], np.cumsum(np.bincount(owner, minlength=many))])
-    tolerance, clearance = START_TOLERANCE_FACTOR * linkages.tolerance, np.full(many, CLEAR_REGULARITY**2)
-    result = run_tape([start.function for start in starts], 1, Tape(first, kinds, slots, p, tolerance, clearance))
-    return result.good > 0, judged
+class _Starts:
+    """The blocks of linkages as a tape of one step, with the places of all links in a state of its own."""
 
+    def __init__(self, linkages: LinkageArrays):
+        self.linkages, blocks = linkages, linkages.block_count
+        self.first = np.concatenate([[0], np.cumsum(linkages.link_counts)])
+        self.state = np.zeros((1 + self.first[-1], POSE_ROWS, LANES))
+        _fill_inputs(self.state, linkages, self.first)
+        self.sums = _sketch_sums(linkages.sketch, self.first)
+        self.told = np.zeros((blocks, MAX_SIGNS + JUDGED_ROWS, LANES))
+        self.places = {each.block_type: each.state_indices(self.first) for each in linkages.batches}
+        self.shown: dict[BlockType, _ShownBlocks] = {}
+        owner, self.kinds = np.zeros((2, blocks), dtype=np.int64)
+        slot_count = 1 + max(each.block_type.slot_count for each in linkages.batches)
+        self.slots, self.table = np.zeros((blocks, slot_count), dtype=np.int64), step_table(1, 0.0)
+        numbers, self.functions = {}, []
+        for kind_number, batch in enumerate(linkages.batches):
+            kind, at, places = batch.block_type, batch.block_numbers, self.places[batch.block_type]
+            owner[at], self.kinds[at] = batch.owner, kind_number
+            self.slots[at, : kind.slot_count] = self.state.ctypes.data + places * self.state.strides[0]
+            if kind.has_closed_form:
+                self.slots[at, kind.slot_count] = self.told.ctypes.data + at * self.told.strides[0]
+                numbers[kind] = np.hstack([batch.p, self.sums[places[:, batch.inner_slots]].reshape(len(at), -1)])
+                rows = [(slot, row) for slot in range(kind.slot_count)[batch.inner_slots] for row in range(POSE_ROWS)]
+                rows += [(kind.slot_count, row) for row in range(kind.sign_count + JUDGED_ROWS)]
+                self.functions.append(compile_block(TapeFormula(kind.start_formula, tuple(rows))))
+            else:
+                self.slots[at, kind.slot_count] = self.table.ctypes.data
+                numbers[kind] = newton_numbers(kind, batch.p, np.zeros((len(at), len(kind.unknown_is_angle))))
+                self.functions.append(compile_newton_block(kind, False))
+        self.begins = np.concatenate([[0], np.cumsum(np.bincount(owner, minlength=len(linkages)))])
+        self.p = np.zeros((blocks, max(own.shape[1] for own in numbers.values())))
+        for batch in linkages.batches:
+            self.p[batch.block_numbers, : numbers[batch.block_type].shape[1]] = numbers[batch.block_type]
+        if not all(batch.block_type.has_closed_form for batch in linkages.batches):
+            self.frames = _shown_frames(linkages, self.first)
+            self._take_frames()
 
-def _distance_to_sketch(poses: Array, sums: Array) -> Array:
-    """Squared distances of points of inner links (blocks, links) to the sketch, from their sums there."""
-    x, y, c, s = np.moveaxis(poses, 2, 0)
-    many, px, py, tx, ty, along, across, squares = np.moveaxis(sums, 2, 0)
-    with np.errstate(invalid="ignore", over="ignore"):
-        mixed = x * (c * px - s * py - tx) + y * (s * px + c * py - ty) - c * along - s * across
-        return np.maximum(np.sum(many * (x * x + y * y) + 2.0 * mixed + squares, axis=1), 0.0)
+    def run(self, clearance: Array) -> BoolArray:
+        """Fill the state, linkage after linkage: which of them (linkages,) are closed and so regular."""
+        tolerance = START_TOLERANCE_FACTOR * self.linkages.tolerance
+        tape = Tape(self.begins, self.kinds, self.slots, self.p, tolerance, clearance)
+        return run_tape(self.functions, 1, tape).good > 0
+
+    def take_solved_frames(self) -> bool:
+        """Begin again where links are not shown, but where what was solved before has them; whether there are any."""
+        if all(each.is_shown.all() for each in self.shown.values()):
+            return False
+        x, y, c, s = np.moveaxis(self.state[:, :, 0], 1, 0)
+        with np.errstate(invalid="ignore"):
+            is_solved = ~self.frames.is_known & (np.abs(c * c + s * s - 1.0) < 0.5)
+        angle = np.where(is_solved, np.arctan2(s, c), 0.0)
+        pairs = zip((x, y, c, s, angle), self.frames.frame[:5], strict=True)
+        frame = Frame(*(np.where(is_solved, new, old) for new, old in pairs))
+        self.frames = self.frames._replace(frame=frame, is_known=self.frames.is_known | is_solved)
+        self._take_frames()
+        return True
+
+    def _take_frames(self) -> None:
+        for batch in self.linkages.batches:
+            kind, numbers = batch.block_type, batch.block_numbers
+            if not kind.has_closed_form:
+                found = _unknowns_from_frames(kind, self.frames, self.places[kind], batch.p)
+                self.shown[kind] = found
+                own = newton_numbers(kind, batch.p, found.unknowns)
+                self.p[numbers, : own.shape[1]] = own
+
+    def distance_to_sketch(self, batch: BlockBatch) -> tuple[Array, Array]:
+        """Squared distances of the points of blocks to the sketch (blocks,), and how many points these are."""
+        inner = self.places[batch.block_type][:, batch.inner_slots]
+        x, y, c, s = np.moveaxis(self.state[inner, :, 0], 2, 0)
+        many, px, py, tx, ty, along, across, squares = np.moveaxis(self.sums[inner], 2, 0)
+        with np.errstate(invalid="ignore", over="ignore"):
+            mixed = x * (c * px - s * py - tx) + y * (s * px + c * py - ty) - c * along - s * across
+            whole = np.maximum(np.sum(many * (x * x + y * y) + 2.0 * mixed + squares, axis=1), 0.0)
+        return whole, many.sum(axis=1)
 
 
 class _ShownFrames(NamedTuple):
-    """Where links are shown (places,), and which of them are."""
+    """Where links are shown (places,), which of them are, and which are known, as they were solved too."""
 
     frame: Frame
+    is_shown: BoolArray
     is_known: BoolArray
 
 
@@ -148,28 +184,26 @@ def _shown_frames(linkages: LinkageArrays, first: IntArray) -> _ShownFrames:
     many, px, py, tx, ty, along, across, _ = _sketch_sums(linkages.shown_points, first).T
     least = np.maximum(many, 1.0)
     turn = along - (px * tx + py * ty) / least, across - (px * ty - py * tx) / least
-    is_known = (many > 1.0) & (np.hypot(*turn) > LEAST_SPREAD)
+    is_shown = (many > 1.0) & (np.hypot(*turn) > LEAST_SPREAD)
     angle = np.arctan2(turn[1], turn[0])
-    angle[0], is_known[0] = 0.0, True
+    angle[0], is_shown[0] = 0.0, True
     c, s = np.cos(angle), np.sin(angle)
     x, y = (tx - c * px + s * py) / least, (ty - s * px - c * py) / least
     x[0] = y[0] = 0.0
-    return _ShownFrames(Frame(x, y, c, s, angle), is_known)
+    return _ShownFrames(Frame(x, y, c, s, angle), is_shown, is_shown)
 
 
-def _unknowns_from_frames(
-    block_type: BlockType, shown: _ShownFrames, index: IntArray, p: Array
-) -> tuple[Array, BoolArray]:
-    """The unknowns (blocks, unknowns) of blocks whose links are shown so, and which of them are (blocks,); p (blocks,
-    numbers). Lengths of slides are read off the frames, in which they are linear.
-    """
+def _unknowns_from_frames(block_type: BlockType, shown: _ShownFrames, index: IntArray, p: Array) -> _ShownBlocks:
+    """The unknowns of blocks whose links are shown so; p (blocks, numbers). Lengths of slides are read off the frames,
+    in which they are linear."""
     given_count, inner_count = len(block_type.given_links), len(block_type.inner_links)
     slots = [*range(given_count), *range(block_type.slot_count)[-inner_count:]]
     of = {"frame": GROUND}
     for name, slot in zip((*block_type.given_links, *block_type.inner_links), slots, strict=True):
         of[name] = Frame(*(part[index[:, slot]] for part in shown.frame[:5]))
-    needed = slots if not all(block_type.unknown_is_angle) else slots[given_count:]
-    is_shown = np.all(shown.is_known[index[:, needed]], axis=1)
+    is_shown = np.all(shown.is_shown[index[:, slots[given_count:]]], axis=1)
+    if not all(block_type.unknown_is_angle):
+        is_shown &= np.all(shown.is_known[index[:, slots[:given_count]]], axis=1)
     own: dict[tuple[str, str], Array] = {}
     first = 0
     for pair in block_type.mechanism.pairs:
@@ -182,11 +216,12 @@ def _unknowns_from_frames(
         for k, (part, _) in enumerate(pair.coordinate_kinds):
             unit = [float(j == k) for j in range(many)]
             way = np.array(pair.residual(bodies, numbers, unit)[:2]) - still
-            own[pair.name, part] = -np.sum(way * still, axis=0) / np.sum(way * way, axis=0)
+            with np.errstate(invalid="ignore"):  # of links that are not shown
+                own[pair.name, part] = -np.sum(way * still, axis=0) / np.sum(way * way, axis=0)
     own |= {(name, "angle"): of[name].angle for name in block_type.inner_links}
     e = block_type.equations
     names = [(e.coordinates[column].owner, e.coordinates[column].part) for column in e.unknowns]
-    return np.stack([own[name] for name in names], axis=1), is_shown
+    return _ShownBlocks(np.stack([own[name] for name in names], axis=1), is_shown)
 
 
 def _fill_inputs(state: Array, linkages: LinkageArrays, first: IntArray) -> None:

@@ -89,11 +89,10 @@ class LinkageEnding(NamedTuple):
 
 
 class FineRun(NamedTuple):
-    """A linkage at the steps of an attempt: how many of them are good, whether it then comes to a dead point; how far
-    the inputs have turned (steps,); and what tells x and y at rows that are told (rows, 2, steps)."""
+    """A linkage at the steps of an attempt: how many of them are good; how far the inputs have turned (steps,); and
+    what gives x and y of points that are told (points, 2, steps)."""
 
     good: int
-    ends_in_dead_point: bool
     turned: Array
     places: Callable[[IntArray], Array]
 
@@ -243,7 +242,7 @@ class _AttemptRun:
         if find_ending is None or watched is None:
             return
         for k in np.flatnonzero(watched[some] & (good > 0)).tolist():
-            fine = FineRun(int(good[k]), bool(outcome[k] == DEAD_POINT), self.turned[: self.count], self._places)
+            fine = FineRun(int(good[k]), self.turned[: self.count], self._places)
             ending = find_ending(int(self.taped.which[k]), fine)
             number = int(some[k])
             run.is_decided[number] = ending is not None
