@@ -117,6 +117,16 @@ def test_random_linkages_of_every_pair_type(seed, links, higher):
     as_cycle(mechanism, result[0], 20, result.outcomes, 1e-7)
 
 
+@pytest.mark.parametrize(("seed", "links", "blur"), [(5004, 5, 0.003), (5103, 6, 0.02)])
+def test_blocks_without_closed_form_start_at_inexact_sketches(seed, links, blur):
+    """The assembly is the one that the mechanism itself takes, though its sketch is off."""
+    mechanism = files.from_dict(random_linkage(seed, links, blur=blur).value)
+    assert not all(each.block_type.has_closed_form for each in partition_mechanism(mechanism).blocks)
+    result = planar.sweep_each([mechanism], 20, pair=mechanism.inputs[0].pair)
+    assert result.sent == 0
+    as_cycle(mechanism, result[0], 20, result.outcomes, 1e-7)
+
+
 def test_many_random_dyads_end_where_their_cycles_end():
     mechanisms = [dyads(seed, 4 + seed % 4) for seed in range(14)]
     result = planar.sweep_each(mechanisms, 40)
