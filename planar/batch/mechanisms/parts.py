@@ -98,10 +98,10 @@ def stream_parts(
 def find_endings(part: SweptPart) -> tuple[tuple[int, int, str], ...]:
     """By outcome how many mechanisms ended so, and why the first of them did; by that of what is solved how many lack
     rates, or digits of them."""
-    codes, first, counts = np.unique(part.last_status, return_index=True, return_counts=True)
-    found = [
-        (int(codes[k]), int(counts[k]), part.swept(int(first[k])).reason) for k in np.argsort(first) if codes[k] != 0
-    ]
+    status = part.last_status
+    codes, first, counts = np.unique(status[status != 0], return_index=True, return_counts=True)
+    ended = np.flatnonzero(status)
+    found = [(int(codes[k]), int(counts[k]), part.swept(int(ended[first[k]])).reason) for k in np.argsort(first)]
     few = [each for each in part.others if each.reason and not each.status.any()]
     return (*found, *([(0, len(few), few[0].reason)] if few else []))
 

@@ -160,6 +160,8 @@ def make_values(points: int, steps: int, rates: bool, dtype: str = "float64") ->
 
 def clear_points(values: Array, first_point: IntArray, which: IntArray, first_step: IntArray) -> None:
     """The points of some linkages, from first_point[k] to first_point[k + 1], are NaN from a step of each on."""
+    if not len(which):
+        return
     counts = np.diff(first_point)[which]
     begin = np.cumsum(counts) - counts
     points = np.repeat(first_point[which] - begin, counts) + np.arange(counts.sum())

@@ -56,7 +56,8 @@ def solve_pinned(
         lambda k, polished: compile_block(pin_formulas(rates, polished)[k], LEAST_COSINE), POINT_ROWS[rates]
     )
     run = run_taped_linkages(_taped_linkages(linkages, tape, told), kinds, values, steps, rates)
-    _fill_frame_pins(linkages, told, values)
+    if request.points is not None:
+        _fill_frame_pins(linkages, told, values)
     stopped = np.flatnonzero(run.is_decided & (run.solved <= steps))
     clear_points(values, told.first, tape.which[stopped], run.solved[stopped])
 
