@@ -241,7 +241,7 @@ class _BlockWriter:
         first that is not good the block ends."""
         t, byte = self.ir, f"i{LANES}"
         left, clear = found[-2:]
-        now = [Direction(found[x], found[y], k if k is None else found[k]) for x, y, k in self.own.directions]
+        now = [LinkDirection(found[x], found[y], k if k is None else found[k]) for x, y, k in self.own.directions]
         parts = [*(part for each in now for part in each[:2]), clear]
         earlier = [self._earlier(value, before, 1) for value, before in zip(parts, watched, strict=True)]
         good = write_turn_flags(t, t.compare("ole", left, self.tolerance), now, earlier[:-1], self.least_cosine)
@@ -272,7 +272,7 @@ class _BlockWriter:
         return self.ir.add_instruction(f"shufflevector {v} {before}, {v} {value}, <{LANES} x i32> <{lanes}>")
 
 
-class Direction(NamedTuple):
+class LinkDirection(NamedTuple):
     """Values of a vector along a link, with its squared length, None where that is one."""
 
     x: str
@@ -281,7 +281,7 @@ class Direction(NamedTuple):
 
 
 def write_turn_flags(
-    t: IRWriter, good: str, now: Sequence[Direction], earlier: Sequence[str], least_cosine: float
+    t: IRWriter, good: str, now: Sequence[LinkDirection], earlier: Sequence[str], least_cosine: float
 ) -> str:
     """Where it is good, and none of the directions, which were so in the step before (x and y of each), turns fast."""
     for k, (x, y, square) in enumerate(now):

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -13,7 +14,8 @@ from planar.batch.mechanisms.linkages import BlockBatch, LinkageArrays, PointArr
 from planar.batch.mechanisms.newton_march import compile_newton_block, newton_numbers, step_table
 from planar.codegen.tape import LANES, Tape, TapeFormula, compile_block, run_tape
 from planar.foundation.arrays import Array, BoolArray, IntArray
-from planar.foundation.geometry import GROUND, Frame
+from planar.foundation.geometry import GROUND, Frame, frame_at
+from planar.model.pairs import MeasureKind
 
 LEAST_CLEARANCE = 1e-4
 """Nearer than this to where two assemblies meet neither is taken."""
@@ -38,7 +40,7 @@ class StartAssemblies(NamedTuple):
     z: Array
 
 
-def find_start_assemblies(linkages: LinkageArrays) -> StartAssemblies:
+def find_linkage_assemblies(linkages: LinkageArrays) -> StartAssemblies:
     """See `StartAssemblies`.
 
     A way to assemble a block is taken where it is nearer to the sketch than any other by more than all blocks of the
@@ -172,11 +174,15 @@ class _Starts:
 
 
 class _ShownFrames(NamedTuple):
-    """Where links are shown (places,), which of them are, and which are known, as they were solved too."""
+    """Where links are shown (places,): frames of those that `is_shown`, and of those that are known as they were
+    solved; and the middles of the points of all, in the link `local` and where they are shown `world` (2, places), NaN
+    of none."""
 
     frame: Frame
     is_shown: BoolArray
     is_known: BoolArray
+    local: Array
+    world: Array
 
 
 def _shown_frames(linkages: LinkageArrays, first: IntArray) -> _ShownFrames:
@@ -186,42 +192,87 @@ def _shown_frames(linkages: LinkageArrays, first: IntArray) -> _ShownFrames:
     turn = along - (px * tx + py * ty) / least, across - (px * ty - py * tx) / least
     is_shown = (many > 1.0) & (np.hypot(*turn) > LEAST_SPREAD)
     angle = np.arctan2(turn[1], turn[0])
-    angle[0], is_shown[0] = 0.0, True
+    local, world = (np.where(many > 0.0, of / least, np.nan) for of in (np.stack([px, py]), np.stack([tx, ty])))
+    angle[0], is_shown[0], local[:, 0], world[:, 0] = 0.0, True, 0.0, 0.0
+    return _ShownFrames(_frame_through(angle, local, world), is_shown, is_shown, local, world)
+
+
+def _frame_through(angle: Array, local: Array, world: Array) -> Frame:
+    """The frame at an angle in which points of links (2, links) lie where they are in the world."""
     c, s = np.cos(angle), np.sin(angle)
-    x, y = (tx - c * px + s * py) / least, (ty - s * px - c * py) / least
-    x[0] = y[0] = 0.0
-    return _ShownFrames(Frame(x, y, c, s, angle), is_shown, is_shown)
+    return Frame(world[0] - (c * local[0] - s * local[1]), world[1] - (s * local[0] + c * local[1]), c, s, angle)
+
+
+class _Slide(NamedTuple):
+    """A pair with own coordinates between links of a kind, and its numbers (blocks,)."""
+
+    pair: Any
+    numbers: list[Array]
+
+    def residual(self, frames: Sequence[Frame], own: Sequence[float]) -> list[Array]:
+        """What the pair leaves open about these frames."""
+        return list(self.pair.residual(frames, self.numbers, own))
 
 
 def _unknowns_from_frames(block_type: BlockType, shown: _ShownFrames, index: IntArray, p: Array) -> _ShownBlocks:
     """The unknowns of blocks whose links are shown so; p (blocks, numbers). Lengths of slides are read off the frames,
     in which they are linear."""
-    given_count, inner_count = len(block_type.given_links), len(block_type.inner_links)
-    slots = [*range(given_count), *range(block_type.slot_count)[-inner_count:]]
-    of = {"frame": GROUND}
-    for name, slot in zip((*block_type.given_links, *block_type.inner_links), slots, strict=True):
-        of[name] = Frame(*(part[index[:, slot]] for part in shown.frame[:5]))
-    is_shown = np.all(shown.is_shown[index[:, slots[given_count:]]], axis=1)
-    if not all(block_type.unknown_is_angle):
-        is_shown &= np.all(shown.is_known[index[:, slots[:given_count]]], axis=1)
+    kind, slides, first = block_type, list[_Slide](), 0
+    for pair in kind.mechanism.pairs:
+        if pair.coordinate_kinds:
+            slides.append(_Slide(pair, [p[:, first + k] for k in range(len(pair.number_kinds))]))
+        first += len(pair.number_kinds)
+    slots = [*range(len(kind.given_links)), *range(kind.slot_count)[-len(kind.inner_links) :]]
+    of, known = {"frame": GROUND}, {"frame": np.ones(len(p), dtype=bool)}
+    places = {name: index[:, slot] for name, slot in zip((*kind.given_links, *kind.inner_links), slots, strict=True)}
+    for name, at in places.items():
+        of[name] = Frame(*(part[at] for part in shown.frame[:5]))
+        known[name] = (shown.is_known if name in kind.given_links else shown.is_shown)[at]
+    for slide in slides * 2:
+        _align_slider(slide, kind, shown, places, of, known)
+    needed = kind.inner_links if all(kind.unknown_is_angle) else places
+    is_shown = np.logical_and.reduce([known[name] for name in needed])
     own: dict[tuple[str, str], Array] = {}
-    first = 0
-    for pair in block_type.mechanism.pairs:
-        numbers = [p[:, first + k] for k in range(len(pair.number_kinds))]
-        first += len(numbers)
-        bodies, many = [of[link] for link in pair.bodies], len(pair.coordinate_kinds)
-        if not many:
-            continue
-        still = np.array(pair.residual(bodies, numbers, [0.0] * many)[:2])
-        for k, (part, _) in enumerate(pair.coordinate_kinds):
-            unit = [float(j == k) for j in range(many)]
-            way = np.array(pair.residual(bodies, numbers, unit)[:2]) - still
+    for slide in slides:
+        bodies, many = [of[link] for link in slide.pair.bodies], len(slide.pair.coordinate_kinds)
+        still = np.array(slide.residual(bodies, [0.0] * many)[:2])
+        for k, (part, _) in enumerate(slide.pair.coordinate_kinds):
+            way = np.array(slide.residual(bodies, [float(j == k) for j in range(many)])[:2]) - still
             with np.errstate(invalid="ignore"):  # of links that are not shown
-                own[pair.name, part] = -np.sum(way * still, axis=0) / np.sum(way * way, axis=0)
-    own |= {(name, "angle"): of[name].angle for name in block_type.inner_links}
-    e = block_type.equations
+                own[slide.pair.name, part] = -np.sum(way * still, axis=0) / np.sum(way * way, axis=0)
+    own |= {(name, "angle"): of[name].angle for name in kind.inner_links}
+    e = kind.equations
     names = [(e.coordinates[column].owner, e.coordinates[column].part) for column in e.unknowns]
     return _ShownBlocks(np.stack([own[name] for name in names], axis=1), is_shown)
+
+
+def _align_slider(
+    slide: _Slide,
+    kind: BlockType,
+    shown: _ShownFrames,
+    places: Mapping[str, IntArray],
+    of: dict[str, Frame],
+    known: dict[str, BoolArray],
+) -> None:
+    """A link of which one point alone is shown, and that a slide holds at an angle to one that is known."""
+    if MeasureKind.ANGLE not in slide.pair.residual_kinds:
+        return
+    row, own = slide.pair.residual_kinds.index(MeasureKind.ANGLE), [0.0] * len(slide.pair.coordinate_kinds)
+    for link, other in (slide.pair.bodies, slide.pair.bodies[::-1]):
+        if link not in kind.inner_links:
+            continue
+        local, world = shown.local[:, places[link]], shown.world[:, places[link]]
+        is_found = ~known[link] & known[other] & np.isfinite(local[0])
+        if is_found.any():
+            still, turned = (
+                slide.residual(
+                    [frame_at(0.0, 0.0, angle) if body == link else of[body] for body in slide.pair.bodies], own
+                )[row]
+                for angle in (0.0, 1.0)
+            )
+            found = _frame_through(still / (still - turned), local, world)
+            pairs = zip(found[:5], of[link][:5], strict=True)
+            of[link], known[link] = Frame(*(np.where(is_found, *both) for both in pairs)), known[link] | is_found
 
 
 def _fill_inputs(state: Array, linkages: LinkageArrays, first: IntArray) -> None:

@@ -24,7 +24,7 @@ from planar.batch.mechanisms.block_type import (
     Y,
     write_formula,
 )
-from planar.batch.mechanisms.initial_assembly import LEAST_CLEARANCE, StartAssemblies, find_start_assemblies
+from planar.batch.mechanisms.initial_assembly import LEAST_CLEARANCE, StartAssemblies, find_linkage_assemblies
 from planar.batch.mechanisms.linkages import BlockBatch, LinkageArrays, LinkageGroup, SweepRequest, linkage_group
 from planar.batch.mechanisms.newton_march import compile_newton_block, newton_numbers, step_table
 from planar.batch.mechanisms.results import Swept, swept_from_rows
@@ -66,7 +66,7 @@ def solve_by_blocks(mechanisms: Sequence[Mechanism], request: SweepRequest) -> d
     group = linkage_group(mechanisms, request)
     if group is None:
         return {}
-    arrays, start = group.arrays, find_start_assemblies(group.arrays)
+    arrays, start = group.arrays, find_linkage_assemblies(group.arrays)
     first_point = _begins(np.bincount(arrays.points.owner, minlength=len(arrays)))
     values = make_values(int(first_point[-1]), request.steps, request.rates)
     types = tuple({id(batch.block_type): batch.block_type for batch in arrays.batches}.values())

@@ -19,8 +19,8 @@ from planar.codegen.tape import (
     BLOCK_NAME,
     UNDECIDED,
     BlockFormula,
-    Direction,
     FormulaInput,
+    LinkDirection,
     write_clear_flags,
     write_ended,
     write_turn_flags,
@@ -153,7 +153,7 @@ class _NewtonBlockWriter:
             t.store(whole, own[0])
         good = t.and_flags(t.compare("ole", left, self.tolerance), t.compare("ole", far, most))
         places = range(0, len(told), self.row_count)
-        now = [Direction(told[number + COS], told[number + SIN], None) for number in places]
+        now = [LinkDirection(told[number + COS], told[number + SIN], None) for number in places]
         good = write_turn_flags(t, good, now, [t.load(slot) for slot in self.direction_slots], LEAST_COSINE)
         for value, slot in zip((part for each in now for part in each[:2]), self.direction_slots, strict=True):
             t.store(value, slot)
