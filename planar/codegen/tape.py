@@ -28,21 +28,24 @@ SHIFT = LANES.bit_length() - 1
 LONG_CALL_NUMBERS = 2**14
 """Blocks times steps from which on other threads go on while they are computed."""
 MAX_BLOCK_FUNCTIONS = 4096
+GREATEST_CHANGE = 2.5
+"""Of a root up to its zero, in times of its change in the step before: 1 / (sqrt(2) - 1) at most."""
 BLOCK_NAME = "block"
 BLOCK_ARGUMENTS = (
     "i64 %limit, i64 %stride, ptr readonly %rows, ptr readonly %p, double %tolerance, double %clearance, ptr %ended"
 )
 """Of the function of a kind: how many steps are wanted; how far rows are apart; the addresses of its slots; its own
 numbers; what may be left open; how clear of a dead point steps are at least; and where it puts the first step that is
-not good, with the outcome, if one is not."""
+not good, with the outcome, if one is not, else whether it surely stays clear up to the next step."""
 BLOCK_ARGUMENT_TYPES = ("int", "int", "array", "array", "float", "float", "array")
 _WALK = f"""
 define void @walk(i64 %begin, i64 %end, i64 %steps, i64 %stride, i64 %slots, i64 %numbers, ptr readonly %functions,
   ptr readonly %first, ptr readonly %kinds, ptr readonly %rows, ptr readonly %p, ptr readonly %tolerance,
   ptr readonly %clearance, ptr %good, ptr %outcome, ptr %at) {{
 entry:
-  %ended = alloca [2 x i64]
+  %ended = alloca [3 x i64]
   %verdict = getelementptr i64, ptr %ended, i64 1
+  %stays = getelementptr i64, ptr %ended, i64 2
   %any = icmp slt i64 %begin, %end
   br i1 %any, label %sequence, label %done
 sequence:
@@ -64,6 +67,7 @@ block:
   %outcomenow = phi i64 [{GOOD}, %sequence], [%outcomenext, %block]
   %atnow = phi i64 [0, %sequence], [%atnext, %block]
   store i64 %limit, ptr %ended
+  store i64 1, ptr %stays
   %kindp = getelementptr i64, ptr %kinds, i64 %j
   %kind = load i64, ptr %kindp
   %functionp = getelementptr ptr, ptr %functions, i64 %kind
@@ -76,7 +80,12 @@ block:
   %come = load i64, ptr %ended
   %ends = icmp slt i64 %come, %limit
   %said = load i64, ptr %verdict
-  %outcomenext = select i1 %ends, i64 %said, i64 %outcomenow
+  %isclear = load i64, ptr %stays
+  %near = icmp eq i64 %isclear, 0
+  %isdead = icmp eq i64 %outcomenow, {DEAD_POINT}
+  %unsure = and i1 %near, %isdead
+  %kept = select i1 %unsure, i64 {UNDECIDED}, i64 %outcomenow
+  %outcomenext = select i1 %ends, i64 %said, i64 %kept
   %atnext = select i1 %ends, i64 %j, i64 %atnow
   %jnext = add i64 %j, 1
   %jmore = icmp slt i64 %jnext, %jend
@@ -100,7 +109,7 @@ done:
 }}
 """
 """Sequences from `begin` to `end`, each block by the function of its kind; a sequence that is not good at its first
-step goes no further."""
+step goes no further. A dead point is none where a later block may come to another end before it."""
 
 
 class FormulaInput(NamedTuple):
@@ -228,7 +237,13 @@ class _BlockWriter:
         else:
             t.write_line("br label %next")
         t.write_label("next")
-        t.close_loop("vector", "vectors", "step", "done")
+        t.close_loop("vector", "vectors", "step", "told" if own.is_checked else "done")
+        if own.is_checked:
+            t.write_label("told")
+            t.write_line(f"%lastlane = and i64 {t.add_instruction('sub i64 %limit, 1')}, {LANES - 1}")
+            stays = write_stays_clear(t, found[-1], self._earlier(found[-1], watched[-1], 1), self.clearance)
+            write_stays(t, t.add_instruction(f"extractelement <{LANES} x i1> {stays}, i64 %lastlane"))
+            t.write_line("br label %done")
         t.write_label("done")
         t.write_line("ret void")
         t.write_line("}")
@@ -257,7 +272,7 @@ class _BlockWriter:
         lane = t.add_instruction(f"call {byte} @llvm.cttz.{byte}({byte} {bad}, i1 true)")
         t.write_line(f"%come = add i64 %off, {t.add_instruction(f'zext {byte} {lane} to i64')}")
         t.write_line("%ends = icmp slt i64 %come, %limit")
-        t.write_line("br i1 %ends, label %stopped, label %done")
+        t.write_line("br i1 %ends, label %stopped, label %told")
         t.write_label("stopped")
         below = t.compare("olt", clear, t.constant(0.0))
         dead = t.and_flags(below, t.compare("ogt", judged.least_before, judged.needed))
@@ -314,6 +329,20 @@ def write_clear_flags(t: IRWriter, clear: str, one: str, two: str, clearance: st
     # at the first steps some of these are no numbers, which is passed over
     needed, least = pick("ogt", bend, clearance), pick("olt", two, one)
     return ClearFlags(t.compare("ogt", pick("olt", least, clear), needed), least, needed)
+
+
+def write_stays_clear(t: IRWriter, clear: str, one: str, clearance: str) -> str:
+    """Whether no dead point is near before the next step, by how clear a step and the one before it are: towards where
+    another block has one this changes as the root of the way that is left."""
+    change = t.call_intrinsic("fabs", t.binary("sub", clear, one))
+    ahead = t.binary("sub", clear, t.binary("mul", t.constant(GREATEST_CHANGE), change))
+    return t.compare("ogt", ahead, clearance)
+
+
+def write_stays(t: IRWriter, flag: str) -> None:
+    """Tell whether a block stays clear."""
+    place = t.add_instruction("getelementptr i64, ptr %ended, i64 2")
+    t.write_line(f"store i64 {t.add_instruction(f'zext i1 {flag} to i64')}, ptr {place}")
 
 
 def write_ended(t: IRWriter, step: str, outcome: str) -> None:

@@ -117,6 +117,14 @@ def test_random_linkages_of_every_pair_type(seed, links, higher):
     as_cycle(mechanism, result[0], 20, result.outcomes, 1e-7)
 
 
+def test_a_slide_that_goes_off_just_before_a_dead_point_ends_the_run():
+    """A later link slides out without an end within the step in which an earlier one comes to a dead point."""
+    mechanism = files.from_dict(random_linkage(24306, 3, blur=0.02, higher=0.3).value)
+    result = planar.sweep_each([mechanism], 24, pair=mechanism.inputs[0].pair)
+    assert result.outcomes[result[0].status[-1]] is Outcome.BRANCH_LOST
+    as_cycle(mechanism, result[0], 24, result.outcomes, 1e-7)
+
+
 @pytest.mark.parametrize(("seed", "links", "blur"), [(5004, 5, 0.003), (5103, 6, 0.02), (6071, 5, 0.01)])
 def test_blocks_without_closed_form_start_at_inexact_sketches(seed, links, blur):
     """The assembly is the one that the mechanism itself takes, though its sketch is off, or shows one point alone of a

@@ -23,6 +23,8 @@ from planar.codegen.tape import (
     LinkDirection,
     write_clear_flags,
     write_ended,
+    write_stays,
+    write_stays_clear,
     write_turn_flags,
 )
 from planar.foundation.arrays import Array
@@ -110,7 +112,12 @@ class _NewtonBlockWriter:
         write_ended(t, "%k", str(UNDECIDED))
         t.write_line("br label %done")
         t.write_label("good")
-        t.close_loop("k", "limit", "step", "done")
+        t.close_loop("k", "limit", "step", "told")
+        t.write_label("told")
+        clear, one = (t.load(slot) for slot in self.clear_slots)
+        stays = write_stays_clear(t, clear, one, self.clearance)
+        write_stays(t, t.add_instruction(f"extractelement <1 x i1> {stays}, i64 0"))
+        t.write_line("br label %done")
         t.write_label("done")
         t.write_line("ret void")
         t.write_line("}")
