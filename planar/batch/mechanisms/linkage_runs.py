@@ -69,9 +69,8 @@ def solve_by_blocks(mechanisms: Sequence[Mechanism], request: SweepRequest) -> d
     arrays, start = group.arrays, find_linkage_assemblies(group.arrays)
     first_point = _begins(np.bincount(arrays.points.owner, minlength=len(arrays)))
     values = make_values(int(first_point[-1]), request.steps, request.rates)
-    types = tuple({id(batch.block_type): batch.block_type for batch in arrays.batches}.values())
-    taped = _make_tape(arrays, start, types).select(np.flatnonzero(start.is_sure))
-    kinds = _block_kinds(types, request.rates)
+    taped = _make_tape(arrays, start).select(np.flatnonzero(start.is_sure))
+    kinds = _block_kinds([batch.block_type for batch in arrays.batches], request.rates)
 
     def find_ending(number: int, run: FineRun) -> LinkageEnding | None:
         watched = np.arange(first_point[number] + len(group.names[number]), first_point[number + 1])
@@ -123,7 +122,7 @@ def _begins(counts: IntArray) -> IntArray:
     return np.concatenate([[0], np.cumsum(counts)])
 
 
-def _make_tape(arrays: LinkageArrays, start: StartAssemblies, types: Sequence[BlockType]) -> TapedLinkages:
+def _make_tape(arrays: LinkageArrays, start: StartAssemblies) -> TapedLinkages:
     """All linkages, of each first its inputs, then its blocks, then its points, the rows of which are told."""
     many, inputs, points = len(arrays), arrays.inputs, arrays.points
     block_owner = np.empty(arrays.block_count, dtype=np.int64)
@@ -138,7 +137,7 @@ def _make_tape(arrays: LinkageArrays, start: StartAssemblies, types: Sequence[Bl
         for owner, own, earlier in zip(owners, counts, before, strict=False)
     )
     numbers = [_block_numbers(batch, start) for batch in arrays.batches]
-    slots = np.full((first[-1], 1 + max(kind.slot_count for kind in types)), FRAME)
+    slots = np.full((first[-1], 1 + max(batch.block_type.slot_count for batch in arrays.batches)), FRAME)
     p = np.zeros((first[-1], max(INPUT_NUMBERS, *(own.shape[1] for own in numbers))))
     kinds, blocks = np.empty(first[-1], dtype=np.int64), np.full(first[-1], -1)
     kinds[at_input], kinds[at_point] = np.where(inputs.runs, RUNNING_INPUT, STANDING_INPUT), POINT
@@ -148,9 +147,9 @@ def _make_tape(arrays: LinkageArrays, start: StartAssemblies, types: Sequence[Bl
     p[at_point, :2], p[at_point, 2] = points.numbers, arrays.unit[points.owner]
     slots[at_point, 0], slots[at_point, 1] = _slot_numbers(points.link_index), np.arange(len(at_point))
     blocks[at_block] = np.arange(arrays.block_count)
-    for batch, own in zip(arrays.batches, numbers, strict=True):
+    for number, (batch, own) in enumerate(zip(arrays.batches, numbers, strict=True)):
         at, kind = at_block[batch.block_numbers], batch.block_type
-        kinds[at] = FIRST_BLOCK_TYPE + types.index(kind)
+        kinds[at] = FIRST_BLOCK_TYPE + number
         slots[at, : kind.slot_count], slots[at, kind.slot_count] = _slot_numbers(batch.link_indices), STEP_TABLE
         p[at, : own.shape[1]] = own
     clearance = np.full(many, LEAST_CLEARANCE)
