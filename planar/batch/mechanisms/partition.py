@@ -142,6 +142,7 @@ class _Partitioner:
         self.neighbours: list[list[tuple[int, int]]] = [[] for _ in range(many)]
         "for every link the links beside it, each with the pair between"
         self.pairs = list(mechanism.pairs)
+        self.pair_points = [pair.coincident_points() for pair in self.pairs]
         self.prevented_motions: list[int] = []
         self.ends: list[tuple[int, int]] = []
         self.is_symmetric: list[bool] = []
@@ -205,7 +206,7 @@ class _Partitioner:
             self.neighbours[second].remove((first, k))
         others = [pair for pair in type(pairs[0]).relative_motions(pairs) if named in pair.links]
         for k, pair in zip(own, others, strict=True):
-            self.pairs[k] = pair
+            self.pairs[k], self.pair_points[k] = pair, pair.coincident_points()
             one, other = pair.links
             first, second = self.ends[k] = self.number[one], self.number[other]
             self.neighbours[first].append((second, k))
@@ -296,8 +297,8 @@ class _Partitioner:
             return
         for link in inner:
             name = self.names[link]
-            points = {at for k in pairs for owner, at in self.pairs[k].coincident_points() if owner == name}
-            places = [self.shapes[name].points[at] for at in points]
+            shape = self.shapes[name].points
+            places = [shape[at] for at in {at for k in pairs for owner, at in self.pair_points[k] if owner == name}]
             arms = (hypot(b.x - a.x, b.y - a.y) for a, b in combinations(places, 2))
             if min(filter(None, arms), default=inf) < SHORT_ARM * self.unit:
                 raise NotPartitionable(f"link {name} is so short that rounding takes digits")
