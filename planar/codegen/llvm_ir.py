@@ -239,6 +239,11 @@ class IRWriter:
         """A pointer to the double at an index."""
         return self.add_instruction(f"getelementptr double, ptr {base}, i64 {index}")
 
+    def row_pointer(self, base: str, stride: str, row: int | str, index: str) -> str:
+        """A pointer to the double at an index of a row; `stride` is the number of doubles of a row."""
+        start = self.add_instruction(f"mul i64 {stride}, {row}")
+        return self.double_pointer(base, self.add_instruction(f"add i64 {start}, {index}"))
+
     def single_pointer(self, base: str, index: str) -> str:
         """A pointer to the number of single precision at an index."""
         return self.add_instruction(f"getelementptr float, ptr {base}, i64 {index}")

@@ -6,7 +6,7 @@ from math import sqrt
 from typing import Any, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 Array: TypeAlias = NDArray[np.floating[Any]]
 """Of float64, as all numbers here; what numpy's linear algebra returns is annotated no closer."""
@@ -15,6 +15,13 @@ BoolArray: TypeAlias = NDArray[np.bool_]
 ComplexArray: TypeAlias = NDArray[np.complexfloating[Any, Any]]
 MIN_LINKS_FOR_ONE_THREAD = 24
 """Links of a mechanism from which on its matrices are so large that BLAS would take several threads for each."""
+
+
+def part_offsets(counts: ArrayLike) -> IntArray:
+    """Return the first index of every part of so many entries, and the number of all entries (parts + 1,)."""
+    offsets = np.zeros(len(np.asarray(counts)) + 1, dtype=np.int64)
+    np.cumsum(counts, out=offsets[1:])
+    return offsets
 
 
 def greatest_size(values: Array) -> float:

@@ -9,6 +9,7 @@ from typing import Any, overload
 
 import numpy as np
 
+from planar.foundation.arrays import part_offsets
 from planar.foundation.errors import BadInput
 from planar.model.mechanism import LARGEST_INPUT_POSITION
 from planar.model.pin_linkage import PinLayout, PinnedMechanism
@@ -61,12 +62,12 @@ def pinned_linkages(
     _refuse((driven < 0) | (driven >= bar_counts), "crank", "the number of a bar is wanted")
     made = PinnedLinkages(
         at[np.arange(at.shape[1]) < pin_counts[:, None]],
-        _offsets(pin_counts),
+        part_offsets(pin_counts),
         held[held >= 0],
-        _offsets(bar_sizes[bar_sizes > 0]),
-        _offsets(bar_counts),
+        part_offsets(bar_sizes[bar_sizes > 0]),
+        part_offsets(bar_counts),
         fixed[fixed >= 0],
-        _offsets(frame_counts),
+        part_offsets(frame_counts),
         driven,
         *rates,
     )
@@ -104,12 +105,12 @@ class PinnedLinkages(Sequence[PinnedMechanism]):
         bars = [bar for each in layouts for bar in each.bars]
         return cls(
             np.concatenate([each.pin_positions for each in layouts]),
-            _offsets([len(each.position_lists) for each in layouts]),
+            part_offsets([len(each.position_lists) for each in layouts]),
             np.array([pin for bar in bars for pin in bar]),
-            _offsets([len(bar) for bar in bars]),
-            _offsets([len(each.bars) for each in layouts]),
+            part_offsets([len(bar) for bar in bars]),
+            part_offsets([len(each.bars) for each in layouts]),
             np.array([pin for each in layouts for pin in each.frame_pins]),
-            _offsets([len(each.frame_pins) for each in layouts]),
+            part_offsets([len(each.frame_pins) for each in layouts]),
             np.array([each.crank for each in layouts]),
             np.array([each.velocity for each in layouts]),
             np.array([each.acceleration for each in layouts]),
@@ -173,13 +174,6 @@ class PinnedLinkages(Sequence[PinnedMechanism]):
 
     def __reduce__(self) -> Any:
         return PinnedLinkages, tuple(getattr(self, each.name) for each in fields(self))
-
-
-def _offsets(counts: Any) -> Array:
-    """Where each of several parts of so many entries begins, and the end."""
-    found = np.zeros(len(counts) + 1, dtype=np.int64)
-    np.cumsum(counts, out=found[1:])
-    return found
 
 
 def _read_positions(places: Any) -> tuple[Array, Array]:

@@ -93,18 +93,12 @@ class DeadPointWriter(KernelWriter):
         t.write_line(f"br i1 {t.add_instruction(f'and i1 {some}, {on}')}, label %look, label %blockend")
         t.write_label("blockend")
         for row, name in enumerate(("distance", "block")):
-            t.store(t.load(self.slots[name]), self._pointer("%out", row))
+            t.store(t.load(self.slots[name]), self.entry_pointer("%out", row))
         t.close_loop("b", "blocks", "block", "done")
         t.write_label("done")
         t.write_line("ret void")
         t.write_line("}")
         return t.module_text()
-
-    def _pointer(self, base: str, row: int) -> str:
-        t = self.ir
-        return t.double_pointer(
-            base, t.add_instruction(f"add i64 {t.add_instruction(f'mul i64 %width, {row}')}, {self.lane}")
-        )
 
     def _put(self, where: str, **values: str) -> None:
         """Put values into slots of the lanes whose flag is up."""
@@ -124,11 +118,11 @@ class DeadPointWriter(KernelWriter):
         first = t.add_instruction(f"mul i64 %b, {t.lanes}")
         past = t.add_instruction(f"icmp sgt i64 {first}, %last")
         self.lane = t.add_instruction(f"select i1 {past}, i64 %last, i64 {first}")
-        names: OperandNames = {("p", k): t.load(self._pointer("%p", k)) for k in range(self.symbols["p"].numel())}
-        names |= self.stop_number_names(lambda k: t.load(self._pointer("%p", k)))
-        names |= {operand: t.load(self._pointer("%drive", k)) for k, operand in enumerate(self.input_operands)}
-        names |= {("sign", k): t.load(self._pointer("%sign", k)) for k in range(len(self.equations.blocks))}
-        reached, self.span, self.longest, self.sense = (t.load(self._pointer("%ranges", k)) for k in range(4))
+        names: OperandNames = {("p", k): self.load_entry("%p", k) for k in range(self.symbols["p"].numel())}
+        names |= self.stop_number_names(lambda k: self.load_entry("%p", k))
+        names |= {operand: self.load_entry("%drive", k) for k, operand in enumerate(self.input_operands)}
+        names |= {("sign", k): self.load_entry("%sign", k) for k in range(len(self.equations.blocks))}
+        reached, self.span, self.longest, self.sense = (self.load_entry("%ranges", k) for k in range(4))
         first_values = {name: t.constant(0.0) for name in self.slots} | {
             "x": reached,
             "h": self.longest,

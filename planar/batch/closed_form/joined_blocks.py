@@ -139,14 +139,14 @@ class BlockJoinWriter(KernelWriter):
         past = t.add_instruction(f"icmp sgt i64 {first}, %last")
         self.lane = t.add_instruction(f"select i1 {past}, i64 %last, i64 {first}")
         count = self.symbols["p"].numel()
-        names |= {("p", k): self._load("%p", k) for k in range(count)}
-        names |= self.stop_number_names(partial(self._load, "%p"))
-        names |= {("q", k): self._load("%q", k) for k in range(2 * len(self.links))}
-        names |= {operand: self._load("%drive", k) for k, operand in enumerate(self.input_operands)}
+        names |= {("p", k): self.load_entry("%p", k) for k in range(count)}
+        names |= self.stop_number_names(partial(self.load_entry, "%p"))
+        names |= {("q", k): self.load_entry("%q", k) for k in range(2 * len(self.links))}
+        names |= {operand: self.load_entry("%drive", k) for k, operand in enumerate(self.input_operands)}
         rows: list[str] = []
         arms: list[str] = []
         for k, part in enumerate(self.equations.blocks):
-            sign = self._load("%sign", k)
+            sign = self.load_entry("%sign", k)
             if self.point_blocks is None:
                 names["sign", k] = sign
                 self.write_closed_form(part, names)
@@ -158,21 +158,12 @@ class BlockJoinWriter(KernelWriter):
         rows += self.write_stops(names) if self.point_blocks is None else []
         state = [names[operand] for operand in self.state_operands()]
         for k, value in enumerate([*rows, *state, *arms]):
-            t.store(value, self._pointer("%out", k))
+            t.store(value, self.entry_pointer("%out", k))
         t.close_loop("b", "blocks", "block", "done")
         t.write_label("done")
         t.write_line("ret void")
         t.write_line("}")
         return t.module_text()
-
-    def _pointer(self, base: str, row: int) -> str:
-        t = self.ir
-        return t.double_pointer(
-            base, t.add_instruction(f"add i64 {t.add_instruction(f'mul i64 %width, {row}')}, {self.lane}")
-        )
-
-    def _load(self, base: str, row: int) -> str:
-        return self.ir.load(self._pointer(base, row))
 
 
 class _JoinText(NamedTuple):

@@ -169,32 +169,23 @@ class _DesignsKernelWriter(KernelWriter):
             t.write_line(self.linear_systems.function_text)
         return DesignsKernelLayout(self.state, self.input_operands, rows, t.module_text(), t.lanes, self.start)
 
-    def _row_pointer(self, base: str, k: int) -> str:
-        """Where the entries of a row that is read stand for this block of designs."""
-        t = self.ir
-        return t.double_pointer(
-            base, t.add_instruction(f"add i64 {t.add_instruction(f'mul i64 %width, {k}')}, {self.lane}")
-        )
-
     def _write_lanes_start(self) -> tuple[OperandNames, OperandNames]:
         """A block of designs begins: its numbers, and the inputs at the start."""
         t, count = self.ir, self.input_count
         t.write_label("block")
         t.write_line("%b = phi i64 [0, %entry], [%bnext, %blockend]")
         self.lane = t.add_instruction(f"mul i64 %b, {t.lanes}")
-        have: OperandNames = {("p", k): t.load(self._row_pointer("%p", k)) for k in range(self.symbols["p"].numel())}
-        have |= self.stop_number_names(lambda k: t.load(self._row_pointer("%p", k)))
-        have |= {("q", k): t.load(self._row_pointer("%q", k)) for k in range(2 * len(self.links))}
+        have: OperandNames = {("p", k): self.load_entry("%p", k) for k in range(self.symbols["p"].numel())}
+        have |= self.stop_number_names(lambda k: self.load_entry("%p", k))
+        have |= {("q", k): self.load_entry("%q", k) for k in range(2 * len(self.links))}
         if self.results is not None:
             first = 2 * len(self.links)
-            have |= {
-                ("number", k): t.load(self._row_pointer("%q", first + k)) for k in range(self.results.numbers.numel())
-            }
+            have |= {("number", k): self.load_entry("%q", first + k) for k in range(self.results.numbers.numel())}
         if self.rates:
-            have |= {(f"u{1 + k // count}", k % count): t.load(self._row_pointer("%rate", k)) for k in range(2 * count)}
+            have |= {(f"u{1 + k // count}", k % count): self.load_entry("%rate", k) for k in range(2 * count)}
         t.mark_hoist_point()
-        at_start = {leaf: t.load(self._row_pointer("%drive", k)) for k, leaf in enumerate(self.input_operands)}
-        state = {leaf: t.load(self._row_pointer("%state", k)) for k, leaf in enumerate(self.state)}
+        at_start = {leaf: self.load_entry("%drive", k) for k, leaf in enumerate(self.input_operands)}
+        state = {leaf: self.load_entry("%state", k) for k, leaf in enumerate(self.state)}
         if self.start.has_signs:
             have |= state
         elif self.equations.closed_forms:

@@ -61,8 +61,18 @@ class KernelWriter(KernelInstructions):
     ):
         super().__init__(equations, links, rates, invariant, carried)
         self.ir = IRWriter(lanes)
+        self.lane = "0"
+        "the first design of the block of designs that is computed"
         self.hoisted_names: dict[int, str] = {}
         "of what does not vary"
+
+    def entry_pointer(self, base: str, row: int) -> str:
+        """Where a row has the entries of the block of designs; rows are `%width` apart."""
+        return self.ir.row_pointer(base, "%width", row, self.lane)
+
+    def load_entry(self, base: str, row: int) -> str:
+        """The entries of a row."""
+        return self.ir.load(self.entry_pointer(base, row))
 
     def write_values(self, outputs: Sequence[ca.SX], names: Mapping[Operand, str]) -> list[str]:
         """The values of expressions where numbers stand under these names. Raises BareAngle, UnsupportedOperation."""

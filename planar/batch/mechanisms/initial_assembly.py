@@ -13,7 +13,7 @@ from planar.batch.mechanisms.block_type import COS, MAX_SIGNS, POSE_ROWS, SIN, S
 from planar.batch.mechanisms.linkages import BlockBatch, LinkageArrays, PointArrays
 from planar.batch.mechanisms.newton_march import compile_newton_block, newton_numbers, step_table
 from planar.codegen.tape import LANES, Tape, TapeFormula, compile_block, run_tape
-from planar.foundation.arrays import Array, BoolArray, IntArray
+from planar.foundation.arrays import Array, BoolArray, IntArray, part_offsets
 from planar.foundation.geometry import GROUND, Frame, frame_at
 from planar.model.pairs import MeasureKind
 
@@ -100,7 +100,7 @@ class _Starts:
 
     def __init__(self, linkages: LinkageArrays):
         self.linkages, blocks = linkages, linkages.block_count
-        self.first = np.concatenate([[0], np.cumsum(linkages.link_counts)])
+        self.first = part_offsets(linkages.link_counts)
         self.state = np.zeros((1 + self.first[-1], POSE_ROWS, LANES))
         _fill_inputs(self.state, linkages, self.first)
         self.sums = _sketch_sums(linkages.sketch, self.first)
@@ -125,7 +125,7 @@ class _Starts:
                 self.slots[at, kind.slot_count] = self.table.ctypes.data
                 numbers[kind] = newton_numbers(kind, batch.p, np.zeros((len(at), len(kind.unknown_is_angle))))
                 self.functions.append(compile_newton_block(kind, False))
-        self.begins = np.concatenate([[0], np.cumsum(np.bincount(owner, minlength=len(linkages)))])
+        self.begins = part_offsets(np.bincount(owner, minlength=len(linkages)))
         self.p = np.zeros((blocks, max(own.shape[1] for own in numbers.values())))
         for batch in linkages.batches:
             self.p[batch.block_numbers, : numbers[batch.block_type].shape[1]] = numbers[batch.block_type]
@@ -278,10 +278,10 @@ def _align_slider(
 def _fill_inputs(state: Array, linkages: LinkageArrays, first: IntArray) -> None:
     """Put the frame and the inputs into the places (places, rows, steps)."""
     state[0, COS] = 1.0
-    where, value = first[linkages.inputs.owner] + linkages.inputs.link_index, linkages.inputs.value
-    state[where, X] = value[:, None]
-    state[where, COS] = np.where(linkages.inputs.is_angle, np.cos(value), 1.0)[:, None]
-    state[where, SIN] = np.where(linkages.inputs.is_angle, np.sin(value), 0.0)[:, None]
+    inputs = linkages.inputs
+    places = first[inputs.owner] + inputs.link_index
+    for row, values in zip((X, COS, SIN), (inputs.value, *inputs.cos_and_sin()), strict=True):
+        state[places, row] = values[:, None]
 
 
 def _sketch_sums(points: PointArrays, first: IntArray) -> Array:

@@ -50,7 +50,7 @@ from planar.batch.mechanisms.tape_runs import (
 )
 from planar.batch.stop_checks import find_first_stop
 from planar.codegen.tape import FormulaInput, TapeFormula, compile_block
-from planar.foundation.arrays import Array, IntArray
+from planar.foundation.arrays import Array, IntArray, part_offsets
 from planar.foundation.errors import Outcome
 from planar.foundation.geometry import Vector
 from planar.model.mechanism import Mechanism, running_input_index
@@ -67,7 +67,7 @@ def solve_by_blocks(mechanisms: Sequence[Mechanism], request: SweepRequest) -> d
     if group is None:
         return {}
     arrays, start = group.arrays, find_linkage_assemblies(group.arrays)
-    first_point = _begins(np.bincount(arrays.points.owner, minlength=len(arrays)))
+    first_point = part_offsets(np.bincount(arrays.points.owner, minlength=len(arrays)))
     values = make_values(int(first_point[-1]), request.steps, request.rates)
     taped = _make_tape(arrays, start).select(np.flatnonzero(start.is_sure))
     kinds = _block_kinds([batch.block_type for batch in arrays.batches], request.rates)
@@ -117,11 +117,6 @@ def _between(inputs: Array) -> str:
     return f"at an input of {inputs[0]:.6g} to {inputs[1]:.6g} rad"
 
 
-def _begins(counts: IntArray) -> IntArray:
-    """Where parts of so many begin, and where the last ends."""
-    return np.concatenate([[0], np.cumsum(counts)])
-
-
 def _make_tape(arrays: LinkageArrays, start: StartAssemblies) -> TapedLinkages:
     """All linkages, of each first its inputs, then its blocks, then its points, the rows of which are told."""
     many, inputs, points = len(arrays), arrays.inputs, arrays.points
@@ -130,10 +125,10 @@ def _make_tape(arrays: LinkageArrays, start: StartAssemblies) -> TapedLinkages:
         block_owner[batch.block_numbers] = batch.owner
     owners = inputs.owner, block_owner, points.owner
     counts = np.array([np.bincount(owner, minlength=many) for owner in owners])
-    first = _begins(counts.sum(axis=0))
+    first = part_offsets(counts.sum(axis=0))
     before = np.concatenate([np.zeros((1, many), dtype=np.int64), np.cumsum(counts, axis=0)])
     at_input, at_block, at_point = (
-        (first[:-1] + earlier - _begins(own)[:-1])[owner] + np.arange(len(owner))
+        (first[:-1] + earlier - part_offsets(own)[:-1])[owner] + np.arange(len(owner))
         for owner, own, earlier in zip(owners, counts, before, strict=False)
     )
     numbers = [_block_numbers(batch, start) for batch in arrays.batches]
@@ -141,8 +136,9 @@ def _make_tape(arrays: LinkageArrays, start: StartAssemblies) -> TapedLinkages:
     p = np.zeros((first[-1], max(INPUT_NUMBERS, *(own.shape[1] for own in numbers))))
     kinds, blocks = np.empty(first[-1], dtype=np.int64), np.full(first[-1], -1)
     kinds[at_input], kinds[at_point] = np.where(inputs.runs, RUNNING_INPUT, STANDING_INPUT), POINT
-    c, s = (np.where(inputs.is_angle, of(inputs.value), still) for of, still in ((np.cos, 1.0), (np.sin, 0.0)))
-    p[at_input, :INPUT_NUMBERS] = np.stack([inputs.value, c, s, inputs.velocity, inputs.acceleration], axis=1)
+    p[at_input, :INPUT_NUMBERS] = np.stack(
+        [inputs.value, *inputs.cos_and_sin(), inputs.velocity, inputs.acceleration], axis=1
+    )
     slots[at_input, 0], slots[at_input, 1] = TABLE, _slot_numbers(inputs.link_index)
     p[at_point, :2], p[at_point, 2] = points.numbers, arrays.unit[points.owner]
     slots[at_point, 0], slots[at_point, 1] = _slot_numbers(points.link_index), np.arange(len(at_point))

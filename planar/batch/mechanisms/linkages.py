@@ -56,6 +56,10 @@ class InputArrays(NamedTuple):
     velocity: Array
     acceleration: Array
 
+    def cos_and_sin(self) -> tuple[Array, Array]:
+        """The cosines and sines of the positions; 1 and 0 for lengths."""
+        return np.where(self.is_angle, np.cos(self.value), 1.0), np.where(self.is_angle, np.sin(self.value), 0.0)
+
 
 class PointArrays(NamedTuple):
     """Points on links: whose, the place of the link, and numbers (points, any) of each."""

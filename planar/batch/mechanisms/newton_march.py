@@ -142,8 +142,7 @@ class _NewtonBlockWriter:
         return have, bases
 
     def _row_pointer(self, base: str, row: int) -> str:
-        t = self.ir
-        return t.double_pointer(base, t.add_instruction(f"add i64 {t.add_instruction(f'mul i64 %stride, {row}')}, %k"))
+        return self.ir.row_pointer(base, "%stride", row, "%k")
 
     def _write_step_end(self, have: dict[FormulaInput, str], bases: list[str], aheads: list[str], most: str) -> None:
         """The step ends: its results are written and judged, and what it moved, `most` at a time, is remembered."""

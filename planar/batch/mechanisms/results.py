@@ -9,6 +9,7 @@ from typing import NamedTuple, Protocol, overload
 
 import numpy as np
 
+from planar.foundation.arrays import part_offsets
 from planar.foundation.errors import Outcome
 from planar.foundation.short_repr import short_repr
 
@@ -158,7 +159,7 @@ class SweptList:
         return SweptList(tuple(each.astype(dtype) for each in self.found))
 
     def rows(self) -> PointRows:
-        first = np.concatenate([[0], np.cumsum([len(each.position) for each in self.found])])
+        first = part_offsets([len(each.position) for each in self.found])
         orders = []
         for order in ("position", "velocity", "acceleration"):
             rows = [values for each in self.found for values in (getattr(each, order) or {}).values()]
@@ -259,4 +260,4 @@ class Each(Sequence[Swept]):
             for order in range(3)
         ]
         position = np.zeros((0, 0, 2)) if whole[0] is None else whole[0]
-        return PointRows(np.concatenate([[0], np.cumsum(counts)]), position, whole[1], whole[2])
+        return PointRows(part_offsets(counts), position, whole[1], whole[2])

@@ -10,7 +10,7 @@ import numpy as np
 
 from planar.batch.march.prediction import MAX_TURN_PER_STEP
 from planar.codegen.tape import DEAD_POINT, LANES, UNDECIDED, Tape, clear_rows, padded_steps, run_tape
-from planar.foundation.arrays import Array, BoolArray, IntArray
+from planar.foundation.arrays import Array, BoolArray, IntArray, part_offsets
 from planar.foundation.errors import Outcome
 
 FULL_TURN = 2.0 * np.pi
@@ -73,7 +73,7 @@ class TapedLinkages(NamedTuple):
         if len(some) == len(self.which):
             return self
         counts = np.diff(self.first)[some]
-        first = np.concatenate([[0], np.cumsum(counts)])
+        first = part_offsets(counts)
         own = np.repeat(self.first[some] - first[:-1], counts) + np.arange(first[-1])
         kinds, slots, p, blocks = (each[own] for each in (self.kinds, self.slots, self.p, self.blocks))
         tolerance, clearance = self.tolerance[some], self.clearance[some]

@@ -7,16 +7,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from planar.batch.mechanisms.results import PointMapping, PointRows, Swept
+from planar.batch.mechanisms.results import PointRows, Swept, swept_from_rows
+from planar.batch.mechanisms.tape_runs import DEAD_POINT_NUMBER, FULL_TURN
 from planar.batch.pinned.tape import pin_number
-from planar.foundation.errors import Outcome
+from planar.foundation.arrays import part_offsets
 
 Array = np.ndarray
-
-SOLVED, DEAD_POINT = (tuple(Outcome).index(each) for each in (Outcome.SOLVED, Outcome.DEAD_POINT))
-ORDERS = 3
-"""Positions, velocities and accelerations."""
-FULL_TURN = 2.0 * np.pi
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,7 +39,7 @@ class PinnedPart:
     @property
     def last_status(self) -> Array:
         """The status at the last step (linkages,)."""
-        found = np.where(self.solved > self.steps, SOLVED, DEAD_POINT).astype(np.int8)
+        found = np.where(self.solved > self.steps, 0, DEAD_POINT_NUMBER).astype(np.int8)
         for k, each in self.found_elsewhere.items():
             found[k] = each.status[-1]
         return found
@@ -82,14 +78,9 @@ class PinnedPart:
             return self.found_elsewhere[k]
         begin, end = int(self.first[k]), int(self.first[k + 1])
         names = [f"P{pin}" for pin in self.pins[begin:end].tolist()]
-        own = self.values[begin:end, :, : self.steps + 1]
-        parts = [PointMapping(names, own[:, row : row + 2].swapaxes(1, 2)) for row in range(0, own.shape[1], 2)]
-        solved = int(self.solved[k])
-        status = np.zeros(self.steps + 1, dtype=np.int8)
-        status[solved:] = DEAD_POINT
-        turned = np.linspace(0.0, 1.0, self.steps + 1) * FULL_TURN
-        position, velocity, acceleration = parts if len(parts) == ORDERS else (parts[0], None, None)
-        return Swept(position, velocity, acceleration, self.start[k] + turned, status, self._reason(k), False)
+        rows = self.values[begin:end, :, : self.steps + 1]
+        inputs = self.start[k] + np.linspace(0.0, 1.0, self.steps + 1) * FULL_TURN
+        return swept_from_rows(names, rows, inputs, int(self.solved[k]), DEAD_POINT_NUMBER, self._reason(k))
 
     def _reason(self, k: int) -> str:
         """Why a linkage stops; nothing where it does not."""
@@ -104,8 +95,8 @@ def join_parts(parts: Sequence[PinnedPart], values: Array) -> PinnedPart:
     """Parts that follow one another, whose points are in one array."""
     if len(parts) == 1:
         return parts[0]
-    sizes = np.concatenate([[0], np.cumsum([len(part) for part in parts])])
-    points = np.concatenate([[0], np.cumsum([part.first[-1] for part in parts])])
+    sizes = part_offsets([len(part) for part in parts])
+    points = part_offsets([part.first[-1] for part in parts])
     first = np.concatenate([*(part.first[:-1] + at for part, at in zip(parts, points, strict=False)), points[-1:]])
     names = ("pins", "start", "solved", "near", "bars")
     pins, start, solved, near, bars = (np.concatenate([getattr(part, name) for part in parts]) for name in names)

@@ -9,7 +9,7 @@ import numpy as np
 
 from planar.batch.assembly.assembly_scores import is_surely_farther
 from planar.batch.pinned.formulas import NUMBERS, PinStep
-from planar.foundation.arrays import Array, BoolArray, IntArray
+from planar.foundation.arrays import Array, BoolArray, IntArray, part_offsets
 from planar.model.pin_linkages import PinnedLinkages
 from planar.solving.checks.residual_check import EPS, NEGLIGIBLE_ERROR, SHORT_ARM, residual_tolerance
 
@@ -38,7 +38,7 @@ def find_told_pins(linkages: PinnedLinkages, names: Sequence[str] | None) -> Tol
     numbers = np.array([number for name in names if (number := pin_number(name)) is not None], dtype=np.int64)
     there = numbers < np.diff(linkages.first_pin)[:, None]
     named = (numbers + linkages.first_pin[:-1, None])[there]
-    return ToldPins(named, np.concatenate([[0], np.cumsum(there.sum(axis=1))]))
+    return ToldPins(named, part_offsets(there.sum(axis=1)))
 
 
 def frame_pins(linkages: PinnedLinkages) -> IntArray:

@@ -207,10 +207,7 @@ def write_numbers(design: DesignNumbers, order: Sequence[Operand]) -> IRWriter:
         f"define internal void @{NUMBERS_FUNCTION}(ptr %own, ptr %places, ptr %given, ptr noalias %numbers) {{"
     )
     t.write_label("entry")
-    size = design.symbols.numel()
-    t.write_line(f"%values = alloca [{size} x double], align 64")
-    t.write_line(f"call void @llvm.memcpy.p0.p0.i64(ptr %values, ptr %own, i64 {8 * size}, i1 false)")
-    is_given = write_given(t)
+    is_given = write_given(t, design.symbols.numel())
     given = [t.load(t.double_pointer("%values", str(k))) for k in range(design.symbols.numel())]
     outputs = [*design.numbers.values(), *design.points]
     function = ca.Function("numbers", [design.symbols], [ca.densify(ca.vertcat(*outputs))], {"cse": True})
@@ -237,8 +234,11 @@ def write_numbers(design: DesignNumbers, order: Sequence[Operand]) -> IRWriter:
     return t
 
 
-def write_given(t: IRWriter) -> str:
-    """Put the given values where they belong; a flag that they are neither too great nor too small."""
+def write_given(t: IRWriter, size: int) -> str:
+    """Write the values of a design, %values (size,): those of the file's design, and the given ones in their places.
+    Return a flag that the given ones are neither too great nor too small."""
+    t.write_line(f"%values = alloca [{size} x double], align 64")
+    t.write_line(f"call void @llvm.memcpy.p0.p0.i64(ptr %values, ptr %own, i64 {8 * size}, i1 false)")
     slot = t.allocate()
     t.store(t.constant(1.0), slot)
     t.write_line("%many = load i64, ptr %places")
@@ -250,10 +250,10 @@ def write_given(t: IRWriter) -> str:
     number = t.load(t.double_pointer("%given", "%k"))
     place = t.add_instruction("getelementptr i64, ptr %places, i64 %knext")
     t.store(number, t.double_pointer("%values", t.add_instruction(f"load i64, ptr {place}")))
-    size = t.call_intrinsic("fabs", number)
-    least, greatest = (t.constant(each) for each in REASONABLE_SIZES)
-    within = t.and_flags(t.compare("oge", size, least), t.compare("ole", size, greatest))
-    within = t.or_flags(within, t.compare("oeq", size, t.constant(0.0)))
+    magnitude = t.call_intrinsic("fabs", number)
+    minimum, maximum = (t.constant(bound) for bound in REASONABLE_SIZES)
+    within = t.and_flags(t.compare("oge", magnitude, minimum), t.compare("ole", magnitude, maximum))
+    within = t.or_flags(within, t.compare("oeq", magnitude, t.constant(0.0)))
     t.store(t.select_or_zero(within, t.load(slot)), slot)
     t.write_line("%more = icmp slt i64 %knext, %many")
     t.write_line("br i1 %more, label %value, label %known")

@@ -109,8 +109,7 @@ def _row_loader(t: IRWriter) -> Callable[[int, str], str]:
     """What loads the number of a row at a position."""
 
     def load(row: int, at: str) -> str:
-        place = t.add_instruction(f"add i64 {t.add_instruction(f'mul i64 %width, {row}')}, {at}")
-        return t.load(t.double_pointer("%out", place))
+        return t.load(t.row_pointer("%out", "%width", row, at))
 
     return load
 
