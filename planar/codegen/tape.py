@@ -1,6 +1,6 @@
-"""Tapes: blocks that are worked off one after the other, each over all steps by the compiled function of its kind.
+"""Tapes: sequences of blocks, each computed over all steps by the compiled function of its kind.
 
-Nothing is compiled for a structure: the function of a kind of block serves every linkage that has such a block.
+No function is compiled for a structure: all linkages with a block of one kind use the same function.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from planar.foundation.instruction_list import InstructionList, required_values
 from planar.foundation.turns import leave_turn
 
 LANES = 8
-"""Steps that are worked on at once; rows of numbers are multiples of so many."""
+"""Steps in one vector; the length of a row is a multiple of it."""
 GOOD, DEAD_POINT, UNDECIDED = range(3)
 """Outcomes of a sequence: good to the end, until a dead point, until a step that is not sure."""
 SHIFT = LANES.bit_length() - 1
@@ -34,9 +34,9 @@ BLOCK_NAME = "block"
 BLOCK_ARGUMENTS = (
     "i64 %limit, i64 %stride, ptr readonly %rows, ptr readonly %p, double %tolerance, double %clearance, ptr %ended"
 )
-"""Of the function of a kind: how many steps are wanted; how far rows are apart; the addresses of its slots; its own
-numbers; what may be left open; how clear of a dead point steps are at least; and where it puts the first step that is
-not good, with the outcome, if one is not, else whether it surely stays clear up to the next step."""
+"""Arguments of a block function: the number of steps; the length of a row; the addresses of the slots; the numbers of
+the block; the residual tolerance; the least distance measure from a dead point; and an output array: the first step
+that is not good and its outcome, and whether the block stays clear of a dead point up to the next step."""
 BLOCK_ARGUMENT_TYPES = ("int", "int", "array", "array", "float", "float", "array")
 _WALK = f"""
 define void @walk(i64 %begin, i64 %end, i64 %steps, i64 %stride, i64 %slots, i64 %numbers, ptr readonly %functions,
@@ -121,7 +121,7 @@ class FormulaInput(NamedTuple):
 
 
 class BlockFormula:
-    """Values of a list by their numbers, of which some are wanted; those of `inputs` are taken from outside."""
+    """A list of instructions with the numbers of its outputs and inputs."""
 
     def __init__(
         self, listing: InstructionList[FormulaInput], wanted: tuple[int, ...], inputs: dict[int, FormulaInput]
@@ -165,19 +165,27 @@ class TapeResult(NamedTuple):
 
 
 def padded_steps(steps: int) -> int:
-    """How many numbers a row of so many steps has: whole vectors."""
+    """The length of a row of steps: a multiple of LANES."""
     return LANES * -(-steps // LANES)
 
 
 def run_tape(functions: Sequence[Any], steps: int, tape: Tape) -> TapeResult:
-    """Work off a whole tape by the functions of its kinds, see `compile_block`, over rows of `padded_steps`."""
-    stride, many = padded_steps(steps), len(tape.tolerance)
-    result = TapeResult(*np.empty((3, many), dtype=np.int64))
-    addresses = np.array([ctypes.cast(each, ctypes.c_void_p).value for each in functions], dtype=np.int64)
-    arrays = [addresses, *(np.ascontiguousarray(each) for each in tape), *result]
+    """Compute all blocks of a tape with the functions of their kinds, see `compile_block`; rows have `padded_steps`."""
+    stride, sequence_count = padded_steps(steps), len(tape.tolerance)
+    result = TapeResult(*np.empty((3, sequence_count), dtype=np.int64))
+    addresses = np.array([ctypes.cast(item, ctypes.c_void_p).value for item in functions], dtype=np.int64)
+    arrays = [addresses, *(np.ascontiguousarray(item) for item in tape), *result]
     walk = compile_function(_WALK, "walk", *("int",) * 6, *("array",) * 10)
     with leave_turn(len(tape.kinds) * steps >= LONG_CALL_NUMBERS):
-        walk(0, many, steps, stride, tape.slots.shape[1], tape.p.shape[1], *(each.ctypes.data for each in arrays))
+        walk(
+            0,
+            sequence_count,
+            steps,
+            stride,
+            tape.slots.shape[1],
+            tape.p.shape[1],
+            *(item.ctypes.data for item in arrays),
+        )
     return result
 
 
@@ -190,12 +198,12 @@ def compile_block(formula: TapeFormula, least_cosine: float = -1.0) -> Any:
 class _BlockWriter:
     """Writes the function of `compile_block`."""
 
-    def __init__(self, own: TapeFormula, least_cosine: float):
-        self.ir, self.own, self.least_cosine = IRWriter(LANES), own, least_cosine
+    def __init__(self, formula: TapeFormula, least_cosine: float):
+        self.ir, self.own, self.least_cosine = IRWriter(LANES), formula, least_cosine
 
     def write(self) -> str:
         """The text of the function."""
-        t, own = self.ir, self.own
+        t, tape_formula = self.ir, self.own
         t.write_line(f"define void @{BLOCK_NAME}({BLOCK_ARGUMENTS}) {{")
         t.write_label("entry")
         t.write_line(f"%rounded = add i64 %limit, {LANES - 1}")
@@ -211,55 +219,61 @@ class _BlockWriter:
 
         names: dict[int, str] = {}
         taken: dict[int, str] = {}
-        for number, leaf in own.formula.inputs.items():
+        for number, leaf in tape_formula.formula.inputs.items():
             if leaf.source == "p":
                 place = t.double_pointer("%p", str(leaf.place))
                 names[number] = t.broadcast(t.add_instruction(f"load double, ptr {place}"))
             else:
                 taken[number] = row_pointer(leaf.place, leaf.part)
-        given = [row_pointer(*place) for place in own.output_rows]
+        output_pointers = [row_pointer(*place) for place in tape_formula.output_rows]
         t.write_line("br label %step")
         t.write_label("step")
         t.write_line("%vector = phi i64 [0, %entry], [%vectornext, %next]")
-        watched = [f"%watched{k}" for k in range(2 * len(own.directions) + 1 if own.is_checked else 0)]
+        watched = [
+            f"%watched{k}" for k in range(2 * len(tape_formula.directions) + 1 if tape_formula.is_checked else 0)
+        ]
         for each in watched:
             t.write_line(f"{each} = phi {t.vector} [{t.constant(nan)}, %entry], [{each}next, %next]")
         t.write_line(f"%off = mul i64 %vector, {LANES}")
         for number, pointer in taken.items():
             names[number] = t.load(t.double_pointer(pointer, "%off"))
         known: dict[int, str] = {}
-        t.write_values(own.formula.instructions, own.formula.order, known, names)
-        found = [known[number] for number in own.formula.outputs]
-        for value, pointer in zip(found, given, strict=False):
+        t.write_values(tape_formula.formula.instructions, tape_formula.formula.order, known, names)
+        values = [known[number] for number in tape_formula.formula.outputs]
+        for value, pointer in zip(values, output_pointers, strict=False):
             t.store(value, t.double_pointer(pointer, "%off"))
-        if own.is_checked:
-            self._write_check(watched, found)
+        if tape_formula.is_checked:
+            self._write_check(watched, values)
         else:
             t.write_line("br label %next")
         t.write_label("next")
-        t.close_loop("vector", "vectors", "step", "told" if own.is_checked else "done")
-        if own.is_checked:
-            t.write_label("told")
+        t.close_loop("vector", "vectors", "step", "judged" if tape_formula.is_checked else "done")
+        if tape_formula.is_checked:
+            t.write_label("judged")
             t.write_line(f"%lastlane = and i64 {t.add_instruction('sub i64 %limit, 1')}, {LANES - 1}")
-            stays = write_stays_clear(t, found[-1], self._earlier(found[-1], watched[-1], 1), self.clearance)
+            stays = write_stays_clear(t, values[-1], self._earlier(values[-1], watched[-1], 1), self.clearance)
             write_stays(t, t.add_instruction(f"extractelement <{LANES} x i1> {stays}, i64 %lastlane"))
             t.write_line("br label %done")
         t.write_label("done")
         t.write_line("ret void")
         t.write_line("}")
-        if own.is_checked:
+        if tape_formula.is_checked:
             t.write_line(f"declare i{LANES} @llvm.cttz.i{LANES}(i{LANES}, i1)")
         return t.module_text()
 
-    def _write_check(self, watched: list[str], found: list[str]) -> None:
+    def _write_check(self, watched: list[str], values: list[str]) -> None:
         """Look at a vector of steps: directions, what is left open and how clear it is, as before in `watched`. At the
         first that is not good the block ends."""
         t, byte = self.ir, f"i{LANES}"
-        left, clear = found[-2:]
-        now = [LinkDirection(found[x], found[y], k if k is None else found[k]) for x, y, k in self.own.directions]
-        parts = [*(part for each in now for part in each[:2]), clear]
+        residual, clear = values[-2:]
+        directions = [
+            LinkDirection(values[x], values[y], k if k is None else values[k]) for x, y, k in self.own.directions
+        ]
+        parts = [*(part for direction in directions for part in direction[:2]), clear]
         earlier = [self._earlier(value, before, 1) for value, before in zip(parts, watched, strict=True)]
-        good = write_turn_flags(t, t.compare("ole", left, self.tolerance), now, earlier[:-1], self.least_cosine)
+        good = write_turn_flags(
+            t, t.compare("ole", residual, self.tolerance), directions, earlier[:-1], self.least_cosine
+        )
         judged = write_clear_flags(t, clear, earlier[-1], self._earlier(clear, watched[-1], 2), self.clearance)
         for value, before in zip(parts, watched, strict=True):
             # a value of its own name, for the next vector
@@ -272,7 +286,7 @@ class _BlockWriter:
         lane = t.add_instruction(f"call {byte} @llvm.cttz.{byte}({byte} {bad}, i1 true)")
         t.write_line(f"%come = add i64 %off, {t.add_instruction(f'zext {byte} {lane} to i64')}")
         t.write_line("%ends = icmp slt i64 %come, %limit")
-        t.write_line("br i1 %ends, label %stopped, label %told")
+        t.write_line("br i1 %ends, label %stopped, label %judged")
         t.write_label("stopped")
         below = t.compare("olt", clear, t.constant(0.0))
         dead = t.and_flags(below, t.compare("ogt", judged.least_before, judged.needed))
@@ -282,7 +296,7 @@ class _BlockWriter:
         t.write_line("br label %done")
 
     def _earlier(self, value: str, before: str, by: int) -> str:
-        """The values so many steps before those of a vector; `before` is the vector before it."""
+        """The values of a vector shifted by some steps; `before` is the previous vector."""
         v, lanes = self.ir.vector, ", ".join(f"i32 {LANES + k - by}" for k in range(LANES))
         return self.ir.add_instruction(f"shufflevector {v} {before}, {v} {value}, <{LANES} x i32> <{lanes}>")
 
@@ -296,17 +310,17 @@ class LinkDirection(NamedTuple):
 
 
 def write_turn_flags(
-    t: IRWriter, good: str, now: Sequence[LinkDirection], earlier: Sequence[str], least_cosine: float
+    t: IRWriter, is_good: str, directions: Sequence[LinkDirection], earlier: Sequence[str], least_cosine: float
 ) -> str:
     """Where it is good, and none of the directions, which were so in the step before (x and y of each), turns fast."""
-    for k, (x, y, square) in enumerate(now):
+    for k, (x, y, square) in enumerate(directions):
         along = t.add_all([t.binary("mul", a, b) for a, b in zip((x, y), earlier[2 * k : 2 * k + 2], strict=True)])
-        least = t.constant(least_cosine)
+        minimum = t.constant(least_cosine)
         if square is not None:
-            least = t.binary("mul", square, least)
+            minimum = t.binary("mul", square, minimum)
         # at the first step there is none before
-        good = t.and_flags(good, t.compare("uge", along, least))
-    return good
+        is_good = t.and_flags(is_good, t.compare("uge", along, minimum))
+    return is_good
 
 
 class ClearFlags(NamedTuple):
@@ -327,8 +341,8 @@ def write_clear_flags(t: IRWriter, clear: str, one: str, two: str, clearance: st
 
     bend = t.call_intrinsic("fabs", t.binary("sub", t.binary("sub", clear, one), t.binary("sub", one, two)))
     # at the first steps some of these are no numbers, which is passed over
-    needed, least = pick("ogt", bend, clearance), pick("olt", two, one)
-    return ClearFlags(t.compare("ogt", pick("olt", least, clear), needed), least, needed)
+    needed, minimum = pick("ogt", bend, clearance), pick("olt", two, one)
+    return ClearFlags(t.compare("ogt", pick("olt", minimum, clear), needed), minimum, needed)
 
 
 def write_stays_clear(t: IRWriter, clear: str, one: str, clearance: str) -> str:
@@ -352,7 +366,8 @@ def write_ended(t: IRWriter, step: str, outcome: str) -> None:
 
 
 def clear_rows(addresses: IntArray, first: IntArray, count: int) -> None:
-    """Rows of so many numbers, a multiple of LANES, at addresses (rows,): NaN from the number first (rows,) on."""
+    """Set rows at addresses (rows,) to NaN from the index first (rows,) on; `count`, a multiple of LANES, is their
+    length."""
     if len(addresses):
         held = [np.ascontiguousarray(each, dtype=np.int64) for each in (addresses, first)]
         _compiled_clearing()(len(addresses), count, *(each.ctypes.data for each in held))

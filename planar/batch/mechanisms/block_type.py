@@ -158,10 +158,10 @@ class SymbolicAssembly(NamedTuple):
 
 
 class _StartWay(NamedTuple):
-    """Numbers of values of a way to assemble a kind: what is told of it, its squared distance to the sketch, what it
-    leaves open, and how far it is from where two ways meet."""
+    """Values of one assembly mode by their numbers: its outputs, its squared distance to the sketch, its residual, and
+    its distance measure from a dead point."""
 
-    told: list[int]
+    outputs: list[int]
     distance: int
     left: int
     clear: int
@@ -367,8 +367,8 @@ class FormulaBuilder:
         return whole
 
     def nearest_way(self, ways: Sequence[_StartWay]) -> list[int]:
-        """What is told of the way that is nearest to the sketch, its squared distance, that of the next, and how far
-        any way is from where two meet. What cannot be joined is `FAR_AWAY`."""
+        """The outputs of the assembly mode nearest to the sketch, its squared distance, the next squared distance, and
+        the least distance measure of any mode from a dead point. A mode that cannot be assembled is `FAR_AWAY`."""
         add = self.instructions.add
         far = self.instructions.add_constant(FAR_AWAY)
         distances = []
@@ -377,18 +377,18 @@ class FormulaBuilder:
             distances.append(
                 add("add", add("where", is_joined, way.distance), add("where", add("not", is_joined), far))
             )
-        told, nearest, second, clear = ways[0].told, distances[0], far, add("abs", ways[0].clear)
+        outputs, nearest, second, clear = ways[0].outputs, distances[0], far, add("abs", ways[0].clear)
         for way, distance in zip(ways[1:], distances[1:], strict=True):
             is_nearer = add("less", distance, nearest)
             stays = add("not", is_nearer)
-            told = [
+            outputs = [
                 add("add", add("where", is_nearer, new), add("where", stays, old))
-                for new, old in zip(way.told, told, strict=True)
+                for new, old in zip(way.outputs, outputs, strict=True)
             ]
             second = add("minnum", second, add("maxnum", nearest, distance))
             nearest = add("minnum", nearest, distance)
             clear = add("minnum", clear, add("abs", way.clear))
-        return [*told, nearest, second, clear]
+        return [*outputs, nearest, second, clear]
 
     def make_formula(self, wanted: list[int]) -> BlockFormula:
         """The formula of wanted values. Raises UnsupportedOperation where an angle stands outside cos and sin, or it is
@@ -449,10 +449,10 @@ class BlockType(BlockEquations):
                 way = work.closed_form_assembly(own)
                 poses = work.poses(way)
                 left, clear = work.acceptance_values(way, work.residuals(way, poses))
-                told = [*(each for pose in poses for each in pose), *own, left]
-                ways.append(_StartWay(told, work.sketch_distance(poses, sums), left, clear))
-            *told, left, nearest, second, least_clear = work.nearest_way(ways)
-            self._start_formula = work.make_formula([*told, nearest, second, left, least_clear])
+                outputs = [*(number for pose in poses for number in pose), *own, left]
+                ways.append(_StartWay(outputs, work.sketch_distance(poses, sums), left, clear))
+            *outputs, left, nearest, second, least_clear = work.nearest_way(ways)
+            self._start_formula = work.make_formula([*outputs, nearest, second, left, least_clear])
         return self._start_formula
 
     _start_formula: BlockFormula | None = None

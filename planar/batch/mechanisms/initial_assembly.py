@@ -20,8 +20,8 @@ from planar.model.pairs import MeasureKind
 LEAST_CLEARANCE = 1e-4
 """Nearer than this to where two assemblies meet neither is taken."""
 SKETCH_DISTANCE_RATIO = 0.075
-"""How far points may lie from the sketch on average (sizes) for a slope that is as regular as one: another assembly
-lies farther off."""
+"""Largest mean distance of points from the sketch (sizes), divided by the regularity of the Jacobian, at which no other
+assembly is nearer."""
 START_TOLERANCE_FACTOR = 100.0
 """How much more may be left open at a start, which is looked at again in the run."""
 MAX_UNKNOWNS = 24
@@ -31,8 +31,8 @@ LEAST_SPREAD = 1e-12
 
 
 class StartAssemblies(NamedTuple):
-    """For every linkage whether its assembly is surely the one that the search of the whole would take (linkages,), and
-    the signs of all blocks (blocks, MAX_SIGNS), or the unknowns of those that Newton's method follows (blocks,
+    """For every linkage whether its assembly is certainly the one that a search of the mechanism returns (linkages,),
+    and the signs of all blocks (blocks, MAX_SIGNS), or the unknowns of those that Newton's method follows (blocks,
     MAX_UNKNOWNS)."""
 
     is_sure: BoolArray
@@ -43,40 +43,40 @@ class StartAssemblies(NamedTuple):
 def find_linkage_assemblies(linkages: LinkageArrays) -> StartAssemblies:
     """See `StartAssemblies`.
 
-    A way to assemble a block is taken where it is nearer to the sketch than any other by more than all blocks of the
-    linkage together are away from it: whatever else were taken, the whole would lie farther off. Blocks that are not in
-    closed form are solved from where they are shown: their points lie at the sketch, and the slope is so regular that
-    no other assembly is as near, see `BlockAssemblies`.
+    An assembly mode of a block is accepted if every other mode is farther from the sketch by more than the distance of
+    all blocks of the linkage together: every other choice gives a larger total distance. Newton's method solves blocks
+    without closed form from the sketch; they are accepted if their points are near the sketch and the Jacobian is so
+    regular that no other assembly is as near, see `BlockAssemblies`.
     """
-    many, blocks = len(linkages), linkages.block_count
+    linkage_count, blocks = len(linkages), linkages.block_count
     starts = _Starts(linkages)
-    is_sure = starts.run(np.full(many, LEAST_CLEARANCE))
+    is_sure = starts.run(np.full(linkage_count, LEAST_CLEARANCE))
     if starts.take_solved_frames():
-        is_sure = starts.run(np.full(many, LEAST_CLEARANCE))
-    cost, clearance = np.zeros(many), np.full(many, LEAST_CLEARANCE)
+        is_sure = starts.run(np.full(linkage_count, LEAST_CLEARANCE))
+    cost, clearance = np.zeros(linkage_count), np.full(linkage_count, LEAST_CLEARANCE)
     margins: list[tuple[Array, Array]] = []
     signs, z = np.ones((blocks, MAX_SIGNS)), np.zeros((blocks, MAX_UNKNOWNS))
     for batch in linkages.batches:
         kind, owner, numbers = batch.block_type, batch.owner, batch.block_numbers
         if kind.has_closed_form:
-            own = starts.told[numbers, :, 0]
-            signs[numbers, : kind.sign_count] = own[:, : kind.sign_count]
-            nearest, second, left, clear = own[:, kind.sign_count : kind.sign_count + JUDGED_ROWS].T
+            rows = starts.judgements[numbers, :, 0]
+            signs[numbers, : kind.sign_count] = rows[:, : kind.sign_count]
+            nearest, second, residual, clear = rows[:, kind.sign_count : kind.sign_count + JUDGED_ROWS].T
             with np.errstate(invalid="ignore"):
-                good = left <= START_TOLERANCE_FACTOR * linkages.tolerance[owner]
-                good &= ~(clear < LEAST_CLEARANCE)
+                is_good = residual <= START_TOLERANCE_FACTOR * linkages.tolerance[owner]
+                is_good &= ~(clear < LEAST_CLEARANCE)
             # what can be assembled in one way alone may lie far off where others are
-            distance = np.where(good, np.maximum(nearest, 0.0), 0.0)
+            distance = np.where(is_good, np.maximum(nearest, 0.0), 0.0)
             margins.append((owner, second - nearest))
         else:
             shown = starts.shown[kind]
             z[numbers, : shown.unknowns.shape[1]] = shown.unknowns
             distance, points = starts.distance_to_sketch(batch)
-            good = shown.is_shown & (points > 0.0) & is_at_sketch(distance, points)
+            is_good = shown.is_shown & (points > 0.0) & is_at_sketch(distance, points)
             needed = distance / np.maximum(points, 1.0) / SKETCH_DISTANCE_RATIO**2
-            np.maximum.at(clearance, owner[good], np.minimum(needed, CLEAR_REGULARITY**2)[good])
-        is_sure[owner[~good]] = False
-        cost += np.bincount(owner, distance, many)
+            np.maximum.at(clearance, owner[is_good], np.minimum(needed, CLEAR_REGULARITY**2)[is_good])
+        is_sure[owner[~is_good]] = False
+        cost += np.bincount(owner, distance, linkage_count)
     for owner, margin in margins:
         is_sure[owner[~is_surely_farther(margin, cost[owner], roundings=2)]] = False
     if np.any(clearance > LEAST_CLEARANCE):
@@ -85,7 +85,7 @@ def find_linkage_assemblies(linkages: LinkageArrays) -> StartAssemblies:
 
 
 JUDGED_ROWS = 4
-"""Rows that are told of a start in closed form after its signs: see `BlockType.start_formula`."""
+"""Number of rows after the signs in the result of `BlockType.start_formula`."""
 
 
 class _ShownBlocks(NamedTuple):
@@ -104,29 +104,33 @@ class _Starts:
         self.state = np.zeros((1 + self.first[-1], POSE_ROWS, LANES))
         _fill_inputs(self.state, linkages, self.first)
         self.sums = _sketch_sums(linkages.sketch, self.first)
-        self.told = np.zeros((blocks, MAX_SIGNS + JUDGED_ROWS, LANES))
-        self.places = {each.block_type: each.state_indices(self.first) for each in linkages.batches}
+        self.judgements = np.zeros((blocks, MAX_SIGNS + JUDGED_ROWS, LANES))
+        self.places = {
+            block_batch.block_type: block_batch.state_indices(self.first) for block_batch in linkages.batches
+        }
         self.shown: dict[BlockType, _ShownBlocks] = {}
         owner, self.kinds = np.zeros((2, blocks), dtype=np.int64)
-        slot_count = 1 + max(each.block_type.slot_count for each in linkages.batches)
+        slot_count = 1 + max(block_batch.block_type.slot_count for block_batch in linkages.batches)
         self.slots, self.table = np.zeros((blocks, slot_count), dtype=np.int64), step_table(1, 0.0)
         numbers, self.functions = {}, []
         for kind_number, batch in enumerate(linkages.batches):
-            kind, at, places = batch.block_type, batch.block_numbers, self.places[batch.block_type]
-            owner[at], self.kinds[at] = batch.owner, kind_number
-            self.slots[at, : kind.slot_count] = self.state.ctypes.data + places * self.state.strides[0]
+            kind, indices, places = batch.block_type, batch.block_numbers, self.places[batch.block_type]
+            owner[indices], self.kinds[indices] = batch.owner, kind_number
+            self.slots[indices, : kind.slot_count] = self.state.ctypes.data + places * self.state.strides[0]
             if kind.has_closed_form:
-                self.slots[at, kind.slot_count] = self.told.ctypes.data + at * self.told.strides[0]
-                numbers[kind] = np.hstack([batch.p, self.sums[places[:, batch.inner_slots]].reshape(len(at), -1)])
+                self.slots[indices, kind.slot_count] = (
+                    self.judgements.ctypes.data + indices * self.judgements.strides[0]
+                )
+                numbers[kind] = np.hstack([batch.p, self.sums[places[:, batch.inner_slots]].reshape(len(indices), -1)])
                 rows = [(slot, row) for slot in range(kind.slot_count)[batch.inner_slots] for row in range(POSE_ROWS)]
                 rows += [(kind.slot_count, row) for row in range(kind.sign_count + JUDGED_ROWS)]
                 self.functions.append(compile_block(TapeFormula(kind.start_formula, tuple(rows))))
             else:
-                self.slots[at, kind.slot_count] = self.table.ctypes.data
-                numbers[kind] = newton_numbers(kind, batch.p, np.zeros((len(at), len(kind.unknown_is_angle))))
+                self.slots[indices, kind.slot_count] = self.table.ctypes.data
+                numbers[kind] = newton_numbers(kind, batch.p, np.zeros((len(indices), len(kind.unknown_is_angle))))
                 self.functions.append(compile_newton_block(kind, False))
         self.begins = part_offsets(np.bincount(owner, minlength=len(linkages)))
-        self.p = np.zeros((blocks, max(own.shape[1] for own in numbers.values())))
+        self.p = np.zeros((blocks, max(values.shape[1] for values in numbers.values())))
         for batch in linkages.batches:
             self.p[batch.block_numbers, : numbers[batch.block_type].shape[1]] = numbers[batch.block_type]
         if not all(batch.block_type.has_closed_form for batch in linkages.batches):
@@ -141,7 +145,7 @@ class _Starts:
 
     def take_solved_frames(self) -> bool:
         """Begin again where links are not shown, but where what was solved before has them; whether there are any."""
-        if all(each.is_shown.all() for each in self.shown.values()):
+        if all(blocks.is_shown.all() for blocks in self.shown.values()):
             return False
         x, y, c, s = np.moveaxis(self.state[:, :, 0], 1, 0)
         with np.errstate(invalid="ignore"):
@@ -157,20 +161,20 @@ class _Starts:
         for batch in self.linkages.batches:
             kind, numbers = batch.block_type, batch.block_numbers
             if not kind.has_closed_form:
-                found = _unknowns_from_frames(kind, self.frames, self.places[kind], batch.p)
-                self.shown[kind] = found
-                own = newton_numbers(kind, batch.p, found.unknowns)
-                self.p[numbers, : own.shape[1]] = own
+                shown_blocks = _unknowns_from_frames(kind, self.frames, self.places[kind], batch.p)
+                self.shown[kind] = shown_blocks
+                values = newton_numbers(kind, batch.p, shown_blocks.unknowns)
+                self.p[numbers, : values.shape[1]] = values
 
     def distance_to_sketch(self, batch: BlockBatch) -> tuple[Array, Array]:
         """Squared distances of the points of blocks to the sketch (blocks,), and how many points these are."""
         inner = self.places[batch.block_type][:, batch.inner_slots]
         x, y, c, s = np.moveaxis(self.state[inner, :, 0], 2, 0)
-        many, px, py, tx, ty, along, across, squares = np.moveaxis(self.sums[inner], 2, 0)
+        counts, px, py, tx, ty, along, across, squares = np.moveaxis(self.sums[inner], 2, 0)
         with np.errstate(invalid="ignore", over="ignore"):
             mixed = x * (c * px - s * py - tx) + y * (s * px + c * py - ty) - c * along - s * across
-            whole = np.maximum(np.sum(many * (x * x + y * y) + 2.0 * mixed + squares, axis=1), 0.0)
-        return whole, many.sum(axis=1)
+            squared_distance = np.maximum(np.sum(counts * (x * x + y * y) + 2.0 * mixed + squares, axis=1), 0.0)
+        return squared_distance, counts.sum(axis=1)
 
 
 class _ShownFrames(NamedTuple):
@@ -187,12 +191,12 @@ class _ShownFrames(NamedTuple):
 
 def _shown_frames(linkages: LinkageArrays, first: IntArray) -> _ShownFrames:
     """By the points of links, two at least that lie apart; the mechanism's frame is where it is."""
-    many, px, py, tx, ty, along, across, _ = _sketch_sums(linkages.shown_points, first).T
-    least = np.maximum(many, 1.0)
-    turn = along - (px * tx + py * ty) / least, across - (px * ty - py * tx) / least
-    is_shown = (many > 1.0) & (np.hypot(*turn) > LEAST_SPREAD)
+    counts, px, py, tx, ty, along, across, _ = _sketch_sums(linkages.shown_points, first).T
+    divisor = np.maximum(counts, 1.0)
+    turn = along - (px * tx + py * ty) / divisor, across - (px * ty - py * tx) / divisor
+    is_shown = (counts > 1.0) & (np.hypot(*turn) > LEAST_SPREAD)
     angle = np.arctan2(turn[1], turn[0])
-    local, world = (np.where(many > 0.0, of / least, np.nan) for of in (np.stack([px, py]), np.stack([tx, ty])))
+    local, world = (np.where(counts > 0.0, of / divisor, np.nan) for of in (np.stack([px, py]), np.stack([tx, ty])))
     angle[0], is_shown[0], local[:, 0], world[:, 0] = 0.0, True, 0.0, 0.0
     return _ShownFrames(_frame_through(angle, local, world), is_shown, is_shown, local, world)
 
@@ -209,9 +213,9 @@ class _Slide(NamedTuple):
     pair: Any
     numbers: list[Array]
 
-    def residual(self, frames: Sequence[Frame], own: Sequence[float]) -> list[Array]:
+    def residual(self, frames: Sequence[Frame], coordinates: Sequence[float]) -> list[Array]:
         """What the pair leaves open about these frames."""
-        return list(self.pair.residual(frames, self.numbers, own))
+        return list(self.pair.residual(frames, self.numbers, coordinates))
 
 
 def _unknowns_from_frames(block_type: BlockType, shown: _ShownFrames, index: IntArray, p: Array) -> _ShownBlocks:
@@ -225,25 +229,27 @@ def _unknowns_from_frames(block_type: BlockType, shown: _ShownFrames, index: Int
     slots = [*range(len(kind.given_links)), *range(kind.slot_count)[-len(kind.inner_links) :]]
     of, known = {"frame": GROUND}, {"frame": np.ones(len(p), dtype=bool)}
     places = {name: index[:, slot] for name, slot in zip((*kind.given_links, *kind.inner_links), slots, strict=True)}
-    for name, at in places.items():
-        of[name] = Frame(*(part[at] for part in shown.frame[:5]))
-        known[name] = (shown.is_known if name in kind.given_links else shown.is_shown)[at]
+    for name, indices in places.items():
+        of[name] = Frame(*(part[indices] for part in shown.frame[:5]))
+        known[name] = (shown.is_known if name in kind.given_links else shown.is_shown)[indices]
     for slide in slides * 2:
         _align_slider(slide, kind, shown, places, of, known)
     needed = kind.inner_links if all(kind.unknown_is_angle) else places
     is_shown = np.logical_and.reduce([known[name] for name in needed])
-    own: dict[tuple[str, str], Array] = {}
+    unknowns: dict[tuple[str, str], Array] = {}
     for slide in slides:
-        bodies, many = [of[link] for link in slide.pair.bodies], len(slide.pair.coordinate_kinds)
-        still = np.array(slide.residual(bodies, [0.0] * many)[:2])
+        bodies, coordinate_count = [of[link] for link in slide.pair.bodies], len(slide.pair.coordinate_kinds)
+        still = np.array(slide.residual(bodies, [0.0] * coordinate_count)[:2])
         for k, (part, _) in enumerate(slide.pair.coordinate_kinds):
-            way = np.array(slide.residual(bodies, [float(j == k) for j in range(many)])[:2]) - still
+            direction = np.array(slide.residual(bodies, [float(j == k) for j in range(coordinate_count)])[:2]) - still
             with np.errstate(invalid="ignore"):  # of links that are not shown
-                own[slide.pair.name, part] = -np.sum(way * still, axis=0) / np.sum(way * way, axis=0)
-    own |= {(name, "angle"): of[name].angle for name in kind.inner_links}
+                unknowns[slide.pair.name, part] = -np.sum(direction * still, axis=0) / np.sum(
+                    direction * direction, axis=0
+                )
+    unknowns |= {(name, "angle"): of[name].angle for name in kind.inner_links}
     e = kind.equations
     names = [(e.coordinates[column].owner, e.coordinates[column].part) for column in e.unknowns]
-    return _ShownBlocks(np.stack([own[name] for name in names], axis=1), is_shown)
+    return _ShownBlocks(np.stack([unknowns[name] for name in names], axis=1), is_shown)
 
 
 def _align_slider(
@@ -257,7 +263,7 @@ def _align_slider(
     """A link of which one point alone is shown, and that a slide holds at an angle to one that is known."""
     if MeasureKind.ANGLE not in slide.pair.residual_kinds:
         return
-    row, own = slide.pair.residual_kinds.index(MeasureKind.ANGLE), [0.0] * len(slide.pair.coordinate_kinds)
+    row, coordinates = slide.pair.residual_kinds.index(MeasureKind.ANGLE), [0.0] * len(slide.pair.coordinate_kinds)
     for link, other in (slide.pair.bodies, slide.pair.bodies[::-1]):
         if link not in kind.inner_links:
             continue
@@ -266,12 +272,12 @@ def _align_slider(
         if is_found.any():
             still, turned = (
                 slide.residual(
-                    [frame_at(0.0, 0.0, angle) if body == link else of[body] for body in slide.pair.bodies], own
+                    [frame_at(0.0, 0.0, angle) if body == link else of[body] for body in slide.pair.bodies], coordinates
                 )[row]
                 for angle in (0.0, 1.0)
             )
-            found = _frame_through(still / (still - turned), local, world)
-            pairs = zip(found[:5], of[link][:5], strict=True)
+            slider_frame = _frame_through(still / (still - turned), local, world)
+            pairs = zip(slider_frame[:5], of[link][:5], strict=True)
             of[link], known[link] = Frame(*(np.where(is_found, *both) for both in pairs)), known[link] | is_found
 
 

@@ -81,7 +81,7 @@ def solve_by_blocks(mechanisms: Sequence[Mechanism], request: SweepRequest) -> d
     stopped = np.flatnonzero(run.is_decided & (run.solved <= request.steps))
     clear_points(values, first_point, taped.which[stopped], run.solved[stopped])
     turned = np.linspace(0.0, 1.0, request.steps + 1) * FULL_TURN
-    found = {}
+    swept = {}
     for k in np.flatnonzero(run.is_decided).tolist():
         number = int(taped.which[k])
         names, begin, reason = group.names[number], int(first_point[number]), run.reasons.get(k, "")
@@ -90,8 +90,8 @@ def solve_by_blocks(mechanisms: Sequence[Mechanism], request: SweepRequest) -> d
             reason = f"links {links} come to a dead point {_between(near)}"
         ending = int(run.solved[k]), int(run.outcome[k]), reason
         rows = values[begin : begin + len(names), :, : request.steps + 1]
-        found[int(group.numbers[number])] = swept_from_rows(names, rows, group.start[number] + turned, *ending)
-    return found
+        swept[int(group.numbers[number])] = swept_from_rows(names, rows, group.start[number] + turned, *ending)
+    return swept
 
 
 def _find_ending(
@@ -99,16 +99,16 @@ def _find_ending(
 ) -> LinkageEnding | None:
     """How a linkage of a group ends whose pairs have stops; None where that is not sure. places (two of each watched
     link, 2, steps)."""
-    mechanism, good = group.mechanisms[number], run.good
-    at = np.moveaxis(places[..., :good], 1, 2)
+    mechanism, step_count = group.mechanisms[number], run.good
+    point_places = np.moveaxis(places[..., :step_count], 1, 2)
     pair = mechanism.inputs[running_input_index(mechanism, request.pair, "inputs")].pair
-    found = {link: (at[2 * k], at[2 * k + 1]) for k, link in enumerate(group.watched[number])}
+    link_places = {link: (point_places[2 * k], point_places[2 * k + 1]) for k, link in enumerate(group.watched[number])}
     positions = group.start[number] + run.turned
-    met = find_first_stop(mechanism, float(group.arrays.unit[number]), pair, positions[:good], found)
-    if met is None or (met.step is None and good < len(positions)):
+    met = find_first_stop(mechanism, float(group.arrays.unit[number]), pair, positions[:step_count], link_places)
+    if met is None or (met.step is None and step_count < len(positions)):
         return None  # beside a dead point it is not clear which comes first
     if met.step is None:
-        return LinkageEnding(good)
+        return LinkageEnding(step_count)
     near = _between(positions[[max(met.step - 1, 0), met.step]])
     return LinkageEnding(met.step, Outcome.STOP, f"{met.reason}, {near}")
 
@@ -118,22 +118,22 @@ def _between(inputs: Array) -> str:
 
 
 def _make_tape(arrays: LinkageArrays, start: StartAssemblies) -> TapedLinkages:
-    """All linkages, of each first its inputs, then its blocks, then its points, the rows of which are told."""
-    many, inputs, points = len(arrays), arrays.inputs, arrays.points
+    """The tape of all linkages: the inputs of a linkage, then its blocks, then its result points."""
+    linkage_count, inputs, points = len(arrays), arrays.inputs, arrays.points
     block_owner = np.empty(arrays.block_count, dtype=np.int64)
     for batch in arrays.batches:
         block_owner[batch.block_numbers] = batch.owner
     owners = inputs.owner, block_owner, points.owner
-    counts = np.array([np.bincount(owner, minlength=many) for owner in owners])
+    counts = np.array([np.bincount(owner, minlength=linkage_count) for owner in owners])
     first = part_offsets(counts.sum(axis=0))
-    before = np.concatenate([np.zeros((1, many), dtype=np.int64), np.cumsum(counts, axis=0)])
+    earlier_counts = np.concatenate([np.zeros((1, linkage_count), dtype=np.int64), np.cumsum(counts, axis=0)])
     at_input, at_block, at_point = (
-        (first[:-1] + earlier - part_offsets(own)[:-1])[owner] + np.arange(len(owner))
-        for owner, own, earlier in zip(owners, counts, before, strict=False)
+        (first[:-1] + earlier - part_offsets(values)[:-1])[owner] + np.arange(len(owner))
+        for owner, values, earlier in zip(owners, counts, earlier_counts, strict=False)
     )
     numbers = [_block_numbers(batch, start) for batch in arrays.batches]
     slots = np.full((first[-1], 1 + max(batch.block_type.slot_count for batch in arrays.batches)), FRAME)
-    p = np.zeros((first[-1], max(INPUT_NUMBERS, *(own.shape[1] for own in numbers))))
+    p = np.zeros((first[-1], max(INPUT_NUMBERS, *(values.shape[1] for values in numbers))))
     kinds, blocks = np.empty(first[-1], dtype=np.int64), np.full(first[-1], -1)
     kinds[at_input], kinds[at_point] = np.where(inputs.runs, RUNNING_INPUT, STANDING_INPUT), POINT
     p[at_input, :INPUT_NUMBERS] = np.stack(
@@ -143,13 +143,16 @@ def _make_tape(arrays: LinkageArrays, start: StartAssemblies) -> TapedLinkages:
     p[at_point, :2], p[at_point, 2] = points.numbers, arrays.unit[points.owner]
     slots[at_point, 0], slots[at_point, 1] = _slot_numbers(points.link_index), np.arange(len(at_point))
     blocks[at_block] = np.arange(arrays.block_count)
-    for number, (batch, own) in enumerate(zip(arrays.batches, numbers, strict=True)):
-        at, kind = at_block[batch.block_numbers], batch.block_type
-        kinds[at] = FIRST_BLOCK_TYPE + number
-        slots[at, : kind.slot_count], slots[at, kind.slot_count] = _slot_numbers(batch.link_indices), STEP_TABLE
-        p[at, : own.shape[1]] = own
-    clearance = np.full(many, LEAST_CLEARANCE)
-    return TapedLinkages(np.arange(many), first, kinds, slots, p, blocks, arrays.tolerance, clearance)
+    for number, (batch, values) in enumerate(zip(arrays.batches, numbers, strict=True)):
+        indices, kind = at_block[batch.block_numbers], batch.block_type
+        kinds[indices] = FIRST_BLOCK_TYPE + number
+        slots[indices, : kind.slot_count], slots[indices, kind.slot_count] = (
+            _slot_numbers(batch.link_indices),
+            STEP_TABLE,
+        )
+        p[indices, : values.shape[1]] = values
+    clearance = np.full(linkage_count, LEAST_CLEARANCE)
+    return TapedLinkages(np.arange(linkage_count), first, kinds, slots, p, blocks, arrays.tolerance, clearance)
 
 
 def _slot_numbers(link_indices: IntArray) -> IntArray:
@@ -212,12 +215,12 @@ def point_formula(rates: bool) -> TapeFormula:
 
     def write(link: ca.SX, numbers: ca.SX) -> list[ca.SX]:
         arm = ca.vertcat(*map(ca.SX, Vector(numbers[0], numbers[1]).rotate(Vector(link[COS], link[SIN]))))
-        found = [numbers[2] * link[[X, Y]] + arm]
+        rows = [numbers[2] * link[[X, Y]] + arm]
         if rates:
             across = ca.vertcat(-arm[1], arm[0])
-            found.append(numbers[2] * link[[X1, Y1]] + link[TURN1] * across)
-            found.append(numbers[2] * link[[X2, Y2]] + link[TURN2] * across - link[TURN1] ** 2 * arm)
-        return found
+            rows.append(numbers[2] * link[[X1, Y1]] + link[TURN1] * across)
+            rows.append(numbers[2] * link[[X2, Y2]] + link[TURN2] * across - link[TURN1] ** 2 * arm)
+        return rows
 
     link = [FormulaInput("row", 0, row) for row in range(_pose_rows(rates))]
     formula = write_formula([link, [FormulaInput("p", k) for k in range(3)]], write)

@@ -85,13 +85,13 @@ class _NewtonBlockWriter:
         self.direction_slots = [t.allocate() for _ in range(2 * len(self.block_type.inner_links))]
         self.clear_slots = [t.allocate() for _ in range(2)]
         self.regularity_slot = t.allocate()
-        have, bases = self._write_block_start()
+        names, bases = self._write_block_start()
         t.write_line("br label %step")
         t.write_label("step")
         t.write_line("%k = phi i64 [0, %entry], [%knext, %good]")
         for leaf in self.operands:
             if leaf.source == "row":
-                have[leaf] = t.load(self._row_pointer(bases[leaf.place], leaf.part))
+                names[leaf] = t.load(self._row_pointer(bases[leaf.place], leaf.part))
         row = t.double_pointer(bases[-1], t.add_instruction(f"mul i64 %k, {TABLE_COLUMNS}"))
         aheads = self._write_prediction(row)
         count = t.add_instruction(f"load double, ptr {t.double_pointer(row, str(PREDICTOR_ORDER))}")
@@ -99,7 +99,7 @@ class _NewtonBlockWriter:
         t.write_line("br label %newton")
         t.write_label("newton")
         t.write_line("%n = phi i64 [0, %step], [%nnext, %newton]")
-        *back, strength = self._write_formula(self.formulas.step, have)
+        *back, strength = self._write_formula(self.formulas.step, names)
         for k, each in enumerate(back):
             forth = t.add_instruction(f"fneg {t.vector} {each}")
             self._write_move(k, forth)
@@ -107,13 +107,13 @@ class _NewtonBlockWriter:
         t.store(strength, self.regularity_slot)
         t.close_loop("n", "count", "newton", "solved")
         t.write_label("solved")
-        self._write_step_end(have, bases, aheads, self._write_load(row, PREDICTOR_ORDER + 1))
+        self._write_step_end(names, bases, aheads, self._write_load(row, PREDICTOR_ORDER + 1))
         t.write_label("bad")
         write_ended(t, "%k", str(UNDECIDED))
         t.write_line("br label %done")
         t.write_label("good")
-        t.close_loop("k", "limit", "step", "told")
-        t.write_label("told")
+        t.close_loop("k", "limit", "step", "judged")
+        t.write_label("judged")
         clear, one = (t.load(slot) for slot in self.clear_slots)
         stays = write_stays_clear(t, clear, one, self.clearance)
         write_stays(t, t.add_instruction(f"extractelement <1 x i1> {stays}, i64 0"))
@@ -126,45 +126,49 @@ class _NewtonBlockWriter:
     def _write_block_start(self) -> tuple[dict[FormulaInput, str], list[str]]:
         """A block begins: its numbers, and where its slots are."""
         t, kind = self.ir, self.block_type
-        have = {leaf: self._write_load("%p", leaf.place) for leaf in self.operands if leaf.source == "p"}
+        names = {leaf: self._write_load("%p", leaf.place) for leaf in self.operands if leaf.source == "p"}
         bases = []
         for slot in range(kind.slot_count + 1):
             place = t.add_instruction(f"getelementptr ptr, ptr %rows, i64 {slot}")
             bases.append(t.add_instruction(f"load ptr, ptr {place}"))
         begin = len(kind.measures) + 2 * len(kind.angle_measures)
-        for k, pointer in enumerate(each for both in self.unknown_slots for each in both):
+        for k, pointer in enumerate(slot_pointer for both in self.unknown_slots for slot_pointer in both):
             t.store(self._write_load("%p", begin + k), pointer)
-        for pointer in (each for own in self.history_slots for each in own):
+        for pointer in (slot_pointer for slots in self.history_slots for slot_pointer in slots):
             t.store("zeroinitializer", pointer)
         for pointer in (*self.direction_slots, *self.clear_slots):
             t.store(t.constant(np.nan), pointer)
         self.tolerance, self.clearance = t.broadcast("%tolerance"), t.broadcast("%clearance")
-        return have, bases
+        return names, bases
 
     def _row_pointer(self, base: str, row: int) -> str:
         return self.ir.row_pointer(base, "%stride", row, "%k")
 
-    def _write_step_end(self, have: dict[FormulaInput, str], bases: list[str], aheads: list[str], most: str) -> None:
+    def _write_step_end(self, names: dict[FormulaInput, str], bases: list[str], aheads: list[str], limit: str) -> None:
         """The step ends: its results are written and judged, and what it moved, `most` at a time, is remembered."""
         t, kind = self.ir, self.block_type
-        *told, left = self._write_formula(self.output_formula, have)
+        *outputs, residual = self._write_formula(self.output_formula, names)
         first = kind.slot_count - len(kind.inner_links)
-        for number, value in enumerate(told):
+        for number, value in enumerate(outputs):
             t.store(value, self._row_pointer(bases[first + number // self.row_count], number % self.row_count))
         far = t.add_all([t.constant(0.0), *(t.call_intrinsic("fabs", t.load(slot)) for slot in self.correction_slots)])
-        for own, ahead, moved in zip(self.history_slots, aheads, self.correction_slots, strict=True):
-            whole = t.binary("add", ahead, t.load(moved))
-            for later, earlier in zip(reversed(own[1:]), reversed(own[:-1]), strict=True):
+        for slots, ahead, moved in zip(self.history_slots, aheads, self.correction_slots, strict=True):
+            move = t.binary("add", ahead, t.load(moved))
+            for later, earlier in zip(reversed(slots[1:]), reversed(slots[:-1]), strict=True):
                 t.store(t.load(earlier), later)
-            t.store(whole, own[0])
-        good = t.and_flags(t.compare("ole", left, self.tolerance), t.compare("ole", far, most))
-        places = range(0, len(told), self.row_count)
-        now = [LinkDirection(told[number + COS], told[number + SIN], None) for number in places]
-        good = write_turn_flags(t, good, now, [t.load(slot) for slot in self.direction_slots], LEAST_COSINE)
-        for value, slot in zip((part for each in now for part in each[:2]), self.direction_slots, strict=True):
+            t.store(move, slots[0])
+        is_good = t.and_flags(t.compare("ole", residual, self.tolerance), t.compare("ole", far, limit))
+        places = range(0, len(outputs), self.row_count)
+        directions = [LinkDirection(outputs[number + COS], outputs[number + SIN], None) for number in places]
+        is_good = write_turn_flags(
+            t, is_good, directions, [t.load(slot) for slot in self.direction_slots], LEAST_COSINE
+        )
+        for value, slot in zip(
+            (part for direction in directions for part in direction[:2]), self.direction_slots, strict=True
+        ):
             t.store(value, slot)
         clear, one, two = (t.load(slot) for slot in (self.regularity_slot, *self.clear_slots))
-        fine = t.and_flags(good, write_clear_flags(t, clear, one, two, self.clearance).is_clear)
+        fine = t.and_flags(is_good, write_clear_flags(t, clear, one, two, self.clearance).is_clear)
         t.store(clear, self.clear_slots[0])
         t.store(one, self.clear_slots[1])
         t.write_line(f"br i1 {t.add_instruction(f'extractelement <1 x i1> {fine}, i64 0')}, label %good, label %bad")
@@ -178,8 +182,8 @@ class _NewtonBlockWriter:
         t = self.ir
         weights = [self._write_load(row, k) for k in range(PREDICTOR_ORDER)]
         aheads = []
-        for k, own in enumerate(self.history_slots):
-            ahead = t.add_all([t.binary("mul", w, t.load(slot)) for w, slot in zip(weights, own, strict=True)])
+        for k, slots in enumerate(self.history_slots):
+            ahead = t.add_all([t.binary("mul", w, t.load(slot)) for w, slot in zip(weights, slots, strict=True)])
             self._write_move(k, ahead)
             t.store("zeroinitializer", self.correction_slots[k])
             aheads.append(ahead)
@@ -203,15 +207,15 @@ class _NewtonBlockWriter:
         )
         # back onto the circle, which rounding leaves
         size = t.binary("add", t.binary("mul", c, c), t.binary("mul", s, s))
-        whole = t.binary("sub", t.constant(1.5), t.binary("mul", t.constant(0.5), size))
-        t.store(t.binary("mul", c, whole), one)
-        t.store(t.binary("mul", s, whole), two)
+        scale_back = t.binary("sub", t.constant(1.5), t.binary("mul", t.constant(0.5), size))
+        t.store(t.binary("mul", c, scale_back), one)
+        t.store(t.binary("mul", s, scale_back), two)
 
-    def _write_formula(self, formula: BlockFormula, have: dict[FormulaInput, str]) -> list[str]:
+    def _write_formula(self, formula: BlockFormula, names: dict[FormulaInput, str]) -> list[str]:
         t = self.ir
-        given = {}
+        inputs = {}
         for number, leaf in formula.inputs.items():
-            given[number] = t.load(self.unknown_slots[leaf.place][leaf.part]) if leaf.source == "z" else have[leaf]
+            inputs[number] = t.load(self.unknown_slots[leaf.place][leaf.part]) if leaf.source == "z" else names[leaf]
         known: dict[int, str] = {}
-        t.write_values(formula.instructions, formula.order, known, given)
+        t.write_values(formula.instructions, formula.order, known, inputs)
         return [known[number] for number in formula.outputs]

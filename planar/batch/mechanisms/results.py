@@ -78,7 +78,7 @@ class Swept(NamedTuple):
 
 def swept_from_rows(names: Sequence[str], rows: Array, inputs: Array, solved: int, outcome: int, reason: str) -> Swept:
     """One mechanism by rows of its points (points, 2 or 6, steps + 1): x and y, then their first and second rates.
-    After so many steps that are solved it has the number of an outcome."""
+    The status after the `solved` steps is the number of an outcome."""
     orders = [PointMapping(names, rows[:, row : row + 2].swapaxes(1, 2)) for row in range(0, rows.shape[1], 2)]
     status = np.zeros(len(inputs), dtype=np.int8)
     status[solved:] = outcome

@@ -1,4 +1,4 @@
-"""Linkages of any structure run as tapes: each a sequence of blocks, all through the same turn of their inputs."""
+"""Run linkages of any structure as tapes: a sequence of blocks for every linkage, over one turn of the inputs."""
 
 from __future__ import annotations
 
@@ -15,32 +15,32 @@ from planar.foundation.errors import Outcome
 
 FULL_TURN = 2.0 * np.pi
 LONGEST_INPUT_STEP, REFINEMENT = 0.07, 8
-"""rad: steps that are longer are divided, so that a position is never far from the one before; those that are not sure
-once more, into so many."""
+"""Longest input step (rad) that is not divided, so that a position stays near the previous one; and the factor by which
+the steps of undecided linkages are divided again."""
 MAX_FINE_BYTES = 16 * 2**20
-"""Bytes of finer steps of what is told that are worked on at once."""
+"""Maximum size in bytes of the result points at divided steps that are computed at once."""
 LEAST_COSINE = cos(MAX_TURN_PER_STEP)
 """Of the angle by which a link turns in a step."""
 POINT_ROWS = {False: 2, True: 6}
 """Rows of a point, without and with rates: x and y, then their first rates, then the second ones."""
 TABLE, FRAME, STEP_TABLE = -1, -2, -3
-"""Slots of a tape that all linkages share: how far inputs have turned, as cosine, sine and angle in its rows; the
-frame; and what blocks need to know of steps that Newton's method solves. Below them are slots of room, which every
-linkage fills anew; from 0 on are the points that are told."""
+"""Slots that all linkages of a tape share: the rotation of the inputs, as cosine, sine and angle in its rows; the
+frame; and the table of steps for Newton's method. Slots below them are temporary, and every linkage overwrites them;
+slots from 0 on are the result points."""
 FIRST_ROOM_SLOT = -4
 TABLE_COS, TABLE_SIN, TABLE_ANGLE = range(3)
 """Rows of the table."""
 
 
 class _Attempt(NamedTuple):
-    """How linkages are run: with steps so many times finer, and whether closed forms are polished."""
+    """The factor by which steps are divided, and whether closed forms are followed by a Newton step."""
 
     refinement: int
     polished: bool
 
 
 _ATTEMPTS = (_Attempt(1, False), _Attempt(1, True), _Attempt(REFINEMENT, True), _Attempt(REFINEMENT**2, True))
-"""One after the other, each for those that the ones before left open."""
+"""In this order; every attempt runs the linkages that the previous ones did not decide."""
 
 
 class BlockKinds(NamedTuple):
@@ -68,16 +68,16 @@ class TapedLinkages(NamedTuple):
     tolerance: Array
     clearance: Array
 
-    def select(self, some: IntArray) -> TapedLinkages:
+    def select(self, numbers: IntArray) -> TapedLinkages:
         """Some of the linkages (numbers, rising)."""
-        if len(some) == len(self.which):
+        if len(numbers) == len(self.which):
             return self
-        counts = np.diff(self.first)[some]
+        counts = np.diff(self.first)[numbers]
         first = part_offsets(counts)
-        own = np.repeat(self.first[some] - first[:-1], counts) + np.arange(first[-1])
-        kinds, slots, p, blocks = (each[own] for each in (self.kinds, self.slots, self.p, self.blocks))
-        tolerance, clearance = self.tolerance[some], self.clearance[some]
-        return TapedLinkages(self.which[some], first, kinds, slots, p, blocks, tolerance, clearance)
+        indices = np.repeat(self.first[numbers] - first[:-1], counts) + np.arange(first[-1])
+        kinds, slots, p, blocks = (values[indices] for values in (self.kinds, self.slots, self.p, self.blocks))
+        tolerance, clearance = self.tolerance[numbers], self.clearance[numbers]
+        return TapedLinkages(self.which[numbers], first, kinds, slots, p, blocks, tolerance, clearance)
 
 
 class LinkageEnding(NamedTuple):
@@ -89,8 +89,8 @@ class LinkageEnding(NamedTuple):
 
 
 class FineRun(NamedTuple):
-    """A linkage at the steps of an attempt: how many of them are good; how far the inputs have turned (steps,); and
-    what gives x and y of points that are told (points, 2, steps)."""
+    """A linkage at the steps of an attempt: the number of good steps; the rotation of the inputs (steps,); and a
+    function that returns x and y of result points (points, 2, steps)."""
 
     good: int
     turned: Array
@@ -129,17 +129,17 @@ def run_taped_linkages(
     What is not decided by any attempt is left to others. `find_ending` says how the `watched` ones (taped,) end, None
     where that is not sure.
     """
-    many = len(taped.which)
-    solved, outcome, block = np.zeros((3, many), dtype=np.int64)
-    run = TapeRun(np.zeros(many, dtype=bool), solved, outcome, np.zeros((many, 2)), block, {})
-    left = np.arange(many)
-    for attempt in _ATTEMPTS if many else ():
+    linkage_count = len(taped.which)
+    solved, outcome, block = np.zeros((3, linkage_count), dtype=np.int64)
+    run = TapeRun(np.zeros(linkage_count, dtype=bool), solved, outcome, np.zeros((linkage_count, 2)), block, {})
+    undecided = np.arange(linkage_count)
+    for attempt in _ATTEMPTS if linkage_count else ():
         finer = step_division(steps) * attempt.refinement
-        for some in _chunks(taped, left, steps * finer + 1, rates, finer > 1):
-            attempted = _AttemptRun(taped.select(some), kinds, attempt.polished, values, steps, finer)
-            attempted.note(run, some, find_ending, watched)
-        left = left[~run.is_decided[left]]
-        if not left.size:
+        for numbers in _chunks(taped, undecided, steps * finer + 1, rates, finer > 1):
+            attempted = _AttemptRun(taped.select(numbers), kinds, attempt.polished, values, steps, finer)
+            attempted.note(run, numbers, find_ending, watched)
+        undecided = undecided[~run.is_decided[undecided]]
+        if not undecided.size:
             break
     return run
 
@@ -150,7 +150,7 @@ def step_division(steps: int) -> int:
 
 
 def make_values(points: int, steps: int, rates: bool, dtype: str = "float64") -> Array:
-    """Room for points (points, rows, numbers), the rows of which are longer than there are steps, and whole vectors."""
+    """Allocate points (points, rows, numbers); rows are padded to a multiple of LANES."""
     shape = points, POINT_ROWS[rates], padded_steps(steps + 1)
     size = int(np.prod(shape))
     made = np.empty(size + LANES, dtype)
@@ -170,36 +170,36 @@ def clear_points(values: Array, first_point: IntArray, which: IntArray, first_st
     clear_rows(rows.ravel(), np.repeat(steps, values.shape[1]), values.shape[2])
 
 
-def _chunks(taped: TapedLinkages, left: IntArray, steps: int, rates: bool, apart: bool) -> Iterator[IntArray]:
-    """So many at a time that what is told of finer steps fits into memory near the processor."""
+def _chunks(taped: TapedLinkages, numbers: IntArray, steps: int, rates: bool, apart: bool) -> Iterator[IntArray]:
+    """Yield parts of the linkages whose result points at divided steps fit into `MAX_FINE_BYTES`."""
     if not apart:
-        yield left
+        yield numbers
         return
-    told = np.add.reduceat((taped.slots >= 0).sum(axis=1), taped.first[:-1])
-    ends = np.cumsum(told[left] * (padded_steps(steps) * POINT_ROWS[rates] * 8))
+    point_counts = np.add.reduceat((taped.slots >= 0).sum(axis=1), taped.first[:-1])
+    ends = np.cumsum(point_counts[numbers] * (padded_steps(steps) * POINT_ROWS[rates] * 8))
     first = 0
-    while first < len(left):
-        before = ends[first - 1] if first else 0
-        last = max(int(np.searchsorted(ends, before + MAX_FINE_BYTES, side="right")), first + 1)
-        yield left[first:last]
+    while first < len(numbers):
+        size_before = ends[first - 1] if first else 0
+        last = max(int(np.searchsorted(ends, size_before + MAX_FINE_BYTES, side="right")), first + 1)
+        yield numbers[first:last]
         first = last
 
 
 class _AttemptRun:
-    """Linkages run once, in steps that are so many times finer than those that are told."""
+    """Linkages run once, with steps divided by a factor."""
 
     def __init__(self, taped: TapedLinkages, kinds: BlockKinds, polished: bool, values: Array, steps: int, finer: int):
         self.taped, self.finer, self.count = taped, finer, steps * finer + 1
         stride = padded_steps(self.count)
         self.turned = np.arange(stride) * (FULL_TURN / (self.count - 1))
         self.rows: IntArray | None = None
-        refs, told = taped.slots, values
+        refs, points = taped.slots, values
         if finer > 1:
             is_told = refs >= 0
             self.rows, places = np.unique(refs[is_told], return_inverse=True)
-            told, refs = np.empty((len(self.rows), values.shape[1], stride)), refs.copy()
+            points, refs = np.empty((len(self.rows), values.shape[1], stride)), refs.copy()
             refs[is_told] = places
-        self.told = told
+        self.points = points
         room = np.empty((max(-int(refs.min()), -1 - FIRST_ROOM_SLOT), max(kinds.room_rows, 1 + TABLE_ANGLE), stride))
         room[-1 - TABLE, : 1 + TABLE_ANGLE] = np.cos(self.turned), np.sin(self.turned), self.turned
         if kinds.frame_rows:
@@ -207,7 +207,7 @@ class _AttemptRun:
             for row, value in kinds.frame_rows.items():
                 room[-1 - FRAME, row] = value
         addresses = np.where(
-            refs >= 0, told.ctypes.data + refs * told.strides[0], room.ctypes.data + (-1 - refs) * room.strides[0]
+            refs >= 0, points.ctypes.data + refs * points.strides[0], room.ctypes.data + (-1 - refs) * room.strides[0]
         )
         if kinds.step_table is not None:
             table = np.ascontiguousarray(kinds.step_table(self.count, FULL_TURN / (self.count - 1)))
@@ -222,31 +222,31 @@ class _AttemptRun:
             Tape(taped.first, number[taped.kinds], addresses, taped.p, taped.tolerance, taped.clearance),
         )
         if self.rows is not None:
-            values[self.rows, :, : steps + 1] = told[:, :, : self.count : finer]
+            values[self.rows, :, : steps + 1] = points[:, :, : self.count : finer]
 
     def note(
         self,
         run: TapeRun,
-        some: IntArray,
+        numbers: IntArray,
         find_ending: Callable[[int, FineRun], LinkageEnding | None] | None,
         watched: BoolArray | None,
     ) -> None:
-        """Put down what is decided of linkages, `some` by their numbers on the whole tape."""
-        good, outcome, at = self.result
-        sure = np.flatnonzero(outcome != UNDECIDED)
-        own = some[sure]
-        run.is_decided[own] = True
-        run.solved[own] = (good[sure] - 1) // self.finer + 1
-        dead = sure[outcome[sure] == DEAD_POINT]
-        run.outcome[some[dead]] = DEAD_POINT_NUMBER
-        run.near[some[dead]] = np.stack([self.turned[good[dead] - 1], self.turned[good[dead]]], axis=1)
-        run.block[some[dead]] = self.taped.blocks[at[dead]]
+        """Store the decided linkages in the run; `numbers` are their indices on the complete tape."""
+        good_counts, outcome, last_blocks = self.result
+        sure_indices = np.flatnonzero(outcome != UNDECIDED)
+        decided = numbers[sure_indices]
+        run.is_decided[decided] = True
+        run.solved[decided] = (good_counts[sure_indices] - 1) // self.finer + 1
+        dead = sure_indices[outcome[sure_indices] == DEAD_POINT]
+        run.outcome[numbers[dead]] = DEAD_POINT_NUMBER
+        run.near[numbers[dead]] = np.stack([self.turned[good_counts[dead] - 1], self.turned[good_counts[dead]]], axis=1)
+        run.block[numbers[dead]] = self.taped.blocks[last_blocks[dead]]
         if find_ending is None or watched is None:
             return
-        for k in np.flatnonzero(watched[some] & (good > 0)).tolist():
-            fine = FineRun(int(good[k]), self.turned[: self.count], self._places)
+        for k in np.flatnonzero(watched[numbers] & (good_counts > 0)).tolist():
+            fine = FineRun(int(good_counts[k]), self.turned[: self.count], self._places)
             ending = find_ending(int(self.taped.which[k]), fine)
-            number = int(some[k])
+            number = int(numbers[k])
             run.is_decided[number] = ending is not None
             if ending is not None:
                 run.solved[number] = (ending.solved_steps - 1) // self.finer + 1
@@ -255,6 +255,6 @@ class _AttemptRun:
                     run.reasons[number] = ending.reason
 
     def _places(self, rows: IntArray) -> Array:
-        """x and y at rows that are told (rows, 2, steps)."""
-        own = rows if self.rows is None else np.searchsorted(self.rows, rows)
-        return self.told[own, :2, : self.count]
+        """Return x and y of result points (rows, 2, steps)."""
+        indices = rows if self.rows is None else np.searchsorted(self.rows, rows)
+        return self.points[indices, :2, : self.count]

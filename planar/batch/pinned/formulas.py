@@ -35,8 +35,8 @@ _FRAME_PIN = {PinStep.DYAD_ON_FRAME: 4, PinStep.CARRIED_ON_FRAME: 2}
 def pin_formulas(rates: bool, polished: bool) -> tuple[TapeFormula, ...]:
     """The formulas of all steps, which take two pins and write the third. `polished`: closed forms are followed by a
     step of Newton's method."""
-    many = POINT_ROWS[rates]
-    rows = tuple((2, row) for row in range(many))
+    row_count = POINT_ROWS[rates]
+    rows = tuple((2, row) for row in range(row_count))
     made = []
     for step in PinStep:
         frame_pin = _FRAME_PIN.get(step)
@@ -45,14 +45,14 @@ def pin_formulas(rates: bool, polished: bool) -> tuple[TapeFormula, ...]:
             table = [FormulaInput("row", 0, row) for row in (TABLE_COS, TABLE_SIN)]
             made.append(TapeFormula(write_formula((table, numbers), partial(_crank, rates)), rows))
             continue
-        first, second = ([FormulaInput("row", slot, row) for row in range(many)] for slot in range(2))
+        first, second = ([FormulaInput("row", slot, row) for row in range(row_count)] for slot in range(2))
         if frame_pin is not None:
             second = [FormulaInput("p", frame_pin + k) for k in range(2)]
         inputs = first, second, numbers
         if step in (PinStep.CARRIED, PinStep.CARRIED_ON_FRAME):
             made.append(TapeFormula(write_formula(inputs, partial(_carried, rates)), rows))
         else:
-            directions = tuple((many + k, many + k + 1, many + k + 2) for k in (0, 3))
+            directions = tuple((row_count + k, row_count + k + 1, row_count + k + 2) for k in (0, 3))
             made.append(TapeFormula(write_formula(inputs, partial(_dyad, rates, polished)), rows, directions, True))
     return tuple(made)
 
@@ -64,14 +64,14 @@ def _turned(x: ca.SX) -> ca.SX:
 
 def _orders(pin: ca.SX, rates: bool) -> list[ca.SX]:
     """Place, velocity and acceleration of a pin; one that has no rates stands."""
-    many = POINT_ROWS[rates] // 2
-    return [pin[2 * k : 2 * k + 2] if 2 * k < pin.numel() else ca.SX.zeros(2) for k in range(many)]
+    order_count = POINT_ROWS[rates] // 2
+    return [pin[2 * k : 2 * k + 2] if 2 * k < pin.numel() else ca.SX.zeros(2) for k in range(order_count)]
 
 
 def _crank(rates: bool, table: ca.SX, numbers: ca.SX) -> list[ca.SX]:
     """Rows of a pin on the crank."""
-    pivot, own, velocity, acceleration = numbers[:2], numbers[2:4], numbers[4], numbers[5]
-    arm = table[0] * own + table[1] * _turned(own)
+    pivot, pin, velocity, acceleration = numbers[:2], numbers[2:4], numbers[4], numbers[5]
+    arm = table[0] * pin + table[1] * _turned(pin)
     if not rates:
         return [pivot + arm]
     return [pivot + arm, velocity * _turned(arm), acceleration * _turned(arm) - velocity**2 * arm]
@@ -113,9 +113,9 @@ def _dyad(rates: bool, polished: bool, first: ca.SX, second: ca.SX, numbers: ca.
     return [*rows, *directions, open_, height * (0.25 / (squares[0] * squares[1]))]
 
 
-def _bars(pin: ca.SX, given: Sequence[ca.SX], squares: ca.SX) -> tuple[ca.SX, ca.SX]:
+def _bars(pin: ca.SX, given_pins: Sequence[ca.SX], squares: ca.SX) -> tuple[ca.SX, ca.SX]:
     """The vectors from given pins to one, row by row, and by how much their squared lengths are off."""
-    bars = ca.horzcat(*(pin - each for each in given)).T
+    bars = ca.horzcat(*(pin - given_pin for given_pin in given_pins)).T
     return bars, bars[:, 0] ** 2 - squares + bars[:, 1] ** 2
 
 
