@@ -95,6 +95,13 @@ class _ShownBlocks(NamedTuple):
     is_shown: BoolArray
 
 
+def _start_number_count(batch: BlockBatch) -> int:
+    """The numbers of a block at its start: those of its pairs, then sums of the sketch or unknowns."""
+    kind = batch.block_type
+    added = SKETCH_SUMS * len(kind.inner_links) if kind.has_closed_form else 2 * len(kind.unknown_is_angle)
+    return int(batch.p.shape[1]) + added
+
+
 class _Starts:
     """The blocks of linkages as a tape of one step, with the places of all links in a state of its own."""
 
@@ -112,7 +119,8 @@ class _Starts:
         owner, self.kinds = np.zeros((2, blocks), dtype=np.int64)
         slot_count = 1 + max(block_batch.block_type.slot_count for block_batch in linkages.batches)
         self.slots, self.table = np.zeros((blocks, slot_count), dtype=np.int64), step_table(1, 0.0)
-        numbers, self.functions = {}, []
+        self.p = np.zeros((blocks, max(map(_start_number_count, linkages.batches))))
+        self.functions = []
         for kind_number, batch in enumerate(linkages.batches):
             kind, indices, places = batch.block_type, batch.block_numbers, self.places[batch.block_type]
             owner[indices], self.kinds[indices] = batch.owner, kind_number
@@ -121,18 +129,15 @@ class _Starts:
                 self.slots[indices, kind.slot_count] = (
                     self.judgements.ctypes.data + indices * self.judgements.strides[0]
                 )
-                numbers[kind] = np.hstack([batch.p, self.sums[places[:, batch.inner_slots]].reshape(len(indices), -1)])
+                values = np.hstack([batch.p, self.sums[places[:, batch.inner_slots]].reshape(len(indices), -1)])
+                self.p[indices, : values.shape[1]] = values
                 rows = [(slot, row) for slot in range(kind.slot_count)[batch.inner_slots] for row in range(POSE_ROWS)]
                 rows += [(kind.slot_count, row) for row in range(kind.sign_count + JUDGED_ROWS)]
                 self.functions.append(compile_block(TapeFormula(kind.start_formula, tuple(rows))))
             else:
                 self.slots[indices, kind.slot_count] = self.table.ctypes.data
-                numbers[kind] = newton_numbers(kind, batch.p, np.zeros((len(indices), len(kind.unknown_is_angle))))
                 self.functions.append(compile_newton_block(kind, False))
         self.begins = part_offsets(np.bincount(owner, minlength=len(linkages)))
-        self.p = np.zeros((blocks, max(values.shape[1] for values in numbers.values())))
-        for batch in linkages.batches:
-            self.p[batch.block_numbers, : numbers[batch.block_type].shape[1]] = numbers[batch.block_type]
         if not all(batch.block_type.has_closed_form for batch in linkages.batches):
             self.frames = _shown_frames(linkages, self.first)
             self._take_frames()
