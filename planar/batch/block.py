@@ -91,9 +91,8 @@ class DesignBlockSolver:
         self.reference: ReferenceDesign = reference_design(block.mechanism, block.pair)
         self.design_count = len(next(iter(block.designs.values())))
         self.scale = float(self.reference.input_scale[self.reference.running_index])
-        self.all_designs = with_design_values(self.reference.mechanism, block.designs)
-        self.u, self.u1, self.u2 = self.reference.inputs(self.all_designs, self.design_count)
-        self.u = np.ascontiguousarray(self.u)
+        self.rows = self.reference.design_rows(block.designs, self.design_count)
+        self.u = np.ascontiguousarray(self.rows.u)
         here = self.u[self.reference.running_index] * self.scale
         self.start: Array = here if block.start is None else np.full(self.design_count, float(block.start))
         self.has_own_range = self.reference.is_sliding and block.stop is None
@@ -133,19 +132,20 @@ class DesignBlockSolver:
         code[failed] = status_code(Outcome.CANNOT_BE_ASSEMBLED)
         if any(self.reference.point_member(name)[0] == self.reference.mechanism.frame for name in block.points):
             erase_from_steps(out, solved)
-        if code.any():
+        rest = np.flatnonzero((good <= block.steps) & ~ended & ~failed).tolist()
+        if rest or code.any():
             # no wider than steps are counted: of all positions
             counter = np.min_scalar_type(-block.steps - 2)
             status = (np.arange(block.steps + 1).astype(counter) >= solved.astype(counter)[:, None]).view(np.int8)
             status *= code[:, None]
         else:
-            status = np.zeros((self.design_count, block.steps + 1), dtype=np.int8)
+            # one number for all, which takes no room
+            status = np.broadcast_to(np.int8(0), (self.design_count, block.steps + 1))
         inputs = self._input_positions(same)
         self.endings = {
             int(each): (int(np.sum(code == each)), self._question(int(np.argmax(code == each)), inputs))
             for each in np.unique(code[code != 0])
         }
-        rest = np.flatnonzero((good <= block.steps) & ~ended & ~failed).tolist()
         for index in rest:
             self._solve_alone(index, out, status, inputs)
         many, ends = (self.general_positions, len(rest) + self.followed_designs), (self.dead_point, self.stop_position)
@@ -192,9 +192,7 @@ class DesignBlockSolver:
     def _run_compiled(self, is_common: bool) -> tuple[Array, Array] | None:
         """out (m, s), and how many of the first steps passed, whether all go equally far (`is_common`) or not; None
         where the structure cannot be compiled."""
-        block, base_ = self.block, self.reference
-        shapes = base_.shapes(self.all_designs)
-        p = base_.pair_numbers(shapes, self.design_count, self.all_designs)
+        block, base_, shapes, p = self.block, self.reference, self.rows.shapes, self.rows.p
         told = {name: base_.point_member(name) for name in block.points}
         moving = {name: each for name, each in told.items() if each[0] != base_.mechanism.frame}
         if block.assemblies is None:
@@ -202,13 +200,13 @@ class DesignBlockSolver:
         else:
             start = given_assemblies(block.assemblies)
         self.failed_block = start.failed_block
-        fit = start.is_sure & base_.is_fit(block.designs, shapes, p)
+        fit = start.is_sure & self.rows.is_fit & ~base_.is_unfit(block.designs, shapes)
         fit &= (np.abs(self.u).max(axis=0) <= LARGEST_INPUT_POSITION) & (np.abs(self.start) <= LARGEST_INPUT_POSITION)
         offsets = np.zeros((block.steps + 1, len(self.u)))
         u0 = self.u.copy()
         u0[base_.running_index] = self.start / self.scale
         offsets[:, base_.running_index] = np.linspace(0.0, self.range_length[0] / self.scale, block.steps + 1)
-        march = base_.design_batch(shapes, p, (u0, self.u1, self.u2), moving.values(), block.rates)
+        march = base_.design_batch(shapes, p, (u0, self.rows.u1, self.rows.u2), moving.values(), block.rates)
         march = march._replace(z0=start.z, signs=start.signs, input_offsets=offsets)
         if base_.mechanism.stops:
             march = self._watch_stops(march, fit)
@@ -228,7 +226,8 @@ class DesignBlockSolver:
 
     def _watch_stops(self, march: DesignBatch, fit: Array) -> DesignBatch:
         """The march with the stops of its pairs; designs that start outside of them end there, others may be unfit."""
-        self.stops = DesignStops(self.reference, self.all_designs, self.u)
+        designs = with_design_values(self.reference.mechanism, self.block.designs)
+        self.stops = DesignStops(self.reference, designs, self.u)
         self.stops.watch_start(march, self.u)
         outside = fit & self.stops.is_outside
         self.solved_steps[outside], self.is_stopped[outside] = 0, True

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from functools import cached_property, lru_cache, reduce
+from functools import cached_property, lru_cache
 from itertools import combinations
 from math import isfinite
 
 import numpy as np
 
 from planar.batch.design_arrays import design_variables, values_of_design, with_design_values
+from planar.batch.design_rows import DesignFormula, DesignRows, stack_rows
 from planar.batch.march.design_batch import DesignBatch
 from planar.equations.coordinates import frames_from_coordinates
-from planar.equations.mechanism_numbers import scaled_pair_numbers, shapes_of_links
+from planar.equations.mechanism_numbers import pair_numbers, shapes_of_links
 from planar.foundation.errors import BadInput, suggest_name
 from planar.foundation.geometry import Vector
 from planar.foundation.jets import Scalar
@@ -31,13 +32,13 @@ from planar.model.mechanism import (
 from planar.model.pairs import MeasureKind
 from planar.model.pairs.base import Pair
 from planar.solving.assembly.block_assemblies import BlockAssemblies
-from planar.solving.checks.residual_check import SHORT_ARM, residual_tolerance
+from planar.solving.checks.residual_check import residual_tolerance
 from planar.solving.position import PositionSolver, solved_mechanism
 
 Array = np.ndarray
 
-LARGEST_SQUARE = 1e200
-"""Of lengths: no square up to it is beyond the numbers."""
+MAX_KEPT_FORMULAS = 64
+"""Formulas of designs, by the names of what they differ in, that are kept."""
 MAX_ROOTS = 16
 """Assemblies of the base from which those of its designs are looked for."""
 
@@ -102,7 +103,7 @@ class ReferenceDesign:
         if not np.isfinite(z).all():
             return design
         shapes = shapes_of_links(design)
-        w = self.functions.coordinates(z, u, self.pair_numbers(shapes, 1, design)[:, 0]) * self.solver.scale
+        w = self.functions.coordinates(z, u, pair_numbers(design, shapes, self.unit)) * self.solver.scale
         frames = frames_from_coordinates(w.tolist(), self.solver.column, shapes, {})[0]
         points = [(name, *each.members[0]) for name, each in self.points.items()]
         places = [(name, frames[link].to_world(shapes[link].position(point))) for name, link, point in points]
@@ -123,13 +124,6 @@ class ReferenceDesign:
                 link.name: self.solver.shapes[link.name] if link is own[link.name] else link_shape(link)
                 for link in designs.links
             }
-
-    def pair_numbers(self, shapes: Mapping[str, LinkShape], many: int, designs: Mechanism) -> Array:
-        """p (numbers, designs), lengths in units of the base's size, of links of these shapes in the designs' pairs."""
-        rows: list[Scalar] = []
-        for pair in designs.pairs:
-            rows += scaled_pair_numbers(pair, shapes, self.unit)
-        return stack_rows(rows, many)
 
     def tolerance(self, p: Array) -> float:
         """What the residual check lets pass for these designs: as `ResidualCheck.tolerance`, of the longest of any."""
@@ -156,15 +150,6 @@ class ReferenceDesign:
         """The rows of p that are lengths."""
         kinds = [kind for pair in self.mechanism.pairs for kind in pair.number_kinds]
         return [k for k, kind in enumerate(kinds) if kind is MeasureKind.LENGTH]
-
-    def inputs(self, designs: Mechanism, many: int) -> tuple[Array, Array, Array]:
-        """Positions and rates of all inputs, each (inputs, designs), lengths in units of the size."""
-        parts = (
-            [getattr(given, what) for given in designs.inputs] for what in ("position", "velocity", "acceleration")
-        )
-        position, velocity, acceleration = (stack_rows(part, many) / self.input_scale[:, None] for part in parts)
-        runs = np.arange(len(self.input_scale))[:, None] == self.running_index
-        return position, np.where(runs, velocity, 0.0), np.where(runs, acceleration, 0.0)
 
     def design_batch(
         self,
@@ -208,25 +193,27 @@ class ReferenceDesign:
     @cached_property
     def _zero_rows_of_p(self) -> Array:
         """The rows of p that are nothing in the base."""
-        return np.flatnonzero(self.pair_numbers(self.solver.shapes, 1, self.mechanism)[:, 0] == 0.0)
+        return np.flatnonzero(pair_numbers(self.mechanism, self.solver.shapes, self.unit) == 0.0)
 
-    def is_fit(self, values: Mapping[str, Array], shapes: Mapping[str, LinkShape], p: Array) -> Array:
-        """The designs that may run compiled (designs,): see `is_unfit` and `has_short_arm`."""
-        fit = ~self.has_short_arm(shapes, p.shape[1])
-        if not np.isfinite(self._row_bounds(p)).all():
-            fit &= np.isfinite(p).all(axis=0)
-        return fit & ~self.is_unfit(values, shapes) if values else fit
+    def design_rows(self, values: Mapping[str, Array], count: int) -> DesignRows:
+        """The numbers of so many designs with these values (designs,) by name."""
+        names = tuple(values)
+        formula = self._formulas.get(names)
+        if formula is None:
+            if len(self._formulas) >= MAX_KEPT_FORMULAS:
+                self._formulas.clear()
+            formula = self._formulas[names] = DesignFormula(self, names)
+        return formula.rows(values, count)
+
+    @cached_property
+    def _formulas(self) -> dict[tuple[str, ...], DesignFormula]:
+        return {}
 
     def is_unfit(self, values: Mapping[str, Array], shapes: Mapping[str, LinkShape]) -> Array:
         """The designs that are looked at one by one (designs,): pairs may refuse them before anything moves, or they
         have a sketch of their own."""
         many = len(next(iter(values.values())))
         found = np.zeros(many, dtype=bool)
-        for shape_ in shapes.values():
-            for at in shape_.points.values():
-                total = at.x + at.y
-                if isinstance(total, np.ndarray) or not isfinite(total):
-                    found |= ~np.isfinite(total)
         choosy = [pair for pair in self.mechanism.pairs if type(pair).find_misfit is not Pair.find_misfit]
         known = design_variables(self.mechanism)
         for name, value in values.items():
@@ -238,31 +225,6 @@ class ReferenceDesign:
                 own = {name: shape_of_design(each, index) for name, each in shapes.items()}
                 pairs = with_design_values(self.mechanism, values_of_design(of_pairs, index)).pairs
                 found[index] |= any(pair.find_misfit(pairs, own, str) for pair in pairs)
-        return found
-
-    def has_short_arm(self, shapes: Mapping[str, LinkShape], many: int) -> Array:
-        """The designs with a link whose arm is so short that rounding may take digits (designs,).
-
-        Beside the size of the base, or the farthest point of a link of the design itself where that is greater.
-        """
-        found = np.zeros(many, dtype=bool)
-        if not many:
-            return found
-        points = [point for at in shapes.values() for point in at.points.values()]
-        ends = [(shapes[link].points[first], shapes[link].points[second]) for link, first, second in self.arms]
-        apart = [(other.x - one.x, other.y - one.y) for one, other in ends]
-        squares = [point.x * point.x + point.y * point.y for point in points]
-        farthest = max((each.max() if isinstance(each, np.ndarray) else each for each in squares), default=0.0)
-        least = SHORT_ARM**2 * max(farthest, self.unit**2)
-        squares = [x * x + y * y for x, y in apart]
-        shortest = (each.min() if isinstance(each, np.ndarray) else each for each in squares)
-        if farthest < LARGEST_SQUARE and all(each > least for each in shortest):
-            return found  # as mostly; a number that is none compares as false
-        sizes = [np.hypot(point.x, point.y) for point in points]
-        arms = [np.hypot(x, y) for x, y in apart]
-        size = reduce(np.fmax, sizes, np.full(many, self.unit))
-        for arm in arms:
-            found |= (arm > 0.0) & (arm < SHORT_ARM * size)
         return found
 
     @cached_property
@@ -318,14 +280,6 @@ class ReferenceDesign:
 def reference_design(mechanism: Mechanism, pair: str | None, is_timed: bool = False) -> ReferenceDesign:
     """The base of a mechanism's designs; kept, since a worker solves many blocks of one sweep."""
     return ReferenceDesign(mechanism, pair, is_timed)
-
-
-def stack_rows(rows: Sequence[Array | float], design_count: int) -> Array:
-    """Rows of numbers, or of arrays of one for each design, as one array (rows, designs)."""
-    found = np.empty((len(rows), design_count))
-    for k, row in enumerate(rows):
-        found[k] = row
-    return found
 
 
 def shape_of_design(whole: LinkShape, index: int) -> LinkShape:

@@ -31,9 +31,8 @@ def drawn(mechanism, spread, many):
         for each in link_lengths(mechanism, frozenset(link.name for link in mechanism.links))
         if each.value
     }
-    designs = with_design_values(common.mechanism, values)
-    shapes = common.shapes(designs)
-    return values, common, shapes, common.pair_numbers(shapes, many, designs), common.inputs(designs, many)[0]
+    rows = common.design_rows(values, many)
+    return values, common, rows.shapes, rows.p, rows.u
 
 
 @pytest.mark.parametrize("case", CASES.values(), ids=CASES)

@@ -41,11 +41,9 @@ class ListedAssemblies(NamedTuple):
 def list_assemblies(reference: ReferenceDesign, values: Mapping[str, Array]) -> ListedAssemblies:
     """All assemblies of designs with `values` (designs,) by name. Raises BadInput where one has too many."""
     many = len(next(iter(values.values())))
-    designs = with_design_values(reference.mechanism, values)
-    shapes = reference.shapes(designs)
-    p, u = reference.pair_numbers(shapes, many, designs), reference.inputs(designs, many)[0]
-    fit = reference.is_fit(values, shapes, p)
-    found, decided = _list_dyads(reference, p, u, fit)
+    rows = reference.design_rows(values, many)
+    fit = rows.is_fit & ~reference.is_unfit(values, rows.shapes)
+    found, decided = _list_dyads(reference, rows.p, rows.u, fit)
     for index in np.flatnonzero(~decided):
         z = _list_one_by_one(reference, values, int(index))
         found = ListedAssemblies(

@@ -163,7 +163,7 @@ class _ResultBlockSolver:
             return max(1, ceil(float(np.max(moved)) / LONGEST_STEP - 1e-9))
         if base_.is_sliding and block.stop is None:
             return ceil(LEAST_STROKE_STEPS / block.steps)
-        inputs = base_.inputs(with_design_values(self.mechanism, block.designs), self.design_count)[0]
+        inputs = base_.design_rows(block.designs, self.design_count).u
         scale = float(base_.input_scale[base_.running_index])
         start = inputs[base_.running_index] if block.start is None else block.start / scale
         length = FULL_TURN if block.stop is None else block.stop / scale - start
@@ -188,7 +188,7 @@ class _ResultBlockSolver:
             link: (rows[:, :, 4 * k : 4 * k + 2], rows[:, :, 4 * k + 2 : 4 * k + 4])
             for k, link in enumerate(self.links)
         }
-        found = DesignFrames(designs, base_.shapes(designs), inputs, places, self.arm)
+        found = DesignFrames(designs, base_.design_rows(part.designs, shape[1]).shapes, inputs, places, self.arm)
         found.time = None if self.duration is None else part.input
         return found
 
@@ -205,8 +205,8 @@ class _ResultBlockSolver:
         """The motion of one design, by itself."""
         mechanism = with_design_values(self.mechanism, values_of_design(part.designs, index))
         if part.assemblies is not None:
-            u = self.reference.inputs(mechanism, 1)[0][:, 0]
-            mechanism = self.reference.with_sketch_of(mechanism, part.assemblies[:, index], u)
+            rows = self.reference.design_rows(part.designs, len(part.status))
+            mechanism = self.reference.with_sketch_of(mechanism, part.assemblies[:, index], rows.u[:, index])
         if self.duration is not None:
             return cycle(mechanism, steps, duration=self.duration)
         if self.reference.is_sliding and self.block.stop is None:

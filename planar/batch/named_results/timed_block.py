@@ -83,7 +83,7 @@ class _TimedBlockSolver:
         design = with_design_values(self.reference.mechanism, values_of_design(self.block.designs, index))
         if self.block.assemblies is None:
             return design
-        u = self.reference.inputs(design, 1)[0][:, 0]
+        u = self.reference.design_rows(self.block.designs, self.design_count).u[:, index]
         return self.reference.with_sketch_of(design, self.block.assemblies[:, index], u)
 
     def _run_compiled(self, out: Array) -> Array:
@@ -92,15 +92,14 @@ class _TimedBlockSolver:
         good = np.zeros(self.design_count, dtype=int)
         if not base_.can_be_compiled or base_.mechanism.stops:
             return good
-        designs = with_design_values(base_.mechanism, block.designs)
-        shapes = base_.shapes(designs)
-        p = base_.pair_numbers(shapes, self.design_count, designs)
+        design_rows = base_.design_rows(block.designs, self.design_count)
+        p, shapes = design_rows.p, design_rows.shapes
         u, u1, u2 = input_motions(base_.mechanism, dict(block.designs), self.time) / base_.input_scale[:, None, None]
         if block.assemblies is None:
-            start = find_assemblies(base_, shapes, p, base_.inputs(designs, self.design_count)[0])
+            start = find_assemblies(base_, shapes, p, design_rows.u)
         else:
             start = given_assemblies(block.assemblies)
-        fit = start.is_sure & base_.is_fit(block.designs, shapes, p)
+        fit = start.is_sure & design_rows.is_fit & ~base_.is_unfit(block.designs, shapes)
         fit &= np.abs(u).max(axis=(0, 1)) <= LARGEST_INPUT_POSITION
         if block.rates:
             fit &= np.all((np.ptp(u1, axis=1) == 0.0) & np.all(u2 == 0.0, axis=1), axis=0)

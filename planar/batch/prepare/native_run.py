@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from planar.batch.block import LEAD_IN_STEP
-from planar.batch.design_arrays import read_designs, with_design_values
+from planar.batch.design_arrays import read_designs
 from planar.batch.march.kernel import Operand
 from planar.batch.prepare.design_numbers import NUMBERS_FUNCTION, SAID, DesignNumbers, compiled_variables, write_numbers
 from planar.batch.prepare.llvm_positions import LANES, POSITIONS_FUNCTION, PositionRows, write_positions
@@ -299,7 +299,8 @@ class FittingPairs:
         if values != self._fitting:
             mechanism = self._reference.mechanism
             arrays = read_designs(mechanism, values)
-            if self._reference.is_unfit(arrays, self._reference.shapes(with_design_values(mechanism, arrays)))[0]:
+            rows = self._reference.design_rows(arrays, 1)
+            if not rows.is_fit[0] or self._reference.is_unfit(arrays, rows.shapes)[0]:
                 return False
             self._fitting = dict(values)
         return True
@@ -316,7 +317,7 @@ class RunPositions(NamedTuple):
 
 def find_positions(reference: ReferenceDesign, positions: Array) -> RunPositions:
     """All positions of a run over those of its input (rad or m)."""
-    u, _, _ = reference.inputs(reference.mechanism, 1)
+    u = reference.design_rows({}, 1).u
     running = reference.running_index
     run = positions / float(reference.input_scale[running])
     own = float(u[running, 0])

@@ -498,10 +498,10 @@ def _own_unknowns(reference: ReferenceDesign, u: Array, members: Sequence[PointM
 
     Raises UnsupportedOperation where its assembly is not sure, or does not come to the end.
     """
-    shapes = reference.shapes(reference.mechanism)
-    p, inputs = reference.pair_numbers(shapes, 1, reference.mechanism), reference.inputs(reference.mechanism, 1)
-    start = find_assemblies(reference, shapes, p, inputs[0])
-    batch = reference.design_batch(shapes, p, inputs, members)._replace(z0=start.z, input_offsets=u - u[0])
+    rows = reference.design_rows({}, 1)
+    start = find_assemblies(reference, rows.shapes, rows.p, rows.u)
+    inputs = rows.u, rows.u1, rows.u2
+    batch = reference.design_batch(rows.shapes, rows.p, inputs, members)._replace(z0=start.z, input_offsets=u - u[0])
     good = run_designs(batch, allocate_aligned(len(u), batch.output_row_count, 1))
     if not start.is_sure[0] or good[0] < len(u):
         raise UnsupportedOperation("the file's own design does not run to the end")
