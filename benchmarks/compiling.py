@@ -68,7 +68,7 @@ def spent(structure: str) -> dict[str, float]:
     import planar
     from planar.batch.march.designs_writer import MARCH_ARGUMENTS, MARCH_FUNCTION
     from planar.batch.march.kernel import kernel_equations
-    from planar.batch.march.runs import designs_kernel
+    from planar.batch.march.runs import LANES, KernelRequest, designs_kernel
     from planar.codegen import llvm_compile
     from planar.equations.functions import equation_functions
     from planar.equations.mechanism_numbers import equation_structure as of
@@ -90,7 +90,7 @@ def spent(structure: str) -> dict[str, float]:
 
     llvm_compile._compile_object = made
     start = perf_counter()
-    text = designs_kernel(kernel_equations(known, of(mechanism)), links, True).ir
+    text = designs_kernel(KernelRequest(kernel_equations(known, of(mechanism)), links, True, LANES)).ir
     told["printing"] = perf_counter() - start
     start = perf_counter()
     llvm_compile.compile_function(text, MARCH_FUNCTION, *MARCH_ARGUMENTS)

@@ -9,7 +9,7 @@ import planar
 from planar.batch.march import designs_writer, kernel, runs
 from planar.batch.march.design_batch import DesignBatch
 from planar.batch.march.kernel import BareAngle, kernel_equations
-from planar.batch.march.runs import designs_kernel
+from planar.batch.march.runs import LANES, KernelRequest, designs_kernel
 from planar.batch.reference_design import reference_design
 from planar.codegen import instructions, llvm_compile, printed_formula
 from planar.codegen.instructions import MAX_INSTRUCTIONS, CosSin, expand_angle_sums
@@ -263,7 +263,7 @@ def all_points(mechanism, rates):
     common = reference_design(mechanism, mechanism.inputs[0].pair)
     links = tuple(common.point_member(name)[0] for name in common.select_points(None))
     equations = kernel_equations(common.functions, equation_structure(common.mechanism))
-    return designs_kernel(equations, links, rates)
+    return designs_kernel(KernelRequest(equations, links, rates, LANES))
 
 
 @pytest.mark.parametrize("rates", [False, True])
@@ -292,12 +292,8 @@ def test_what_is_wanted_before_it_is_known_is_not_printed(monkeypatch):
 
     monkeypatch.setattr(designs_writer._DesignsKernelWriter, "write", written)
     with watched(10), pytest.raises(UnsupportedOperation, match="a later one"):
-        designs_writer.write_designs_kernel(
-            kernel_equations(reference_design(IDLE, None).functions, equation_structure(IDLE)),
-            ("L2",),
-            False,
-            16,
-        )
+        equations = kernel_equations(reference_design(IDLE, None).functions, equation_structure(IDLE))
+        designs_writer.write_designs_kernel(KernelRequest(equations, ("L2",), False, 16))
 
 
 def test_what_cancels_is_nothing():
@@ -310,9 +306,9 @@ def test_what_cancels_is_nothing():
 def test_designs_of_a_longer_function_are_followed_and_it_is_printed_once_in_vain(monkeypatch):
     mechanism, tried, really = MODELS["stephenson-1-six-bar"], [], designs_writer.write_designs_kernel
 
-    def printing(*given, **more):
-        tried.append(given)
-        return really(*given, **more)
+    def printing(request):
+        tried.append(request)
+        return really(request)
 
     at, pair = mechanism.inputs[0].position, mechanism.inputs[0].pair
     designs, run_ = {f"{pair}.velocity": np.linspace(1, 2, 6)}, {"start": at, "stop": at + 0.1, "pair": pair}
@@ -322,7 +318,7 @@ def test_designs_of_a_longer_function_are_followed_and_it_is_printed_once_in_vai
     runs._designs_kernel_or_reason.cache_clear()
     found = planar.sweep(mechanism, designs, 5, block=2, **run_)
     runs._designs_kernel_or_reason.cache_clear()
-    assert len({given[1:] for given in tried}) == len(tried) > 0
+    assert len({request[1:] for request in tried}) == len(tried) > 0
     assert (wanted.general, found.whole.all()) == (0, True)
     for point in found.points:
         np.testing.assert_allclose(found.acceleration[point], wanted.acceleration[point], rtol=1e-9, atol=1e-9)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import inf, nan
+from typing import NamedTuple
 
 import casadi as ca
 
@@ -44,81 +45,65 @@ INVARIANT_KINDS = frozenset({"p", "q", "u1", "u2", "scale", "stop", "number"})
 """Of operands that are the same at all steps of a design."""
 
 
-def write_designs_kernel(  # many: what a text is written for
-    equations: KernelEquations,
-    links: Sequence[str],
-    rates: bool,
-    lanes: int,
-    point_blocks: tuple[int, ...] | None = None,
-    *,
-    streams: bool = True,
-    is_single: bool = False,
-    counts_candidates: bool = False,
-    start: KernelStart = STATE_GIVEN,
-    results: ResultRows | None = None,
-) -> DesignsKernelLayout:
-    """The function for points on these links, none of which is the frame. Raises UnsupportedOperation.
+class KernelRequest(NamedTuple):
+    """What the function of `write_designs_kernel` does for points on `links`, none of which is the frame.
 
-    A step gives x and y of every point, then with `rates` all first and second rates: no numbers from the first that
-    does not pass the checks; `good` counts the steps that do. With `counts_candidates`, of blocks in closed form alone,
-    numbers up to the first that does not pass the checks of a position by itself, which `candidates` counts. With
-    `point_blocks`, of the block that places each point, it gives more: x and y of every point in the other assembly of
-    its block (infinite where that is not known), the state, and how regular the least regular of the blocks is that
-    Newton's method solves. What it gives goes past the caches where it `streams`; where `is_single`, it is rounded.
-    `results` stand in place of the points.
+    Every step writes x and y of every point, then with `rates` all first and second rates: NaN from the first step on
+    that does not pass the checks; `good` counts those that do. With `counts_candidates`, where all blocks are in closed
+    form, the steps are written up to the first that does not pass the checks of a single position, which `candidates`
+    counts. With `point_blocks`, the block that places each point, a step has further rows: x and y of every point in
+    the other assembly of its block (infinite where that is not known), the state, and the regularity of the least
+    regular block that Newton's method solves. Rows bypass the caches where it `streams`; where it `is_single`, they are
+    rounded. `results` are written in place of the points.
     """
+
+    equations: KernelEquations
+    links: tuple[str, ...]
+    rates: bool
+    lanes: int
+    point_blocks: tuple[int, ...] | None = None
+    start: KernelStart = STATE_GIVEN
+    streams: bool = True
+    is_single: bool = False
+    counts_candidates: bool = False
+    results: ResultRows | None = None
+
+
+def write_designs_kernel(request: KernelRequest) -> DesignsKernelLayout:
+    """Write the function of a request. Raises UnsupportedOperation."""
     carried: frozenset[Operand] = frozenset()
     while True:
         try:
-            own = start if not carried else STATE_GIVEN
-            writer = _DesignsKernelWriter(equations, tuple(links), rates, lanes, point_blocks, carried, own)
-            writer.streams, writer.is_single, writer.counts_candidates = streams, is_single, counts_candidates
-            writer.tell(results)
-            return writer.write()
+            return _DesignsKernelWriter(request, carried).write()
         except BareAngle as angle:
             if angle.operand in carried:  # its value is wanted before its own block is solved
                 raise UnsupportedOperation(f"a group stands in an angle of a later one: {angle.operand}") from None
             carried |= {angle.operand}
+            request = request._replace(start=STATE_GIVEN)
 
 
 class _DesignsKernelWriter(KernelWriter):
-    streams = True  # whether results are written past the caches
-    is_single = False  # whether what a step gives is written in single precision
-    counts_candidates = False  # whether what passes the checks of a position by itself is written too
-    results: ResultRows | None = None  # what is told in place of the points
-
-    def __init__(
-        self,
-        equations: KernelEquations,
-        links: tuple[str, ...],
-        rates: bool,
-        lanes: int,
-        levels: tuple[int, ...] | None,
-        carried: frozenset[Operand],
-        start: KernelStart,
-    ):
-        super().__init__(equations, links, rates, lanes, INVARIANT_KINDS, carried)
-        self.point_blocks = levels
+    def __init__(self, request: KernelRequest, carried: frozenset[Operand]):
+        equations = request.equations
+        super().__init__(equations, request.links, request.rates, request.lanes, INVARIANT_KINDS, carried)
+        self.request, self.start, self.results = request, request.start, request.results
         self.other_points: dict[int, list[str]] = {}
-        self.apart_here: list[str] = []  # flags of blocks in closed form: their assemblies are apart at a step
-        self.start = start
+        self.apart_here: list[str] = []
+        "flags of blocks in closed form whose assemblies are apart at a step"
         self.state = self.state_operands()
-        if start.has_signs:
+        if self.start.has_signs:
             self.state = tuple(("sign", k) for k in range(len(equations.closed_forms)))
         self.input_count = len(equations.input_is_angle)
         self.newton_unknowns = [k for part in equations.blocks if part.closed_form is None for k in part.unknowns]
-
-    def tell(self, results: ResultRows | None) -> None:
-        """Tell these in place of the points."""
-        if results is not None:
-            self.results, self.solves_rates_apart = results, True
-            self.symbols["number"] = results.numbers
+        if self.results is not None:
+            self.solves_rates_apart = True
+            self.symbols["number"] = self.results.numbers
 
     def write(self) -> DesignsKernelLayout:
         """The whole function: blocks of designs, in each the steps."""
         t = self.ir
         rows = 2 * len(self.links) * (3 if self.rates else 1) if self.results is None else self.results.row_count
-        rows += 0 if self.point_blocks is None else 2 * len(self.links) + len(self.state) + 1
+        rows += 0 if self.request.point_blocks is None else 2 * len(self.links) + len(self.state) + 1
         arrays = ", ".join(f"ptr noalias readonly %{name}" for name in _READ_ARRAYS)
         numbers = ", ".join(f"double %{name}" for name in ("tolerance", "astray", "scale"))
         written = ", ".join(f"ptr noalias %{name}" for name in ("out", "good", "candidates"))
@@ -237,13 +222,13 @@ class _DesignsKernelWriter(KernelWriter):
 
     def _write_closed_form_block(self, part: KernelBlock, have: OperandNames) -> list[str]:
         """A block in closed form; flags that say where its two assemblies keep apart."""
-        if self.point_blocks is not None:
+        if self.request.point_blocks is not None:
             self._write_other_assembly(part, have)
         bend = self.write_closed_form(part, have)
         for k in part.unknowns:
             if self.is_carried(("z", k)):
                 self._write_carried_angle(k, have)
-        if self.counts_candidates:
+        if self.request.counts_candidates:
             self.apart_here.append(self.write_apart_here(part, bend, have))
         return [self._write_keeps_below(bend, self.bend_slots[self.sign_index[part.block.block_index]])]
 
@@ -261,20 +246,20 @@ class _DesignsKernelWriter(KernelWriter):
     def _write_stops(self, have: OperandNames) -> list[str]:
         """Flags that say which pairs keep off their stops."""
         t, values = self.ir, self.write_stops(have)
-        if self.counts_candidates:
+        if self.request.counts_candidates:
             self.apart_here += [t.compare("ole", value, t.constant(1.0)) for value in values]
         slots = self.bend_slots[len(self.equations.closed_forms) :]
         return [self._write_keeps_below(*both) for both in zip(values, slots, strict=True)]
 
     def _write_other_assembly(self, part: KernelBlock, have: OperandNames) -> None:
         """Where the block places its points in its other assembly."""
-        assert self.point_blocks is not None
+        assert self.request.point_blocks is not None
         level, there = part.block.block_index, dict(have)
         there["sign", self.sign_index[level]] = self.ir.add_instruction(
             f"fneg {self.ir.vector} {have['sign', self.sign_index[level]]}"
         )
         self.write_closed_form(part, there)
-        points = [k for k, each in enumerate(self.point_blocks) if each == level]
+        points = [k for k, each in enumerate(self.request.point_blocks) if each == level]
         places = self.write_values([self.point_coordinates(points)], there)
         self.other_points |= {k: places[2 * n : 2 * n + 2] for n, k in enumerate(points)}
 
@@ -373,7 +358,7 @@ class _DesignsKernelWriter(KernelWriter):
     def _write_regularity(self, spanned: str, lengths: str, squared_arm: str, count: int) -> str:
         """How regular a Jacobian is, where that is told; else only whether it is enough: not below nothing."""
         t = self.ir
-        if self.point_blocks is not None:
+        if self.request.point_blocks is not None:
             return t.binary("div", spanned, lengths)
         least = least_regularity(LEAST_KERNEL_REGULARITY**2, count)
         room = t.binary("sub", spanned, t.binary("mul", lengths, t.constant(least)))
@@ -387,30 +372,30 @@ class _DesignsKernelWriter(KernelWriter):
         left, counted, *values = self.write_separately([self.equations.residuals(), self.counted_angles(), *told], have)
         flags = [*flags, *write_turns_little(t, counted, self.counted_angle_slots)]
         many = [each for of in values for each in of] if results is None else results.write_rows(self, have)
-        if self.point_blocks is not None:
+        if self.request.point_blocks is not None:
             nowhere = [t.constant(inf)] * 2
             many += [part for k in range(len(self.links)) for part in self.other_points.get(k, nowhere)]
             many += [*(have[leaf] for leaf in self.state), t.load(self.regularity_slot)]
         flags.append(write_closes(t, [*left, *self.write_circle_residuals(have)], "%tolerance"))
         if self.newton_unknowns:
-            least = LEAST_KERNEL_REGULARITY**3 if self.point_blocks is not None else 0.0
+            least = LEAST_KERNEL_REGULARITY**3 if self.request.point_blocks is not None else 0.0
             flags.append(t.compare("oge", t.load(self.regularity_slot), t.constant(least)))
             near = t.compare("ole", t.load(self.correction_slot), t.broadcast("%astray"))
             flags.append(t.or_flags(near, t.broadcast_counter_test("%k", "sle", PREDICTOR_ORDER)))
         passed = [self.write_passed(flags, self.passed_slot)]
-        pointers = result_pointers(t, self.lane, len(many), self.is_single)
+        pointers = result_pointers(t, self.lane, len(many), self.request.is_single)
         # mostly all designs pass, and are candidates too: then nothing of theirs is erased or counted
         t.write_line(f"br i1 {t.all_flags(passed[0][1])}, label %whole, label %judged")
         t.write_label("whole")
-        store_results(t, many, pointers, self.streams, self.is_single)
+        store_results(t, many, pointers, self.request.streams, self.request.is_single)
         t.write_line("br label %stepend")
         t.write_label("judged")
-        if self.counts_candidates:
+        if self.request.counts_candidates:
             here = [*self.apart_here, *flags[len(self.apart_here) :]]
             passed.append(self.write_passed(here, self.candidate_slot))
-        if self.point_blocks is None:
+        if self.request.point_blocks is None:
             many = [t.select(passed[-1][1], each, t.constant(nan)) for each in many]
-        store_results(t, many, pointers, self.streams, self.is_single)
+        store_results(t, many, pointers, self.request.streams, self.request.is_single)
         step = t.broadcast(t.add_instruction("sitofp i64 %k to double"))
         for (_, slot, _), (before, now) in zip(self._counted(), passed, strict=True):
             t.store(t.select(now, t.load(slot), t.select(before, step, t.load(slot))), slot)
@@ -421,4 +406,4 @@ class _DesignsKernelWriter(KernelWriter):
         """Of the steps that pass all checks, and of candidates: slots of the flags and of the count, and its array."""
         good = self.passed_slot, self.good_count_slot, "%good"
         candidates = self.candidate_slot, self.candidate_count_slot, "%candidates"
-        return [good, candidates] if self.counts_candidates else [good]
+        return [good, candidates] if self.request.counts_candidates else [good]

@@ -94,15 +94,13 @@ class KernelEquations:
         self,
         equations: ConstraintEquations,
         mechanism: Mechanism,
-        given: Sequence[str] = (),
         zeros: frozenset[Operand] = frozenset(),
         stop_pairs: tuple[Pair, ...] = (),
     ):
         e = self.equations = equations
         if not e.is_square:
             raise UnsupportedOperation("constraints hold each other more than once")
-        self.mechanism, self.given_links, self.zeros = mechanism, tuple(given), zeros
-        self.stop_pairs = stop_pairs
+        self.mechanism, self.zeros, self.stop_pairs = mechanism, zeros, stop_pairs
         self.blocks = tuple(
             KernelBlock(block, find_closed_form(e, block)) for block in e.blocks if slice_length(block.unknowns)
         )
@@ -132,9 +130,6 @@ class KernelEquations:
 
     def frame(self, link: str) -> Frame:
         """Where a link is, as expressions."""
-        if link in self.given_links:
-            first = 3 * self.given_links.index(link)
-            return frame_at(*(self.equations.u[first + k] for k in range(3)))
         if (link, "x") not in self.column_of:
             return GROUND
         return frame_at(*(self.equations.w[self.column_of[link, part]] for part in ("x", "y", "angle")))
@@ -147,8 +142,7 @@ class KernelEquations:
         e, pairs = self.equations, self.mechanism.pairs
         _, own = frames_from_coordinates(ca.vertsplit(e.w), self.column_of, (), {pair.name: pair for pair in pairs})
         frames = {link.name: self.frame(link.name) for link in self.mechanism.links}
-        u = scalars(e.u)[3 * len(self.given_links) :]
-        rows = residuals(self.mechanism, frames, split_pair_numbers(pairs, e.p), own, u)
+        rows = residuals(self.mechanism, frames, split_pair_numbers(pairs, e.p), own, scalars(e.u))
         return ca.vertcat(*(closing_error(value, row.kind) for row, value in rows))
 
     def stop_coalescences(self, numbers: ca.SX) -> ca.SX:
@@ -200,7 +194,7 @@ def kernel_equations(
     stop_pairs: tuple[Pair, ...] = (),
 ) -> KernelEquations:
     """The equations of a structure, kept. Raises UnsupportedOperation."""
-    return KernelEquations(functions.equations, structure, (), zeros, stop_pairs)
+    return KernelEquations(functions.equations, structure, zeros, stop_pairs)
 
 
 def batch_equations(batch: DesignBatch) -> KernelEquations:

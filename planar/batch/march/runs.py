@@ -14,17 +14,17 @@ from planar.batch.march.checks import DesignFunctions, PointWriter, design_posit
 from planar.batch.march.design_batch import (
     CorrectedAssemblies,
     DesignBatch,
-    ResultRows,
     erase_between,
     erase_from_steps,
 )
 from planar.batch.march.designs_writer import (
     MARCH_ARGUMENTS,
     MARCH_FUNCTION,
+    KernelRequest,
     write_designs_kernel,
 )
 from planar.batch.march.kernel import KernelEquations, batch_equations, operand_rows, unknowns_from_state
-from planar.batch.march.kernel_writer import STATE_GIVEN, DesignsKernelLayout, KernelStart
+from planar.batch.march.kernel_writer import DesignsKernelLayout, KernelStart
 from planar.batch.march.prediction import (
     LONGEST_STEP,
     PREDICTOR_ORDER,
@@ -51,40 +51,19 @@ LANES = 16
 """Designs at once: two vectors of the widest machines, so that one waits while the other works."""
 
 
-def designs_kernel(
-    equations: KernelEquations,
-    links: tuple[str, ...],
-    rates: bool,
-    point_blocks: tuple[int, ...] | None = None,
-    is_single: bool = False,
-    start: KernelStart = STATE_GIVEN,
-    counts_candidates: bool = False,
-    results: ResultRows | None = None,
-) -> DesignsKernelLayout:
-    """The function for points on links of a structure, see `march`. Raises UnsupportedOperation."""
-    found = _designs_kernel_or_reason(
-        equations, links, rates, point_blocks, is_single, start, counts_candidates, results
-    )
-    if isinstance(found, str):
-        raise UnsupportedOperation(found)
-    return found
+def designs_kernel(request: KernelRequest) -> DesignsKernelLayout:
+    """The function of a request, kept. Raises UnsupportedOperation."""
+    layout = _designs_kernel_or_reason(request)
+    if isinstance(layout, str):
+        raise UnsupportedOperation(layout)
+    return layout
 
 
 @lru_cache(maxsize=256)
-def _designs_kernel_or_reason(
-    equations: KernelEquations,
-    links: tuple[str, ...],
-    rates: bool,
-    point_blocks: tuple[int, ...] | None,
-    is_single: bool,
-    start: KernelStart,
-    counts_candidates: bool,
-    results: ResultRows | None,
-) -> DesignsKernelLayout | str:
+def _designs_kernel_or_reason(request: KernelRequest) -> DesignsKernelLayout | str:
     """The same, or why there is none: every block of a sweep would find that out again."""
     try:
-        more = {"is_single": is_single, "counts_candidates": counts_candidates}
-        return write_designs_kernel(equations, links, rates, LANES, point_blocks, start=start, results=results, **more)
+        return write_designs_kernel(request)
     except UnsupportedOperation as why:
         return str(why)
 
@@ -185,12 +164,12 @@ def run_compiled(batch: DesignBatch, out: Array, candidates: Array | None = None
 
 def _run_steps(batch: DesignBatch, out: Array, candidates: Array | None, extra_corrections: int) -> Array:
     """As `run_compiled`, of steps that are short enough."""
-    is_single = out.dtype == np.float32
     equations = batch_equations(batch)
     signs, common = _known_signs(batch, equations), _common_inputs(batch.u0)
     start = KernelStart(signs is not None, signs is not None and common is not None)
     counts = candidates is not None and not equations.has_newton_blocks
-    kernel = designs_kernel(equations, tuple(batch.links), batch.rates, None, is_single, start, counts, batch.results)
+    request = KernelRequest(equations, tuple(batch.links), batch.rates, LANES, start=start, results=batch.results)
+    kernel = designs_kernel(request._replace(is_single=out.dtype == np.float32, counts_candidates=counts))
     table, corrections = step_table(batch.input_offsets, common if kernel.start.has_common_inputs else None)
     tolerances = batch.tolerance, correction_limit(longest_step(batch.input_offsets)), batch.unit
     _, good, found = _run_kernel(
@@ -220,7 +199,7 @@ def unknowns_at_steps(batch: DesignBatch, steps: Array) -> Array:
     """The unknowns (unknowns, designs) of a run that came to these steps, at (designs,), of each design to one."""
     parts, offsets = _divide_steps(batch.input_offsets)
     batch = batch._replace(stops=None, input_offsets=offsets)
-    kernel = designs_kernel(batch_equations(batch), (), False, ())
+    kernel = designs_kernel(KernelRequest(batch_equations(batch), (), False, LANES, ()))
     table, counts = step_table(offsets)
     tolerances = batch.tolerance, correction_limit(longest_step(offsets)), 1.0
     found = _run_kernel(kernel, batch, False, (table, counts + EXTRA_CORRECTIONS), tolerances, None)[0]
@@ -247,7 +226,9 @@ def lead_designs(batch: DesignBatch, index: int, span: Array, step: float) -> tu
 
 def correct_designs(batch: DesignBatch, point_blocks: Sequence[int], corrections: int) -> CorrectedAssemblies:
     """Designs corrected from unknowns near by, at the inputs where they start. Raises UnsupportedOperation."""
-    kernel = designs_kernel(batch_equations(batch), tuple(batch.links), False, tuple(point_blocks))
+    kernel = designs_kernel(
+        KernelRequest(batch_equations(batch), tuple(batch.links), False, LANES, tuple(point_blocks))
+    )
     table, counts = step_table(np.zeros((1, len(batch.u0))))
     counts[:] = corrections
     out, good, _ = _run_kernel(kernel, batch, False, (table, counts), (batch.tolerance, np.inf, 1.0), None)

@@ -16,7 +16,7 @@ import numpy as np
 from planar.batch.assembly.assembly_scores import MAX_BLOCK_UNKNOWNS, NEAR_SKETCH
 from planar.batch.assembly.nearest_assemblies import CORRECTIONS
 from planar.batch.initial_assembly import find_assemblies
-from planar.batch.march.designs_writer import MARCH_ARGUMENTS, MARCH_FUNCTION, write_designs_kernel
+from planar.batch.march.designs_writer import MARCH_ARGUMENTS, MARCH_FUNCTION, KernelRequest, write_designs_kernel
 from planar.batch.march.kernel import KernelEquations, Operand, operand_rows
 from planar.batch.march.kernel_writer import DesignsKernelLayout, write_angle_sum
 from planar.batch.march.prediction import (
@@ -419,8 +419,10 @@ class NewtonRun:
             raise UnsupportedOperation("the sketch does not show every group")
         pieces = _Pieces(len(u))
         kernels = (
-            write_designs_kernel(design.equations("at"), shown, False, LANES, blocks, streams=False),
-            write_designs_kernel(equations, links, rates, LANES, (-1,) * len(links), streams=False),
+            write_designs_kernel(
+                KernelRequest(design.equations("at"), tuple(shown), False, LANES, blocks, streams=False)
+            ),
+            write_designs_kernel(KernelRequest(equations, links, rates, LANES, (-1,) * len(links), streams=False)),
         )
         starts, lanes = _assembly_lanes(reference, equations)
         layout = write_newton_run(equations, design, kernels, len(links), rates, lanes)
