@@ -6,7 +6,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.batch.design_rows import stack_rows
 from planar.batch.march.checks import pair_positions
 from planar.batch.march.design_batch import DesignBatch
 from planar.batch.march.stops import (
@@ -17,7 +16,7 @@ from planar.batch.march.stops import (
     are_periodic,
     stop_limits,
 )
-from planar.batch.reference_design import ReferenceDesign
+from planar.batch.reference_design import ReferenceDesign, stack_rows
 from planar.model.mechanism import Mechanism
 from planar.model.pairs import MeasureKind, Pair
 from planar.solving.stops import STOP_TOLERANCE
