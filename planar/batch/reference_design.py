@@ -20,7 +20,7 @@ from planar.foundation.arrays import BoolArray
 from planar.foundation.errors import BadInput, suggest_name
 from planar.foundation.geometry import Vector
 from planar.foundation.jets import Scalar
-from planar.foundation.recorded_formula import greatest_of, least_of, record_formula
+from planar.foundation.recorded_formula import formula_of_results, greatest_of, least_of, record_formula
 from planar.model.link_shapes import LinkPlace, LinkShape, PointMember, PointName, link_shape, place_in_link
 from planar.model.mechanism import (
     Drive,
@@ -307,28 +307,46 @@ class DesignFormula:
         )
         self.changed_links = [link for link, shape in shapes.items() if shape is not reference.solver.shapes[link]]
         self.pair_number_count = sum(len(pair.number_kinds) for pair in reference.mechanism.pairs)
+        input_count = len(reference.mechanism.inputs)
+        self.sections = [self.pair_number_count + k * input_count for k in range(4)]
+        "where the rows of u, u1 and u2 begin among those of `_rows`, and where they end"
         self.function: FormulaFunction | None = None
-        "None where a pair has numbers that are measured in floats alone"
+        "of the rows that are computed; None where a pair has numbers that are measured in floats alone"
+        self.coordinates: list[float | int] = []
+        "of the points of changed links: a constant, or the number of an argument, and behind these of a computed row"
         if all(pair.measures_symbols for pair in reference.mechanism.pairs):
-            formula = record_formula(self._rows, len(self.names))
-            self.function = FormulaFunction(formula, [1] * len(self.names), [(1, len(formula.results))])
+            self._record()
+
+    def _record(self) -> None:
+        formula = record_formula(self._rows, len(self.names))
+        point_row = self.sections[-1] + 2
+        computed = list(formula.results[:point_row])
+        for number in formula.results[point_row:]:
+            operation, _, constant, argument = formula.instructions[number]
+            if operation == "const":
+                self.coordinates.append(float(constant))
+            elif argument is not None:
+                self.coordinates.append(argument)
+            else:
+                self.coordinates.append(len(self.names) + len(computed))
+                computed.append(number)
+        self.function = FormulaFunction(
+            formula_of_results(formula, computed), [1] * len(self.names), [(1, len(computed))]
+        )
 
     def _rows(self, values: Sequence[Scalar]) -> list[Scalar]:
         """The rows of designs with these values of the named numbers, in any arithmetic: p; positions, velocities and
-        accelerations of the inputs; x and y of the points of the changed links; a margin that is negative where an arm
-        is short; and the sum of all these, which is finite where they are."""
+        accelerations of the inputs; a margin that is negative where an arm is short; the sum of all other rows, which
+        is finite where they are; and x and y of the points of the changed links."""
         reference = self.reference
         design = with_design_values(reference.mechanism, dict(zip(self.names, values, strict=True)))
         shapes = reference.shapes(design)
         rows = [number for pair in design.pairs for number in scaled_pair_numbers(pair, shapes, reference.unit)]
         rows += [given.position / scale for given, scale in zip(design.inputs, reference.input_scale, strict=True)]
-        for rate in ("velocity", "acceleration"):
+        running = design.inputs[reference.running_index]
+        for rate in (running.velocity, running.acceleration):
             rows += [0.0] * len(design.inputs)
-            running = design.inputs[reference.running_index]
-            rows[reference.running_index - len(design.inputs)] = (
-                getattr(running, rate) / reference.input_scale[reference.running_index]
-            )
-        rows += [part for link in self.changed_links for point in shapes[link].points.values() for part in point]
+            rows[reference.running_index - len(design.inputs)] = rate / reference.input_scale[reference.running_index]
         points = [point for shape in shapes.values() for point in shape.points.values()]
         squared_size = reduce(greatest_of, [point.dot(point) for point in points], reference.unit**2)
         margin: Scalar = 0.0
@@ -337,32 +355,28 @@ class DesignFormula:
             square = arm.dot(arm)
             # an arm of no length at all turns nothing
             margin = least_of(margin, greatest_of(square - SHORT_ARM**2 * squared_size, -square))
-        return [*rows, margin, sum(rows)]
+        coordinates = [part for link in self.changed_links for point in shapes[link].points.values() for part in point]
+        return [*rows, margin, sum([*rows, *coordinates]), *coordinates]
 
     def rows(self, values: Mapping[str, Array], count: int) -> DesignRows:
         """The rows of designs with these values (designs,) by name."""
         arguments = [values[name] for name in self.names]
+        point_row = self.sections[-1] + 2
         with np.errstate(all="ignore"):  # what cannot be placed is not a number
             if self.function is None:
-                rows = stack_rows(self._rows(arguments), count)
+                every = self._rows(arguments)
+                rows, coordinates = stack_rows(every[:point_row], count), iter(every[point_row:])
             else:
                 rows = self.function.evaluate_entries(count, *(argument[None] for argument in arguments))
-        p, u, u1, u2 = np.split(rows[: self.pair_number_count + 3 * self.input_count], self._sections)
-        shapes, row = dict(self.reference.solver.shapes), self.pair_number_count + 3 * self.input_count
+                known = [*arguments, *rows]
+                coordinates = iter(known[part] if isinstance(part, int) else part for part in self.coordinates)
+        p, u, u1, u2, (margin, total), _ = np.split(rows, [*self.sections, point_row])
+        shapes = dict(self.reference.solver.shapes)
         for link in self.changed_links:
             shape = shapes[link]
-            places = {name: Vector(rows[row + 2 * k], rows[row + 2 * k + 1]) for k, name in enumerate(shape.points)}
-            shapes[link] = LinkShape(places, shape.origin, shape.axis)
-            row += 2 * len(places)
-        return DesignRows(p, u, u1, u2, shapes, (rows[-2] >= 0.0) & np.isfinite(rows[-1]))
-
-    @property
-    def input_count(self) -> int:
-        return len(self.reference.mechanism.inputs)
-
-    @property
-    def _sections(self) -> list[int]:
-        return [self.pair_number_count + k * self.input_count for k in range(3)]
+            points = {name: Vector(next(coordinates), next(coordinates)) for name in shape.points}
+            shapes[link] = LinkShape(points, shape.origin, shape.axis)
+        return DesignRows(p, u, u1, u2, shapes, (margin >= 0.0) & np.isfinite(total))
 
 
 @lru_cache(maxsize=16)
