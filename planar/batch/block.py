@@ -184,36 +184,36 @@ class DesignBlockSolver:
         self._count_sentence(status_code(Outcome.SOLVED), told.rate_remark)
 
     def _count_sentence(self, code: int, sentence: str | NoAnswer) -> None:
-        """One design more of which this is said by a code; the first one's sentence is kept."""
+        """Count a design with a sentence for a code; the sentence of the first design is kept."""
         if sentence:
-            many, first = self.endings.get(code, (0, sentence))
-            self.endings[code] = many + 1, first
+            count, first = self.endings.get(code, (0, sentence))
+            self.endings[code] = count + 1, first
 
     def _run_compiled(self, is_common: bool) -> tuple[Array, Array] | None:
-        """out (m, s), and how many of the first steps passed, whether all go equally far (`is_common`) or not; None
-        where the structure cannot be compiled."""
-        block, base_, shapes, p = self.block, self.reference, self.rows.shapes, self.rows.p
-        told = {name: base_.point_member(name) for name in block.points}
-        moving = {name: each for name, each in told.items() if each[0] != base_.mechanism.frame}
+        """Return out (m, s) and the number of first steps that passed (designs,); None where the structure cannot be
+        compiled. `is_common`: all designs run over ranges of equal length."""
+        block, reference, shapes, p = self.block, self.reference, self.rows.shapes, self.rows.p
+        members = {name: reference.point_member(name) for name in block.points}
+        moving = [member for member in members.values() if member[0] != reference.mechanism.frame]
         if block.assemblies is None:
-            start = find_assemblies(base_, shapes, p, self.u)
+            start = find_assemblies(reference, shapes, p, self.u)
         else:
             start = given_assemblies(block.assemblies)
         self.failed_block = start.failed_block
-        fit = start.is_sure & self.rows.is_fit & ~base_.is_unfit(block.designs, shapes)
+        fit = start.is_sure & self.rows.is_fit & ~reference.is_unfit(block.designs, shapes)
         fit &= (np.abs(self.u).max(axis=0) <= LARGEST_INPUT_POSITION) & (np.abs(self.start) <= LARGEST_INPUT_POSITION)
         offsets = np.zeros((block.steps + 1, len(self.u)))
         u0 = self.u.copy()
-        u0[base_.running_index] = self.start / self.scale
-        offsets[:, base_.running_index] = np.linspace(0.0, self.range_length[0] / self.scale, block.steps + 1)
-        march = base_.design_batch(shapes, p, (u0, self.rows.u1, self.rows.u2), moving.values(), block.rates)
+        u0[reference.running_index] = self.start / self.scale
+        offsets[:, reference.running_index] = np.linspace(0.0, self.range_length[0] / self.scale, block.steps + 1)
+        march = reference.design_batch(shapes, p, (u0, self.rows.u1, self.rows.u2), moving, block.rates)
         march = march._replace(z0=start.z, signs=start.signs, input_offsets=offsets)
-        if base_.mechanism.stops:
+        if reference.mechanism.stops:
             march = self._watch_stops(march, fit)
         try:
             if not is_common:
                 out = self._run_own_ranges(march, fit, start.signs)
-                return None if out is None else (self._with_frame_points(out, told, shapes), np.zeros(len(fit), int))
+                return None if out is None else (self._with_frame_points(out, members, shapes), np.zeros(len(fit), int))
             march, fit = self._lead_to_start(march, fit, start.signs)
             fit = fit if self.stops is None else fit & self.stops.have_room(march, self.range_length)
             out, good, candidates = self._run_fit_designs(march, fit)
@@ -222,7 +222,7 @@ class DesignBlockSolver:
             return None
         self._follow_to_dead_points(march, out, (good, candidates), start.signs)
         erase_between(out, np.where(self.solved_steps >= 0, self.solved_steps, good), candidates)
-        return self._with_frame_points(out, told, shapes), good
+        return self._with_frame_points(out, members, shapes), good
 
     def _watch_stops(self, march: DesignBatch, fit: Array) -> DesignBatch:
         """The march with the stops of its pairs; designs that start outside of them end there, others may be unfit."""
@@ -238,43 +238,43 @@ class DesignBlockSolver:
         """End designs at a stop of the input that runs, beyond which they would have gone on."""
         if self.stops is None:
             return
-        met = self.stops.find_input_stops(march, self.range_length)
-        some = np.flatnonzero((good > met.solved_steps) & met.is_clear)
+        input_stops = self.stops.find_input_stops(march, self.range_length)
+        stopped = np.flatnonzero((good > input_stops.solved_steps) & input_stops.is_clear)
         candidates[:] = np.maximum(candidates, good)
-        np.minimum(good, met.solved_steps, out=good)
-        self.solved_steps[some] = met.solved_steps[some]
-        self._keep_ends(some, met.distance[some], np.ones(some.size, dtype=bool))
+        np.minimum(good, input_stops.solved_steps, out=good)
+        self.solved_steps[stopped] = input_stops.solved_steps[stopped]
+        self._keep_ends(stopped, input_stops.distance[stopped], np.ones(stopped.size, dtype=bool))
 
     def _run_own_ranges(self, march: DesignBatch, fit: Array, signs: Array | None) -> Array | None:
-        """out of designs each of which has a range of its own; None where not all blocks are in closed form."""
+        """Return out of designs whose ranges differ; None where a block is not in closed form."""
         fit = fit if self.stops is None or self.has_own_range else fit & self.stops.have_room(march, self.range_length)
-        some = np.flatnonzero(fit & (self.range_length != 0.0))
-        own = None if signs is None else signs[:, some]
-        designs = closed_form_designs(march.select(some), self.reference.running_index, own)
+        chosen = np.flatnonzero(fit & (self.range_length != 0.0))
+        chosen_signs = None if signs is None else signs[:, chosen]
+        designs = closed_form_designs(march.select(chosen), self.reference.running_index, chosen_signs)
         if designs is None:
             return None
         out = self._own_output(march)
         out[:] = np.nan
         if not self.has_own_range:
-            lengths, none = self.range_length[some] / self.scale, np.zeros(some.size, dtype=int)
-            self._settle(some, find_ends(designs, lengths, none, none, self.block.steps), out)
+            lengths, none = self.range_length[chosen] / self.scale, np.zeros(chosen.size, dtype=int)
+            self._settle(chosen, find_ends(designs, lengths, none, none, self.block.steps), out)
             return out
-        found = run_between_limits(designs, self.block.steps)
-        self.limits[:, some] = found.limits
-        settled = some[found.is_settled]
-        out[:, :, settled] = found.out[:, :, found.is_settled]
+        runs = run_between_limits(designs, self.block.steps)
+        self.limits[:, chosen] = runs.limits
+        settled = chosen[runs.is_settled]
+        out[:, :, settled] = runs.out[:, :, runs.is_settled]
         self.solved_steps[settled] = len(out)
         return out
 
     def _own_output(self, march: DesignBatch) -> Array:
-        """Where the results of a march stand: those of points on the frame are none of its."""
+        """The array that a march fills: without the points on the frame."""
         out = self._output_array()
         if march.output_row_count == out.shape[1]:
             return out
         return allocate_aligned(len(out), march.output_row_count, self.design_count, out.dtype)
 
     def _output_array(self) -> Array:
-        """Where the results stand."""
+        """The array of all results."""
         block = self.block
         if self.out is None:
             rows = 2 * len(block.points) * (3 if block.rates else 1)
@@ -286,17 +286,20 @@ class DesignBlockSolver:
         out, candidates = self._own_output(march), np.zeros(self.design_count, dtype=int)
         self.march, march.u0[:, ~fit] = march, np.nan
         steps = len(out) if self.stops is None else self.stops.needed_steps(march, self.range_length, fit)
-        shown = march._replace(input_offsets=march.input_offsets[:steps])
+        needed = march._replace(input_offsets=march.input_offsets[:steps])
         out[steps:] = np.nan
         if fit.mean() > RUN_ALL_RATIO:
-            # where all go together, few stop
-            return out, run_designs(shown, out[:steps], None if fit.all() else candidates), candidates
+            # where all designs are fit, few end early
+            return out, run_designs(needed, out[:steps], None if fit.all() else candidates), candidates
         out[:] = np.nan
-        some, good = np.flatnonzero(fit), np.zeros(self.design_count, dtype=int)
-        if some.size:
-            own, found = allocate_aligned(steps, march.output_row_count, some.size, out.dtype), good[some]
-            good[some] = run_designs(shown.select(some), own, found)
-            out[:steps, :, some], candidates[some] = own, found
+        chosen, good = np.flatnonzero(fit), np.zeros(self.design_count, dtype=int)
+        if chosen.size:
+            rows, chosen_candidates = (
+                allocate_aligned(steps, march.output_row_count, chosen.size, out.dtype),
+                good[chosen],
+            )
+            good[chosen] = run_designs(needed.select(chosen), rows, chosen_candidates)
+            out[:steps, :, chosen], candidates[chosen] = rows, chosen_candidates
         return out, good, candidates
 
     def _follow_to_dead_points(
@@ -306,34 +309,35 @@ class DesignBlockSolver:
         counts: tuple[Array, Array],
         signs: Array | None,
     ) -> None:
-        """Follow those that compiled code did not bring to the end, all at once, as far as they come.
+        """Follow the designs that compiled code did not bring to the end, all at once, to their ends.
 
-        counts: how many steps of each design are good, and how many candidates (designs,).
+        counts: the numbers of good steps and of candidates of each design (designs,).
         """
         good, candidates = counts
-        some = np.flatnonzero((good > 0) & (good < len(march.input_offsets)) & (self.solved_steps < 0))
-        if not some.size:
+        open_ = np.flatnonzero((good > 0) & (good < len(march.input_offsets)) & (self.solved_steps < 0))
+        if not open_.size:
             return
         index = self.reference.running_index
-        own = None if signs is None else signs[:, some]
-        designs = closed_form_designs(march.select(some), index, own)
+        open_signs = None if signs is None else signs[:, open_]
+        designs = closed_form_designs(march.select(open_), index, open_signs)
         if designs is not None:
-            lengths = self.range_length[some] / self.scale
-            ends = find_ends(designs, lengths, good[some], np.maximum(good, candidates)[some], self.block.steps)
-            self._settle(some, ends, out)
-            some = some[~ends.is_settled]
-        if some.size:
-            found = follow_to_dead_points(march.select(some), index, good[some])
-            self._settle(some, found, out)
-            self.general_positions += int(found.design.size)
-            self.followed_designs += int(found.is_settled.sum())
+            lengths = self.range_length[open_] / self.scale
+            ends = find_ends(designs, lengths, good[open_], np.maximum(good, candidates)[open_], self.block.steps)
+            self._settle(open_, ends, out)
+            open_ = open_[~ends.is_settled]
+        if open_.size:
+            followed = follow_to_dead_points(march.select(open_), index, good[open_])
+            self._settle(open_, followed, out)
+            self.general_positions += int(followed.design.size)
+            self.followed_designs += int(followed.is_settled.sum())
 
-    def _settle(self, some: Array, found: FollowedDesigns, out: Array) -> None:
-        """Keep how far some designs were followed, and the positions that were solved on the way."""
-        out[found.step, :, some[found.design]] = found.out.T
-        settled = some[found.is_settled]
-        self.solved_steps[settled] = found.solved_steps[found.is_settled]
-        self._keep_ends(settled, found.distance[found.is_settled], found.stop[found.is_settled] >= 0)
+    def _settle(self, designs: Array, followed: FollowedDesigns, out: Array) -> None:
+        """Store the positions of followed designs and where they end."""
+        out[followed.step, :, designs[followed.design]] = followed.out.T
+        is_settled = followed.is_settled
+        settled = designs[is_settled]
+        self.solved_steps[settled] = followed.solved_steps[is_settled]
+        self._keep_ends(settled, followed.distance[is_settled], followed.stop[is_settled] >= 0)
 
     def _keep_ends(self, settled: Array, distance: Array, is_stopped: Array) -> None:
         """Keep where designs end (designs,), rad or sizes from their start: at dead points, or at stops."""
@@ -344,52 +348,46 @@ class DesignBlockSolver:
         self.is_stopped[settled] = is_stopped
 
     def _lead_to_start(self, march: DesignBatch, fit: Array, signs: Array | None) -> tuple[DesignBatch, Array]:
-        """The same march from the assemblies at its start, to which those at the designs' own positions are led."""
-        gone = march.u0 - self.u
-        far = float(np.max(np.abs(gone), initial=0.0))
-        if far == 0.0:
+        """Lead the assemblies at the designs' own inputs to where the march starts; return the march from there, and
+        which designs arrived (designs,)."""
+        offset = march.u0 - self.u
+        longest = float(np.max(np.abs(offset), initial=0.0))
+        if longest == 0.0:
             return march, fit
-        if far > LARGEST_INPUT_POSITION:
+        if longest > LARGEST_INPUT_POSITION:
             return march, np.zeros_like(fit)
-        index, own = self.reference.running_index, np.flatnonzero(fit)
-        there = march._replace(u0=self.u).select(own)
-        signs = None if signs is None else signs[:, own]
-        designs = closed_form_designs(there, index, signs)
+        index, chosen = self.reference.running_index, np.flatnonzero(fit)
+        origin = march._replace(u0=self.u).select(chosen)
+        chosen_signs = None if signs is None else signs[:, chosen]
+        designs, arrived = closed_form_designs(origin, index, chosen_signs), np.zeros_like(fit)
+        span = offset[index, chosen]
         if designs is not None:
-            span = gone[index, own]
-            z, found = designs.lead(span, LEAD_IN_STEP)
-            ends = found.distance
-            dead = np.isfinite(ends) & (np.abs(span) - ends > DEAD_POINT_MARGIN * np.abs(span))
-            self.solved_steps[own[dead]] = 0
-            self.is_stopped[own[dead]] = designs.stops_of(found)[dead] >= 0
-            passed = np.zeros_like(fit)
-            passed[own] = ends - np.abs(span) > DEAD_POINT_MARGIN * np.abs(span)
-            march.z0[:, own] = z
-            return march, passed
-        z, led = lead_designs(there, index, gone[index, own], LEAD_IN_STEP)
-        passed = np.zeros_like(fit)
-        passed[own] = led
-        if march.stops is not None:
-            passed &= march.stops.input_rooms(self.u[index], gone[index]) >= np.abs(gone[index]) - SAME_END
-        march.z0[:, own] = z
-        return march, passed
+            z, ends = designs.lead(span, LEAD_IN_STEP)
+            room = ends.distance - np.abs(span)
+            dead = np.isfinite(ends.distance) & (-room > DEAD_POINT_MARGIN * np.abs(span))
+            self.solved_steps[chosen[dead]] = 0
+            self.is_stopped[chosen[dead]] = designs.stops_of(ends)[dead] >= 0
+            arrived[chosen] = room > DEAD_POINT_MARGIN * np.abs(span)
+        else:
+            z, arrived[chosen] = lead_designs(origin, index, span, LEAD_IN_STEP)
+            if march.stops is not None:
+                arrived &= march.stops.input_rooms(self.u[index], offset[index]) >= np.abs(offset[index]) - SAME_END
+        march.z0[:, chosen] = z
+        return march, arrived
 
     def _with_frame_points(
-        self, out: Array, told: Mapping[PointName, PointMember], shapes: Mapping[str, LinkShape]
+        self, out: Array, members: Mapping[PointName, PointMember], shapes: Mapping[str, LinkShape]
     ) -> Array:
         """The rows of all points, those on the frame filled in."""
         frame = self.reference.mechanism.frame
-        if all(link != frame for link, _ in told.values()):
+        if all(link != frame for link, _ in members.values()):
             return out
-        orders = 3 if self.block.rates else 1
-        whole = self._output_array()
-        whole[:] = 0.0
-        moving = [k for k, (link, _) in enumerate(told.values()) if link != frame]
-        for k, (link, point) in enumerate(told.values()):
+        every = self._output_array()
+        every[:] = 0.0
+        for k, (link, point) in enumerate(members.values()):
             if link == frame:
-                whole[:, 2 * k], whole[:, 2 * k + 1] = place_in_link(shapes[link], point)
-        for order in range(orders):
-            for place, k in enumerate(moving):
-                old, new = 2 * (order * len(moving) + place), 2 * (order * len(told) + k)
-                whole[:, new : new + 2] = out[:, old : old + 2]
-        return whole
+                every[:, 2 * k], every[:, 2 * k + 1] = place_in_link(shapes[link], point)
+        moving = [k for k, (link, _) in enumerate(members.values()) if link != frame]
+        orders = every.reshape(len(out), -1, len(members), 2, self.design_count)
+        orders[:, :, moving] = out.reshape(len(out), -1, len(moving), 2, self.design_count)
+        return every
