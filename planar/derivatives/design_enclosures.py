@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable
+from collections.abc import Iterable
 
 import casadi as ca
 
 from planar.derivatives.design_equations import DesignEquations, design_equations
 from planar.derivatives.enclosures import ParametricSystem
-from planar.derivatives.limit_systems import LimitEquations, LimitSystem
-from planar.derivatives.result_expressions import kinematic_expressions
+from planar.derivatives.kinematic_slopes import kinematic_results
 from planar.dynamics.forces import Forces
 from planar.equations.casadi_call import BufferedFunction
 from planar.foundation.errors import BadInput
@@ -24,42 +23,25 @@ class PositionResult:
         if isinstance(source, Forces):
             raise BadInput("guaranteed", refusal)
         self.design = design = design_equations(source.mechanism, offsets)
-        expressions = kinematic_expressions(design, source, of)
-        self.value: ca.SX = next(expression.value for expression in expressions if expression.name == result)
+        results = kinematic_results(design.motion, source._point_members, of)
+        self.value: ca.SX = ca.vertcat(*next(named.parts for named in results if named.name == result))
         rates = ca.vertcat(design.z1, design.z2, design.u1, design.u2)
         if rates.numel() and ca.depends_on(self.value, rates):
             raise BadInput("guaranteed", refusal)
         if design.F.numel() != design.z.numel():
-            told = "guaranteed bands are told of mechanisms without redundant constraints, which deviations contradict"
-            raise BadInput("guaranteed", told)
+            message = (
+                "guaranteed bands are told of mechanisms without redundant constraints, which deviations contradict"
+            )
+            raise BadInput("guaranteed", message)
 
     def moving(self, names: Iterable[str]) -> list[str]:
         """Those of the names of t on which it depends."""
-        by = ca.jacobian_sparsity(ca.vertcat(self.design.F, self.value), self.design.t).get_col()
-        moved: Collection[int] = set(by)
-        return [name for name in names if self.design.names.index(name) in moved]
+        columns = {*ca.jacobian_sparsity(ca.vertcat(self.design.F, self.value), self.design.t).get_col()}
+        return [name for name in names if self.design.names.index(name) in columns]
 
     def over_boxes(self, columns: list[int]) -> ParametricSystem:
         """The equations with the result, where some columns of t vary. Raises BadInput."""
-        design = self.design
-        try:
-            return ParametricSystem(design.z, design.t, design.F, self.value, columns)
-        except KeyError as problem:
-            raise _refuse_operation(problem) from None
-
-
-def limit_over_boxes(system: LimitSystem, limit: LimitEquations, columns: list[int]) -> ParametricSystem:
-    """A limit with its value, where some of the limit system's parameters vary. Raises BadInput."""
-    t = ca.vertcat(system.parameters, limit.constants)
-    try:
-        return ParametricSystem(limit.unknowns, t, limit.equations, limit.value, columns)
-    except KeyError as problem:
-        raise _refuse_operation(problem) from None
-
-
-def _refuse_operation(problem: KeyError) -> BadInput:
-    told = f"guaranteed bands are not told of this mechanism, whose formulas have a {problem.args[0]!r} in them"
-    return BadInput("guaranteed", told)
+        return ParametricSystem(self.design.z, self.design.t, self.design.F, self.value, columns)
 
 
 def dead_points_over_boxes(design: DesignEquations) -> ParametricSystem:
@@ -67,13 +49,13 @@ def dead_points_over_boxes(design: DesignEquations) -> ParametricSystem:
     v, factor = ca.SX.sym("v", design.z.numel()), ca.SX.sym("factor")
     e, c = ca.SX.sym("e", design.t.numel()), ca.SX.sym("c", design.z.numel())
     both = ca.Function("both", [design.z, design.t, v], [design.F, ca.jtimes(design.F, design.z, v)])
-    left = ca.vertcat(*both(design.z, design.t + factor * e, v), ca.dot(c, v) - 1.0)
-    return ParametricSystem(ca.vertcat(design.z, v, factor), ca.vertcat(design.t, e, c), left, ca.SX(0, 1), ())
+    residual = ca.vertcat(*both(design.z, design.t + factor * e, v), ca.dot(c, v) - 1.0)
+    return ParametricSystem(ca.vertcat(design.z, v, factor), ca.vertcat(design.t, e, c), residual, ca.SX(0, 1), ())
 
 
 def fold_function(design: DesignEquations) -> BufferedFunction:
     """(z, t, v) -> F_z, F_t and F_zz v v, by which two assemblies meet."""
     v = ca.SX.sym("v", design.z.numel())
-    turned = ca.jtimes(ca.jtimes(design.F, design.z, v), design.z, v)
-    slopes = [ca.densify(ca.jacobian(design.F, of)) for of in (design.z, design.t)]
-    return BufferedFunction(ca.Function("fold", [design.z, design.t, v], [*slopes, ca.densify(turned)]))
+    curvature = ca.jtimes(ca.jtimes(design.F, design.z, v), design.z, v)
+    slopes = [ca.densify(ca.jacobian(design.F, variable)) for variable in (design.z, design.t)]
+    return BufferedFunction(ca.Function("fold", [design.z, design.t, v], [*slopes, ca.densify(curvature)]))

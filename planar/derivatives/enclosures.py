@@ -34,6 +34,7 @@ from planar.derivatives.intervals import (
 from planar.equations.casadi_call import BufferedFunction
 from planar.equations.generic_evaluation import evaluate_function
 from planar.foundation.arrays import Array, BoolArray, IntArray
+from planar.foundation.errors import BadInput
 from planar.foundation.generalised_inverses import invert_matrices
 
 START_STEPS = 2
@@ -121,8 +122,7 @@ class Enclosures(NamedTuple):
 class ParametricSystem:
     """Equations F(x, t) = 0, as many as unknowns, and results r(x, t), whose slopes in `columns` of t are wanted.
 
-    Raises KeyError, with the name of a casadi operation, where there are some of which no intervals are known, or that
-    jump.
+    Raises BadInput where there are operations of which no intervals are known, or that jump.
     """
 
     def __init__(self, x: ca.SX, t: ca.SX, equations: ca.SX, results: ca.SX, columns: Sequence[int]):
@@ -141,7 +141,11 @@ class ParametricSystem:
             for k in range(function.n_instructions()):
                 code = function.instruction_id(k)
                 if (code not in INTERVAL_OPERATIONS and names[code] not in HELD) or code in jumps:
-                    raise KeyError(names[code].removeprefix("OP_").lower())
+                    operation = names[code].removeprefix("OP_").lower()
+                    raise BadInput(
+                        "guaranteed",
+                        f"guaranteed bands are not told of this mechanism, whose formulas have a {operation!r} in them",
+                    )
 
     def enclose(self, boxes: ParameterBoxes, start: Array, steps: int = START_STEPS) -> Enclosures:
         """What can be proved over boxes, of solutions at their middles that so many of Newton's steps from a start

@@ -9,6 +9,7 @@ Second derivatives follow in the same way from jets of the second order.
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from functools import cached_property, lru_cache
 from typing import Any, NamedTuple
@@ -153,12 +154,23 @@ class FileNumbers:
         self.p = stack_numbers(of_pairs, directions.count, order)
 
 
-class CoordinateMotion(LinkMotion):
+class RatedMotion(LinkMotion):
+    """Positions of links and of relative motions with rates, in any arithmetic."""
+
+    orders: int
+    "how many rates are known, the position among them"
+
+    @abstractmethod
+    def input_position(self, pair: Pair) -> Jet:
+        """The position of a relative motion with its rates."""
+
+
+class CoordinateMotion(RatedMotion):
     """Positions of links from their coordinates q, jets in time of arrays (n, coordinates, ...)."""
 
     def __init__(self, elements: ConstraintElements, numbers: FileNumbers, size: float, q: Jet):
         self.elements, self.numbers, self._size, self.q = elements, numbers, size, q
-        self.mechanism, self.shapes = numbers.mechanism, numbers.shapes
+        self.mechanism, self.shapes, self.orders = numbers.mechanism, numbers.shapes, len(q.parts)
         self._frames: dict[str, Frame] = {}
 
     @property
@@ -184,14 +196,12 @@ class CoordinateMotion(LinkMotion):
         return () if own is None else tuple(take_entries(self.q, k) for k in range(own.start, own.stop))
 
     def input_position(self, pair: Pair) -> Jet:
-        """The position of a relative motion with its rates."""
-        orders = len(self.q.parts)
         frames = [
             self.moving_frame(link) if link in self.elements.link_columns else self.frame(link) for link in pair.bodies
         ]
-        numbers = [constant_jet(number, orders) for number in self.numbers.measured[pair.name]]
+        numbers = [constant_jet(number, self.orders) for number in self.numbers.measured[pair.name]]
         position = pair.input_position(frames, numbers, self.own_coordinates(pair.name))
-        return position if isinstance(position, Jet) else Jet(position, *([0.0] * (orders - 1)))
+        return position if isinstance(position, Jet) else Jet(position, *([0.0] * (self.orders - 1)))
 
 
 class KinematicSlopes:
@@ -334,12 +344,12 @@ POINT_RESULTS = {"position": "length", "velocity": "velocity", "acceleration": "
 LINK_RESULTS = ("angle", "angular_velocity", "angular_acceleration")
 
 
-def kinematic_results(motion: CoordinateMotion, points: Mapping[str, tuple[str, str]], name: str) -> list[NamedResult]:
+def kinematic_results(motion: RatedMotion, points: Mapping[str, tuple[str, str]], name: str) -> list[NamedResult]:
     """The results of a state of a name: of a point, else of a link, and of a pair; `points` are (link, point) by name.
 
     Without rates only what follows from positions.
     """
-    results, orders = [], len(motion.q.parts)
+    results, orders = [], motion.orders
     if name in points:
         link, point = points[name]
         local = motion.shapes[link].position(point)
