@@ -250,7 +250,7 @@ def _solve_blocks(
 ) -> Iterator[int]:
     """Solve the blocks that are not there yet, and write them; how many designs are done after each."""
     plan = into.plan
-    parts = list(split_into_blocks(plan.design_count, into.block_size))
+    parts = list(split_into_blocks(plan.design_count, plan.block_size))
     whole = plan.all_designs
     missing = {k: part for k, part in enumerate(parts) if k not in into.finished}
     ready = plan.design_count - sum(part.stop - part.start for part in missing.values())

@@ -11,6 +11,7 @@ from planar.derivatives.enclosures import ParametricSystem
 from planar.derivatives.kinematic_slopes import kinematic_results
 from planar.dynamics.forces import Forces
 from planar.equations.casadi_call import BufferedFunction
+from planar.equations.elimination import stack_expressions
 from planar.foundation.errors import BadInput
 from planar.results.motion import Motion, State
 
@@ -24,7 +25,7 @@ class PositionResult:
             raise BadInput("guaranteed", refusal)
         self.design = design = design_equations(source.mechanism, offsets)
         results = kinematic_results(design.motion, source._point_members, of)
-        self.value: ca.SX = ca.vertcat(*next(named.parts for named in results if named.name == result))
+        self.value = stack_expressions(next(named.parts for named in results if named.name == result))
         rates = ca.vertcat(design.z1, design.z2, design.u1, design.u2)
         if rates.numel() and ca.depends_on(self.value, rates):
             raise BadInput("guaranteed", refusal)

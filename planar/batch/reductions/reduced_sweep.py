@@ -219,9 +219,6 @@ class ReductionStore(BlockStore):
         self.status[part] = done.status
         self.block_notes[number] = done.general_positions, done.general_designs, done.endings
 
-    def takes(self, done: SolvedDesigns | ReducedBlock) -> bool:
-        return True
-
     def leave_out(self, parts: Mapping[int, slice], reason: str) -> None:
         if not self.reduced:
             raise interrupted(reason, "before a block of designs was reduced")

@@ -5,11 +5,11 @@ from __future__ import annotations
 import hashlib
 import json
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from importlib import import_module
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from planar.batch.named_results.result_rows import POINT_QUANTITIES, RequestedRe
 from planar.batch.results import Sweep, SweepNotes
 from planar.codegen.llvm_compile import allocate_aligned
 from planar.document.files import to_dict
+from planar.foundation.arrays import part_offsets
 from planar.foundation.errors import BadInput, Outcome
 from planar.foundation.safe_files import PARTIAL_FILE_NAME, write_error
 from planar.foundation.time_limit import interrupted
@@ -31,8 +32,8 @@ ZARR_PARTIAL_SUFFIX = ".partial"
 """Ending of the files that Zarr has not written whole."""
 STORE_VERSION = 3
 """Of what stands in a store; raised where it is no longer that of stores of before."""
-
-
+POINT_UNITS = ("m", "m/s", "m/s^2")
+RowValue = TypeVar("RowValue")
 INTERRUPTED = [*Outcome].index(Outcome.INTERRUPTED)
 """What stands for that in a status."""
 
@@ -74,14 +75,26 @@ class SweepPlan(NamedTuple):
         return POINT_QUANTITIES if self.all_designs.rates else POINT_QUANTITIES[:1]
 
     @property
-    def result_rows(self) -> tuple[ResultRow, ...]:
-        """What is told beside points."""
-        return self.results.rows(self.all_designs.mechanism, self.all_designs.rates)
+    def rows(self) -> tuple[ResultRow, ...]:
+        """What is told at a step in the order of the numbers: of all points, then beside them."""
+        points = (
+            ResultRow(quantity, name, 2, unit)
+            for quantity, unit in zip(self.quantities, POINT_UNITS, strict=False)
+            for name in self.point_names
+        )
+        return *points, *self.results.rows(self.all_designs.mechanism, self.all_designs.rates)
 
     @property
     def row_count(self) -> int:
         """How many numbers are told at a step."""
-        return 2 * len(self.all_designs.points) * len(self.quantities) + sum(row.width for row in self.result_rows)
+        return sum(row.width for row in self.rows)
+
+    def by_quantity(self, values: Iterable[RowValue]) -> dict[str, dict[str, RowValue]]:
+        """Values of all rows, one for each, by quantity and name."""
+        named: dict[str, dict[str, RowValue]] = {quantity: {} for quantity in self.quantities}
+        for row, value in zip(self.rows, values, strict=True):
+            named.setdefault(row.quantity, {})[row.name] = value
+        return named
 
     def fingerprint(self) -> str:
         """The same for two sweeps that have the same results."""
@@ -98,7 +111,7 @@ class BlockStore(ABC):
     """Takes solved blocks, each by its number, and makes of them the result of the sweep."""
 
     def __init__(self, plan: SweepPlan):
-        self.plan, self.block_size = plan, plan.block_size
+        self.plan = plan
         self.finished: set[int] = set()
         self.damaged: set[int] = set()
         "blocks of which something was there already, but not whole"
@@ -114,16 +127,12 @@ class BlockStore(ABC):
         """A solved block, of these designs."""
 
     def takes(self, done: SolvedDesigns) -> bool:
-        """Whether a block is kept: in a store that is gone on with, only one that no time limit ended."""
-        return all(code != INTERRUPTED for code, _, _ in done.endings)
+        """Whether a block is kept."""
+        return True
 
+    @abstractmethod
     def leave_out(self, parts: Mapping[int, slice], reason: str) -> None:
         """Say that blocks are not solved, as a computation ended early. Raises NoAnswer."""
-        many = self.plan.design_count
-        done = many - sum(part.stop - part.start for part in parts.values())
-        raise interrupted(
-            reason, f"after {done} of {many} designs, which the store has", "the same sweep into this store goes on"
-        )
 
     @abstractmethod
     def result(self) -> Any:
@@ -212,15 +221,58 @@ def is_folder_begun(path: Path) -> bool:
         )
 
 
-def foreign_store_error(path: Path) -> BadInput:
-    """That a folder is not this sweep's to write in."""
-    return BadInput("store", f"{path} holds something else than this sweep; name another store, or take it away first")
+class FolderStore(BlockStore):
+    """A store in a folder of its own, which is gone on with where it is there."""
 
+    READ_ERRORS: tuple[type[Exception], ...] = ()
+    """What is raised of damaged files."""
 
-def damaged_block_error(path: Path, number: int, part: slice) -> BadInput:
-    """That a block of a store cannot be read."""
-    told = f"block {number} of {path} (designs {part.start} to {part.stop - 1}) is missing or damaged"
-    return BadInput("store", f"{told}; the same sweep into this store solves it again")
+    def __init__(self, plan: SweepPlan, path: Path):
+        super().__init__(plan)
+        self.path, self.fingerprint = path, plan.fingerprint()
+        if is_folder_begun(path):
+            try:
+                about = self.read_about()
+            except self.READ_ERRORS:
+                about = {}
+            size = about.get("block") if isinstance(about, dict) and about.get("fingerprint") == self.fingerprint else 0
+            if not isinstance(size, int) or size < 1:
+                told = f"{path} holds something else than this sweep; name another store, or take it away first"
+                raise BadInput("store", told)
+            self.plan = plan._replace(block_size=size)
+        else:
+            with reporting_write_errors(path):
+                self.write_about({"fingerprint": self.fingerprint, "block": plan.block_size})
+
+    @abstractmethod
+    def read_about(self) -> Any:
+        """What the store says about itself. Raises one of `READ_ERRORS`."""
+
+    @abstractmethod
+    def write_about(self, about: dict[str, Any]) -> None:
+        """Begin the store with what it says about itself, so that it is this sweep's from its first moment."""
+
+    def block_slice(self, number: int) -> slice:
+        """The designs of a block."""
+        size = self.plan.block_size
+        return slice(number * size, min((number + 1) * size, self.plan.design_count))
+
+    def damaged_block_error(self, number: int) -> BadInput:
+        """That a block of the store cannot be read."""
+        part = self.block_slice(number)
+        told = f"block {number} of {self.path} (designs {part.start} to {part.stop - 1}) is missing or damaged"
+        return BadInput("store", f"{told}; the same sweep into this store solves it again")
+
+    def takes(self, done: SolvedDesigns) -> bool:
+        """Only a block that no time limit ended, as the store is gone on with."""
+        return all(code != INTERRUPTED for code, _, _ in done.endings)
+
+    def leave_out(self, parts: Mapping[int, slice], reason: str) -> None:
+        count = self.plan.design_count
+        done = count - sum(part.stop - part.start for part in parts.values())
+        raise interrupted(
+            reason, f"after {done} of {count} designs, which the store has", "the same sweep into this store goes on"
+        )
 
 
 class MemoryStore(BlockStore):
@@ -250,9 +302,6 @@ class MemoryStore(BlockStore):
         self.inputs = _join_inputs(self.inputs, done.input, part, self.plan)
         self.block_notes[number] = done.general_positions, done.general_designs, done.endings
 
-    def takes(self, done: SolvedDesigns) -> bool:
-        return True
-
     def leave_out(self, parts: Mapping[int, slice], reason: str) -> None:
         for number, part in parts.items():
             many = part.stop - part.start
@@ -263,27 +312,18 @@ class MemoryStore(BlockStore):
     def result(self) -> Sweep:
         assert self.inputs is not None
         ends = self.dead_point, self.stop_position
-        return self.make_sweep(result_views(self.out, self.plan), self.status, self.inputs, ends)
+        return self.make_sweep(self.plan.by_quantity(result_views(self.out, self.plan)), self.status, self.inputs, ends)
 
 
-def result_views(out: Array, plan: SweepPlan) -> dict[str, dict[str, Array]]:
-    """out (steps + 1, rows, designs) by quantity and name, without a copy: arrays (designs, steps + 1), or of vectors
+def result_views(out: Array, plan: SweepPlan) -> list[Array]:
+    """out (steps + 1, rows, designs) by the rows of a plan, without a copy: arrays (designs, steps + 1), or of vectors
     (designs, steps + 1, 2)."""
-    turned = out.transpose(2, 0, 1)
-    many = len(plan.all_designs.points)
-    found = {
-        order: {
-            name: turned[:, :, 2 * (k * many + place) : 2 * (k * many + place) + 2]
-            for place, name in enumerate(plan.point_names)
-        }
-        for k, order in enumerate(plan.quantities)
-    }
-    at = 2 * many * len(plan.quantities)
-    for row in plan.result_rows:
-        values = turned[:, :, at] if row.width == 1 else turned[:, :, at : at + row.width]
-        found.setdefault(row.quantity, {})[row.name] = values
-        at += row.width
-    return found
+    rows, by_design = plan.rows, out.transpose(2, 0, 1)
+    offsets = part_offsets([row.width for row in rows])
+    return [
+        by_design[:, :, first] if row.width == 1 else by_design[:, :, first : first + row.width]
+        for row, first in zip(rows, offsets, strict=False)
+    ]
 
 
 def _join_inputs(whole: Array | None, own: Array, part: slice, plan: SweepPlan) -> Array:

@@ -13,13 +13,11 @@ import zarr
 from zarr.codecs import Crc32cCodec, ZstdCodec
 
 from planar.batch.block import SolvedDesigns
+from planar.batch.named_results.result_rows import ResultRow
 from planar.batch.results import Sweep
 from planar.batch.stores.store import (
-    BlockStore,
+    FolderStore,
     SweepPlan,
-    damaged_block_error,
-    foreign_store_error,
-    is_folder_begun,
     reporting_write_errors,
     result_views,
 )
@@ -36,56 +34,39 @@ MISSING_STATUS = -1
 """The status of what is not there: none that a design can have."""
 
 
-class ZarrStore(BlockStore):
+class ZarrStore(FolderStore):
     """See the module. A block is whole once its record, written last, and all its chunks can be read."""
 
+    READ_ERRORS = READ_ERRORS
+
     def __init__(self, plan: SweepPlan, path: Path):
-        super().__init__(plan)
-        self.path, mark = path, plan.fingerprint()
-        if is_folder_begun(path):
-            try:
-                self.group = zarr.open_group(str(path), mode="r+")
-                about = dict(self.group.attrs)
-            except READ_ERRORS:
-                about = {}
-            size = about.get("block")
-            if about.get("fingerprint") != mark or not isinstance(size, int) or size < 1:
-                raise foreign_store_error(path)
-            self.size = size
-            self.plan = plan = plan._replace(block_size=self.size)
-        else:
-            # written at once: a store is this sweep's from its first moment
-            about = {
-                "fingerprint": mark,
-                "mechanism": to_dict(plan.all_designs.mechanism),
-                "points": list(plan.point_names),
-                "block": self.block_size,
-                "outcomes": [each.value for each in Outcome],
-            }
-            with reporting_write_errors(path):
-                self.group = zarr.create_group(str(path), attributes=about)
+        super().__init__(plan, path)
         with (
             reporting_write_errors(path),
             zarr.config.set({"array.write_empty_chunks": True}),
         ):  # a chunk that is not there is lost
             self.arrays = dict(self._open_arrays())
-        for number in range(plan.block_count):
+        for number in range(self.plan.block_count):
             self._verify_block(number)
+
+    def read_about(self) -> Any:
+        self.group = zarr.open_group(str(self.path), mode="r+")
+        return dict(self.group.attrs)
+
+    def write_about(self, about: dict[str, Any]) -> None:
+        about["mechanism"] = to_dict(self.plan.all_designs.mechanism)
+        about |= {"points": list(self.plan.point_names), "outcomes": [outcome.value for outcome in Outcome]}
+        self.group = zarr.create_group(str(self.path), attributes=about)
 
     def _open_arrays(self) -> Iterator[tuple[str, Any]]:
         """All arrays by name, those made that are not there or not as they have to be."""
-        plan, rows, steps = self.plan, self.block_size, self.plan.all_designs.steps + 1
+        plan, rows, steps = self.plan, self.plan.block_size, self.plan.all_designs.steps + 1
         row = {"shape": (plan.design_count, steps), "chunks": (rows, steps), "dimension_names": ("design", "step")}
-        point: dict[str, Any] = {"shape": (plan.design_count, steps, 2), "chunks": (rows, steps, 2)}
-        point["dimension_names"] = ("design", "step", "axis")
-        dtype = plan.all_designs.dtype
-        for order in plan.quantities:
-            for name in plan.point_names:
-                yield self._open_array(f"{order}/{_path_name(name)}", dtype=dtype, fill_value=np.nan, **point)
-        for result in plan.result_rows:
-            shape = point if result.width == 2 else row
-            path = f"{result.quantity}/{_path_name(result.name)}"
-            yield self._open_array(path, dtype=dtype, fill_value=np.nan, **shape)
+        vector: dict[str, Any] = {"shape": (plan.design_count, steps, 2), "chunks": (rows, steps, 2)}
+        vector["dimension_names"] = ("design", "step", "axis")
+        for result in plan.rows:
+            shape = vector if result.width == 2 else row
+            yield self._open_array(_array_path(result), dtype=plan.all_designs.dtype, fill_value=np.nan, **shape)
         yield self._open_array("status", dtype="int8", fill_value=MISSING_STATUS, **row)
         yield self._open_array("input", dtype="float64", fill_value=np.nan, **row)
         of_designs = {"shape": (plan.design_count,), "chunks": (rows,), "dimension_names": ("design",)}
@@ -152,15 +133,10 @@ class ZarrStore(BlockStore):
             return False
         return self.has_chunk(name, number)
 
-    def block_slice(self, number: int) -> slice:
-        """The designs of a block."""
-        return slice(number * self.block_size, min((number + 1) * self.block_size, self.plan.design_count))
-
     def write_block(self, number: int, part: slice, done: SolvedDesigns) -> None:
         with reporting_write_errors(self.path):
-            for order, points in result_views(done.out, self.plan).items():
-                for name, values in points.items():
-                    self.arrays[f"{order}/{_path_name(name)}"][part] = np.ascontiguousarray(values)
+            for row, values in zip(self.plan.rows, result_views(done.out, self.plan), strict=True):
+                self.arrays[_array_path(row)][part] = np.ascontiguousarray(values)
             for name in ("status", "dead_point", "stop_position"):
                 self.arrays[name][part] = getattr(done, name)
             self.arrays["input"][part] = np.broadcast_to(done.input, done.status.shape)
@@ -170,13 +146,7 @@ class ZarrStore(BlockStore):
         self.block_notes[number] = note
 
     def result(self) -> Sweep:
-        found = {
-            order: {name: StoredArray(self, f"{order}/{_path_name(name)}") for name in self.plan.point_names}
-            for order in self.plan.quantities
-        }
-        for row in self.plan.result_rows:
-            stored = StoredArray(self, f"{row.quantity}/{_path_name(row.name)}")
-            found.setdefault(row.quantity, {})[row.name] = stored
+        found = self.plan.by_quantity(StoredArray(self, _array_path(row)) for row in self.plan.rows)
         ends = StoredArray(self, "dead_point"), StoredArray(self, "stop_position")
         return self.make_sweep(found, StoredArray(self, "status"), self._input_positions(), ends)
 
@@ -213,7 +183,7 @@ class StoredArray:
         store = self._store
         for number in range(store.plan.block_count):
             if not right(self._name, number):
-                raise damaged_block_error(store.path, number, store.block_slice(number)) from None
+                raise store.damaged_block_error(number) from None
 
     def __getattr__(self, name: str) -> Any:
         if name.startswith("_"):  # none of the array's own, nor of this one before it is made
@@ -245,6 +215,10 @@ def _shorten_sentences(said: Any) -> list[Any]:
     """What is said of a block, sentences shortened so that all fit into its record."""
     longest = (RECORD_BYTES - 512) // (4 * max(1, len(said)))  # a character has four bytes at most
     return [[code, count, str(sentence)[:longest]] for code, count, sentence in said]
+
+
+def _array_path(row: ResultRow) -> str:
+    return f"{row.quantity}/{_path_name(row.name)}"
 
 
 def _path_name(name: str) -> str:
