@@ -19,10 +19,10 @@ from planar.batch.assembly.assembly_lists import list_assemblies
 from planar.batch.block import DesignBlock
 from planar.batch.design_arrays import read_designs, split_into_blocks
 from planar.batch.executor import TASKS_PER_WORKER, run_tasks, thread_count, worker_count
+from planar.batch.named_results.design_forces import output_link
 from planar.batch.named_results.design_slopes import design_slopes
 from planar.batch.named_results.result_block import ResultBlock, solve_result_block
 from planar.batch.named_results.result_rows import RequestedResults, select_names
-from planar.batch.named_results.transmission_angles import output_link
 from planar.batch.reductions.reduced_sweep import (
     ReducedSweep,
     Reduction,

@@ -29,7 +29,8 @@ class DesignFrames:
 
     `shapes` have numbers, or an array (designs,) where designs differ; `inputs` are the positions of inputs, each an
     array that spreads over (steps + 1, designs). `places` are, of every link but the frame, the origin of its axes and
-    the place at `arm` (m) on its x-axis, each (orders, steps + 1, 2, designs): positions, then first and second rates.
+    the place at `arm` (m) on its x-axis, each (orders, steps + 1, 2, designs): positions, then first and second rates;
+    `time` (steps + 1,) that of a run in time (s).
     """
 
     def __init__(
@@ -39,10 +40,9 @@ class DesignFrames:
         inputs: Mapping[str, Array],
         places: Mapping[str, tuple[Array, Array]],
         arm: float,
+        time: Array | None = None,
     ):
-        self.mechanism, self.shapes, self.inputs = mechanism, shapes, inputs
-        self.time: Array | None = None
-        "of a run in time (s), (steps + 1,)"
+        self.mechanism, self.shapes, self.inputs, self.time = mechanism, shapes, inputs, time
         self.motions = relative_motions(mechanism)
         self.counted_links = links_counting_turns(mechanism)
         directions = {link: (axis - origin) / arm for link, (origin, axis) in places.items()}

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
+from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput, suggest_name
 from planar.model.mechanism import Mechanism, relative_motions
 from planar.model.pairs import MeasureKind
@@ -13,6 +14,8 @@ POINT_QUANTITIES = ("position", "velocity", "acceleration")
 LINK_QUANTITIES = ("angle", "angular_velocity", "angular_acceleration")
 PAIR_QUANTITIES = ("value", "value_rate", "value_second_rate")
 RATE_UNITS = ("", "/s", "/s^2")
+NamedArrays: TypeAlias = dict[tuple[str, str], Array]
+"""Results (numbers, steps + 1, designs) by quantity and name."""
 
 
 class ResultRow(NamedTuple):
