@@ -217,7 +217,9 @@ class _ResultBlockSolver:
         """Write the results into rows of out (steps + 1, rows, designs); derivatives that are marched stand last."""
         rows = [row for row in self.rows if row.quantity != "derivatives" or not self.marches_slopes]
         arrays: NamedArrays = {
-            (row.quantity, row.name): np.full((row.width, *frames.design_shape), np.nan) for row in rows
+            (row.quantity, row.name): np.full((row.width, *frames.design_shape), np.nan)
+            for row in rows
+            if row.quantity not in (*LINK_QUANTITIES, *PAIR_QUANTITIES)
         }
         for name in self.results.links:
             for quantity, rate in zip(LINK_QUANTITIES, frames.link_angle(name), strict=False):
