@@ -18,12 +18,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.derivatives.directional_jets import highest_slopes, take_entries, variable_jet
 from planar.derivatives.kinematic_slopes import (
     CoordinateMotion,
     KinematicSlopes,
     NamedResult,
     element_arguments,
+    highest_slopes,
+    take_entries,
+    variable_jet,
 )
 from planar.dynamics.external_actions import (
     LinkAction,

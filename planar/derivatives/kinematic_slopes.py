@@ -5,6 +5,9 @@ second rates for every value of the parameters. Evaluated on jets along the para
 order of rates are still zero, each of them leaves open what J dq has to close, with the one matrix J = dF/dq for
 positions, velocities and accelerations (A. Griewank, A. Walther, Evaluating Derivatives, SIAM 2008, ch. 13 and 15).
 Second derivatives follow in the same way from jets of the second order.
+
+A jet along the parameters is Jet(value, slopes), whose slopes have a last axis for the parameters; one of the second
+order is a jet of such jets, with two axes. Time derivatives are jets around these.
 """
 
 from __future__ import annotations
@@ -16,14 +19,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from planar.derivatives.directional_jets import (
-    highest_slopes,
-    parameter_jet,
-    plain_value,
-    stack_numbers,
-    take_entries,
-    variable_jet,
-)
 from planar.derivatives.parameters import Parameters
 from planar.dynamics.equilibrium import Equilibrium
 from planar.dynamics.external_actions import LinkMotion
@@ -103,6 +98,52 @@ def element_arguments(group: ElementGroup, q: Scalar, p: Scalar, orders: int) ->
     return [*arguments, *(constant_jet(number, orders) if orders else number for number in numbers)]
 
 
+def variable_jet(value: Array, *derivatives: Array) -> Scalar:
+    """What depends on the parameters: values (n, entries), slopes (n, entries, parameters), and second ones; values
+    alone have one axis for none."""
+    if not derivatives:
+        return value[..., None]
+    if len(derivatives) == 1:
+        return Jet(value[..., None], derivatives[0])
+    slopes, second_slopes = derivatives
+    return Jet(Jet(value[..., None, None], slopes[..., None, :]), Jet(slopes[..., None], second_slopes))
+
+
+def take_entries(value: Scalar, entries: Any) -> Scalar:
+    """Some entries of arrays (n, entries, ...) in a jet, or of a jet of jets."""
+    if isinstance(value, Jet):
+        return Jet(*(take_entries(part, entries) for part in value.parts))
+    return value[:, entries]
+
+
+def highest_slopes(value: Scalar, order: int) -> Scalar:
+    """The derivatives of an order, of a number that may have none: 0."""
+    for _ in range(order):
+        value = value.parts[1] if isinstance(value, Jet) else 0.0
+    return value
+
+
+def plain_value(value: Scalar) -> Scalar:
+    """The number itself."""
+    while isinstance(value, Jet):
+        value = value.parts[0]
+    return value
+
+
+def stack_numbers(numbers: Sequence[Scalar], count: int, order: int) -> Scalar:
+    """Numbers as one jet of arrays (1 or n, numbers, ...), of `count` parameters; of order 0 an array (1 or n, numbers,
+    1)."""
+    size = max((np.size(plain_value(number)) for number in numbers), default=1)
+    arrays: list[Array] = [np.zeros((size, len(numbers), *((count,) * axes))) for axes in range(order + 1)]
+    for k, number in enumerate(numbers):
+        arrays[0][:, k] = np.ravel(plain_value(number))
+        for axes in range(1, order + 1) if isinstance(number, Jet) else ():
+            inner = number if axes == order else number.parts[0]
+            shape = size, *((1,) * (order - axes)), *((count,) * axes)
+            arrays[axes][:, k] = np.broadcast_to(highest_slopes(inner, axes), shape).reshape(arrays[axes][:, k].shape)
+    return variable_jet(*arrays)
+
+
 class Directions:
     """The parameters along which there are derivatives: all of them, or those of some `columns` among their names, and
     `extra` ones behind them on which no coordinates depend."""
@@ -115,7 +156,11 @@ class Directions:
     def jet(self, column: int, value: Scalar, order: int) -> Scalar:
         """The parameter of a column, of an order; one that is not chosen is a number."""
         place = self.places.get(column)
-        return value if place is None or order == 0 else parameter_jet(value, place, self.count, order)
+        if place is None or order == 0:
+            return value
+        unit: Array = np.zeros(self.count)
+        unit[place] = 1.0
+        return Jet(value, unit) if order == 1 else Jet(Jet(value, unit), Jet(unit[:, None], 0.0))
 
 
 class FileNumbers:
@@ -252,28 +297,23 @@ class KinematicSlopes:
         scale = self._row_scale[pattern.rows, 0] * self._column_scale[pattern.columns, 0]
         return SparseMatrices(pattern, values * scale)
 
-    def coordinates(self, slopes: Sequence[Array], second: Sequence[Array] | None = None) -> Jet:
+    def _coordinates(self, *derivatives: Sequence[Array]) -> Jet:
         """The coordinates as jets in time, as far as their derivatives are given."""
-        return Jet(
-            *(
-                variable_jet(value, slope, None if second is None else second[rate])
-                for rate, (value, slope) in enumerate(zip(self.rates, slopes, strict=False))
-            )
-        )
+        return Jet(*(variable_jet(value, *slopes) for value, *slopes in zip(self.rates, *derivatives, strict=False)))
 
     @cached_property
     def motion(self) -> CoordinateMotion:
         """The positions of links with their first derivatives."""
-        return CoordinateMotion(
-            self.elements, self.first_numbers, self.parameters.unit, self.coordinates(self.first_slopes)
-        )
+        return self._motion(self.first_numbers, self.first_slopes)
 
     @cached_property
     def second_motion(self) -> CoordinateMotion:
         """The positions of links with their second derivatives."""
         numbers = self.numbers(2)
-        q = self.coordinates(self.first_slopes, self._solve(2, numbers))
-        return CoordinateMotion(self.elements, numbers, self.parameters.unit, q)
+        return self._motion(numbers, self.first_slopes, self._solve(2, numbers))
+
+    def _motion(self, numbers: FileNumbers, *derivatives: Sequence[Array]) -> CoordinateMotion:
+        return CoordinateMotion(self.elements, numbers, self.parameters.unit, self._coordinates(*derivatives))
 
     def _solve(self, order: int, numbers: FileNumbers) -> list[Array]:
         """The derivatives of an order of the coordinates and their rates (n, coordinates, parameters, ...)."""
@@ -281,7 +321,7 @@ class KinematicSlopes:
         solved: list[Array] = []
         for rate in range(len(self.rates)):
             tried = [*solved, np.zeros(shape)]
-            q = self.coordinates(tried) if order == 1 else self.coordinates(self.first_slopes[: rate + 1], tried)
+            q = self._coordinates(tried) if order == 1 else self._coordinates(self.first_slopes, tried)
             opening = self._opening(q, numbers.p, rate, order)
             columns = opening.reshape(*opening.shape[:2], self.count**order) * self._row_scale
             constraints = self._constraints
