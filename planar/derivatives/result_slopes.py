@@ -26,7 +26,6 @@ from planar.dynamics.forces import Forces
 from planar.dynamics.load_variation import load_factors
 from planar.foundation.arrays import Array, BoolArray
 from planar.foundation.errors import BadInput
-from planar.foundation.jets import Scalar
 from planar.foundation.time_limit import all_within_time
 from planar.model.mechanism import Mechanism
 from planar.results.motion import Motion, State
@@ -76,19 +75,10 @@ class PositionSlopes:
         motion = kinematics.motion if order == 1 else kinematics.second_motion
         results = kinematic_results(motion, system.moving._point_members, name)
         if self.forces is not None:
-            results += self.forces.balance(order).results(name, self._input_velocities(order))
+            results += self.forces.balance(order).results(name)
         if not results:
             raise unknown_name(system.moving, name)
         return results
-
-    def _input_velocities(self, order: int) -> list[Scalar]:
-        inputs = self.system.parameters.inputs
-        velocities = [np.broadcast_to(self.system.moving.inputs[name].velocity, self.system.count) for name in inputs]
-        directions = self.system.directions
-        return [
-            directions.jet(len(inputs) + k, velocity[self.rows].reshape(-1, *((1,) * order)), order)
-            for k, velocity in enumerate(velocities)
-        ]
 
 
 class SlopeSystem:
