@@ -252,19 +252,25 @@ class BalanceAtPositions:
         return parts
 
     def _load(self, pair: Pair, load: ContactLoad) -> Scalar:
-        """A part of what a pair's constraints exert on a link; the frame has what the other bodies have not."""
-        forces = self.constraint_forces(pair.name, apart=False)
-        if load.link in forces:
-            return self._load_on(load.link, forces[load.link], load)
-        others = (self._load_on(link, parts, load) for link, parts in forces.items())
-        return -sum(others, 0.0)
-
-    def _load_on(self, link: str, parts: list[Scalar], load: ContactLoad) -> Scalar:
-        force, frame = Vector(parts[0], parts[1]), self.motion.frame(link)
+        """A part of what a pair's constraints exert on a link."""
+        force, moment = self._wrench(self.constraint_forces(pair.name, apart=False), load.link)
         if load.direction is not None:
             return load.direction.dot(force)
         assert load.place is not None
-        return parts[2] - (load.place - Vector(frame.x, frame.y)).cross(force)
+        return moment - load.place.cross(force)
+
+    def _wrench(self, forces: LinkForces, link: str) -> tuple[Vector, Scalar]:
+        """What a pair exerts on a link by its forces on moving links: the force, and the moment about the world's
+        origin; on the frame acts what adds up to nothing."""
+        wrenches: dict[str, tuple[Scalar, Scalar, Scalar]] = {}
+        for body, (x, y, moment) in forces.items():
+            frame = self.motion.frame(body)
+            wrenches[body] = x, y, moment + (frame.x * y - frame.y * x)
+        if link in wrenches:
+            x, y, moment = wrenches[link]
+        else:
+            x, y, moment = (-sum((wrench[k] for wrench in wrenches.values()), 0.0) for k in range(3))
+        return Vector(x, y), moment
 
     # results
 
@@ -281,8 +287,10 @@ class BalanceAtPositions:
             results.append(NamedResult("effort", effort_kind, (effort,)))
             results.append(NamedResult("power", "power", (velocity * effort,)))
         if name in self.pairs:
-            x, y, couple = self._reaction(name)
-            results.append(NamedResult("force", "force", (x, y)))
+            force, moment = self._wrench(self.pair_forces(name), self.pairs[name].links[1])
+            place = self._reaction_point(self.pairs[name])
+            couple = moment if place is None else moment - place.cross(force)
+            results.append(NamedResult("force", "force", tuple(force)))
             results.append(NamedResult("couple", "torque", (couple,)))
         for index, contact in enumerate(self.rubbing_contacts):
             if contact.pair.name == name:
@@ -290,22 +298,8 @@ class BalanceAtPositions:
                 break
         return results
 
-    def _reaction(self, name: str) -> tuple[Scalar, Scalar, Scalar]:
-        """The force (x, y) of a pair on its second link, and its couple about the point of that force."""
-        pair, forces = self.pairs[name], self.pair_forces(name)
-        wrenches: dict[str, tuple[Scalar, Scalar, Scalar]] = {}
-        for link, (x, y, moment) in forces.items():
-            frame = self.motion.frame(link)
-            wrenches[link] = x, y, moment + (frame.x * y - frame.y * x)
-        second = pair.links[1]
-        if second not in wrenches:  # on the frame acts what adds up to nothing
-            x, y, moment = (-sum((wrench[k] for wrench in wrenches.values()), 0.0) for k in range(3))
-        else:
-            x, y, moment = wrenches[second]
-        place = self._reaction_point(pair)
-        return (x, y, moment) if place is None else (x, y, moment - place.x * y + place.y * x)
-
     def _reaction_point(self, pair: Pair) -> Vector | None:
+        """Where the force of a pair is told."""
         if pair.name in self.contacts:
             return self.contacts[pair.name].pitch_point
         end = bearing_point(pair)

@@ -94,15 +94,19 @@ class SlopeSystem:
         numbers: Sequence[str] | None = None,
     ):
         """`is_balanced`: forces without friction and inertia are derived, of a state or a motion too; `has_rates` is
-        false where results of positions alone are asked for, `numbers` are the parameters, by default all."""
+        false where results of positions alone are asked for, `numbers` are the parameters, by default all. Raises
+        BadInput of forces that equilibrium does not determine."""
         self.moving: State | Motion = result.moving if isinstance(result, Forces) else result
         self.forces = result if isinstance(result, Forces) else None
         self.is_balanced = is_balanced or self.forces is not None
         mechanism = self.moving.mechanism
         self.parameters = Parameters(mechanism, offsets)
         self.names = self.parameters.names if numbers is None else tuple(numbers)
-        if self.forces is not None:
-            refuse_stiffness(self.forces)
+        if self.forces is not None and mechanism.pair_stiffness:
+            raise BadInput(
+                mechanism.pair_stiffness[0][0],
+                "derivatives are told of forces that equilibrium determines, and not of those shared by stiffness",
+            )
         columns = [self.parameters.names.index(name) for name in self.names]
         self.directions = Directions(self.parameters, columns, len(mechanism.loads) if self.is_balanced else 0)
         elements = constraint_elements(mechanism)
@@ -200,15 +204,6 @@ def second_derivatives(
     """Those of a result of this kind of quantity, see `SlopeSystem`; without rates where positions determine it."""
     has_rates = isinstance(source, Forces) or kind not in POSITION_KINDS
     return SlopeSystem(source, offsets, has_rates=has_rates, numbers=numbers).second_slopes(of, result)
-
-
-def refuse_stiffness(forces: Forces) -> None:
-    """Refuse forces whose derivatives do not follow from equilibrium alone. Raises BadInput."""
-    if forces.mechanism.pair_stiffness:
-        raise BadInput(
-            forces.mechanism.pair_stiffness[0][0],
-            "derivatives are told of forces that equilibrium determines, and not of those shared by stiffness",
-        )
 
 
 def tied_dimensions(mechanism: Mechanism, among: Container[str] | None = None) -> tuple[str, ...]:
