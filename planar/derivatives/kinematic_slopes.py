@@ -29,12 +29,10 @@ from planar.equations.elements import PlacedElement
 from planar.equations.mechanism_numbers import equation_structure, shapes_of_links
 from planar.equations.sparse_matrices import SparseMatrices
 from planar.foundation.arrays import Array, BoolArray
-from planar.foundation.errors import Unknown, suggest_name
 from planar.foundation.geometry import Frame, Vector, frame_at
 from planar.foundation.jets import Jet, Scalar, constant_jet, cos, sin
 from planar.model.mechanism import Mechanism, relative_motions
 from planar.model.pairs import MeasureKind, Pair
-from planar.results.kinematic_result import KinematicResult
 
 TINY = 1e-300
 ROUNDING = 1e-15
@@ -409,12 +407,6 @@ def kinematic_results(motion: RatedMotion, points: Mapping[str, tuple[str, str]]
             if value is not None and (orders > 1 or pair.result_kinds[result] in POSITION_KINDS):
                 results.append(NamedResult(result, pair.result_kinds[result], (value,)))
     return results
-
-
-def unknown_name(moving: KinematicResult, name: str) -> Unknown:
-    """That nothing bears a name."""
-    known = dict.fromkeys((*moving.point_names, *moving.frames, *moving._relative_motions))
-    return Unknown(f"there is no point, link or pair {name!r}{suggest_name(name, known, 'names')}")
 
 
 def result_array(value: Scalar, order: int, shape: Sequence[int]) -> Array:

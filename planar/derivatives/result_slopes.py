@@ -1,8 +1,10 @@
-"""The derivatives of results of a state, a motion or forces, at every position, in every parameter."""
+"""The derivatives of results of a state, a motion or forces, at every position, in every parameter; and what a
+mechanism with other dimensions shows at given positions of its inputs, with the derivatives in both."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Container, Iterator, Mapping, Sequence
+from contextlib import suppress
 from functools import cached_property
 from typing import NamedTuple
 
@@ -11,25 +13,28 @@ import numpy as np
 from planar.derivatives.force_slopes import ForceSlopes, factor_slopes, slopes_by_factors
 from planar.derivatives.kinematic_slopes import (
     POSITION_KINDS,
+    CoordinateMotion,
     Directions,
     KinematicSlopes,
     NamedResult,
     constraint_elements,
     kinematic_results,
     stack_results,
-    unknown_name,
 )
 from planar.derivatives.parameters import Parameters, design_dimensions
-from planar.document.dimensions import Dimension
+from planar.document.dimensions import Dimension, value_at
 from planar.document.revised.changed_numbers import with_values
 from planar.dynamics.forces import Forces
 from planar.dynamics.load_variation import load_factors
 from planar.foundation.arrays import Array, BoolArray
-from planar.foundation.errors import BadInput
+from planar.foundation.errors import BadInput, NoAnswer, Unknown, suggest_name
+from planar.foundation.jets import sqrt
 from planar.foundation.time_limit import all_within_time
 from planar.model.mechanism import Mechanism
+from planar.results.kinematic_result import KinematicResult
 from planar.results.motion import Motion, State
-from planar.solving.position import solved_mechanism
+from planar.solving.grids.grid_motion import motion_over_input
+from planar.solving.position import solve, solved_mechanism
 
 MAX_CHUNK_NUMBERS = 2_000_000
 """Derivatives of coordinates that are held at once."""
@@ -193,6 +198,12 @@ class SlopeSystem:
         return np.concatenate(rows)
 
 
+def unknown_name(moving: KinematicResult, name: str) -> Unknown:
+    """That nothing bears a name."""
+    known = dict.fromkeys((*moving.point_names, *moving.frames, *moving._relative_motions))
+    return Unknown(f"there is no point, link or pair {name!r}{suggest_name(name, known, 'names')}")
+
+
 def second_derivatives(
     source: State | Motion | Forces,
     of: str,
@@ -249,3 +260,76 @@ def _is_accepted(mechanism: Mechanism, dimensions: Sequence[Dimension], sign: fl
     except BadInput:
         return False
     return True
+
+
+class PredictedValues(NamedTuple):
+    """Results (n, parts), their derivatives in inputs (n, parts, inputs) and numbers (n, parts, numbers), SI, and where
+    there are none of these (n,)."""
+
+    values: Array
+    by_inputs: Array
+    by_numbers: Array
+    is_singular: BoolArray
+
+
+def position_results(moving: KinematicResult, name: str) -> dict[str, NamedResult]:
+    """The results of the position of a point, link or pair, or of "B to E" (two points), by the results' names.
+
+    Raises Unknown.
+    """
+    parameters = Parameters(moving.mechanism)
+    coordinates = constraint_elements(moving.mechanism).coordinates(moving)[0]
+    return _results_at(KinematicSlopes(parameters, [coordinates], Directions(parameters, ())).motion, moving, name)
+
+
+def _results_at(motion: CoordinateMotion, moving: KinematicResult, name: str) -> dict[str, NamedResult]:
+    points = moving._point_members
+    results = kinematic_results(motion, points, name)
+    if results:
+        return {result.name: result for result in results}
+    first, _, second = name.partition(" to ")
+    for end in (first, second) if second else (first,):
+        if end not in points:
+            raise unknown_name(moving, end)
+    places = (kinematic_results(motion, points, end)[0].parts for end in (first, second))
+    x, y = (one - other for one, other in zip(*places, strict=True))
+    return {"distance": NamedResult("distance", "length", (sqrt(x * x + y * y),))}
+
+
+class PredictedResults:
+    """Results, (name, result) each, of mechanisms that differ from one in some numbers."""
+
+    def __init__(self, mechanism: Mechanism, results: Sequence[tuple[str, str]], numbers: Sequence[str]):
+        self.parameters = Parameters(mechanism)
+        self.results = tuple(results)
+        self.input_count = len(mechanism.inputs)
+        columns = [*range(self.input_count), *map(self.parameters.names.index, numbers)]
+        self.directions = Directions(self.parameters, columns)
+
+    def at_inputs(self, mechanism: Mechanism, inputs: Array) -> PredictedValues:
+        """The results of a mechanism at positions of its inputs (n, inputs), rad or m. Raises NoAnswer."""
+        if self.input_count == 1:
+            with suppress(NoAnswer):  # of a single position the reason is told
+                return self.along(motion_over_input(mechanism, inputs[:, 0]))
+        states = [
+            solve(mechanism, dict(zip(self.parameters.inputs, map(float, position), strict=True)))
+            for position in inputs
+        ]
+        elements = constraint_elements(mechanism)
+        coordinates = np.concatenate([elements.coordinates(state)[0] for state in states])
+        return self._predict(coordinates, states[0])
+
+    def along(self, motion: Motion) -> PredictedValues:
+        """The results at every position of a motion."""
+        return self._predict(constraint_elements(motion.mechanism).coordinates(motion)[0], motion)
+
+    def _predict(self, coordinates: Array, moving: KinematicResult) -> PredictedValues:
+        numbers = [value_at(moving.mechanism, dimension.address) for dimension in self.parameters.dimensions]
+        kinematics = KinematicSlopes(self.parameters, [coordinates], self.directions, numbers)
+        parts = [
+            part for name, result in self.results for part in _results_at(kinematics.motion, moving, name)[result].parts
+        ]
+        shape = len(coordinates), self.directions.count
+        values, slopes = stack_results(parts, 0, shape[:1]), stack_results(parts, 1, shape)
+        count = self.input_count
+        return PredictedValues(values, slopes[..., :count], slopes[..., count:], kinematics.is_singular)
