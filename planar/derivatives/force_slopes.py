@@ -376,7 +376,7 @@ class ForceSlopes:
 
     def _solve_with_friction(self, forces: Forces, rows_of_all: slice, contacts: list[_Contact]) -> Array:
         """The forces with friction, by Newton's method from the friction of the solution, on its side of all kinks."""
-        count, own = len(self.factors), self.first_friction
+        count, first_friction = len(self.factors), self.first_friction
         names = list(dict.fromkeys(contact.pair.name for contact in contacts))
 
         def columns(values: Sequence[Array | float]) -> Array:
@@ -389,9 +389,8 @@ class ForceSlopes:
             [k == 0 or contacts[k - 1].pair_index != contact.pair_index for k, contact in enumerate(contacts)]
         )
         acts = first_of_pair & (senses[:, [contact.pair_index for contact in contacts]] != 0.0)
-        efforts = [np.abs(forces.friction[contact.pair.name].effort) for contact in contacts]
-        known = columns(efforts)
-        y: Array = np.concatenate([np.zeros((count, own)), np.nan_to_num(known) * acts], axis=1)
+        known = columns([np.abs(forces.friction[contact.pair.name].effort) for contact in contacts])
+        y: Array = np.concatenate([np.zeros((count, first_friction)), np.nan_to_num(known) * acts], axis=1)
         self.constants.senses = senses.astype(float)
         self.constants.leading = np.zeros((count, contacts[-1].parts.stop))
         is_tie: BoolArray = np.zeros(count, bool)
@@ -399,15 +398,15 @@ class ForceSlopes:
             opening, slopes = self._linearise(y)
             is_fixed = step < FIXED_FRICTION_STEPS
             rows = slice(0, -len(contacts)) if is_fixed else slice(None)
-            free = slice(0, own) if is_fixed else slice(None)
+            free = slice(0, first_friction) if is_fixed else slice(None)
             inverse, _ = invert_matrices(np.nan_to_num(slopes[:, rows, free]))
             change = (inverse @ np.nan_to_num(opening[:, rows]))[..., 0]
             y[:, free] -= change
             self.constants.pressing = np.sign(y[:, self._pressing_rows])
             is_tie = self._choose_greatest(y)
-        size, moved = np.abs(y).max(axis=1), np.abs(change).max(axis=1)
-        off = (np.abs(y[:, own:] - known) * acts).max(axis=1, initial=0.0)
-        self.is_unknown = is_tie | ~(moved <= SETTLED * size) | ~(off <= SETTLED * size)
+        tolerance, last_change = SETTLED * np.abs(y).max(axis=1), np.abs(change).max(axis=1)
+        deviation = (np.abs(y[:, first_friction:] - known) * acts).max(axis=1, initial=0.0)
+        self.is_unknown = is_tie | ~(last_change <= tolerance) | ~(deviation <= tolerance)
         return y
 
     def _choose_greatest(self, y: Array) -> BoolArray:

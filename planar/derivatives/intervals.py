@@ -170,11 +170,10 @@ def _may_hold(angle: Intervals, on: float) -> BoolArray:
 def _point_angle(y: Array, x: Array) -> Intervals:
     """The angle of points, by what turning them back by a float near it leaves: |atan t| <= |t|."""
     near = np.arctan2(y, x)
-    at = exact(near)
-    cos, sin = at.cos(), at.sin()
+    cos, sin = exact(near).cos(), exact(near).sin()
     across, along = exact(y) * cos - exact(x) * sin, exact(x) * cos + exact(y) * sin
-    left = (across / along).magnitude().upper
-    return Intervals(down(near - left), up(near + left))
+    error = (across / along).magnitude().upper
+    return Intervals(down(near - error), up(near + error))
 
 
 INTERVAL_OPERATIONS: Mapping[int, Callable[..., Intervals]] = {

@@ -50,7 +50,7 @@ class ConstraintElements(LinkCoordinates):
     def __init__(self, mechanism: Mechanism):
         super().__init__(mechanism)
         motions = relative_motions(mechanism)
-        inputs = [motions[given.pair] for given in mechanism.inputs]
+        inputs = [motions[driven.pair] for driven in mechanism.inputs]
         numbered = {pair.name: pair for pair in (*mechanism.pairs, *inputs)}
         self.numbered_pairs = tuple(numbered)
         "the names of the pairs whose numbers are p, one after the other"
@@ -235,8 +235,8 @@ class CoordinateMotion(RatedMotion):
 
     def own_coordinates(self, name: str) -> tuple[Jet, ...]:
         """The coordinates of a pair's own as jets in time."""
-        own = self.elements.own_slices.get(name)
-        return () if own is None else tuple(take_entries(self.q, k) for k in range(own.start, own.stop))
+        columns = self.elements.own_slices.get(name, slice(0, 0))
+        return tuple(take_entries(self.q, k) for k in range(columns.start, columns.stop))
 
     def input_position(self, pair: Pair) -> Jet:
         frames = [
@@ -360,8 +360,8 @@ class KinematicSlopes:
             scale[place] = self.parameters.scale[column]
         for pair in self.first_numbers.mechanism.pairs:
             if type(pair).contact_gap is not Pair.contact_gap:
-                own = [coordinate.parts[0] for coordinate in self.motion.own_coordinates(pair.name)]
-                gap = pair.contact_gap(self.first_numbers.measured[pair.name], own)
+                coordinates = [coordinate.parts[0] for coordinate in self.motion.own_coordinates(pair.name)]
+                gap = pair.contact_gap(self.first_numbers.measured[pair.name], coordinates)
                 opened |= np.abs(highest_slopes(gap, 1) / unit * scale) > OPENING
         tied: BoolArray = self.contradicts | opened
         tied[self.is_singular] = False

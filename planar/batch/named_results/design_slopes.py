@@ -46,24 +46,24 @@ class DesignSlopes:
         self.reference, self.results, self.orders = reference, results, 3 if rates else 1
         self.parameters = Parameters(reference.mechanism)
         names = list(self.parameters.names)
-        for each in results.derivatives:
-            if each not in names:
-                hint = suggest_name(each, names, "numbers")
-                raise BadInput("derivatives", f"nothing is derived in {each!r:.60}{hint}")
+        for number in results.derivatives:
+            if number not in names:
+                hint = suggest_name(number, names, "numbers")
+                raise BadInput("derivatives", f"nothing is derived in {number!r:.60}{hint}")
         self.directions = Directions(self.parameters, [names.index(number) for number in results.derivatives])
 
     @cached_property
     def is_bound(self) -> BoolArray:
         """The numbers that cannot change alone (numbers,)."""
         bound = tied_dimensions(self.reference.mechanism)
-        return np.array([each in bound for each in self.results.derivatives])
+        return np.array([number in bound for number in self.results.derivatives])
 
     @cached_property
     def free(self) -> SlopeResults:
         """The same in the numbers that can change alone, as machine code has it."""
-        numbers = [each for each, tied in zip(self.results.derivatives, self.is_bound, strict=True) if not tied]
-        of = self.results
-        return SlopeResults(of.derived_points, of.links, of.pairs, tuple(numbers), self.orders > 1)
+        results = self.results
+        numbers = tuple(np.array(results.derivatives, dtype=object)[~self.is_bound])
+        return SlopeResults(results.derived_points, results.links, results.pairs, numbers, self.orders > 1)
 
     def write_free(self, slopes: Array, out: Array) -> None:
         """Write rows of `free` (steps + 1, rows, designs) into those of all numbers."""
@@ -71,9 +71,9 @@ class DesignSlopes:
             out[:] = slopes
             return
         of_all = self.free._replace(numbers=self.results.derivatives)
-        for whole, part in zip(of_all.split_rows(out), self.free.split_rows(slopes), strict=True):
-            whole[:, :, self.is_bound] = np.nan
-            whole[:, :, ~self.is_bound] = part
+        for rows, free_rows in zip(of_all.split_rows(out), self.free.split_rows(slopes), strict=True):
+            rows[:, :, self.is_bound] = np.nan
+            rows[:, :, ~self.is_bound] = free_rows
 
     def march_block(
         self, block: DesignBlock, march: DesignBatch, done: SolvedDesigns

@@ -80,16 +80,15 @@ class _ResultBlockSolver:
     def _needed_links(self, by_places: bool) -> tuple[str, ...]:
         """The links whose axes are looked at: with those that tell how far they have turned."""
         frame, motions = self.mechanism.frame, self.reference.motions
+        moving = tuple(link.name for link in self.mechanism.links if link.name != frame)
         if self.results.outputs or self.results.has_forces or by_places:
-            found = [link.name for link in self.mechanism.links]
-        else:
-            found = [*self.results.links, *(link for name in self.results.pairs for link in motions[name].bodies)]
-            if not found and self.marches_slopes:
-                return ()
-            if self.reference.counted_links.intersection(found):
-                found = [link.name for link in self.mechanism.links]
-        moving = [link.name for link in self.mechanism.links if link.name != frame]
-        return tuple(link for link in dict.fromkeys(found or moving[:1]) if link != frame)
+            return moving
+        links = [*self.results.links, *(link for name in self.results.pairs for link in motions[name].bodies)]
+        if self.reference.counted_links.intersection(links):
+            return moving
+        if not links:
+            return () if self.marches_slopes else moving[:1]
+        return tuple(link for link in dict.fromkeys(links) if link != frame)
 
     def solve(self, out: Array | None) -> SolvedDesigns:
         """See `solve_result_block`."""
@@ -243,9 +242,9 @@ class _ResultBlockSolver:
 
     def _slope_positions(self, designs: slice, refined: int) -> BoolArray:
         """Where derivatives are wanted (steps + 1, designs): not between the positions that are told."""
-        found = np.zeros((self.block.steps * refined + 1, self.design_count), dtype=bool)
-        found[::refined] = True if self.slopes_at is None else self.slopes_at
-        return found[:, designs]
+        is_wanted = np.zeros((self.block.steps * refined + 1, self.design_count), dtype=bool)
+        is_wanted[::refined] = True if self.slopes_at is None else self.slopes_at
+        return is_wanted[:, designs]
 
 
 class _SolvedPart(NamedTuple):

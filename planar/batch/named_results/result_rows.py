@@ -87,8 +87,8 @@ def derivative_name(what: str, number: str) -> str:
 def select_names(place: str, given: Sequence[str] | str, known: Sequence[str]) -> tuple[str, ...]:
     """Names that are asked for, each once. Raises BadInput for one that is not known."""
     asked = [given] if isinstance(given, str) else list(given)
-    for each in asked:
-        if each not in known:
-            hint = suggest_name(str(each), known, "names here")
-            raise BadInput(place, f"there is nothing of the name {each!r:.60} here{hint}")
+    for name in asked:
+        if name not in known:
+            hint = suggest_name(str(name), known, "names here")
+            raise BadInput(place, f"there is nothing of the name {name!r:.60} here{hint}")
     return tuple(dict.fromkeys(asked))

@@ -24,10 +24,9 @@ from planar.batch.stores.store import (
     result_views,
 )
 from planar.document.files import read_limited
+from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput, Outcome
 from planar.foundation.safe_files import PARTIAL_FILE_NAME, file_sha256, write_atomically
-
-Array = np.ndarray
 
 MANIFEST = "_planar.json"
 """What makes a folder a store; readers pass over names that begin so."""
@@ -101,15 +100,15 @@ class ParquetStore(FolderStore):
             axes = np.moveaxis(values, 2, 0) if values.ndim == 3 else values[None]
             for column, axis_values in zip(_column_names(row), axes, strict=True):
                 columns[column] = np.ascontiguousarray(axis_values).ravel()
-        said = [(code, count, str(sentence)) for code, count, sentence in done.endings]
+        endings = [(code, count, str(sentence)) for code, count, sentence in done.endings]
         about = {
             "fingerprint": self.fingerprint,
             "block": self.plan.block_size,
             "number": number,
             "general": done.general_positions,
             "sent": done.general_designs,
-            "said": said,
-            "outcomes": [each.value for each in Outcome],
+            "said": endings,
+            "outcomes": [outcome.value for outcome in Outcome],
         }
         content, table = BytesIO(), pa.table(columns).replace_schema_metadata({"planar": json.dumps(about)})
         parquet.write_table(table, content, write_page_checksum=True)
@@ -119,12 +118,12 @@ class ParquetStore(FolderStore):
             write_atomically(
                 self._checksum_path(number), self._checksum_line(number, sha256(content.getbuffer()).hexdigest())
             )
-        self.block_notes[number] = done.general_positions, done.general_designs, said
+        self.block_notes[number] = done.general_positions, done.general_designs, endings
 
     def read_columns(self, columns: tuple[str, ...]) -> list[Array]:
         """Columns of all blocks, each (designs, steps + 1). Raises BadInput."""
-        found = [self._read_block(number, columns) for number in range(self.plan.block_count)]
-        return [np.concatenate(each) for each in zip(*found, strict=True)]
+        blocks = [self._read_block(number, columns) for number in range(self.plan.block_count)]
+        return [np.concatenate(column) for column in zip(*blocks, strict=True)]
 
     def _read_block(self, number: int, columns: tuple[str, ...]) -> list[Array]:
         part = self.block_slice(number)
@@ -138,10 +137,10 @@ class ParquetStore(FolderStore):
 
     def result(self) -> Sweep:
         columns = self.plan.by_quantity(map(_column_names, self.plan.rows))
-        found = {quantity: _ParquetResults(self, names) for quantity, names in columns.items()}
+        results = {quantity: _ParquetResults(self, names) for quantity, names in columns.items()}
         status, inputs, *ends = self.read_columns(("status", "input", "dead_point", "stop_position"))
         common = inputs[0] if np.all(inputs == inputs[0]) else inputs
-        return self.make_sweep(found, status, common, (ends[0][:, 0], ends[1][:, 0]))
+        return self.make_sweep(results, status, common, (ends[0][:, 0], ends[1][:, 0]))
 
 
 class _ParquetResults(Mapping[str, Any]):
@@ -151,8 +150,8 @@ class _ParquetResults(Mapping[str, Any]):
         self.store, self.columns = store, columns
 
     def __getitem__(self, name: str) -> Array:
-        found = self.store.read_columns(self.columns[name])
-        return np.stack(found, axis=2) if len(found) > 1 else found[0]
+        columns = self.store.read_columns(self.columns[name])
+        return np.stack(columns, axis=2) if len(columns) > 1 else columns[0]
 
     def __iter__(self) -> Iterator[str]:
         return iter(self.columns)
@@ -165,5 +164,5 @@ def _column_names(row: ResultRow) -> tuple[str, ...]:
     """The columns of a result."""
     if row.quantity in POINT_LETTERS:
         return tuple(f"{row.name} {POINT_LETTERS[row.quantity]}{axis} [{row.unit}]" for axis in "xy")
-    said = f"{row.name} {row.quantity.replace('_', ' ')}"
-    return (f"{said} [{row.unit}]",) if row.width == 1 else tuple(f"{said} {axis} [{row.unit}]" for axis in "xy")
+    result = f"{row.name} {row.quantity.replace('_', ' ')}"
+    return (f"{result} [{row.unit}]",) if row.width == 1 else tuple(f"{result} {axis} [{row.unit}]" for axis in "xy")

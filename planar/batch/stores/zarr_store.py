@@ -22,9 +22,8 @@ from planar.batch.stores.store import (
     result_views,
 )
 from planar.document.files import to_dict
+from planar.foundation.arrays import Array
 from planar.foundation.errors import Outcome
-
-Array = np.ndarray
 
 RECORD_BYTES = 32_768
 """Bytes of a block's record: a sentence for each outcome, as JSON."""
@@ -93,10 +92,11 @@ class ZarrStore(FolderStore):
     def _open_array(self, name: str, **wanted: Any) -> tuple[str, Any]:
         wanted["compressors"] = (ZstdCodec(), Crc32cCodec())
         try:
-            there = self.group[name]
-            as_wanted = zarr.create_array(zarr.storage.MemoryStore(), **wanted).metadata
-            if isinstance(there, zarr.Array) and _is_same_metadata(there.metadata, as_wanted):
-                return name, there
+            array = self.group[name]
+            expected = zarr.create_array(zarr.storage.MemoryStore(), **wanted).metadata
+            # as text, since NaN equals nothing
+            if isinstance(array, zarr.Array) and repr(array.metadata.to_dict()) == repr(expected.to_dict()):
+                return name, array
         except READ_ERRORS:
             pass
         return name, self.group.create_array(name, overwrite=True, **wanted)
@@ -104,11 +104,13 @@ class ZarrStore(FolderStore):
     def _verify_block(self, number: int) -> None:
         """Take a block as finished that is whole, and as damaged of which only something is there."""
         record = self._read_record(number)
-        there = [self.is_readable(name, number) for name in self.arrays if _is_written_by_block(name)]
-        if record is not None and all(there):
+        # all arrays but those that are written at once, and the records
+        names = (name for name in self.arrays if name != "blocks" and not name.startswith("designs/"))
+        are_readable = [self.is_readable(name, number) for name in names]
+        if record is not None and all(are_readable):
             self.finished.add(number)
             self.block_notes[number] = record
-        elif record is not None or any(there):
+        elif record is not None or any(are_readable):
             self.damaged.add(number)
 
     def _read_record(self, number: int) -> tuple[int, int, Any] | None:
@@ -116,10 +118,10 @@ class ZarrStore(FolderStore):
             text = bytes(self.arrays["blocks"][number]).rstrip(b"\0")
             if not text:
                 return None
-            general, sent, said = json.loads(text)
+            positions, designs, endings = json.loads(text)
         except READ_ERRORS:
             return None
-        return None if general is None else (int(general), int(sent), [tuple(each) for each in said])
+        return None if positions is None else (int(positions), int(designs), [tuple(ending) for ending in endings])
 
     def has_chunk(self, name: str, number: int) -> bool:
         """Whether a block's chunk of an array is there."""
@@ -146,17 +148,17 @@ class ZarrStore(FolderStore):
         self.block_notes[number] = note
 
     def result(self) -> Sweep:
-        found = self.plan.by_quantity(StoredArray(self, _array_path(row)) for row in self.plan.rows)
+        results = self.plan.by_quantity(StoredArray(self, _array_path(row)) for row in self.plan.rows)
         ends = StoredArray(self, "dead_point"), StoredArray(self, "stop_position")
-        return self.make_sweep(found, StoredArray(self, "status"), self._input_positions(), ends)
+        return self.make_sweep(results, StoredArray(self, "status"), self._input_positions(), ends)
 
     def _input_positions(self) -> Any:
         """Positions of the input, as one row where all designs have the same; looked at block by block."""
         stored = StoredArray(self, "input")
         first = stored[0]
         for number in range(self.plan.block_count):
-            own = stored[self.block_slice(number)]
-            if not np.array_equal(np.broadcast_to(first, own.shape), own, equal_nan=True):
+            block = stored[self.block_slice(number)]
+            if not np.array_equal(np.broadcast_to(first, block.shape), block, equal_nan=True):
                 return stored
         return first
 
@@ -169,14 +171,14 @@ class StoredArray:
 
     def __getitem__(self, key: Any) -> Any:
         try:
-            found = self._array[key]
+            values = self._array[key]
         except READ_ERRORS:
             self._check_blocks(self._store.is_readable)
             raise
         # a chunk that is not there is read as what fills the array
-        if np.any(np.isnan(found) if self._array.dtype.kind == "f" else found == MISSING_STATUS):
+        if np.any(np.isnan(values) if self._array.dtype.kind == "f" else values == MISSING_STATUS):
             self._check_blocks(self._store.has_chunk)
-        return found
+        return values
 
     def _check_blocks(self, right: Callable[[str, int], bool]) -> None:
         """Raises BadInput for the first block that is not right."""
@@ -194,27 +196,17 @@ class StoredArray:
         return self._array.shape[0]
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> Array:
-        found = np.asarray(self[...])
-        return found if dtype is None else found.astype(dtype)
+        values = np.asarray(self[...])
+        return values if dtype is None else values.astype(dtype)
 
     def __repr__(self) -> str:
         return repr(self._array)
 
 
-def _is_written_by_block(name: str) -> bool:
-    """Whether an array is written block by block."""
-    return name != "blocks" and not name.startswith("designs/")
-
-
-def _is_same_metadata(one: Any, other: Any) -> bool:
-    """Whether two arrays' metadata say the same; as text, since NaN equals nothing."""
-    return repr(one.to_dict()) == repr(other.to_dict())
-
-
-def _shorten_sentences(said: Any) -> list[Any]:
-    """What is said of a block, sentences shortened so that all fit into its record."""
-    longest = (RECORD_BYTES - 512) // (4 * max(1, len(said)))  # a character has four bytes at most
-    return [[code, count, str(sentence)[:longest]] for code, count, sentence in said]
+def _shorten_sentences(endings: Any) -> list[Any]:
+    """How designs of a block ended, sentences shortened so that all fit into its record."""
+    longest = (RECORD_BYTES - 512) // (4 * max(1, len(endings)))  # a character has four bytes at most
+    return [[code, count, str(sentence)[:longest]] for code, count, sentence in endings]
 
 
 def _array_path(row: ResultRow) -> str:
