@@ -24,6 +24,7 @@ from planar.derivatives.kinematic_slopes import (
     NamedResult,
     element_arguments,
     highest_slopes,
+    plain_value,
     take_entries,
     variable_jet,
 )
@@ -197,17 +198,14 @@ class BalanceAtPositions:
         """What an input supplies (N, N m)."""
         return take_entries(self.y, self.of.elements.constraint_count + index)
 
-    def open_balance(self, paths: Sequence[tuple[int, ...]], shapes: Sequence[tuple[int, ...]]) -> list[Array]:
-        """By how much the balance is open (n, coordinates and contacts, ...): of jets the parts that paths lead to, in
-        these shapes."""
+    def open_balance(self, orders: Sequence[int], shapes: Sequence[tuple[int, ...]]) -> list[Array]:
+        """By how much the balance is open (n, coordinates and contacts, ...): values, for an order of 0, or the
+        derivatives of an order, in these shapes."""
         totals: list[Array] = [np.zeros(shape) for shape in shapes]
 
         def add(column: int, value: Scalar) -> None:
-            for total, path in zip(totals, paths, strict=True):
-                part = value
-                for step in path:
-                    part = part.parts[step] if isinstance(part, Jet) else (part if step == 0 else 0.0)
-                total[:, column] += part
+            for total, order in zip(totals, orders, strict=True):
+                total[:, column] += highest_slopes(value, order) if order else plain_value(value)
 
         for group, names in self.of.groups:
             exerted, _ = self._constraint_forces[names[0]]
@@ -371,7 +369,7 @@ class ForceSlopes:
         balance = BalanceAtPositions(self, self.motion, variable_jet(y, unit), list(self.factors.T[..., None]))
         rows = self.elements.coordinate_count + count - self.first_friction
         with np.errstate(all="ignore"):  # what is not defined is not a number
-            opening, slopes = balance.open_balance([(0,), (1,)], [(len(y), rows, 1), (len(y), rows, count)])
+            opening, slopes = balance.open_balance([0, 1], [(len(y), rows, 1), (len(y), rows, count)])
         return opening, slopes
 
     def _solve_with_friction(self, forces: Forces, rows_of_all: slice, contacts: list[_Contact]) -> Array:
@@ -449,7 +447,7 @@ class ForceSlopes:
 
         none: Array = np.zeros((len(self.y), self.unknown_count, *shape))
         with np.errstate(all="ignore"):  # what is not defined is not a number
-            (opening,) = balance_with(none).open_balance([(1,) * order], [(len(self.y), slopes.shape[1], *shape)])
+            (opening,) = balance_with(none).open_balance([order], [(len(self.y), slopes.shape[1], *shape)])
         columns = opening.reshape(*opening.shape[:2], self.kinematics.count**order)
         return balance_with(_close_balance(slopes, inverse, columns).reshape(none.shape))
 

@@ -74,9 +74,7 @@ class ConstraintElements(LinkCoordinates):
         "of every group the entries there (places, rows, local coordinates)"
 
 
-@lru_cache(maxsize=32)
-def _cached_elements(structure: Mechanism) -> ConstraintElements:
-    return ConstraintElements(structure)
+_cached_elements = lru_cache(maxsize=32)(ConstraintElements)
 
 
 def constraint_elements(mechanism: Mechanism) -> ConstraintElements:

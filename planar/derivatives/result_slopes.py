@@ -156,7 +156,10 @@ class SlopeSystem:
                 slopes.setdefault(result.name, []).append(stack_results(result.parts, 1, shape))
         # results side by side, so that rounding at a kink of a load's course is judged beside all of them
         ends = np.cumsum([arrays[0].shape[1] for arrays in slopes.values()])[:-1]
-        joined = self._with_factors(np.concatenate([np.concatenate(arrays) for arrays in slopes.values()], axis=1))
+        joined = np.concatenate([np.concatenate(arrays) for arrays in slopes.values()], axis=1)
+        if self.is_balanced:  # with what the factors of loads change by the parameters
+            parameters, factors = np.split(joined, [len(self.names)], axis=2)
+            joined = parameters + slopes_by_factors(factors, factor_slopes(self.moving, self.names))
         is_singular = np.concatenate(singular_rows)
         joined[is_singular] = np.nan
         return DerivedResults(
@@ -178,14 +181,6 @@ class SlopeSystem:
         is_free = np.array([parameter not in bound for parameter in self.names])
         slopes = {result: np.where(is_free, array, np.nan) for result, array in derived.slopes.items()}
         return derived._replace(slopes=slopes, tied=tuple(number for number in self.names if number in bound))
-
-    def _with_factors(self, slopes: Array) -> Array:
-        """The derivatives by the parameters alone, with what the factors of loads change by them."""
-        if not self.is_balanced:
-            return slopes
-        count = len(self.names)
-        by_inputs = factor_slopes(self.moving, self.names)
-        return slopes[..., :count] + slopes_by_factors(slopes[..., count:], by_inputs)
 
     def second_slopes(self, name: str, result: str) -> Array:
         """The second derivatives of a result (n, parts, parameters, parameters)."""

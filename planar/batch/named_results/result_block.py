@@ -11,7 +11,6 @@ from planar.batch.block import FULL_TURN, DesignBlock, DesignBlockSolver, Solved
 from planar.batch.design_arrays import design_variables, split_into_blocks, values_of_design, with_design_values
 from planar.batch.general_path import link_angles, solve_timed_design
 from planar.batch.initial_assembly import find_assemblies, given_assemblies
-from planar.batch.march.design_batch import DesignBatch
 from planar.batch.march.prediction import LONGEST_STEP
 from planar.batch.march.runs import run_designs
 from planar.batch.named_results.design_forces import find_forces, output_link
@@ -97,8 +96,12 @@ class _ResultBlockSolver:
         asked = block._replace(
             points=(*block.points, *places), rates=self.rates, steps=block.steps * refined, dtype="float64"
         )
-        done, march = self._solve_places(asked)
-        marched = None
+        march = marched = None
+        if self.duration is not None:
+            done = _TimedBlockSolver(asked, self.duration).solve()
+        else:
+            solver = DesignBlockSolver(asked, None)
+            done, march = solver.solve(), solver.march
         if self.slopes is not None and self.marches_slopes:
             marched = None if march is None else self.slopes.march_block(asked, march, done)
             if marched is None:  # machine code cannot do that
@@ -131,13 +134,6 @@ class _ResultBlockSolver:
             general_positions=done.general_positions + looked_up * len(done.out),
             general_designs=done.general_designs + looked_up,
         )
-
-    def _solve_places(self, asked: DesignBlock) -> tuple[SolvedDesigns, DesignBatch | None]:
-        """The points and places that are asked for, and how compiled code marched to them."""
-        if self.duration is not None:
-            return _TimedBlockSolver(asked, self.duration).solve(), None
-        solver = DesignBlockSolver(asked, None)
-        return solver.solve(), solver.march
 
     def _write_marched(self, slopes: Array, is_missing: BoolArray, out: Array) -> None:
         """Write the derivatives into the last rows of out: those that machine code tells, and what it leaves open."""
