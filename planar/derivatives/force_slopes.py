@@ -23,8 +23,7 @@ from planar.derivatives.kinematic_slopes import (
     KinematicSlopes,
     NamedResult,
     element_arguments,
-    highest_slopes,
-    plain_value,
+    slopes_of_order,
     take_entries,
     variable_jet,
 )
@@ -205,7 +204,7 @@ class BalanceAtPositions:
 
         def add(column: int, value: Scalar) -> None:
             for total, order in zip(totals, orders, strict=True):
-                total[:, column] += highest_slopes(value, order) if order else plain_value(value)
+                total[:, column] += slopes_of_order(value, order)
 
         for group, names in self.of.groups:
             exerted, _ = self._constraint_forces[names[0]]
@@ -438,7 +437,7 @@ class ForceSlopes:
         motion = self.kinematics.motion if order == 1 else self.kinematics.second_motion
         slopes, inverse = self._closing_matrices
         shape = [self.kinematics.count] * order
-        lower = [] if order == 1 else [highest_slopes(self.balance(1).y, 1)]
+        lower = [] if order == 1 else [slopes_of_order(self.balance(1).y, 1)]
 
         def balance_with(derivatives: Array) -> BalanceAtPositions:
             """The balance with these derivatives of the highest order (n, unknowns, parameters, ...)."""

@@ -112,15 +112,12 @@ def take_entries(value: Scalar, entries: Any) -> Scalar:
     return value[:, entries]
 
 
-def highest_slopes(value: Scalar, order: int) -> Scalar:
-    """The derivatives of an order, of a number that may have none: 0."""
-    for _ in range(order):
-        value = value.parts[1] if isinstance(value, Jet) else 0.0
-    return value
-
-
-def plain_value(value: Scalar) -> Scalar:
-    """The number itself."""
+def slopes_of_order(value: Scalar, order: int) -> Scalar:
+    """The derivatives of an order, of a number that may have none: 0; of order 0 the number itself."""
+    if order:
+        for _ in range(order):
+            value = value.parts[1] if isinstance(value, Jet) else 0.0
+        return value
     while isinstance(value, Jet):
         value = value.parts[0]
     return value
@@ -129,14 +126,14 @@ def plain_value(value: Scalar) -> Scalar:
 def stack_numbers(numbers: Sequence[Scalar], count: int, order: int) -> Scalar:
     """Numbers as one jet of arrays (1 or n, numbers, ...), of `count` parameters; of order 0 an array (1 or n, numbers,
     1)."""
-    size = max((np.size(plain_value(number)) for number in numbers), default=1)
+    size = max((np.size(slopes_of_order(number, 0)) for number in numbers), default=1)
     arrays: list[Array] = [np.zeros((size, len(numbers), *((count,) * axes))) for axes in range(order + 1)]
     for k, number in enumerate(numbers):
-        arrays[0][:, k] = np.ravel(plain_value(number))
+        arrays[0][:, k] = np.ravel(slopes_of_order(number, 0))
         for axes in range(1, order + 1) if isinstance(number, Jet) else ():
             inner = number if axes == order else number.parts[0]
             shape = size, *((1,) * (order - axes)), *((count,) * axes)
-            arrays[axes][:, k] = np.broadcast_to(highest_slopes(inner, axes), shape).reshape(arrays[axes][:, k].shape)
+            arrays[axes][:, k] = np.broadcast_to(slopes_of_order(inner, axes), shape).reshape(arrays[axes][:, k].shape)
     return variable_jet(*arrays)
 
 
@@ -267,7 +264,7 @@ class KinematicSlopes:
         unit = parameters.unit
         self._row_scale = np.where(self.elements.is_length_row, 1.0 / unit, 1.0)[:, None]
         self._column_scale = np.where(self.elements.is_length, unit, 1.0)[:, None]
-        scaled = self._scaled_jacobian(plain_value(self.first_numbers.p)[..., 0])
+        scaled = self._scaled_jacobian(slopes_of_order(self.first_numbers.p, 0)[..., 0])
         sizes = scaled.column_norms(TINY)
         self._column_scale = self._column_scale / sizes[..., None]
         self._constraints = Equilibrium(scaled.divide_columns(sizes))
@@ -340,7 +337,7 @@ class KinematicSlopes:
                 rests = group.element.rest.evaluate(element_arguments(group, q, p, rate + 1))
                 for row, rest in enumerate(rests):
                     part = rest.parts[rate] if isinstance(rest, Jet) else 0.0
-                    opening[:, group.rows[:, row]] = highest_slopes(part, order)
+                    opening[:, group.rows[:, row]] = slopes_of_order(part, order)
         if order == 1:  # what inputs prescribe
             for k in range(len(self.parameters.inputs)):
                 place = self.directions.places.get(rate * len(self.parameters.inputs) + k)
@@ -360,7 +357,7 @@ class KinematicSlopes:
             if type(pair).contact_gap is not Pair.contact_gap:
                 coordinates = [coordinate.parts[0] for coordinate in self.motion.own_coordinates(pair.name)]
                 gap = pair.contact_gap(self.first_numbers.measured[pair.name], coordinates)
-                opened |= np.abs(highest_slopes(gap, 1) / unit * scale) > OPENING
+                opened |= np.abs(slopes_of_order(gap, 1) / unit * scale) > OPENING
         tied: BoolArray = self.contradicts | opened
         tied[self.is_singular] = False
         return tied
@@ -409,9 +406,8 @@ def kinematic_results(motion: RatedMotion, points: Mapping[str, tuple[str, str]]
 
 def result_array(value: Scalar, order: int, shape: Sequence[int]) -> Array:
     """The value (n,) or the derivatives of an order (n, parameters, ...) of a number."""
-    part = highest_slopes(value, order) if order else plain_value(value)
-    array: Array = np.empty(shape)
-    array[:] = part if order else np.reshape(part, (-1,)) if np.ndim(part) else part
+    part, array = slopes_of_order(value, order), np.empty(shape)
+    array[:] = part if order else np.ravel(part)
     return array
 
 

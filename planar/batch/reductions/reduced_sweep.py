@@ -214,12 +214,12 @@ class ReductionStore(BlockStore):
 
     def write_block(self, number: int, part: slice, done: SolvedDesigns | ReducedBlock) -> None:
         assert isinstance(done, ReducedBlock)
+        first = next(iter(self.blocks.values()), done)
         for name, values in done.reduced.items():
-            for other in [*self.blocks.values()][:1]:
-                shape, expected = values.shape[1:], other.reduced[name].shape[1:]
-                if shape != expected:
-                    told = f"designs {part.start} to {part.stop - 1} have an array {shape} each, others {expected}"
-                    raise BadInput(f"reduce.{name}", told)
+            shape, expected = values.shape[1:], first.reduced[name].shape[1:]
+            if shape != expected:
+                designs = f"designs {part.start} to {part.stop - 1}"
+                raise BadInput(f"reduce.{name}", f"{designs} have an array {shape} each, others {expected}")
         self.blocks[number] = done
         self.block_notes[number] = done.general_positions, done.general_designs, done.endings
 
